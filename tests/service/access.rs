@@ -9,10 +9,10 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
-use crate::guarded::{Guarded, loaded};
+use crate::guarded::Guarded;
 use crate::runs::{columns, template};
 use crate::server::{Answer, Server, Setup, example};
-use crate::support::case;
+use crate::support::{case, loaded};
 
 #[tokio::test]
 async fn without_a_good_key_there_is_no_answer() {
@@ -93,17 +93,17 @@ fn operations_on(kind: &str, id: &str) -> Vec<(Method, String)> {
     found
 }
 
-/// Answers of the south to what is the north's and to what nobody has.
+/// What a key is answered about what it may not see, and about what nobody has.
 async fn assert_foreign_is_unknown(
     guarded: &Guarded,
+    key: &str,
     foreign: Vec<(Method, String)>,
     unknown: Vec<(Method, String)>,
 ) {
-    let south = &guarded.south;
     for ((method, foreign), (_, unknown)) in foreign.into_iter().zip(unknown) {
         let what = format!("{method} {foreign}");
-        let foreign = guarded.send(south, method.clone(), &foreign, None).await;
-        let unknown = guarded.send(south, method, &unknown, None).await;
+        let foreign = guarded.send(key, method.clone(), &foreign, None).await;
+        let unknown = guarded.send(key, method, &unknown, None).await;
         assert_eq!(foreign.status, 404, "{what}: {}", foreign.text);
         let told = |answer: &Answer| {
             let mut problem = answer.json.clone();
@@ -114,108 +114,66 @@ async fn assert_foreign_is_unknown(
     }
 }
 
+/// Another tenant's key opens nothing, nor does a key of the same tenant that is bound to a label which the work has not.
 #[tokio::test]
-async fn runs_and_profiles_of_another_tenant_are_answered_like_what_does_not_exist() {
+async fn what_belongs_to_others_is_answered_like_what_does_not_exist() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;
     let (north, south) = (&guarded.north, &guarded.south);
-    let post = async |key: &str, path: &str, body: &Value| {
-        guarded.send(key, Method::POST, path, Some(body)).await
-    };
     let rows = json!({ "template": template("table"), "columns": columns(3) });
-    let run = post(north, "/v1/runs", &rows).await;
-    let run = run.header("location").expect("a run").to_owned();
-    let id = run.rsplit('/').next().unwrap();
-    assert_foreign_is_unknown(
-        &guarded,
-        operations_on("runs", id),
-        operations_on("runs", NOBODY),
-    )
-    .await;
-    assert_eq!(guarded.get(north, &run).await.status, 200);
-    let seen = guarded.get(south, "/v1/runs").await;
-    assert_eq!(seen.json["runs"], json!([]));
-
-    let evolution = post(north, "/v1/evolutions", &crate::evolutions::request(1)).await;
-    let evolution = evolution
-        .header("location")
-        .expect("an evolution")
-        .to_owned();
-    let id = evolution.rsplit('/').next().unwrap();
-    assert_foreign_is_unknown(
-        &guarded,
-        operations_on("evolutions", id),
-        operations_on("evolutions", NOBODY),
-    )
-    .await;
-    assert_eq!(guarded.get(north, &evolution).await.status, 200);
-    let seen = guarded.get(south, "/v1/evolutions").await;
-    assert_eq!(seen.json["evolutions"], json!([]));
+    for (kind, body) in [
+        ("jobs", case("north's")),
+        ("batches", json!([case("n1"), loaded(50_000)])),
+        ("runs", rows),
+        ("evolutions", crate::evolutions::request(1)),
+    ] {
+        let list = format!("/v1/{kind}");
+        let made = guarded.post(north, &list, &body).await;
+        let path = made.is(202).location();
+        let id = path.rsplit('/').next().unwrap();
+        if kind != "evolutions" {
+            guarded.until_ended(north, &path).await;
+        }
+        for key in [south, &guarded.line_7] {
+            let (foreign, unknown) = (operations_on(kind, id), operations_on(kind, NOBODY));
+            assert_foreign_is_unknown(&guarded, key, foreign, unknown).await;
+            let seen = guarded.get(key, &list).await;
+            assert_eq!(seen.json[kind], json!([]), "{kind}");
+        }
+        // Nothing of what was tried has touched it.
+        assert_eq!(guarded.get(north, &path).await.status, 200);
+        if kind == "batches" {
+            for query in ["state=succeeded", "label=line:A12", &format!("batch={id}")] {
+                let list = format!("/v1/jobs?{query}");
+                let seen = async |key: &str| {
+                    let page = guarded.get(key, &list).await.is(200).json;
+                    page["jobs"].as_array().unwrap().len()
+                };
+                assert!(seen(north).await >= 2, "{list}");
+                assert_eq!(seen(south).await, 0, "{list}");
+            }
+        }
+    }
+    let page = guarded.get(north, "/v1/jobs?limit=1").await.json;
+    let cursor = page["next_cursor"].as_str().unwrap();
+    let path = format!("/v1/jobs?limit=1&cursor={cursor}");
+    assert_eq!(guarded.get(south, &path).await.json["jobs"], json!([]));
 
     let mut wheel_on_rail = example("wheel-rail.case.json");
     let rail = wheel_on_rail["contact"]["rail"].clone();
-    let kept = post(north, "/v1/profiles", &rail).await.json;
+    let kept = guarded.post(north, "/v1/profiles", &rail);
+    let kept = kept.await.json;
     let on = |digest: &str| {
         let path = format!("/v1/profiles/{digest}");
         vec![(Method::GET, path.clone()), (Method::DELETE, path)]
     };
     let digest = kept["digest"].as_str().expect("a digest");
-    assert_foreign_is_unknown(&guarded, on(digest), on(&"0".repeat(64))).await;
+    assert_foreign_is_unknown(&guarded, south, on(digest), on(&"0".repeat(64))).await;
     assert_eq!(guarded.get(north, &on(digest)[0].1).await.status, 200);
     let seen = guarded.get(south, "/v1/profiles").await;
     assert_eq!(seen.json["profiles"], json!([]));
     wheel_on_rail["contact"]["rail"] = json!({ "profile": digest });
-    let named = post(south, "/v1/jobs", &wheel_on_rail).await;
-    assert_problem(&named, 422, "faulty-case", "fault");
-}
-
-#[tokio::test]
-async fn what_belongs_to_another_tenant_is_answered_like_what_does_not_exist() {
-    let guarded = Guarded::start(Setup::new(), |_| {}).await;
-    let (north, south) = (&guarded.north, &guarded.south);
-    let job = guarded.submit(north, &case("north's")).await;
-    let batch = guarded.batch(north, &[case("n1"), loaded(50_000)]).await;
-    assert_eq!(guarded.until_ended(north, &job).await["state"], "succeeded");
-    let results = guarded
-        .get(north, &format!("{batch}/results?wait=60"))
-        .await;
-    assert_eq!(results.text.lines().count(), 2);
-
-    for (kind, path) in [("jobs", &job), ("batches", &batch)] {
-        let id = path.rsplit('/').next().unwrap();
-        assert_foreign_is_unknown(
-            &guarded,
-            operations_on(kind, id),
-            operations_on(kind, NOBODY),
-        )
-        .await;
-    }
-    // Nothing of what was tried has touched them.
-    assert_eq!(
-        guarded.get(north, &format!("{job}/result")).await.status,
-        200
-    );
-    let batch_id = batch.rsplit('/').next().unwrap();
-    for list in [
-        "/v1/jobs".to_owned(),
-        "/v1/jobs?state=succeeded".to_owned(),
-        "/v1/jobs?label=line:A12".to_owned(),
-        "/v1/jobs?label=line:A12&state=succeeded".to_owned(),
-        format!("/v1/jobs?batch={batch_id}"),
-    ] {
-        let seen = async |key: &str| {
-            let page = guarded.get(key, &list).await;
-            assert_eq!(page.status, 200, "{list}: {}", page.text);
-            page.json["jobs"].as_array().unwrap().len()
-        };
-        assert!(seen(north).await >= 2, "{list}");
-        assert_eq!(seen(south).await, 0, "{list}");
-    }
-    let page = guarded.get(north, "/v1/jobs?limit=1").await.json;
-    let cursor = page["next_cursor"].as_str().unwrap();
-    let page = guarded
-        .get(south, &format!("/v1/jobs?limit=1&cursor={cursor}"))
-        .await;
-    assert_eq!(page.json["jobs"], json!([]));
+    let named = guarded.post(south, "/v1/jobs", &wheel_on_rail);
+    assert_problem(&named.await, 422, "faulty-case", "fault");
 }
 
 #[tokio::test]
@@ -246,7 +204,7 @@ async fn tenants_share_neither_results_nor_idempotency_keys() {
                 request.json(&case("keyed"))
             };
             let answer = guarded.server.send(Method::POST, "/v1/jobs", keyed).await;
-            jobs.insert(answer.header("location").unwrap().to_owned());
+            jobs.insert(answer.location());
         }
     }
     assert_eq!(jobs.len(), 2);
@@ -327,11 +285,9 @@ async fn ids_of_another_tenant_open_nothing_by_other_ways_either() {
     }
     let batches = format!("/v1/batches?template={job}");
     let table = async |key: &str| {
-        let shape = |request: reqwest::RequestBuilder| {
-            let request = request.bearer_auth(key).header("content-type", "text/csv");
-            request.body("name\nx\n")
-        };
-        guarded.server.send(Method::POST, &batches, shape).await
+        guarded
+            .post_as(key, &batches, "text/csv", "name\nx\n")
+            .await
     };
     assert_problem(&table(south).await, 404, "job-not-found", "");
     assert_eq!(table(north).await.status, 202);

@@ -7,14 +7,14 @@ use serde_json::{Value, json};
 
 use crate::batches::{lines, results, send, small};
 use crate::errors::assert_problem;
-use crate::results::path_of;
+use crate::evolutions::request as evolution;
+use crate::runs::{columns, template};
 use crate::server::{Server, Setup};
-use crate::support::{case, pause};
+use crate::support::{Turned, case, pause};
 
 /// A service without workers that queues so many jobs.
 async fn bounded(queue_max: u64, tenant_queue_max: u64) -> Server {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.options.queue_max = queue_max;
     setup.options.tenant_queue_max = tenant_queue_max;
     setup.start().await
@@ -30,7 +30,7 @@ async fn queued(server: &Server) -> usize {
     let mut count = 0;
     let mut path = "/v1/jobs?state=queued&limit=1000".to_owned();
     loop {
-        let page = server.get(&path).await.json;
+        let page = server.read(&path).await;
         count += page["jobs"].as_array().expect("jobs").len();
         let Some(cursor) = page["next_cursor"].as_str() else {
             return count;
@@ -65,8 +65,7 @@ async fn batches_at_the_same_time_do_not_pass_the_bound_of_the_queue() {
             pause().await;
         }
         for _ in accepted..fit {
-            let retried = until_accepted(&server, &body).await;
-            assert_eq!(retried.status, 202, "{}", retried.text);
+            until_accepted(&server, &body).await.is(202);
         }
         let room = queue_max.min(of_tenant) as usize - fit * size;
         let rest = send(&server, "", "application/x-ndjson", lines(&many(room))).await;
@@ -112,16 +111,13 @@ async fn a_batch_that_is_broken_off_gives_its_places_back() {
     let mut body = Value::from(many(2_000)).to_string();
     body.pop();
     body.push_str(", nonsense]");
-    let broken = send(&server, "", "application/json", body).await;
-    assert_eq!(broken.status, 400, "{}", broken.text);
-    let accepted = until_accepted(&server, &lines(&many(3_000))).await;
-    assert_eq!(accepted.status, 202, "{}", accepted.text);
+    send(&server, "", "application/json", body).await.is(400);
+    until_accepted(&server, &lines(&many(3_000))).await.is(202);
 }
 
 #[tokio::test]
 async fn rows_of_a_table_are_kept_without_their_template() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let setup = Setup::idle();
     let data_dir = setup.options.data_dir.clone();
     let server = setup.start().await;
     let y: Vec<f64> = (0..1000)
@@ -131,10 +127,7 @@ async fn rows_of_a_table_are_kept_without_their_template() {
     let mut template = small("template");
     template["contact"] =
         json!({ "type": "gap_profile", "rolling_mm": 460, "y_mm": y, "gap_mm": gap });
-    let accepted = server.post("/v1/jobs", &template).await;
-    assert_eq!(accepted.status, 202, "{}", accepted.text);
-    let path = path_of(&accepted.json);
-    let id = path.rsplit('/').next().expect("an id");
+    let id = server.keep(&template).await;
     let rows: String = (0..400)
         .map(|row| format!("{},r{row}\n", 50_000 + row))
         .collect();
@@ -143,7 +136,7 @@ async fn rows_of_a_table_are_kept_without_their_template() {
     assert_eq!(batch.status, 202, "{}", batch.text);
     let lines = results(&server, &batch.json, "").await;
     let job = format!("/v1/jobs/{}", lines[7]["id"].as_str().expect("an id"));
-    let filled = server.get(&format!("{job}/case")).await.json;
+    let filled = server.read(&format!("{job}/case")).await;
     assert_eq!(filled["load"]["normal_force_n"], 50_007);
     assert_eq!(
         (&filled["name"], &filled["contact"]),
@@ -161,16 +154,14 @@ async fn rows_of_a_table_are_kept_without_their_template() {
 
 #[tokio::test]
 async fn staged_bytes_are_bounded_as_expanded() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.options.staging = StagingBounds {
         all: 1 << 20,
         tenant: 100_000,
     };
     let server = setup.start().await;
     let template = small("template");
-    let id = path_of(&server.post("/v1/jobs", &template).await.json);
-    let id = id.rsplit('/').next().expect("an id");
+    let id = server.keep(&template).await;
     let rows = 100_000 / template.to_string().len() + 1;
     let rows: String = (0..rows).map(|row| format!("{}\n", 50_000 + row)).collect();
     let table = format!("normal_force_n\n{rows}");
@@ -187,33 +178,34 @@ async fn staged_bytes_are_bounded_as_expanded() {
 }
 
 #[tokio::test]
-async fn a_replay_is_marked_and_options_belong_to_the_key() {
+async fn a_key_stands_for_one_piece_of_work_with_its_options() {
     let server = Server::idle().await;
-    for (path, body) in [
-        ("/v1/jobs", small("one")),
-        ("/v1/batches", json!([small("one"), small("two")])),
+    let rows = |count| json!({ "template": template("table"), "columns": columns(count) });
+    for (path, body, other) in [
+        ("/v1/jobs", small("one"), small("two")),
+        ("/v1/batches", json!([small("one")]), json!([small("two")])),
+        ("/v1/runs", rows(3), rows(4)),
+        ("/v1/evolutions", evolution(1), evolution(2)),
     ] {
-        let ask = async |query: &str, key: &str| {
-            let shape =
-                |request: RequestBuilder| request.header("idempotency-key", key).json(&body);
-            server
-                .send(Method::POST, &format!("{path}{query}"), shape)
-                .await
+        let ask = async |query: &str, key: &str, body: &Value| {
+            let path = format!("{path}{query}");
+            server.post_with(&path, "idempotency-key", key, body).await
         };
-        let first = ask("?priority=low", "k").await;
-        assert_eq!(
-            (first.status, first.header("idempotency-replayed")),
-            (202, None)
-        );
-        let again = ask("?priority=low", "k").await;
-        assert_eq!(
-            (again.status, again.header("idempotency-replayed")),
-            (202, Some("true"))
-        );
-        assert_eq!(again.json["id"], first.json["id"]);
-        for other in ["", "?priority=high", "?priority=low&deadline_s=60"] {
-            assert_problem(&ask(other, "k").await, 422, "idempotency-conflict", "");
+        let first = ask("?priority=low", path, &body).await.is(202);
+        assert_eq!(first.header("idempotency-replayed"), None);
+        let again = ask("?priority=low", path, &body).await.is(202);
+        assert_eq!(again.header("idempotency-replayed"), Some("true"));
+        assert_eq!(again.json, first.json);
+        let another = ask("?priority=low", &format!("{path}/2"), &body)
+            .await
+            .is(202);
+        assert_ne!(another.json["id"], first.json["id"]);
+        for options in ["", "?priority=high", "?priority=low&deadline_s=60"] {
+            let refused = ask(options, path, &body).await;
+            assert_problem(&refused, 422, "idempotency-conflict", "");
         }
+        let refused = ask("?priority=low", path, &other).await;
+        assert_problem(&refused, 422, "idempotency-conflict", "different");
     }
 }
 
@@ -221,12 +213,8 @@ async fn a_replay_is_marked_and_options_belong_to_the_key() {
 async fn the_key_of_an_expired_job_makes_a_new_one() {
     let mut setup = Setup::new();
     setup.options.retention = Some(std::time::Duration::from_secs(30 * 24 * 3600));
-    let ahead = std::sync::Arc::new(std::sync::atomic::AtomicI64::new(0));
-    let system = railhead::jobs::clock::Clock::system();
-    setup.options.clock = railhead::jobs::clock::Clock::new({
-        let ahead = ahead.clone();
-        move || system.now_ms() + ahead.load(std::sync::atomic::Ordering::SeqCst)
-    });
+    let turned = Turned::default();
+    setup.options.clock = turned.clock();
     setup.options.cache = false;
     let server = setup.start().await;
     let shape = |request: RequestBuilder| {
@@ -242,7 +230,7 @@ async fn the_key_of_an_expired_job_makes_a_new_one() {
         "{}",
         first.text
     );
-    ahead.store(31 * 24 * 3600 * 1000, std::sync::atomic::Ordering::SeqCst);
+    turned.turn(31);
     let second = server.send(Method::POST, "/v1/jobs", shape).await;
     assert_eq!(
         (second.status, second.header("idempotency-replayed")),

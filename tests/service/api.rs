@@ -1,14 +1,11 @@
 //! What clients do: submit, wait, list, look, cancel, delete.
 
-use std::sync::Mutex;
-use std::sync::mpsc::channel;
-
-use railhead::contact::error::SolveError;
 use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::results::{number, path_of};
 use crate::server::{Server, Setup, example};
+use crate::support::tick_forever;
 
 #[tokio::test]
 async fn every_example_is_solved_while_the_client_waits() {
@@ -19,7 +16,7 @@ async fn every_example_is_solved_while_the_client_waits() {
         assert_eq!(job["progress"], 1.0, "{file}");
         let path = path_of(&job);
         assert_eq!(
-            server.get(&format!("{path}/result")).await.json,
+            server.read(&format!("{path}/result")).await,
             job["result"],
             "{file}: waiting and fetching agree"
         );
@@ -73,7 +70,7 @@ async fn wait_that_is_too_short_answers_the_job_as_it_is() {
             answer.json["links"]["self"].as_str()
         );
         assert_eq!(answer.header("retry-after"), Some("1"));
-        let mut looked = server.get(&path_of(&answer.json)).await.json;
+        let mut looked = server.read(&path_of(&answer.json)).await;
         let queue = looked.as_object_mut().expect("a job").remove("queue");
         let queue = queue.expect("a place in the queue");
         assert_eq!(queue["position"], place);
@@ -91,27 +88,13 @@ async fn case_comes_back_as_submitted() {
     let server = Server::idle().await;
     let case = example("hertz-steel.case.json");
     let path = server.submit(&case).await;
-    assert_eq!(server.get(&format!("{path}/case")).await.json, case);
-    let job = server.get(&path).await.json;
+    assert_eq!(server.read(&format!("{path}/case")).await, case);
+    let job = server.read(&path).await;
     assert_eq!(
         (&job["name"], &job["labels"]),
         (&case["name"], &case["labels"])
     );
     assert_eq!(job["batch_id"], Value::Null);
-}
-
-#[tokio::test]
-async fn same_key_and_case_give_the_same_job() {
-    let server = Server::idle().await;
-    let send = |key: &'static str| {
-        let case = example("spin.case.json");
-        server.send(Method::POST, "/v1/jobs", move |request| {
-            request.header("idempotency-key", key).json(&case)
-        })
-    };
-    let first = send("one").await.json;
-    assert_eq!(send("one").await.json, first);
-    assert_ne!(send("two").await.json["id"], first["id"]);
 }
 
 #[tokio::test]
@@ -128,7 +111,7 @@ async fn list_pages_through_all_jobs_newest_first() {
     let mut listed = Vec::new();
     let mut next = "/v1/jobs?limit=2".to_owned();
     loop {
-        let page = server.get(&next).await.json;
+        let page = server.read(&next).await;
         listed.extend(page["jobs"].as_array().expect("jobs").iter().map(path_of));
         let Some(cursor) = page["next_cursor"].as_str() else {
             break;
@@ -143,16 +126,10 @@ async fn list_pages_through_all_jobs_newest_first() {
     }
     assert_eq!(listed, submitted);
     let count = async |query: &str| {
-        let page = server.get(&format!("/v1/jobs?{query}")).await.json;
+        let page = server.read(&format!("/v1/jobs?{query}")).await;
         page["jobs"].as_array().expect("jobs").len()
     };
-    server
-        .send(
-            Method::POST,
-            &format!("{}/cancel", submitted[0]),
-            |request| request,
-        )
-        .await;
+    server.cancel(&submitted[0]).await;
     assert_eq!(count("state=cancelled").await, 1);
     assert_eq!(count("state=queued").await, 4);
     assert_eq!(count("label=line:odd").await, 2);
@@ -162,7 +139,7 @@ async fn list_pages_through_all_jobs_newest_first() {
         5,
         "only the first colon divides"
     );
-    let created = server.get(&submitted[4]).await.json["created_at"]
+    let created = server.read(&submitted[4]).await["created_at"]
         .as_str()
         .expect("a time")
         .to_owned();
@@ -177,43 +154,21 @@ async fn list_pages_through_all_jobs_newest_first() {
 
 #[tokio::test]
 async fn running_job_is_cancelled_on_request() {
-    let (started, waiting) = channel();
-    let started = Mutex::new(started);
-    let setup = Setup::new().solving(move |_, monitor| {
-        let _ = started.lock().expect("a lock").send(());
-        loop {
-            if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.5) {
-                return Err(SolveError::from(stop));
-            }
-            std::thread::yield_now();
-        }
-    });
+    let setup = Setup::new().solving(|_, monitor| Err(tick_forever(monitor)));
     let server = setup.start().await;
     let path = server.submit(&example("spin.case.json")).await;
-    let waiting = tokio::task::spawn_blocking(move || waiting.recv());
-    waiting
-        .await
-        .expect("a thread")
-        .expect("the solve has begun");
+    server.until(&path, "running").await;
     let early = server.get(&format!("{path}/result")).await;
     assert_eq!(
         (early.status, early.header("retry-after")),
         (409, Some("1"))
     );
-    let answer = server
-        .send(Method::POST, &format!("{path}/cancel"), |request| request)
-        .await;
+    let answer = server.cancel(&path).await;
     assert!([200, 202].contains(&answer.status), "{}", answer.text);
-    let id = path.trim_start_matches("/v1/jobs/").parse().expect("an id");
-    server
-        .jobs
-        .wait(id, std::time::Duration::from_secs(60))
-        .await
-        .expect("the job");
-    assert_eq!(server.get(&path).await.json["state"], "cancelled");
-    let again = server
-        .send(Method::POST, &format!("{path}/cancel"), |request| request)
-        .await;
+    let ended = server.get_with(&path, "prefer", "wait=60").await;
+    assert_eq!(ended.json["state"], "cancelled");
+    assert!(ended.json["error"].is_null(), "{}", ended.text);
+    let again = server.cancel(&path).await;
     assert_eq!(
         (again.status, &again.json["state"]),
         (200, &json!("cancelled")),
@@ -253,5 +208,5 @@ async fn checking_a_case_tells_its_cost_and_makes_no_job() {
     assert_eq!(sweep["motions"], 11);
     assert_ne!(sweep["digest"], spin["digest"]);
     assert_eq!(check("spin.case.json").await["digest"], spin["digest"]);
-    assert_eq!(server.get("/v1/jobs").await.json["jobs"], json!([]));
+    assert_eq!(server.read("/v1/jobs").await["jobs"], json!([]));
 }

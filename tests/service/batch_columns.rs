@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
 use crate::results::number;
-use crate::server::{Answer, Server, example};
+use crate::server::{Answer, Server, example, link};
 
 fn case(file: &str, name: &str, km: &str) -> Value {
     let mut case = example(&format!("{file}.case.json"));
@@ -33,15 +33,8 @@ fn table(answer: &Answer) -> (Vec<String>, Vec<Vec<String>>) {
 /// The path of the results of these cases, all ended, and their lines as NDJSON.
 async fn solved(server: &Server, cases: &[Value]) -> (String, Vec<Value>) {
     let batch = server.post("/v1/batches", &json!(cases)).await.json;
-    let path = batch["links"]["results"]
-        .as_str()
-        .expect("a link")
-        .to_owned();
-    let lines = server.get(&format!("{path}?wait=60")).await.text;
-    let lines = lines
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("JSON"));
-    let lines: Vec<Value> = lines.collect();
+    let path = link(&batch, "results").to_owned();
+    let lines = server.get(&format!("{path}?wait=60")).await.lines();
     assert_eq!(lines.len(), cases.len());
     (path, lines)
 }
@@ -123,12 +116,8 @@ async fn without_columns_there_are_the_usual_ones_and_unknown_ones_are_refused()
         ("state=done", "state"),
         ("after=1", "after"),
     ] {
-        assert_problem(
-            &server.get(&format!("{path}?{query}")).await,
-            400,
-            "bad-query",
-            word,
-        );
+        let answer = server.get(&format!("{path}?{query}")).await;
+        assert_problem(&answer, 400, "bad-query", word);
     }
 }
 
@@ -185,11 +174,9 @@ async fn lines_are_chosen_by_state_and_go_on_after_the_last_one_read() {
     }
     let (path, lines) = solved(&server, &cases).await;
     let indices = async |query: &str| {
-        let text = server.get(&format!("{path}?{query}")).await.text;
-        let lines = text
-            .lines()
-            .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+        let lines = server.get(&format!("{path}?{query}")).await.lines();
         lines
+            .iter()
             .map(|line| line["index"].as_u64().expect("an index"))
             .collect::<Vec<_>>()
     };

@@ -6,7 +6,7 @@ use railhead::http::{HttpOptions, Peer, router};
 use serde_json::{Value, json};
 use tower::ServiceExt;
 
-use crate::server::{Server, Setup};
+use crate::server::{Server, Setup, link};
 use crate::support::long_case;
 
 /// What one reader is counted with for small results, in bytes.
@@ -20,14 +20,9 @@ async fn solved(server: &Server, motions: u32) -> (String, String) {
     large["solver"]["mesh"] = json!({ "strips": 2, "cells": 2 });
     let cases = json!([long_case("before", 2), large, long_case("behind", 3)]);
     let batch = server.post("/v1/batches", &cases).await.json;
-    let path = batch["links"]["results"]
-        .as_str()
-        .expect("a link")
-        .to_owned();
-    let lines = server.get(&format!("{path}?wait=60")).await.text;
-    let line = lines.lines().nth(1).expect("a second line");
-    let line: Value = serde_json::from_str(line).expect("JSON");
-    let job = line["id"].as_str().expect("an id");
+    let path = link(&batch, "results").to_owned();
+    let lines = server.get(&format!("{path}?wait=60")).await.lines();
+    let job = lines[1]["id"].as_str().expect("an id");
     (path, format!("/v1/jobs/{job}/result"))
 }
 

@@ -11,7 +11,7 @@ const NDJSON: &str = "application/x-ndjson";
 /// Priority, and whether there is a deadline, of the jobs of a batch in the order of their cases.
 async fn options(server: &Server, batch: &Value) -> Vec<(String, bool)> {
     let id = batch["id"].as_str().expect("an id");
-    let page = server.get(&format!("/v1/jobs?batch={id}")).await.json;
+    let page = server.read(&format!("/v1/jobs?batch={id}")).await;
     let jobs = page["jobs"].as_array().expect("jobs").iter().rev();
     jobs.map(|job| {
         let priority = job["priority"].as_str().expect("a priority");
@@ -31,12 +31,10 @@ async fn a_case_of_a_batch_may_have_options_of_its_own_in_every_form_of_a_batch(
         (NDJSON, lines(&cases)),
         ("application/json", json!(cases).to_string()),
     ] {
-        let batch = send(&server, "?priority=low", content, body).await;
-        assert_eq!(batch.status, 202, "{}", batch.text);
+        let batch = send(&server, "?priority=low", content, body).await.is(202);
         assert_eq!(options(&server, &batch.json).await, expected);
     }
-    let template = server.post("/v1/jobs", &small("template")).await.json;
-    let template = template["id"].as_str().expect("an id");
+    let template = server.keep(&small("template")).await;
     let query = format!("?priority=low&template={template}");
     let table = "name,priority,deadline_s\na,,\nb,high,600\nc,,\n".to_owned();
     let batch = send(&server, &query, "text/csv", table).await;
@@ -44,9 +42,9 @@ async fn a_case_of_a_batch_may_have_options_of_its_own_in_every_form_of_a_batch(
 
     // What is kept is the case alone.
     let id = batch.json["id"].as_str().expect("an id");
-    let page = server.get(&format!("/v1/jobs?batch={id}")).await.json;
+    let page = server.read(&format!("/v1/jobs?batch={id}")).await;
     let job = page["jobs"][1]["id"].as_str().expect("an id");
-    let case = server.get(&format!("/v1/jobs/{job}/case")).await.json;
+    let case = server.read(&format!("/v1/jobs/{job}/case")).await;
     assert_eq!(case["name"], "b");
     assert!(case.get("priority").is_none() && case.get("case").is_none());
 }

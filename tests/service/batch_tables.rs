@@ -4,12 +4,10 @@ use serde_json::json;
 
 use crate::batches::{results, send, small};
 use crate::errors::assert_problem;
-use crate::server::Server;
+use crate::server::{Server, link};
 
 async fn template(server: &Server) -> String {
-    let path = server.submit(&small("template")).await;
-    let id = path.rsplit('/').next().expect("an id");
-    format!("?template={id}")
+    format!("?template={}", server.keep(&small("template")).await)
 }
 
 #[tokio::test]
@@ -119,7 +117,7 @@ async fn names_that_look_like_formulas_are_texts_in_a_table() {
     let names = ["=1+1", "+1+1", "-1", "@SUM(1)", "plain=1"];
     let cases: Vec<_> = names.iter().map(|name| small(name)).collect();
     let batch = server.post("/v1/batches", &json!(cases)).await.json;
-    let path = batch["links"]["results"].as_str().expect("a link");
+    let path = link(&batch, "results");
     let table = server.get(&format!("{path}?wait=60&format=csv")).await.text;
     let found: Vec<&str> = table
         .lines()
@@ -141,11 +139,7 @@ async fn names_and_labels_have_no_control_characters() {
     ] {
         let mut case = small("plain");
         *case.pointer_mut(pointer).expect("a member") = value;
-        assert_problem(
-            &server.post("/v1/jobs", &case).await,
-            422,
-            "faulty-case",
-            "1 fault",
-        );
+        let answer = server.post("/v1/jobs", &case).await;
+        assert_problem(&answer, 422, "faulty-case", "1 fault");
     }
 }

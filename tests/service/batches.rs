@@ -10,7 +10,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
-use crate::server::{Answer, Server, Setup};
+use crate::server::{Answer, Server, Setup, link};
 use crate::store::{new_batch, open_beside};
 use crate::support::{Service, case, endless_case, open, pause, tick_forever};
 
@@ -30,22 +30,17 @@ pub fn small(name: &str) -> Value {
 /// Sends the body of a batch.
 pub async fn send(server: &Server, query: &str, content: &str, body: String) -> Answer {
     server
-        .send(Method::POST, &format!("/v1/batches{query}"), |request| {
-            request.header("content-type", content).body(body)
-        })
+        .post_as(&format!("/v1/batches{query}"), content, body)
         .await
 }
 
 /// The lines of the results of a batch.
 pub async fn results(server: &Server, batch: &Value, query: &str) -> Vec<Value> {
-    let path = batch["links"]["results"].as_str().expect("a link");
+    let path = link(batch, "results");
     let answer = server.get(&format!("{path}{query}")).await;
     assert_eq!(answer.status, 200);
     assert_eq!(answer.header("content-type"), Some("application/x-ndjson"));
-    let lines = answer.text.lines();
-    lines
-        .map(|line| serde_json::from_str(line).expect("a line of JSON"))
-        .collect()
+    answer.lines()
 }
 
 #[tokio::test]
@@ -72,8 +67,8 @@ async fn results_come_in_input_order_with_one_line_per_case() {
             assert_eq!(line["name"], format!("case {index}"));
             assert_eq!(line["state"], "succeeded", "{line}");
         }
-        let path = batch.json["links"]["self"].as_str().expect("a link");
-        let now = server.get(path).await.json;
+        let path = link(&batch.json, "self");
+        let now = server.read(path).await;
         assert_eq!(now["states"]["succeeded"], 150);
         assert_eq!(
             (&now["progress"], &now["ended"]),
@@ -81,9 +76,9 @@ async fn results_come_in_input_order_with_one_line_per_case() {
         );
         // A line says what the job itself says.
         let id = lines[77]["id"].as_str().expect("an id");
-        let alone = server.get(&format!("/v1/jobs/{id}/result")).await.json;
+        let alone = server.read(&format!("/v1/jobs/{id}/result")).await;
         assert_eq!(lines[77]["result"], alone);
-        let job = server.get(&format!("/v1/jobs/{id}")).await.json;
+        let job = server.read(&format!("/v1/jobs/{id}")).await;
         assert_eq!(job["batch_id"], batch.json["id"]);
         assert_eq!(job["attempt"], 1);
     }
@@ -104,7 +99,7 @@ async fn one_faulty_case_refuses_the_batch_and_names_its_line() {
         (&json!(3), &json!(4))
     );
     assert_eq!(errors[1]["pointer"], "/2");
-    let jobs = server.get("/v1/jobs").await.json;
+    let jobs = server.read("/v1/jobs").await;
     assert_eq!(jobs["jobs"], json!([]), "nothing was stored");
 
     let answer = send(&server, "?on_invalid=skip", "application/x-ndjson", body).await;
@@ -146,27 +141,20 @@ async fn bodies_that_are_no_batch_are_refused() {
     )
     .await;
     assert_problem(&answer, 400, "bad-query", "on_invalid");
-    for path in ["", "/results"] {
-        let unknown = "/v1/batches/0196f0a0-0000-7000-8000-000000000000";
-        let answer = server.get(&format!("{unknown}{path}")).await;
-        assert_problem(&answer, 404, "batch-not-found", "");
-    }
 }
 
 #[tokio::test]
 async fn a_batch_is_bounded_by_case_by_bytes_and_by_count() {
-    let mut setup = Setup::new();
+    let mut setup = Setup::idle();
     setup.http.body_max_bytes = 1000;
     setup.http.batch_max_bytes = 4000;
     setup.http.batch_max_cases = 3;
     setup.options.queue_max = 4;
-    setup.working = false;
     let server = setup.start().await;
     let three = lines(&vec![small("x"); 3]);
     assert!(three.len() < 2000);
     let ndjson = "application/x-ndjson";
-    let answer = send(&server, "", ndjson, three.clone()).await;
-    assert_eq!(answer.status, 202, "{}", answer.text);
+    let _answer = send(&server, "", ndjson, three.clone()).await.is(202);
     for (body, word) in [
         (lines(&vec![small("x"); 4]), "3 cases"),
         (small(&"n".repeat(900)).to_string(), "line 1 is larger"),
@@ -177,30 +165,8 @@ async fn a_batch_is_bounded_by_case_by_bytes_and_by_count() {
     }
     let answer = send(&server, "", ndjson, three).await;
     assert_problem(&answer, 503, "queue-full", "nothing was stored");
-    let jobs = server.get("/v1/jobs").await.json;
+    let jobs = server.read("/v1/jobs").await;
     assert_eq!(jobs["jobs"].as_array().map(Vec::len), Some(3));
-}
-
-#[tokio::test]
-async fn the_same_key_gives_the_same_batch() {
-    let server = Server::idle().await;
-    let keyed = async |name: &str| {
-        let body = Value::from(vec![small(name), small("b")]).to_string();
-        server
-            .send(Method::POST, "/v1/batches", |request| {
-                request
-                    .header("content-type", "application/json")
-                    .header("idempotency-key", "k1")
-                    .body(body)
-            })
-            .await
-    };
-    let (first, again, other) = (keyed("a").await, keyed("a").await, keyed("c").await);
-    assert_eq!((first.status, again.status), (202, 202));
-    assert_eq!(first.json, again.json);
-    assert_problem(&other, 422, "idempotency-conflict", "");
-    let jobs = server.get("/v1/jobs").await.json;
-    assert_eq!(jobs["jobs"].as_array().map(Vec::len), Some(2));
 }
 
 #[tokio::test]
@@ -214,7 +180,7 @@ async fn cancelling_a_batch_ends_its_queued_jobs_and_no_other() {
         .json;
     let body = lines(&vec![small("x"); 5]);
     let batch = send(&server, "", "application/x-ndjson", body).await.json;
-    let path = batch["links"]["cancel"].as_str().expect("a link");
+    let path = link(&batch, "cancel");
     let answer = server.send(Method::POST, path, |request| request).await;
     assert_eq!(
         (answer.status, &answer.json["states"]["cancelled"]),
@@ -222,15 +188,9 @@ async fn cancelling_a_batch_ends_its_queued_jobs_and_no_other() {
     );
     let lines = results(&server, &batch, "?wait=10").await;
     assert!(lines.iter().all(|line| line["state"] == "cancelled"));
-    let other = server
-        .get(alone["links"]["self"].as_str().expect("a link"))
-        .await
-        .json;
+    let other = server.read(link(&alone, "self")).await;
     assert_eq!(other["state"], "queued");
-    let listed = server
-        .get(batch["links"]["jobs"].as_str().expect("a link"))
-        .await
-        .json;
+    let listed = server.read(link(&batch, "jobs")).await;
     assert_eq!(listed["jobs"].as_array().map(Vec::len), Some(5));
 }
 
@@ -248,7 +208,7 @@ async fn results_as_csv_have_a_header_and_a_line_per_motion() {
         json!([small("one"), sweep]).to_string(),
     )
     .await;
-    let path = batch.json["links"]["results"].as_str().expect("a link");
+    let path = link(&batch.json, "results");
     let answer = server.get(&format!("{path}?wait=60&format=csv")).await;
     let rows: Vec<&str> = answer.text.lines().collect();
     assert_eq!(rows.len(), 4, "{}", answer.text);
@@ -264,11 +224,7 @@ async fn results_as_csv_have_a_header_and_a_line_per_motion() {
     for row in &rows[2..] {
         assert!(codes(row).contains("friction-unusual"), "{row}");
     }
-    let by_accept = server
-        .send(Method::GET, path, |request| {
-            request.header("accept", "text/csv")
-        })
-        .await;
+    let by_accept = server.get_with(path, "accept", "text/csv").await;
     assert_eq!(by_accept.text, answer.text);
 }
 
@@ -307,11 +263,11 @@ async fn a_running_group_stops_when_its_batch_is_cancelled() {
         lines(&vec![small("x"); 3]),
     )
     .await;
-    let path = batch.json["links"]["self"].as_str().expect("a link");
-    while server.get(path).await.json["states"]["running"] == 0 {
+    let path = link(&batch.json, "self");
+    while server.read(path).await["states"]["running"] == 0 {
         pause().await;
     }
-    let cancel = batch.json["links"]["cancel"].as_str().expect("a link");
+    let cancel = link(&batch.json, "cancel");
     server.send(Method::POST, cancel, |request| request).await;
     let lines = results(&server, &batch.json, "?wait=60").await;
     assert!(
@@ -324,18 +280,14 @@ async fn a_running_group_stops_when_its_batch_is_cancelled() {
 async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
     let folder = tempfile::tempdir().unwrap();
     let service = Service::start(folder.path(), &["--workers", "2"]);
-    let count = 1500;
+    let count = 600;
     let cases: Vec<Value> = (0..count).map(|i| case(&format!("{i}"))).collect();
-    let answer = service
-        .request(Method::POST, "/v1/batches")
-        .header("content-type", "application/x-ndjson")
-        .body(lines(&cases))
-        .send()
+    let batch = service
+        .post("/v1/batches", &json!(cases))
         .await
-        .unwrap();
-    assert_eq!(answer.status(), 202);
-    let batch: Value = answer.json().await.unwrap();
-    let path = batch["links"]["self"].as_str().unwrap().to_owned();
+        .is(202)
+        .json;
+    let path = link(&batch, "self").to_owned();
     let mut service = service;
     for kill in 1..=2 {
         while service.get(&path).await["states"]["succeeded"]
@@ -348,18 +300,8 @@ async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
         service.kill();
         service = Service::start(folder.path(), &["--workers", "2"]);
     }
-    let text = service
-        .request(Method::GET, &format!("{path}/results?wait=120"))
-        .send()
-        .await
-        .unwrap()
-        .text()
-        .await
-        .unwrap();
-    let lines: Vec<Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let results = format!("{path}/results?wait=120");
+    let lines = service.ask(&results).await.lines();
     assert_eq!(lines.len(), count);
     for (index, line) in lines.iter().enumerate() {
         assert_eq!(

@@ -32,11 +32,11 @@ async fn make(guarded: &Guarded, list: &str, number: usize, label: &str) -> Stri
             )
         }
     };
-    let made = guarded
-        .send(&guarded.north, Method::POST, &path, Some(&body))
-        .await;
-    assert_eq!(made.status, 202, "{}", made.text);
-    made.json["id"].as_str().expect("an id").to_owned()
+    let made = guarded.post(&guarded.north, &path, &body);
+    made.await.is(202).json["id"]
+        .as_str()
+        .expect("an id")
+        .to_owned()
 }
 
 /// The ids of a whole list, one entry a page.
@@ -57,9 +57,7 @@ async fn ids(guarded: &Guarded, key: &str, list: &str, filter: &str) -> Vec<Stri
 
 #[tokio::test]
 async fn a_bound_key_turns_the_pages_of_its_own_part_of_every_list() {
-    let mut setup = Setup::new();
-    setup.working = false;
-    let guarded = Guarded::start(setup, |_| {}).await;
+    let guarded = Guarded::start(Setup::idle(), |_| {}).await;
     for list in ["jobs", "batches", "runs"] {
         let mut own = BTreeSet::new();
         for number in 0..4 {
@@ -85,16 +83,13 @@ async fn a_bound_key_turns_the_pages_of_its_own_part_of_every_list() {
             .await;
         let cursor = page.json["next_cursor"].as_str().expect("more");
         let path = format!("/v1/{list}?limit=1&cursor={cursor}");
-        let refused = guarded.get(&guarded.line_7, &path).await;
-        assert_eq!(refused.status, 400, "{}", refused.text);
+        guarded.get(&guarded.line_7, &path).await.is(400);
     }
 }
 
 #[tokio::test]
 async fn a_bound_key_hears_of_its_own_jobs_and_batches_alone() {
-    let mut setup = Setup::new();
-    setup.working = false;
-    let guarded = Guarded::start(setup, |_| {}).await;
+    let guarded = Guarded::start(Setup::idle(), |_| {}).await;
     let url = format!("http://{}/v1/events", guarded.server.address);
     let stream = reqwest::Client::new().get(url).bearer_auth(&guarded.line_7);
     let mut stream = stream.send().await.expect("an answer");
@@ -120,10 +115,8 @@ async fn a_bound_key_uses_profiles_by_their_digests_and_neither_lists_nor_delete
     let (north, bound) = (&guarded.north, &guarded.line_7);
     let mut wheel_on_rail = example("wheel-rail.case.json");
     let rail = wheel_on_rail["contact"]["rail"].clone();
-    let kept = guarded
-        .send(north, Method::POST, "/v1/profiles", Some(&rail))
-        .await;
-    let path = kept.header("location").expect("a path").to_owned();
+    let kept = guarded.post(north, "/v1/profiles", &rail).await;
+    let path = kept.location();
     for (method, path) in [
         (Method::GET, "/v1/profiles"),
         (Method::DELETE, path.as_str()),
@@ -134,9 +127,7 @@ async fn a_bound_key_uses_profiles_by_their_digests_and_neither_lists_nor_delete
     let read = guarded.get(bound, &path).await;
     assert_eq!((read.status, &read.json), (200, &rail));
     let wheel = wheel_on_rail["contact"]["wheel"].clone();
-    let own = guarded
-        .send(bound, Method::POST, "/v1/profiles", Some(&wheel))
-        .await;
+    let own = guarded.post(bound, "/v1/profiles", &wheel).await;
     assert_eq!(own.status, 201, "{}", own.text);
     wheel_on_rail["contact"]["rail"] = json!({ "profile": kept.json["digest"] });
     wheel_on_rail["contact"]["wheel"] = json!({ "profile": own.json["digest"] });
@@ -155,23 +146,53 @@ async fn a_bound_key_takes_no_template_of_others() {
     for path in ["/v1/batches", "/v1/runs", "/v1/evaluate"] {
         for (template, refused) in [(&foreign, true), (&own, false)] {
             let path = format!("{path}?template={template}");
-            let shape = |request: reqwest::RequestBuilder| {
-                let request = request.bearer_auth(&guarded.line_7);
-                let request = request.header("content-type", "text/csv");
-                request.body(
-                    "friction_coefficient,creepage_x\n0.3,0.001\n"
-                        .replace("friction_coefficient", "/friction/coefficient"),
-                )
-            };
-            let answer = guarded.server.send(Method::POST, &path, shape).await;
+            let table = "/friction/coefficient,creepage_x\n0.3,0.001\n";
+            let sent = guarded.post_as(&guarded.line_7, &path, "text/csv", table);
+            let answer = sent.await;
             assert_eq!(answer.status == 404, refused, "{path}: {}", answer.text);
         }
     }
 }
 
 #[tokio::test]
-async fn usage_tells_the_labels_of_a_bound_key() {
+async fn a_bound_key_gives_its_label_to_what_it_makes() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;
-    let me: Value = guarded.get(&guarded.line_7, "/v1/me").await.json;
-    assert_eq!(me["labels"], json!({ "line": "7" }));
+    let bound = &guarded.line_7;
+    let post = async |path: &str, body: &Value| guarded.post(bound, path, body).await;
+    let mut foreign = case("on a line");
+    foreign["labels"] = json!({ "line": "8" });
+    let mut own = foreign.clone();
+    own["labels"] = json!({ "km": "12.4" });
+    let refused = post("/v1/jobs", &foreign).await;
+    assert_problem(&refused, 422, "faulty-case", "/labels/line");
+    let cases = json!([foreign, own]);
+    let batch = post("/v1/batches?on_invalid=skip", &cases).await;
+    assert_eq!(batch.is(202).json["rejected"], 1);
+    for key in [bound, &guarded.north] {
+        let jobs = guarded.get(key, "/v1/jobs").await;
+        let labels = &jobs.json["jobs"][0]["labels"];
+        assert_eq!(*labels, json!({ "line": "7", "km": "12.4" }));
+        let batches = guarded.get(key, "/v1/batches").await;
+        assert_eq!(batches.json["batches"][0]["labels"], json!({ "line": "7" }));
+    }
+    let rows = json!({ "template": template("table"), "columns": columns(2) });
+    let run = post("/v1/runs", &rows).await;
+    assert_eq!(run.json["labels"], json!({ "line": "7" }), "{}", run.text);
+    let me = guarded.get(bound, "/v1/me").await;
+    assert_eq!(me.json["labels"], json!({ "line": "7" }));
+}
+
+/// The same case under the same key of idempotency: nothing of another line may be answered.
+#[tokio::test]
+async fn a_bound_key_is_not_answered_with_a_job_of_others() {
+    let guarded = Guarded::start(Setup::new(), |_| {}).await;
+    let case = case("on a line");
+    for (key, status) in [(&guarded.north, 202), (&guarded.line_7, 422)] {
+        let shape = |request: reqwest::RequestBuilder| {
+            let request = request.bearer_auth(key).header("idempotency-key", "k");
+            request.json(&case)
+        };
+        let sent = guarded.server.send(Method::POST, "/v1/jobs", shape);
+        sent.await.is(status);
+    }
 }

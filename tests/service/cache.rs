@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use railhead::contact;
 use railhead::contact::monitor::Stop;
 use railhead::jobs::Options;
-use reqwest::{Method, RequestBuilder};
+use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::metrics::samples;
 use crate::results::path_of;
-use crate::server::{Answer, Server, Setup};
-use crate::support::{Service, case};
+use crate::server::{Answer, Server, Setup, link};
+use crate::support::{Service, case, files_below, loaded};
 
 /// A service that counts its solves.
 async fn counting(change: impl FnOnce(&mut Options)) -> (Server, Arc<AtomicUsize>) {
@@ -42,13 +42,10 @@ fn bare(result: &Value) -> Value {
 }
 
 async fn solve_fresh(server: &Server, case: &Value) -> Answer {
-    let shape = |request: RequestBuilder| {
-        let request = request.header("prefer", "wait=60");
-        request
-            .header("cache-control", "max-age=0, No-Cache")
-            .json(case)
-    };
-    server.send(Method::POST, "/v1/jobs", shape).await
+    let control = "max-age=0, No-Cache";
+    server
+        .post_with("/v1/jobs?wait=60", "cache-control", control, case)
+        .await
 }
 
 #[tokio::test]
@@ -63,7 +60,7 @@ async fn an_identical_case_is_answered_at_once_with_the_first_result() {
         (answer.status, &answer.json["state"]),
         (202, &json!("succeeded"))
     );
-    let second = server.get(&path_of(&answer.json)).await.json;
+    let second = server.read(&path_of(&answer.json)).await;
     assert_eq!(second["cached"], true);
     assert_eq!(
         (&second["name"], &second["labels"]["km"]),
@@ -74,15 +71,12 @@ async fn an_identical_case_is_answered_at_once_with_the_first_result() {
         (&json!(0), &json!(1.0))
     );
     assert_eq!(second["remarks"], first["remarks"]);
-    let result = server
-        .get(&format!("{}/result", path_of(&second)))
-        .await
-        .json;
+    let result = server.read(&format!("{}/result", path_of(&second))).await;
     assert_eq!(result["cached"], true);
     // The seconds are those of the one solve there was.
     assert_eq!(bare(&result), bare(&first["result"]));
     for part in ["tractions", "zones", "resultants"] {
-        let of = async |job: &Value| server.get(&format!("{}/{part}", path_of(job))).await.json;
+        let of = async |job: &Value| server.read(&format!("{}/{part}", path_of(job))).await;
         assert_eq!(of(&second).await, of(&first).await, "{part}");
     }
     assert_eq!(solves.load(Ordering::SeqCst), 1);
@@ -161,53 +155,33 @@ async fn either_job_can_be_deleted_without_the_other() {
             for last in [kept, &third] {
                 assert_eq!(server.delete(&path_of(last)).await.status, 204);
             }
-            assert_eq!(files_below(&folder), 0, "nothing is left behind");
+            assert!(files_below(&folder).is_empty(), "nothing is left behind");
             assert_eq!(server.solve(&case("again")).await["cached"], false);
         }
     }
 }
 
-fn files_below(folder: &std::path::Path) -> usize {
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        return 0;
-    };
-    let paths = entries.map(|entry| entry.expect("an entry").path());
-    paths
-        .map(|path| if path.is_dir() { files_below(&path) } else { 1 })
-        .sum()
-}
-
 #[tokio::test]
 async fn a_batch_is_answered_from_earlier_results() {
     let (server, solves) = counting(|_| {}).await;
-    let cases: Vec<Value> = (1..=30)
-        .map(|number| {
-            let mut case = case("one of many");
-            case["load"]["normal_force_n"] = json!(10_000 * number);
-            case
-        })
-        .collect();
+    let cases: Vec<Value> = (1..=30).map(|number| loaded(10_000 * number)).collect();
     let submit = async |cases: &[Value], fresh: bool| {
-        let shape = |request: RequestBuilder| match fresh {
-            true => request.header("cache-control", "no-cache").json(cases),
-            false => request.json(cases),
-        };
-        let answer = server.send(Method::POST, "/v1/batches", shape).await;
-        assert_eq!(answer.status, 202, "{}", answer.text);
-        answer.header("location").expect("a location").to_owned()
+        let control = if fresh { "no-cache" } else { "max-age=60" };
+        let cases = json!(cases);
+        let sent = server.post_with("/v1/batches", "cache-control", control, &cases);
+        sent.await.is(202).location()
     };
     let lines = async |batch: &str| -> Vec<Value> {
-        let text = server.get(&format!("{batch}/results?wait=60")).await.text;
-        let lines = text
+        server
+            .get(&format!("{batch}/results?wait=60"))
+            .await
             .lines()
-            .map(|line| serde_json::from_str(line).expect("a line"));
-        lines.collect()
     };
     let first = submit(&cases[..20], false).await;
     let solved = lines(&first).await;
     assert_eq!(solves.load(Ordering::SeqCst), 20);
     let second = submit(&cases, false).await;
-    let known = server.get(&second).await.json;
+    let known = server.read(&second).await;
     assert!(known["states"]["succeeded"].as_u64() >= Some(20), "{known}");
     let again = lines(&second).await;
     assert_eq!(solves.load(Ordering::SeqCst), 30);
@@ -224,17 +198,11 @@ async fn a_batch_is_answered_from_earlier_results() {
 
 /// Sends a batch and returns its lines once all have ended.
 async fn batch_items(server: &Server, cases: &[Value], fresh: bool) -> Vec<Value> {
-    let shape = |request: RequestBuilder| match fresh {
-        true => request.header("cache-control", "no-cache").json(cases),
-        false => request.json(cases),
-    };
-    let batch = server.send(Method::POST, "/v1/batches", shape).await.json;
-    let results = batch["links"]["results"].as_str().expect("a link");
-    let text = server.get(&format!("{results}?wait=60")).await.text;
-    let lines = text.lines();
-    lines
-        .map(|line| serde_json::from_str(line).expect("a line"))
-        .collect()
+    let (cases, control) = (json!(cases), if fresh { "no-cache" } else { "max-age=60" });
+    let sent = server.post_with("/v1/batches", "cache-control", control, &cases);
+    let batch = sent.await.json;
+    let results = link(&batch, "results");
+    server.get(&format!("{results}?wait=60")).await.lines()
 }
 
 #[tokio::test]
@@ -289,9 +257,7 @@ async fn earlier_results_outlive_the_process_and_the_deletion_of_their_job() {
     let mut large = case("large");
     large["solver"]["mesh"] = json!({ "strips": 40, "cells": 40 });
     let solve = async |service: &Service| -> Value {
-        let request = service.request(Method::POST, "/v1/jobs");
-        let request = request.header("prefer", "wait=60").json(&large);
-        request.send().await.unwrap().json().await.unwrap()
+        service.post("/v1/jobs?wait=60", &large).await.is(200).json
     };
     let service = Service::start(folder.path(), &[]);
     let first = solve(&service).await;
@@ -303,7 +269,7 @@ async fn earlier_results_outlive_the_process_and_the_deletion_of_their_job() {
         (&json!(false), &json!(true))
     );
     assert!(
-        files_below(&folder.path().join("results")) > 0,
+        !files_below(&folder.path().join("results")).is_empty(),
         "it is a large one"
     );
     let path = format!("/v1/jobs/{}", first["id"].as_str().unwrap());

@@ -4,17 +4,12 @@ use std::io::Read;
 
 use railhead::http::HttpOptions;
 use reqwest::Method;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Answer, Server, Setup, example, example_text, unpacked};
 use crate::support::{Service, case};
-
-async fn get_with(server: &Server, path: &str, name: &str, value: &str) -> Answer {
-    let send = server.send(Method::GET, path, |request| request.header(name, value));
-    send.await
-}
 
 #[tokio::test]
 async fn finished_results_are_kept_for_good_and_asked_for_by_tag() {
@@ -42,10 +37,12 @@ async fn finished_results_are_kept_for_good_and_asked_for_by_tag() {
             Some(tag.as_str()),
             "{part}"
         );
-        let again = get_with(&server, &path, "if-none-match", &format!("\"x\", {tag}")).await;
+        let again = server
+            .get_with(&path, "if-none-match", &format!("\"x\", {tag}"))
+            .await;
         assert_eq!((again.status, again.bytes.len()), (304, 0), "{part}");
         assert_eq!(again.header("etag"), Some(tag.as_str()), "{part}");
-        let other = get_with(&server, &path, "if-none-match", "\"x\"").await;
+        let other = server.get_with(&path, "if-none-match", "\"x\"").await;
         assert_eq!((other.status, other.bytes), (200, first.bytes), "{part}");
     }
     let csv = server.get(&format!("{path}/slip?format=csv")).await;
@@ -65,7 +62,7 @@ async fn tag_of_a_job_changes_with_the_job() {
     assert_eq!(queued.header("cache-control"), Some("private, no-cache"));
     let tag = queued.header("etag").expect("a tag").to_owned();
     assert_eq!(
-        get_with(&server, &path, "if-none-match", &tag).await.status,
+        server.get_with(&path, "if-none-match", &tag).await.status,
         304
     );
     let early = server.get(&format!("{path}/result")).await;
@@ -73,15 +70,15 @@ async fn tag_of_a_job_changes_with_the_job() {
         (early.status, early.header("cache-control")),
         (409, Some("no-store"))
     );
-    server.post(&format!("{path}/cancel"), &Value::Null).await;
-    let cancelled = get_with(&server, &path, "if-none-match", &tag).await;
+    server.cancel(&path).await;
+    let cancelled = server.get_with(&path, "if-none-match", &tag).await;
     assert_eq!(
         (cancelled.status, &cancelled.json["state"]),
         (200, &json!("cancelled"))
     );
     assert_ne!(cancelled.header("etag"), Some(tag.as_str()));
     server.delete(&path).await;
-    let gone = get_with(&server, &path, "if-none-match", &tag).await;
+    let gone = server.get_with(&path, "if-none-match", &tag).await;
     assert_problem(&gone, 404, "job-not-found", "");
     assert_eq!(gone.header("cache-control"), Some("no-store"));
 }
@@ -100,12 +97,12 @@ async fn tag_of_a_batch_changes_with_its_jobs() {
         .expect("a tag")
         .to_owned();
     assert_eq!(
-        get_with(&server, &path, "if-none-match", &tag).await.status,
+        server.get_with(&path, "if-none-match", &tag).await.status,
         304
     );
-    server.post(&format!("{path}/cancel"), &Value::Null).await;
+    server.cancel(&path).await;
     assert_eq!(
-        get_with(&server, &path, "if-none-match", &tag).await.status,
+        server.get_with(&path, "if-none-match", &tag).await.status,
         200
     );
 }
@@ -119,7 +116,7 @@ async fn answers_are_packed_for_those_who_accept_it() {
         let plain = server.get(&path).await;
         assert_eq!(plain.header("content-encoding"), None, "{part}");
         for coding in ["gzip", "zstd"] {
-            let packed = get_with(&server, &path, "accept-encoding", coding).await;
+            let packed = server.get_with(&path, "accept-encoding", coding).await;
             assert_eq!(packed.header("content-encoding"), Some(coding), "{part}");
             assert!(packed.bytes.len() < plain.bytes.len(), "{part} as {coding}");
             assert_eq!(
@@ -135,7 +132,7 @@ async fn answers_are_packed_for_those_who_accept_it() {
             );
             let tag = packed.header("etag").expect("a tag").to_owned();
             assert!(tag.ends_with(&format!("-{coding}\"")), "{tag}");
-            let again = get_with(&server, &path, "if-none-match", &tag).await;
+            let again = server.get_with(&path, "if-none-match", &tag).await;
             assert_eq!(
                 (again.status, again.header("etag")),
                 (304, Some(tag.as_str()))
@@ -143,13 +140,9 @@ async fn answers_are_packed_for_those_who_accept_it() {
         }
     }
     for part in ["plot.png", "tractions?format=npz"] {
-        let answer = get_with(
-            &server,
-            &format!("{path}/{part}"),
-            "accept-encoding",
-            "gzip, zstd",
-        )
-        .await;
+        let answer = server
+            .get_with(&format!("{path}/{part}"), "accept-encoding", "gzip, zstd")
+            .await;
         assert_eq!(
             answer.header("content-encoding"),
             None,
@@ -220,8 +213,7 @@ async fn packed_cases_and_batches_are_unpacked() {
 
 #[tokio::test]
 async fn limits_hold_before_and_after_unpacking() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.http = HttpOptions {
         body_max_bytes: 20_000,
         batch_max_bytes: 60_000,
@@ -229,42 +221,28 @@ async fn limits_hold_before_and_after_unpacking() {
     };
     let server = setup.start().await;
     let case = example_text("spin.case.json");
-    let padded = |bytes: usize| format!("{}{case}", " ".repeat(bytes - case.len()));
+    let padded = " ".repeat(20_000 - case.len()) + &case;
     let json = "application/json";
-    let fits = send_packed(
-        &server,
-        "/v1/jobs",
-        json,
-        "gzip",
-        gzip(padded(20_000).as_bytes()),
-    )
-    .await;
-    assert_eq!(fits.status, 202, "{}", fits.text);
-    for coding in ["gzip", "zstd"] {
-        // 200 MB of blanks, a few kB on the way.
-        let text = vec![b' '; 200_000_000];
-        let bomb = match coding {
-            "gzip" => gzip(&text),
-            _ => zstd::encode_all(text.as_slice(), 3).expect("zstd"),
-        };
-        let answer = send_packed(&server, "/v1/jobs", json, coding, bomb.clone()).await;
-        assert_problem(&answer, 413, "body-too-large", "20000");
-        let answer = send_packed(&server, "/v1/batches", json, coding, bomb).await;
-        assert_problem(&answer, 413, "body-too-large", "60000");
-    }
-    // A large body is still refused once it has unpacked to many times what has come.
-    let server = Server::idle().await;
+    let padded = gzip(padded.as_bytes());
+    let fits = send_packed(&server, "/v1/jobs", json, "gzip", padded).await;
+    fits.is(202);
+    let generous = Server::idle().await;
+    // 200 MB of empty lines, a few kB on the way.
     let text = vec![b'\n'; 200_000_000];
     for (coding, bomb) in [
         ("gzip", gzip(&text)),
         ("zstd", zstd::encode_all(text.as_slice(), 3).expect("zstd")),
     ] {
+        let answer = send_packed(&server, "/v1/jobs", json, coding, bomb.clone()).await;
+        assert_problem(&answer, 413, "body-too-large", "20000");
+        let answer = send_packed(&server, "/v1/batches", json, coding, bomb.clone()).await;
+        assert_problem(&answer, 413, "body-too-large", "60000");
+        // A large body is still refused once it has unpacked to many times what has come.
         let lines = "application/x-ndjson";
-        let answer = send_packed(&server, "/v1/batches", lines, coding, bomb).await;
+        let answer = send_packed(&generous, "/v1/batches", lines, coding, bomb).await;
         assert_problem(&answer, 413, "body-too-large", "200 times its size");
     }
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.http.body_max_bytes = 20_000;
     let server = setup.start().await;
     // Empty blocks without end: nothing comes out, but more goes in than is allowed; the length is not declared.

@@ -8,8 +8,7 @@ use crate::results::{number, numbers};
 use crate::server::{Server, Setup, example};
 
 async fn understood(server: &Server, case: &Value) -> Value {
-    let answer = server.post("/v1/cases/check", case).await;
-    assert_eq!(answer.status, 200, "{}", answer.text);
+    let answer = server.post("/v1/cases/check", case).await.is(200);
     answer.json["understood"].clone()
 }
 
@@ -130,8 +129,7 @@ async fn the_time_is_that_of_a_solve_where_one_ends_soon() {
         let mut setup = Setup::new();
         setup.http.check_trial = Duration::from_millis(trial_ms);
         let server = setup.start().await;
-        let answer = server.post("/v1/cases/check", case).await;
-        assert_eq!(answer.status, 200, "{}", answer.text);
+        let answer = server.post("/v1/cases/check", case).await.is(200);
         let estimate = &answer.json["estimate"];
         assert_eq!(estimate["found_by"], found_by, "{estimate}");
         assert!(number(&estimate["seconds"]) > 0.0, "{estimate}");
@@ -146,8 +144,7 @@ async fn a_solve_that_fails_while_it_is_tried_is_told() {
     let mut case = example("uic60-crown.case.json");
     // Overlaps so deeply that the contact reaches the ends of the samples.
     case["load"] = json!({ "normal_force_n": 1e9 });
-    let answer = server.post("/v1/cases/check", &case).await;
-    assert_eq!(answer.status, 200, "{}", answer.text);
+    let answer = server.post("/v1/cases/check", &case).await.is(200);
     assert_eq!(
         answer.json["estimate"]["found_by"], "failed_solve",
         "{}",

@@ -1,90 +1,29 @@
 //! Columns of tables that come in and go out: titles, units, bounds, texts, damage.
 
-use railhead::jobs::codec::arrow::ArrowWriter;
-use railhead::jobs::codec::parquet::encode;
 use railhead::jobs::codec::table::{COLUMNS_MAX, RowTable, TableColumn};
-use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::batches::{results, send, small};
 use crate::errors::assert_problem;
-use crate::evaluate::npz;
-use crate::runs::{ended, lines, template};
-use crate::server::{Answer, Server};
-
-const ARROW: &str = "application/vnd.apache.arrow.stream";
-const PARQUET: &str = "application/vnd.apache.parquet";
-const NPZ: &str = "application/x-npz";
-
-/// The id of a job whose case rows by the table are filled into.
-async fn kept_template(server: &Server) -> String {
-    let mut case = template("table");
-    case["load"]["normal_force_n"] = json!(1e5);
-    let job = server.submit(&case).await;
-    job.rsplit('/').next().expect("an id").to_owned()
-}
-
-async fn send_rows(server: &Server, query: &str, form: &str, body: impl Into<Vec<u8>>) -> Answer {
-    let body = body.into();
-    let send = |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
-    let path = format!("/v1/runs?template={query}");
-    server.send(Method::POST, &path, send).await
-}
+use crate::runs::answers;
+use crate::server::{Answer, Server, link};
+use crate::table_forms::{ARROW, NPZ, forms, kept_template, send_rows};
 
 async fn rows_of(server: &Server, sent: &Answer) -> Vec<Value> {
     assert_eq!(sent.status, 202, "{}", sent.text);
-    let run = sent.header("location").expect("a location").to_owned();
-    ended(server, &run).await;
-    lines(&server.get(&format!("{run}/results?format=ndjson")).await)
+    answers(server, &sent.location()).await
 }
 
-fn arrow(table: RowTable) -> Vec<u8> {
-    let kinds: Vec<_> = table
-        .columns
-        .iter()
-        .map(|(name, column)| (name.clone(), column.kind()))
-        .collect();
-    let mut writer = ArrowWriter::new(Vec::new(), &kinds).expect("a stream");
-    writer.write(table).expect("a batch");
-    writer.finish().expect("the end");
-    std::mem::take(writer.inner_mut())
-}
-
-/// One row of numbers with these titles in every form that a run may be sent in.
-fn in_every_form(titles: &[String]) -> Vec<(&'static str, Vec<u8>)> {
-    let numbers = |k: usize| vec![1e-3 + 1e-6 * k as f64];
-    let table = || RowTable {
-        columns: titles
-            .iter()
-            .enumerate()
-            .map(|(k, title)| (title.clone(), TableColumn::Numbers(numbers(k))))
-            .collect(),
-    };
-    let quoted = titles.iter().map(|title| format!("\"{title}\""));
-    let csv = quoted.collect::<Vec<_>>().join(",");
-    let values: Vec<String> = (0..titles.len())
-        .map(|k| numbers(k)[0].to_string())
-        .collect();
-    let members = titles.iter().enumerate();
-    let members = members.map(|(k, title)| format!("{}:{}", json!(title), numbers(k)[0]));
-    let arrays: Vec<(&str, Vec<f64>)> = titles
-        .iter()
-        .enumerate()
-        .map(|(k, title)| (title.as_str(), numbers(k)))
-        .collect();
-    vec![
-        (
-            "text/csv",
-            format!("{csv}\n{}\n", values.join(",")).into_bytes(),
-        ),
-        (
-            "application/x-ndjson",
-            format!("{{{}}}\n", members.collect::<Vec<_>>().join(",")).into_bytes(),
-        ),
-        (ARROW, arrow(table())),
-        (PARQUET, encode(&table()).expect("a file")),
-        (NPZ, npz(&arrays)),
-    ]
+/// One row of numbers with these titles.
+fn one_row(titles: &[String]) -> RowTable {
+    let titles = titles.iter().enumerate();
+    let columns = titles.map(|(k, title)| {
+        let numbers = vec![1e-3 + 1e-6 * k as f64];
+        (title.clone(), TableColumn::Numbers(numbers))
+    });
+    RowTable {
+        columns: columns.collect(),
+    }
 }
 
 #[tokio::test]
@@ -173,7 +112,7 @@ async fn columns_are_known_bounded_and_there_once_in_every_form() {
         (many, "1000"),
     ];
     for (titles, word) in cases {
-        for (form, body) in in_every_form(&titles) {
+        for (form, body) in forms(&one_row(&titles)) {
             let refused = send_rows(&server, &template, form, body).await;
             assert_eq!(refused.status, 422, "{form} {word}: {}", refused.text);
             assert!(refused.text.contains(word), "{form}: {}", refused.text);
@@ -183,19 +122,15 @@ async fn columns_are_known_bounded_and_there_once_in_every_form() {
         let mut case = crate::runs::template("table");
         case["load"]["normal_force_n"] = json!(1e5);
         let body = json!({ "template": case, "columns": columns });
-        let refused = server.post("/v1/runs", &body).await;
-        assert_eq!(refused.status, 422, "{}", refused.text);
-        let refused = server.post("/v1/evaluate", &body).await;
-        assert_eq!(refused.status, 422, "{}", refused.text);
+        let _refused = server.post("/v1/runs", &body).await.is(422);
+        let _refused = server.post("/v1/evaluate", &body).await.is(422);
     }
     let evaluate = async |form: &str, body: Vec<u8>| {
-        let send =
-            |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
         let path = format!("/v1/evaluate?template={template}");
-        server.send(Method::POST, &path, send).await
+        server.post_as(&path, form, body).await
     };
     let twice = owned(&["creepage_x", "/motion/creepage_x"]);
-    for (form, body) in in_every_form(&twice) {
+    for (form, body) in forms(&one_row(&twice)) {
         if ["text/csv", ARROW, NPZ].contains(&form) {
             let refused = evaluate(form, body).await;
             assert_problem(&refused, 422, "faulty-case", "for one member");
@@ -215,8 +150,7 @@ async fn columns_are_known_bounded_and_there_once_in_every_form() {
 #[tokio::test]
 async fn a_table_of_a_batch_is_read_with_units_semicolons_and_decimal_commas() {
     let server = Server::start().await;
-    let job = server.submit(&small("template")).await;
-    let query = format!("?template={}", job.rsplit('/').next().expect("an id"));
+    let query = format!("?template={}", server.keep(&small("template")).await);
     let mut cases = Vec::new();
     for table in [
         "label:km,normal_force_n,creepage_x\n37.2,64100,0.002\n37.4,,\n37.6,64100,\n",
@@ -228,7 +162,7 @@ async fn a_table_of_a_batch_is_read_with_units_semicolons_and_decimal_commas() {
         let mut own = Vec::new();
         for line in results(&server, &batch.json, "?wait=60").await {
             let id = line["id"].as_str().expect("an id");
-            own.push(server.get(&format!("/v1/jobs/{id}/case")).await.json);
+            own.push(server.read(&format!("/v1/jobs/{id}/case")).await);
         }
         cases.push(own);
     }
@@ -279,7 +213,7 @@ async fn the_usual_table_of_a_batch_has_its_labels() {
     cases[0]["labels"] = json!({ "km": "-5", "line": "=1+1" });
     cases[1]["labels"] = json!({ "km": "-5,25" });
     let batch = server.post("/v1/batches", &json!(cases)).await.json;
-    let path = batch["links"]["results"].as_str().expect("a link");
+    let path = link(&batch, "results");
     let table = server.get(&format!("{path}?wait=60&format=csv")).await.text;
     let mut reader = csv::Reader::from_reader(table.as_bytes());
     let head = reader.headers().expect("a header").clone();
@@ -355,7 +289,7 @@ async fn texts_of_rows_come_back_as_they_were_and_are_no_formulas_in_csv() {
 async fn damaged_files_of_columns_are_refused_and_are_no_failures_of_the_service() {
     let server = Server::idle().await;
     let template = kept_template(&server).await;
-    let table = || RowTable {
+    let table = RowTable {
         columns: vec![
             ("creepage_x".to_owned(), TableColumn::Numbers(vec![1e-3; 9])),
             (
@@ -364,10 +298,7 @@ async fn damaged_files_of_columns_are_refused_and_are_no_failures_of_the_service
             ),
         ],
     };
-    for (form, file) in [
-        (ARROW, arrow(table())),
-        (PARQUET, encode(&table()).expect("a file")),
-    ] {
+    for (form, file) in forms(&table).split_off(2) {
         // Every fifth byte, so that lengths and offsets of each kind are hit.
         for place in (0..file.len()).step_by(5) {
             let mut damaged = file.clone();

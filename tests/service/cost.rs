@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::Duration;
 
 use railhead::http::{HttpOptions, router};
-use reqwest::{Method, RequestBuilder};
+use reqwest::Method;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
@@ -39,32 +39,21 @@ fn repeated(element: &str, bytes: usize) -> String {
     )
 }
 
-fn json_body(request: RequestBuilder, text: String) -> RequestBuilder {
-    request
-        .header("content-type", "application/json")
-        .body(text)
-}
-
 #[tokio::test]
 async fn bodies_that_would_fill_the_memory_are_refused_unread() {
     let server = Server::idle().await;
-    for element in [r#"{"":1}"#, "[1]", "1", r#"{"a":{"b":{}}}"#] {
+    for (element, path) in [
+        (r#"{"":1}"#, "/v1/jobs"),
+        ("[1]", "/v1/cases/check"),
+        ("1", "/v1/jobs"),
+        (r#"{"a":{"b":{}}}"#, "/v1/cases/check"),
+    ] {
         let text = repeated(element, 8 << 20);
-        for path in ["/v1/jobs", "/v1/cases/check"] {
-            let answer = server
-                .send(Method::POST, path, |request| {
-                    json_body(request, text.clone())
-                })
-                .await;
-            assert_problem(&answer, 413, "body-too-large", "allowed");
-        }
-        let batch = format!("[{}]", &text[..text.len() - 1].to_owned());
-        let batch = format!("{}]]", &batch[..batch.len() - 1]);
-        let answer = server
-            .send(Method::POST, "/v1/batches", |request| {
-                json_body(request, batch)
-            })
-            .await;
+        let batch = format!("[{text}]");
+        let json = "application/json";
+        let answer = server.post_as(path, json, text).await;
+        assert_problem(&answer, 413, "body-too-large", "allowed");
+        let answer = server.post_as("/v1/batches", json, batch).await;
         assert_problem(&answer, 413, "body-too-large", "");
     }
 }
@@ -215,7 +204,7 @@ async fn what_a_client_has_is_not_made_again() {
     }
     let unknown = format!("/v1/jobs/{}/zones", uuid::Uuid::now_v7());
     assert_eq!(ask(&unknown, Some("\"x\"")).await, 404);
-    let _: Value = server.get(&own).await.json;
+    let _: Value = server.read(&own).await;
 }
 
 #[tokio::test]
@@ -235,9 +224,7 @@ async fn large_results_are_passed_on_as_they_are_stored() {
         .await;
     let case = crate::batches::small("large");
     let waited = server
-        .send(Method::POST, "/v1/jobs", |request| {
-            request.header("prefer", "wait=60").json(&case)
-        })
+        .post_with("/v1/jobs", "prefer", "wait=60", &case)
         .await;
     assert_eq!(
         (waited.status, &waited.json["state"]),

@@ -6,6 +6,7 @@ use std::path::Path;
 use reqwest::Method;
 use serde_json::Value;
 
+use crate::server::Answer;
 use crate::support::{Service, long_case, pause};
 
 const JOBS: usize = 50;
@@ -123,13 +124,9 @@ async fn an_idempotency_key_outlives_the_process() {
     let mut ids = BTreeSet::new();
     for _ in 0..2 {
         let service = Service::start(folder.path(), &[]);
-        let submit = service
-            .request(Method::POST, "/v1/jobs")
-            .header("Idempotency-Key", "k1");
-        let answer = submit.json(&case).send().await.unwrap();
-        let status = answer.status();
-        let job: Value = answer.json().await.unwrap();
-        assert!(status.is_success(), "{status}: {job}");
+        let submit = service.request(Method::POST, "/v1/jobs");
+        let submit = submit.header("Idempotency-Key", "k1").json(&case);
+        let job = Answer::to(submit).await.is(202).json;
         ids.insert(job["id"].as_str().unwrap().to_owned());
         service.kill();
     }

@@ -1,10 +1,9 @@
 //! Is a damaged job table noticed, and said so?
 
 use railhead::jobs::{Jobs, JobsError, Options};
-use reqwest::Method;
-use serde_json::Value;
 
 use crate::batches::small;
+use crate::errors::assert_problem;
 use crate::support::{Service, open};
 
 #[tokio::test]
@@ -49,26 +48,18 @@ async fn a_table_that_is_damaged_under_a_service_is_told_by_probes_metrics_and_r
     let service = Service::start(folder.path(), &["--cache", "false"]);
     let mut refusal = None;
     for _ in 0..50 {
-        let request = service.request(Method::POST, "/v1/jobs");
-        let answer = request.json(&small("more")).send().await.unwrap();
-        if answer.status() != 202 {
+        let answer = service.post("/v1/jobs", &small("more")).await;
+        if answer.status != 202 {
             refusal = Some(answer);
             break;
         }
     }
     let refusal = refusal.expect("a damaged table takes no jobs");
-    assert_eq!(refusal.status(), 503);
-    assert!(refusal.headers().contains_key("retry-after"));
-    let problem: Value = refusal.json().await.unwrap();
-    assert_eq!(problem["type"], "/problems/storage-unwritable", "{problem}");
-    let get = async |path: &str| service.request(Method::GET, path).send().await.unwrap();
-    let metrics = get("/metrics").await;
-    assert_eq!(metrics.status(), 200);
-    let metrics = metrics.text().await.unwrap();
-    assert!(
-        metrics.contains("\nrailhead_storage_failing 1\n"),
-        "{metrics}"
-    );
-    assert_eq!(get("/healthz").await.status(), 200);
-    assert_eq!(get("/readyz").await.status(), 503);
+    assert_problem(&refusal, 503, "storage-unwritable", "");
+    assert!(refusal.header("retry-after").is_some());
+    let metrics = service.ask("/metrics").await.is(200).text;
+    let failing = "\nrailhead_storage_failing 1\n";
+    assert!(metrics.contains(failing), "{metrics}");
+    service.ask("/healthz").await.is(200);
+    service.ask("/readyz").await.is(503);
 }

@@ -4,15 +4,12 @@ use std::time::Duration;
 
 use reqwest::Method;
 use serde_json::{Value, json};
-use tokio::time::timeout;
 
 use crate::batches::small;
 use crate::errors::assert_problem;
+use crate::events::Reader;
 use crate::evolutions::request as evolution;
-use crate::results::path_of;
-use crate::server::{Server, example};
-
-const AT_MOST: Duration = Duration::from_secs(60);
+use crate::server::{Server, example, link};
 
 fn case(name: &str, load: u32) -> Value {
     let mut case = small(name);
@@ -38,22 +35,20 @@ async fn a_list_is_narrowed_counted_and_not_sent_twice() {
         (&json!(5), &Value::Null)
     );
     let two = server
-        .get("/v1/jobs?state=queued&state=cancelled&name=CROWN")
-        .await
-        .json;
+        .read("/v1/jobs?state=queued&state=cancelled&name=CROWN")
+        .await;
     assert_eq!(two["jobs"].as_array().map(Vec::len), Some(4));
     assert_eq!(two["total_at_least"], 4);
     let slim = server
-        .get("/v1/jobs?fields=id,state&state=cancelled")
-        .await
-        .json;
+        .read("/v1/jobs?fields=id,state&state=cancelled")
+        .await;
     assert_eq!(
         slim["jobs"],
         json!([{ "id": cancelled, "state": "cancelled" }])
     );
-    let since = server.get(&own).await.json["updated_at"].clone();
+    let since = server.read(&own).await["updated_at"].clone();
     let changed = format!("/v1/jobs?updated_after={}", since.as_str().expect("a time"));
-    let changed = server.get(&changed).await.json;
+    let changed = server.read(&changed).await;
     assert_eq!(changed["jobs"][0]["id"], cancelled);
     let tag = all.header("etag").expect("a tag").to_owned();
     let again = |request: reqwest::RequestBuilder| request.header("if-none-match", tag);
@@ -76,9 +71,9 @@ async fn batches_have_names_and_labels_and_are_listed() {
     let cases = json!([case("a", 50_001), case("b", 50_002)]);
     let path = "/v1/batches?name=Timetable%202026&label=line:A12&label=km:37.2";
     let batch = server.post(path, &cases).await.json;
-    let own = batch["links"]["self"].as_str().expect("a link").to_owned();
+    let own = link(&batch, "self").to_owned();
     server.get(&format!("{own}/results?wait=60")).await;
-    let shown = server.get(&own).await.json;
+    let shown = server.read(&own).await;
     assert_eq!(shown["name"], "Timetable 2026");
     assert_eq!(shown["labels"], json!({ "line": "A12", "km": "37.2" }));
     assert_eq!(
@@ -88,7 +83,7 @@ async fn batches_have_names_and_labels_and_are_listed() {
     server
         .post("/v1/batches", &json!([case("c", 50_003)]))
         .await;
-    let all = server.get("/v1/batches").await.json;
+    let all = server.read("/v1/batches").await;
     assert_eq!(
         (all["batches"].as_array().map(Vec::len), &all["total"]),
         (Some(2), &json!(2))
@@ -99,7 +94,7 @@ async fn batches_have_names_and_labels_and_are_listed() {
         "label=line:A12",
         "label=line:A12&label=km:37.2",
     ] {
-        let found = server.get(&format!("/v1/batches?{query}")).await.json;
+        let found = server.read(&format!("/v1/batches?{query}")).await;
         assert_eq!(found["batches"], json!([shown]), "{query}");
     }
     let page = server.get("/v1/batches?limit=1").await;
@@ -107,9 +102,8 @@ async fn batches_have_names_and_labels_and_are_listed() {
     let link = format!("</v1/batches?limit=1&cursor={cursor}>; rel=\"next\"");
     assert_eq!(page.header("link"), Some(link.as_str()));
     let next = server
-        .get(&format!("/v1/batches?limit=1&cursor={cursor}"))
-        .await
-        .json;
+        .read(&format!("/v1/batches?limit=1&cursor={cursor}"))
+        .await;
     assert_eq!(
         (&next["batches"], &next["next_cursor"]),
         (&json!([shown]), &Value::Null)
@@ -124,7 +118,7 @@ async fn batches_have_names_and_labels_and_are_listed() {
 async fn a_client_learns_who_it_is_and_what_it_uses() {
     let server = Server::idle().await;
     server.submit(&small("one")).await;
-    let me = server.get("/v1/me").await.json;
+    let me = server.read("/v1/me").await;
     assert_eq!(
         (&me["tenant"], &me["used"]["queued"]),
         (&json!("anonymous"), &json!(1))
@@ -133,7 +127,7 @@ async fn a_client_learns_who_it_is_and_what_it_uses() {
         me["used"]["jobs"],
         json!({ "queued": 1, "running": 0, "succeeded": 0, "failed": 0, "cancelled": 0 })
     );
-    let methods = server.get("/v1/methods").await.json;
+    let methods = server.read("/v1/methods").await;
     assert_eq!(me["quota"]["queued"], methods["limits"]["queue_max"]);
     assert_eq!(
         me["limits"]["streams_max"],
@@ -144,7 +138,7 @@ async fn a_client_learns_who_it_is_and_what_it_uses() {
 #[tokio::test]
 async fn examples_are_the_shipped_ones_and_each_can_be_asked() {
     let server = Server::idle().await;
-    let examples = server.get("/v1/examples").await.json;
+    let examples = server.read("/v1/examples").await;
     let examples = examples.as_array().expect("a list");
     let shipped =
         std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/api/examples")).expect("a folder");
@@ -191,119 +185,47 @@ async fn a_job_and_its_result_can_be_waited_for() {
     assert_problem(&early, 409, "result-not-ready", "queued");
 }
 
-/// The events of a stream, as they come.
-struct Events {
-    answer: reqwest::Response,
-    text: String,
-}
-
-impl Events {
-    async fn open(server: &Server, last: Option<&str>) -> Events {
-        let request = reqwest::Client::new().get(format!("http://{}/v1/events", server.address));
-        let request = match last {
-            Some(id) => request.header("last-event-id", id),
-            None => request,
-        };
-        let answer = request.send().await.expect("an answer");
-        assert_eq!(answer.status(), 200);
-        Events {
-            answer,
-            text: String::new(),
-        }
-    }
-
-    /// Name, id and data of the next event.
-    async fn next(&mut self) -> (String, String, Value) {
-        loop {
-            if let Some((event, rest)) = self.text.split_once("\n\n") {
-                let (event, rest) = (event.to_owned(), rest.to_owned());
-                self.text = rest;
-                let line = |name: &str| event.lines().find_map(|line| line.strip_prefix(name));
-                if let (Some(name), Some(id), Some(data)) =
-                    (line("event: "), line("id: "), line("data: "))
-                {
-                    let data = serde_json::from_str(data).expect("JSON");
-                    return (name.to_owned(), id.to_owned(), data);
-                }
-                continue;
-            }
-            let piece = timeout(AT_MOST, self.answer.chunk())
-                .await
-                .expect("an event in time");
-            let piece = piece.expect("a stream").expect("no end");
-            self.text.push_str(&String::from_utf8_lossy(&piece));
-        }
-    }
-
-    /// Reads until an event tells of this job or batch in this state; its id.
-    async fn until(&mut self, id: &str, state: &str) -> String {
-        loop {
-            let (_, event, data) = self.next().await;
-            if data["id"] == id && data["state"] == state {
-                return event;
-            }
-        }
-    }
-}
-
 #[tokio::test]
 async fn one_stream_tells_all_work_and_goes_on_where_it_was() {
     let server = Server::start().await;
-    let before = path_of(&server.solve(&case("before", 70_000)).await);
+    let before = server.solve(&case("before", 70_000)).await["id"].clone();
     tokio::time::sleep(Duration::from_millis(2_100)).await;
-    let mut events = Events::open(&server, None).await;
-    let (name, start, _) = events.next().await;
-    assert_eq!(name, "start");
+    let mut events = Reader::open(&server, "/v1/events", None).await;
+    let start = events.next().await.expect("the first");
+    assert_eq!(start.name, "start");
+    let ended = |data: &Value| data["ended_at"].is_string();
     let job = server.solve(&case("alone", 70_001)).await["id"].clone();
-    let job = job.as_str().expect("an id");
-    let seen = events.until(job, "succeeded").await;
-    let batch = server
-        .post(
-            "/v1/batches",
-            &json!([case("x", 70_002), case("y", 70_003)]),
-        )
-        .await;
-    let batch = batch.json["id"].as_str().expect("an id").to_owned();
-    events.until(&batch, "ended").await;
-    let run = server.post("/v1/runs", &example("run.json")).await;
-    assert_eq!(run.status, 202, "{}", run.text);
-    loop {
-        let (name, _, data) = events.next().await;
-        if data["id"] == run.json["id"] {
-            assert_eq!(name, "run");
-            if data["state"] == "succeeded" {
-                assert_eq!(data["rows_done"], 4);
-                break;
-            }
+    let seen = events.until(&job, ended).await.id;
+    let cases = json!([case("x", 70_002), case("y", 70_003)]);
+    let mut batch = Value::Null;
+    for (name, path, body) in [
+        ("batch", "/v1/batches", cases),
+        ("run", "/v1/runs", example("run.json")),
+        ("evolution", "/v1/evolutions", evolution(1)),
+    ] {
+        let work = server.post(path, &body).await.is(202);
+        if name == "evolution" {
+            server.cancel(&work.location()).await;
         }
-    }
-    let evolution = server.post("/v1/evolutions", &evolution(1)).await;
-    assert_eq!(evolution.status, 202, "{}", evolution.text);
-    let path = evolution.header("location").expect("a location").to_owned();
-    server.post(&format!("{path}/cancel"), &json!({})).await;
-    loop {
-        let (name, _, data) = events.next().await;
-        if data["id"] == evolution.json["id"] {
-            assert_eq!(name, "evolution");
-            assert_eq!(data["links"]["self"], path);
-            if data["ended_at"].is_string() {
-                break;
-            }
+        let last = events.until(&work.json["id"], ended).await;
+        assert_eq!(
+            (last.name.as_str(), &last.data["links"]["self"]),
+            (name, &json!(work.location()))
+        );
+        if name == "run" {
+            assert_eq!(last.data["rows_done"], 4);
+        }
+        if name == "batch" {
+            batch = work.json["id"].clone();
         }
     }
     // Another stream from where the first one was: the batch, and nothing of long ago.
-    let mut later = Events::open(&server, Some(&seen)).await;
-    assert_eq!(later.next().await.0, "start");
-    loop {
-        let (name, _, data) = later.next().await;
-        assert!(
-            !before.ends_with(data["id"].as_str().expect("an id")),
-            "{data}"
-        );
-        if name == "batch" && data["state"] == "ended" {
-            assert_eq!(data["id"], batch.as_str());
-            break;
-        }
-    }
-    assert!(seen.parse::<i64>().expect("a moment") >= start.parse().expect("a moment"));
+    let mut later = Reader::open(&server, "/v1/events", Some(&seen)).await;
+    assert_eq!(later.next().await.expect("the first").name, "start");
+    let told = |data: &Value| {
+        assert_ne!(data["id"], before);
+        ended(data)
+    };
+    later.until(&batch, told).await;
+    assert!(seen.parse::<i64>().expect("a moment") >= start.id.parse().expect("a moment"));
 }

@@ -1,6 +1,5 @@
 //! What the service says about itself: its abilities, its contract, its tour.
 
-use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::server::{Server, example, example_text};
@@ -41,8 +40,8 @@ fn enumerated(schema: &Value) -> Vec<String> {
 #[tokio::test]
 async fn methods_name_every_word_of_the_contract() {
     let server = Server::idle().await;
-    let abilities = server.get("/v1/methods").await.json;
-    let contract: Value = server.get("/openapi.json").await.json;
+    let abilities = server.read("/v1/methods").await;
+    let contract: Value = server.read("/openapi.json").await;
     let schemas = &contract["components"]["schemas"];
     assert_eq!(words(&abilities["methods"]), enumerated(&schemas["Method"]));
     assert_eq!(
@@ -128,11 +127,7 @@ async fn readable_contract_needs_no_other_server() {
 #[tokio::test]
 async fn request_id_is_taken_over_or_made() {
     let server = Server::idle().await;
-    let answer = server
-        .send(Method::GET, "/healthz", |request| {
-            request.header("x-request-id", "abc-1")
-        })
-        .await;
+    let answer = server.get_with("/healthz", "x-request-id", "abc-1").await;
     assert_eq!(answer.header("x-request-id"), Some("abc-1"));
     let (one, two) = (server.get("/v1/jobs").await, server.get("/nowhere").await);
     assert!(one.header("x-request-id").is_some_and(|id| id.len() == 36));
@@ -157,7 +152,7 @@ async fn tour_uses_existing_examples_and_routes() {
             "{file}"
         );
     }
-    let contract = server.get("/openapi.json").await.json;
+    let contract = server.read("/openapi.json").await;
     let known = contract["paths"].as_object().expect("paths");
     let mut called = 0;
     for line in tour.lines().filter(|line| line.contains("curl ")) {
@@ -183,7 +178,7 @@ async fn tour_uses_existing_examples_and_routes() {
 #[tokio::test]
 async fn remarks_are_explained_and_those_of_an_answer_are_among_them() {
     let server = Server::idle().await;
-    let kinds = server.get("/v1/remarks").await.json;
+    let kinds = server.read("/v1/remarks").await;
     let kinds = kinds.as_array().expect("a list");
     assert!(kinds.len() > 10);
     for kind in kinds {

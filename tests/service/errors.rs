@@ -11,7 +11,9 @@ use railhead::contact::monitor::Stop;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::server::{Answer, Server, Setup, example};
+use crate::runs::{columns, template};
+use crate::server::{Answer, Server, Setup, example, link};
+use crate::support::files_below;
 
 /// Checks a failure: status, type, and a word that its detail must have.
 pub fn assert_problem(answer: &Answer, status: u16, kind: &str, word: &str) {
@@ -35,7 +37,13 @@ pub fn assert_problem(answer: &Answer, status: u16, kind: &str, word: &str) {
 #[tokio::test]
 async fn faulty_case_is_answered_with_all_its_faults() {
     let server = Server::idle().await;
-    let answer = server.post("/v1/jobs", &example("faulty.case.json")).await;
+    let keyed = async |file: &str| {
+        let case = example(file);
+        server
+            .post_with("/v1/jobs", "idempotency-key", "k", &case)
+            .await
+    };
+    let answer = keyed("faulty.case.json").await;
     assert_problem(&answer, 422, "faulty-case", "faults");
     assert_eq!(
         answer.json,
@@ -50,11 +58,10 @@ async fn faulty_case_is_answered_with_all_its_faults() {
         checked.json["errors"], answer.json["errors"],
         "checking and submitting agree"
     );
-    assert_eq!(
-        server.get("/v1/jobs").await.json["jobs"],
-        json!([]),
-        "a faulty case makes no job"
-    );
+    let listed = server.read("/v1/jobs").await;
+    assert_eq!(listed["jobs"], json!([]), "a faulty case makes no job");
+    // Nor does it take the key, under which the repaired one is sent.
+    keyed("spin.case.json").await.is(202);
 }
 
 #[tokio::test]
@@ -85,118 +92,104 @@ async fn unknown_addresses_and_methods_are_problems() {
     );
 }
 
-#[tokio::test]
-async fn idempotency_key_of_another_case_is_refused() {
-    let server = Server::idle().await;
-    let send = |file: &str| {
-        let case = example(file);
-        server.send(Method::POST, "/v1/jobs", move |request| {
-            request.header("idempotency-key", "k").json(&case)
-        })
-    };
-    assert_eq!(send("spin.case.json").await.status, 202);
-    assert_problem(
-        &send("sweep.case.json").await,
-        422,
-        "idempotency-conflict",
-        "different case",
-    );
+/// Paths of all kinds of work, a body for each, and its problems if it is not there or has not ended.
+fn kinds_of_work() -> [(&'static str, Value, [&'static str; 2]); 4] {
+    let rows = json!({ "template": template("table"), "columns": columns(3) });
+    let case = example("spin.case.json");
+    let job = ["job-not-found", "job-not-ended"];
+    [
+        (
+            "/v1/batches",
+            json!([case]),
+            ["batch-not-found", "batch-not-ended"],
+        ),
+        ("/v1/jobs", case, job),
+        ("/v1/runs", rows, ["run-not-found", "run-not-ended"]),
+        ("/v1/evolutions", crate::evolutions::request(1), job),
+    ]
 }
 
 #[tokio::test]
-async fn unknown_jobs_are_not_found_everywhere() {
+async fn unknown_work_is_not_found_everywhere() {
     let server = Server::idle().await;
-    for id in ["0198c0de-0000-7000-8000-000000000000", "not-an-id"] {
-        let job = format!("/v1/jobs/{id}");
-        assert_problem(&server.get(&job).await, 404, "job-not-found", "id");
-        assert_problem(&server.delete(&job).await, 404, "job-not-found", "id");
-        assert_problem(
-            &server
-                .send(Method::POST, &format!("{job}/cancel"), |request| request)
-                .await,
-            404,
-            "job-not-found",
-            "id",
-        );
-        for part in [
-            "result",
-            "resultants",
-            "zones",
-            "tractions",
-            "pressure",
-            "slip",
-            "case",
-        ] {
-            assert_problem(
-                &server.get(&format!("{job}/{part}")).await,
-                404,
-                "job-not-found",
-                "id",
-            );
+    for (path, _, [kind, _]) in kinds_of_work() {
+        for id in ["0198c0de-0000-7000-8000-000000000000", "not-an-id"] {
+            let work = format!("{path}/{id}");
+            assert_problem(&server.delete(&work).await, 404, kind, "id");
+            assert_problem(&server.cancel(&work).await, 404, kind, "id");
+            let waited = server.get_with(&work, "prefer", "wait=60").await;
+            assert_problem(&waited, 404, kind, "id");
+            let parts = match path {
+                "/v1/jobs" => "/result /resultants /zones /tractions /pressure /slip /case /events",
+                "/v1/evolutions" => "/result",
+                _ => "/results /events",
+            };
+            assert_problem(&server.get(&work).await, 404, kind, "id");
+            for part in parts.split(' ') {
+                let answer = server.get(&format!("{work}{part}")).await;
+                assert_problem(&answer, 404, kind, "id");
+            }
+        }
+        if path != "/v1/evolutions" {
+            let events = format!("{path}/{}/events", uuid::Uuid::nil());
+            let other = server.get_with(&events, "accept", "application/json").await;
+            assert_problem(&other, 406, "not-acceptable", "text/event-stream");
         }
     }
 }
 
 #[tokio::test]
-async fn result_asked_for_too_early_says_when_to_ask_again() {
+async fn work_that_has_not_ended_says_when_to_ask_again_and_is_cancelled_before_it_is_deleted() {
     let server = Server::idle().await;
-    let path = server.submit(&example("spin.case.json")).await;
-    for part in [
-        "result",
-        "resultants",
-        "zones",
-        "tractions",
-        "pressure",
-        "slip",
-    ] {
-        let answer = server.get(&format!("{path}/{part}")).await;
-        assert_problem(&answer, 409, "result-not-ready", "queued");
-        assert_eq!(answer.header("retry-after"), Some("1"));
+    for (path, body, [_, not_ended]) in kinds_of_work() {
+        let work = server.post(path, &body).await.is(202).location();
+        let parts = match path {
+            "/v1/jobs" => "result resultants zones tractions pressure slip",
+            "/v1/evolutions" => "result",
+            _ => "",
+        };
+        let parts: Vec<&str> = parts.split_terminator(' ').collect();
+        for part in &parts {
+            let answer = server.get(&format!("{work}/{part}")).await;
+            assert_problem(&answer, 409, "result-not-ready", "queued");
+            assert_eq!(answer.header("retry-after"), Some("1"));
+        }
+        let kept = server.delete(&work).await;
+        assert_problem(&kept, 409, not_ended, "cancel");
+        server.cancel(&work).await.is(200);
+        for part in &parts {
+            let answer = server.get(&format!("{work}/{part}")).await;
+            assert_problem(&answer, 409, "job-cancelled", "cancelled");
+        }
+        server.delete(&work).await.is(204);
+        server.get(&work).await.is(404);
     }
-    assert_problem(&server.delete(&path).await, 409, "job-not-ended", "cancel");
-}
-
-#[tokio::test]
-async fn cancelled_job_has_no_result() {
-    let server = Server::idle().await;
-    let path = server.submit(&example("spin.case.json")).await;
-    let answer = server
-        .send(Method::POST, &format!("{path}/cancel"), |request| request)
-        .await;
-    assert_eq!(
-        (answer.status, &answer.json["state"]),
-        (200, &json!("cancelled"))
-    );
-    assert_problem(
-        &server.get(&format!("{path}/result")).await,
-        409,
-        "job-cancelled",
-        "cancelled",
-    );
-    assert_eq!(server.delete(&path).await.status, 204);
 }
 
 #[tokio::test]
 async fn full_queue_refuses_and_stores_nothing() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.options.queue_max = 2;
     let server = setup.start().await;
     let case = example("spin.case.json");
-    server.submit(&case).await;
+    let keyed = async || {
+        server
+            .post_with("/v1/jobs", "idempotency-key", "k", &case)
+            .await
+    };
+    let first = keyed().await.is(202).json;
     let path = server.submit(&case).await;
     let answer = server.post("/v1/jobs", &case).await;
+    assert_eq!(keyed().await.json, first, "a known key needs no place");
     assert_problem(&answer, 503, "queue-full", "2");
     assert_eq!(answer.header("retry-after"), Some("1"));
     assert_eq!(
-        server.get("/v1/jobs").await.json["jobs"]
+        server.read("/v1/jobs").await["jobs"]
             .as_array()
             .map(Vec::len),
         Some(2)
     );
-    server
-        .send(Method::POST, &format!("{path}/cancel"), |request| request)
-        .await;
+    server.cancel(&path).await;
     server.submit(&case).await;
 }
 
@@ -205,12 +198,8 @@ async fn draining_service_is_not_ready_and_takes_no_jobs() {
     let server = Server::start().await;
     assert_eq!(server.get("/readyz").await.status, 200);
     server.jobs.drain();
-    assert_problem(
-        &server.get("/readyz").await,
-        503,
-        "draining",
-        "shutting down",
-    );
+    let answer = server.get("/readyz").await;
+    assert_problem(&answer, 503, "draining", "shutting down");
     let answer = server.post("/v1/jobs", &example("spin.case.json")).await;
     assert_problem(&answer, 503, "draining", "shutting down");
     assert_eq!(answer.header("retry-after"), Some("1"));
@@ -253,16 +242,12 @@ async fn failed_job_is_answered_with_its_reason_in_time() {
         let error = &job["error"];
         assert_eq!(error["type"], format!("/problems/{kind}"), "{job:#}");
         assert_eq!(error["status"], status);
-        let path = job["links"]["self"].as_str().expect("a link");
+        let path = link(&job, "self");
         assert_eq!(error["instance"], path);
         assert!(job.get("result").is_none(), "{job:#}");
         let reason = error["detail"].as_str().expect("a detail");
-        assert_problem(
-            &server.get(&format!("{path}/result")).await,
-            409,
-            "job-failed",
-            reason,
-        );
+        let answer = server.get(&format!("{path}/result")).await;
+        assert_problem(&answer, 409, "job-failed", reason);
         assert!(!reason.contains("a defect of the solver"), "{reason}");
         if kind == "not-converged" {
             assert_eq!(
@@ -278,7 +263,7 @@ async fn failed_job_is_answered_with_its_reason_in_time() {
 async fn field_that_was_not_asked_for_says_what_was() {
     let server = Server::start().await;
     let job = server.solve(&example("hertz-steel.case.json")).await;
-    let path = job["links"]["self"].as_str().expect("a link");
+    let path = link(&job, "self");
     for part in ["pressure", "slip"] {
         let answer = server.get(&format!("{path}/{part}")).await;
         assert_problem(
@@ -298,27 +283,16 @@ async fn field_that_was_not_asked_for_says_what_was() {
         );
     }
     assert_eq!(
-        server
-            .get(
-                job["result"]["links"]["tractions"]
-                    .as_str()
-                    .expect("a link")
-            )
-            .await
-            .status,
+        server.get(link(&job["result"], "tractions")).await.status,
         200
     );
     let mut case = example("hertz-steel.case.json");
     case["outputs"] = json!(["resultants"]);
     let job = server.solve(&case).await;
-    let path = job["links"]["self"].as_str().expect("a link");
+    let path = link(&job, "self");
     for part in ["zones", "tractions", "pressure", "slip"] {
-        assert_problem(
-            &server.get(&format!("{path}/{part}")).await,
-            404,
-            "output-not-asked",
-            "`resultants`",
-        );
+        let answer = server.get(&format!("{path}/{part}")).await;
+        assert_problem(&answer, 404, "output-not-asked", "`resultants`");
     }
 }
 
@@ -342,35 +316,21 @@ async fn job_whose_workers_fall_silent_fails_as_lost() {
 #[tokio::test]
 async fn every_kind_of_problem_explains_itself() {
     let server = Server::idle().await;
-    let kinds = server.get("/problems").await.json;
+    let kinds = server.read("/problems").await;
     let kinds = kinds.as_array().expect("a list");
     let mut seen = BTreeSet::new();
     for kind in kinds {
         let path = kind["type"].as_str().expect("a type");
         assert!(seen.insert(path.to_owned()), "{path} is there twice");
-        assert_eq!(&server.get(path).await.json, kind);
+        assert_eq!(&server.read(path).await, kind);
     }
-    // Every kind is provoked by a test here or in the files below; `internal` by a unit test of the panic handler, and `not-ready`
+    // Every kind is provoked by a test here; `internal` by a unit test of the panic handler, and `not-ready`
     // needs a job table that stops answering.
-    let here = concat!(
-        include_str!("batch_deletion.rs"),
-        include_str!("batch_tables.rs"),
-        include_str!("access.rs"),
-        include_str!("batches.rs"),
-        include_str!("caching.rs"),
-        include_str!("crowds.rs"),
-        include_str!("errors.rs"),
-        include_str!("evaluate.rs"),
-        include_str!("kept_profiles.rs"),
-        include_str!("order.rs"),
-        include_str!("cluster/database_away.rs"),
-        include_str!("requests.rs"),
-        include_str!("retention.rs"),
-        include_str!("runs.rs"),
-        include_str!("shares.rs"),
-        include_str!("storage.rs"),
-        include_str!("stored_bytes.rs")
-    );
+    let tests = files_below(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/service").as_ref());
+    let tests = tests
+        .iter()
+        .map(|file| std::fs::read_to_string(file).expect("a test"));
+    let here: String = tests.collect();
     let untested: Vec<&String> = seen
         .iter()
         .filter(|path| !["/problems/internal", "/problems/not-ready"].contains(&path.as_str()))

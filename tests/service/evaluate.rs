@@ -5,7 +5,6 @@ use std::io::{Read, Write};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::batches::small;
 use crate::caching::gzip;
 use crate::errors::assert_problem;
 use crate::server::{Server, Setup, example};
@@ -65,38 +64,29 @@ fn values_of(archive: &[u8], name: &str, bytes: usize) -> Vec<u8> {
 }
 
 #[tokio::test]
-async fn arrays_of_numpy_in_and_out_are_what_csv_is_and_runs_take_them() {
+async fn arrays_of_numpy_come_in_and_go_out() {
     let mut setup = Setup::new();
     setup.http.evaluate_max_bytes = 20_000;
     let server = setup.start().await;
     let mut case = template("table");
     case["load"]["normal_force_n"] = json!(1e5);
     case["motion"]["creepage_x"] = json!(0.0);
-    let job = server.submit(&case).await;
-    let send = async |to: &str, form: &str, body: Vec<u8>| {
-        let path = format!("{to}template={}", &job[9..]);
-        let shape =
-            |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
-        server.send(Method::POST, &path, shape).await
+    let template = server.keep(&case).await;
+    let send = async |format: &str, body: Vec<u8>| {
+        let path = format!("/v1/evaluate?format={format}&template={template}");
+        server.post_as(&path, "application/x-npz", body).await
     };
     let rows = npz(&[
         ("normal_force_n", vec![1e5, 5e4]),
         ("/motion/creepage_x", vec![1e-3, -2e-3]),
     ]);
-    let csv = b"normal_force_n,/motion/creepage_x\n100000,1e-3\n50000,-2e-3\n".to_vec();
-    let form = "application/x-npz";
-    let by_numpy = send("/v1/evaluate?", form, rows.clone()).await;
-    assert_eq!(by_numpy.status, 200, "{}", by_numpy.text);
-    assert_eq!(
-        by_numpy.json,
-        send("/v1/evaluate?", "text/csv", csv).await.json
-    );
-    let answer = send("/v1/evaluate?format=npz&", form, rows.clone()).await;
+    let columns = send("json", rows.clone()).await.is(200).json["columns"].take();
+    let answer = send("npz", rows).await;
     let forces: Vec<f64> = values_of(&answer.bytes, "force_x_n.npy", 16)
         .chunks(8)
         .map(|bytes| f64::from_le_bytes(bytes.try_into().expect("8 bytes")))
         .collect();
-    assert_eq!(json!(forces), by_numpy.json["columns"]["force_x_n"]);
+    assert_eq!(json!(forces), columns["force_x_n"]);
     let status = values_of(&answer.bytes, "status.npy", 8);
     assert_eq!(status, b"o\0\0\0k\0\0\0");
     for (columns, status, kind, detail) in [
@@ -120,12 +110,9 @@ async fn arrays_of_numpy_in_and_out_are_what_csv_is_and_runs_take_them() {
             "20000",
         ),
     ] {
-        let answer = send("/v1/evaluate?", form, npz(&columns)).await;
+        let answer = send("json", npz(&columns)).await;
         assert_problem(&answer, status, kind, detail);
     }
-    let run = send("/v1/runs?", form, rows).await;
-    assert_eq!(run.status, 202, "{}", run.text);
-    assert_eq!(run.json["rows"], json!(2));
 }
 
 #[tokio::test]
@@ -141,8 +128,7 @@ async fn creepages_and_spin_that_the_template_leaves_out_are_0() {
 #[tokio::test]
 async fn rows_are_answered_without_a_job() {
     let server = Server::idle().await;
-    let answer = evaluate(&server, template("auto"), columns()).await;
-    assert_eq!(answer.status, 200, "{}", answer.text);
+    let answer = evaluate(&server, template("auto"), columns()).await.is(200);
     assert_eq!(answer.json["rows"], 3);
     let column = |name: &str, row: usize| answer.json["columns"][name][row].as_f64();
     let force = |row| column("force_x_n", row).expect("a force");
@@ -158,7 +144,7 @@ async fn rows_are_answered_without_a_job() {
         assert!((0.0..=1.0).contains(&stick));
         assert_eq!(answer.json["columns"]["status"][row], "ok");
     }
-    assert_eq!(server.get("/v1/jobs").await.json["jobs"], json!([]));
+    assert_eq!(server.read("/v1/jobs").await["jobs"], json!([]));
     let mut by_table = template("table");
     by_table["outputs"] = json!(["resultants", "gradients"]);
     let answer = evaluate(&server, by_table, columns()).await;
@@ -167,39 +153,6 @@ async fn rows_are_answered_without_a_job() {
         slope.as_f64().is_some_and(|slope| slope > 1e6),
         "{}",
         answer.text
-    );
-}
-
-#[tokio::test]
-async fn a_table_of_rows_is_answered_as_csv_with_a_line_for_each() {
-    let server = Server::idle().await;
-    let mut case = small("template");
-    case["solver"] = json!({ "method": "table" });
-    let path = server.submit(&case).await;
-    let id = path.rsplit('/').next().expect("an id").to_owned();
-    let table = "normal_force_n,creepage_x,creepage_y,spin_per_mm\r\n80000,0.001,0,0\r\n9e4,0,0.0005,-2e-4\r\n";
-    let post = |query: String, text: &'static str| {
-        let path = format!("/v1/evaluate{query}");
-        let server = &server;
-        async move {
-            let shape = |request: reqwest::RequestBuilder| {
-                request.header("content-type", "text/csv").body(text)
-            };
-            server.send(Method::POST, &path, shape).await
-        }
-    };
-    let answer = post(format!("?template={id}&format=csv"), table).await;
-    assert_eq!(answer.status, 200, "{}", answer.text);
-    let lines: Vec<&str> = answer.text.lines().collect();
-    assert_eq!(lines.len(), 3, "{}", answer.text);
-    assert!(lines[0].starts_with("force_x_n,force_y_n,moment_z_n_mm,error_estimate,"));
-    let answer = post(format!("?template={id}"), "creepage_x\n0.1\nten\n").await;
-    assert_problem(&answer, 422, "faulty-table", "line 3, column `creepage_x`");
-    assert_problem(
-        &post(String::new(), table).await,
-        400,
-        "bad-query",
-        "template",
     );
 }
 
@@ -273,44 +226,13 @@ fn wheel_on_rail() -> (Value, Value) {
 }
 
 #[tokio::test]
-async fn any_case_is_answered_as_its_job_is() {
-    let server = Server::start().await;
-    let mut unlike = template("fastsim");
-    unlike["load"]["normal_force_n"] = json!(1e5);
-    unlike["motion"]["creepage_x"] = json!(0.001);
-    unlike["solver"] = json!({ "method": "boundary_element", "target_error": 0.02 });
-    unlike["outputs"] = json!(["resultants", "zones"]);
-    let (wheel, columns) = wheel_on_rail();
-    for case in [unlike, wheel] {
-        let job = server.solve(&case).await;
-        let total = &job["result"]["total"][0];
-        assert!(total["force_x_n"].is_number(), "{job}");
-        let answer = evaluate(&server, case, columns.clone()).await;
-        assert_eq!(answer.status, 200, "{}", answer.text);
-        let rows = &answer.json["columns"];
-        for name in ["force_x_n", "force_y_n", "moment_z_n_mm"] {
-            assert_eq!(rows[name][0], total[name], "{name}");
-        }
-        assert_eq!(rows["status"], json!(["ok"]));
-        assert!(rows["patches"][0].as_f64() >= Some(1.0));
-    }
-    assert_eq!(
-        server.get("/v1/jobs").await.json["jobs"]
-            .as_array()
-            .map(Vec::len),
-        Some(2)
-    );
-}
-
-#[tokio::test]
 async fn auto_solves_the_rows_that_the_table_leaves() {
     let server = Server::idle().await;
     let mut case = template("auto");
     // Far beyond the table.
     case["contact"] = json!({ "type": "ellipse", "a_mm": 12.0, "b_mm": 1.0 });
     let columns = json!({ "/load/normal_force_n": [5e4], "/motion/creepage_x": [0.001] });
-    let answer = evaluate(&server, case, columns).await;
-    assert_eq!(answer.status, 200, "{}", answer.text);
+    let answer = evaluate(&server, case, columns).await.is(200);
     let rows = &answer.json["columns"];
     assert!(rows["force_x_n"][0].as_f64() > Some(1e3), "{}", answer.text);
     assert_eq!(rows["status"], json!(["ok"]));
@@ -318,8 +240,7 @@ async fn auto_solves_the_rows_that_the_table_leaves() {
 
 #[tokio::test]
 async fn rows_beyond_the_budget_of_the_solver_belong_to_a_run() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.http.evaluate_time = std::time::Duration::ZERO;
     let server = setup.start().await;
     let (case, columns) = wheel_on_rail();
@@ -344,8 +265,7 @@ async fn a_packed_table_leaves_memory_for_the_solver() {
     let server = Server::start().await;
     let mut case = example("hertz-steel.case.json");
     case["solver"] = json!({ "method": "fastsim", "mesh": { "strips": 30, "cells": 30 } });
-    let location = server.submit(&case).await;
-    let id = location.rsplit('/').next().expect("an id");
+    let id = server.keep(&case).await;
     for rows in [2, 1000] {
         let row = |row: usize| format!("{}\n", 1e-6 * row as f64);
         let table = format!("creepage_x\n{}", (0..rows).map(row).collect::<String>());

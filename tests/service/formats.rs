@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
 use std::process::Command;
 
-use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
@@ -127,7 +126,7 @@ async fn every_form_of_the_cells_says_the_same_numbers() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("spin.case.json")).await);
     for (part, names) in PARTS {
-        let cells = server.get(&format!("{path}/{part}")).await.json["cells"].take();
+        let cells = server.read(&format!("{path}/{part}")).await["cells"].take();
         let table = server.get(&format!("{path}/{part}?format=csv")).await;
         let header: Vec<&str> = PLACES.iter().chain(names).copied().collect();
         assert_eq!(
@@ -166,7 +165,7 @@ async fn every_form_of_a_grid_says_the_same_numbers() {
     let path = path_of(&server.solve(&example("spin.case.json")).await);
     for (part, names) in PARTS {
         let query = format!("{path}/{part}?grid=9x5");
-        let field = server.get(&query).await.json;
+        let field = server.read(&query).await;
         let table = read_csv(&server.get(&format!("{query}&format=csv")).await);
         let archive = read_npz(&server.get(&format!("{query}&format=npz")).await);
         let (x, y) = (numbers(&field["x_mm"]), numbers(&field["y_mm"]));
@@ -206,7 +205,7 @@ async fn numpy_reads_the_archive() {
     let output = output.expect("python runs");
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let force: f64 = text.trim().parse().unwrap_or_else(|_| panic!("{output:?}"));
-    let cells = server.get(&format!("{path}/tractions")).await.json["cells"].take();
+    let cells = server.read(&format!("{path}/tractions")).await["cells"].take();
     let column = |name: &str| numbers(&cells[name]);
     let (values, dx, dy) = (column("traction_y_mpa"), column("dx_mm"), column("dy_mm"));
     let areas = dx.iter().zip(&dy).map(|(dx, dy)| dx * dy);
@@ -227,9 +226,7 @@ async fn the_form_is_chosen_by_query_before_accept() {
     let path = path_of(&server.solve(&example("spin.case.json")).await);
     let ask = async |query: &str, accept: &str| {
         let path = format!("{path}/{query}");
-        let send = server.send(Method::GET, &path, |request| {
-            request.header("accept", accept)
-        });
+        let send = server.get_with(&path, "accept", accept);
         send.await
     };
     for (query, accept, expected) in [
@@ -278,7 +275,7 @@ async fn the_form_is_chosen_by_query_before_accept() {
 async fn resultants_as_a_table_have_a_line_per_patch_motion_and_sum() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("two-patches.case.json")).await);
-    let whole = server.get(&format!("{path}/resultants")).await.json;
+    let whole = server.read(&format!("{path}/resultants")).await;
     let patches = whole["patches"].as_array().expect("patches");
     let motions = whole["total"].as_array().expect("totals").len();
     assert!(patches.len() > 1);

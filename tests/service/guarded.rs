@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use railhead::jobs::Options;
 use railhead::jobs::keys::Keyring;
-use reqwest::Method;
+use reqwest::{Body, Method, RequestBuilder};
 use serde_json::{Value, json};
 
 use crate::server::{Answer, Server, Setup};
-use crate::support::{case, pause};
+use crate::support::pause;
 
 /// A service with keys of two tenants and of the operator, and one that is bound to a label.
 pub struct Guarded {
@@ -52,7 +52,7 @@ impl Guarded {
         path: &str,
         body: Option<&Value>,
     ) -> Answer {
-        let shape = |request: reqwest::RequestBuilder| {
+        let shape = |request: RequestBuilder| {
             let request = request.bearer_auth(key);
             match body {
                 Some(body) => request.json(body),
@@ -62,23 +62,43 @@ impl Guarded {
         self.server.send(method, path, shape).await
     }
 
+    pub async fn post(&self, key: &str, path: &str, body: &Value) -> Answer {
+        self.send(key, Method::POST, path, Some(body)).await
+    }
+
+    /// Sends a body of some media type.
+    pub async fn post_as(
+        &self,
+        key: &str,
+        path: &str,
+        form: &str,
+        body: impl Into<Body>,
+    ) -> Answer {
+        let shape = |request: RequestBuilder| {
+            let request = request.bearer_auth(key).header("content-type", form);
+            request.body(body)
+        };
+        self.server.send(Method::POST, path, shape).await
+    }
+
+    pub async fn cancel(&self, key: &str, path: &str) -> Answer {
+        let path = format!("{path}/cancel");
+        self.send(key, Method::POST, &path, None).await
+    }
+
     pub async fn get(&self, key: &str, path: &str) -> Answer {
         self.send(key, Method::GET, path, None).await
     }
 
     pub async fn submit(&self, key: &str, case: &Value) -> String {
         let answer = self.send(key, Method::POST, "/v1/jobs", Some(case)).await;
-        assert_eq!(answer.status, 202, "{}", answer.text);
-        answer.header("location").unwrap().to_owned()
+        answer.is(202).location()
     }
 
     pub async fn batch(&self, key: &str, cases: &[Value]) -> String {
         let cases = json!(cases);
-        let answer = self
-            .send(key, Method::POST, "/v1/batches", Some(&cases))
-            .await;
-        assert_eq!(answer.status, 202, "{}", answer.text);
-        answer.header("location").unwrap().to_owned()
+        let sent = self.send(key, Method::POST, "/v1/batches", Some(&cases));
+        sent.await.is(202).location()
     }
 
     pub async fn until_ended(&self, key: &str, path: &str) -> Value {
@@ -90,11 +110,4 @@ impl Guarded {
             pause().await;
         }
     }
-}
-
-/// A case with this normal force.
-pub fn loaded(newtons: u32) -> Value {
-    let mut case = case("one of many");
-    case["load"]["normal_force_n"] = json!(newtons);
-    case
 }

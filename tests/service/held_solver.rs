@@ -6,7 +6,6 @@ use std::sync::mpsc;
 use nix::sys::ptrace::{self, Options};
 use nix::sys::wait::{WaitPidFlag, waitpid};
 use nix::unistd::Pid;
-use reqwest::Method;
 
 use crate::support::{Service, endless_case};
 
@@ -18,8 +17,7 @@ async fn a_process_with_more_deaf_solvers_than_allowed_ends_to_be_started_again(
     let id = service.submit(&endless_case("deaf")).await;
     service.until(&id, "running").await;
     let holder = hold(service.id(), "solver-0");
-    let cancel = service.request(Method::POST, &format!("/v1/jobs/{id}/cancel"));
-    assert!(cancel.send().await.unwrap().status().is_success());
+    service.cancel(&id).await;
     let ended = tokio::task::spawn_blocking(move || service.wait());
     let ended = ended.await.unwrap();
     holder.join().unwrap();

@@ -1,10 +1,9 @@
 //! Cross-sections kept once and named by cases, batches and runs.
 
-use std::time::{Duration, Instant};
-
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
+use crate::runs::answers;
 use crate::server::{Server, Setup, example};
 
 /// The shipped wheel on a rail, its two cross-sections and the same case without them.
@@ -17,8 +16,7 @@ fn pair() -> (Value, Value, Value) {
 }
 
 async fn keep(server: &Server, section: &Value) -> Value {
-    let answer = server.post("/v1/profiles", section).await;
-    assert_eq!(answer.status, 201, "{}", answer.text);
+    let answer = server.post("/v1/profiles", section).await.is(201);
     answer.json
 }
 
@@ -46,9 +44,9 @@ async fn a_case_that_names_its_profiles_is_the_case_with_their_points() {
             "/v1/profiles/{}",
             kept_rail["digest"].as_str().expect("a digest")
         );
-        assert_eq!(server.get(&path).await.json, rail);
+        assert_eq!(server.read(&path).await, rail);
         assert_eq!(
-            server.get("/v1/profiles").await.json["profiles"]
+            server.read("/v1/profiles").await["profiles"]
                 .as_array()
                 .map(Vec::len),
             Some(2)
@@ -72,9 +70,9 @@ async fn assert_pages(server: &Server) {
         first.header("link"),
         Some(&*format!("<{next}>; rel=\"next\""))
     );
-    let second = server.get(&next).await.json;
+    let second = server.read(&next).await;
     assert_eq!(second["next_cursor"], Value::Null);
-    let all = server.get("/v1/profiles").await.json["profiles"].clone();
+    let all = server.read("/v1/profiles").await["profiles"].clone();
     assert_eq!(
         all,
         json!([first.json["profiles"][0], second["profiles"][0]])
@@ -91,27 +89,12 @@ async fn assert_run(server: &Server, named: &Value, rail: &Value) {
     let rows = json!({ "template": named, "columns": {
         "/contact/rail/profile": [rail["digest"], rail["digest"]], "lateral_shift_mm": [0.0, 1.0]
     } });
-    let answer = server.post("/v1/runs", &rows).await;
-    assert_eq!(answer.status, 202, "{}", answer.text);
-    let run = answer.header("location").expect("a location").to_owned();
-    let begun = Instant::now();
-    while !server.get(&run).await.json["ended_at"].is_string() {
-        assert!(begun.elapsed() < Duration::from_secs(60));
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
-    let results = server.get(&format!("{run}/results")).await.text;
-    let rows: Vec<Value> = results
-        .lines()
-        .map(|line| serde_json::from_str(line).expect("JSON"))
-        .collect();
+    let run = server.post("/v1/runs", &rows).await.is(202).location();
+    let rows = answers(server, &run).await;
     let mut single = named.clone();
     single["contact"]["lateral_shift_mm"] = json!(1.0);
     let single = server.solve(&single).await;
-    assert_eq!(
-        &rows[1]["force_y_n"],
-        forces(&single["result"]),
-        "{results}"
-    );
+    assert_eq!(&rows[1]["force_y_n"], forces(&single["result"]));
     assert_ne!(rows[0]["force_y_n"], rows[1]["force_y_n"]);
     let mut unknown =
         json!({ "template": named, "columns": { "/contact/rail/profile": ["nothing"] } });
@@ -129,8 +112,7 @@ async fn assert_run(server: &Server, named: &Value, rail: &Value) {
 
 #[tokio::test]
 async fn profiles_are_bounded_and_faulty_ones_are_refused() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     let (case, rail, wheel) = pair();
     setup.options.tenant_profiles_max_bytes = rail.to_string().len() as u64 + 10;
     let server = setup.start().await;

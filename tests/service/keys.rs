@@ -1,14 +1,15 @@
 //! Keys made and revoked beside the real program, what its start refuses, and what browsers are told.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Output;
 use std::time::{Duration, Instant};
 
 use reqwest::Method;
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use crate::server::Server;
-use crate::support::{Service, endless_case, pause, railhead};
+use crate::errors::assert_problem;
+use crate::server::{Answer, Server};
+use crate::support::{Service, endless_case, files_below, pause, railhead};
 
 fn keys(data_dir: &Path, args: &[&str]) -> Output {
     let mut command = railhead();
@@ -26,20 +27,6 @@ fn make_key(data_dir: &Path, tenant: &str) -> String {
     let key = text.trim().to_owned();
     assert_eq!(key.len(), "rh_".len() + 12 + 1 + 64, "{text:?}");
     key
-}
-
-fn files_below(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).unwrap();
-    let paths = entries.map(|entry| entry.unwrap().path());
-    paths
-        .flat_map(|path| {
-            if path.is_dir() {
-                files_below(&path)
-            } else {
-                vec![path]
-            }
-        })
-        .collect()
 }
 
 #[tokio::test]
@@ -88,121 +75,13 @@ async fn ask(
     key: &str,
     (method, path): (Method, &str),
     body: Option<&Value>,
-) -> (u16, Value) {
+) -> Answer {
     let request = service.request(method, path).bearer_auth(key);
-    let request = match body {
+    Answer::to(match body {
         Some(body) => request.json(body),
         None => request,
-    };
-    let answer = request.send().await.unwrap();
-    let status = answer.status().as_u16();
-    (status, answer.json().await.unwrap_or(Value::Null))
-}
-
-/// A key of everything that the tenant `north` has, and one that is bound to line 7.
-fn key_and_bound_key(folder: &Path) -> (String, String) {
-    let flags = ["create", "--tenant", "north", "--label", "line:7"];
-    let made = String::from_utf8(keys(folder, &flags).stdout).unwrap();
-    (make_key(folder, "north"), made.trim().to_owned())
-}
-
-/// Rows of a run.
-fn rows() -> Value {
-    let mut template = crate::support::case("rows");
-    template["outputs"] = json!(["resultants"]);
-    json!({ "template": template, "columns": { "/friction/coefficient": [0.2, 0.3] } })
-}
-
-#[tokio::test]
-async fn a_key_bound_to_a_label_opens_nothing_of_others() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &[]);
-    let (all, bound) = key_and_bound_key(folder.path());
-    let case = crate::support::case("on a line");
-    let submit = async |key: &str| {
-        let request = service.request(Method::POST, "/v1/jobs").bearer_auth(key);
-        let request = request.header("idempotency-key", "one-of-all").json(&case);
-        let answer = request.send().await.unwrap();
-        let status = answer.status().as_u16();
-        (status, answer.json::<Value>().await.unwrap())
-    };
-    let (status, other) = submit(&all).await;
-    assert_eq!(status, 202, "{other}");
-    // The same case and the same key of idempotency: nothing of another line may be answered.
-    let (status, conflict) = submit(&bound).await;
-    assert_eq!(status, 422, "{conflict}");
-    let other = other["links"]["self"].as_str().unwrap();
-    let (_, batch) = {
-        let cases = json!([case]);
-        ask(&service, &all, (Method::POST, "/v1/batches"), Some(&cases)).await
-    };
-    let batch = batch["links"]["self"].as_str().unwrap();
-    let rows = rows();
-    let (_, run) = ask(&service, &all, (Method::POST, "/v1/runs"), Some(&rows)).await;
-    let run = run["links"]["self"].as_str().unwrap();
-    for (method, path) in [
-        (Method::GET, run),
-        (Method::GET, &format!("{run}/results")),
-        (Method::GET, &format!("{run}/manifest")),
-        (Method::GET, &format!("{run}/totals")),
-        (Method::POST, &format!("{run}/cancel")),
-        (Method::DELETE, run),
-        (Method::GET, other),
-        (Method::GET, &format!("{other}/case")),
-        (Method::GET, &format!("{other}/result")),
-        (Method::GET, &format!("{other}/events")),
-        (Method::POST, &format!("{other}/cancel")),
-        (Method::DELETE, other),
-        (Method::GET, batch),
-        (Method::GET, &format!("{batch}/results")),
-        (Method::POST, &format!("{batch}/cancel")),
-        (Method::DELETE, batch),
-    ] {
-        let (status, _) = ask(&service, &bound, (method.clone(), path), None).await;
-        assert_eq!(status, 404, "{method} {path}");
-    }
-    for list in ["jobs", "batches", "runs"] {
-        let path = format!("/v1/{list}");
-        let (_, page) = ask(&service, &bound, (Method::GET, &path), None).await;
-        assert_eq!(page[list], json!([]));
-    }
-}
-
-#[tokio::test]
-async fn a_key_bound_to_a_label_gives_it_to_what_it_makes() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &[]);
-    let (all, bound) = key_and_bound_key(folder.path());
-    let mut foreign = crate::support::case("on a line");
-    foreign["labels"] = json!({ "line": "8" });
-    let mut own = foreign.clone();
-    own["labels"] = json!({ "km": "12.4" });
-    let cases = json!([foreign, own]);
-    let (status, refused) = ask(
-        &service,
-        &bound,
-        (Method::POST, "/v1/jobs"),
-        Some(&cases[0]),
-    )
-    .await;
-    assert_eq!(status, 422, "{refused}");
-    assert_eq!(refused["errors"][0]["pointer"], "/labels/line", "{refused}");
-    let path = "/v1/batches?on_invalid=skip";
-    let (status, batch) = ask(&service, &bound, (Method::POST, path), Some(&cases)).await;
-    assert_eq!((status, &batch["rejected"]), (202, &json!(1)), "{batch}");
-    for key in [&bound, &all] {
-        let get = async |path| ask(&service, key, (Method::GET, path), None).await.1;
-        let jobs = get("/v1/jobs").await;
-        let labels = &jobs["jobs"][0]["labels"];
-        assert_eq!(*labels, json!({ "line": "7", "km": "12.4" }), "{jobs}");
-        let batches = get("/v1/batches").await;
-        let labels = &batches["batches"][0]["labels"];
-        assert_eq!(*labels, json!({ "line": "7" }), "{batches}");
-    }
-    let (_, run) = ask(&service, &bound, (Method::POST, "/v1/runs"), Some(&rows())).await;
-    assert_eq!(run["labels"], json!({ "line": "7" }), "{run}");
-    let (_, me) = ask(&service, &bound, (Method::GET, "/v1/me"), None).await;
-    assert_eq!(me["labels"], json!({ "line": "7" }));
+    })
+    .await
 }
 
 #[tokio::test]
@@ -217,14 +96,13 @@ async fn a_key_that_may_only_read_changes_nothing() {
         ask(&service, key, (method, path), body).await
     };
     let case = crate::support::case("shown in a hall");
-    let (status, job) = ask(&own, Method::POST, "/v1/jobs", Some(&case)).await;
-    assert_eq!(status, 202);
-    let path = job["links"]["self"].as_str().unwrap();
+    let job = ask(&own, Method::POST, "/v1/jobs", Some(&case)).await;
+    let path = &job.is(202).location();
     for read in [path, "/v1/jobs", "/v1/me", &format!("{path}/case")] {
-        assert_eq!(ask(reader, Method::GET, read, None).await.0, 200, "{read}");
+        ask(reader, Method::GET, read, None).await.is(200);
     }
-    let checked = ask(reader, Method::POST, "/v1/cases/check", Some(&case)).await;
-    assert_eq!(checked.0, 200);
+    let checked = ask(reader, Method::POST, "/v1/cases/check", Some(&case));
+    checked.await.is(200);
     let cases = Value::Array(vec![case.clone()]);
     for (method, changed, body) in [
         (Method::POST, "/v1/jobs".to_owned(), Some(&case)),
@@ -232,12 +110,8 @@ async fn a_key_that_may_only_read_changes_nothing() {
         (Method::POST, format!("{path}/cancel"), None),
         (Method::DELETE, path.to_owned(), None),
     ] {
-        let (status, problem) = ask(reader, method, &changed, body).await;
-        assert_eq!(
-            (status, &problem["type"]),
-            (403, &Value::from("/problems/forbidden")),
-            "{changed}"
-        );
+        let refused = ask(reader, method, &changed, body).await;
+        assert_problem(&refused, 403, "forbidden", "");
     }
     let listed = String::from_utf8(keys(folder.path(), &["list"]).stdout).unwrap();
     let may = |key: &str| {

@@ -77,7 +77,6 @@ mod store;
 mod store_back;
 mod store_expiry;
 mod store_jobs;
-mod store_keys;
 mod store_lists;
 mod store_model;
 mod store_moves;

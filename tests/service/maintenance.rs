@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
 use crate::results::{number, numbers, path_of};
-use crate::server::{Server, Setup, example};
+use crate::server::{Server, Setup, example, link};
 
 #[tokio::test]
 async fn parts_of_maintenance_say_what_the_result_says() {
@@ -19,9 +19,8 @@ async fn parts_of_maintenance_say_what_the_result_says() {
         assert_eq!(links[part], format!("{path}/{part}"));
     }
     let stresses = server
-        .get(&format!("{path}/subsurface?patch=0&point=0"))
-        .await
-        .json;
+        .read(&format!("{path}/subsurface?patch=0&point=0"))
+        .await;
     assert_eq!(stresses["worst"], point["subsurface"]["worst"]);
     assert_eq!(stresses["body"], "lower");
     let points = stresses["points"].as_array().expect("points");
@@ -39,11 +38,11 @@ async fn parts_of_maintenance_say_what_the_result_says() {
         .text;
     assert_eq!(csv.lines().count(), 8);
     assert!(csv.starts_with("x_mm,y_mm,depth_mm,stress_xx_mpa"));
-    let damage = server.get(&format!("{path}/damage")).await.json;
+    let damage = server.read(&format!("{path}/damage")).await;
     assert_eq!(damage["t_gamma"], point["damage"]["t_gamma"]);
     assert_eq!(damage["parameters"], job["result"]["damage_parameters"]);
     assert_eq!(damage["parameters"]["set"], "900a-r8t-1");
-    let field = server.get(&format!("{path}/temperature")).await.json;
+    let field = server.read(&format!("{path}/temperature")).await;
     let hottest = numbers(&field["cells"]["temperature_c"])
         .into_iter()
         .fold(0.0, f64::max);
@@ -70,7 +69,7 @@ async fn a_part_that_was_not_asked_for_says_so_and_a_batch_has_columns_for_it() 
     let mut plain = example("maintenance.case.json");
     let check = server.post("/v1/cases/check", &plain).await.json;
     let batch = server.post("/v1/batches", &json!([plain])).await.json;
-    let results = batch["links"]["results"].as_str().expect("a link");
+    let results = link(&batch, "results");
     let columns = "usfd_depth_nm,archard_depth_nm,wlrm_damage,von_mises_max_mpa,temperature_max_c";
     let table = server
         .get(&format!("{results}?wait=60&format=csv&columns={columns}"))

@@ -13,7 +13,7 @@ async fn parameters_that_nobody_knows_are_refused_everywhere() {
     let server = Server::start().await;
     let job = path_of(&server.solve(&small("one")).await);
     let sent = server.post("/v1/batches", &json!([small("two")])).await;
-    let batch = sent.header("location").expect("a place").to_owned();
+    let batch = sent.location();
     let gets = [
         job.clone(),
         format!("{job}/case"),
@@ -81,7 +81,7 @@ async fn the_limits_of_a_service_can_be_asked_for() {
     setup.http.batch_max_cases = 66;
     setup.http.grid_max_samples = 4444;
     let server = setup.start().await;
-    let limits = server.get("/v1/methods").await.json["limits"].clone();
+    let limits = server.read("/v1/methods").await["limits"].clone();
     for (name, value) in [
         ("motions_max", json!(77)),
         ("queue_max", json!(55)),
@@ -98,13 +98,7 @@ async fn the_limits_of_a_service_can_be_asked_for() {
 async fn figures_come_in_the_form_that_is_accepted() {
     let server = Server::start().await;
     server.solve(&small("one")).await;
-    let get = async |accept: &'static str| {
-        server
-            .send(Method::GET, "/metrics", |request| {
-                request.header("accept", accept)
-            })
-            .await
-    };
+    let get = async |accept: &'static str| server.get_with("/metrics", "accept", accept).await;
     let new = get("application/openmetrics-text;version=1.0.0,text/plain;q=0.5").await;
     assert!(new.text.ends_with("# EOF\n"));
     let old = get("text/plain").await;

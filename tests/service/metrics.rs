@@ -11,8 +11,7 @@ use crate::support::case;
 
 /// The samples of `/metrics`: name with labels, value.
 pub async fn samples(server: &Server) -> BTreeMap<String, f64> {
-    let answer = server.get("/metrics").await;
-    assert_eq!(answer.status, 200, "{}", answer.text);
+    let answer = server.get("/metrics").await.is(200);
     let kind = answer.header("content-type").unwrap_or_default();
     assert!(kind.starts_with("application/openmetrics-text"), "{kind}");
     assert!(answer.text.ends_with("# EOF\n"), "the end is marked");
@@ -85,7 +84,7 @@ async fn waiting_failed_cancelled_and_large_jobs_are_seen() {
     assert!(value(&waiting, "railhead_queue_cost_seconds") > 0.0);
 
     for _ in 0..2 {
-        server.post(&format!("{other}/cancel"), &json!({})).await;
+        server.cancel(&other).await;
     }
     server.jobs.start().expect("workers start");
     let id = path.rsplit('/').next().unwrap().parse().unwrap();

@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use futures_util::future::join_all;
-use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::server::{Server, example};
@@ -19,11 +18,7 @@ const REQUESTS: usize = 6;
 async fn submit(server: &Server, path: &str, key: &str, body: &Value) -> Vec<(u16, String)> {
     let one = async |number: usize| {
         tokio::time::sleep(Duration::from_millis(3 * number as u64)).await;
-        let answer = server
-            .send(Method::POST, path, |request| {
-                request.header("idempotency-key", key).json(body)
-            })
-            .await;
+        let answer = server.post_with(path, "idempotency-key", key, body).await;
         let id = answer.json["id"].as_str().unwrap_or_default().to_owned();
         (answer.status, id)
     };
@@ -69,6 +64,6 @@ async fn one_key_makes_one_batch_and_one_run_while_others_write() {
     for writer in writers {
         writer.await.unwrap();
     }
-    let page = server.get("/v1/runs?limit=100").await.json;
+    let page = server.read("/v1/runs?limit=100").await;
     assert_eq!(page["runs"].as_array().unwrap().len(), KEYS);
 }

@@ -1,29 +1,15 @@
 //! Priorities, deadlines, and clocks that jump: who is solved first, and who too late?
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
 use railhead::contact;
 use railhead::jobs::State;
-use railhead::jobs::clock::Clock;
-use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
 use crate::batches::small;
 use crate::errors::assert_problem;
-use crate::server::{Server, Setup};
-use crate::support::{case, pause, tick_forever};
-
-const DAY_MS: i64 = 24 * 3600 * 1000;
-
-/// A clock that a test turns.
-fn turned() -> (Clock, Arc<AtomicI64>) {
-    let ahead = Arc::new(AtomicI64::new(0));
-    let (shown, system) = (ahead.clone(), Clock::system());
-    let clock = Clock::new(move || system.now_ms() + shown.load(Ordering::SeqCst));
-    (clock, ahead)
-}
+use crate::server::{Server, Setup, link};
+use crate::support::{DAY_MS, Turned, case, tick_forever};
 
 async fn submit(server: &Server, query: &str, case: &Value) -> Value {
     let answer = server.post(&format!("/v1/jobs{query}"), case).await;
@@ -32,15 +18,7 @@ async fn submit(server: &Server, query: &str, case: &Value) -> Value {
 }
 
 async fn until(server: &Server, job: &Value, state: &str) -> Value {
-    let path = job["links"]["self"].as_str().expect("a link");
-    loop {
-        let job = server.get(path).await.json;
-        if job["state"] == state {
-            return job;
-        }
-        assert!(job["ended_at"].is_null(), "{state} was expected: {job}");
-        pause().await;
-    }
+    server.until(link(job, "self"), state).await
 }
 
 #[tokio::test]
@@ -49,8 +27,8 @@ async fn late_jobs_fail_whether_queued_or_running_and_others_do_not() {
         Some("endless") => Err(tick_forever(monitor)),
         _ => contact::solve(checked, monitor),
     });
-    let (clock, ahead) = turned();
-    setup.options.clock = clock;
+    let turned = Turned::default();
+    setup.options.clock = turned.clock();
     // The jump shall not cost the running job its lease.
     setup.options.lease = Duration::from_secs(3600);
     let server = setup.start().await;
@@ -64,7 +42,7 @@ async fn late_jobs_fail_whether_queued_or_running_and_others_do_not() {
         (&json!("high"), &json!("normal"))
     );
     assert_eq!(patient["deadline_at"], Value::Null);
-    ahead.store(61_000, Ordering::SeqCst);
+    turned.set(61_000);
     for job in [&queued, &running] {
         let job = until(&server, job, "failed").await;
         assert_eq!(job["error"]["type"], "/problems/deadline-passed", "{job}");
@@ -85,10 +63,7 @@ async fn wishes_hold_for_every_job_of_a_batch_and_bad_ones_are_refused() {
         .post("/v1/batches?priority=low&deadline_s=3600", &cases)
         .await
         .json;
-    let path = batch["links"]["jobs"].as_str();
-    let id = batch["id"].as_str().expect("an id");
-    let path = path.map_or(format!("/v1/jobs?batch={id}"), ToOwned::to_owned);
-    let jobs = server.get(&path).await.json;
+    let jobs = server.read(link(&batch, "jobs")).await;
     let jobs = jobs["jobs"].as_array().expect("jobs");
     assert_eq!(jobs.len(), 2);
     for job in jobs {
@@ -113,8 +88,8 @@ async fn wishes_hold_for_every_job_of_a_batch_and_bad_ones_are_refused() {
 #[tokio::test]
 async fn a_clock_that_jumps_loses_no_job() {
     let mut setup = Setup::new();
-    let (clock, ahead) = turned();
-    setup.options.clock = clock;
+    let turned = Turned::default();
+    setup.options.clock = turned.clock();
     setup.options.workers = 2;
     setup.options.cache = false;
     let server = setup.start().await;
@@ -124,16 +99,9 @@ async fn a_clock_that_jumps_loses_no_job() {
             .map(|number| small(&format!("{jump} {number}")))
             .collect();
         let batch = server.post("/v1/batches", &json!(cases)).await.json;
-        jobs.push(
-            batch["links"]["results"]
-                .as_str()
-                .expect("a link")
-                .to_owned(),
-        );
-        ahead.store(jump, Ordering::SeqCst);
-        let single =
-            |request: RequestBuilder| request.header("prefer", "wait=30").json(&case("single"));
-        let job = server.send(Method::POST, "/v1/jobs", single).await.json;
+        jobs.push(link(&batch, "results").to_owned());
+        turned.set(jump);
+        let job = server.solve(&case("single")).await;
         assert_eq!(job["state"], "succeeded", "{job}");
     }
     for results in jobs {

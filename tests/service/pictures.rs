@@ -255,7 +255,7 @@ async fn pictures_share_a_scale_when_asked() {
     };
     let middle = |pixels: &Pixmap| light(pixels, pixels.width() / 2, pixels.height() / 2);
     let own = get("").await;
-    let result = server.get(&format!("{path}/result")).await.json;
+    let result = server.read(&format!("{path}/result")).await;
     let largest = result["patches"][0]["pressure_max_mpa"]
         .as_f64()
         .expect("a number");
@@ -324,7 +324,7 @@ async fn a_creep_curve_has_a_bar_for_every_estimated_error() {
     assert_eq!(Pixmap::decode_png(&png.bytes).expect("a PNG").width(), 640);
 
     // A bar is as long as twice the error in the scale of the curve.
-    let result = server.get(&format!("{path}/resultants")).await.json;
+    let result = server.read(&format!("{path}/resultants")).await;
     let total = result["total"].as_array().expect("motions");
     let force = |k: usize| total[k]["force_x_n"].as_f64().expect("a force");
     let error = |k: usize| {

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::errors::assert_problem;
 use crate::formats::{bits, column, flat, read_npz};
 use crate::results::{area, number, path_of};
-use crate::server::{Server, example};
+use crate::server::{Server, example, link};
 
 const PARTS: [(&str, &[&str]); 4] = [
     ("pressure", &["pressure_mpa"]),
@@ -26,12 +26,12 @@ async fn one_answer_has_all_fields_of_a_motion_as_their_parts_have_them() {
     let all = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
     let job = solved(&server, all).await;
     let path = path_of(&job);
-    let link = job["result"]["links"]["fields"].as_str().expect("a link");
-    let fields = server.get(link).await.json;
-    let grid = server.get(&format!("{link}?grid=20x30")).await.json;
+    let link = link(&job["result"], "fields");
+    let fields = server.read(link).await;
+    let grid = server.read(&format!("{link}?grid=20x30")).await;
     for (part, names) in PARTS {
-        let cells = server.get(&format!("{path}/{part}")).await.json;
-        let sampled = server.get(&format!("{path}/{part}?grid=20x30")).await.json;
+        let cells = server.read(&format!("{path}/{part}")).await;
+        let sampled = server.read(&format!("{path}/{part}?grid=20x30")).await;
         assert_eq!(cells["outlines"]["patch"], fields["outlines"]["patch"]);
         assert_eq!(sampled["outlines"]["patch"], fields["outlines"]["patch"]);
         for name in names.iter().copied().chain(["x_mm", "y_mm"]) {
@@ -52,15 +52,12 @@ async fn parts_are_chosen_by_name_and_must_be_there() {
     let server = Server::start().await;
     let some = json!(["resultants", "pressure", "tractions"]);
     let path = path_of(&solved(&server, some).await);
-    let fields = server.get(&format!("{path}/fields")).await.json;
+    let fields = server.read(&format!("{path}/fields")).await;
     assert!(
         fields["cells"]["pressure_mpa"].is_array() && fields["cells"]["traction_x_mpa"].is_array()
     );
     assert!(fields["cells"]["zone"].is_null() && fields["outlines"]["stick"].is_null());
-    let one = server
-        .get(&format!("{path}/fields?parts=pressure"))
-        .await
-        .json;
+    let one = server.read(&format!("{path}/fields?parts=pressure")).await;
     assert!(one["cells"]["pressure_mpa"].is_array() && one["cells"]["traction_x_mpa"].is_null());
     let missing = server
         .get(&format!("{path}/fields?parts=pressure,slip"))

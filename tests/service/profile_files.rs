@@ -148,8 +148,7 @@ async fn a_kept_section_keeps_its_unit_and_a_case_may_state_another() {
     let (case, [rail, wheel]) = case();
     let right = force(&server.solve(&case).await);
     let keep = async |section: Value| {
-        let answer = server.post("/v1/profiles", &section).await;
-        assert_eq!(answer.status, 201, "{}", answer.text);
+        let answer = server.post("/v1/profiles", &section).await.is(201);
         answer.json["digest"].clone()
     };
     let in_cm = keep(json!({ "points_mm": scaled(&rail, 0.1), "unit": "cm" })).await;
@@ -173,8 +172,7 @@ async fn units_hold_for_both_sides_of_a_wheelset() {
     wheelset["contact"]["rail"] = in_m(&rail);
     wheelset["contact"]["wheel"] = in_m(&wheel);
     wheelset["contact"]["right"] = json!({ "rail": in_m(&rail), "wheel": in_m(&wheel) });
-    let checked = server.post("/v1/cases/check", &wheelset).await;
-    assert_eq!(checked.status, 200, "{}", checked.text);
+    let checked = server.post("/v1/cases/check", &wheelset).await.is(200);
     assert!(
         !checked.text.contains("profile-size-unusual"),
         "{}",

@@ -30,11 +30,11 @@ async fn a_wheel_on_a_rail_is_submitted_and_read() {
     let radius = number(&position["rolling_radius_mm"]);
     let depth = number(&position["wheel_mm"][1]);
     assert!((radius - number(&case["contact"]["rolling_radius_mm"]) - depth).abs() < 1e-9);
-    let total = server.get(&format!("{path}/resultants")).await.json;
+    let total = server.read(&format!("{path}/resultants")).await;
     assert_eq!(total["total"], result["total"]);
     assert!((number(&total["total"][0]["force_z_n"]) + force).abs() < 1e-3 * force);
     assert!(number(&result["wheel_lowering_mm"]) > 0.0);
-    let cells = server.get(&format!("{path}/pressure?patch=0")).await.json["cells"].clone();
+    let cells = server.read(&format!("{path}/pressure?patch=0")).await["cells"].clone();
     let column = |name: &str| -> Vec<f64> {
         let values = cells[name].as_array().expect("a column").iter();
         values.map(number).collect()
@@ -119,8 +119,7 @@ async fn a_wheel_steered_by_forces_is_answered_with_its_creepages_or_told_the_ra
 async fn checking_a_wheel_on_a_rail_names_its_cost_and_its_faults() {
     let server = Server::idle().await;
     let mut case = example("wheel-rail.case.json");
-    let checked = server.post("/v1/cases/check", &case).await;
-    assert_eq!(checked.status, 200, "{}", checked.text);
+    let checked = server.post("/v1/cases/check", &case).await.is(200);
     assert!(number(&checked.json["estimate"]["seconds"]) > 0.0);
     case["contact"]["rail"] = json!({ "format": "columns", "text": "0 0\n1 x\n" });
     case["contact"]["wheel"]["colour"] = json!("red");

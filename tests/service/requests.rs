@@ -27,12 +27,9 @@ async fn malformed_json_is_answered_with_its_position() {
         (deep.as_str(), 1, "recursion limit"),
     ] {
         for path in ["/v1/jobs", "/v1/cases/check"] {
-            let raw = |request: reqwest::RequestBuilder| {
-                request
-                    .header("content-type", "application/json")
-                    .body(body.to_owned())
-            };
-            let answer = server.send(Method::POST, path, raw).await;
+            let answer = server
+                .post_as(path, "application/json", body.to_owned())
+                .await;
             assert_problem(&answer, 400, "malformed-json", word);
             assert_eq!(answer.json["line"], line, "{}", answer.text);
             assert!(answer.json["column"].is_u64(), "{}", answer.text);
@@ -74,24 +71,13 @@ async fn body_must_be_declared_as_json() {
 #[tokio::test]
 async fn body_size_is_limited_exactly() {
     let case = example_text("spin.case.json");
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.http.body_max_bytes = case.len();
     let server = setup.start().await;
-    let send = |body: String| {
-        server.send(Method::POST, "/v1/jobs", |request| {
-            request
-                .header("content-type", "application/json")
-                .body(body)
-        })
-    };
+    let send = |body: String| server.post_as("/v1/jobs", "application/json", body);
     assert_eq!(send(case.clone()).await.status, 202);
-    assert_problem(
-        &send(format!("{case} ")).await,
-        413,
-        "body-too-large",
-        &case.len().to_string(),
-    );
+    let answer = send(format!("{case} ")).await;
+    assert_problem(&answer, 413, "body-too-large", &case.len().to_string());
 }
 
 /// Writes raw bytes to the service and reads the whole answer.
@@ -228,18 +214,10 @@ async fn bad_query_names_every_parameter_with_its_value() {
             && detail.contains("queued, running, succeeded, failed, cancelled"),
         "{detail}"
     );
-    assert_problem(
-        &server.get("/v1/jobs?limit=1001").await,
-        400,
-        "bad-query",
-        "1001",
-    );
-    assert_problem(
-        &server.get("/v1/jobs?cursor=unheard-of").await,
-        400,
-        "bad-query",
-        "cursor",
-    );
+    let answer = server.get("/v1/jobs?limit=1001").await;
+    assert_problem(&answer, 400, "bad-query", "1001");
+    let answer = server.get("/v1/jobs?cursor=unheard-of").await;
+    assert_problem(&answer, 400, "bad-query", "cursor");
     assert_eq!(
         server.get("/v1/jobs?limit=1000.0").await.status,
         200,
@@ -256,60 +234,41 @@ async fn bad_query_names_every_parameter_with_its_value() {
         "points=1",
     ] {
         let name = query.split('=').next().expect("a name");
-        assert_problem(
-            &server.get(&format!("{path}/tractions?{query}")).await,
-            400,
-            "bad-query",
-            name,
-        );
+        let answer = server.get(&format!("{path}/tractions?{query}")).await;
+        assert_problem(&answer, 400, "bad-query", name);
     }
 }
 
 #[tokio::test]
 async fn bad_idempotency_keys_are_refused() {
     let server = Server::idle().await;
-    let send = |key: String| {
-        server.send(Method::POST, "/v1/jobs", |request| {
-            request
-                .header("idempotency-key", key)
-                .json(&example("spin.case.json"))
-        })
+    let case = example("spin.case.json");
+    let send = async |key: &str| {
+        server
+            .post_with("/v1/jobs", "idempotency-key", key, &case)
+            .await
     };
-    assert_problem(&send("x".repeat(256)).await, 400, "bad-header", "255");
-    assert_problem(&send(String::new()).await, 400, "bad-header", "255");
-    assert_problem(
-        &send("two words".to_owned()).await,
-        400,
-        "bad-header",
-        "visible",
-    );
-    assert_eq!(send("x".repeat(255)).await.status, 202);
+    assert_problem(&send(&"x".repeat(256)).await, 400, "bad-header", "255");
+    assert_problem(&send("").await, 400, "bad-header", "255");
+    let answer = send("two words").await;
+    assert_problem(&answer, 400, "bad-header", "visible");
+    assert_eq!(send(&"x".repeat(255)).await.status, 202);
 }
 
 #[tokio::test]
 async fn answers_that_exclude_json_are_refused() {
     let server = Server::idle().await;
     for path in ["/v1/jobs", "/v1/methods", "/v1/jobs/x/result"] {
-        let answer = server
-            .send(Method::GET, path, |request| {
-                request.header("accept", "text/csv")
-            })
-            .await;
+        let answer = server.get_with(path, "accept", "text/csv").await;
         assert_problem(&answer, 406, "not-acceptable", "text/csv");
     }
     let named = server.get("/v1/methods?format=csv").await;
     assert_problem(&named, 406, "not-acceptable", "`json` only");
-    let send = server.send(Method::GET, "/v1/methods?format=json", |request| {
-        request.header("accept", "text/csv")
-    });
+    let send = server.get_with("/v1/methods?format=json", "accept", "text/csv");
     assert_eq!(send.await.status, 200, "`format` overrides `Accept`");
     let browser = "text/html,application/xhtml+xml,*/*;q=0.8";
     assert_eq!(
-        server
-            .send(Method::GET, "/v1/jobs", |request| request
-                .header("accept", browser))
-            .await
-            .status,
+        server.get_with("/v1/jobs", "accept", browser).await.status,
         200
     );
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::{Value, json};
 
-use crate::server::{Server, Setup, example};
+use crate::server::{Server, Setup, example, link};
 
 /// The numbers of an array.
 pub fn numbers(value: &Value) -> Vec<f64> {
@@ -30,7 +30,7 @@ pub fn number(value: &Value) -> f64 {
 
 /// The path of a job.
 pub fn path_of(job: &Value) -> String {
-    job["links"]["self"].as_str().expect("a link").to_owned()
+    link(job, "self").to_owned()
 }
 
 fn assert_close(left: f64, right: f64, scale: f64, what: &str) {
@@ -54,7 +54,7 @@ async fn a_result_is_read_without_a_look_at_the_case() {
     case["outputs"] = json!(["resultants"]);
     let job = server.solve(&case).await;
     let before = checks.load(Ordering::SeqCst);
-    let path = job["links"]["result"].as_str().expect("a link");
+    let path = link(&job, "result");
     let result = server.get(path).await;
     assert_eq!(result.json["links"], job["result"]["links"]);
     let slip = path.replace("result", "slip");
@@ -73,7 +73,7 @@ async fn fields_add_up_to_the_resultants() {
     let patch = &job["result"]["patches"][0];
     let point = &patch["points"][0];
     let load = number(&patch["normal_force_n"]);
-    let resultants = server.get(&format!("{path}/resultants")).await.json;
+    let resultants = server.read(&format!("{path}/resultants")).await;
     for name in [
         "force_x_n",
         "force_y_n",
@@ -94,9 +94,8 @@ async fn fields_add_up_to_the_resultants() {
             .sum()
     };
     let tractions = server
-        .get(&format!("{path}/tractions?point=0&patch=0"))
-        .await
-        .json;
+        .read(&format!("{path}/tractions?point=0&patch=0"))
+        .await;
     assert_close(
         sum(&tractions["cells"], "traction_x_mpa"),
         number(&point["force_x_n"]),
@@ -109,7 +108,7 @@ async fn fields_add_up_to_the_resultants() {
         load,
         "force y",
     );
-    let pressure = server.get(&format!("{path}/pressure")).await.json;
+    let pressure = server.read(&format!("{path}/pressure")).await;
     assert_close(
         sum(&pressure["cells"], "pressure_mpa"),
         load,
@@ -120,7 +119,7 @@ async fn fields_add_up_to_the_resultants() {
         tractions["cells"].get("pressure_mpa").is_none(),
         "a field answers its own values only"
     );
-    let slip = server.get(&format!("{path}/slip")).await.json;
+    let slip = server.read(&format!("{path}/slip")).await;
     assert_eq!(
         numbers(&slip["cells"]["slip_x"]).len(),
         numbers(&pressure["cells"]["pressure_mpa"]).len()
@@ -154,7 +153,7 @@ pub fn area(polygons: &Value) -> f64 {
 async fn outlines_enclose_the_areas_of_the_zones() {
     let server = Server::start().await;
     let job = server.solve(&example("hertz-steel.case.json")).await;
-    let zones = server.get(&format!("{}/zones", path_of(&job))).await.json;
+    let zones = server.read(&format!("{}/zones", path_of(&job))).await;
     let (stick, slip) = (
         number(&zones["stick_area_mm2"]),
         number(&zones["slip_area_mm2"]),
@@ -203,10 +202,7 @@ async fn outlines_enclose_the_areas_of_the_zones() {
 async fn grid_is_ordered_by_y_then_x_and_empty_outside() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("spin.case.json")).await);
-    let pressure = server
-        .get(&format!("{path}/pressure?grid=21x11"))
-        .await
-        .json;
+    let pressure = server.read(&format!("{path}/pressure?grid=21x11")).await;
     let (x, y) = (numbers(&pressure["x_mm"]), numbers(&pressure["y_mm"]));
     assert_eq!((x.len(), y.len()), (21, 11));
     assert!(x.is_sorted() && y.is_sorted());
@@ -236,7 +232,7 @@ async fn grid_is_ordered_by_y_then_x_and_empty_outside() {
         ("slip", "slip_y"),
         ("zones", "zone"),
     ] {
-        let field = server.get(&format!("{path}/{part}?grid=4x3")).await.json;
+        let field = server.read(&format!("{path}/{part}?grid=4x3")).await;
         let rows = field[name]
             .as_array()
             .unwrap_or_else(|| panic!("{part} has no {name}: {field}"));
@@ -260,7 +256,7 @@ async fn each_motion_of_a_sweep_is_fetched_by_its_number() {
     let server = Server::start().await;
     let job = server.solve(&example("sweep.case.json")).await;
     let path = path_of(&job);
-    let all = server.get(&format!("{path}/resultants")).await.json;
+    let all = server.read(&format!("{path}/resultants")).await;
     let forces: Vec<f64> = all["total"]
         .as_array()
         .expect("totals")
@@ -273,21 +269,15 @@ async fn each_motion_of_a_sweep_is_fetched_by_its_number() {
         "a creep curve rises from 0: {forces:?}"
     );
     let one = server
-        .get(&format!("{path}/resultants?point=10&patch=0"))
-        .await
-        .json;
+        .read(&format!("{path}/resultants?point=10&patch=0"))
+        .await;
     assert_eq!(one["total"], json!([all["total"][10]]));
     assert_eq!(
         one["patches"][0]["points"],
         json!([all["patches"][0]["points"][10]])
     );
     let slipping = async |point: u32| {
-        number(
-            &server
-                .get(&format!("{path}/zones?point={point}"))
-                .await
-                .json["slip_area_mm2"],
-        )
+        number(&server.read(&format!("{path}/zones?point={point}")).await["slip_area_mm2"])
     };
     assert!(slipping(10).await > slipping(1).await);
     for query in [

@@ -1,8 +1,5 @@
 //! Are ended jobs kept for as long as was said, and then gone with all that belonged to them?
 
-use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
@@ -15,24 +12,7 @@ use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Server, Setup};
 use crate::store::{claim_up_to, finish_one, new_job, open_beside, success};
-use crate::support::{case, endless_case, pause};
-
-const DAY_MS: i64 = 24 * 3600 * 1000;
-
-/// A clock that can be turned forward.
-#[derive(Clone, Default)]
-struct Turned(Arc<AtomicI64>);
-
-impl Turned {
-    fn clock(&self) -> Clock {
-        let (ahead, system) = (self.0.clone(), Clock::system());
-        Clock::new(move || system.now_ms() + ahead.load(Ordering::SeqCst))
-    }
-
-    fn turn(&self, days: i64) {
-        self.0.fetch_add(days * DAY_MS, Ordering::SeqCst);
-    }
-}
+use crate::support::{DAY_MS, Turned, case, endless_case, files_below, loaded, pause};
 
 /// A service that keeps ended jobs for 30 days, and its clock.
 fn keeping_30_days() -> (Setup, Turned) {
@@ -41,14 +21,6 @@ fn keeping_30_days() -> (Setup, Turned) {
     setup.options.retention = Some(Duration::from_secs(30 * 24 * 3600));
     setup.options.clock = turned.clock();
     (setup, turned)
-}
-
-fn files_below(folder: &Path) -> usize {
-    let entries = std::fs::read_dir(folder).into_iter().flatten();
-    let paths = entries.map(|entry| entry.unwrap().path());
-    paths
-        .map(|path| if path.is_dir() { files_below(&path) } else { 1 })
-        .sum()
 }
 
 fn epoch_ms(time: &Value) -> i64 {
@@ -89,10 +61,10 @@ async fn an_ended_job_says_when_it_will_go_and_goes_then() {
         turned.turn(1);
         // Also before any sweep has come along.
         assert_expired(&server, &path).await;
-        assert_eq!(server.get("/v1/jobs").await.json["jobs"], json!([]));
+        assert_eq!(server.read("/v1/jobs").await["jobs"], json!([]));
         server.jobs.sweep_expired().await.unwrap();
         assert_expired(&server, &path).await;
-        assert_eq!(files_below(&results), 0);
+        assert!(files_below(&results).is_empty());
         let id = path.rsplit('/').next().unwrap().parse().unwrap();
         let foreign = server.jobs.of("another".into()).get(id).await;
         assert!(
@@ -119,7 +91,7 @@ async fn a_running_service_removes_what_has_expired_by_itself() {
     let results = setup.options.data_dir.join("results");
     let server = setup.start().await;
     let path = server.submit(&case("short-lived")).await;
-    while server.get(&path).await.status != 410 || files_below(&results) > 0 {
+    while server.get(&path).await.status != 410 || !files_below(&results).is_empty() {
         pause().await;
     }
 }
@@ -129,16 +101,14 @@ async fn jobs_that_have_not_ended_and_services_without_retention_lose_nothing() 
     let (setup, turned) = keeping_30_days();
     let server = setup.start().await;
     let running = server.submit(&endless_case("runs")).await;
-    while server.get(&running).await.json["state"] != "running" {
-        pause().await;
-    }
+    server.until(&running, "running").await;
     let queued = server.submit(&endless_case("waits")).await;
     turned.turn(400);
     assert_eq!(server.jobs.sweep_expired().await.unwrap(), 0);
     for path in [&running, &queued] {
         let job = server.get(path).await;
         assert_eq!((job.status, &job.json["expires_at"]), (200, &Value::Null));
-        server.post(&format!("{path}/cancel"), &json!({})).await;
+        server.cancel(path).await;
     }
 
     let (mut setup, turned) = keeping_30_days();
@@ -156,40 +126,14 @@ async fn jobs_that_have_not_ended_and_services_without_retention_lose_nothing() 
 async fn a_batch_goes_with_the_last_of_its_jobs() {
     let (setup, turned) = keeping_30_days();
     let server = setup.start().await;
-    let cases: Vec<Value> = (1..=600)
-        .map(|number| {
-            let mut case = case("one of many");
-            case["load"]["normal_force_n"] = json!(10_000 + number);
-            case
-        })
-        .collect();
+    let cases: Vec<Value> = (10_001..=10_600).map(loaded).collect();
     let answer = server.post("/v1/batches", &json!(cases)).await;
-    let batch = answer.header("location").unwrap().to_owned();
+    let batch = answer.location();
     let lines = server.get(&format!("{batch}/results?wait=60")).await.text;
     assert_eq!(lines.lines().count(), 600);
     turned.turn(31);
     assert_eq!(server.jobs.sweep_expired().await.unwrap(), 600);
     assert_expired(&server, &batch).await;
-}
-
-#[tokio::test]
-async fn a_result_in_use_outlives_the_job_that_computed_it() {
-    let (mut setup, turned) = keeping_30_days();
-    setup.options.small_result_max_bytes = 0;
-    let results = setup.options.data_dir.join("results");
-    let server = setup.start().await;
-    let first = server.solve(&case("first")).await;
-    turned.turn(20);
-    let second = server.solve(&case("second")).await;
-    assert_eq!(second["cached"], true);
-    turned.turn(20);
-    assert_eq!(server.jobs.sweep_expired().await.unwrap(), 1);
-    assert_expired(&server, &path_of(&first)).await;
-    let fields = server.get(&format!("{}/tractions", path_of(&second))).await;
-    assert_eq!(fields.status, 200, "{}", fields.text);
-    turned.turn(20);
-    assert_eq!(server.jobs.sweep_expired().await.unwrap(), 1);
-    assert_eq!(files_below(&results), 0);
 }
 
 #[tokio::test]

@@ -21,9 +21,7 @@ const WITHIN: Duration = Duration::from_secs(45);
 
 /// A service that solves nothing.
 async fn idle() -> Guarded {
-    let mut setup = Setup::new();
-    setup.working = false;
-    Guarded::start(setup, |_| {}).await
+    Guarded::start(Setup::idle(), |_| {}).await
 }
 
 /// Revokes the key of the north beside the running service.
@@ -83,14 +81,10 @@ async fn results_of_a_run_break_off_and_do_not_look_complete() {
         json!({ "method": "boundary_element", "mesh": { "strips": 32, "cells": 32 } });
     let loads: Vec<f64> = (0..2500).map(|row| 50_000.0 + f64::from(row)).collect();
     let rows = json!({ "template": template, "columns": { "/load/normal_force_n": loads } });
-    let run = guarded
-        .send(north, Method::POST, "/v1/runs", Some(&rows))
-        .await;
+    let run = guarded.post(north, "/v1/runs", &rows).await;
     assert_eq!(run.status, 202, "{}", run.text);
-    let run = run.header("location").expect("a run").to_owned();
-    let cancelled = guarded
-        .send(north, Method::POST, &format!("{run}/cancel"), None)
-        .await;
+    let run = run.location();
+    let cancelled = guarded.cancel(north, &run).await;
     assert_eq!(cancelled.status, 200, "{}", cancelled.text);
     let router = router(guarded.server.jobs.clone(), HttpOptions::default());
     let mut open = Vec::new();

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::runs::{ended, lines, submit, template};
+use crate::runs::{ended, submit, template};
 use crate::server::Server;
 
 #[tokio::test]
@@ -24,7 +24,7 @@ async fn rows_with_prescribed_forces_tell_the_creepages_that_were_found() {
         .collect();
     assert!(names.contains(&"creepage_y") && !names.contains(&"creepage_x"));
     let results = server.get(&format!("{run}/results?format=ndjson")).await;
-    for (row, asked) in lines(&results).iter().zip([4000.0, -9000.0]) {
+    for (row, asked) in results.lines().iter().zip([4000.0, -9000.0]) {
         let number = |name: &str| row[name].as_f64().expect("a number");
         assert!(
             (number("force_y_n") - asked).abs() < 0.01 * 0.3 * 8e4,

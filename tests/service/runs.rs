@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 use railhead::jobs::codec::arrow::read;
 use railhead::jobs::codec::parquet::TableReader;
 use railhead::jobs::codec::table::{RowTable, TableColumn};
-use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
+use crate::support::files_below;
 
 /// Ends of a guard: something hangs.
 const WITHIN: Duration = Duration::from_secs(90);
@@ -37,22 +37,27 @@ pub fn columns(rows: usize) -> Value {
 }
 
 pub async fn submit(server: &Server, body: &Value) -> String {
-    let answer = server.post("/v1/runs", body).await;
-    assert_eq!(answer.status, 202, "{}", answer.text);
-    answer.header("location").expect("a location").to_owned()
+    let answer = server.post("/v1/runs", body).await.is(202);
+    answer.location()
 }
 
 pub async fn ended(server: &Server, run: &str) -> Value {
     let begun = Instant::now();
     loop {
-        let answer = server.get(run).await;
-        assert_eq!(answer.status, 200, "{}", answer.text);
+        let answer = server.get(run).await.is(200);
         if answer.json["ended_at"].is_string() {
             return answer.json;
         }
         assert!(begun.elapsed() < WITHIN, "{}", answer.text);
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
+}
+
+/// The answers of a run that has ended.
+pub async fn answers(server: &Server, run: &str) -> Vec<Value> {
+    ended(server, run).await;
+    let results = format!("{run}/results?format=ndjson");
+    server.get(&results).await.is(200).lines()
 }
 
 /// A refusal whose faults say this.
@@ -63,13 +68,6 @@ fn assert_faults(answer: &Answer, word: &str) {
         "`{word}` is not in: {}",
         answer.text
     );
-}
-
-pub fn lines(answer: &Answer) -> Vec<Value> {
-    let lines = answer.text.lines();
-    lines
-        .map(|line| serde_json::from_str(line).expect("JSON"))
-        .collect()
 }
 
 /// The forms in which the answers come hold the same numbers.
@@ -135,8 +133,7 @@ async fn assert_row(server: &Server, run: &str, sent: &Value, line: &Value) {
         sent["/load/normal_force_n"][17]
     );
     assert_eq!(case["motion"]["creepage_x"], sent["creepage_x"][17]);
-    let checked = server.post("/v1/cases/check", case).await;
-    assert_eq!(checked.status, 200, "{}", checked.text);
+    server.post("/v1/cases/check", case).await.is(200);
     for beyond in ["120", "-1", "x"] {
         let answer = server.get(&format!("{run}/rows/{beyond}")).await;
         assert_problem(&answer, 404, "row-not-found", "rows");
@@ -157,7 +154,7 @@ async fn a_run_answers_each_of_its_rows_once_in_every_format() {
         assert_eq!([&about["rows"], &about["rows_done"]], [120, 120]);
         assert_eq!(about["rows_without_answer"], 0);
         let results = format!("{run}/results");
-        let all = lines(&server.get(&results).await);
+        let all = server.get(&results).await.lines();
         let numbers: Vec<_> = all.iter().map(|row| row["row"].as_u64()).collect();
         assert_eq!(numbers, (0..rows).map(Some).collect::<Vec<_>>());
         for (place, row) in all.iter().enumerate() {
@@ -189,7 +186,7 @@ async fn a_run_answers_each_of_its_rows_once_in_every_format() {
             "pieces of runs are no jobs of the client"
         );
         assert_eq!(
-            server.get("/v1/runs?limit=1").await.json["runs"][0]["id"],
+            server.read("/v1/runs?limit=1").await["runs"][0]["id"],
             about["id"]
         );
         assert_eq!(server.delete(&run).await.status, 204);
@@ -205,10 +202,9 @@ async fn totals_are_those_of_the_rows_in_all_and_by_section() {
         &json!({ "template": template("table"), "columns": columns(90) }),
     )
     .await;
-    ended(&server, &run).await;
-    let rows = lines(&server.get(&format!("{run}/results?format=ndjson")).await);
+    let rows = answers(&server, &run).await;
     let path = format!("{run}/totals?columns=force_x_n&percentiles=100&above=5000&by=section");
-    let totals = server.get(&path).await.json;
+    let totals = server.read(&path).await;
     let sizes = |section: Option<&str>| -> Vec<f64> {
         let of = rows
             .iter()
@@ -231,10 +227,7 @@ async fn totals_are_those_of_the_rows_in_all_and_by_section() {
     for section in sections {
         compare(section, section["value"].as_str());
     }
-    let by_length = server
-        .get(&format!("{run}/totals?by=km&width=3"))
-        .await
-        .json;
+    let by_length = server.read(&format!("{run}/totals?by=km&width=3")).await;
     let lengths = by_length["sections"].as_array().expect("sections");
     assert_eq!(
         lengths
@@ -264,7 +257,7 @@ async fn a_row_that_cannot_be_solved_has_a_status_and_faults_of_a_run_are_named(
         [&about["state"], &about["rows_without_answer"]],
         [&json!("succeeded"), &json!(1)]
     );
-    let all = lines(&server.get(&format!("{run}/results")).await);
+    let all = server.get(&format!("{run}/results")).await.lines();
     let statuses: Vec<_> = all.iter().map(|row| row["status"].as_str()).collect();
     assert_eq!(statuses, [Some("ok"), Some("refused"), Some("ok")]);
     assert!(all[1]["force_x_n"].is_null() && all[1]["method"].is_null());
@@ -303,29 +296,19 @@ async fn a_row_that_cannot_be_solved_has_a_status_and_faults_of_a_run_are_named(
 }
 
 #[tokio::test]
-async fn a_key_gives_the_run_again_and_a_cancelled_run_keeps_what_it_has() {
+async fn a_run_is_listed_by_name_and_label_and_a_cancelled_one_keeps_what_it_has() {
     for server in Server::on_every_store().await {
         let body = json!({ "template": template("table"), "columns": columns(30) });
-        let keyed = async |body: &Value| {
-            let send = |request: reqwest::RequestBuilder| {
-                request.header("idempotency-key", "night").json(body)
-            };
-            server
-                .send(Method::POST, "/v1/runs?name=night&label=line:A12", send)
-                .await
-        };
-        let (first, again) = (keyed(&body).await, keyed(&body).await);
-        assert_eq!(first.json["id"], again.json["id"]);
-        assert_eq!(again.header("idempotency-replayed"), Some("true"));
-        let other = json!({ "template": template("table"), "columns": columns(31) });
-        assert_problem(&keyed(&other).await, 422, "idempotency-conflict", "Key");
-        let run = format!("/v1/runs/{}", first.json["id"].as_str().expect("an id"));
+        let sent = server
+            .post("/v1/runs?name=night&label=line:A12", &body)
+            .await;
+        let run = sent.is(202).location();
         ended(&server, &run).await;
         assert_eq!(
-            server.get("/v1/runs?label=line:A12&name=NIGHT").await.json["total"],
+            server.read("/v1/runs?label=line:A12&name=NIGHT").await["total"],
             1
         );
-        let cancelled = server.post(&format!("{run}/cancel"), &json!({})).await;
+        let cancelled = server.cancel(&run).await;
         assert_eq!(cancelled.json["state"], "succeeded");
     }
     let idle = Server::idle().await;
@@ -338,32 +321,18 @@ async fn a_key_gives_the_run_again_and_a_cancelled_run_keeps_what_it_has() {
     .await;
     let early = idle.get(&format!("{run}/results")).await;
     assert_problem(&early, 409, "result-not-ready", "queued");
-    assert_problem(&idle.delete(&run).await, 409, "run-not-ended", "cancel");
-    let cancelled = idle.post(&format!("{run}/cancel"), &json!({})).await;
+    let cancelled = idle.cancel(&run).await;
     assert_eq!(
         (cancelled.status, &cancelled.json["state"]),
         (200, &json!("cancelled"))
     );
     assert_eq!(cancelled.json["rows_without_answer"], 130);
-    let all = lines(&idle.get(&format!("{run}/results")).await);
+    let all = idle.get(&format!("{run}/results")).await.lines();
     assert_eq!(all.len(), 130);
     assert!(
         all.iter()
             .all(|row| row["status"] == "cancelled" && row["section"].is_string())
     );
-}
-
-/// The files of answers below a folder.
-fn answer_files(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
-    let entries = std::fs::read_dir(folder).expect("a folder");
-    let paths = entries.map(|entry| entry.expect("an entry").path());
-    paths
-        .flat_map(|path| match path.is_dir() {
-            true => answer_files(&path),
-            false => vec![path],
-        })
-        .filter(|path| path.ends_with("rows.parquet"))
-        .collect()
 }
 
 #[tokio::test]
@@ -374,7 +343,8 @@ async fn answers_that_are_damaged_or_missing_are_an_error_and_no_broken_answer()
     let body = json!({ "template": template("table"), "columns": columns(3) });
     let run = submit(&server, &body).await;
     ended(&server, &run).await;
-    let files = answer_files(&folder);
+    let mut files = files_below(&folder);
+    files.retain(|path| path.ends_with("rows.parquet"));
     assert_eq!(files.len(), 1, "{files:?}");
     let damages: [fn(&std::path::Path); 3] = [
         |file| std::fs::write(file, "PAR1 damaged PAR1").expect("written"),

@@ -7,7 +7,7 @@ use railhead::jobs::codec::table::TableColumn;
 use serde_json::{Value, json};
 
 use crate::batches::{results, send};
-use crate::runs::{ended, lines};
+use crate::runs::answers;
 use crate::server::{Server, example};
 
 const CREEPAGES: [[f64; 2]; 2] = [[1e-3, -5e-4], [-2e-3, 1e-3]];
@@ -156,16 +156,14 @@ async fn assert_jobs(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]], wit
     sweep["motion"] = json!({ "sweep": { "creepage_x": values(0), "creepage_y": values(1), "speed_mm_per_s": 20000 } });
     let sweep = totals(&server.solve(&sweep).await);
     assert_agrees(&format!("sweep, {friction}"), &sweep, alone, within);
-    let template = server.submit(&singles[0]).await;
-    let query = format!("?template={}", &template[9..]);
+    let query = format!("?template={}", server.keep(&singles[0]).await);
     let table = "creepage_x,creepage_y\n1e-3,-5e-4\n-2e-3,1e-3\n".to_owned();
     let cases = Value::from(singles.to_vec()).to_string();
     for (query, content, body) in [
         ("", "application/json", cases),
         (&*query, "text/csv", table),
     ] {
-        let batch = send(server, query, content, body).await;
-        assert_eq!(batch.status, 202, "{}", batch.text);
+        let batch = send(server, query, content, body).await.is(202);
         let answers = results(server, &batch.json, "?wait=60").await;
         let found: Vec<_> = answers
             .iter()
@@ -188,16 +186,13 @@ async fn assert_rows(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]], wit
         "/motion/creepage_y": CREEPAGES.map(|creepages| creepages[1]),
     });
     let rows = json!({ "template": case, "columns": columns });
-    let run = server.post("/v1/runs", &rows).await;
-    assert_eq!(run.status, 202, "{}", run.text);
-    let run = run.header("location").expect("a location").to_owned();
-    ended(server, &run).await;
-    let answers = lines(&server.get(&format!("{run}/results")).await);
+    let run = server.post("/v1/runs", &rows).await.is(202);
+    let run = run.location();
+    let answers = answers(server, &run).await;
     assert_forms(server, &run, &answers).await;
     let found: Vec<_> = answers.iter().map(of_row).collect();
     assert_agrees(&format!("run, {friction}"), &found, alone, within);
-    let answer = server.post("/v1/evaluate", &rows).await;
-    assert_eq!(answer.status, 200, "{}", answer.text);
+    let answer = server.post("/v1/evaluate", &rows).await.is(200);
     let columns = &answer.json["columns"];
     let row = |k: usize| {
         let of = |name: &str| columns[name][k].clone();
@@ -241,9 +236,8 @@ async fn a_row_without_an_answer_has_a_reason_and_a_run_has_one_position_in_each
     );
     assert!(answer.json["columns"]["force_x_n"][1].is_null());
     let run = server.post("/v1/runs", &rows).await;
-    let run = run.header("location").expect("a location").to_owned();
-    ended(&server, &run).await;
-    let answers = lines(&server.get(&format!("{run}/results")).await);
+    let run = run.location();
+    let answers = answers(&server, &run).await;
     assert_eq!(answers[1]["status"], "refused");
     let reason = answers[1]["reason"].as_str().expect("a reason");
     assert!(reason.contains("/load: the largest pressure"), "{reason}");

@@ -1,6 +1,5 @@
 //! A service in this process, on a port of its own with a data folder of its own, and a client for it.
 
-use std::io::Read;
 use std::net::SocketAddr;
 use std::path::Path;
 
@@ -11,13 +10,14 @@ use railhead::contact::solution::words::answer::{Fields, Solution};
 use railhead::http::{HttpOptions, router};
 use railhead::jobs::engine::Engine;
 use railhead::jobs::{Jobs, Options};
-use reqwest::header::HeaderMap;
-use reqwest::{Method, RequestBuilder};
+use reqwest::{Body, Method, RequestBuilder};
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio_util::sync::CancellationToken;
 
 use crate::schema::assert_documented;
+use crate::support::pause;
+pub use crate::support::{Answer, unpacked};
 
 /// A running service. It ends with the test's runtime.
 pub struct Server {
@@ -37,17 +37,6 @@ pub struct Setup {
     folder: TempDir,
 }
 
-/// An answer. `json` is null where the body is not JSON.
-#[derive(Debug)]
-pub struct Answer {
-    pub status: u16,
-    pub headers: HeaderMap,
-    pub bytes: Vec<u8>,
-    /// The body as text; what is not UTF-8 is replaced.
-    pub text: String,
-    pub json: Value,
-}
-
 impl Setup {
     /// The defaults: real physics, one worker.
     pub fn new() -> Setup {
@@ -58,6 +47,14 @@ impl Setup {
             recipe: Engine::contact(),
             working: true,
             folder,
+        }
+    }
+
+    /// Without workers.
+    pub fn idle() -> Setup {
+        Setup {
+            working: false,
+            ..Setup::new()
         }
     }
 
@@ -123,9 +120,7 @@ impl Server {
 
     /// A service that takes jobs and never solves them.
     pub async fn idle() -> Server {
-        let mut setup = Setup::new();
-        setup.working = false;
-        setup.start().await
+        Setup::idle().start().await
     }
 
     /// Sends a request as `shape` completes it, and checks the answer against the contract.
@@ -138,25 +133,9 @@ impl Server {
         let request = self
             .client
             .request(method.clone(), format!("http://{}{path}", self.address));
-        let response = shape(request).send().await.expect("an answer");
-        let status = response.status().as_u16();
-        let headers = response.headers().clone();
-        let bytes = response.bytes().await.expect("a body").to_vec();
-        let text = String::from_utf8_lossy(&bytes).into_owned();
-        let answer = Answer {
-            status,
-            json: serde_json::from_slice(&unpacked(&headers, &bytes)).unwrap_or(Value::Null),
-            headers,
-            bytes,
-            text,
-        };
-        assert_documented(
-            method.as_str(),
-            path,
-            status,
-            answer.header("content-type"),
-            &answer.json,
-        );
+        let answer = Answer::to(shape(request)).await;
+        let (form, json) = (answer.header("content-type"), &answer.json);
+        assert_documented(method.as_str(), path, answer.status, form, json);
         answer
     }
 
@@ -173,41 +152,61 @@ impl Server {
             .await
     }
 
+    /// The JSON answer to a GET that has to succeed.
+    pub async fn read(&self, path: &str) -> Value {
+        self.get(path).await.is(200).json
+    }
+
+    /// A GET with one more header.
+    pub async fn get_with(&self, path: &str, name: &str, value: &str) -> Answer {
+        self.send(Method::GET, path, |request| request.header(name, value))
+            .await
+    }
+
+    /// Sends JSON with one more header.
+    pub async fn post_with(&self, path: &str, name: &str, value: &str, body: &Value) -> Answer {
+        let shape = |request: RequestBuilder| request.header(name, value).json(body);
+        self.send(Method::POST, path, shape).await
+    }
+
+    /// Sends a body of some media type.
+    pub async fn post_as(&self, path: &str, form: &str, body: impl Into<Body>) -> Answer {
+        let shape = |request: RequestBuilder| request.header("content-type", form).body(body);
+        self.send(Method::POST, path, shape).await
+    }
+
+    /// Cancels a job, a batch, a run or an evolution.
+    pub async fn cancel(&self, path: &str) -> Answer {
+        self.send(Method::POST, &format!("{path}/cancel"), |request| request)
+            .await
+    }
+
+    /// Waits until work is in a state.
+    pub async fn until(&self, path: &str, state: &str) -> Value {
+        loop {
+            let work = self.read(path).await;
+            if work["state"] == state {
+                return work;
+            }
+            assert!(work["ended_at"].is_null(), "{state} was expected: {work}");
+            pause().await;
+        }
+    }
+
+    /// Submits a case to be filled in by the rows of tables; answers the id of the job.
+    pub async fn keep(&self, template: &Value) -> String {
+        self.submit(template).await["/v1/jobs/".len()..].to_owned()
+    }
+
     /// Submits a case without waiting; answers the path of the job.
     pub async fn submit(&self, case: &Value) -> String {
-        let answer = self.post("/v1/jobs", case).await;
-        assert_eq!(answer.status, 202, "{}", answer.text);
-        answer.header("location").expect("a location").to_owned()
+        self.post("/v1/jobs", case).await.is(202).location()
     }
 
     /// Submits a case and waits for its end; answers the job.
     pub async fn solve(&self, case: &Value) -> Value {
-        let waiting = |request: RequestBuilder| request.header("prefer", "wait=60").json(case);
-        let answer = self.send(Method::POST, "/v1/jobs", waiting).await;
-        assert_eq!(answer.status, 200, "{}", answer.text);
-        answer.json
-    }
-}
-
-impl Answer {
-    pub fn header(&self, name: &str) -> Option<&str> {
-        self.headers.get(name).and_then(|value| value.to_str().ok())
-    }
-}
-
-/// A body as it was before it was packed.
-pub fn unpacked(headers: &HeaderMap, bytes: &[u8]) -> Vec<u8> {
-    let coding = headers.get("content-encoding");
-    match coding.map(|coding| coding.to_str().expect("a coding")) {
-        Some("zstd") => zstd::decode_all(bytes).expect("zstd"),
-        Some("gzip") => {
-            let mut out = Vec::new();
-            let mut reader = flate2::read::GzDecoder::new(bytes);
-            reader.read_to_end(&mut out).expect("gzip");
-            out
-        }
-        Some(other) => panic!("{other} was not asked for"),
-        None => bytes.to_vec(),
+        let answer = self.post_with("/v1/jobs", "prefer", "wait=60", case).await;
+        answer.is(200).json
     }
 }
 
@@ -222,4 +221,9 @@ pub fn example_text(file: &str) -> String {
 /// A file in `api/examples`.
 pub fn example(file: &str) -> Value {
     serde_json::from_str(&example_text(file)).expect("an example is JSON")
+}
+
+/// A link of a job, a batch, a run or a result.
+pub fn link<'a>(of: &'a Value, name: &str) -> &'a str {
+    of["links"][name].as_str().expect("a link")
 }

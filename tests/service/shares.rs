@@ -9,9 +9,9 @@ use serde_json::{Value, json};
 use tower::ServiceExt;
 
 use crate::errors::assert_problem;
-use crate::guarded::{Guarded, loaded};
+use crate::guarded::Guarded;
 use crate::server::Setup;
-use crate::support::{case, endless_case, pause};
+use crate::support::{case, endless_case, loaded, pause};
 
 #[tokio::test]
 async fn a_key_that_asks_too_often_is_told_when_to_come_back() {
@@ -150,21 +150,17 @@ async fn clients_behind_a_trusted_proxy_are_counted_one_by_one() {
 
 #[tokio::test]
 async fn a_tenant_may_have_so_many_queued_jobs_and_no_more() {
-    let mut setup = Setup::new();
-    setup.working = false;
-    let guarded = Guarded::start(setup, |options| options.tenant_queue_max = 2).await;
+    let guarded = Guarded::start(Setup::idle(), |options| options.tenant_queue_max = 2).await;
     let (north, south) = (&guarded.north, &guarded.south);
     let first = guarded.submit(north, &case("1")).await;
     guarded.submit(north, &case("2")).await;
     for (path, body) in [("/v1/jobs", case("3")), ("/v1/batches", json!([case("3")]))] {
-        let answer = guarded.send(north, Method::POST, path, Some(&body)).await;
+        let answer = guarded.post(north, path, &body).await;
         assert_problem(&answer, 429, "quota-exceeded", "2 jobs");
         assert!(answer.header("retry-after").is_some());
     }
     guarded.submit(south, &case("of another tenant")).await;
-    let cancelled = guarded
-        .send(north, Method::POST, &format!("{first}/cancel"), None)
-        .await;
+    let cancelled = guarded.cancel(north, &first).await;
     assert_eq!(cancelled.status, 200);
     guarded.submit(north, &case("has room again")).await;
 }
@@ -191,11 +187,7 @@ async fn long_jobs_of_one_tenant_leave_the_next_turn_to_another() {
     }
     let waiting = guarded.submit(north, &endless_case("was here first")).await;
     let job = guarded.submit(south, &case("came later")).await;
-    guarded
-        .send(north, Method::POST, &format!("{running}/cancel"), None)
-        .await;
+    guarded.cancel(north, &running).await;
     assert_eq!(guarded.until_ended(south, &job).await["state"], "succeeded");
-    guarded
-        .send(north, Method::POST, &format!("{waiting}/cancel"), None)
-        .await;
+    guarded.cancel(north, &waiting).await;
 }

@@ -170,8 +170,7 @@ async fn a_stopped_service_hands_its_running_job_to_the_next_one() {
     let job = service.until(&id, "running").await;
     assert_eq!(job["attempt"], 1, "the first attempt does not count");
     assert_eq!(service.logged("job of a dead process taken back"), 0);
-    let cancel = service.request(Method::POST, &format!("/v1/jobs/{id}/cancel"));
-    assert!(cancel.send().await.unwrap().status().is_success());
+    service.cancel(&id).await;
     service.until(&id, "cancelled").await;
 }
 

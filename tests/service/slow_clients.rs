@@ -3,12 +3,11 @@
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use reqwest::Method;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpSocket, TcpStream};
 
-use crate::server::{Server, Setup, example};
+use crate::server::{Server, Setup, example, link};
 use crate::support::{Service, long_case, pause};
 
 /// Between two bytes of a slow client.
@@ -172,10 +171,7 @@ async fn until_closed(server: SocketAddr, client: SocketAddr) {
 async fn large_results(server: &Server) -> (String, usize) {
     let cases: Vec<Value> = (0..40).map(large_case).collect();
     let batch = server.post("/v1/batches", &json!(cases)).await.json;
-    let path = format!(
-        "{}?wait=60",
-        batch["links"]["results"].as_str().expect("a link")
-    );
+    let path = format!("{}?wait=60", link(&batch, "results"));
     let whole = server.get(&path).await.bytes.len();
     assert!(whole > 12 << 20, "{whole} bytes do not fill the buffers");
     (path, whole)
@@ -194,28 +190,10 @@ async fn clients_that_read_nothing_cost_little_memory() {
     let folder = tempfile::tempdir().expect("a folder");
     let service = Service::start(folder.path(), &["--workers", "2"]);
     let cases: Vec<Value> = (0..40).map(large_case).collect();
-    let batch = service.request(Method::POST, "/v1/batches").json(&cases);
-    let batch: Value = batch
-        .send()
-        .await
-        .expect("an answer")
-        .json()
-        .await
-        .expect("JSON");
-    let results = format!(
-        "{}?wait=60",
-        batch["links"]["results"].as_str().expect("a link")
-    );
-    let events = batch["links"]["events"]
-        .as_str()
-        .expect("a link")
-        .to_owned();
-    let read = service
-        .request(Method::GET, &results)
-        .send()
-        .await
-        .expect("an answer");
-    let whole = read.bytes().await.expect("a body").len();
+    let batch = service.post("/v1/batches", &json!(cases)).await.json;
+    let results = format!("{}?wait=60", link(&batch, "results"));
+    let events = link(&batch, "events").to_owned();
+    let whole = service.ask(&results).await.bytes.len();
     let before = resident_bytes(service.id());
     let mut silent = Vec::new();
     for path in [&results, &events] {
@@ -243,18 +221,13 @@ async fn a_large_result_that_nobody_reads_is_not_held_in_memory() {
     // The most motions there may be.
     let mut case = long_case("large", 10_000);
     case["solver"]["mesh"] = json!({ "strips": 2, "cells": 2 });
-    let submitted = service.request(Method::POST, "/v1/jobs").json(&case);
-    let submitted = submitted.header("prefer", "wait=60");
-    let answer = submitted.send().await.expect("an answer");
-    let job: Value = answer.json().await.expect("JSON, with the result");
+    let job = service.post("/v1/jobs?wait=60", &case).await.json;
     let motions = &job["result"]["patches"][0]["points"];
     assert_eq!(motions.as_array().map(Vec::len), Some(10_000), "{job:.300}");
     let id = job["id"].as_str().expect("an id");
     for part in ["result", "resultants", "resultants?format=csv"] {
         let path = format!("/v1/jobs/{id}/{part}");
-        let read = service.request(Method::GET, &path).send();
-        let whole = read.await.expect("an answer").bytes().await;
-        let whole = whole.expect("a body").len();
+        let whole = service.ask(&path).await.bytes.len();
         assert!(whole > 1 << 20, "{part}: {whole} bytes fill no buffer");
         let before = resident_bytes(service.id());
         let mut silent = Vec::new();

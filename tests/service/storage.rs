@@ -28,6 +28,9 @@ impl Disk {
             .arg(folder.path())
             .output();
         let mounted = mounted.is_ok_and(|out| out.status.success());
+        if !mounted {
+            skip("this process may not mount a file system");
+        }
         mounted.then_some(Disk { folder })
     }
 
@@ -62,25 +65,12 @@ impl Drop for Disk {
     }
 }
 
-async fn answer(request: reqwest::RequestBuilder) -> Answer {
-    let response = request.send().await.unwrap();
-    let (status, headers) = (response.status().as_u16(), response.headers().clone());
-    let bytes = response.bytes().await.unwrap().to_vec();
-    Answer {
-        status,
-        headers,
-        json: serde_json::from_slice(&bytes).unwrap_or(Value::Null),
-        text: String::from_utf8_lossy(&bytes).into_owned(),
-        bytes,
-    }
-}
-
 async fn submit(service: &Service, case: &Value) -> Answer {
-    answer(service.request(Method::POST, "/v1/jobs").json(case)).await
+    service.post("/v1/jobs", case).await
 }
 
 async fn ready(service: &Service) -> Answer {
-    answer(service.request(Method::GET, "/readyz")).await
+    service.ask("/readyz").await
 }
 
 /// Submits until the service refuses; the jobs it acknowledged and the refusal.
@@ -122,7 +112,6 @@ async fn all_succeed(service: &Service, accepted: &[String]) {
 #[tokio::test]
 async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     let Some(disk) = Disk::mount("size=24m") else {
-        skip("this process may not mount a file system");
         return;
     };
     let flags = ["--cache", "false", "--workers", "1"];
@@ -135,8 +124,8 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     assert!(refusal.header("retry-after").is_some());
     assert_problem(&ready(&service).await, 507, "storage-full", "");
     let cases = json!([case("a"), case("b")]);
-    let batch = service.request(Method::POST, "/v1/batches").json(&cases);
-    assert_problem(&answer(batch).await, 507, "storage-full", "");
+    let batch = service.post("/v1/batches", &cases).await;
+    assert_problem(&batch, 507, "storage-full", "");
     // The result that is ready by then waits for room instead of being given up.
     while service.logged("could not be written yet") == 0 {
         pause().await;
@@ -148,8 +137,7 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     until_ready(&service).await;
     accepted.push(large);
     all_succeed(&service, &accepted).await;
-    let after = submit(&service, &case("after")).await;
-    assert_eq!(after.status, 202, "{}", after.text);
+    submit(&service, &case("after")).await.is(202);
     let list = service.get("/v1/jobs?limit=1000").await;
     let known = list["jobs"].as_array().unwrap().len();
     assert_eq!(known, accepted.len() + 1, "no more than were acknowledged");
@@ -162,13 +150,12 @@ async fn send_batch(service: &Service, key: &str, cases: &[Value]) -> Answer {
     let request = request
         .header("Idempotency-Key", key)
         .header("Content-Type", "application/x-ndjson");
-    answer(request.body(lines)).await
+    Answer::to(request.body(lines)).await
 }
 
 #[tokio::test]
 async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once() {
     let Some(disk) = Disk::mount("size=64m") else {
-        skip("this process may not mount a file system");
         return;
     };
     let flags = ["--cache", "false", "--workers", "1"];
@@ -188,8 +175,7 @@ async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once(
     let list = service.get("/v1/jobs?limit=1000").await;
     assert_eq!(list["jobs"], json!([]), "nothing is listed");
     std::fs::remove_file(ballast).unwrap();
-    let again = send_batch(&service, "k", &cases).await;
-    assert_eq!(again.status, 202, "{}", again.text);
+    let again = send_batch(&service, "k", &cases).await.is(202);
     let path = format!("/v1/batches/{}", again.json["id"].as_str().unwrap());
     while service.get(&path).await["states"]["succeeded"] != json!(cases.len()) {
         pause().await;
@@ -197,7 +183,7 @@ async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once(
     // A job is counted just after its end is stored.
     let name = "\nrailhead_jobs_ended_total{state=\"succeeded\"} ";
     let solved = loop {
-        let metrics = answer(service.request(Method::GET, "/metrics")).await.text;
+        let metrics = service.ask("/metrics").await.text;
         let (_, value) = metrics.split_once(name).expect("the sample is there");
         let value: usize = value.lines().next().unwrap().parse().unwrap();
         if value >= cases.len() {
@@ -222,7 +208,6 @@ async fn a_service_starts_on_a_full_disk_and_serves_what_it_has() {
 
 async fn starts_on_a_full_disk(killed: bool) {
     let Some(disk) = Disk::mount("size=16m") else {
-        skip("this process may not mount a file system");
         return;
     };
     let flags = ["--cache", "false", "--workers", "1"];
@@ -243,26 +228,20 @@ async fn starts_on_a_full_disk(killed: bool) {
     service.get(&format!("/v1/jobs/{solved}/result")).await;
     if killed {
         // The other one has the room that was kept for its start.
-        assert_problem(
-            &submit(&service, &case("refused")).await,
-            507,
-            "storage-full",
-            "",
-        );
+        let answer = submit(&service, &case("refused")).await;
+        assert_problem(&answer, 507, "storage-full", "");
         assert_problem(&ready(&service).await, 507, "storage-full", "");
     }
     std::fs::remove_file(ballast).unwrap();
     until_ready(&service).await;
     service.until(&running, "running").await;
-    let after = submit(&service, &case("after")).await;
-    assert_eq!(after.status, 202, "{}", after.text);
+    let after = submit(&service, &case("after")).await.is(202);
     all_succeed(&service, &[after.json["id"].as_str().unwrap().to_owned()]).await;
 }
 
 #[tokio::test]
 async fn a_full_disk_costs_a_sweep_no_slice() {
     let Some(disk) = Disk::mount("size=16m") else {
-        skip("this process may not mount a file system");
         return;
     };
     let flags = [
@@ -299,7 +278,6 @@ async fn a_full_disk_costs_a_sweep_no_slice() {
 #[tokio::test]
 async fn a_full_disk_and_a_kill_lose_nothing_either() {
     let Some(disk) = Disk::mount("size=16m") else {
-        skip("this process may not mount a file system");
         return;
     };
     let flags = ["--cache", "false", "--workers", "1"];
@@ -319,7 +297,6 @@ async fn a_full_disk_and_a_kill_lose_nothing_either() {
 #[test]
 fn a_read_only_disk_is_named_at_the_start() {
     let Some(disk) = Disk::mount("size=1m") else {
-        skip("this process may not mount a file system");
         return;
     };
     let remounted = Command::new("mount")
@@ -339,14 +316,13 @@ fn a_read_only_disk_is_named_at_the_start() {
 
 /// Does the service say that its storage fails?
 async fn failing(service: &Service) -> bool {
-    let metrics = answer(service.request(Method::GET, "/metrics")).await.text;
+    let metrics = service.ask("/metrics").await.text;
     metrics.contains("\nrailhead_storage_failing 1\n")
 }
 
 #[tokio::test]
 async fn results_without_room_are_told_although_the_table_takes_data() {
     let Some(disk) = Disk::mount("size=64k") else {
-        skip("this process may not mount a file system");
         return;
     };
     let folder = tempfile::tempdir().unwrap();
@@ -378,7 +354,6 @@ async fn results_without_room_are_told_although_the_table_takes_data() {
 #[tokio::test]
 async fn a_body_that_fills_the_disk_is_told_until_there_is_room() {
     let Some(disk) = Disk::mount("size=32m") else {
-        skip("this process may not mount a file system");
         return;
     };
     let service = Service::start(&disk.data_dir(), &["--workers", "1"]);
@@ -391,7 +366,7 @@ async fn a_body_that_fills_the_disk_is_told_until_there_is_room() {
     let send = async || {
         let request = service.request(Method::POST, &format!("/v1/runs?template={job}"));
         let request = request.header("Content-Type", "text/csv");
-        answer(request.body(table.clone())).await
+        Answer::to(request.body(table.clone())).await
     };
     let ballast = disk.fill_but(256 << 10);
     assert_problem(&send().await, 507, "storage-full", "");
@@ -429,7 +404,7 @@ async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     assert_problem(&refusal, 503, "storage-unwritable", "cannot be written");
     assert_problem(&ready(&service).await, 503, "storage-unwritable", "");
     service.get(&format!("/v1/jobs/{first}")).await;
-    let metrics = answer(service.request(Method::GET, "/metrics")).await.text;
+    let metrics = service.ask("/metrics").await.text;
     assert!(
         metrics.contains("\nrailhead_storage_failing 1\n"),
         "{metrics}"
@@ -440,8 +415,7 @@ async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     limit_files(&service, "unlimited");
     until_ready(&service).await;
     all_succeed(&service, &[first]).await;
-    let after = submit(&service, &case("after")).await;
-    assert_eq!(after.status, 202, "{}", after.text);
+    let _after = submit(&service, &case("after")).await.is(202);
     assert_eq!(service.logged("the disk takes data again"), 1);
 }
 
@@ -460,8 +434,7 @@ async fn a_table_locked_by_another_process_is_waited_for_and_then_told() {
     until_ready(&service).await;
     let mut another = case("after");
     another["load"]["normal_force_n"] = json!(70_000);
-    let after = submit(&service, &another).await;
-    assert_eq!(after.status, 202, "{}", after.text);
+    let after = submit(&service, &another).await.is(202);
     service
         .until(after.json["id"].as_str().unwrap(), "succeeded")
         .await;

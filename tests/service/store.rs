@@ -13,7 +13,7 @@ use railhead::contact::remark::list::Remark;
 use railhead::jobs::model::{Kind, Queue, SubmitOptions};
 use railhead::jobs::store::{
     Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Filter, Lease, NewBatch, NewJob,
-    Page, QueueBounds, Reap, ReleaseReason, Renewal, ResultRef, Store, StoredResult,
+    Page, QueueBounds, ReleaseReason, ResultRef, Store, StoredResult,
 };
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
@@ -97,15 +97,6 @@ impl Table {
         claim_up_to(&*self.store, now, LEASE, 1).await.pop()
     }
 
-    /// Extends one lease.
-    pub async fn renew(&self, claim: &Claim, progress: f64, now: i64) -> Renewal {
-        let renewals = self
-            .store
-            .renew(&[(claim, progress)], Lease { now, ms: LEASE })
-            .await;
-        renewals.unwrap()[0]
-    }
-
     /// Ends one job; `None` if its lease was lost.
     pub async fn finish(&self, claim: &Claim, ending: &Ending, now: i64) -> Option<Job> {
         finish_one(&*self.store, claim, ending, now).await
@@ -158,10 +149,6 @@ impl Table {
     pub async fn job_by_key(&self, key: &str, digest: &[u8; 32]) -> Option<Enqueued> {
         let found = self.store.job_by_key("anonymous", key, digest);
         found.await.unwrap()
-    }
-
-    pub async fn reap(&self, which: Reap, now: i64, attempts_max: u32) -> Vec<(Uuid, State)> {
-        self.store.reap(which, now, attempts_max).await.unwrap()
     }
 
     pub async fn released_blobs(&self, done: &[String], limit: u32) -> Vec<String> {

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use proptest::prelude::*;
 use proptest::sample::Index;
+use railhead::jobs::State;
 use railhead::jobs::model::Kind;
 use railhead::jobs::store::{BatchBegun, Claim, Filter, NewBatch, QueueBounds};
 use uuid::Uuid;
@@ -145,14 +146,29 @@ impl Pair {
                 .await;
             let jobs = page.unwrap().entries.into_iter().rev();
             let seen: Vec<_> = jobs
-                .map(|job| (job.id, job.state, job.attempt, job.cached))
+                .map(|job| {
+                    let failed = job.failure.is_some();
+                    assert!(job.state != State::Queued || job.started_at.is_none());
+                    (
+                        job.id,
+                        job.state,
+                        job.attempt,
+                        job.cached,
+                        job.ended_at,
+                        failed,
+                    )
+                })
                 .collect();
             let rows = self
                 .model
                 .rows
                 .iter()
                 .filter(|(_, row)| row.tenant == tenant);
-            let known = rows.map(|(id, row)| (*id, row.state, row.attempt, row.cached));
+            let known = rows.map(|(id, row)| {
+                let ended_at = row.state.ended().then_some(row.ended_at);
+                let failed = row.state == State::Failed;
+                (*id, row.state, row.attempt, row.cached, ended_at, failed)
+            });
             assert_eq!(seen, known.collect::<Vec<_>>());
         }
         let outbox = self.store.released_blobs(&[], 1000).await.unwrap();

@@ -37,26 +37,31 @@ async fn submit(
 }
 
 async fn one_key_makes_one_job_whoever_asks_at_the_same_moment(kind: StoreKind) {
-    let (_table, stores) = two(kind).await;
-    let keyed = || NewJob {
-        idempotency: Some(("k".to_owned(), [7; 32])),
+    let (table, stores) = two(kind).await;
+    let keyed = |key: &str, digest: u8| NewJob {
+        idempotency: Some((key.to_owned(), [digest; 32])),
         ..new_job()
     };
-    let jobs = (0..32).map(|_| keyed()).collect();
+    let jobs = (0..32).map(|_| keyed("k", 7)).collect();
     let answers = submit(&stores, jobs, QueueBounds::NONE).await;
     let mut ids = HashSet::new();
     let mut created = 0;
     for answer in answers {
+        created += usize::from(matches!(answer, Enqueued::Created(_)));
         match answer {
-            Enqueued::Created(job) => {
-                created += 1;
-                ids.insert(job.id);
-            }
-            Enqueued::Existing(job) => drop(ids.insert(job.id)),
+            Enqueued::Created(job) | Enqueued::Existing(job) => ids.insert(job.id),
             other => panic!("{other:?}"),
-        }
+        };
     }
     assert_eq!((created, ids.len()), (1, 1));
+    // Another case has the key of that one, or a key of its own.
+    let conflict = Some(Enqueued::Conflict);
+    assert_eq!(table.job_by_key("k", &[2; 32]).await, conflict);
+    assert_eq!(table.job_by_key("other", &[7; 32]).await, None);
+    let others = vec![keyed("k", 2), keyed("other", 7)];
+    let others = submit(&stores, others, QueueBounds::NONE).await;
+    assert_eq!(others[0], Enqueued::Conflict);
+    assert!(matches!(others[1], Enqueued::Created(_)));
 }
 
 async fn a_quota_is_exact_whoever_submits_at_the_same_moment(kind: StoreKind) {

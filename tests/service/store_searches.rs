@@ -43,26 +43,28 @@ async fn twelve(table: &Table) -> Vec<Uuid> {
     ids
 }
 
+/// The places of the jobs found, read page by page, and how many there are.
+async fn pages(table: &Table, ids: &[Uuid], filter: &Filter) -> (Vec<usize>, Total) {
+    let (mut found, mut after, mut total) = (Vec::new(), None, None);
+    loop {
+        let page = table.list(filter, after, 2).await;
+        assert!(page.entries.len() <= 2);
+        for job in &page.entries {
+            assert_eq!(job.batch_id, None);
+            found.push(ids.iter().position(|id| *id == job.id).unwrap());
+        }
+        total = total.or(Some(page.total));
+        match page.next_cursor {
+            Some(cursor) => after = filter.read_cursor(&cursor),
+            None => return (found, total.unwrap()),
+        }
+    }
+}
+
 async fn several_states_labels_and_words_of_the_name_are_found_page_by_page(kind: StoreKind) {
     let table = Table::new(kind).await;
     let ids = twelve(&table).await;
-    let found = async |filter: &Filter| {
-        let (mut found, mut after, mut total) = (Vec::new(), None, None);
-        loop {
-            let page = table.list(filter, after, 2).await;
-            assert!(page.entries.len() <= 2);
-            found.extend(
-                page.entries
-                    .iter()
-                    .map(|job| ids.iter().position(|id| *id == job.id).unwrap()),
-            );
-            total = total.or(Some(page.total));
-            match page.next_cursor {
-                Some(cursor) => after = filter.read_cursor(&cursor),
-                None => return (found, total.unwrap()),
-            }
-        }
-    };
+    let found = async |filter: &Filter| pages(&table, &ids, filter).await;
     let states = |states: &[State]| Filter {
         states: states.to_vec(),
         ..Filter::default()
@@ -143,22 +145,7 @@ async fn jobs_submitted_alone_are_listed_without_those_of_batches(kind: StoreKin
     let table = Table::new(kind).await;
     let ids = twelve(&table).await;
     four_batches(&table).await;
-    let found = async |filter: &Filter| {
-        let (mut found, mut after, mut total) = (Vec::new(), None, None);
-        loop {
-            let list = table.store.list("anonymous", filter, after, 2);
-            let page = list.await.unwrap();
-            for job in &page.entries {
-                assert_eq!(job.batch_id, None);
-                found.push(ids.iter().position(|id| *id == job.id).unwrap());
-            }
-            total = total.or(Some(page.total));
-            match page.next_cursor {
-                Some(cursor) => after = filter.read_cursor(&cursor),
-                None => return (found, total.unwrap()),
-            }
-        }
-    };
+    let found = async |filter: &Filter| pages(&table, &ids, filter).await;
     let mut alone = Filter {
         member: Some(Membership::Alone),
         ..Filter::default()

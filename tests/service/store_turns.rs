@@ -1,6 +1,6 @@
 //! In which order are jobs claimed, and what is held against them when their process dies?
 
-use railhead::jobs::model::{Kind, Priority, Queue, SubmitOptions};
+use railhead::jobs::model::{Kind, Queue};
 use railhead::jobs::store::{
     BatchBegun, ClaimKind, ClaimRequest, Enqueued, Lease, NewBatch, NewJob, QueueBounds, Reap,
     Refusal, ReleaseReason,
@@ -12,41 +12,10 @@ use crate::store::{
 };
 
 conformance!(
-    jobs_are_claimed_by_priority_and_then_by_age,
     a_bystander_of_a_dead_process_counts_no_attempt,
     a_job_that_was_longer_than_thought_is_known_as_long,
     jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together,
 );
-
-fn wishing(tenant: &str, priority: Priority) -> NewJob {
-    NewJob {
-        tenant: tenant.into(),
-        options: SubmitOptions {
-            priority,
-            ..SubmitOptions::default()
-        },
-        ..new_job()
-    }
-}
-
-async fn jobs_are_claimed_by_priority_and_then_by_age(kind: StoreKind) {
-    let table = Table::new(kind).await;
-    let mut added = Vec::new();
-    for priority in [
-        Priority::Low,
-        Priority::Normal,
-        Priority::High,
-        Priority::Normal,
-        Priority::High,
-    ] {
-        added.push(table.add(wishing("t", priority)).await.id);
-    }
-    let mut claimed = Vec::new();
-    while let Some(claim) = table.claim(0).await {
-        claimed.push(claim.id);
-    }
-    assert_eq!(claimed, [2, 4, 1, 3, 0].map(|place: usize| added[place]));
-}
 
 fn request(queue: &Queue) -> ClaimRequest<'_> {
     ClaimRequest {

@@ -23,13 +23,10 @@ fn large(bytes: u32) -> Value {
 }
 
 async fn table(guarded: &Guarded, path: &str, rows: &str) -> Answer {
-    let shape = |request: reqwest::RequestBuilder| {
-        let request = request.bearer_auth(&guarded.north);
-        request
-            .header("content-type", "text/csv")
-            .body(format!("creepage_x\n{rows}\n"))
-    };
-    guarded.server.send(Method::POST, path, shape).await
+    let body = format!("creepage_x\n{rows}\n");
+    guarded
+        .post_as(&guarded.north, path, "text/csv", body)
+        .await
 }
 
 async fn stored(guarded: &Guarded, key: &str) -> u64 {
@@ -39,9 +36,7 @@ async fn stored(guarded: &Guarded, key: &str) -> u64 {
 
 #[tokio::test]
 async fn a_template_is_stored_once_and_goes_with_its_last_user() {
-    let mut setup = Setup::new();
-    setup.working = false;
-    let guarded = Guarded::start(setup, |_| {}).await;
+    let guarded = Guarded::start(Setup::idle(), |_| {}).await;
     let key = &guarded.north;
     let template = large(15_000);
     let bytes = template.to_string().len() as u64;
@@ -63,17 +58,15 @@ async fn a_template_is_stored_once_and_goes_with_its_last_user() {
         )
         .await;
         assert_eq!(answer.status, 202, "{}", answer.text);
-        users.push(answer.header("location").unwrap().to_owned());
+        users.push(answer.location());
     }
     let after = stored(&guarded, key).await;
     // One for batches and one for runs.
     assert!(after - before < 3 * bytes, "{before} {after} {bytes}");
     for path in &users {
         assert_eq!(guarded.get(key, path).await.status, 200);
-        let cancel = format!("{path}/cancel");
-        guarded.send(key, Method::POST, &cancel, None).await;
-        let gone = guarded.send(key, Method::DELETE, path, None).await;
-        assert_eq!(gone.status, 204, "{}", gone.text);
+        guarded.cancel(key, path).await;
+        guarded.send(key, Method::DELETE, path, None).await.is(204);
     }
     assert_eq!(stored(&guarded, key).await, before);
     assert_eq!(stored(&guarded, &guarded.south).await, 0);
@@ -93,13 +86,11 @@ async fn beyond_its_stored_bytes_a_tenant_submits_nothing_and_loses_nothing() {
         let mut next = example("spin.case.json");
         next["outputs"] = json!(["resultants", "zones"]);
         next["motion"]["creepage_x"] = json!(1e-5 * paths.len() as f64);
-        let answer = guarded
-            .send(key, Method::POST, "/v1/jobs", Some(&next))
-            .await;
+        let answer = guarded.post(key, "/v1/jobs", &next).await;
         if answer.status != 202 {
             break answer;
         }
-        let path = answer.header("location").unwrap().to_owned();
+        let path = answer.location();
         guarded.until_ended(key, &path).await;
         paths.push(path);
         assert!(paths.len() < 100);
@@ -128,15 +119,11 @@ async fn beyond_its_stored_bytes_a_tenant_submits_nothing_and_loses_nothing() {
 
 #[tokio::test]
 async fn chunks_of_runs_count_for_their_tenant() {
-    let mut setup = Setup::new();
-    setup.working = false;
-    let guarded = Guarded::start(setup, |options| options.tenant_queue_max = 3).await;
+    let guarded = Guarded::start(Setup::idle(), |options| options.tenant_queue_max = 3).await;
     let key = &guarded.north;
     let run = example("run.json");
     for used in 1..=2 {
-        let answer = guarded
-            .send(key, Method::POST, "/v1/runs", Some(&run))
-            .await;
+        let answer = guarded.post(key, "/v1/runs", &run).await;
         assert_eq!(answer.status, 202, "{}", answer.text);
         let me = guarded.get(key, "/v1/me").await.json["used"].clone();
         assert_eq!(
@@ -146,7 +133,7 @@ async fn chunks_of_runs_count_for_their_tenant() {
     }
     guarded.submit(key, &case("the last")).await;
     for (path, body) in [("/v1/runs", &run), ("/v1/jobs", &case("too many"))] {
-        let answer = guarded.send(key, Method::POST, path, Some(body)).await;
+        let answer = guarded.post(key, path, body).await;
         assert_problem(&answer, 429, "quota-exceeded", "3 jobs");
     }
     guarded

@@ -1,10 +1,11 @@
 //! Starting what is under test: the jobs room in this process, or the real program beside it.
 
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
 
@@ -12,10 +13,14 @@ use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::contact::problem::checked_case::CheckedCase;
 use railhead::contact::solution::words::answer::{Fields, Solution};
+use railhead::jobs::clock::Clock;
 use railhead::jobs::engine::Engine;
 use railhead::jobs::{Jobs, Options};
+use reqwest::header::HeaderMap;
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
+
+pub const DAY_MS: i64 = 24 * 3600 * 1000;
 
 /// A case of the handbook: a new wheel on the crown of a rail.
 pub fn case(name: &str) -> Value {
@@ -30,6 +35,13 @@ pub fn case(name: &str) -> Value {
         "solver": { "method": "boundary_element", "mesh": { "strips": 6, "cells": 6 } },
         "outputs": ["resultants", "zones", "tractions"]
     })
+}
+
+/// A small case with this normal force, which no other one equals.
+pub fn loaded(newtons: usize) -> Value {
+    let mut case = case("one of many");
+    case["load"]["normal_force_n"] = json!(newtons);
+    case
 }
 
 /// Jobs on a data folder, solved by the given function.
@@ -57,6 +69,71 @@ where
         ..options
     };
     Jobs::open_with(options, recipe).await.unwrap()
+}
+
+/// An answer. `json` is null where the body is not JSON.
+#[derive(Debug)]
+pub struct Answer {
+    pub status: u16,
+    pub headers: HeaderMap,
+    pub bytes: Vec<u8>,
+    /// The body as text; what is not UTF-8 is replaced.
+    pub text: String,
+    pub json: Value,
+}
+
+impl Answer {
+    /// Sends a request and reads the whole answer.
+    pub async fn to(request: RequestBuilder) -> Answer {
+        let response = request.send().await.expect("an answer");
+        let (status, headers) = (response.status().as_u16(), response.headers().clone());
+        let bytes = response.bytes().await.expect("a body").to_vec();
+        Answer {
+            status,
+            json: serde_json::from_slice(&unpacked(&headers, &bytes)).unwrap_or(Value::Null),
+            headers,
+            text: String::from_utf8_lossy(&bytes).into_owned(),
+            bytes,
+        }
+    }
+
+    /// The answer, which has to have this status.
+    #[track_caller]
+    pub fn is(self, status: u16) -> Answer {
+        assert_eq!(self.status, status, "{}", self.text);
+        self
+    }
+
+    /// Where the work is that was accepted.
+    pub fn location(&self) -> String {
+        self.header("location").expect("a location").to_owned()
+    }
+
+    /// The lines of the body, each of them JSON.
+    pub fn lines(&self) -> Vec<Value> {
+        let lines = self.text.lines();
+        lines.map(|line| line.parse().expect("JSON")).collect()
+    }
+
+    pub fn header(&self, name: &str) -> Option<&str> {
+        self.headers.get(name).and_then(|value| value.to_str().ok())
+    }
+}
+
+/// A body as it was before it was packed.
+pub fn unpacked(headers: &HeaderMap, bytes: &[u8]) -> Vec<u8> {
+    let coding = headers.get("content-encoding");
+    match coding.map(|coding| coding.to_str().expect("a coding")) {
+        Some("zstd") => zstd::decode_all(bytes).expect("zstd"),
+        Some("gzip") => {
+            let mut out = Vec::new();
+            let mut reader = flate2::read::GzDecoder::new(bytes);
+            reader.read_to_end(&mut out).expect("gzip");
+            out
+        }
+        Some(other) => panic!("{other} was not asked for"),
+        None => bytes.to_vec(),
+    }
 }
 
 /// The real program, serving on a free port. Killed when dropped.
@@ -152,21 +229,29 @@ impl Service {
 
     /// The JSON answer to a GET that has to succeed.
     pub async fn get(&self, path: &str) -> Value {
-        let answer = self.request(Method::GET, path).send().await.unwrap();
-        assert_eq!(answer.status(), 200, "{path}");
-        answer.json().await.unwrap()
+        self.ask(path).await.is(200).json
+    }
+
+    /// The answer to a GET.
+    pub async fn ask(&self, path: &str) -> Answer {
+        Answer::to(self.request(Method::GET, path)).await
+    }
+
+    /// The answer to JSON.
+    pub async fn post(&self, path: &str, body: &Value) -> Answer {
+        Answer::to(self.request(Method::POST, path).json(body)).await
+    }
+
+    /// Cancels a job.
+    pub async fn cancel(&self, id: &str) {
+        let path = format!("/v1/jobs/{id}/cancel");
+        let answer = Answer::to(self.request(Method::POST, &path)).await;
+        assert!([200, 202].contains(&answer.status), "{}", answer.text);
     }
 
     /// Submits a case and returns the id of its job.
     pub async fn submit(&self, case: &Value) -> String {
-        let answer = self
-            .request(Method::POST, "/v1/jobs")
-            .json(case)
-            .send()
-            .await
-            .unwrap();
-        assert_eq!(answer.status(), 202);
-        let job: Value = answer.json().await.unwrap();
+        let job = self.post("/v1/jobs", case).await.is(202).json;
         job["id"].as_str().unwrap().to_owned()
     }
 
@@ -229,6 +314,26 @@ impl Drop for Service {
     }
 }
 
+/// A clock that a test turns.
+#[derive(Clone, Default)]
+pub struct Turned(Arc<AtomicI64>);
+
+impl Turned {
+    pub fn clock(&self) -> Clock {
+        let (ahead, system) = (self.0.clone(), Clock::system());
+        Clock::new(move || system.now_ms() + ahead.load(Ordering::SeqCst))
+    }
+
+    /// Shows this many milliseconds more than the system's clock.
+    pub fn set(&self, ahead_ms: i64) {
+        self.0.store(ahead_ms, Ordering::SeqCst);
+    }
+
+    pub fn turn(&self, days: i64) {
+        self.0.fetch_add(days * DAY_MS, Ordering::SeqCst);
+    }
+}
+
 /// Ticks until it is told to stop.
 pub fn tick_forever(monitor: &dyn Monitor) -> SolveError {
     loop {
@@ -243,6 +348,17 @@ pub fn tick_forever(monitor: &dyn Monitor) -> SolveError {
 pub fn skip(reason: &str) {
     assert!(std::env::var_os("CI").is_none(), "not run: {reason}");
     eprintln!("SKIPPED: {reason}");
+}
+
+/// The files below a folder, which need not be there.
+pub fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    let files = paths.flat_map(|path| match path.is_dir() {
+        true => files_below(&path),
+        false => vec![path],
+    });
+    files.collect()
 }
 
 /// Between two looks at a service that can only be asked.

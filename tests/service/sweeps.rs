@@ -10,13 +10,12 @@ use railhead::contact::monitor::{Monitor, Unmonitored};
 use railhead::contact::solution::words::answer::{PatchFields, Solution};
 use railhead::jobs::engine::Engine;
 use railhead::jobs::{FailureKind, Jobs, Options, State};
-use reqwest::Method;
 use serde_json::{Value, json};
 use uuid::Uuid;
 
 use crate::batches::small;
 use crate::store::open_beside;
-use crate::support::{Service, long_case, pause};
+use crate::support::{Service, files_below, long_case, pause};
 
 const AT_MOST: Duration = Duration::from_secs(60);
 
@@ -88,16 +87,8 @@ impl Shop {
 
     /// Files of stored results.
     fn files(&self) -> usize {
-        files_below(&self.folder.path().join("results"))
+        files_below(&self.folder.path().join("results")).len()
     }
-}
-
-fn files_below(folder: &std::path::Path) -> usize {
-    let entries = std::fs::read_dir(folder).into_iter().flatten();
-    let paths = entries.map(|entry| entry.unwrap().path());
-    paths
-        .map(|path| if path.is_dir() { files_below(&path) } else { 1 })
-        .sum()
 }
 
 /// A sweep of so many motions on a coarse mesh.
@@ -337,7 +328,6 @@ async fn a_killed_process_costs_a_sweep_no_more_than_the_slice_it_was_at() {
     while service.logged("slice stored") < slices - stored + 1 {
         pause().await;
     }
-    let cancel = service.request(Method::POST, &format!("/v1/jobs/{cancelled}/cancel"));
-    assert!(cancel.send().await.unwrap().status().is_success());
+    service.cancel(&cancelled).await;
     service.until(&cancelled, "cancelled").await;
 }

@@ -5,15 +5,32 @@ use std::io::Cursor;
 use axum::body::Bytes;
 use railhead::jobs::codec::arrow::{ArrowWriter, read};
 use railhead::jobs::codec::parquet::{TableReader, encode};
-use railhead::jobs::codec::table::{RowTable, TableColumn, TableKind};
-use reqwest::Method;
+use railhead::jobs::codec::table::{RowTable, TableColumn};
+use reqwest::Body;
 use serde_json::{Value, json};
 
 use crate::batches::results;
 use crate::errors::assert_problem;
 use crate::evaluate::npz;
 use crate::runs::{columns, ended, template};
-use crate::server::{Answer, Server, Setup};
+use crate::server::{Answer, Server, Setup, link};
+
+pub const ARROW: &str = "application/vnd.apache.arrow.stream";
+pub const PARQUET: &str = "application/vnd.apache.parquet";
+pub const NPZ: &str = "application/x-npz";
+
+/// The id of a job whose case rows by the table are filled into.
+pub async fn kept_template(server: &Server) -> String {
+    let mut case = template("table");
+    case["load"]["normal_force_n"] = json!(1e5);
+    server.keep(&case).await
+}
+
+/// Sends rows over a kept template, and what else the query says.
+pub async fn send_rows(server: &Server, query: &str, form: &str, body: impl Into<Body>) -> Answer {
+    let path = format!("/v1/runs?template={query}");
+    server.post_as(&path, form, body).await
+}
 
 /// Rows with the columns `normal_force_n`, `creepage_x` and, if it is given, one of texts.
 fn rows(texts: Option<&str>) -> RowTable {
@@ -29,16 +46,12 @@ fn rows(texts: Option<&str>) -> RowTable {
     }
 }
 
-fn kinds(table: &RowTable) -> Vec<(String, TableKind)> {
-    let columns = table.columns.iter();
-    columns
-        .map(|(name, column)| (name.clone(), column.kind()))
-        .collect()
-}
-
 /// The table in every form that a request may have, with its media type. NPZ holds numbers only.
-fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
-    let mut arrow = ArrowWriter::new(Vec::new(), &kinds(table)).expect("a stream");
+pub fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
+    let columns = table.columns.iter();
+    let kinds = columns.map(|(name, column)| (name.clone(), column.kind()));
+    let kinds: Vec<_> = kinds.collect();
+    let mut arrow = ArrowWriter::new(Vec::new(), &kinds).expect("a stream");
     arrow.write(table.clone()).expect("a batch");
     arrow.finish().expect("the end");
     let value = |column: &TableColumn, row: usize| match column {
@@ -66,14 +79,8 @@ fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
     let mut forms = vec![
         ("text/csv", csv.into_bytes()),
         ("application/x-ndjson", ndjson.into_bytes()),
-        (
-            "application/vnd.apache.arrow.stream",
-            std::mem::take(arrow.inner_mut()),
-        ),
-        (
-            "application/vnd.apache.parquet",
-            encode(table).expect("a file"),
-        ),
+        (ARROW, std::mem::take(arrow.inner_mut())),
+        (PARQUET, encode(table).expect("a file")),
     ];
     let numbers: Option<Vec<(&str, Vec<f64>)>> = table
         .columns
@@ -84,21 +91,9 @@ fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
         })
         .collect();
     if let Some(arrays) = numbers {
-        forms.push(("application/x-npz", npz(&arrays)));
+        forms.push((NPZ, npz(&arrays)));
     }
     forms
-}
-
-/// Sends a table over a stored template.
-async fn send_form(
-    server: &Server,
-    path: &str,
-    template: &str,
-    (form, body): (&str, Vec<u8>),
-) -> Answer {
-    let path = format!("{path}template={template}");
-    let send = |request: reqwest::RequestBuilder| request.header("content-type", form).body(body);
-    server.send(Method::POST, &path, send).await
 }
 
 #[tokio::test]
@@ -106,11 +101,9 @@ async fn a_run_answers_the_same_rows_alike_whatever_form_they_come_in() {
     let server = Server::start().await;
     let template = kept_template(&server).await;
     let mut answers = Vec::new();
-    for form in forms(&rows(Some("section"))) {
-        let name = form.0;
-        let answer = send_form(&server, "/v1/runs?", &template, form).await;
-        assert_eq!(answer.status, 202, "{name}: {}", answer.text);
-        let run = answer.header("location").expect("a location").to_owned();
+    for (form, body) in forms(&rows(Some("section"))) {
+        let run = send_rows(&server, &template, form, body).await;
+        let run = run.is(202).location();
         ended(&server, &run).await;
         answers.push(server.get(&format!("{run}/results?format=csv")).await.text);
     }
@@ -125,11 +118,10 @@ async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
     let server = Server::start().await;
     let template = kept_template(&server).await;
     let mut answers = Vec::new();
-    for form in forms(&rows(None)) {
-        let name = form.0;
-        let answer = send_form(&server, "/v1/evaluate?", &template, form).await;
-        assert_eq!(answer.status, 200, "{name}: {}", answer.text);
-        answers.push(answer.json);
+    let path = format!("/v1/evaluate?template={template}");
+    for (form, body) in forms(&rows(None)) {
+        let answer = server.post_as(&path, form, body).await;
+        answers.push(answer.is(200).json);
     }
     assert_eq!(answers.len(), 5);
     let expected = &answers[0]["columns"];
@@ -137,9 +129,9 @@ async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
     let same = answers.iter().all(|answer| answer["columns"] == *expected);
     assert!(same, "{answers:#?}");
     for format in ["csv", "ndjson", "arrow", "parquet"] {
-        let path = format!("/v1/evaluate?format={format}&");
-        let csv = forms(&rows(None)).remove(0);
-        let answer = send_form(&server, &path, &template, csv).await;
+        let path = format!("{path}&format={format}");
+        let (csv, body) = forms(&rows(None)).remove(0);
+        let answer = server.post_as(&path, csv, body).await;
         for (row, line) in lines_of(format, &answer).iter().enumerate() {
             for (name, values) in expected.as_object().expect("columns") {
                 assert_eq!(line[name], values[row], "{format}, row {row}, {name}");
@@ -147,24 +139,17 @@ async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
         }
     }
     // What is carried along by a run has no place here.
-    let carried = forms(&rows(Some("section"))).remove(0);
-    let refused = send_form(&server, "/v1/evaluate?", &template, carried).await;
-    assert_problem(
-        &refused,
-        422,
-        "faulty-table",
-        "only runs carry columns along",
-    );
+    let (csv, carried) = forms(&rows(Some("section"))).remove(0);
+    let refused = server.post_as(&path, csv, carried).await;
+    let words = "only runs carry columns along";
+    assert_problem(&refused, 422, "faulty-table", words);
 }
 
 /// The rows of an answer in some form of table, three of them.
 fn lines_of(format: &str, answer: &Answer) -> Vec<Value> {
     assert_eq!(answer.status, 200, "{format}: {}", answer.text);
     let lines: Vec<Value> = match format {
-        "ndjson" => {
-            let lines = answer.text.lines();
-            lines.map(|line| line.parse().expect("JSON")).collect()
-        }
+        "ndjson" => answer.lines(),
         "csv" => {
             let mut reader = csv::Reader::from_reader(answer.text.as_bytes());
             let names: Vec<String> = reader
@@ -223,10 +208,9 @@ async fn a_batch_makes_the_same_cases_of_every_form_and_answers_them_alike_in_ev
     let server = Server::start().await;
     let template = kept_template(&server).await;
     let mut answers = Vec::new();
-    for form in forms(&rows(Some("label:section"))) {
-        let name = form.0;
-        let batch = send_form(&server, "/v1/batches?wait=60&", &template, form).await;
-        assert_eq!(batch.status, 200, "{name}: {}", batch.text);
+    let path = format!("/v1/batches?wait=60&template={template}");
+    for (name, body) in forms(&rows(Some("label:section"))) {
+        let batch = server.post_as(&path, name, body).await.is(200);
         let lines = results(&server, &batch.json, "").await;
         let said = lines.iter().map(|line| {
             let patches = &line["result"]["patches"];
@@ -243,7 +227,7 @@ async fn a_batch_makes_the_same_cases_of_every_form_and_answers_them_alike_in_ev
     for (name, said, _) in &answers {
         assert_eq!(said, expected, "{name}");
     }
-    let path = batch.json["links"]["results"].as_str().expect("a link");
+    let path = link(&batch.json, "results");
     let columns = "index,id,point,label:section,force_x_n,error_force_x_n,target_met,remarks,error";
     let mut tables = Vec::new();
     for format in ["csv", "arrow", "parquet"] {
@@ -253,12 +237,8 @@ async fn a_batch_makes_the_same_cases_of_every_form_and_answers_them_alike_in_ev
         let mut lines = lines_of(format, &answer);
         // A text without letters is none in CSV.
         for line in &mut lines {
-            line.as_object_mut()
-                .expect("a row")
-                .retain(|_, cell| *cell != json!(""));
-            line.as_object_mut()
-                .expect("a row")
-                .retain(|_, cell| !cell.is_null());
+            let cells = line.as_object_mut().expect("a row");
+            cells.retain(|_, cell| *cell != json!("") && !cell.is_null());
         }
         tables.push(lines);
     }
@@ -276,79 +256,45 @@ async fn faults_of_rows_in_any_form_are_named() {
     let template = kept_template(&server).await;
     let mut wrong = rows(None);
     wrong.columns[0].1 = TableColumn::Numbers(vec![5e4, -5e4, 7e4]);
-    for form in forms(&wrong) {
-        let name = form.0;
-        for (path, kind) in [
-            ("/v1/runs?", "faulty-case"),
-            ("/v1/evaluate?", "faulty-case"),
-            ("/v1/batches?", "faulty-batch"),
-        ] {
-            let form = (name, form.1.clone());
-            let refused = send_form(&server, path, &template, form).await;
+    let paths = [
+        ("/v1/runs", "faulty-case"),
+        ("/v1/evaluate", "faulty-case"),
+        ("/v1/batches", "faulty-batch"),
+    ];
+    let wrong = forms(&wrong);
+    for (path, kind) in paths {
+        let bare = server.post_as(path, "text/csv", "creepage_x\n1e-3\n").await;
+        assert_problem(&bare, 400, "bad-query", "template");
+        let path = format!("{path}?template={template}");
+        for (form, body) in wrong.clone() {
+            let refused = server.post_as(&path, form, body).await;
             assert_problem(&refused, 422, kind, "1");
-            assert!(refused.text.contains("-50000"), "{name}: {}", refused.text);
+            assert!(refused.text.contains("-50000"), "{form}: {}", refused.text);
         }
-    }
-    for form in [
-        "application/vnd.apache.arrow.stream",
-        "application/vnd.apache.parquet",
-        "application/x-npz",
-    ] {
-        for path in ["/v1/runs?", "/v1/evaluate?", "/v1/batches?"] {
-            let broken = send_form(&server, path, &template, (form, b"neither".to_vec())).await;
+        for form in [ARROW, PARQUET, NPZ] {
+            let broken = server.post_as(&path, form, "neither").await;
             assert_problem(&broken, 422, "faulty-table", "cannot be read");
+        }
+        if kind == "faulty-case" {
+            let letters = server.post_as(&path, "text/csv", "creepage_x\n0.1\nten\n");
+            let word = "line 3, column `creepage_x`";
+            assert_problem(&letters.await, 422, "faulty-table", word);
         }
     }
 }
 
 #[tokio::test]
 async fn more_rows_or_bytes_than_allowed_are_refused() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     (setup.http.run_max_rows, setup.http.run_max_bytes) = (100, 4096);
     let server = setup.start().await;
     let body = json!({ "template": template("table"), "columns": columns(101) });
-    assert_problem(
-        &server.post("/v1/runs", &body).await,
-        413,
-        "body-too-large",
-        "run-max-rows",
-    );
+    let answer = server.post("/v1/runs", &body).await;
+    assert_problem(&answer, 413, "body-too-large", "run-max-rows");
     let template = kept_template(&server).await;
-    let send = |request: reqwest::RequestBuilder| {
-        request
-            .header("content-type", "text/csv")
-            .body("creepage_x\n".repeat(1000))
-    };
-    let answer = server
-        .send(Method::POST, &format!("/v1/runs?template={template}"), send)
-        .await;
+    let many = "creepage_x\n".repeat(1000);
+    let answer = send_rows(&server, &template, "text/csv", many).await;
     assert_problem(&answer, 413, "body-too-large", "4096");
-    let send = |request: reqwest::RequestBuilder| {
-        request.header("content-type", "text/csv").body("a\n1\n")
-    };
-    assert_problem(
-        &server.send(Method::POST, "/v1/runs", send).await,
-        400,
-        "bad-query",
-        "template",
-    );
-}
-
-/// The id of a job whose case rows by the table are filled into.
-async fn kept_template(server: &Server) -> String {
-    let mut case = template("table");
-    case["load"]["normal_force_n"] = json!(1e5);
-    let job = server.submit(&case).await;
-    job.rsplit('/').next().expect("an id").to_owned()
-}
-
-/// Sends a table in CSV over a template.
-async fn send_table(server: &Server, template: &str, table: &'static str) -> Answer {
-    let path = format!("/v1/runs?template={template}");
-    let csv =
-        |request: reqwest::RequestBuilder| request.header("content-type", "text/csv").body(table);
-    server.send(Method::POST, &path, csv).await
 }
 
 /// A table as a simulation writes it, and the same rows in the words of this service.
@@ -372,8 +318,10 @@ async fn a_table_of_a_simulation_is_read_with_its_units() {
     ];
     let mut answers = Vec::new();
     for (query, table) in tables {
-        let sent = send_table(&server, &format!("{template}{query}"), table).await;
-        assert_eq!(sent.status, 202, "{}", sent.text);
+        let query_of = format!("{template}{query}");
+        let sent = send_rows(&server, &query_of, "text/csv", table)
+            .await
+            .is(202);
         assert_eq!(sent.json["columns"][0]["pointer"], "/load/normal_force_n");
         let factor = if query.is_empty() && table.starts_with("normal") {
             1.0
@@ -381,10 +329,10 @@ async fn a_table_of_a_simulation_is_read_with_its_units() {
             1e3
         };
         assert_eq!(sent.json["columns"][0]["factor"], factor);
-        let run = sent.header("location").expect("a location").to_owned();
+        let run = sent.location();
         assert_eq!(ended(&server, &run).await["rows_without_answer"], 0);
         let results = format!("{run}/results?format=ndjson&columns=time,force_x_n,normal_force_n");
-        answers.push(crate::runs::lines(&server.get(&results).await));
+        answers.push(server.get(&results).await.lines());
     }
     for other in &answers[1..] {
         for (row, same) in answers[0].iter().zip(other) {
@@ -416,7 +364,8 @@ async fn a_table_whose_units_are_not_clear_is_refused() {
             ["`Q`", "no title"],
         ),
     ] {
-        let refused = send_table(&server, &format!("{template}{query}"), table).await;
+        let query = format!("{template}{query}");
+        let refused = send_rows(&server, &query, "text/csv", table).await;
         assert_problem(&refused, 422, "faulty-table", words[0]);
         assert!(
             words.iter().all(|word| refused.text.contains(word)),

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::thread::available_parallelism;
 use std::time::Duration;
 
-use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
@@ -48,11 +47,7 @@ async fn every_table(guarded: &Guarded, key: &str, template: &str) -> Vec<(&'sta
             evaluate.to_string(),
         ),
     ] {
-        let shape = |request: reqwest::RequestBuilder| {
-            let request = request.bearer_auth(key).header("content-type", form);
-            request.body(body)
-        };
-        let answer = guarded.server.send(Method::POST, &path, shape).await;
+        let answer = guarded.post_as(key, &path, form, body).await;
         answers.push((what, answer));
     }
     answers
@@ -60,8 +55,7 @@ async fn every_table(guarded: &Guarded, key: &str, template: &str) -> Vec<(&'sta
 
 #[tokio::test(flavor = "multi_thread")]
 async fn long_evaluations_of_one_tenant_leave_turns_to_another() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.http.memory_max_bytes = 4 << 30;
     setup.http.tenant_memory_max_bytes = 2 << 30;
     let guarded = Guarded::start(setup, |_| {}).await;
@@ -103,8 +97,7 @@ async fn long_evaluations_of_one_tenant_leave_turns_to_another() {
 
 #[tokio::test]
 async fn a_table_that_takes_longer_than_it_may_is_refused_and_leaves_nothing() {
-    let mut setup = Setup::new();
-    setup.working = false;
+    let mut setup = Setup::idle();
     setup.http.table_time = Duration::ZERO;
     let guarded = Guarded::start(setup, |_| {}).await;
     let template = guarded.submit(&guarded.south, &fastsim()).await;

@@ -14,6 +14,7 @@ use prost::Message;
 use reqwest::Method;
 use serde_json::{Value, json};
 
+use crate::server::link;
 use crate::support::{Service, case, endless_case};
 
 /// A collector of spans, as OTLP over HTTP has it.
@@ -161,7 +162,7 @@ async fn cases_of_a_batch_belong_to_its_trace() {
     unsolvable["solver"]["time_limit_s"] = json!(1e-9);
     let cases = json!([case("first"), unsolvable]);
     let batch = send(&service, "/v1/batches", &cases, TRACE, "01").await;
-    let results = batch["links"]["results"].as_str().unwrap();
+    let results = link(&batch, "results");
     let results = service.request(Method::GET, &format!("{results}?wait=60"));
     let results = results.send().await.unwrap().text().await.unwrap();
     assert_eq!(results.lines().count(), 2, "{results}");
@@ -213,8 +214,7 @@ async fn a_trace_goes_on_in_the_process_that_solves_the_job() {
     service.kill();
 
     let service = Service::start(folder.path(), &collected);
-    let cancel = service.request(Method::POST, &format!("/v1/jobs/{ahead}/cancel"));
-    cancel.send().await.unwrap();
+    service.cancel(&ahead).await;
     service.until(&untraced, "succeeded").await;
     service.until(&traced, "succeeded").await;
     stop(service).await;

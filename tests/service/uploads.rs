@@ -22,38 +22,23 @@ fn body(parts: &[(&str, &str)]) -> String {
 async fn upload(server: &Server, path: &str, parts: &[(&str, &str)]) -> Answer {
     let body = body(parts);
     let kind = format!("multipart/form-data; boundary={BOUNDARY}");
-    let send = |request: reqwest::RequestBuilder| request.header("content-type", kind).body(body);
-    server.send(Method::POST, path, send).await
-}
-
-async fn with_type(server: &Server, path: &str, kind: &'static str, text: &str) -> Answer {
-    let text = text.to_owned();
-    let send = |request: reqwest::RequestBuilder| request.header("content-type", kind).body(text);
-    server.send(Method::POST, path, send).await
+    server.post_as(path, &kind, body).await
 }
 
 #[tokio::test]
 async fn a_table_with_its_template_is_answered_like_one_over_a_job() {
     let server = Server::start().await;
     let case = small("template");
-    let job = server.submit(&case).await;
-    let id = job.rsplit('/').next().expect("an id");
+    let id = server.keep(&case).await;
     let table = "label:km,normal_force_n,/motion/creepage_x\n37.2,80000,0.002\n37.4,90000,0\n";
-    let over_job = with_type(
-        &server,
-        &format!("/v1/batches?template={id}"),
-        "text/csv",
-        table,
-    )
-    .await;
-    assert_eq!(over_job.status, 202, "{}", over_job.text);
+    let path = format!("/v1/batches?template={id}");
+    let over_job = server.post_as(&path, "text/csv", table).await.is(202);
     let case = case.to_string();
     let parts = [
         ("name=\"template\"; filename=\"case.json\"", case.as_str()),
         ("name=\"table\"; filename=\"rows.csv\"", table),
     ];
-    let alone = upload(&server, "/v1/batches", &parts).await;
-    assert_eq!(alone.status, 202, "{}", alone.text);
+    let alone = upload(&server, "/v1/batches", &parts).await.is(202);
     let [expected, found] = [
         results(&server, &over_job.json, "?wait=60").await,
         results(&server, &alone.json, "?wait=60").await,
@@ -76,8 +61,7 @@ async fn a_run_takes_every_form_of_table_with_its_template() {
     let rows = json!({ "template": template("auto"), "columns": {
         "normal_force_n": [5e4, 6e4], "/motion/creepage_x": [1e-3, 0.0], "section": ["a", "b"]
     } });
-    let expected = server.post("/v1/runs?wait=60", &rows).await;
-    assert_eq!(expected.status, 200, "{}", expected.text);
+    let expected = server.post("/v1/runs?wait=60", &rows).await.is(200);
     let template = ("name=\"template\"", case.as_str());
     let mut answers = vec![answers_of(&server, &expected).await];
     for table in [
@@ -105,7 +89,7 @@ async fn a_run_takes_every_form_of_table_with_its_template() {
 }
 
 async fn answers_of(server: &Server, run: &Answer) -> String {
-    let path = run.header("location").expect("a location").to_owned();
+    let path = run.location();
     ended(server, &path).await;
     server.get(&format!("{path}/results?format=csv")).await.text
 }
@@ -144,7 +128,9 @@ async fn parts_that_are_missing_or_wrong_are_named() {
     .await;
     assert_problem(&twice, 400, "bad-query", "leave `?template=` out");
     let kind = "multipart/form-data";
-    let bare = with_type(&server, "/v1/runs", kind, &body(&[template, table])).await;
+    let bare = server
+        .post_as("/v1/runs", kind, body(&[template, table]))
+        .await;
     assert_problem(&bare, 415, "unsupported-media-type", "boundary");
     let faulty: Value = json!({ "load": {} });
     let faulty = faulty.to_string();
@@ -185,7 +171,7 @@ async fn a_batch_and_a_run_can_be_waited_for_as_a_job_can() {
         }
         // What has not been waited for can be waited for later.
         let later = server.post(path, &body).await;
-        let location = later.header("location").expect("a location").to_owned();
+        let location = later.location();
         let got = server.get(&format!("{location}?wait=60")).await;
         assert_eq!(got.status, 200, "{}", got.text);
         assert!(got.json["ended_at"].is_string(), "{path}: {}", got.text);

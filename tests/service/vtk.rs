@@ -37,7 +37,7 @@ impl<'a> Vtk<'a> {
 async fn vtk_has_one_quadrilateral_per_cell() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("spin.case.json")).await);
-    let cells = server.get(&format!("{path}/tractions")).await.json["cells"].take();
+    let cells = server.read(&format!("{path}/tractions")).await["cells"].take();
     let (dx, dy) = (numbers(&cells["dx_mm"]), numbers(&cells["dy_mm"]));
     let n = dx.len();
     let file = server.get(&format!("{path}/tractions?format=vtk")).await;
@@ -89,7 +89,7 @@ async fn vtk_has_one_quadrilateral_per_cell() {
 async fn vtk_of_a_grid_is_structured_points() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("spin.case.json")).await);
-    let field = server.get(&format!("{path}/zones?grid=8x4")).await.json;
+    let field = server.read(&format!("{path}/zones?grid=8x4")).await;
     let (x, y) = (numbers(&field["x_mm"]), numbers(&field["y_mm"]));
     let file = server
         .get(&format!("{path}/zones?grid=8x4&format=vtk"))

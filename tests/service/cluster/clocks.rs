@@ -102,8 +102,7 @@ async fn clocks_that_are_off_by_40_seconds_cost_no_lease_and_shift_no_time() {
             (&job["state"], &job["attempt"]),
             (&"running".into(), &1.into())
         );
-        let cancel = behind.request(Method::POST, &format!("/v1/jobs/{id}/cancel"));
-        assert_eq!(cancel.send().await.unwrap().status(), 202);
+        behind.cancel(id).await;
         right.until(id, "cancelled").await;
     }
     for number in 0..8 {

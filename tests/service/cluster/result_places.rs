@@ -11,7 +11,7 @@ use railhead::jobs::{Jobs, Options};
 use uuid::Uuid;
 
 use crate::cluster::postgres::database;
-use crate::support::case;
+use crate::support::{case, files_below};
 
 fn folder_place(folder: &Path, shared: bool) -> ResultsPlace {
     let url = format!("file://{}", folder.display());
@@ -138,16 +138,4 @@ async fn only_old_results_that_no_job_refers_to_are_swept() {
     assert!(kept > 2);
     assert_eq!(files_below(place.path()).len(), kept);
     jobs.shutdown(Duration::ZERO).await;
-}
-
-fn files_below(folder: &Path) -> Vec<std::path::PathBuf> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        match path.is_dir() {
-            true => found.extend(files_below(&path)),
-            false => found.push(path),
-        }
-    }
-    found
 }
