@@ -10,7 +10,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
-use crate::server::{Answer, Server, Setup, link};
+use crate::server::{Answer, Server, Setup, count, link};
 use crate::store::{new_batch, open_beside};
 use crate::support::{Service, case, endless_case, open, pause, tick_forever};
 
@@ -54,8 +54,8 @@ async fn results_come_in_input_order_with_one_line_per_case() {
         ("application/json", Value::from(cases.clone()).to_string()),
         ("application/x-ndjson", lines(&cases)),
     ] {
-        let batch = send(&server, "", content, body).await;
-        assert_eq!((batch.status, &batch.json["count"]), (202, &json!(150)));
+        let batch = send(&server, "", content, body).await.is(202);
+        assert_eq!(batch.json["count"], 150);
         assert_eq!(
             batch.header("location"),
             batch.json["links"]["self"].as_str()
@@ -70,10 +70,8 @@ async fn results_come_in_input_order_with_one_line_per_case() {
         let path = link(&batch.json, "self");
         let now = server.read(path).await;
         assert_eq!(now["states"]["succeeded"], 150);
-        assert_eq!(
-            (&now["progress"], &now["ended"]),
-            (&json!(1.0), &json!(true))
-        );
+        assert_eq!(now["progress"], 1.0);
+        assert_eq!(now["ended"], true);
         // A line says what the job itself says.
         let id = lines[77]["id"].as_str().expect("an id");
         let alone = server.read(&format!("/v1/jobs/{id}/result")).await;
@@ -94,16 +92,15 @@ async fn one_faulty_case_refuses_the_batch_and_names_its_line() {
     assert_problem(&answer, 422, "faulty-batch", "2 of 4 cases");
     let errors = answer.json["errors"].as_array().expect("errors");
     assert_eq!(errors[0]["pointer"], "/1/friction/coefficient");
-    assert_eq!(
-        (&errors[0]["line"], &errors[1]["line"]),
-        (&json!(3), &json!(4))
-    );
+    assert_eq!(errors[0]["line"], 3);
+    assert_eq!(errors[1]["line"], 4);
     assert_eq!(errors[1]["pointer"], "/2");
     let jobs = server.read("/v1/jobs").await;
     assert_eq!(jobs["jobs"], json!([]), "nothing was stored");
 
     let answer = send(&server, "?on_invalid=skip", "application/x-ndjson", body).await;
-    assert_eq!((answer.status, &answer.json["count"]), (202, &json!(2)));
+    assert_eq!(answer.status, 202, "{}", answer.text);
+    assert_eq!(answer.json["count"], 2);
     assert_eq!(answer.json["rejected"], 2);
     assert_eq!(
         answer.json["errors"].as_array().map(Vec::len),
@@ -154,7 +151,7 @@ async fn a_batch_is_bounded_by_case_by_bytes_and_by_count() {
     let three = lines(&vec![small("x"); 3]);
     assert!(three.len() < 2000);
     let ndjson = "application/x-ndjson";
-    let _answer = send(&server, "", ndjson, three.clone()).await.is(202);
+    send(&server, "", ndjson, three.clone()).await.is(202);
     for (body, word) in [
         (lines(&vec![small("x"); 4]), "3 cases"),
         (small(&"n".repeat(900)).to_string(), "line 1 is larger"),
@@ -166,7 +163,7 @@ async fn a_batch_is_bounded_by_case_by_bytes_and_by_count() {
     let answer = send(&server, "", ndjson, three).await;
     assert_problem(&answer, 503, "queue-full", "nothing was stored");
     let jobs = server.read("/v1/jobs").await;
-    assert_eq!(jobs["jobs"].as_array().map(Vec::len), Some(3));
+    assert_eq!(count(&jobs["jobs"]), 3);
 }
 
 #[tokio::test]
@@ -182,16 +179,14 @@ async fn cancelling_a_batch_ends_its_queued_jobs_and_no_other() {
     let batch = send(&server, "", "application/x-ndjson", body).await.json;
     let path = link(&batch, "cancel");
     let answer = server.send(Method::POST, path, |request| request).await;
-    assert_eq!(
-        (answer.status, &answer.json["states"]["cancelled"]),
-        (200, &json!(5))
-    );
+    assert_eq!(answer.status, 200, "{}", answer.text);
+    assert_eq!(answer.json["states"]["cancelled"], 5);
     let lines = results(&server, &batch, "?wait=10").await;
     assert!(lines.iter().all(|line| line["state"] == "cancelled"));
     let other = server.read(link(&alone, "self")).await;
     assert_eq!(other["state"], "queued");
     let listed = server.read(link(&batch, "jobs")).await;
-    assert_eq!(listed["jobs"].as_array().map(Vec::len), Some(5));
+    assert_eq!(count(&listed["jobs"]), 5);
 }
 
 #[tokio::test]
@@ -278,8 +273,7 @@ async fn a_running_group_stops_when_its_batch_is_cancelled() {
 
 #[tokio::test]
 async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--workers", "2"]);
+    let (folder, service) = Service::fresh(&["--workers", "2"]);
     let count = 600;
     let cases: Vec<Value> = (0..count).map(|i| case(&format!("{i}"))).collect();
     let batch = service

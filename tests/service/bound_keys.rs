@@ -127,8 +127,7 @@ async fn a_bound_key_uses_profiles_by_their_digests_and_neither_lists_nor_delete
     let read = guarded.get(bound, &path).await;
     assert_eq!((read.status, &read.json), (200, &rail));
     let wheel = wheel_on_rail["contact"]["wheel"].clone();
-    let own = guarded.post(bound, "/v1/profiles", &wheel).await;
-    assert_eq!(own.status, 201, "{}", own.text);
+    let own = guarded.post(bound, "/v1/profiles", &wheel).await.is(201);
     wheel_on_rail["contact"]["rail"] = json!({ "profile": kept.json["digest"] });
     wheel_on_rail["contact"]["wheel"] = json!({ "profile": own.json["digest"] });
     let job = guarded.submit(bound, &wheel_on_rail).await;

@@ -55,21 +55,14 @@ async fn an_identical_case_is_answered_at_once_with_the_first_result() {
     assert_eq!(first["cached"], false);
     assert_eq!(first["result"]["cached"], false);
     // Not waited for: it has ended when it is accepted.
-    let answer = server.post("/v1/jobs", &renamed("second")).await;
-    assert_eq!(
-        (answer.status, &answer.json["state"]),
-        (202, &json!("succeeded"))
-    );
+    let answer = server.post("/v1/jobs", &renamed("second")).await.is(202);
+    assert_eq!(answer.json["state"], "succeeded");
     let second = server.read(&path_of(&answer.json)).await;
     assert_eq!(second["cached"], true);
-    assert_eq!(
-        (&second["name"], &second["labels"]["km"]),
-        (&json!("second"), &json!("second"))
-    );
-    assert_eq!(
-        (&second["attempt"], &second["progress"]),
-        (&json!(0), &json!(1.0))
-    );
+    assert_eq!(second["name"], "second");
+    assert_eq!(second["labels"]["km"], "second");
+    assert_eq!(second["attempt"], 0);
+    assert_eq!(second["progress"], 1.0);
     assert_eq!(second["remarks"], first["remarks"]);
     let result = server.read(&format!("{}/result", path_of(&second))).await;
     assert_eq!(result["cached"], true);
@@ -101,8 +94,8 @@ async fn what_changes_the_answer_or_refuses_the_cache_is_solved() {
         assert_eq!(server.solve(different).await["cached"], false);
         assert_eq!(solves.load(Ordering::SeqCst), 2 + number);
     }
-    let fresh = solve_fresh(&server, &case("first")).await;
-    assert_eq!((fresh.status, &fresh.json["cached"]), (200, &json!(false)));
+    let fresh = solve_fresh(&server, &case("first")).await.is(200);
+    assert_eq!(fresh.json["cached"], false);
     assert_eq!(solves.load(Ordering::SeqCst), 4);
 
     let (server, solves) = counting(|options| options.cache = false).await;
@@ -120,10 +113,8 @@ async fn a_failure_is_not_used_again() {
         .await;
     for _ in 0..2 {
         let job = server.solve(&case("fails")).await;
-        assert_eq!(
-            (&job["state"], &job["cached"]),
-            (&json!("failed"), &json!(false))
-        );
+        assert_eq!(job["state"], "failed");
+        assert_eq!(job["cached"], false);
     }
 }
 
@@ -138,10 +129,8 @@ async fn either_job_can_be_deleted_without_the_other() {
             let first = server.solve(&case("first")).await;
             let second = server.solve(&case("second")).await;
             let third = server.solve(&case("third")).await;
-            assert_eq!(
-                (&second["cached"], &third["cached"]),
-                (&json!(true), &json!(true))
-            );
+            assert_eq!(second["cached"], true);
+            assert_eq!(third["cached"], true);
             let (gone, kept) = if first_goes {
                 (&first, &second)
             } else {
@@ -264,10 +253,8 @@ async fn earlier_results_outlive_the_process_and_the_deletion_of_their_job() {
     service.kill();
     let service = Service::start(folder.path(), &[]);
     let second = solve(&service).await;
-    assert_eq!(
-        (&first["cached"], &second["cached"]),
-        (&json!(false), &json!(true))
-    );
+    assert_eq!(first["cached"], false);
+    assert_eq!(second["cached"], true);
     assert!(
         !files_below(&folder.path().join("results")).is_empty(),
         "it is a large one"

@@ -61,21 +61,13 @@ async fn tag_of_a_job_changes_with_the_job() {
     let queued = server.get(&path).await;
     assert_eq!(queued.header("cache-control"), Some("private, no-cache"));
     let tag = queued.header("etag").expect("a tag").to_owned();
-    assert_eq!(
-        server.get_with(&path, "if-none-match", &tag).await.status,
-        304
-    );
+    server.get_with(&path, "if-none-match", &tag).await.is(304);
     let early = server.get(&format!("{path}/result")).await;
-    assert_eq!(
-        (early.status, early.header("cache-control")),
-        (409, Some("no-store"))
-    );
+    assert_eq!(early.status, 409, "{}", early.text);
+    assert_eq!(early.header("cache-control"), Some("no-store"));
     server.cancel(&path).await;
-    let cancelled = server.get_with(&path, "if-none-match", &tag).await;
-    assert_eq!(
-        (cancelled.status, &cancelled.json["state"]),
-        (200, &json!("cancelled"))
-    );
+    let cancelled = server.get_with(&path, "if-none-match", &tag).await.is(200);
+    assert_eq!(cancelled.json["state"], "cancelled");
     assert_ne!(cancelled.header("etag"), Some(tag.as_str()));
     server.delete(&path).await;
     let gone = server.get_with(&path, "if-none-match", &tag).await;
@@ -96,15 +88,9 @@ async fn tag_of_a_batch_changes_with_its_jobs() {
         .header("etag")
         .expect("a tag")
         .to_owned();
-    assert_eq!(
-        server.get_with(&path, "if-none-match", &tag).await.status,
-        304
-    );
+    server.get_with(&path, "if-none-match", &tag).await.is(304);
     server.cancel(&path).await;
-    assert_eq!(
-        server.get_with(&path, "if-none-match", &tag).await.status,
-        200
-    );
+    server.get_with(&path, "if-none-match", &tag).await.is(200);
 }
 
 #[tokio::test]
@@ -190,12 +176,8 @@ async fn packed_cases_and_batches_are_unpacked() {
     ] {
         let answer =
             send_packed(&server, "/v1/batches", "application/x-ndjson", coding, body).await;
-        assert_eq!(
-            (answer.status, &answer.json["count"]),
-            (202, &json!(30)),
-            "{}",
-            answer.text
-        );
+        assert_eq!(answer.status, 202, "{}", answer.text);
+        assert_eq!(answer.json["count"], 30);
     }
     let answer = send_packed(&server, "/v1/jobs", "application/json", "br", vec![1, 2]).await;
     assert_problem(&answer, 415, "unsupported-encoding", "`br`");
@@ -273,8 +255,7 @@ async fn tag_and_status(service: &Service, result: &str, known: &str) -> (String
 
 #[tokio::test]
 async fn tags_of_results_end_with_the_build_that_made_them() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let service = Service::start(folder.path(), &[]);
+    let (folder, service) = Service::fresh(&[]);
     let job = service.submit(&case("kept by clients")).await;
     service.until(&job, "succeeded").await;
     let result = format!("/v1/jobs/{job}/resultants");

@@ -147,8 +147,7 @@ fn the_contract_can_be_printed() {
 
 #[test]
 fn a_health_check_tells_a_ready_service_from_none() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &[]);
+    let (_folder, service) = Service::fresh(&[]);
     let check = |url: &str| {
         railhead()
             .args(["healthcheck", "--url", url])

@@ -123,7 +123,7 @@ async fn columns_are_known_bounded_and_there_once_in_every_form() {
         case["load"]["normal_force_n"] = json!(1e5);
         let body = json!({ "template": case, "columns": columns });
         let _refused = server.post("/v1/runs", &body).await.is(422);
-        let _refused = server.post("/v1/evaluate", &body).await.is(422);
+        server.post("/v1/evaluate", &body).await.is(422);
     }
     let evaluate = async |form: &str, body: Vec<u8>| {
         let path = format!("/v1/evaluate?template={template}");

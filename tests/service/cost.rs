@@ -60,8 +60,7 @@ async fn bodies_that_would_fill_the_memory_are_refused_unread() {
 
 #[tokio::test]
 async fn large_bodies_at_once_take_bounded_memory_and_others_are_served() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &[]);
+    let (_folder, service) = Service::fresh(&[]);
     // A body that is read whole, and one that is refused for what it would become.
     let plain = format!(
         r#"{{"x":{}}}"#,
@@ -111,8 +110,7 @@ async fn solved(service: &Service) -> String {
 
 #[tokio::test]
 async fn grids_that_nobody_reads_take_bounded_memory_and_others_are_served() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &[]);
+    let (_folder, service) = Service::fresh(&[]);
     let job = solved(&service).await;
     let mut silent = Vec::new();
     for number in 0..16 {
@@ -226,10 +224,8 @@ async fn large_results_are_passed_on_as_they_are_stored() {
     let waited = server
         .post_with("/v1/jobs", "prefer", "wait=60", &case)
         .await;
-    assert_eq!(
-        (waited.status, &waited.json["state"]),
-        (200, &json!("succeeded"))
-    );
+    assert_eq!(waited.status, 200, "{}", waited.text);
+    assert_eq!(waited.json["state"], "succeeded");
     let id = waited.json["id"].as_str().unwrap();
     let result = server.get(&format!("/v1/jobs/{id}/result")).await;
     assert!(result.bytes.len() > 1 << 20, "{}", result.bytes.len());

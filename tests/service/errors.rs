@@ -12,7 +12,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::runs::{columns, template};
-use crate::server::{Answer, Server, Setup, example, link};
+use crate::server::{Answer, Server, Setup, count, example, link};
 use crate::support::files_below;
 
 /// Checks a failure: status, type, and a word that its detail must have.
@@ -183,12 +183,8 @@ async fn full_queue_refuses_and_stores_nothing() {
     assert_eq!(keyed().await.json, first, "a known key needs no place");
     assert_problem(&answer, 503, "queue-full", "2");
     assert_eq!(answer.header("retry-after"), Some("1"));
-    assert_eq!(
-        server.read("/v1/jobs").await["jobs"]
-            .as_array()
-            .map(Vec::len),
-        Some(2)
-    );
+    let listed = server.read("/v1/jobs").await;
+    assert_eq!(count(&listed["jobs"]), 2);
     server.cancel(&path).await;
     server.submit(&case).await;
 }
@@ -203,11 +199,7 @@ async fn draining_service_is_not_ready_and_takes_no_jobs() {
     let answer = server.post("/v1/jobs", &example("spin.case.json")).await;
     assert_problem(&answer, 503, "draining", "shutting down");
     assert_eq!(answer.header("retry-after"), Some("1"));
-    assert_eq!(
-        server.get("/healthz").await.status,
-        200,
-        "a draining process is alive"
-    );
+    server.get("/healthz").await.is(200);
 }
 
 #[tokio::test]
@@ -282,10 +274,7 @@ async fn field_that_was_not_asked_for_says_what_was() {
             "{part} is linked"
         );
     }
-    assert_eq!(
-        server.get(link(&job["result"], "tractions")).await.status,
-        200
-    );
+    server.get(link(&job["result"], "tractions")).await.is(200);
     let mut case = example("hertz-steel.case.json");
     case["outputs"] = json!(["resultants"]);
     let job = server.solve(&case).await;

@@ -208,8 +208,7 @@ async fn client_that_never_reads_blocks_nobody() {
 
 #[tokio::test]
 async fn last_event_id_is_good_after_a_restart() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let service = Service::start(folder.path(), &["--workers", "1"]);
+    let (folder, service) = Service::fresh(&["--workers", "1"]);
     let id = service.submit(&endless_case("long")).await;
     let url = |service: &Service| format!("http://{}/v1/jobs/{id}/events", service.address());
     let mut reader = Reader::get(&url(&service), None).await;

@@ -31,8 +31,7 @@ fn make_key(data_dir: &Path, tenant: &str) -> String {
 
 #[tokio::test]
 async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--anonymous", "loopback"]);
+    let (folder, service) = Service::fresh(&["--anonymous", "loopback"]);
     // Made beside the running service.
     let key = make_key(folder.path(), "north");
     let ask = async || {
@@ -86,8 +85,7 @@ async fn ask(
 
 #[tokio::test]
 async fn a_key_that_may_only_read_changes_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--anonymous", "always"]);
+    let (folder, service) = Service::fresh(&["--anonymous", "always"]);
     let own = make_key(folder.path(), "north");
     let flags = ["create", "--tenant", "north", "--read-only"];
     let made = String::from_utf8(keys(folder.path(), &flags).stdout).unwrap();
@@ -127,8 +125,7 @@ async fn a_key_that_may_only_read_changes_nothing() {
 
 #[tokio::test]
 async fn a_revoked_key_ends_the_streams_that_it_opened() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &[]);
+    let (folder, service) = Service::fresh(&[]);
     let key = make_key(folder.path(), "north");
     let request = service
         .request(Method::POST, "/v1/batches")

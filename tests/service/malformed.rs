@@ -163,8 +163,7 @@ fn seeds(template: &str) -> Vec<(String, &'static str, Vec<u8>)> {
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn ten_thousand_malformed_bodies_are_answered_as_documented() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--log", "warn,railhead::cli=info"]);
+    let (_folder, service) = Service::fresh(&["--log", "warn,railhead::cli=info"]);
     let template = service.submit(&case("template")).await;
     let seeds = seeds(&template);
     let service = std::sync::Arc::new(service);

@@ -59,10 +59,8 @@ async fn files_of_the_page_may_be_kept_for_good_and_the_page_itself_not() {
     }
     // A page that was loaded before the service was renewed finds its files still, but must ask again.
     let other = server.get("/page/0123456789abcdef/js/page.js").await;
-    assert_eq!(
-        (other.status, other.header("cache-control")),
-        (200, Some("no-cache"))
-    );
+    assert_eq!(other.status, 200, "{}", other.text);
+    assert_eq!(other.header("cache-control"), Some("no-cache"));
     for path in [
         "/page/-/none.js",
         "/page/-/../mod.rs",

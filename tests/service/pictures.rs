@@ -32,10 +32,8 @@ async fn every_field_is_drawn_as_svg_and_as_png() {
         let svg = server
             .get(&format!("{path}/plot.svg?field={field}&patch=1"))
             .await;
-        assert_eq!(
-            (svg.status, svg.header("content-type")),
-            (200, Some("image/svg+xml"))
-        );
+        assert_eq!(svg.status, 200, "{}", svg.text);
+        assert_eq!(svg.header("content-type"), Some("image/svg+xml"));
         Tree::from_str(&svg.text, &Options::default()).expect("well-formed SVG");
         for word in [label, "x in mm", "y in mm", "rolling", "patch 1 of 0 to 1"] {
             assert!(
@@ -48,10 +46,8 @@ async fn every_field_is_drawn_as_svg_and_as_png() {
         let png = server
             .get(&format!("{path}/plot.png?field={field}&patch=1&width=640"))
             .await;
-        assert_eq!(
-            (png.status, png.header("content-type")),
-            (200, Some("image/png"))
-        );
+        assert_eq!(png.status, 200, "{}", png.text);
+        assert_eq!(png.header("content-type"), Some("image/png"));
         let pixels = Pixmap::decode_png(&png.bytes).expect("a PNG");
         assert_eq!(pixels.width(), 640);
         let same = server

@@ -59,8 +59,7 @@ async fn what_schemathesis_makes_of_the_contract_is_answered_as_documented() {
     let Some(program) = schemathesis() else {
         return;
     };
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--log", "warn,railhead::cli=info"]);
+    let (folder, service) = Service::fresh(&["--log", "warn,railhead::cli=info"]);
     let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
     let output = Command::new(program)
         .env("PYTHONPATH", &tests)

@@ -227,3 +227,8 @@ pub fn example(file: &str) -> Value {
 pub fn link<'a>(of: &'a Value, name: &str) -> &'a str {
     of["links"][name].as_str().expect("a link")
 }
+
+/// The number of entries of an array.
+pub fn count(of: &Value) -> usize {
+    of.as_array().expect("an array").len()
+}

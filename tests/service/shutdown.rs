@@ -176,8 +176,7 @@ async fn a_stopped_service_hands_its_running_job_to_the_next_one() {
 
 #[tokio::test]
 async fn a_second_signal_ends_the_service_at_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--shutdown-grace-s", "3600"]);
+    let (_folder, service) = Service::fresh(&["--shutdown-grace-s", "3600"]);
     let id = service.submit(&endless_case("long")).await;
     service.until(&id, "running").await;
     service.signal("INT");
@@ -190,8 +189,7 @@ async fn a_second_signal_ends_the_service_at_once() {
 
 #[tokio::test]
 async fn a_second_signal_ends_a_service_that_waits_for_its_load_balancer() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--drain-delay-s", "3600"]);
+    let (_folder, service) = Service::fresh(&["--drain-delay-s", "3600"]);
     service.signal("TERM");
     while service.logged("stopping") == 0 {
         pause().await;
@@ -202,8 +200,7 @@ async fn a_second_signal_ends_a_service_that_waits_for_its_load_balancer() {
 
 #[tokio::test]
 async fn a_service_says_that_it_is_not_ready_before_its_port_closes() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--drain-delay-s", "2"]);
+    let (_folder, service) = Service::fresh(&["--drain-delay-s", "2"]);
     // Each look is a connection of its own, as that of a load balancer may be.
     let look = async || {
         let url = format!("http://{}/readyz", service.address());

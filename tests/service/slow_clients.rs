@@ -187,8 +187,7 @@ fn large_case(number: u32) -> Value {
 
 #[tokio::test]
 async fn clients_that_read_nothing_cost_little_memory() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let service = Service::start(folder.path(), &["--workers", "2"]);
+    let (_folder, service) = Service::fresh(&["--workers", "2"]);
     let cases: Vec<Value> = (0..40).map(large_case).collect();
     let batch = service.post("/v1/batches", &json!(cases)).await.json;
     let results = format!("{}?wait=60", link(&batch, "results"));
@@ -216,8 +215,7 @@ async fn clients_that_read_nothing_cost_little_memory() {
 #[tokio::test]
 async fn a_large_result_that_nobody_reads_is_not_held_in_memory() {
     const CLIENTS: usize = 60;
-    let folder = tempfile::tempdir().expect("a folder");
-    let service = Service::start(folder.path(), &["--request-memory-mb", "64"]);
+    let (_folder, service) = Service::fresh(&["--request-memory-mb", "64"]);
     // The most motions there may be.
     let mut case = long_case("large", 10_000);
     case["solver"]["mesh"] = json!({ "strips": 2, "cells": 2 });

@@ -415,14 +415,13 @@ async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     limit_files(&service, "unlimited");
     until_ready(&service).await;
     all_succeed(&service, &[first]).await;
-    let _after = submit(&service, &case("after")).await.is(202);
+    submit(&service, &case("after")).await.is(202);
     assert_eq!(service.logged("the disk takes data again"), 1);
 }
 
 #[tokio::test]
 async fn a_table_locked_by_another_process_is_waited_for_and_then_told() {
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &[]);
+    let (folder, service) = Service::fresh(&[]);
     let before = service.submit(&case("before")).await;
     service.until(&before, "succeeded").await;
     let other = rusqlite::Connection::open(folder.path().join("jobs.db")).unwrap();

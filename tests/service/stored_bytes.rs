@@ -102,10 +102,7 @@ async fn beyond_its_stored_bytes_a_tenant_submits_nothing_and_loses_nothing() {
     refuse(&table(&guarded, &format!("/v1/runs?template={first}"), "0.1").await);
     // What is stored stays, others go on, and room that is made can be used.
     for path in &paths {
-        assert_eq!(
-            guarded.get(key, &format!("{path}/result")).await.status,
-            200
-        );
+        guarded.get(key, &format!("{path}/result")).await.is(200);
     }
     guarded
         .submit(&guarded.south, &case("of another tenant"))
@@ -123,8 +120,7 @@ async fn chunks_of_runs_count_for_their_tenant() {
     let key = &guarded.north;
     let run = example("run.json");
     for used in 1..=2 {
-        let answer = guarded.post(key, "/v1/runs", &run).await;
-        assert_eq!(answer.status, 202, "{}", answer.text);
+        guarded.post(key, "/v1/runs", &run).await.is(202);
         let me = guarded.get(key, "/v1/me").await.json["used"].clone();
         assert_eq!(
             (&me["queued"], &me["jobs"]["queued"]),

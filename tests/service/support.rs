@@ -19,6 +19,7 @@ use railhead::jobs::{Jobs, Options};
 use reqwest::header::HeaderMap;
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
+use tempfile::TempDir;
 
 pub const DAY_MS: i64 = 24 * 3600 * 1000;
 
@@ -149,6 +150,13 @@ impl Service {
     pub fn start(data_dir: &Path, flags: &[&str]) -> Service {
         let mut program = railhead();
         Service::spawn(&mut program, "serve", data_dir, flags)
+    }
+
+    /// Starts `railhead serve` on a data folder of its own.
+    pub fn fresh(flags: &[&str]) -> (TempDir, Service) {
+        let folder = tempfile::tempdir().unwrap();
+        let service = Service::start(folder.path(), flags);
+        (folder, service)
     }
 
     /// Starts `railhead worker` and returns when it can be asked how it is.

@@ -108,8 +108,7 @@ const OTHER: &str = "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa";
 #[tokio::test]
 async fn a_job_is_one_trace_from_its_submission_to_its_stored_result() {
     let collector = Collector::start().await;
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--otlp-endpoint", &collector.endpoint()]);
+    let (_folder, service) = Service::fresh(&["--otlp-endpoint", &collector.endpoint()]);
     let job = send(&service, "/v1/jobs", &case("traced"), TRACE, "01").await;
     assert_eq!(job["state"], "succeeded");
     let mut other = case("not wanted");
@@ -156,8 +155,7 @@ async fn a_job_is_one_trace_from_its_submission_to_its_stored_result() {
 #[tokio::test]
 async fn cases_of_a_batch_belong_to_its_trace() {
     let collector = Collector::start().await;
-    let folder = tempfile::tempdir().unwrap();
-    let service = Service::start(folder.path(), &["--otlp-endpoint", &collector.endpoint()]);
+    let (_folder, service) = Service::fresh(&["--otlp-endpoint", &collector.endpoint()]);
     let mut unsolvable = case("runs out of time");
     unsolvable["solver"]["time_limit_s"] = json!(1e-9);
     let cases = json!([case("first"), unsolvable]);
