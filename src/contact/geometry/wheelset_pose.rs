@@ -8,9 +8,11 @@
 //! `ν_x = v_x / V`, `ν_y = v · t / V`, `φ = ω · n / V`. Free rolling at the radius r has `Ω = V / r`, positive.
 //! Source: Kalker 1990, section 1.3; the same as in the Manchester contact benchmark.
 
+use std::f64::consts::FRAC_PI_2;
+
 use crate::contact::geometry::rigid_touch::{RailTop, RigidTouch};
 use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::numerics::roots::{CloseEnough, Course, try_find};
+use crate::contact::numerics::equilibrium::{Search, Trial};
 
 /// The wheels' heights may differ by so much in mm, 1e-10 rad of roll.
 const LEVEL: f64 = 1e-7;
@@ -68,32 +70,31 @@ impl PairOfRails {
     /// # Errors
     /// A sentence, if a wheel is not over its rail or the roll is not found.
     pub fn pose(&mut self, lateral_shift: f64, yaw: f64, roll: f64) -> Result<RigidPose, String> {
-        // Rolled to the left rail's side up, the left wheel hangs higher: its height above the right one falls with the roll, with
-        // a kink where a wheel changes its place of contact.
-        let close = CloseEnough {
-            value: LEVEL,
-            place: 0.0,
-        };
-        let mut found = None;
-        let unbounded = [f64::NEG_INFINITY, f64::INFINITY];
-        try_find(unbounded, roll, Course::Falling, close, |roll| {
+        // The right wheel's height above the left one grows with the roll by about the distance between them, with a kink where a wheel changes
+        // its place of contact.
+        let start = self.touches(lateral_shift, yaw, roll)?;
+        let distance = start[0].at[1] - start[1].at[1];
+        let mut search = Search::new([Some(1.0 / distance)], [FRAC_PI_2]);
+        let found = search.find([roll], |[roll]| {
             let touches = self.touches(lateral_shift, yaw, roll)?;
-            let above = touches[0].height - touches[1].height;
-            let pose = RigidPose {
-                lateral_shift,
-                yaw,
-                roll,
-                height: 0.5 * (touches[0].height + touches[1].height),
-                touches,
-            };
-            found = (above.abs() < LEVEL).then_some(pose);
-            Ok::<_, String>([above, -pose.contact_distance()])
+            Ok::<_, String>(Trial {
+                residual: [touches[1].height - touches[0].height],
+                tolerance: LEVEL,
+                value: RigidPose {
+                    lateral_shift,
+                    yaw,
+                    roll,
+                    height: 0.5 * (touches[0].height + touches[1].height),
+                    touches,
+                },
+            })
         })?;
-        found.ok_or_else(|| {
-            format!(
+        match found.converged() {
+            true => Ok(found.value),
+            false => Err(format!(
                 "no roll of the wheelset was found at which both wheels touch, at a lateral shift of {lateral_shift} mm"
-            )
-        })
+            )),
+        }
     }
 
     /// The wheelset at a shift to the left in mm and a yaw in rad with its axle level, as if one wheel could hang in the air.

@@ -7,8 +7,6 @@
 //! Tangents at the nodes are those of the parabola through the node and its two neighbours, so the curve has a
 //! continuous derivative and reproduces parabolas exactly (Catmull and Rom 1974, for unequal spacing).
 
-use std::convert::Infallible;
-
 /// Bisects the interval between `low` and `high` (in either order) and returns the bracket after the given number of halvings, `2^-halvings` times as
 /// long. `is_low` is true on the side of `low` and false on that of `high`.
 pub(crate) fn bisect(
@@ -93,30 +91,12 @@ pub(crate) enum Course {
 /// of the bracket if `start` lies outside. If Newton steps do not converge, as at a triple root, sixty halvings reduce the bracket to
 /// rounding error.
 pub(crate) fn find(
-    bracket: [f64; 2],
+    [mut low, mut high]: [f64; 2],
     start: f64,
     course: Course,
     close: CloseEnough,
     f: impl Fn(f64) -> [f64; 2],
 ) -> f64 {
-    let Ok(root) = try_find(bracket, start, course, close, |at| {
-        Ok::<[f64; 2], Infallible>(f(at))
-    });
-    root
-}
-
-/// The same for a function that may have no value, which ends the search. Ends of the bracket may be infinite as long as Newton steps
-/// stay finite. Where the criterion for the value is met, the root returned is the argument evaluated last.
-///
-/// # Errors
-/// The one of `f`.
-pub(crate) fn try_find<E>(
-    [mut low, mut high]: [f64; 2],
-    start: f64,
-    course: Course,
-    close: CloseEnough,
-    mut f: impl FnMut(f64) -> Result<[f64; 2], E>,
-) -> Result<f64, E> {
     let inside = |at: f64, low: f64, high: f64| at > low && at < high;
     let mut at = if (low..=high).contains(&start) {
         start
@@ -124,7 +104,7 @@ pub(crate) fn try_find<E>(
         0.5 * (low + high)
     };
     for step in 1..=2 * NEWTON_STEPS {
-        let [value, slope] = f(at)?;
+        let [value, slope] = f(at);
         if value.abs() < close.value {
             break;
         }
@@ -145,7 +125,7 @@ pub(crate) fn try_find<E>(
             break;
         }
     }
-    Ok(at)
+    at
 }
 
 /// A cubic `c0 + c1 s + c2 s² + c3 s³` on an interval, with s from 0 at its start to 1 at its end.
@@ -418,28 +398,6 @@ mod monotone_root_tests {
             [x * x - 0.09, 2.0 * x]
         });
         assert!((root * root - 0.09).abs() < 1e-3 && (root - 0.3).abs() > 1e-9);
-    }
-
-    #[test]
-    fn a_root_without_known_bounds_is_found_and_a_missing_value_ends_the_search() {
-        let close = CloseEnough {
-            value: 1e-9,
-            place: 0.0,
-        };
-        let open = [f64::NEG_INFINITY, f64::INFINITY];
-        let mut last = f64::NAN;
-        // A kink at 2: the slope there is that of one side.
-        let kinked = |x: f64| {
-            last = x;
-            let slope = if x < 2.0 { -1.0 } else { -0.2 };
-            Ok::<_, ()>([slope * (x - 2.0) - 0.5, slope])
-        };
-        let root = try_find(open, 7.0, Course::Falling, close, kinked).unwrap();
-        assert!((root - 1.5).abs() < 1e-8, "{root}");
-        assert_eq!(root, last);
-        let missing = |x: f64| if x > 1.0 { Err(x) } else { Ok([x - 1.5, 1.0]) };
-        let ended = try_find(open, 0.0, Course::Rising, close, missing);
-        assert_eq!(ended, Err(1.5));
     }
 }
 
