@@ -2,7 +2,7 @@
 //!
 //! This is the slow reference implementation; [`strips`](crate::contact::half_space::strip_operator::operator) evaluates the same forms in bulk.
 //!
-//! Stresses of many point loads at several points of a half-space at once, in the machine's lanes and in single precision.
+//! Stresses of many point loads at a point of a half-space, in the machine's lanes and in single precision.
 //!
 //! Axes: x, y in the surface, z into the body. Tension is positive. Sources: Boussinesq's and Cerruti's point loads (Johnson 1985, §3.2 and 3.6).
 
@@ -229,7 +229,7 @@ pub mod rectangle_stress {
     #[cfg(test)]
     mod tests {
         use super::*;
-        use crate::contact::half_space::kernels::{LANES, LoadPack, stresses};
+        use crate::contact::half_space::kernels::{LoadPack, stress};
 
         fn rectangle(at: [f64; 3], sides: [f64; 4], loads: [f64; 3], nu: f64) -> Stress {
             let mut sum = [0.0; 6];
@@ -352,12 +352,6 @@ pub mod rectangle_stress {
                 [0.1, -0.3, 4.0],
                 [2.0, 2.0, 0.1],
             ];
-            let mut points = [[1.0; LANES]; 3];
-            for (lane, place) in places.iter().enumerate() {
-                for k in 0..3 {
-                    points[k][lane] = place[k] as f32;
-                }
-            }
             for force in [
                 [1.0, 0.0, 0.0],
                 [0.0, 1.0, 0.0],
@@ -369,9 +363,8 @@ pub mod rectangle_stress {
                 for (forces, force) in pack.force.iter_mut().zip(force) {
                     forces[0] = force as f32;
                 }
-                let felt = std::array::from_fn(|_| std::iter::once(0..1).collect());
-                let found = stresses(&[pack], &felt, &points, 0.28);
-                for (place, found) in places.iter().zip(found) {
+                for place in &places {
+                    let found = stress(&[pack], &[0..1], place.map(|at| at as f32), 0.28);
                     let mut known = [0.0; 6];
                     let [x, y, z] = force.map(|f| f / (side * side));
                     let half = 0.5 * side;
@@ -399,10 +392,10 @@ pub mod rectangle_stress {
 /// Stresses `xx, yy, zz, xy, xz, yz`.
 pub type Stress = [f64; 6];
 
-/// Points that are answered side by side.
+/// Loads that are taken side by side.
 pub const LANES: usize = 16;
 
-/// One number for each of the points.
+/// One number for each of them.
 pub type Lanes = [f32; LANES];
 
 /// Forces on the surface, [`LANES`] side by side. Those that are not needed are 0.
@@ -414,48 +407,37 @@ pub struct LoadPack {
     pub force: [Lanes; 3],
 }
 
-/// The stresses in MPa at the points `[x, y, z]` in mm, z more than 0, for Poisson's ratio `nu`; each point feels its own packs of the list
-/// of all.
+/// The stress in MPa at a point `[x, y, z]` in mm, z more than 0, of these packs of a list, for Poisson's ratio `nu`.
 #[must_use]
-pub fn stresses(
-    packs: &[LoadPack],
-    felt: &[Vec<Range<usize>>; LANES],
-    points: &[Lanes; 3],
-    nu: f64,
-) -> [Stress; LANES] {
-    simd::dispatch(FeltStresses {
+pub fn stress(packs: &[LoadPack], felt: &[Range<usize>], point: [f32; 3], nu: f64) -> Stress {
+    simd::dispatch(FeltStress {
         packs,
         felt,
-        points,
+        point,
         rest: (1.0 - 2.0 * nu) as f32,
     })
 }
 
-struct FeltStresses<'a> {
+struct FeltStress<'a> {
     packs: &'a [LoadPack],
-    felt: &'a [Vec<Range<usize>>; LANES],
-    points: &'a [Lanes; 3],
+    felt: &'a [Range<usize>],
+    point: [f32; 3],
     /// 1 − 2ν.
     rest: f32,
 }
 
-impl NullaryFnOnce for FeltStresses<'_> {
-    type Output = [Stress; LANES];
+impl NullaryFnOnce for FeltStress<'_> {
+    type Output = Stress;
 
     #[inline(always)]
-    fn call(self) -> [Stress; LANES] {
-        let mut stresses = [[0.0; 6]; LANES];
-        let points = (0..LANES).map(|k| self.points.map(|axis| axis[k]));
-        for ((stress, felt), point) in stresses.iter_mut().zip(self.felt).zip(points) {
-            let mut sums = StressSums::default();
-            for packs in felt {
-                for pack in &self.packs[packs.clone()] {
-                    add(pack, point, self.rest, &mut sums);
-                }
+    fn call(self) -> Stress {
+        let mut sums = StressSums::default();
+        for packs in self.felt {
+            for pack in &self.packs[packs.clone()] {
+                add(pack, self.point, self.rest, &mut sums);
             }
-            *stress = sums.total();
         }
-        stresses
+        sums.total()
     }
 }
 
@@ -637,23 +619,13 @@ mod point_loads_tests {
             force: [[0.1; LANES], [0.2; LANES], [1.0; LANES]],
         };
         let packs = [pack(0.0), pack(0.7), pack(-0.4)];
-        let points = [
-            std::array::from_fn(|lane| lane as f32),
-            [0.3; LANES],
-            [0.5; LANES],
-        ];
-        // Ends of what a point feels.
-        let felt = |first: &[usize], second: &[usize]| {
-            let mut felt = [const { Vec::new() }; LANES];
-            for (felt, ends) in felt.iter_mut().zip([first, second]) {
-                felt.extend(ends.windows(2).map(|ends| ends[0]..ends[1]));
-            }
-            felt
-        };
-        let all = stresses(&packs, &felt(&[0, 1, 3], &[0, 1]), &points, 0.3);
-        let first = stresses(&packs, &felt(&[0, 3], &[]), &points, 0.3);
-        let second = stresses(&packs, &felt(&[], &[0, 1]), &points, 0.3);
-        assert_eq!((all[0], all[1]), (first[0], second[1]));
-        assert_eq!(all[2], [0.0; 6]);
+        let felt = |felt: &[Range<usize>]| stress(&packs, felt, [1.0, 0.3, 0.5], 0.3);
+        let parts = [0..1, 1..3].map(|part| felt(&[part]));
+        let sum = [0, 1, 2, 3, 4, 5].map(|k| parts[0][k] + parts[1][k]);
+        for (all, sum) in felt(&[0..1, 1..3]).iter().zip(sum) {
+            assert!((all - sum).abs() < 1e-6, "{all} {sum}");
+        }
+        assert_eq!(felt(&[0..1, 1..3]), felt(&[0..3]));
+        assert_eq!(felt(&[]), [0.0; 6]);
     }
 }

@@ -3,22 +3,15 @@
 //! A part is halved along its larger side, whatever the point: only how far the halving goes depends on the distance. So the parts of a region
 //! are a tree that is the same for all points, and each part is worked out once.
 //!
-//! How large parts of the loads look from several points at once: how many points of a quadrature each needs along and across.
+//! How large parts of the loads look from a point: how many points of a quadrature each needs along and across.
 
 use std::ops::Range;
 
-use pulp::NullaryFnOnce;
-
-use crate::contact::half_space::kernels::{LANES, Lanes, LoadPack};
+use crate::contact::half_space::kernels::LoadPack;
 use crate::contact::numerics::quadrature::RULES;
-use crate::contact::numerics::simd;
 
-/// Parts, and packs of point loads, that are kept, in 45 MB together; only memory depends on them.
-const PARTS_MAX: usize = 100_000;
-/// See [`PARTS_MAX`].
-const PACKS_MAX: usize = 100_000;
-/// Room for packs from the beginning.
-const PACKS_FIRST: usize = 1024;
+/// Parts, and packs of point loads, that are kept, in 45 MB together; only memory depends on it.
+const KEPT_MAX: usize = 100_000;
 
 /// A region is halved across at most so often: of a patch a hundred times as wide as long a part is then a third of the least depth that is
 /// answered wide.
@@ -89,13 +82,13 @@ impl LoadParts {
         LoadParts {
             first: nodes.len(),
             nodes,
-            packs: Vec::with_capacity(PACKS_FIRST),
+            packs: Vec::new(),
         }
     }
 
     /// Forgets all later parts and all packs if there are too many. Called between points.
     pub fn trim(&mut self) {
-        if self.nodes.len() > PARTS_MAX.max(2 * self.first) || self.packs.len() > PACKS_MAX {
+        if self.nodes.len() > KEPT_MAX.max(2 * self.first) || self.packs.len() > KEPT_MAX {
             self.nodes.truncate(self.first);
             for node in &mut self.nodes {
                 *node = Node::new(node.part, node.seen);
@@ -222,10 +215,8 @@ impl Piece {
     }
 }
 
-/// Number of rules; the code one above the last asks for a division of the part.
+/// Number of rules; one above the last asks for a division of the part.
 pub const ORDERS: usize = RULES.len();
-/// Codes of one axis.
-const CODES: u32 = ORDERS as u32 + 1;
 /// How finely the loads are resolved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadResolution {
@@ -256,64 +247,21 @@ pub struct PartBox {
     pub squares: [f32; 2],
 }
 
-/// The codes of one part, point by point: see [`orders`].
-pub type PartCodes = [u8; LANES];
-
-/// Which rules a code stands for, along and across; [`ORDERS`] where the part has to be divided.
-#[must_use]
-pub fn orders(code: u8) -> [usize; 2] {
-    let codes = CODES as usize;
-    [usize::from(code) / codes, usize::from(code) % codes]
-}
-
-/// Appends the codes of every part as seen from the points `x, y, z` in mm.
-pub fn look(
-    parts: impl Iterator<Item = PartBox>,
-    points: &[Lanes; 3],
-    resolution: LoadResolution,
-    codes: &mut Vec<PartCodes>,
-) {
-    let LoadResolution { sizes } = resolution;
-    simd::dispatch(Look {
-        parts,
-        points,
-        limits: sizes.map(|size| size * size),
-        codes,
-    });
-}
-
-struct Look<'a, I> {
-    parts: I,
-    points: &'a [Lanes; 3],
-    /// Squares of the sizes over distance.
-    limits: [f32; ORDERS],
-    codes: &'a mut Vec<PartCodes>,
-}
-
-impl<I: Iterator<Item = PartBox>> NullaryFnOnce for Look<'_, I> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let [xs, ys, zs] = self.points;
-        let limits = self.limits;
-        for PartBox { sides, squares } in self.parts {
-            let [x0, x1, y0, y1] = sides;
-            let mut code = [0_u32; LANES];
-            for lane in 0..LANES {
-                let (x, y, z) = (xs[lane], ys[lane], zs[lane]);
-                let dx = (x0 - x).max(x - x1).max(0.0);
-                let dy = (y0 - y).max(y - y1).max(0.0);
-                let square = dx * dx + dy * dy + z * z;
-                let mut sum = 0;
-                for limit in limits {
-                    let limit = limit * square;
-                    sum += CODES * u32::from(squares[0] > limit) + u32::from(squares[1] > limit);
-                }
-                code[lane] = sum;
-            }
-            self.codes.push(code.map(|code| code as u8));
-        }
+impl LoadResolution {
+    /// Which rules a part needs along and across as seen from a point `[x, y, z]` in mm; [`ORDERS`] where it has to be divided.
+    #[must_use]
+    pub fn orders(&self, PartBox { sides, squares }: PartBox, [x, y, z]: [f32; 3]) -> [usize; 2] {
+        let [x0, x1, y0, y1] = sides;
+        let dx = (x0 - x).max(x - x1).max(0.0);
+        let dy = (y0 - y).max(y - y1).max(0.0);
+        let distance = dx * dx + dy * dy + z * z;
+        let sizes = self.sizes.iter();
+        squares.map(|own| {
+            sizes
+                .clone()
+                .filter(|size| own > *size * *size * distance)
+                .count()
+        })
     }
 }
 
@@ -327,17 +275,11 @@ mod seen_parts_tests {
             sides: [-1.0, 1.0, -0.5, 0.5],
             squares: [4.0, 1.0],
         };
-        let depths = std::array::from_fn(|lane| 0.1 * 1.6_f32.powi(lane as i32));
-        let points = [[0.0; LANES], [0.0; LANES], depths];
-        let mut codes = Vec::new();
-        look(
-            [part].into_iter(),
-            &points,
-            LoadResolution::FINE,
-            &mut codes,
-        );
-        let seen = codes[0].map(orders);
-        assert_eq!((seen[0], seen[LANES - 1]), ([ORDERS; 2], [0; 2]));
+        let depths = (0..16).map(|k| 0.1 * 1.6_f32.powi(k));
+        let seen: Vec<[usize; 2]> = depths
+            .map(|depth| LoadResolution::FINE.orders(part, [0.0, 0.0, depth]))
+            .collect();
+        assert_eq!((seen[0], seen[15]), ([ORDERS; 2], [0; 2]));
         for pair in seen.windows(2) {
             assert!(pair[0][0] >= pair[1][0] && pair[0][1] >= pair[1][1]);
         }

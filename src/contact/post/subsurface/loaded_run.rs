@@ -14,21 +14,14 @@ use crate::contact::rolling::strip_mesh::StripMesh;
 /// Points of the rule with most of them.
 const POINTS_MAX: usize = RULES[ORDERS - 1].len();
 
-/// See [`halvings`]: of Hertz's ellipses with one coefficient of friction; of other patches; of those whose pressure is rough or that have
-/// hollows. With none at all, errors on ellipses with a pole of spin grow from 0.0015 of the largest pressure to 0.0055, where friction jumps from 0.4
-/// to 0.1 across from 0.0009 to 0.0055, on a gap of two radii from 0.001 to 0.004, and where the pressure jumps from 0.007 to 0.02. Two halvings across
-/// take an eighth more time than none.
-const SMOOTH: [u32; 2] = [0, 2];
-/// See [`SMOOTH`].
-const UNEVEN: [u32; 2] = [0, 4];
-/// See [`SMOOTH`].
+/// See [`halvings`]. With no halvings across, errors on ellipses with a pole of spin grow from 0.0015 of the largest pressure to 0.0055, where friction
+/// jumps from 0.4 to 0.1 across from 0.0009 to 0.0055, and on a gap of two radii from 0.001 to 0.004.
+const SMOOTH: [u32; 2] = [0, 4];
+/// The same of patches whose pressure is rough or that have hollows: without, errors where the pressure jumps grow from 0.007 to 0.02.
 const ROUGH: [u32; 2] = [4, 4];
 /// See [`steepest`]: it is 0.30 at most on ellipses and gaps, where the last cells differ by their width alone, and 0.54 and more where the pressure jumps,
 /// at hollows, and where a gap opens so steeply that the pressure rises towards the edge.
 const STEEP: f64 = 0.4;
-/// By how much, relatively, coefficients may differ that are taken for one. Chosen by judgement.
-const EVEN: f64 = 0.1;
-
 /// The loads on a run of strips.
 #[derive(Debug)]
 pub(crate) struct LoadedRun<'a> {
@@ -298,21 +291,9 @@ fn halvings(level: &StripMesh, footprint: &Footprint, segments: &[Segment]) -> [
     let patch = segments[0].chord.patch;
     let all = level.mesh.segments.iter();
     let hollow = all.filter(|segment| segment.chord.patch == patch).count() > segments.len();
-    if footprint.jumps() || hollow || steepest(level, segments) > STEEP {
-        return ROUGH;
-    }
-    // Bounds over pressures, cell by cell, multiplied by both pressures.
-    let first = segments[0].cells.start;
-    let evenly = |i: usize| {
-        let [own, known] =
-            [[i, first], [first, i]].map(|[i, j]| level.bound[i] * level.pressure[j]);
-        (own - known).abs() <= EVEN * known
-    };
-    let even = segments[0].cells.start..segments[segments.len() - 1].cells.end;
-    if footprint.is_closed_form() && even.into_iter().all(evenly) {
-        SMOOTH
-    } else {
-        UNEVEN
+    match footprint.jumps() || hollow || steepest(level, segments) > STEEP {
+        true => ROUGH,
+        false => SMOOTH,
     }
 }
 

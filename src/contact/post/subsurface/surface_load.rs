@@ -4,17 +4,17 @@
 //! regions of their own. What a part of a region carries acts as point loads at the points of Gauss's quadrature, in the angle along and in y
 //! across, where the pressure of a smooth patch is smooth up to its edge; traction over pressure is interpolated between the nodes of the cells. How
 //! many points there are follows from the size of the part over its distance; parts that are too near for the rule with most points are halved until
-//! they are not. The shift of its ends between its two sides counts as width, so that refined parts fill the outline. Sixteen points are looked
-//! at side by side to find what each feels; then the loads that a point feels are taken side by side.
+//! they are not. The shift of its ends between its two sides counts as width, so that refined parts fill the outline. The loads that a point
+//! feels are taken side by side.
 
 use std::ops::Range;
 
-use crate::contact::half_space::kernels::{LANES, Lanes, LoadPack, Stress, stresses};
+use crate::contact::half_space::kernels::{LANES, LoadPack, Stress, stress};
 use crate::contact::mesh::{Chord, Segment};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::numerics::quadrature::RULES;
 use crate::contact::post::subsurface::load_parts::{
-    LoadPart, LoadParts, LoadResolution, ORDERS, PartBox, PartCodes, look, orders,
+    LoadPart, LoadParts, LoadResolution, ORDERS, PartBox,
 };
 use crate::contact::post::subsurface::loaded_run::{KnownLines, LoadedRun};
 use crate::contact::rolling::answer::LevelAnswer;
@@ -43,8 +43,7 @@ enum LoadedRegion<'a> {
 pub struct LoadWorkspace {
     parts: LoadParts,
     lines: KnownLines,
-    codes: Vec<PartCodes>,
-    felt: [Vec<Range<usize>>; LANES],
+    felt: Vec<Range<usize>>,
 }
 
 impl<'a> SurfaceLoad<'a> {
@@ -105,96 +104,49 @@ impl<'a> SurfaceLoad<'a> {
         LoadWorkspace {
             parts: LoadParts::new(self.first_parts.iter().copied()),
             lines: KnownLines::default(),
-            codes: Vec::new(),
-            felt: Default::default(),
+            felt: Vec::new(),
         }
     }
 
-    /// The stress at one place, see [`SurfaceLoad::stresses`].
-    pub fn stress(
-        &self,
-        at: [f64; 3],
-        resolution: LoadResolution,
-        workspace: &mut LoadWorkspace,
-    ) -> Stress {
-        let mut found = [[0.0; 6]; LANES];
-        self.stresses_of_block(&[at], resolution, workspace, &mut found);
-        found[0]
-    }
-
-    /// The stresses at places `[x, y, depth]` in mm, in axes with z into the body. What is found at a place does not depend on the
-    /// others.
+    /// The stresses at places, see [`SurfaceLoad::stress`].
     pub fn stresses(
         &self,
         places: &[[f64; 3]],
         resolution: LoadResolution,
         workspace: &mut LoadWorkspace,
     ) -> Vec<Stress> {
-        let mut stresses = Vec::with_capacity(places.len());
-        let mut found = [[0.0; 6]; LANES];
-        for block in places.chunks(LANES) {
-            self.stresses_of_block(block, resolution, workspace, &mut found);
-            stresses.extend_from_slice(&found[..block.len()]);
-        }
-        stresses
+        let places = places.iter();
+        places
+            .map(|at| self.stress(*at, resolution, workspace))
+            .collect()
     }
 
-    /// At most [`LANES`] places side by side.
-    fn stresses_of_block(
+    /// The stress at a place `[x, y, depth]` in mm, in axes with z into the body.
+    pub fn stress(
         &self,
-        places: &[[f64; 3]],
+        [x, y, depth]: [f64; 3],
         resolution: LoadResolution,
-        LoadWorkspace {
-            parts,
-            lines,
-            codes,
-            felt,
-        }: &mut LoadWorkspace,
-        found: &mut [Stress; LANES],
-    ) {
+        LoadWorkspace { parts, lines, felt }: &mut LoadWorkspace,
+    ) -> Stress {
         parts.trim();
-        felt.iter_mut().for_each(Vec::clear);
-        let mut points: [Lanes; 3] = [[0.0; LANES]; 3];
-        for lane in 0..LANES {
-            let [x, y, z] = places[lane.min(places.len() - 1)];
-            points[0][lane] = (x - self.origin[0]) as f32;
-            points[1][lane] = (y - self.origin[1]) as f32;
-            points[2][lane] = z as f32;
-        }
-        let asked = u16::MAX >> (LANES - places.len());
-        let mut open: Vec<(usize, u16)> = (0..parts.first()).map(|k| (k, asked)).collect();
-        let mut next = Vec::new();
-        while !open.is_empty() {
-            codes.clear();
-            let seen = open.iter().map(|(k, _)| parts.seen(*k));
-            look(seen, &points, resolution, codes);
-            for ((number, lanes), codes) in open.drain(..).zip(codes.iter()) {
-                let mut divided = 0;
-                for_each_code(codes, lanes, |code, lanes| {
-                    let [along, mut across] = orders(code);
-                    if parts.narrow(number) {
-                        across = across.min(ORDERS - 1);
-                    }
-                    if along == ORDERS || across == ORDERS {
-                        divided |= lanes;
-                        return;
-                    }
-                    let along = along.max(self.least_rule(parts.part(number)));
-                    let make = |part: &LoadPart, to: &mut Vec<LoadPack>| {
-                        self.quadrature(part, [along, across], lines, to);
-                    };
-                    let loads = parts.quadrature(number, [along, across], make);
-                    for_each_lane(lanes, |lane| felt[lane].push(loads.clone()));
-                });
-                if divided != 0 {
-                    let make = |part: &LoadPart| self.seen(part, lines);
-                    let halves = parts.halves(number, make);
-                    next.extend(halves.map(|half| (half, divided)));
-                }
+        felt.clear();
+        let point = [x - self.origin[0], y - self.origin[1], depth].map(|at| at as f32);
+        let mut open: Vec<usize> = (0..parts.first()).collect();
+        while let Some(number) = open.pop() {
+            let [along, mut across] = resolution.orders(parts.seen(number), point);
+            if parts.narrow(number) {
+                across = across.min(ORDERS - 1);
             }
-            std::mem::swap(&mut open, &mut next);
+            if along == ORDERS || across == ORDERS {
+                open.extend(parts.halves(number, |part| self.seen(part, lines)));
+                continue;
+            }
+            let along = along.max(self.least_rule(parts.part(number)));
+            felt.push(parts.quadrature(number, [along, across], |part, to| {
+                self.quadrature(part, [along, across], lines, to);
+            }));
         }
-        *found = stresses(parts.packs(), felt, &points, self.poisson_ratio);
+        stress(parts.packs(), felt, point, self.poisson_ratio)
     }
 
     /// How large a part is.
@@ -252,31 +204,6 @@ fn runs(segments: &[Segment]) -> Vec<&[Segment]> {
 
 fn one_strip(a: &Segment, b: &Segment) -> bool {
     a.chord.patch == b.chord.patch && a.chord.strip == b.chord.strip
-}
-
-fn for_each_lane(lanes: u16, mut with: impl FnMut(usize)) {
-    let mut left = lanes;
-    while left != 0 {
-        with(left.trailing_zeros() as usize);
-        left &= left - 1;
-    }
-}
-
-/// Calls with every code of these lanes, and with the lanes that have it.
-fn for_each_code(codes: &PartCodes, lanes: u16, mut with: impl FnMut(u8, u16)) {
-    let mut left = lanes;
-    while left != 0 {
-        let code = codes[left.trailing_zeros() as usize];
-        let alike = left & lanes_of(codes, code);
-        with(code, alike);
-        left &= !alike;
-    }
-}
-
-/// The lanes that have a code.
-fn lanes_of(codes: &PartCodes, code: u8) -> u16 {
-    let alike = codes.iter().enumerate().filter(|(_, own)| **own == code);
-    alike.fold(0, |lanes, (lane, _)| lanes | 1 << lane)
 }
 
 /// The loads on a rectangle.

@@ -9,6 +9,8 @@
 //! give, is solved by steps towards the farthest and away from the nearest point (Yildirim 2008, Two algorithms for the minimum
 //! enclosing ball problem); primal and dual bound the radius from both sides.
 
+use std::convert::Infallible;
+
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::post::subsurface::load_parts::LoadResolution;
 use crate::contact::post::subsurface::states::von_mises;
@@ -26,27 +28,9 @@ const REACH: [f64; 2] = [1.02, 0.9];
 /// Points from which a search starts, and how far apart they lie at least.
 const STARTS: usize = 3;
 const APART: f64 = 0.4;
-/// First steps in `x/a`, `y/b` and `ln depth`, and rounds of a search; a round is one block of points that are answered side by side.
-const STEPS: [f64; 3] = [0.12, 0.15, 0.2];
-const ROUNDS: usize = 16;
-/// The point itself, along the axes, and along the diagonals.
-const DIRECTIONS: [[f64; 3]; 15] = [
-    [0.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [-1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.0, -1.0, 0.0],
-    [0.0, 0.0, 1.0],
-    [0.0, 0.0, -1.0],
-    [1.0, 1.0, 1.0],
-    [1.0, 1.0, -1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, -1.0, -1.0],
-    [-1.0, 1.0, 1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [-1.0, -1.0, -1.0],
-];
+/// First steps in `x/a`, `y/b` and `ln depth`, and evaluations of a search.
+pub(crate) const STEPS: [f64; 3] = [0.12, 0.15, 0.2];
+const EVALUATIONS: usize = 120;
 
 /// The coordinates of the search in one patch.
 struct PatchColumns<'a> {
@@ -91,15 +75,9 @@ pub fn worst_place(
         small: 0.5 * (x_max - x_min).min(y_max - y_min),
         least,
     };
-    let mut badness = |at: &[[f64; 3]], resolution| {
-        let places: Vec<Option<[f64; 3]>> = at.iter().map(|at| columns.place(*at)).collect();
-        let inside: Vec<[f64; 3]> = places.iter().flatten().copied().collect();
-        let mut stresses = load.stresses(&inside, resolution, workspace).into_iter();
-        let bad = |place: &Option<[f64; 3]>| match place {
-            Some(_) => stresses.next().map_or(0.0, von_mises),
-            None => 0.0,
-        };
-        places.iter().map(bad).collect::<Vec<f64>>()
+    let mut badness = |at: [f64; 3], resolution| match columns.place(at) {
+        Some(place) => von_mises(load.stress(place, resolution, workspace)),
+        None => 0.0,
     };
     let spread =
         |k: usize, count: usize, reach: f64| reach * (2.0 * k as f64 / (count - 1) as f64 - 1.0);
@@ -110,9 +88,9 @@ pub fn worst_place(
             columns_at.extend(DEPTHS.map(|depth| [x, y, depth.ln()]));
         }
     }
-    let mut scanned: Vec<(f64, [f64; 3])> = badness(&columns_at, LoadResolution::COARSE)
-        .into_iter()
-        .zip(columns_at)
+    let columns_at = columns_at.into_iter();
+    let mut scanned: Vec<(f64, [f64; 3])> = columns_at
+        .map(|at| (badness(at, LoadResolution::COARSE), at))
         .collect();
     scanned.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut starts: Vec<[f64; 3]> = Vec::new();
@@ -125,32 +103,48 @@ pub fn worst_place(
             break;
         }
     }
-    let found = starts
-        .into_iter()
-        .map(|start| search_from(start, |at| badness(at, LoadResolution::FINE)));
-    let (_, best) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let found = starts.into_iter().map(|start| {
+        let Ok(found) = climb(start, STEPS, EVALUATIONS, |at| {
+            Ok::<_, Infallible>((badness(at, LoadResolution::FINE), ()))
+        });
+        found
+    });
+    let (best, _) = found.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     columns.place(best)
 }
 
-/// The highest point that a search from a start finds, with its height: every round looks at the point, one step along and against every axis
-/// and along the diagonals, and halves the steps where none is higher.
-fn search_from(
-    start: [f64; 3],
-    mut heights: impl FnMut(&[[f64; 3]]) -> Vec<f64>,
-) -> (f64, [f64; 3]) {
-    let mut best = (f64::NEG_INFINITY, start);
-    let mut steps = STEPS;
-    for _ in 0..ROUNDS {
-        let tried = DIRECTIONS
-            .map(|direction| std::array::from_fn(|k| best.1[k] + steps[k] * direction[k]));
-        let found = heights(&tried).into_iter().zip(tried);
-        let highest = found.max_by(|a, b| a.0.total_cmp(&b.0));
-        match highest {
-            Some(highest) if highest.0 > best.0 => best = highest,
-            _ => steps = steps.map(|step| 0.5 * step),
+/// The highest place that steps along the axes lead to from a start, with its height and what else was found there; steps are halved where none
+/// leads higher. The evaluations end with the round in which they reach their number.
+///
+/// # Errors
+/// Those of `height`.
+pub(crate) fn climb<const N: usize, T: Copy, E>(
+    start: [f64; N],
+    mut steps: [f64; N],
+    evaluations: usize,
+    mut height: impl FnMut([f64; N]) -> Result<(f64, T), E>,
+) -> Result<([f64; N], (f64, T)), E> {
+    let (mut at, mut best) = (start, height(start)?);
+    let mut used = 1;
+    while used < evaluations {
+        let before = best.0;
+        for axis in 0..N {
+            for sign in [1.0, -1.0] {
+                let mut tried = at;
+                tried[axis] += sign * steps[axis];
+                let found = height(tried)?;
+                used += 1;
+                if found.0 > best.0 {
+                    (at, best) = (tried, found);
+                    break;
+                }
+            }
+        }
+        if best.0 <= before {
+            steps = steps.map(|step| 0.5 * step);
         }
     }
-    best
+    Ok((at, best))
 }
 
 /// A deviator in coordinates of which the sum of squares is that of the tensor's components.
@@ -253,8 +247,9 @@ mod tests {
             let off: f64 = (0..3).map(|k| (at[k] - top[k]).powi(2)).sum();
             5.0 - off
         };
-        let heights = |all: &[[f64; 3]]| all.iter().map(|at| height(*at)).collect();
-        let (found, at) = search_from([0.2, 0.0, -0.7], heights);
+        let Ok((at, (found, ()))) = climb([0.2, 0.0, -0.7], STEPS, EVALUATIONS, |at| {
+            Ok::<_, Infallible>((height(at), ()))
+        });
         assert!(found > 5.0 - 1e-3, "{found} at {at:?}");
     }
 }

@@ -22,7 +22,7 @@ use crate::contact::normal::footprint::Footprint;
 use crate::contact::post::subsurface::load_parts::LoadResolution;
 use crate::contact::post::subsurface::states::{PassageTask, principal, von_mises};
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::contact::post::subsurface::worst::{DEPTHS, Deviator, enclosing_ball};
+use crate::contact::post::subsurface::worst::{DEPTHS, Deviator, STEPS, climb, enclosing_ball};
 use crate::contact::solution::words::evolution::{PassagePlace, PassageSummary};
 
 // The numbers below are chosen by judgement; `cargo test --test physics -- shakes_down` holds what they give against closed forms.
@@ -35,8 +35,7 @@ const NEAR_REACH: f64 = 1.5;
 const FAR: [f64; 4] = [1.8, 2.3, 3.2, 5.0];
 /// How often the spaces beside states that decide are halved.
 const HALVINGS: usize = 4;
-/// First steps of the search in `y/b` and `ln depth`, and its evaluations.
-const STEPS: [f64; 2] = [0.15, 0.2];
+/// Evaluations of the search.
 const EVALUATIONS: usize = 24;
 /// The outermost line.
 const OUTERMOST: f64 = 0.95;
@@ -208,7 +207,7 @@ impl<'a> Lines<'a> {
         (found.stress, found.gap)
     }
 
-    /// The worst line from a start: steps along both axes, halved where none is worse.
+    /// The worst line that a search from a start finds.
     fn search(
         &self,
         measure: PassageMeasure,
@@ -216,29 +215,15 @@ impl<'a> Lines<'a> {
         workspace: &mut LoadWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<(PassagePlace, f64), Stop> {
-        let ((mut best, mut gap), mut at) = (self.value(measure, start, workspace), start);
-        let (mut steps, mut used) = (STEPS, 1);
-        while used < EVALUATIONS {
-            let before = best;
-            for axis in 0..2 {
-                for sign in [1.0, -1.0] {
-                    if let ControlFlow::Break(stop) = monitor.tick(0.0) {
-                        return Err(stop);
-                    }
-                    let mut tried = at;
-                    tried[axis] += sign * steps[axis];
-                    let (found, left) = self.value(measure, tried, workspace);
-                    used += 1;
-                    if found > best {
-                        (best, gap, at) = (found, left, tried);
-                        break;
-                    }
-                }
-            }
-            if best <= before {
-                steps = steps.map(|step| 0.5 * step);
-            }
-        }
+        let (at, (best, gap)) = climb(
+            start,
+            [STEPS[1], STEPS[2]],
+            EVALUATIONS,
+            |at| match monitor.tick(0.0) {
+                ControlFlow::Continue(()) => Ok(self.value(measure, at, workspace)),
+                ControlFlow::Break(stop) => Err(stop),
+            },
+        )?;
         let place = PassagePlace {
             at_mm: self.place(at),
             stress_mpa: best,
