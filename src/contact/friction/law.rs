@@ -58,13 +58,8 @@ impl FrictionLaw {
     #[must_use]
     pub fn bound_fall(&self, rolling_speed: Option<f64>, slip_unit: f64) -> Option<Softening> {
         match self {
-            FrictionLaw::Constant(_)
-            | FrictionLaw::Across(_)
-            | FrictionLaw::Heated(_)
-            | FrictionLaw::Along(_) => None,
-            FrictionLaw::Falling(law) => {
-                rolling_speed.map(|speed| law.bound_fall(speed, slip_unit))
-            }
+            FrictionLaw::Falling(law) => Some(law.bound_fall(rolling_speed?, slip_unit)),
+            _ => None,
         }
     }
 
@@ -115,10 +110,7 @@ impl FrictionLaw {
     pub fn across(&self) -> Option<&AcrossLaw> {
         match self {
             FrictionLaw::Across(law) => Some(law),
-            FrictionLaw::Constant(_)
-            | FrictionLaw::Falling(_)
-            | FrictionLaw::Heated(_)
-            | FrictionLaw::Along(_) => None,
+            _ => None,
         }
     }
 
@@ -135,13 +127,8 @@ impl FrictionLaw {
     /// bounds keep the last digit of the pressure and a contact without friction has bounds too.
     #[must_use]
     pub fn share(&self, loads: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
-        match self {
-            FrictionLaw::Constant(_)
-            | FrictionLaw::Falling(_)
-            | FrictionLaw::Heated(_)
-            | FrictionLaw::Along(_) => 1.0,
-            FrictionLaw::Across(law) => law.mean(loads) / law.largest(),
-        }
+        self.across()
+            .map_or(1.0, |law| law.mean(loads) / law.largest())
     }
 
     /// Friction limit in N of a patch: the largest tangential force it can carry, `μN` for a constant coefficient.
@@ -158,13 +145,8 @@ impl FrictionLaw {
         normal_force: f64,
         load: impl FnOnce() -> L,
     ) -> f64 {
-        match self {
-            FrictionLaw::Constant(_)
-            | FrictionLaw::Falling(_)
-            | FrictionLaw::Heated(_)
-            | FrictionLaw::Along(_) => self.largest() * normal_force,
-            FrictionLaw::Across(law) => law.mean_over(load().borrow()) * normal_force,
-        }
+        let across = self.across().map(|law| law.mean_over(load().borrow()));
+        across.unwrap_or_else(|| self.largest()) * normal_force
     }
 
     /// Friction limit in N of all patches together.
@@ -175,10 +157,7 @@ impl FrictionLaw {
             FrictionLaw::Constant(coefficient) => {
                 coefficient * patches.iter().map(|patch| patch.normal_force).sum::<f64>()
             }
-            FrictionLaw::Falling(_)
-            | FrictionLaw::Across(_)
-            | FrictionLaw::Heated(_)
-            | FrictionLaw::Along(_) => (0..patches.len()).map(|k| self.limit(footprint, k)).sum(),
+            _ => (0..patches.len()).map(|k| self.limit(footprint, k)).sum(),
         }
     }
 }
@@ -245,17 +224,18 @@ impl CoefficientTable {
         &self.points
     }
 
-    /// The coefficient at a place; on a jump that of the side of larger places.
+    /// The coefficient at a place and its slope there; on a jump those of the side of larger places.
     #[must_use]
-    pub fn at(&self, place: f64) -> f64 {
+    pub fn at(&self, place: f64) -> (f64, f64) {
         let table = &self.points;
         let above = table.partition_point(|(at, _)| *at <= place);
         match (above.checked_sub(1).map(|k| table[k]), table.get(above)) {
             (Some((low, mu)), Some((high, next))) => {
-                mu + (place - low) / (high - low) * (next - mu)
+                let slope = (next - mu) / (high - low);
+                (mu + slope * (place - low), slope)
             }
-            (Some((_, mu)), None) | (None, Some(&(_, mu))) => mu,
-            (None, None) => 0.0,
+            (Some((_, mu)), None) | (None, Some(&(_, mu))) => (mu, 0.0),
+            (None, None) => (0.0, 0.0),
         }
     }
 
@@ -296,7 +276,7 @@ impl AcrossLaw {
     /// The coefficient at a place; on a jump that of the side of larger places.
     #[must_use]
     pub fn at(&self, place: f64) -> f64 {
-        self.table.at(place)
+        self.table.at(place).0
     }
 
     /// The largest coefficient.
@@ -373,12 +353,12 @@ impl AlongLaw {
         let (mut sum, mut before) = (0.0, from);
         for end in ends {
             // Of a straight line, the mean is the value in the middle.
-            sum += (end - before) * self.table.at(0.5 * (before + end));
+            sum += (end - before) * self.table.at(0.5 * (before + end)).0;
             before = end;
         }
         match sum / (to - from) {
             mean if mean.is_finite() => mean.min(self.largest()),
-            _ => self.table.at(from),
+            _ => self.table.at(from).0,
         }
     }
 }
@@ -453,7 +433,7 @@ mod coefficient_table_tests {
         for (from, to, mean) in known {
             assert!((law.mean(from, to) - mean).abs() < 1e-15, "{from} to {to}");
         }
-        assert_eq!(law.mean(0.5, 0.5), law.table.at(0.5));
+        assert_eq!(law.mean(0.5, 0.5), law.table.at(0.5).0);
         assert_eq!(law.largest(), 0.5);
     }
 

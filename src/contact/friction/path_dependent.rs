@@ -3,8 +3,7 @@
 //! Both only look ahead, to where the point has been: along a strip every bound follows from the slips of the cells ahead and of its own.
 //! The method solves with bounds that are given, finds the bounds that belong to the slips, and repeats until they agree.
 
-use std::sync::Arc;
-
+use crate::contact::friction::law::CoefficientTable;
 use crate::contact::friction::velocity_weakening::{SLIP_OF_CELL, STABILITY_MAX};
 use crate::contact::mesh::Mesh;
 use crate::contact::numerics::roots::{self, CloseEnough, Course};
@@ -16,7 +15,7 @@ const KELVIN: f64 = 1e-6;
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatedLaw {
     /// Temperatures in °C, rising, with coefficients that never rise.
-    table: Arc<[(f64, f64)]>,
+    table: CoefficientTable,
     /// Temperature in °C without friction heat.
     base: f64,
     /// Temperature rise in K, at a rolling speed of 1 mm/s, per unit of `∫ q/√(x′ − x) dx′` with q in MPa times relative slip and
@@ -30,35 +29,16 @@ impl HeatedLaw {
     #[must_use]
     pub fn new(at: &[f64], coefficient: &[f64], base: f64, rise: f64) -> HeatedLaw {
         HeatedLaw {
-            table: at
-                .iter()
-                .copied()
-                .zip(coefficient.iter().copied())
-                .collect(),
+            table: CoefficientTable::new(at, coefficient),
             base,
             rise,
-        }
-    }
-
-    /// The coefficient at a temperature in °C, and its derivative per K.
-    #[must_use]
-    pub fn at(&self, temperature: f64) -> (f64, f64) {
-        let table = &self.table;
-        let above = table.partition_point(|(at, _)| *at <= temperature);
-        match (above.checked_sub(1).map(|k| table[k]), table.get(above)) {
-            (Some((low, mu)), Some((high, next))) => {
-                let slope = (next - mu) / (high - low);
-                (mu + slope * (temperature - low), slope)
-            }
-            (Some((_, mu)), None) | (None, Some(&(_, mu))) => (mu, 0.0),
-            (None, None) => (0.0, 0.0),
         }
     }
 
     /// The coefficient of the coldest contact, which is the largest.
     #[must_use]
     pub fn largest(&self) -> f64 {
-        self.table.first().map_or(0.0, |(_, mu)| *mu)
+        self.table.largest()
     }
 
     /// Temperature rise in K per unit of heating at a rolling speed in mm/s.
@@ -77,7 +57,12 @@ impl HeatedLaw {
         shear_modulus: f64,
     ) -> f64 {
         let slope = |pair: &[(f64, f64)]| (pair[0].1 - pair[1].1) / (pair[1].0 - pair[0].0);
-        let steepest = self.table.windows(2).map(slope).fold(0.0, f64::max);
+        let steepest = self
+            .table
+            .points()
+            .windows(2)
+            .map(slope)
+            .fold(0.0, f64::max);
         // 2.188: the largest of ∫ √(1 − s²)/√(s − ξ) ds.
         let rise = self.rise_at(speed) * self.largest() * pressure_max * 2.188 * half_length.sqrt();
         SLIP_OF_CELL * steepest * rise * pressure_max / shear_modulus
@@ -207,12 +192,12 @@ impl CellHeat<'_> {
         };
         let temperature = match own > 0.0 {
             true => roots::find([fixed, hottest], hottest, Course::Rising, close, |t| {
-                let (mu, slope) = self.law.at(t);
+                let (mu, slope) = self.law.table.at(t);
                 [t - fixed - own * mu, 1.0 - own * slope]
             }),
             false => fixed,
         };
-        rest * self.law.at(temperature).0 / largest
+        rest * self.law.table.at(temperature).0 / largest
     }
 }
 
