@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use serde_json::to_value;
 use thiserror::Error;
 
+use crate::contact::case::contact_task::{FLANGE_BACKS, GAUGE};
 use crate::contact::case::solver::Limits;
 use crate::contact::case::words::contact::{Contact, InfluenceName, Load, SideName, SurfaceName};
 use crate::contact::case::words::cross_section::{CrossSection, FormatName, Smoothing};
@@ -19,11 +20,6 @@ use crate::contact::monitor::Unmonitored;
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::solution::words::answer::Solution;
 use crate::contact::{check, solve};
-
-/// Gauge of standard track in mm.
-const GAUGE: f64 = 1435.0;
-/// Distance of the backs of the flanges of a standard wheelset in mm.
-const FLANGE_BACK_DISTANCE: f64 = 1360.0;
 
 /// Why a case has no answer.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -285,7 +281,7 @@ impl Contact {
             gauge_height_mm: None,
             rail_origin_mm: None,
             cant_rad: 0.0,
-            flange_back_distance_mm: FLANGE_BACK_DISTANCE,
+            flange_back_distance_mm: FLANGE_BACKS,
             flange_back_position_mm: None,
             lateral_shift_mm: 0.0,
             yaw_rad: 0.0,

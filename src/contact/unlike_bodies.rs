@@ -28,7 +28,7 @@ use crate::contact::rolling::answer::Resultants;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::{Resolution, RollingTask};
+use crate::contact::rolling::task::{Resolution, RollingTask, TARGET_USUAL};
 use crate::contact::rolling::{force_control, history};
 use crate::contact::solution::words::answer::{
     Fields, MotionRegion, NormalReport, PatchSolution, Solution,
@@ -36,9 +36,6 @@ use crate::contact::solution::words::answer::{
 use crate::contact::time_limit::TimeLimit;
 use crate::contact::{normal_stage, rolling_stage};
 
-/// Allowed error of the resultants in the rounds, relative to μN: the opening follows from tractions, whose error counts K times. Chosen on the 12
-/// contacts of `tests/physics/unlike.rs`, not on others.
-const TARGET_OF_ROUNDS: f64 = 0.005;
 /// Mesh of the rounds where bodies are only pressed together: approaches of the three contacts of `tests/physics/pressing.rs` are within 0.03 % of
 /// those with 48 × 48 already on 16 × 16.
 const MESH_OF_PRESSING: MeshSize = MeshSize {
@@ -157,7 +154,8 @@ impl UnlikeGap {
 /// The case as the rounds solve it: for resultants, no more closely than they need.
 fn rough(case: &CheckedCase) -> CheckedCase {
     let mut rough = CheckedCase {
-        run: case.run.for_resultants(TARGET_OF_ROUNDS),
+        // The opening follows from tractions, whose error counts K times.
+        run: case.run.for_resultants(TARGET_USUAL),
         ..case.clone()
     };
     if case.problem.history.is_some() {

@@ -268,11 +268,11 @@ fn find(wheel: &Profile) -> Result<(f64, Option<Remark>), String> {
 }
 
 /// Usual gauge in mm: standard gauge.
-const GAUGE: f64 = 1435.0;
+pub(crate) const GAUGE: f64 = 1435.0;
 /// Usual distance of the middle of a rail from that of the track in mm, on standard gauge.
 const RAIL_ORIGIN: f64 = 752.5;
 /// Usual distance of the backs of the flanges in mm, on standard gauge.
-const FLANGE_BACKS: f64 = 1360.0;
+pub(crate) const FLANGE_BACKS: f64 = 1360.0;
 /// Usual rolling radius in mm (UIC wheels of 920 mm diameter).
 const RADIUS: f64 = 460.0;
 

@@ -8,6 +8,7 @@ use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::motion::{
     AskedMotion, Combine, History, HistoryCourse, HistoryStartName, Motions, Sweep, Swept, Wheelset,
 };
+use crate::contact::case::words::object::FAULTS_MAX;
 use crate::contact::case::words::solver::{MethodName, Output, Solver};
 use crate::contact::error::Fault;
 use crate::contact::normal::hertz::Patch;
@@ -37,9 +38,6 @@ pub(crate) struct ExpandedMotions {
     /// How they follow each other, where they are one history.
     pub(crate) history: Option<HistoryTask>,
 }
-
-/// Faults of forces that are named one by one.
-const FAULTS_MAX: usize = 100;
 
 /// The motions and prescribed forces of a case.
 ///

@@ -9,21 +9,21 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::contact::case::words::cross_section::CrossSection;
-use crate::contact::case::words::solver::{MethodName, Solver, TARGET_ERROR_DEFAULT};
+use crate::contact::case::words::solver::{MethodName, Solver};
 use crate::contact::error::Fault;
 use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
 use crate::contact::method::Method;
 use crate::contact::problem::memory::SizeInput;
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::operator_store::BYTES_DEFAULT;
-use crate::contact::rolling::task::Resolution;
+use crate::contact::rolling::task::{Resolution, TARGET_USUAL};
 
 pub(crate) fn resolution(solver: &Solver) -> Resolution {
     match (solver.mesh, solver.target_error) {
         (Some(size), _) => Resolution::Mesh(size.into()),
         // As it would solve for any target.
         (None, None) if solver.method == MethodName::Fastsim => Resolution::Mesh(fastsim::MESH),
-        (None, target) => Resolution::Target(target.unwrap_or(TARGET_ERROR_DEFAULT)),
+        (None, target) => Resolution::Target(target.unwrap_or(TARGET_USUAL)),
     }
 }
 

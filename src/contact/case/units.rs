@@ -8,6 +8,7 @@ use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::material::{Elastic, Material};
 use crate::contact::case::words::motion::{AskedMotion, HistoryCourse, Motions, Swept, Wheelset};
 use crate::contact::case::words::solver::Case;
+use crate::contact::geometry::profile::LengthUnit;
 use crate::contact::normal::hertz::Patch;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -32,8 +33,6 @@ const CREEPAGE_PERCENT: [f64; 2] = [0.05, 5.0];
 const ANGLE_MOST: f64 = 0.05;
 /// Largest inclination of a rail in rad: twice the 1:20 of the steepest.
 const CANT_MOST: f64 = 0.1;
-/// Units of length with their size in mm.
-const LENGTHS: [(&str, f64); 3] = [("m", 1000.0), ("cm", 10.0), ("inch", 25.4)];
 /// Pressures of wheels on rails in MPa.
 const PRESSURES: [f64; 2] = [200.0, 3500.0];
 /// Pressure in MPa above which lengths are doubted where the patch follows from them alone: the static limit of ball bearings (ISO 76).
@@ -170,12 +169,9 @@ fn of_load(
 /// Units in which a length would make the pressure of a patch usual, which falls with this power of the length.
 fn units_by_pressure(patches: &[Patch], power: f64) -> Option<String> {
     let pressure = patches.first()?.pressure_max;
-    let usual = |(_, size): &&(&str, f64)| is_within(pressure / size.powf(power), PRESSURES);
-    let units: Vec<&str> = LENGTHS
-        .iter()
-        .filter(usual)
-        .map(|(name, _)| *name)
-        .collect();
+    let usual = |unit: &LengthUnit| is_within(pressure / unit.mm().powf(power), PRESSURES);
+    let units = [LengthUnit::M, LengthUnit::Cm, LengthUnit::Inch].into_iter();
+    let units: Vec<&str> = units.filter(usual).map(LengthUnit::symbol).collect();
     (pressure > PRESSURE_DOUBTED && !units.is_empty()).then(|| units.join(" or "))
 }
 

@@ -3,12 +3,12 @@
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::profile::Body;
 
-/// Length in mm below which a chord is not a hole, and over which the direction of the profile at the end of a hole is taken.
-const LENGTH_MIN: f64 = 1.0;
-/// Length relative to the width of the contact below which a chord is not a hole.
-const WIDTH_MIN: f64 = 1.0;
-/// Length relative to the width of the contact above which a chord may hold the whole contact.
-const WIDE: f64 = 1.5;
+/// Length in mm below which a chord is not a hole and fine enough for any patch, and over which the direction of the profile at the end of a hole is taken.
+pub(crate) const LENGTH_MIN: f64 = 1.0;
+/// Length relative to the width of the contact below which a chord is neither a hole nor coarse.
+pub(crate) const WIDTH_MIN: f64 = 1.0;
+/// Length relative to the width of the contact above which a chord may hold the whole contact, so that a job fails.
+pub(crate) const WIDE: f64 = 1.5;
 /// Distance in mm of the places at which the other body is compared with a chord.
 const STEP: f64 = 0.1;
 /// Largest slope of a tangent at the end of a chord; a steeper one bounds nothing.

@@ -501,7 +501,7 @@ impl<'a> Points<'a> {
 const STEP: [f64; 2] = [0.1, 0.2];
 /// Places of the comparison from one point to the next, within these bounds. Chosen by judgement: a cubic between two points is seen.
 const PLACES: f64 = 4.0;
-/// Distance in mm by which the comparison extends beyond twice the half width of the contact.
+/// Distance in mm by which the comparison and the measurement of noise extend beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
 /// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
 const SUPPORT: f64 = 3.0;
@@ -705,9 +705,6 @@ const ROUNDED: f64 = 0.289;
 const ROUNDED_MAX: f64 = 2.0 * ROUNDED;
 /// Waviness over that which the noise explains, up to which noise is its cause: estimates from few points scatter by a factor of 2.
 const EXPLAINED: f64 = 3.0;
-/// Additional distance in mm over which noise is measured.
-const AROUND: f64 = 10.0;
-
 /// Quality of the points of one body under one contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnderContact {
@@ -757,7 +754,7 @@ pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> U
     let widest = (first..=last.min(last_chord))
         .max_by(|a, b| points.chord(*a).total_cmp(&points.chord(*b)))
         .unwrap_or(first.min(last_chord));
-    let wide = [low - half - AROUND, high + half + AROUND];
+    let wide = [low - half - BEYOND, high + half + BEYOND];
     let around = points.numbers(wide);
     let count = around[1] - around[0];
     let spacing = if count > 1 {

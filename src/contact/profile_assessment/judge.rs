@@ -2,6 +2,8 @@
 //!
 //! Defects of a profile, described so that whoever measured it can correct them.
 
+use crate::contact::case::understood::BEYOND;
+use crate::contact::geometry::holes::{LENGTH_MIN, WIDE, WIDTH_MIN};
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::{
     Grain, Oddity, UnderContact, advised_smoothing, noise_pressure, under_contact,
@@ -14,13 +16,6 @@ use crate::contact::solution::words::damage::{PatchQuality, ProfileQuality};
 
 /// Share of the roughness of both bodies from which that of one body is reported.
 const BLAMED: f64 = 0.6;
-/// Longest chord relative to the width of the patch from which there is a remark, and from which a job fails (as with
-/// [`AMBIGUOUS_MAX`]).
-const COARSE: f64 = 1.0;
-const COARSE_MAX: f64 = 1.5;
-/// Chords up to this length in mm count as fine enough for any patch: only a lightly loaded flange, which touches over some tenths of
-/// a mm, has smaller patches.
-const CHORD_MIN: f64 = 1.0;
 /// Ambiguity, relative to the pressure, below which the distance of points does not matter, as on a straight stretch.
 const AMBIGUOUS_LEAST: f64 = 0.02;
 /// Length in mm up to which a chord is judged by its ambiguity alone, however narrow the patch. The arcs of heads and treads are 10 to
@@ -32,9 +27,6 @@ const CHORD_HIDES_ARC: f64 = 10.0;
 const AMBIGUOUS_MAX: f64 = 0.5;
 /// Pressure in MPa below which errors do no harm and no job fails because of them.
 const PRESSURE_LIGHT: f64 = 200.0;
-/// Length in mm of profile needed beyond a contact; with less there is a remark.
-const BEYOND: f64 = 5.0;
-
 /// What the assessment needs to know of a patch.
 #[derive(Debug, Clone, Copy)]
 pub struct FoundPatch<'a> {
@@ -241,11 +233,12 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
         AMBIGUOUS
     };
     let open = found.roughness.ambiguity > least * patch.pressure;
-    let wide = found.over_width > COARSE && open || found.over_width > COARSE_MAX && hides_arc;
-    let wide = wide && length > CHORD_MIN;
+    // Only a lightly loaded flange, which touches over some tenths of a mm, has patches that shorter chords are too long for.
+    let wide = length > LENGTH_MIN
+        && (found.over_width > WIDTH_MIN && open || found.over_width > WIDE && hides_arc);
     wide.then(|| Finding {
         share: own.rough() / patch.pressure,
-        refused: patch.load_share > LIGHT && found.over_width > COARSE_MAX,
+        refused: patch.load_share > LIGHT && found.over_width > WIDE,
         ..own.finding(patch, Cause::Spacing)
     })
 }

@@ -23,11 +23,11 @@ use crate::contact::solution::words::damage::{ProfileQuality, ProfileUncertainty
 use crate::contact::wheel_on_rail;
 
 /// The companion solves use the smoothing multiplied by these factors.
-const COMPANIONS: [f64; 2] = [0.4, 2.0];
+pub(crate) const COMPANIONS: [f64; 2] = [0.4, 2.0];
 /// Smoothing of a companion to a solve without smoothing, in mm, and in lengths of chords for coarse points, which a shorter smoothing
 /// would not change.
 const COMPANION_LEAST: f64 = 2.0;
-const COMPANION_CHORDS: f64 = 2.0;
+pub(crate) const COMPANION_CHORDS: f64 = 2.0;
 /// Waves and noise below this share of the pressure need no companion.
 pub(crate) const HARMLESS: f64 = 0.03;
 /// Added to the differences, relative to the largest pressure and to μN.

@@ -140,8 +140,9 @@ pub fn precision_of(resolution: Resolution) -> Precision {
     }
 }
 
-/// The target that stands for an explicit mesh where a search needs one. Chosen by judgement; how much it matters was not measured.
-const TARGET_OF_MESH: f64 = 0.005;
+/// Error of the resultants relative to μN that is allowed when nothing else is asked for, and that stands for an explicit mesh where a search needs a
+/// target.
+pub const TARGET_USUAL: f64 = 0.005;
 /// Part of a target that another error may take up while the rest of it is still sought.
 const ERROR_MAX: f64 = 0.95;
 
@@ -180,7 +181,7 @@ impl Resolution {
     /// The target, or what stands for it with an explicit mesh.
     #[must_use]
     pub fn target_or_usual(self) -> f64 {
-        self.target().unwrap_or(TARGET_OF_MESH)
+        self.target().unwrap_or(TARGET_USUAL)
     }
 
     /// The target reduced so that its root sum of squares with another error equals the original; unchanged if that error is 0, or takes up

@@ -16,12 +16,9 @@ use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel::{KinematicsTask, WheelTask};
 use crate::contact::problem::checked_case;
 use crate::contact::problem::checked_case::PRESSURE_USUAL;
+use crate::contact::profile_assessment::uncertainty::{COMPANION_CHORDS, COMPANIONS};
 use crate::contact::solution::words::answer::{EquivalentConicity, Kinematics, TouchLine};
 
-/// The other reading of a cross-section has its smoothing times this, or one of so many chords.
-const OTHER_TIMES: f64 = 2.0;
-/// See [`OTHER_TIMES`].
-const OTHER_CHORDS: f64 = 2.0;
 /// Between two shifts the radius difference is known to this in mm, a fifth of the rounding of the standard's tables ...
 const RESOLVED: f64 = 2e-3;
 /// ... or its jump to the distance of the shifts halved this many times, 0.0001 mm for 0.1 mm.
@@ -211,8 +208,8 @@ fn other_reading(side: &WheelTask) -> WheelRail {
     let grains = profiles.map(checked_case::grain);
     let advised = advised_smoothing(grains, side.contact_modulus, PRESSURE_USUAL);
     let other = |k: usize, profile: &Profile| {
-        let chords = OTHER_CHORDS * profile.usual_chord();
-        let least = (OTHER_TIMES * profile.smoothing()).max(chords.min(SMOOTHING_ADVISED[1]));
+        let chords = COMPANION_CHORDS * profile.usual_chord();
+        let least = (COMPANIONS[1] * profile.smoothing()).max(chords.min(SMOOTHING_ADVISED[1]));
         least.max(advised[k])
     };
     side.geometry

@@ -313,8 +313,8 @@ const VELOCITY: AllowedRange = AllowedRange::closed(-1e9, 1e9, "mm/s");
 const RATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "rad/s");
 const RADIUS: AllowedRange = AllowedRange::positive(1e9, "mm");
 const TORQUE: AllowedRange = AllowedRange::closed(-1e15, 1e15, "N mm");
-/// Most motions of a sweep and points of a history, before the limit of the service.
-const POINTS_MAX: u32 = 1_000_000;
+/// Most motions of a sweep, points of a history and coordinates of a grid, before the limit of the service.
+pub(crate) const POINTS_MAX: u32 = 1_000_000;
 const FORCE: AllowedRange = AllowedRange::closed(-1e15, 1e15, "N");
 /// The forces stand in the order of the creepages they replace.
 const COMPONENTS: [&str; 5] = [

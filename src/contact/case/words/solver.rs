@@ -21,10 +21,7 @@ use crate::contact::case::words::motion::{
 };
 use crate::contact::case::words::object::{Object, join, names, shown, word};
 use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
-use crate::contact::rolling::task::{PrescribedForces, TARGET_LEAST};
-
-/// Allowed error of the resultants when nothing else is asked for, relative to μN.
-pub(crate) const TARGET_ERROR_DEFAULT: f64 = 0.005;
+use crate::contact::rolling::task::{PrescribedForces, TARGET_LEAST, TARGET_USUAL};
 
 /// How to solve, and how exactly.
 #[none_is_absent]
@@ -247,7 +244,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     let solver = Solver::members(&mut case.child_or_empty("solver")?)?;
     // The simplified theory has one mesh and a stated error, which no target changes: it has none of its own.
     let wanted = solver.mesh.is_none() && solver.method != MethodName::Fastsim;
-    let usual = wanted.then_some(TARGET_ERROR_DEFAULT);
+    let usual = wanted.then_some(TARGET_USUAL);
     Some(Solver {
         target_error: solver.target_error.or(usual),
         ..solver

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
+use crate::contact::case::words::motion::POINTS_MAX;
 use crate::contact::case::words::object::{
     AllowedRange, Member, Object, join, names, number, shown, word,
 };
@@ -344,8 +345,6 @@ fn in_order(block: &mut Object, name: &str, [before, after]: [f64; 2]) -> Option
 
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const DEPTH: AllowedRange = AllowedRange::closed(0.0, 1e6, "mm");
-/// Most points of one list or axis, before the limit of the service.
-const COUNT_MAX: u32 = 1_000_000;
 const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
 
 /// Reads the member `subsurface` of a case, which belongs to the output of that name; left out, it asks for the worst point.
@@ -470,7 +469,7 @@ fn coordinates(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<
     match block.required(name, what)? {
         Value::Array(_) => list(block, name, allowed).map(GridAxis::List),
         Value::Object(_) => {
-            let (from, to, points) = block.child(name)?.range(allowed, 2, COUNT_MAX)?;
+            let (from, to, points) = block.child(name)?.range(allowed, 2, POINTS_MAX)?;
             Some(GridAxis::Spaced { from, to, points })
         }
         _ => block.number(name, allowed).map(GridAxis::One),
