@@ -116,8 +116,6 @@ impl CheckedParts {
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.after.stress_points(),
                 ellipse: region.and_then(length_over_width),
-                // Friction may not be known.
-                by_table: region.and_then(length_over_width).is_some(),
                 store: limits.operator_store_bytes,
             };
             faults.extend(size.faults(limits));

@@ -5,18 +5,18 @@
 //! which most cases need less than. Single cases differ from the figures here by a factor of 3 either way and more:
 //! `cargo bench --bench stress -- --only times` prints how many do, kind by kind.
 
+use crate::contact::geometry::profile_quality::advised_smoothing;
 use crate::contact::method::Method;
 use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::wheel::{WheelTask, WheelsetMove};
+use crate::contact::normal::wheel::WheelTask;
 use crate::contact::post::subsurface::states::StressPlaces;
-use crate::contact::problem::checked_case;
-use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::problem::checked_case::{self, CheckedCase, PRESSURE_USUAL};
 use crate::contact::rolling::history::solve::usual_work;
-use crate::contact::rolling::task::{Resolution, TARGET_LEAST};
+use crate::contact::rolling::task::{Resolution, TARGET_LEAST, TARGET_USUAL};
 
-/// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`].
+/// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`], from which on the bound of the creep table usually meets the
+/// target where the table is taken.
 const MOTION_SECONDS: f64 = 3e-4;
-const TARGET_USUAL: f64 = 0.005;
 /// Power with which the time grows as the target falls.
 const TARGET_POWER: f64 = 1.4;
 /// Time of a motion with spin, with a prescribed force, or with friction that depends on slip, over that of one without.
@@ -24,17 +24,16 @@ const HARD_TIMES: f64 = 3.0;
 /// A motion by the table, with its place in the answer, in s; twice what a row of a run of a million takes on an idle machine
 /// (`cargo bench --bench load -- rows`).
 pub(crate) const TABLE_SECONDS: f64 = 5e-6;
-/// Targets from here on are usually met by the bound of the creep table, 0.0023 in the median.
-const TABLE_BOUND: f64 = 0.003;
 /// Time in s to find region and pressure of a gap with one patch; it grows with the square of their number.
 const GAP_SECONDS: f64 = 1.5e-3;
 /// Time in s to bring a wheel to rest on its rail.
 const WHEEL_SECONDS: f64 = 9e-3;
-/// Half-length and half-width in mm of a patch under a wheel.
-const HALF_UNDER_WHEEL: [f64; 2] = [6.0, 5.0];
-/// Solves of a wheelset until the heights of both wheels agree with the roll, and of a wheel or wheelset that is to carry prescribed forces.
-const ROUNDS_ROLL: f64 = 2.0;
-const ROUNDS_FORCES: f64 = 6.0;
+/// Solves of a wheel on profiles that are judged by other readings.
+const OTHER_READINGS: f64 = 3.0;
+/// Half-length and half-width in mm of a patch that is found.
+const HALF_USUAL: f64 = 5.0;
+/// Solves of a wheelset or of a wheel that is to carry prescribed forces, for each position.
+const TRIALS: f64 = 4.0;
 /// Time in s to place the rigid wheelset at one shift with two readings of its profiles.
 const RIGID_SHIFT: f64 = 3e-3;
 /// Time in s that pressure and opening of a gap take for each motion of unlike bodies (12 contacts of `tests/physics/unlike.rs`).
@@ -42,6 +41,12 @@ const UNLIKE_SECONDS: f64 = 0.045;
 /// Time in s of a step of a history, and for every square of its cells: 33 to 97 points of `tests/data/transient.json` on 72 to 1152 cells.
 const STEP_SECONDS: f64 = 5e-5;
 const STEP_CELLS_SECONDS: f64 = 5e-9;
+/// Time in s for each stress below the surface, and for the worst point of a patch (`cargo bench --bench stress -- --only after`, medians over 18
+/// ellipses); a fine mesh takes several times as long. Other outputs of a solved motion take less than 0.1 ms.
+const STRESS_SECONDS: f64 = 4e-7;
+const WORST_SECONDS: f64 = 0.0025;
+/// For the passages below a patch, for each thing that is judged of them: the same bench.
+const PASSAGE_SECONDS: f64 = 0.03;
 
 /// Half-length and half-width in mm of the patches, as far as they are known before the normal problem is solved, and the time in s to solve it.
 fn expected_patches(task: &NormalTask) -> (Vec<[f64; 2]>, f64) {
@@ -56,22 +61,28 @@ fn expected_patches(task: &NormalTask) -> (Vec<[f64; 2]>, f64) {
             (half.collect(), 0.0)
         }
         NormalTask::Gap(task) => {
-            let preview = task.preview();
-            let count = preview.asperities;
-            let half = preview.half.map(|half| half / (count as f64).sqrt());
-            (vec![half; count], GAP_SECONDS * (count as f64).powi(2))
+            let count = task.preview().asperities;
+            (
+                vec![[HALF_USUAL; 2]; count],
+                GAP_SECONDS * (count as f64).powi(2),
+            )
         }
-        NormalTask::Wheel(task) => (vec![HALF_UNDER_WHEEL], at_rest(task)),
+        NormalTask::Wheel(task) => (vec![[HALF_USUAL; 2]], at_rest(task)),
         NormalTask::Wheelset(task) => (
-            vec![HALF_UNDER_WHEEL; 2],
+            vec![[HALF_USUAL; 2]; 2],
             task.sides.iter().map(at_rest).sum(),
         ),
     }
 }
 
-/// Time in s to bring a wheel to rest on its rail, with all the readings of its profiles.
+/// Time in s to bring a wheel to rest on its rail, with the other readings of its profiles where they are smoothed or should be.
 fn at_rest(task: &WheelTask) -> f64 {
-    WHEEL_SECONDS * f64::from(1 + checked_case::readings_expected(task))
+    let profiles = task.geometry.profiles();
+    let grains = profiles.map(checked_case::grain);
+    let read_again = task.trust.auto.contains(&true)
+        || profiles.iter().any(|profile| profile.smoothing() > 0.0)
+        || advised_smoothing(grains, task.contact_modulus, PRESSURE_USUAL) != [0.0; 2];
+    WHEEL_SECONDS * if read_again { OTHER_READINGS } else { 1.0 }
 }
 
 impl CheckedCase {
@@ -95,17 +106,12 @@ impl CheckedCase {
         let after = motions * self.after_seconds(half.len());
         let once = normal + rolling + coupled + after;
         let NormalTask::Wheelset(task) = &self.problem.task else {
-            return once * self.problem.pull().map_or(1.0, |_| ROUNDS_FORCES);
+            return once * self.problem.pull().map_or(1.0, |_| TRIALS);
         };
-        let rounds_of = |moving: &WheelsetMove| match moving.drive_torque {
-            Some(_) => ROUNDS_FORCES,
-            None => ROUNDS_ROLL,
-        };
-        let rounds: f64 = task.moves.iter().map(rounds_of).sum();
         let kinematics = task.kinematics.as_ref().map_or(0.0, |asked| {
             RIGID_SHIFT * (1.0 + 2.0 * asked.reach / asked.step)
         });
-        once * rounds + kinematics
+        once * TRIALS * task.moves.len() as f64 + kinematics
     }
 
     /// Time of motion `k` over that of the easiest.
@@ -139,7 +145,7 @@ impl CheckedCase {
     }
 
     fn to_target(&self, patches: usize, target: f64) -> f64 {
-        let by_table = target >= TABLE_BOUND && !self.run.needs_cells();
+        let by_table = target >= TARGET_USUAL && !self.run.needs_cells();
         let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_POWER);
         let motions = 0..self.problem.motions.len();
         let seconds = motions.map(|k| match by_table && self.may_take_table(k) {
@@ -160,16 +166,7 @@ impl CheckedCase {
         let motions = 0..self.problem.motions.len();
         motions.map(|k| each * self.hardness(k)).sum()
     }
-}
 
-/// Time in s for each stress below the surface, and for the worst point of a patch (`cargo bench --bench stress -- --only after`, medians over 18
-/// ellipses); a fine mesh takes several times as long. Other outputs of a solved motion take less than 0.1 ms.
-const STRESS_SECONDS: f64 = 4e-7;
-const WORST_SECONDS: f64 = 0.0025;
-/// For the passages below a patch, for each thing that is judged of them: the same bench.
-const PASSAGE_SECONDS: f64 = 0.03;
-
-impl CheckedCase {
     /// Estimated time in s of the outputs computed from one solved motion (damage, subsurface stresses, temperature) for a number of patches.
     pub(crate) fn after_seconds(&self, patches: usize) -> f64 {
         let after = &self.run.after;
@@ -196,9 +193,7 @@ impl CheckedCase {
         }
         seconds
     }
-}
 
-impl CheckedCase {
     /// Estimated time and memory of this solve: operators of the meshes, matrices of the dense method, and the answer. The time is rough.
     #[must_use]
     pub fn cost(&self) -> Cost {

@@ -134,36 +134,23 @@ pub fn evaluate_at_once<E>(
 /// How long the rows of a task take, in s on one core of the machine the figures were taken on; rough, and the same for the same rows.
 #[must_use]
 pub fn expected_seconds(task: &ManyTask) -> f64 {
-    let rows = task.rows();
+    let rows = task.rows() as f64;
     let Ok(checked) = contact::check_with(task.known, task.case, task.limits) else {
-        return rows as f64 * REFUSED_SECONDS;
+        return rows * TABLE_SECONDS;
     };
+    let seconds = checked.cost().seconds;
     let Some((evaluable, method)) = evaluable(task, &checked) else {
-        let sampled: Vec<f64> = (0..rows)
-            .step_by(rows.div_ceil(SAMPLED).max(1))
-            .map(|row| match task.checked(row) {
-                Ok(checked) => checked.cost().seconds,
-                Err(_) => REFUSED_SECONDS,
-            })
-            .collect();
-        return rows as f64 * sampled.iter().sum::<f64>() / sampled.len().max(1) as f64;
+        return rows * seconds;
     };
     let evaluated = evaluable.evaluate();
     let left = evaluated.status.iter();
     let left = left.filter(|status| to_solve(**status, method)).count();
-    let each = match checked.run.method_asked {
-        MethodName::Fastsim => FASTSIM_SECONDS,
+    let each = match method {
+        MethodName::Fastsim => seconds,
         _ => TABLE_SECONDS,
     };
-    rows as f64 * each + left as f64 * checked.cost().seconds
+    rows * each + left as f64 * seconds
 }
-
-/// Rows that [`expected_seconds`] looks at.
-const SAMPLED: usize = 16;
-/// Time of a row by the simplified theory, in s: 0.017 LU of the report (`cargo bench --bench report`) and what is written of it.
-const FASTSIM_SECONDS: f64 = 3e-5;
-/// Time of a row that is refused, in s; not measured, it only keeps chunks of faulty rows from being endless.
-const REFUSED_SECONDS: f64 = 1e-4;
 
 /// The rows as [`Rows`], if they are of that kind, and whether the method was left to the service.
 fn evaluable(task: &ManyTask, checked: &CheckedCase) -> Option<(Rows, MethodName)> {

@@ -16,7 +16,6 @@ use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::gap::outcome::{APPROACH_USUAL_MAX, HALF_WIDTH_USUAL_MAX};
 use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::wheel::WheelTask;
 use crate::contact::problem::physics::{MotionPart, Problem, Run};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -130,23 +129,6 @@ pub fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {
     let advised = advised_smoothing(profiles.map(grain), modulus, PRESSURE_USUAL);
     let [rail, wheel] = [0, 1].map(|k| section(profiles[k], advised[k]));
     PairQuality { rail, wheel }
-}
-
-/// How many other readings of the profiles a solve will look at: two with a smoothing, one where the noise asks for one, and one to settle
-/// an automatic one.
-#[must_use]
-pub fn readings_expected(contact: &WheelTask) -> u32 {
-    let profiles = contact.geometry.profiles();
-    let auto = contact.trust.auto.contains(&true);
-    let smoothed = profiles.iter().any(|profile| profile.smoothing() > 0.0);
-    let grains = profiles.map(grain);
-    let noisy = advised_smoothing(grains, contact.contact_modulus, PRESSURE_USUAL) != [0.0; 2];
-    match (auto, smoothed || auto && noisy, noisy) {
-        (true, true, _) => 3,
-        (_, true, _) => 2,
-        (_, false, true) => 1,
-        _ => 0,
-    }
 }
 
 /// The quality of one profile, with the smoothing that suits it in mm.

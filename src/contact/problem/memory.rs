@@ -16,9 +16,7 @@ use crate::contact::rolling::refinement::mesh_family::{
 use crate::contact::rolling::task::{Motion, Resolution, precision_of};
 
 /// Cells of the finest mesh for a target of 0.02, on average.
-const TARGET_CELLS: f64 = 160.0;
-/// The same for an ellipse whose error the table of creep forces tells (62 Hertz contacts of the report; 150 at 0.005, 500 at 0.001).
-const TARGET_CELLS_BY_TABLE: f64 = 64.0;
+const TARGET_CELLS: f64 = 128.0;
 /// Power by which they grow as the target falls.
 const TARGET_GROWTH: f64 = 0.65;
 /// Dense square matrices the method of Liu and Hsu holds at once.
@@ -55,8 +53,6 @@ pub(crate) struct SizeInput {
     pub(crate) stress_points: usize,
     /// Length over width of an ellipse; nothing for other regions.
     pub(crate) ellipse: Option<f64>,
-    /// Does the table of creep forces tell the error?
-    pub(crate) by_table: bool,
     /// Are the motions the points of a history, which is kept whole on two levels?
     pub(crate) history: bool,
     /// Does it begin with bodies pressed together?
@@ -219,12 +215,7 @@ impl SizeInput {
     fn usual_cells(&self, finest: f64) -> f64 {
         match (self.resolution, self.method) {
             (Resolution::Target(target), Method::BoundaryElement) => {
-                let cells = if self.by_table {
-                    TARGET_CELLS_BY_TABLE
-                } else {
-                    TARGET_CELLS
-                };
-                finest.min(cells * (0.02 / target).powf(TARGET_GROWTH))
+                finest.min(TARGET_CELLS * (0.02 / target).powf(TARGET_GROWTH))
             }
             _ => finest,
         }
@@ -251,12 +242,6 @@ impl CheckedCase {
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
             stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),
-            by_table: self.problem.is_in_table()
-                && self
-                    .problem
-                    .forces
-                    .iter()
-                    .all(|forces| *forces == [None; 2]),
             store: self.run.operator_store_bytes,
         }
     }
@@ -271,7 +256,6 @@ impl CheckedCase {
         let bytes = SizeInput {
             segments,
             ellipse: None,
-            by_table: false,
             ..self.size_input()
         }
         .bytes() as u64;
