@@ -20,7 +20,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::{Problem, Run};
 use crate::contact::profile_assessment::trust;
 use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::rolling::force_places::{CubicLaw, PLACE_MAX};
+use crate::contact::rolling::force_control::{CubicLaw, PLACE_MAX};
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::rolling::task::{Motion, PrescribedForces, RelativeTo};
 use crate::contact::solution::words::answer::{Fields, PatchSolution, Solution};

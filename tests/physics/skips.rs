@@ -146,16 +146,10 @@ fn mirror_symmetry_halves_the_work_and_does_not_move_the_answer() {
 }
 
 #[test]
-fn full_slip_needs_no_newton_and_does_not_move_the_answer() {
+fn in_full_slip_nothing_sticks_and_the_answer_is_that_of_a_plain_newton_solve() {
     for motion in [[60.0, 0.0, 0.0], [80.0, -40.0, 3.0]] {
         let contact = Ellipse::steel(1.4, 0.28).normalised(motion[0], motion[1], motion[2]);
         let point = answered(&contact);
-        let words = "fixed-point iteration replaced Newton's method";
-        assert!(
-            point.solver.skipped.iter().any(|s| s.contains(words)),
-            "{:?}",
-            point.solver.skipped
-        );
         assert_eq!(point.stick_area_mm2, Some(0.0));
         let distance = distance_to_plain_newton(&contact);
         assert!(distance < 1e-6, "{motion:?}: {distance:e}");

@@ -19,7 +19,6 @@ const ORDER: &[&str] = &[
     "contact::rolling",
     "contact::rolling::refinement",
     "contact::rolling::history",
-    "contact::rolling::force_places",
     "contact::rolling::force_control",
     "contact::case::words",
     "contact::solution::words",

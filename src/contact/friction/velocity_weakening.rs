@@ -14,9 +14,6 @@ pub(crate) const SLIP_OF_CELL: f64 = 1.7;
 /// at 1.5 one.
 pub(crate) const STABILITY_MAX: f64 = 1.0;
 
-/// Parts of the fall that bounds are given one after the other where the iteration does not settle with all of it.
-pub const CONTINUATION: [f64; 5] = [0.25, 0.5, 0.75, 0.9, 1.0];
-
 /// How fast the terms of a law fall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FallForm {
@@ -129,7 +126,6 @@ impl FallingLaw {
         Softening {
             law: *self,
             speed: rolling_speed * slip_unit,
-            drop: 1.0,
         }
     }
 }
@@ -140,32 +136,21 @@ pub struct Softening {
     law: FallingLaw,
     /// Speed of slip in mm/s for one unit of slip.
     speed: f64,
-    /// Part of the fall that is taken: 1 of the law itself, less on the way to it.
-    drop: f64,
 }
 
 impl Softening {
-    /// The same with a part of the fall, from 0 (a constant bound) to 1 (the law).
-    #[must_use]
-    pub fn softened(&self, drop: f64) -> Softening {
-        Softening { drop, ..*self }
-    }
-
     /// Bound over the bound at rest at a slip, and its derivative.
     #[must_use]
     pub fn at(&self, slip: f64) -> (f64, f64) {
         let rest = self.law.at_rest();
         let (value, slope) = self.law.at(self.speed * slip);
-        (
-            1.0 - self.drop * (1.0 - value / rest),
-            self.drop * self.speed * slope / rest,
-        )
+        (value / rest, self.speed * slope / rest)
     }
 
     /// The largest size of the derivative.
     #[must_use]
     pub fn steepest(&self) -> f64 {
-        self.drop * self.speed * self.law.steepest() / self.law.at_rest()
+        self.speed * self.law.steepest() / self.law.at_rest()
     }
 
     /// The slip σ with `g(σ) + r σ = length`, where `g` is the bound of a cell whose bound at rest is `rest`, for a `length` above
@@ -284,12 +269,5 @@ mod tests {
 
     fn law_fall(form: FallForm) -> Softening {
         law(form).bound_fall(20_000.0, 0.005)
-    }
-
-    #[test]
-    fn without_its_fall_a_bound_is_constant() {
-        let still = law_fall(FallForm::Rational).softened(0.0);
-        assert_eq!(still.at(3.0), (1.0, -0.0));
-        assert_eq!(still.steepest(), 0.0);
     }
 }

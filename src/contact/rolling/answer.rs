@@ -152,8 +152,6 @@ pub enum Skip {
     NoFriction,
     /// The rigid slip is so large that elastic slip cannot turn the tractions.
     RigidSlip,
-    /// Everything slips, and a fixed point found the tractions.
-    FullSlip,
     /// Patch and motion are mirror-symmetric, so that half the cells are unknowns.
     HalfTheCells,
     /// The patch alone is mirror-symmetric, so that half the operator is enough.
@@ -171,7 +169,6 @@ impl Skip {
             Skip::RigidSlip => {
                 "the rigid slip exceeds the elastic slip by a factor of a million: tractions follow the rigid slip"
             }
-            Skip::FullSlip => "all cells slip: a fixed-point iteration replaced Newton's method",
             Skip::HalfTheCells => "mirror symmetry of patch and motion: half the cells",
             Skip::HalfTheOperator => {
                 "mirror symmetry of the patch: half of the influence matrix was computed"

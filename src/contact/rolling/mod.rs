@@ -3,7 +3,7 @@
 //! | question | where |
 //! |---|---|
 //! | what is asked | [`task`] |
-//! | which creepages give a prescribed force | [`force_control`], with its unknowns in [`force_places`] |
+//! | which creepages give a prescribed force | [`force_control`] |
 //! | on which meshes, until when | [`refinement`] |
 //! | how one mesh is solved | [`methods`] |
 //! | which equations they solve | [`slip_equations`], [`slip_rules`] |
@@ -16,7 +16,6 @@
 pub mod answer;
 pub mod displacement_memory;
 pub mod force_control;
-pub mod force_places;
 pub mod history;
 pub mod linear_theory;
 pub mod load_ellipse;

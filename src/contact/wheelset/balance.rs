@@ -18,7 +18,7 @@ use crate::contact::numerics::equilibrium::{Search, Trial};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::profile_assessment::trust;
 use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::rolling::force_places::PLACE_MAX;
+use crate::contact::rolling::force_control::PLACE_MAX;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::{
     ErrorEstimate, Fields, Kinematics, Origin, PatchSolution, Solution, Total, WheelOnRail,

@@ -15,7 +15,6 @@ use crate::contact::rolling::displacement_memory::LeadingEdges;
 use crate::contact::rolling::history::plan::{
     HistoryStep, HistoryTask, PointRecord, StepEquations, StepKind, memory, steady, steps, weights,
 };
-use crate::contact::rolling::methods::boundary_element::fixed_point::slide_along;
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonTask, STEPS_MAX,
@@ -337,35 +336,8 @@ impl<'a> LevelRun<'a> {
             .solve(&law, &mut tractions, self.workspace, self.monitor)?;
         let mut work = count(&report, of.newton);
         if !report.exit.converged() {
+            // The start may be what hinders the iteration.
             tractions.fill(0.0);
-            if of.kind == StepKind::Steady {
-                let level = (self.level, &*self.operator, self.parity);
-                let equations = steady(Rule::Upwind, level);
-                let newton = self.newton(of.kind, &equations);
-                let rigid = &self.rigid(
-                    &StepEquations {
-                        equations: &equations,
-                        ..*of
-                    },
-                    motion,
-                );
-                let law = NewtonTask { rigid, ..law };
-                let report = newton.solve(&law, &mut tractions, self.workspace, self.monitor)?;
-                work.add(count(&report, &newton));
-            }
-            report = of
-                .newton
-                .solve(&law, &mut tractions, self.workspace, self.monitor)?;
-            work.add(count(&report, of.newton));
-        }
-        if !report.exit.converged() {
-            // Every cell slips along what the motion and the past ask for.
-            slide_along(
-                &rigid,
-                &self.bound[..self.cells],
-                law.fall.as_ref(),
-                &mut tractions,
-            );
             report = of
                 .newton
                 .solve(&law, &mut tractions, self.workspace, self.monitor)?;

@@ -246,10 +246,6 @@ const CHANGE: f64 = 2e-5;
 /// From this step on the mean of two states is taken for the past, since single cells at the edge of what sticks may come and go for ever
 /// where nearly all sticks.
 const STEPS_FREE: usize = 60;
-/// After so many steps a change of this is taken too.
-const STEPS_LATE: usize = 160;
-/// See [`STEPS_LATE`].
-const CHANGE_LATE: f64 = 3e-4;
 /// Energies grow with this power of the size.
 const ENERGY_POWER: f64 = 5.0;
 
@@ -307,7 +303,7 @@ impl LevelRun<'_> {
                 }
             });
             self.state.tractions = tractions;
-            if change < CHANGE && step > 1 || change < CHANGE_LATE && step > STEPS_LATE {
+            if change < CHANGE && step > 1 {
                 self.settle(of);
                 return Ok(());
             }

@@ -53,8 +53,6 @@ const MISSED: f64 = 2e-5;
 /// Residual of the tractions of a step of rolling. A step changes little, so that the tractions before it leave a small residual by themselves: at
 /// 1e-4 they were kept, and under small creepages forces stayed up to 0.012 of the limit from steady rolling, with estimates of 0.002.
 const STEP_RESIDUAL: f64 = 1e-6;
-/// Residual of the tractions of a pressing, whose steps are many and alike.
-const PRESSED_RESIDUAL: f64 = 1e-5;
 /// The error of creepages and shifts that are found is to be below this many times the target, relative to the largest creepage.
 const CREEPAGE_SHARE: f64 = 10.0;
 
@@ -112,13 +110,11 @@ pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64
         return (history.distances.len() as f64, CELLS_FIRST * CELLS_FIRST);
     };
     let cells = along.unwrap_or(CELLS_FIRST * FINER * FINER);
-    let pressed = history.start == HistoryStart::Pressed;
+    let pressing = match history.start {
+        HistoryStart::Pressed => STEPS_PRESSED,
+        HistoryStart::Rest | HistoryStart::Steady => 0.0,
+    };
     let steps = plan::count(history, half / (STEPS_PER_CELL * cells));
-    if pressed && history.distances.len() == 1 {
-        let second = CELLS_FIRST * FINER;
-        return (STEPS_PRESSED, second * second / SHAPE_PRESSED);
-    }
-    let pressing = if pressed { STEPS_PRESSED } else { 0.0 };
     (steps + pressing, cells * cells / SHAPE)
 }
 
@@ -251,17 +247,8 @@ fn on_level(
     let began = monitor.elapsed();
     let number = state.levels.level(plan.size.into())?;
     let level = state.levels.get(number);
-    let forced = task.has_prescribed_forces();
-    let residual = match task.resolution {
-        Resolution::Target(_) if history.only_presses() => PRESSED_RESIDUAL,
-        Resolution::Target(_) | Resolution::Mesh(_) => STEP_RESIDUAL,
-    };
     // What the iteration leaves of a force is a change of the creepage in one step.
-    let tolerance = if forced {
-        [5e-6_f64.min(residual), 1e-5]
-    } else {
-        [residual, 1e-5]
-    };
+    let tolerance = [STEP_RESIDUAL, 1e-5];
     let workspace = &mut state.workspace;
     let run = LevelRun::new(task, history, &level, tolerance, workspace, monitor)?;
     let points = run

@@ -1,6 +1,5 @@
 //! Semismooth Newton iteration on strips.
 
-pub mod fixed_point;
 pub mod linearisation;
 pub mod newton;
 pub mod preconditioner;

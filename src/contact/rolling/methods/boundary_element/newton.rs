@@ -34,9 +34,6 @@ const PROJECTION: f64 = 0.3;
 /// The first so many steps are never halved: far from the solution the residual may grow for a step or two. With 4 or 16 the steps
 /// change by 0.6 % at most.
 const FREE_STEPS: u32 = 8;
-/// Residual over the one to reach below which a start needs no Newton step. Chosen by judgement: a hundredth is what one step of a
-/// quadratically convergent iteration leaves.
-const START_ACCEPTED: f64 = 0.01;
 /// A step is halved at most so many times. 3 and 8 give the same steps.
 const HALVINGS_MAX: u32 = 5;
 /// If the tractions of slipping cells are this close to the tangents of their discs, relative to the residual, they are not moved there,
@@ -164,11 +161,8 @@ impl<'a> Newton<'a> {
                 least = report.residual;
                 best.copy_from_slice(t);
             }
-            let needed = match report.iterations {
-                0 if !law.accepts_start => START_ACCEPTED * law.tolerance,
-                _ => law.tolerance,
-            };
-            if report.residual <= needed {
+            let is_answer = law.accepts_start || report.iterations > 0;
+            if is_answer && report.residual <= law.tolerance {
                 report.exit = NewtonTermination::Converged;
                 break;
             }

@@ -3,15 +3,12 @@
 use std::borrow::Cow;
 
 use crate::contact::friction::path_dependent::PathDependentFriction;
-use crate::contact::friction::velocity_weakening::{CONTINUATION, Softening};
+use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd::length;
 use crate::contact::rolling::answer::{LevelFailure, Work};
-use crate::contact::rolling::methods::boundary_element::fixed_point::{
-    SAME_SOLUTION, fixed_point, force_change, slide_along,
-};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{
     Convergence, LevelTask, NewtonTask, STEPS_MAX,
@@ -22,6 +19,8 @@ use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::Motion;
 
+/// Forces of two solutions that differ by no more than this part of the friction limit are the same: ten times what the iteration leaves.
+const SAME_SOLUTION: f64 = 4e-3;
 /// From this stability number on (see [`Newton::stability`]) a second solution is looked for. None was seen below 1.5 in 360 random
 /// motions of the prototype.
 const SECOND_START_FROM: f64 = 0.5;
@@ -38,12 +37,6 @@ pub(super) struct ThreePointAnswer {
     pub(super) slips: Vec<bool>,
     /// By how much a second solution differs, see [`RuleSequence::other_solution`].
     pub(super) other: Option<f64>,
-}
-
-/// Which cells slip under the trapezoid rule, and whether a fixed point found that.
-pub(super) struct TrapezoidAnswer {
-    pub(super) slips: Vec<bool>,
-    pub(super) by_fixed_point: bool,
 }
 
 /// With which buffers to solve, and who may stop it.
@@ -158,14 +151,8 @@ impl<'a> RuleSequence<'a> {
         t
     }
 
-    /// Solves one rule from `t`; `shortcut` allows the fixed point.
-    fn rule(
-        &mut self,
-        newton: &Newton,
-        rigid: &[f64],
-        t: &mut [f64],
-        shortcut: bool,
-    ) -> Result<(Convergence, bool), Stop> {
+    /// Solves one rule from `t`.
+    fn rule(&mut self, newton: &Newton, rigid: &[f64], t: &mut [f64]) -> Result<Convergence, Stop> {
         let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
         let falls = newton.rule() != Rule::Trapezoid;
         let law = NewtonTask {
@@ -184,55 +171,28 @@ impl<'a> RuleSequence<'a> {
             accepts_start: falls,
         };
         let Control { workspace, monitor } = &mut self.control;
-        let settled = if shortcut {
-            fixed_point(newton, &law, t, workspace, *monitor)?
-        } else {
-            None
-        };
-        let by_fixed_point = settled.is_some();
-        let report = match settled {
-            Some(report) => report,
-            None => newton.solve(&law, t, workspace, *monitor)?,
-        };
+        let report = newton.solve(&law, t, workspace, *monitor)?;
         self.work.add(Work {
             iterations: report.iterations,
             products: report.products,
             entries: u64::from(report.products) * newton.entries() as u64,
             residual: report.residual,
         });
-        Ok((report, by_fixed_point))
+        Ok(report)
     }
 
-    /// The three-point rule: from the start, else from zero, else from the upwind solution.
-    pub(super) fn three_point(
-        &mut self,
-        t: &mut [f64],
-        started: bool,
-    ) -> Result<ThreePointAnswer, LevelFailure> {
+    /// The three-point rule: from the start, else from the upwind solution.
+    pub(super) fn three_point(&mut self, t: &mut [f64]) -> Result<ThreePointAnswer, LevelFailure> {
         let equations = self.equations(Rule::ThreePoint);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        let mut report = self.rule(&newton, &rigid, t, true)?.0;
+        let mut report = self.rule(&newton, &rigid, t)?;
         // The start may be what hinders the iteration.
-        if !report.exit.converged() && started {
-            t.fill(0.0);
-            report = self.rule(&newton, &rigid, t, false)?.0;
-        }
         if !report.exit.converged() {
             t.fill(0.0);
             // The upwind rule is of first order, but monotone; its solution serves as a start only.
             self.upwind(t)?;
-            report = self.rule(&newton, &rigid, t, false)?.0;
-        }
-        if !report.exit.converged()
-            && let Some(fall) = self.fall
-        {
-            // All of the fall at once was too much: parts of it follow one another, each from the tractions of the last.
-            for drop in CONTINUATION {
-                self.fall = Some(fall.softened(drop));
-                report = self.rule(&newton, &rigid, t, false)?.0;
-            }
-            self.fall = Some(fall);
+            report = self.rule(&newton, &rigid, t)?;
         }
         if !report.exit.converged() {
             return Err(LevelFailure::NotConverged {
@@ -297,7 +257,7 @@ impl<'a> RuleSequence<'a> {
             for (bound, found) in self.bound.iter_mut().zip(found) {
                 *bound += weight * (found - *bound);
             }
-            if !self.rule(newton, rigid, t, true)?.0.exit.converged() {
+            if !self.rule(newton, rigid, t)?.exit.converged() {
                 break;
             }
         }
@@ -326,7 +286,7 @@ impl<'a> RuleSequence<'a> {
         let mut other = vec![0.0; t.len()];
         slide_along(rigid, bound, Some(&fall), &mut other);
         let limit: f64 = area.iter().zip(bound).map(|(a, g)| a * g).sum();
-        let report = self.rule(newton, rigid, &mut other, false)?.0;
+        let report = self.rule(newton, rigid, &mut other)?;
         if !report.exit.converged() {
             return Ok(None);
         }
@@ -353,56 +313,29 @@ impl<'a> RuleSequence<'a> {
         let equations = self.equations(Rule::Upwind);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        Ok(self.rule(&newton, &rigid, t, false)?.0.exit.converged())
+        Ok(self.rule(&newton, &rigid, t)?.exit.converged())
     }
 
-    /// The trapezoid rule from `t` in at most `steps_max` Newton steps; `t` stays as it was if they do not suffice.
+    /// Which cells slip by the trapezoid rule, solved from `t` in at most `steps_max` Newton steps; `t` and its residual stay as they were if they do not
+    /// suffice.
     pub(super) fn trapezoid(
         &mut self,
         t: &mut [f64],
         steps_max: u32,
-    ) -> Result<Option<TrapezoidAnswer>, Stop> {
-        let mut found = t.to_vec();
-        let answer = self.trapezoid_in_place(&mut found, steps_max, true)?;
-        if answer.is_some() {
-            t.copy_from_slice(&found);
-        }
-        Ok(answer)
-    }
-
-    /// The trapezoid rule from the upwind solution; `t` stays as it was if that leads to no solution.
-    pub(super) fn trapezoid_from_upwind(
-        &mut self,
-        t: &mut [f64],
-    ) -> Result<Option<TrapezoidAnswer>, Stop> {
-        let residual = self.work.residual;
-        let mut found = vec![0.0; t.len()];
-        self.upwind(&mut found)?;
-        let answer = self.trapezoid_in_place(&mut found, STEPS_MAX, false)?;
-        match answer {
-            Some(_) => t.copy_from_slice(&found),
-            // The tractions remain those of the three-point rule, and so does their residual.
-            None => self.work.residual = residual,
-        }
-        Ok(answer)
-    }
-
-    fn trapezoid_in_place(
-        &mut self,
-        t: &mut [f64],
-        steps_max: u32,
-        shortcut: bool,
-    ) -> Result<Option<TrapezoidAnswer>, Stop> {
+    ) -> Result<Option<Vec<bool>>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
+        let (mut found, residual) = (t.to_vec(), self.work.residual);
         self.steps_max = steps_max;
-        let (report, by_fixed_point) = self.rule(&newton, &rigid, t, shortcut)?;
+        let report = self.rule(&newton, &rigid, &mut found)?;
         self.steps_max = STEPS_MAX;
-        Ok(report.exit.converged().then(|| TrapezoidAnswer {
-            slips: self.zones(&newton, t),
-            by_fixed_point,
-        }))
+        if !report.exit.converged() {
+            self.work.residual = residual;
+            return Ok(None);
+        }
+        t.copy_from_slice(&found);
+        Ok(Some(self.zones(&newton, t)))
     }
 
     /// The slips of the rule that was solved last, over the whole mesh.
@@ -414,4 +347,26 @@ impl<'a> RuleSequence<'a> {
     pub(super) fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
         self.level.expand(self.parity, values)
     }
+}
+
+/// Tractions of these cells at their bounds, along slips, both components one after the other.
+fn slide_along(slip: &[f64], bound: &[f64], fall: Option<&Softening>, t: &mut [f64]) {
+    let padded = t.len() / 2;
+    for (i, rest) in bound.iter().enumerate() {
+        let size = length(slip[i], slip[padded + i]);
+        let bound = fall.map_or(*rest, |fall| rest * fall.at(size).0);
+        let factor = if size > 0.0 { bound / size } else { 0.0 };
+        t[i] = factor * slip[i];
+        t[padded + i] = factor * slip[padded + i];
+    }
+}
+
+/// Length of the difference of the forces of two sets of tractions on cells with these areas.
+fn force_change(area: &[f64], t: &[f64], other: &[f64]) -> f64 {
+    let padded = t.len() / 2;
+    let [x, y] = [0, padded].map(|from| {
+        let change = |(i, area): (usize, &f64)| area * (other[from + i] - t[from + i]);
+        area.iter().enumerate().map(change).sum::<f64>()
+    });
+    x.hypot(y)
 }

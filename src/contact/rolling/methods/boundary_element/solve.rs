@@ -33,7 +33,7 @@ pub fn solve(
     }
     let operator = task.level.operator(monitor)?;
     let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
-    let mut skips = symmetry(task.level, solve.parity);
+    let skips = symmetry(task.level, solve.parity);
     let mut remarks = Vec::new();
     let mut t = solve.start(start);
     let bounds_are_given = task.fall.is_none() && task.passage.is_none();
@@ -44,25 +44,18 @@ pub fn solve(
     let mut smooth = None;
     let mut failed_slips = None;
     if found.is_none() {
-        let three_point = solve.three_point(&mut t, start.is_some())?;
+        let three_point = solve.three_point(&mut t)?;
         if let Some(force_change) = three_point.other {
             remarks.push(Remark::SeveralSolutions { force_change });
         }
         smooth = Some((solve.expand(&t), three_point.slip));
         found = solve.trapezoid(&mut t, STEPS_MAX)?;
         if found.is_none() {
-            found = solve.trapezoid_from_upwind(&mut t)?;
-        }
-        if found.is_none() {
             remarks.push(Remark::SecondRuleFailed {});
             failed_slips = Some(three_point.slips);
         }
     }
-    if found.as_ref().is_some_and(|found| found.by_fixed_point) {
-        skips.push(Skip::FullSlip);
-    }
-    let slips = found.map(|found| found.slips).or(failed_slips);
-    let slips = slips.unwrap_or_default();
+    let slips = found.or(failed_slips).unwrap_or_default();
     let mut traction = solve.expand(&t);
     let (second, slip) = match smooth {
         Some((second, slip)) => (Some(second), slip),
@@ -105,7 +98,7 @@ pub fn smooth_slips(
     let operator = task.level.operator(monitor)?;
     let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
     let mut t = solve.start(Some(&answer.traction));
-    let three_point = solve.three_point(&mut t, true)?;
+    let three_point = solve.three_point(&mut t)?;
     answer.second = Some(solve.expand(&t));
     // The tractions are within their bounds already, and stay as they are to the last bit.
     let mut same = answer.traction.clone();
