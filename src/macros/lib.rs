@@ -99,13 +99,33 @@ pub fn words(item: TokenStream) -> TokenStream {
     .into()
 }
 
+/// Gives an enum of unit variants the function `name`: the word of a variant, as by [`Words`](macro@Words).
+#[proc_macro_derive(Named, attributes(serde))]
+pub fn named(item: TokenStream) -> TokenStream {
+    let item = parse_macro_input!(item as ItemEnum);
+    let (name, variants) = (&item.ident, item.variants.iter().map(|it| &it.ident));
+    let words = item.variants.iter().map(word);
+    quote! {
+        impl #name {
+            /// The word for it in every text.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    #(#name::#variants => #words,)*
+                }
+            }
+        }
+    }
+    .into()
+}
+
 /// Gives a struct, or an enum of struct variants with `type` as its tag, the function `members`, which reads it from the members of a JSON
 /// object with all of their faults. A member is needed unless its type is an `Option` or it has a default.
 ///
 /// `#[member(…)]` of a field takes: the range of a number, as `positive(most, "unit")` or `closed(least, most, "unit")`; that of a count, as
 /// `1..=10`; `default` or `default = value`; `empty`, if an absent member is read as an empty object; `what = "a sentence"` for the fault of a
-/// missing member; `with = function`, which reads the value, or `whole = function`, which reads the member whether it is there or not; `skip`
-/// for a field that is no member. `#[members(rule)]` of a struct or variant names a function that is called with the object and
+/// missing member; `with = function`, which reads the value and is given the range too if there is one, or `whole = function`, which reads the
+/// member whether it is there or not; `skip` for a field that is no member. `#[members(rule)]` of a struct or variant names a function that is called with the object and
 /// what was read of it, and refuses members that do not go together.
 #[proc_macro_derive(Members, attributes(member, members))]
 pub fn members(item: TokenStream) -> TokenStream {
@@ -218,11 +238,16 @@ fn read_field(field: &Field) -> Tokens {
     let own = optional.unwrap_or(&field.ty);
     let kind = own.to_token_stream().to_string();
     let read = match (kind.as_str(), value("with")) {
+        (_, Some(with)) if range.is_some() => quote!(|block, name| #with(block, name, #range)),
         (_, Some(with)) => quote!(#with),
         ("f64", _) => quote!(|block, name| block.number(name, #range)),
         ("u32", _) => quote!(|block, name| block.required_count(name, #range)),
         ("bool", _) => quote!(#object::Object::flag),
         _ => quote!(<#own as #object::Member>::read),
+    };
+    let here = match (value("with"), &range) {
+        (Some(with), Some(range)) => quote!(#with(block, #member, #range)),
+        _ => quote!(#read(block, #member)),
     };
     if let Some(skipped) = value("skip") {
         quote!(Some(#skipped))
@@ -235,12 +260,12 @@ fn read_field(field: &Field) -> Tokens {
     } else if let Some(default) = value("default") {
         quote!(block.optional(#member, #read).map(|read| read.unwrap_or(#default)))
     } else if let Some(what) = value("what") {
-        quote!(block.required(#member, #what).and_then(|_| #read(block, #member)))
+        quote!(block.required(#member, #what).and_then(|_| #here))
     } else {
         match kind.as_str() {
             "f64" => quote!(block.required_number(#member, #range)),
             "u32" => quote!(block.required_count(#member, #range)),
-            _ => quote!(#read(block, #member)),
+            _ => here,
         }
     }
 }

@@ -323,7 +323,9 @@ fn faults_of_friction_name_what_is_wrong() {
     assert_fault(&pulled, "/motion/force_x_n", &["two creepages"]);
     assert_fault(&one(json!({})), "/friction/coefficient", &["missing"]);
     assert_fault(
-        &one(json!({ "coefficient": 0.3, "across": {} })),
+        &one(
+            json!({ "coefficient": 0.3, "across": { "y_mm": [0, 1], "coefficient": [0.3, 0.2] } }),
+        ),
         "/friction/across",
         &["exactly one"],
     );

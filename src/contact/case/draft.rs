@@ -14,10 +14,10 @@ use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::case::words::friction::Friction;
 use crate::contact::case::words::material::{Material, ThermalWords};
 use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::object::{Faults, Object, has_controls, join, shown};
+use crate::contact::case::words::object::{Faults, Member, Object, has_controls, join, shown};
 use crate::contact::case::words::solver::{Case, Output, Solver};
 use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
-use crate::contact::case::words::{contact, friction, material, motion, solver, subsurface};
+use crate::contact::case::words::{contact, material, motion, solver, subsurface};
 use crate::contact::error::{CaseError, Fault};
 use crate::contact::method::Method;
 
@@ -134,7 +134,7 @@ fn read(case: &mut Object) -> CaseDraft {
     let name = case.line("name", NAME_LENGTH_MAX);
     let labels = labels(case);
     let material = material::read_material(case);
-    let friction = friction::read(case);
+    let friction = Friction::read(case, "friction");
     let contact = contact::read(case);
     let load = contact::read_load(case);
     let motion = motion::read(case);

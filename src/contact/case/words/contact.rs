@@ -173,11 +173,11 @@ pub enum Contact {
         /// Shift of the wheelset to the left, in mm: a number, or several; 0 when left out. A shift and a yaw make a position, and every
         /// position has its own patches.
         #[schema(required = false, inline = false)]
-        #[member(with = shifts, default = Swept::Constant(0.0))]
+        #[member(with = swept, closed(-1e3, 1e3, "mm"), default = Swept::Constant(0.0))]
         lateral_shift_mm: Swept,
         /// Yaw of the wheelset in rad, positive from x to y: a number, or several; 0 when left out.
         #[schema(required = false, inline = false)]
-        #[member(with = yaws, default = Swept::Constant(0.0))]
+        #[member(with = swept, closed(-0.3, 0.3, "rad"), default = Swept::Constant(0.0))]
         yaw_rad: Swept,
         /// How several shifts and several yaws make positions: `together` (default) or `grid`, yaw fastest.
         #[schema(required = false)]
@@ -471,16 +471,6 @@ fn by_gauge(
         true => Some(None),
         false => block.number_or(name, allowed, usual).map(Some),
     }
-}
-
-/// Shifts of a wheelset.
-pub(crate) fn shifts(block: &mut Object, name: &str) -> Option<Swept> {
-    swept(block, name, AllowedRange::closed(-1e3, 1e3, "mm"))
-}
-
-/// Yaws of a wheelset.
-pub(crate) fn yaws(block: &mut Object, name: &str) -> Option<Swept> {
-    swept(block, name, AllowedRange::closed(-0.3, 0.3, "rad"))
 }
 
 /// Shifts and yaws that are combined one by one are as many.

@@ -4,24 +4,28 @@ use railhead_macros::{Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::case::words::object::{AllowedRange, Member, Object, join};
+use crate::contact::case::words::object::{AllowedRange, Object, join};
 
 /// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across`, `along` and `by_temperature`. `layer` and
 /// `reduction` make the contact softer to tractions and may stand beside each of them.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema, Members)]
+#[members(faults_of_friction)]
 pub struct Friction {
     /// Friction coefficient: 0 (frictionless), or 1e-12 to 100.
     #[schema(minimum = 0.0, maximum = 100.0)]
+    #[member(closed(0.0, 100.0, ""))]
     pub coefficient: Option<f64>,
     /// How the coefficient falls with the speed of slip; every motion needs its `speed_mm_per_s`.
     pub law: Option<FallName>,
     /// The coefficient that is left at the highest speeds of slip, 0 to 100; with `law`.
     #[schema(minimum = 0.0, maximum = 100.0)]
+    #[member(closed(0.0, 100.0, ""))]
     pub limit: Option<f64>,
     /// What falls: one or two terms; with `law`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false, min_items = 1, max_items = 2)]
+    #[member(with = terms, default)]
     pub terms: Vec<FallTermWords>,
     /// A coefficient that varies across the contact.
     pub across: Option<AcrossWords>,
@@ -32,7 +36,8 @@ pub struct Friction {
     /// A layer between the bodies, such as wet leaves, sand or oxides.
     pub layer: Option<LayerWords>,
     /// Kalker's reduction factor, more than 0 and at most 1: the initial slope of the creep curves is this part of that of clean bodies.
-    #[schema(exclusive_minimum = 0.0, maximum = 1.0)]
+    #[schema(maximum = 1.0)]
+    #[member(positive(1.0, ""))]
     pub reduction: Option<f64>,
 }
 
@@ -66,43 +71,53 @@ pub struct FallTermWords {
 /// A coefficient across the contact: linear between points, constant outside; two points at the same place are a jump. Exactly one of
 /// `y_mm` and `angle_rad` says where the points are.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[members(faults_of_across)]
 #[schema(as = FrictionAcross)]
 pub struct AcrossWords {
     /// Places in mm, in order: y in the axes of the case; with `profiles` the y of the rail's profile.
     #[schema(min_items = 2, max_items = 1000)]
+    #[member(with = list, closed(-1e6, 1e6, "mm"))]
     pub y_mm: Option<Vec<f64>>,
     /// Inclinations of the rail's surface in rad, in order, positive as contact angles are; with `profiles` only.
     #[schema(min_items = 2, max_items = 1000)]
+    #[member(with = list, closed(-1.6, 1.6, "rad"))]
     pub angle_rad: Option<Vec<f64>>,
     /// The coefficient at each of them, 1e-12 to 100.
     #[schema(min_items = 2, max_items = 1000)]
+    #[member(with = list, closed(1e-12, 100.0, ""))]
     pub coefficient: Vec<f64>,
 }
 
 /// A coefficient along the track, on which it lies still while the contact rolls over it: linear between points, constant outside; two
 /// points at the same place are a jump.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[members(faults_of_along)]
 #[schema(as = FrictionAlong)]
 pub struct AlongWords {
     /// Places in mm, in order: x in the axes of the case when the history begins. After a rolled distance q the contact's x = 0 stands at q.
     #[schema(min_items = 2, max_items = 1000)]
+    #[member(with = list, closed(-1e6, 1e6, "mm"))]
     pub x_mm: Vec<f64>,
     /// The coefficient at each of them, 1e-12 to 100.
     #[schema(min_items = 2, max_items = 1000)]
+    #[member(with = list, closed(1e-12, 100.0, ""))]
     pub coefficient: Vec<f64>,
 }
 
 /// A coefficient by the temperature of both surfaces in the contact: linear between points, constant outside. Friction heats the contact,
 /// and every place has the coefficient of the temperature it reaches.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[members(faults_of_temperatures)]
 #[schema(as = FrictionByTemperature)]
 pub struct ByTemperatureWords {
     /// Temperatures in °C, rising.
     #[schema(min_items = 2, max_items = 1000)]
+    #[member(with = list, closed(-273.15, 1e5, "°C"))]
     pub temperature_c: Vec<f64>,
     /// The coefficient at each of them, 1e-12 to 100, never rising.
     #[schema(min_items = 2, max_items = 1000)]
+    #[member(with = list, closed(1e-12, 100.0, ""))]
     pub coefficient: Vec<f64>,
 }
 
@@ -159,173 +174,120 @@ impl Friction {
     }
 }
 
-const COEFFICIENT: AllowedRange = AllowedRange::closed(0.0, 100.0, "");
 /// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
 pub(crate) const COEFFICIENT_LEAST: f64 = 1e-12;
-const ACROSS: AllowedRange = AllowedRange::closed(COEFFICIENT_LEAST, 100.0, "");
-const PLACE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
-const ANGLE: AllowedRange = AllowedRange::closed(-1.6, 1.6, "rad");
-const REDUCTION: AllowedRange = AllowedRange::positive(1.0, "");
-const TEMPERATURE: AllowedRange = AllowedRange::closed(-273.15, 1e5, "°C");
 /// Points of a coefficient across, along or by temperature.
 const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// The ways to give a coefficient.
 const WAYS: [&str; 5] = ["coefficient", "law", "across", "along", "by_temperature"];
+/// What `terms` has to be.
+const TERMS: &str = "an array of one or two objects with coefficient and half_speed_mm_per_s";
 
-/// Reads the required member `friction` of a case.
-pub(crate) fn read(case: &mut Object) -> Option<Friction> {
-    let mut block = case.child("friction")?;
-    let names = [&WAYS[..], &["limit", "terms", "layer", "reduction"]].concat();
-    block.only(&names);
-    let mut friction = match block.given(&WAYS)[..] {
-        ["law"] => law(&mut block),
-        ["across"] => across(&mut block).map(|across| Friction {
-            across: Some(across),
-            ..Friction::default()
-        }),
-        ["along"] => along(&mut block).map(|along| Friction {
-            along: Some(along),
-            ..Friction::default()
-        }),
-        ["by_temperature"] => by_temperature(&mut block).map(|law| Friction {
-            by_temperature: Some(law),
-            ..Friction::default()
-        }),
-        [] | [_] => constant(&mut block),
+/// Exactly one way to give a coefficient, with what belongs to it.
+pub(crate) fn faults_of_friction(block: &mut Object, read: Option<&Friction>) -> Option<()> {
+    let coefficient = AllowedRange::closed(0.0, 100.0, "");
+    let falls = block.has("law");
+    let needed = match block.given(&WAYS)[..] {
+        [] => block
+            .required_number("coefficient", coefficient)
+            .map(|_| ()),
+        ["law"] if !block.has("limit") => block.required_number("limit", coefficient).map(|_| ()),
+        ["law"] => block.required("terms", TERMS).map(|_| ()),
+        [_] => Some(()),
         [first, second, ..] => {
             block.exclude(first, second);
             None
         }
     };
-    if !block.has("law") {
-        for name in ["limit", "terms"] {
-            if block.has(name) {
-                block.fault(name, "given without law, to which it belongs");
-                friction = None;
-            }
-        }
+    let foreign = block.given(&["limit", "terms"]);
+    let foreign = foreign.into_iter().filter(|_| !falls);
+    for name in foreign.clone() {
+        block.fault(name, "given without law, to which it belongs");
     }
-    let layer = block.optional("layer", LayerWords::read);
-    let reduction = block.optional_number("reduction", REDUCTION);
-    let yields = layer
-        .flatten()
-        .is_some_and(|layer| layer.yield_mpa.is_some());
-    if yields && block.has("law") {
+    needed.filter(|()| foreign.count() == 0)?;
+    let read = read?;
+    let largest = read.largest();
+    match read.coefficient {
+        Some(given) if given > 0.0 && given < COEFFICIENT_LEAST => {
+            let detail = format!("{given:e} given; 0 or at least {COEFFICIENT_LEAST:e} is needed");
+            block.fault("coefficient", detail);
+            return None;
+        }
+        None if falls && !(COEFFICIENT_LEAST..=100.0).contains(&largest) => {
+            block.fault_here(format!(
+                "limit and terms add up to {largest}; the coefficient at rest has to be a number from {COEFFICIENT_LEAST:e} to 100"
+            ));
+            return None;
+        }
+        _ => {}
+    }
+    if falls && read.layer.is_some_and(|layer| layer.yield_mpa.is_some()) {
         let detail = "given with a layer that yields; friction that falls with slip goes with a layer that does not";
         block.fault("law", detail);
-        return None;
-    }
-    Some(Friction {
-        layer: layer?,
-        reduction: reduction?,
-        ..friction?
-    })
-}
-
-fn constant(block: &mut Object) -> Option<Friction> {
-    let coefficient = block.required_number("coefficient", COEFFICIENT)?;
-    enough(block, "coefficient", coefficient)?;
-    Some(Friction {
-        coefficient: Some(coefficient),
-        ..Friction::default()
-    })
-}
-
-/// A coefficient is 0 or not too small.
-fn enough(block: &mut Object, name: &str, coefficient: f64) -> Option<()> {
-    if coefficient > 0.0 && coefficient < COEFFICIENT_LEAST {
-        let detail =
-            format!("{coefficient:e} given; 0 or at least {COEFFICIENT_LEAST:e} is needed");
-        block.fault(name, detail);
         return None;
     }
     Some(())
 }
 
-fn law(block: &mut Object) -> Option<Friction> {
-    let law = block.word("law", FallName::WORDS);
-    let limit = block.required_number("limit", COEFFICIENT);
-    let what = "an array of one or two objects with coefficient and half_speed_mm_per_s";
-    block.required("terms", what)?;
-    let elements = block.array("terms", 1..=2, what)?;
-    let pointer = block.pointer_to("terms");
-    let mut terms = Vec::new();
-    for (k, element) in elements.iter().enumerate() {
-        let term = Object::open(element, join(&pointer, k), block.faults());
-        terms.push(term.and_then(|mut term| FallTermWords::members(&mut term)));
-    }
-    let friction = Friction {
-        law: Some(law?),
-        limit: Some(limit?),
-        terms: terms.into_iter().collect::<Option<_>>()?,
-        ..Friction::default()
+/// What falls.
+pub(crate) fn terms(block: &mut Object, name: &str) -> Option<Vec<FallTermWords>> {
+    let elements = block.array(name, 1..=2, TERMS)?;
+    let pointer = block.pointer_to(name);
+    let one = |(k, element)| {
+        FallTermWords::members(&mut Object::open(
+            element,
+            join(&pointer, k),
+            block.faults(),
+        )?)
     };
-    let largest = friction.largest();
-    if !(COEFFICIENT_LEAST..=100.0).contains(&largest) {
-        block.fault_here(format!(
-            "limit and terms add up to {largest}; the coefficient at rest has to be a number from {COEFFICIENT_LEAST:e} to 100"
-        ));
-        return None;
-    }
-    Some(friction)
+    let read: Vec<Option<FallTermWords>> = elements.iter().enumerate().map(one).collect();
+    read.into_iter().collect()
 }
 
-fn across(block: &mut Object) -> Option<AcrossWords> {
-    let mut across = block.child("across")?;
-    across.only(&["y_mm", "angle_rad", "coefficient"]);
-    let angles = across.has("angle_rad");
-    if angles && across.has("y_mm") {
-        across.exclude("y_mm", "angle_rad");
-        return None;
-    }
-    let (name, allowed) = match angles {
-        true => ("angle_rad", ANGLE),
-        false => ("y_mm", PLACE),
+/// Places are given in one way, and in order.
+pub(crate) fn faults_of_across(block: &mut Object, read: Option<&AcrossWords>) -> Option<()> {
+    let name = match block.given(&["y_mm", "angle_rad"])[..] {
+        [] => {
+            block.required("y_mm", "an array of places in mm")?;
+            return None;
+        }
+        [name] => name,
+        [first, second, ..] => {
+            block.exclude(first, second);
+            return None;
+        }
     };
-    let (places, coefficient) = places(&mut across, name, allowed)?;
-    let places = Some(places);
-    let (y_mm, angle_rad) = if angles {
-        (None, places)
-    } else {
-        (places, None)
-    };
-    Some(AcrossWords {
-        y_mm,
-        angle_rad,
-        coefficient,
-    })
+    let read = read?;
+    let places = read.y_mm.as_ref().or(read.angle_rad.as_ref())?;
+    in_places(block, name, places, &read.coefficient)
 }
 
-fn along(block: &mut Object) -> Option<AlongWords> {
-    let mut along = block.child("along")?;
-    along.only(&["x_mm", "coefficient"]);
-    let (x_mm, coefficient) = places(&mut along, "x_mm", PLACE)?;
-    Some(AlongWords { x_mm, coefficient })
+/// Places are in order.
+pub(crate) fn faults_of_along(block: &mut Object, read: Option<&AlongWords>) -> Option<()> {
+    let read = read?;
+    in_places(block, "x_mm", &read.x_mm, &read.coefficient)
 }
 
 /// Places in order, and as many coefficients.
-fn places(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<(Vec<f64>, Vec<f64>)> {
-    let places = list(block, name, allowed);
-    let coefficient = list(block, "coefficient", ACROSS);
-    let (places, coefficient) = (places?, coefficient?);
+fn in_places(block: &mut Object, name: &str, places: &[f64], coefficient: &[f64]) -> Option<()> {
     as_many(block, name, places.len(), coefficient.len())?;
     let falls = |k: usize| places[k] < places[k - 1];
     let is_third = |k: usize| k > 1 && places[k] == places[k - 2];
-    if let Some(k) = (1..places.len()).find(|k| falls(*k) || is_third(*k)) {
-        let (given, before) = (places[k], places[k - 1]);
-        let detail = match falls(k) {
-            true => format!(
-                "{given} given after {before}; places must increase, or be equal twice where the coefficient jumps"
-            ),
-            false => format!(
-                "{given} given three times; two equal places are a jump of the coefficient, and no more may be equal"
-            ),
-        };
-        let pointer = join(&block.pointer_to(name), k);
-        block.faults().add(pointer, detail);
-        return None;
-    }
-    Some((places, coefficient))
+    let Some(k) = (1..places.len()).find(|k| falls(*k) || is_third(*k)) else {
+        return Some(());
+    };
+    let (given, before) = (places[k], places[k - 1]);
+    let detail = match falls(k) {
+        true => format!(
+            "{given} given after {before}; places must increase, or be equal twice where the coefficient jumps"
+        ),
+        false => format!(
+            "{given} given three times; two equal places are a jump of the coefficient, and no more may be equal"
+        ),
+    };
+    let pointer = join(&block.pointer_to(name), k);
+    block.faults().add(pointer, detail);
+    None
 }
 
 /// There is one coefficient for every place of a table.
@@ -340,41 +302,37 @@ fn as_many(block: &mut Object, name: &str, places: usize, coefficients: usize) -
     None
 }
 
-fn by_temperature(block: &mut Object) -> Option<ByTemperatureWords> {
-    let mut law = block.child("by_temperature")?;
-    law.only(&["temperature_c", "coefficient"]);
-    let temperature = list(&mut law, "temperature_c", TEMPERATURE);
-    let coefficient = list(&mut law, "coefficient", ACROSS);
-    let (temperature, coefficient) = (temperature?, coefficient?);
-    as_many(
-        &mut law,
-        "temperature_c",
-        temperature.len(),
-        coefficient.len(),
-    )?;
+/// Temperatures rise, and coefficients do not.
+pub(crate) fn faults_of_temperatures(
+    block: &mut Object,
+    read: Option<&ByTemperatureWords>,
+) -> Option<()> {
+    let ByTemperatureWords {
+        temperature_c: temperature,
+        coefficient,
+    } = read?;
+    as_many(block, "temperature_c", temperature.len(), coefficient.len())?;
     if let Some(k) = temperature.windows(2).position(|pair| pair[1] <= pair[0]) {
-        let pointer = join(&law.pointer_to("temperature_c"), k + 1);
+        let pointer = join(&block.pointer_to("temperature_c"), k + 1);
         let [before, given] = [temperature[k], temperature[k + 1]];
         let detail = format!("{given} given after {before}; the temperatures have to rise");
-        law.faults().add(pointer, detail);
+        block.faults().add(pointer, detail);
         return None;
     }
     if let Some(k) = coefficient.windows(2).position(|pair| pair[1] > pair[0]) {
-        let pointer = join(&law.pointer_to("coefficient"), k + 1);
+        let pointer = join(&block.pointer_to("coefficient"), k + 1);
         let [before, given] = [coefficient[k], coefficient[k + 1]];
         let detail = format!(
             "{given} given after {before}; a coefficient that rises with temperature is not covered, because heat and friction may then drive each other"
         );
-        law.faults().add(pointer, detail);
+        block.faults().add(pointer, detail);
         return None;
     }
-    Some(ByTemperatureWords {
-        temperature_c: temperature,
-        coefficient,
-    })
+    Some(())
 }
 
-fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
+/// The numbers of a table.
+pub(crate) fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
     let what = format!("an array of {} to {} numbers", POINTS.start(), POINTS.end());
     block.required(name, &what)?;
     let elements = block.array(name, POINTS, &what)?;

@@ -92,32 +92,39 @@ pub enum Motions {
 /// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
 /// normal n are v_x / V, v · t / V and the spin ω · n / V.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
 pub struct Wheelset {
     /// Speed V along x in mm/s, more than 0.
-    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e9, "mm/s"))]
     pub speed_mm_per_s: f64,
     /// Angular velocity Ω about the axle in rad/s, positive for rolling forward.
+    #[member(closed(-1e6, 1e6, "rad/s"))]
     pub angular_velocity_rad_per_s: Option<f64>,
     /// Radius in mm at which the wheel would roll freely: Ω is the speed divided by it.
-    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e9, "mm"))]
     pub free_rolling_radius_mm: Option<f64>,
     /// Torque about the axle that a drive or a brake exerts on the wheelset, in N mm, positive if it drives forward; for the contact
     /// `wheelset` only. The angular velocity is found at which the rails balance it: 0 is a wheelset that rolls freely.
+    #[member(closed(-1e15, 1e15, "N mm"))]
     pub drive_torque_n_mm: Option<f64>,
     /// Longitudinal force on the rail in N, over all patches of the wheel; for the contact `profiles` only. The angular velocity is found at which
     /// the rail carries it.
+    #[member(closed(-1e15, 1e15, "N"))]
     pub force_x_n: Option<f64>,
     /// Velocity of the centre to the left in mm/s; 0 when left out.
+    #[member(closed(-1e9, 1e9, "mm/s"))]
     pub lateral_velocity_mm_per_s: Option<f64>,
     /// Lateral force on the rail in N, over all patches of the wheel, in track axes and with the normal forces; for the contact `profiles` only.
     /// The lateral velocity is found at which the rail carries it.
+    #[member(closed(-1e15, 1e15, "N"))]
     pub force_y_n: Option<f64>,
     /// Rate of the yaw in rad/s; 0 when left out.
     #[schema(required = false)]
+    #[member(closed(-1e6, 1e6, "rad/s"), default)]
     pub yaw_rate_rad_per_s: f64,
     /// Rate of the roll in rad/s; 0 when left out.
     #[schema(required = false)]
+    #[member(closed(-1e6, 1e6, "rad/s"), default)]
     pub roll_rate_rad_per_s: f64,
 }
 
@@ -127,19 +134,19 @@ pub struct Wheelset {
 #[members(faults_of_components, faults_of_sweep)]
 pub struct Sweep {
     /// Longitudinal creepage.
-    #[member(with = creepages)]
+    #[member(with = swept, closed(-1e6, 1e6, ""))]
     pub creepage_x: Option<Swept>,
     /// Lateral creepage.
-    #[member(with = creepages)]
+    #[member(with = swept, closed(-1e6, 1e6, ""))]
     pub creepage_y: Option<Swept>,
     /// Spin in 1/mm.
-    #[member(with = spins)]
+    #[member(with = swept, closed(-1e6, 1e6, "1/mm"))]
     pub spin_per_mm: Option<Swept>,
     /// Longitudinal force on the lower body in N, in place of `creepage_x`.
-    #[member(with = forces)]
+    #[member(with = swept, closed(-1e15, 1e15, "N"))]
     pub force_x_n: Option<Swept>,
     /// Lateral force on the lower body in N, in place of `creepage_y`.
-    #[member(with = forces)]
+    #[member(with = swept, closed(-1e15, 1e15, "N"))]
     pub force_y_n: Option<Swept>,
     /// Rolling speed in mm/s, the same for all motions; only temperatures, Archard's wear and friction that falls with slip depend on it.
     #[member(positive(1e9, "mm/s"))]
@@ -201,29 +208,56 @@ impl Swept {
 /// Where a distance equals the one before, or is 0 at first, the bodies do not roll but are shifted: by `shift_x_mm`, `shift_y_mm` and
 /// `turn_rad`, or until the prescribed forces are reached. Two equal distances are thus also a jump of a creepage or force.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
+#[members(faults_of_history)]
 pub struct History {
     /// Distance rolled since the start in mm, never decreasing.
+    #[member(with = course, closed(0.0, 1e9, "mm"), what = "an array of distances in mm")]
     pub distance_mm: HistoryCourse,
     /// Longitudinal creepage.
+    #[member(with = course, closed(-1e6, 1e6, ""))]
     pub creepage_x: Option<HistoryCourse>,
     /// Lateral creepage.
+    #[member(with = course, closed(-1e6, 1e6, ""))]
     pub creepage_y: Option<HistoryCourse>,
     /// Spin in 1/mm.
+    #[member(with = course, closed(-1e6, 1e6, "1/mm"))]
     pub spin_per_mm: Option<HistoryCourse>,
     /// Longitudinal force on the lower body in N, in place of `creepage_x`; creepages and shifts that give it are found.
+    #[member(with = course, closed(-1e15, 1e15, "N"))]
     pub force_x_n: Option<HistoryCourse>,
     /// Lateral force on the lower body in N, in place of `creepage_y`.
+    #[member(with = course, closed(-1e15, 1e15, "N"))]
     pub force_y_n: Option<HistoryCourse>,
     /// Rolling speed in mm/s, which friction that falls with slip needs.
-    #[schema(exclusive_minimum = 0.0)]
+    #[member(positive(1e9, "mm/s"))]
     pub speed_mm_per_s: Option<f64>,
     /// Displacement of the upper body against the lower one along x in mm, from the point before; 0 where the bodies roll.
+    #[member(with = course, closed(-1e6, 1e6, "mm"))]
     pub shift_x_mm: Option<HistoryCourse>,
     /// The same along y.
+    #[member(with = course, closed(-1e6, 1e6, "mm"))]
     pub shift_y_mm: Option<HistoryCourse>,
     /// Turn of the upper body against the lower one about z in rad, from the point before; 0 where the bodies roll.
+    #[member(with = course, closed(-10.0, 10.0, "rad"))]
     pub turn_rad: Option<HistoryCourse>,
+}
+
+impl History {
+    /// The components by their names, the shifts last.
+    fn courses(&self) -> [(&'static str, Option<&HistoryCourse>); 8] {
+        [
+            ("creepage_x", &self.creepage_x),
+            ("creepage_y", &self.creepage_y),
+            ("spin_per_mm", &self.spin_per_mm),
+            ("force_x_n", &self.force_x_n),
+            ("force_y_n", &self.force_y_n),
+            ("shift_x_mm", &self.shift_x_mm),
+            ("shift_y_mm", &self.shift_y_mm),
+            ("turn_rad", &self.turn_rad),
+        ]
+        .map(|(name, course)| (name, course.as_ref()))
+    }
 }
 
 /// A number for all points of a history, or one value per point.
@@ -306,16 +340,8 @@ impl Range {
     }
 }
 
-const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
-const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
-const SPEED: AllowedRange = AllowedRange::positive(1e9, "mm/s");
-const VELOCITY: AllowedRange = AllowedRange::closed(-1e9, 1e9, "mm/s");
-const RATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "rad/s");
-const RADIUS: AllowedRange = AllowedRange::positive(1e9, "mm");
-const TORQUE: AllowedRange = AllowedRange::closed(-1e15, 1e15, "N mm");
 /// Most motions of a sweep, points of a history and coordinates of a grid, before the limit of the service.
 pub(crate) const POINTS_MAX: u32 = 1_000_000;
-const FORCE: AllowedRange = AllowedRange::closed(-1e15, 1e15, "N");
 /// The forces stand in the order of the creepages they replace.
 const COMPONENTS: [&str; 5] = [
     "creepage_x",
@@ -324,12 +350,8 @@ const COMPONENTS: [&str; 5] = [
     "force_x_n",
     "force_y_n",
 ];
-/// Rolling speed of a wheelset in mm/s, the only member that is no component of the motion.
-const SPEED_NAME: &str = "speed_mm_per_s";
 /// The lateral velocity of a wheelset, and the force that may stand in its place.
-const LATERAL_NAME: &str = "lateral_velocity_mm_per_s";
-/// See [`LATERAL_NAME`].
-const ACROSS_NAME: &str = "force_y_n";
+const ACROSS: [&str; 2] = ["lateral_velocity_mm_per_s", "force_y_n"];
 
 /// Reads the required member `motion` of a case.
 pub(crate) fn read(case: &mut Object) -> Option<Motions> {
@@ -424,52 +446,29 @@ fn wheelsets(motions: &[Value], pointer: &str, faults: &mut Faults) -> Option<Mo
 
 /// The motion of a wheelset; on both rails a torque can be balanced, on one a longitudinal and a lateral force.
 fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
-    const TORQUE_NAME: (&str, AllowedRange) = ("drive_torque_n_mm", TORQUE);
-    const FORCE_NAME: (&str, AllowedRange) = ("force_x_n", FORCE);
-    const RATES: [(&str, AllowedRange); 3] = [
-        (LATERAL_NAME, VELOCITY),
-        ("yaw_rate_rad_per_s", RATE),
-        ("roll_rate_rad_per_s", RATE),
-    ];
-    let spins = [
-        ("angular_velocity_rad_per_s", RATE),
-        ("free_rolling_radius_mm", RADIUS),
-        if on_both_rails {
-            TORQUE_NAME
-        } else {
-            FORCE_NAME
-        },
-    ];
-    let names = spins.iter().chain(&RATES).map(|(name, _)| *name);
-    let across = (!on_both_rails).then_some(ACROSS_NAME);
-    let names: Vec<&str> = [SPEED_NAME]
-        .into_iter()
-        .chain(names)
-        .chain(across)
-        .collect();
-    block.only(&names);
-    let speed_mm_per_s = block.required_number(SPEED_NAME, SPEED);
-    let mut spin = [None; 3];
-    for (k, (name, allowed)) in spins.iter().enumerate() {
-        spin[k] = block.number(name, *allowed);
+    let (balanced, refused) = match on_both_rails {
+        true => ("drive_torque_n_mm", &["force_x_n", "force_y_n"][..]),
+        false => ("force_x_n", &["drive_torque_n_mm"][..]),
+    };
+    let foreign = block.given(refused);
+    for name in &foreign {
+        block.fault(
+            name,
+            format!("given, but {balanced} is what such a contact can balance"),
+        );
     }
-    let rates = RATES.map(|(name, allowed)| block.number_or(name, allowed, 0.0));
-    let force_y_n = across_of_wheelset(block, on_both_rails);
-    turning_is_said_once(block, spins.map(|(name, _)| name))?;
-    let [angular_velocity_rad_per_s, free_rolling_radius_mm, balanced] = spin;
-    spin.into_iter().flatten().next()?;
-    let [lateral, yaw, roll] = rates;
-    let (lateral, force_y_n) = (lateral?, force_y_n?);
+    let read = Wheelset::members(block);
+    let spins = ["angular_velocity_rad_per_s", "free_rolling_radius_mm"];
+    turning_is_said_once(block, [spins[0], spins[1], balanced])?;
+    if let [velocity, force] = block.given(&ACROSS)[..] {
+        block.exclude(velocity, force);
+        return None;
+    }
+    let read = read.filter(|_| foreign.is_empty())?;
+    let still = read.force_y_n.is_none().then_some(0.0);
     Some(Wheelset {
-        speed_mm_per_s: speed_mm_per_s?,
-        angular_velocity_rad_per_s,
-        free_rolling_radius_mm,
-        drive_torque_n_mm: balanced.filter(|_| on_both_rails),
-        force_x_n: balanced.filter(|_| !on_both_rails),
-        lateral_velocity_mm_per_s: force_y_n.is_none().then_some(lateral),
-        force_y_n,
-        yaw_rate_rad_per_s: yaw?,
-        roll_rate_rad_per_s: roll?,
+        lateral_velocity_mm_per_s: read.lateral_velocity_mm_per_s.or(still),
+        ..read
     })
 }
 
@@ -479,9 +478,10 @@ fn turning_is_said_once(block: &mut Object, names: [&str; 3]) -> Option<()> {
         [_] => Some(()),
         [] => {
             let others = names[1..].join(" or ");
+            let rate = AllowedRange::closed(-1e6, 1e6, "rad/s");
             block.fault(
                 names[0],
-                format!("missing; {RATE} is needed, or {others} instead"),
+                format!("missing; {rate} is needed, or {others} instead"),
             );
             None
         }
@@ -490,19 +490,6 @@ fn turning_is_said_once(block: &mut Object, names: [&str; 3]) -> Option<()> {
             None
         }
     }
-}
-
-/// The lateral force in place of the lateral velocity, which may be left out; the outer `None` says that it is faulty.
-fn across_of_wheelset(block: &mut Object, on_both_rails: bool) -> Option<Option<f64>> {
-    if on_both_rails || !block.has(ACROSS_NAME) {
-        return Some(None);
-    }
-    let force = block.number(ACROSS_NAME, FORCE);
-    if block.has(LATERAL_NAME) {
-        block.exclude(LATERAL_NAME, ACROSS_NAME);
-        return None;
-    }
-    force.map(Some)
 }
 
 /// Components that are combined one by one have the same number of values.
@@ -555,21 +542,6 @@ pub(crate) fn faults_of_components<T>(block: &mut Object, _: Option<&T>) -> Opti
     sound.then_some(())
 }
 
-/// Creepages of a sweep.
-pub(crate) fn creepages(block: &mut Object, name: &str) -> Option<Swept> {
-    swept(block, name, CREEPAGE)
-}
-
-/// Spins of a sweep.
-pub(crate) fn spins(block: &mut Object, name: &str) -> Option<Swept> {
-    swept(block, name, SPIN)
-}
-
-/// Forces of a sweep.
-pub(crate) fn forces(block: &mut Object, name: &str) -> Option<Swept> {
-    swept(block, name, FORCE)
-}
-
 /// A number, `{"from": …, "to": …, "points": …}` or `{"values": […]}`.
 pub(crate) fn swept(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Swept> {
     let what = "a number, {\"from\": …, \"to\": …, \"points\": …} or {\"values\": […]}";
@@ -608,59 +580,38 @@ fn range(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Range>
     Some(Range { from, to, points })
 }
 
-const DISTANCE: AllowedRange = AllowedRange::closed(0.0, 1e9, "mm");
-const SHIFT: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
-const TURN: AllowedRange = AllowedRange::closed(-10.0, 10.0, "rad");
-/// Components along x, across and about z; each force excludes its creepage and its shift.
-const HISTORY_COMPONENTS: [(&str, AllowedRange); 8] = [
-    ("creepage_x", CREEPAGE),
-    ("creepage_y", CREEPAGE),
-    ("spin_per_mm", SPIN),
-    ("force_x_n", FORCE),
-    ("force_y_n", FORCE),
-    ("shift_x_mm", SHIFT),
-    ("shift_y_mm", SHIFT),
-    ("turn_rad", TURN),
-];
-/// Places of the shifts in [`HISTORY_COMPONENTS`].
-const SHIFTS: std::ops::Range<usize> = 5..8;
-const EXCLUSIVE: [(&str, [&str; 2]); 2] = [
-    ("force_x_n", ["creepage_x", "shift_x_mm"]),
-    ("force_y_n", ["creepage_y", "shift_y_mm"]),
-];
-
 /// Reads the block `{"history": …, "start": …}`.
 pub(crate) fn read_history(block: &mut Object) -> Option<Motions> {
     block.only(&["history", "start"]);
     let start = block.optional_word("start", HistoryStartName::WORDS);
-    let start = start.map(|start| start.unwrap_or(HistoryStartName::Rest));
-    let history = history(&mut block.child("history")?, start);
-    Some(Motions::History {
-        history: history?,
-        start: start?,
-    })
-}
-
-fn history(block: &mut Object, start: Option<HistoryStartName>) -> Option<History> {
-    let names = ["distance_mm", SPEED_NAME].into_iter();
-    let names: Vec<&str> = names
-        .chain(HISTORY_COMPONENTS.map(|(name, _)| name))
-        .collect();
-    block.only(&names);
-    block.required("distance_mm", "an array of distances in mm")?;
-    let distance_mm = course(block, "distance_mm", DISTANCE, None);
-    let distances = distance_mm.as_ref().map(|course| course.values(1));
-    let points = distances.as_ref().map(Vec::len);
-    let mut read = [const { None }; HISTORY_COMPONENTS.len()];
-    for (read, (name, allowed)) in read.iter_mut().zip(HISTORY_COMPONENTS) {
-        if block.has(name) {
-            *read = Some(course(block, name, allowed, points));
+    let mut block = block.child("history")?;
+    let history = History::members(&mut block)?;
+    let start = start?.unwrap_or_default();
+    let courses = history.courses();
+    if start != HistoryStartName::Pressed && courses.iter().all(|(_, course)| course.is_none()) {
+        let names = courses.map(|(name, _)| name).join(", ");
+        block.fault_here(format!(
+            "no motion given; at least one of {names} is needed"
+        ));
+        return None;
+    }
+    let distances = history.distance_mm.values(1);
+    let mut sound = true;
+    for (name, course) in &courses[5..] {
+        if let Some(course) = course {
+            sound &= shifted_at_rest(&mut block, name, course, &distances, start);
         }
     }
-    let mut sound = !read.contains(&Some(None));
-    let speed_mm_per_s = block.number(SPEED_NAME, SPEED);
-    sound &= speed_mm_per_s.is_some() || !block.has(SPEED_NAME);
-    for (force, others) in EXCLUSIVE {
+    sound.then_some(Motions::History { history, start })
+}
+
+/// A force stands in place of a creepage and a shift, every list has one value per distance, and the distance never decreases.
+pub(crate) fn faults_of_history(block: &mut Object, read: Option<&History>) -> Option<()> {
+    let mut sound = true;
+    for (force, others) in [
+        ("force_x_n", ["creepage_x", "shift_x_mm"]),
+        ("force_y_n", ["creepage_y", "shift_y_mm"]),
+    ] {
         for other in others {
             if block.has(force) && block.has(other) {
                 let detail =
@@ -670,43 +621,23 @@ fn history(block: &mut Object, start: Option<HistoryStartName>) -> Option<Histor
             }
         }
     }
-    let needs_motion = start.is_some_and(|start| start != HistoryStartName::Pressed);
-    if needs_motion && read.iter().all(Option::is_none) {
-        let names = HISTORY_COMPONENTS.map(|(name, _)| name).join(", ");
-        block.fault_here(format!(
-            "no motion given; at least one of {names} is needed"
-        ));
-        return None;
-    }
-    let distances = distances?;
-    sound &= increasing(block, &distances);
-    for k in SHIFTS {
-        if let Some(Some(course)) = &read[k] {
-            sound &= shifted_at_rest(block, HISTORY_COMPONENTS[k].0, course, &distances, start?);
+    let read = read?;
+    let distances = read.distance_mm.values(1);
+    let points = distances.len();
+    for (name, course) in read.courses() {
+        let count = match course {
+            None | Some(HistoryCourse::Constant(_)) => continue,
+            Some(course) => course.points(),
+        };
+        if count != points {
+            let detail = format!(
+                "{count} values given for {points} distances; as many as distances are needed, or one number"
+            );
+            block.fault(name, detail);
+            sound = false;
         }
     }
-    let [
-        creepage_x,
-        creepage_y,
-        spin_per_mm,
-        force_x_n,
-        force_y_n,
-        shift_x_mm,
-        shift_y_mm,
-        turn_rad,
-    ] = read.map(Option::flatten);
-    sound.then_some(History {
-        distance_mm: distance_mm?,
-        creepage_x,
-        creepage_y,
-        spin_per_mm,
-        force_x_n,
-        force_y_n,
-        speed_mm_per_s,
-        shift_x_mm,
-        shift_y_mm,
-        turn_rad,
-    })
+    (increasing(block, &distances) && sound).then_some(())
 }
 
 /// Does the distance never decrease?
@@ -753,36 +684,26 @@ fn shifted_at_rest(
 }
 
 /// A number, an array of one value per point, or `{"from": …, "to": …, "points": …}`.
-fn course(
+pub(crate) fn course(
     block: &mut Object,
     name: &str,
     allowed: AllowedRange,
-    points: Option<usize>,
 ) -> Option<HistoryCourse> {
-    let found = match block.value(name)? {
-        Value::Number(_) => return block.number(name, allowed).map(HistoryCourse::Constant),
-        Value::Array(elements) if (1..=POINTS_MAX as usize).contains(&elements.len()) => {
-            HistoryCourse::Values(block.numbers(name, elements, allowed)?)
-        }
+    match block.value(name)? {
+        Value::Number(_) => block.number(name, allowed).map(HistoryCourse::Constant),
+        Value::Array(elements) if (1..=POINTS_MAX as usize).contains(&elements.len()) => block
+            .numbers(name, elements, allowed)
+            .map(HistoryCourse::Values),
         Value::Object(_) => {
             let (from, to, points) = block.child(name)?.range(allowed, 2, POINTS_MAX)?;
-            HistoryCourse::Range(Range { from, to, points })
+            Some(HistoryCourse::Range(Range { from, to, points }))
         }
         _ => {
             let what = format!(
                 "a number, an array of 1 to {POINTS_MAX} numbers or {{\"from\": …, \"to\": …, \"points\": …}}"
             );
             block.mistaken(name, &what);
-            return None;
+            None
         }
-    };
-    let count = found.points();
-    if let Some(points) = points.filter(|points| *points != count) {
-        let detail = format!(
-            "{count} values given for {points} distances; as many as distances are needed, or one number"
-        );
-        block.fault(name, detail);
-        return None;
     }
-    Some(found)
 }

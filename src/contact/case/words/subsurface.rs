@@ -26,7 +26,7 @@ pub struct SubsurfaceWords {
     #[member(with = line_at)]
     pub along_depth_at_mm: Option<DepthLineAt>,
     /// Depths on that line in mm.
-    #[member(with = depths)]
+    #[member(with = list, closed(0.0, 1e6, "mm"))]
     pub depths_mm: Option<Vec<f64>>,
     /// A grid of points, usually in a plane.
     pub plane: Option<StressGrid>,
@@ -75,13 +75,13 @@ pub enum FoundPlace {
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 pub struct StressGrid {
     /// x in mm.
-    #[member(with = axis)]
+    #[member(with = coordinates, closed(-1e6, 1e6, "mm"))]
     pub x_mm: GridAxis,
     /// y in mm.
-    #[member(with = axis)]
+    #[member(with = coordinates, closed(-1e6, 1e6, "mm"))]
     pub y_mm: GridAxis,
     /// Depths in mm.
-    #[member(with = axis_of_depths)]
+    #[member(with = coordinates, closed(0.0, 1e6, "mm"))]
     pub depths_mm: GridAxis,
 }
 
@@ -440,12 +440,8 @@ pub(crate) fn line_at(block: &mut Object, name: &str) -> Option<DepthLineAt> {
     None
 }
 
-/// Depths of a line.
-pub(crate) fn depths(block: &mut Object, name: &str) -> Option<Vec<f64>> {
-    list(block, name, DEPTH)
-}
-
-fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
+/// Numbers in mm.
+pub(crate) fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
     let elements = block.array(name, 1..=usize::MAX, "an array of numbers in mm")?;
     let pointer = block.pointer_to(name);
     let faults = block.faults();
@@ -454,17 +450,12 @@ fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64
     read.into_iter().collect()
 }
 
-/// Coordinates of a grid.
-pub(crate) fn axis(block: &mut Object, name: &str) -> Option<GridAxis> {
-    coordinates(block, name, COORDINATE)
-}
-
-/// Depths of a grid.
-pub(crate) fn axis_of_depths(block: &mut Object, name: &str) -> Option<GridAxis> {
-    coordinates(block, name, DEPTH)
-}
-
-fn coordinates(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<GridAxis> {
+/// Coordinates of a grid along one axis.
+pub(crate) fn coordinates(
+    block: &mut Object,
+    name: &str,
+    allowed: AllowedRange,
+) -> Option<GridAxis> {
     let what = "a number, an array of numbers or {\"from\", \"to\", \"points\"}";
     match block.required(name, what)? {
         Value::Array(_) => list(block, name, allowed).map(GridAxis::List),
