@@ -1,5 +1,6 @@
 //! The errors of `contact`: a case with faults, and a solve without an answer.
 
+use railhead_macros::Named;
 use serde_json::{Number, Value};
 use thiserror::Error;
 
@@ -49,7 +50,7 @@ pub struct FaultFigures {
 }
 
 /// Kinds of faults.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Named)]
 pub enum FaultCode {
     /// Another kind, described by the sentence.
     #[default]
@@ -57,31 +58,20 @@ pub enum FaultCode {
     /// A member that is needed is not there.
     Missing,
     /// A member is not known here.
+    #[serde(rename = "unknown-member")]
     UnknownMember,
     /// A value of another type is needed.
+    #[serde(rename = "wrong-type")]
     WrongType,
     /// A number is too small or too large.
+    #[serde(rename = "out-of-range")]
     OutOfRange,
     /// A word is none of those allowed.
+    #[serde(rename = "unknown-word")]
     UnknownWord,
     /// A text is too long.
+    #[serde(rename = "too-long")]
     TooLong,
-}
-
-impl FaultCode {
-    /// The code that clients read.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            FaultCode::Invalid => "invalid",
-            FaultCode::Missing => "missing",
-            FaultCode::UnknownMember => "unknown-member",
-            FaultCode::WrongType => "wrong-type",
-            FaultCode::OutOfRange => "out-of-range",
-            FaultCode::UnknownWord => "unknown-word",
-            FaultCode::TooLong => "too-long",
-        }
-    }
 }
 
 /// Every fault of a case at once; never empty.

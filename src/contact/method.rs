@@ -1,7 +1,9 @@
 //! Which method solves a motion.
 
+use railhead_macros::Named;
+
 /// A method; each is a file or folder of this name in [`rolling::methods`](crate::contact::rolling::methods).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Method {
     /// Semismooth Newton iteration with strip-preconditioned GMRES.
     BoundaryElement,
@@ -30,17 +32,6 @@ impl Method {
         match self {
             Method::BoundaryElement | Method::LiuHsu | Method::Fastsim => true,
             Method::Table => false,
-        }
-    }
-
-    /// The word of the field, as in errors and answers.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Method::BoundaryElement => "boundary_element",
-            Method::LiuHsu => "liu_hsu",
-            Method::Fastsim => "fastsim",
-            Method::Table => "table",
         }
     }
 }

@@ -143,17 +143,6 @@ impl Output {
     }
 }
 
-impl MethodName {
-    /// The word itself.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            MethodName::Auto => "auto",
-            named => Method::from(named).name(),
-        }
-    }
-}
-
 impl From<MethodName> for Method {
     fn from(name: MethodName) -> Method {
         match name {

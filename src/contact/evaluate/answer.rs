@@ -5,9 +5,10 @@ use crate::contact::error::{CaseError, SolveError};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::Problem;
 use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
+use railhead_macros::Named;
 
 /// What became of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum RowStatus {
     /// The resultants meet the target, or there is none.
     Ok,
@@ -32,23 +33,6 @@ pub enum RowStatus {
 }
 
 impl RowStatus {
-    /// The word that clients read.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            RowStatus::Ok => "ok",
-            RowStatus::TargetMissed => "target_missed",
-            RowStatus::NeedsSolver => "needs_solver",
-            RowStatus::NotCovered => "not_covered",
-            RowStatus::Refused => "refused",
-            RowStatus::NotFinite => "not_finite",
-            RowStatus::NotConverged => "not_converged",
-            RowStatus::Unsolvable => "unsolvable",
-            RowStatus::OutOfTime => "out_of_time",
-            RowStatus::SolverFailed => "solver_failed",
-        }
-    }
-
     /// The row has resultants.
     #[must_use]
     pub fn has_answer(self) -> bool {
@@ -258,15 +242,17 @@ const NUMBERS_LEFT_OUT: [&str; 4] = [
 pub type RowNumbers = [f64; NUMBER_NAMES.len()];
 
 /// An unknown that is solved for where a row prescribes a force or a torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Found {
     /// Longitudinal creepage.
     CreepageX,
     /// Lateral creepage.
     CreepageY,
     /// Angular velocity of the wheelset in rad/s.
+    #[serde(rename = "angular_velocity_rad_per_s")]
     AngularVelocity,
     /// Velocity of the wheelset to the left in mm/s.
+    #[serde(rename = "lateral_velocity_mm_per_s")]
     LateralVelocity,
 }
 
@@ -286,15 +272,6 @@ impl Found {
         .into_iter()
         .filter_map(|(sought, found)| sought.then_some(found))
         .collect()
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Found::CreepageX => "creepage_x",
-            Found::CreepageY => "creepage_y",
-            Found::AngularVelocity => "angular_velocity_rad_per_s",
-            Found::LateralVelocity => "lateral_velocity_mm_per_s",
-        }
     }
 
     fn number(self, solution: &Solution) -> Option<f64> {

@@ -20,13 +20,14 @@
 //!
 //! A header and rows of numbers.
 
+use railhead_macros::Named;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use crate::contact::geometry::profile::LengthUnit;
 
 /// A file format that a client can name; each is read in the file of that name in this folder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Format {
     /// Two columns y and z, separated by blanks, commas, semicolons or tabs.
     Columns,
@@ -75,7 +76,7 @@ pub fn read(format: Format, text: &str) -> Result<ProfileFile, String> {
         Some(other) => {
             format!(
                 "{reason}; this looks like a file of the format {}",
-                other.word()
+                other.name()
             )
         }
         None => reason,
@@ -157,16 +158,6 @@ fn looks_like(text: &str) -> Option<Format> {
             _ => None,
         }
     })
-}
-
-impl Format {
-    fn word(self) -> &'static str {
-        match self {
-            Format::Columns => "columns",
-            Format::Simpack => "simpack",
-            Format::Miniprof => "miniprof",
-        }
-    }
 }
 
 #[derive(Debug, Clone, Default)]

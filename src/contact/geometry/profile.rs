@@ -5,6 +5,7 @@
 //!
 //! Units of length in which cross-sections are given.
 
+use railhead_macros::Named;
 use std::sync::Arc;
 
 use crate::contact::geometry::orientation::{
@@ -36,23 +37,12 @@ const FLANGE_BACK_TURN: f64 = -0.2;
 const ZIGZAG_SHARE_MAX: f64 = 0.05;
 
 /// Which body a profile belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Body {
     /// The lower body.
     Rail,
     /// The upper body.
     Wheel,
-}
-
-impl Body {
-    /// The word for it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Body::Rail => "rail",
-            Body::Wheel => "wheel",
-        }
-    }
 }
 
 /// How the points of a profile are to be read.

@@ -4,34 +4,24 @@
 //! leading edge: that is what selects the solution that vanishes there and keeps the problem well posed. Slip is in
 //! units of G⁻¹ × traction, lengths in the unit of the mesh.
 
+use railhead_macros::Named;
 use std::ops::Range;
 
 use crate::contact::mesh::{Mesh, Segment, observe};
 
 /// The rules offered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Rule {
     /// Mean slip between a node and the next (the leading edge for the last node). First order, monotone.
     Upwind,
     /// One-sided three-point derivative at the node; behind the leading edge the nodes are mirrored. Second order,
     /// smooth slips.
+    #[serde(rename = "mirror")]
     ThreePoint,
     /// The seed's eq. 6 with `x_U` at the leading edge and half weight for the own cell, differenced along the strip:
     /// slips of neighbouring cells average to the mean slip between their nodes. Second order, best forces, but its
     /// slips oscillate next to the stick zone.
     Trapezoid,
-}
-
-impl Rule {
-    /// A word for logs and answers.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Rule::Upwind => "upwind",
-            Rule::ThreePoint => "mirror",
-            Rule::Trapezoid => "trapezoid",
-        }
-    }
 }
 
 /// A rule made ready for the segments of a mesh, cell by cell: `t_i = Σ_k band_i[k] (d_{i+k} + W_{i+k})`, then, from the

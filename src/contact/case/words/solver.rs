@@ -7,7 +7,7 @@
 //!
 //! A case in the form of which its digest is taken.
 
-use railhead_macros::{Members, Words, none_is_absent};
+use railhead_macros::{Members, Named, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -52,7 +52,9 @@ pub struct Solver {
 }
 
 /// The methods a client can choose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words, Named,
+)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Method)]
 pub enum MethodName {

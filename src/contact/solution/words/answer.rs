@@ -11,7 +11,7 @@
 //!
 //! What a case was understood as before anything is solved: what is known of its patches, and where wheel and rail lie.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Named, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -488,24 +488,13 @@ pub struct PointFields {
 }
 
 /// What a cell of the contact patch does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Named)]
 #[serde(rename_all = "snake_case")]
 pub enum Zone {
     /// No relative slip.
     Stick,
     /// The friction bound is reached and the surfaces slip.
     Slip,
-}
-
-impl Zone {
-    /// The word for this zone in every text.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Zone::Stick => "stick",
-            Zone::Slip => "slip",
-        }
-    }
 }
 
 /// What is answered of a wheelset beside its patches.
