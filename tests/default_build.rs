@@ -1,4 +1,4 @@
-//! What is particular to the build without features: all other tests are run with all of them.
+//! What is particular to the build without features.
 #![cfg(not(any(feature = "cluster", feature = "otlp")))]
 
 use std::path::Path;
