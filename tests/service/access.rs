@@ -139,7 +139,7 @@ async fn what_belongs_to_others_is_answered_like_what_does_not_exist() {
             let seen = guarded.get(key, &list).await;
             assert_eq!(seen.json[kind], json!([]), "{kind}");
         }
-        // Nothing of what was tried has touched it.
+        // The refused requests have changed nothing.
         assert_eq!(guarded.get(north, &path).await.status, 200);
         if kind == "batches" {
             for query in ["state=succeeded", "label=line:A12", &format!("batch={id}")] {

@@ -215,7 +215,7 @@ async fn one_stream_tells_all_work_and_goes_on_where_it_was() {
             batch = work.json["id"].clone();
         }
     }
-    // Another stream from where the first one was: the batch, and nothing of long ago.
+    // A second stream that starts after the last event of the first has the events of the batch, and no earlier ones.
     let mut later = Reader::open(&server, "/v1/events", Some(&seen)).await;
     assert_eq!(later.next().await.expect("the first").name, "start");
     let told = |data: &Value| {

@@ -60,7 +60,7 @@ async fn faulty_case_is_answered_with_all_its_faults() {
     );
     let listed = server.read("/v1/jobs").await;
     assert_eq!(listed["jobs"], json!([]), "a faulty case makes no job");
-    // Nor does it take the key, under which the repaired one is sent.
+    // A refused case leaves its idempotency key free, so that the corrected case can be sent with it.
     keyed("spin.case.json").await.is(202);
 }
 

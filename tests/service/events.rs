@@ -72,7 +72,7 @@ impl Reader {
         }
     }
 
-    /// Reads until an event says this of what has the id.
+    /// Reads events until one about this id satisfies a condition, and returns it.
     pub async fn until(&mut self, id: &Value, is: impl Fn(&Value) -> bool) -> Event {
         loop {
             let event = self.next().await.expect("an event");

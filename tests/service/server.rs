@@ -50,7 +50,7 @@ impl Setup {
         }
     }
 
-    /// Without workers.
+    /// A server without workers, so that jobs stay queued.
     pub fn idle() -> Setup {
         Setup {
             working: false,
@@ -181,7 +181,7 @@ impl Server {
             .await
     }
 
-    /// Waits until work is in a state.
+    /// Waits until the job, batch or run at a path is in a state, and returns it.
     pub async fn until(&self, path: &str, state: &str) -> Value {
         loop {
             let work = self.read(path).await;

@@ -54,7 +54,7 @@ async fn one_key_makes_one_job_whoever_asks_at_the_same_moment(kind: StoreKind) 
         };
     }
     assert_eq!((created, ids.len()), (1, 1));
-    // Another case has the key of that one, or a key of its own.
+    // Another case with the same key is a conflict; a key that nobody has used is free.
     let conflict = Some(Enqueued::Conflict);
     assert_eq!(table.job_by_key("k", &[2; 32]).await, conflict);
     assert_eq!(table.job_by_key("other", &[7; 32]).await, None);

@@ -38,7 +38,7 @@ pub fn case(name: &str) -> Value {
     })
 }
 
-/// A small case with this normal force, which no other one equals.
+/// A small case with this normal force. Cases with different forces have different digests.
 pub fn loaded(newtons: usize) -> Value {
     let mut case = case("one of many");
     case["load"]["normal_force_n"] = json!(newtons);
@@ -105,7 +105,7 @@ impl Answer {
         self
     }
 
-    /// Where the work is that was accepted.
+    /// The address of the accepted work.
     pub fn location(&self) -> String {
         self.header("location").expect("a location").to_owned()
     }
@@ -121,7 +121,7 @@ impl Answer {
     }
 }
 
-/// A body as it was before it was packed.
+/// A body without its content encoding.
 pub fn unpacked(headers: &HeaderMap, bytes: &[u8]) -> Vec<u8> {
     let coding = headers.get("content-encoding");
     match coding.map(|coding| coding.to_str().expect("a coding")) {

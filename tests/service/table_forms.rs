@@ -19,7 +19,7 @@ pub const ARROW: &str = "application/vnd.apache.arrow.stream";
 pub const PARQUET: &str = "application/vnd.apache.parquet";
 pub const NPZ: &str = "application/x-npz";
 
-/// The id of a job whose case rows by the table are filled into.
+/// Submits the case that the rows of tables are filled into, and returns the id of its job.
 pub async fn kept_template(server: &Server) -> String {
     let mut case = template("table");
     case["load"]["normal_force_n"] = json!(1e5);

@@ -400,7 +400,7 @@ pub type Stress = [f64; 6];
 /// Loads that are taken side by side.
 pub const LANES: usize = 16;
 
-/// One number for each of them.
+/// One number per lane.
 pub type Lanes = [f32; LANES];
 
 /// Forces on the surface, [`LANES`] side by side. Those that are not needed are 0.

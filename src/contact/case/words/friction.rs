@@ -180,7 +180,7 @@ pub(crate) const COEFFICIENT_LEAST: f64 = 1e-12;
 const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// The ways to give a coefficient.
 const WAYS: [&str; 5] = ["coefficient", "law", "across", "along", "by_temperature"];
-/// What `terms` has to be.
+/// The words of a fault for what `terms` has to be.
 const TERMS: &str = "an array of one or two objects with coefficient and half_speed_mm_per_s";
 
 /// Exactly one way to give a coefficient, with what belongs to it.
@@ -229,7 +229,7 @@ pub(crate) fn faults_of_friction(block: &mut Object, read: Option<&Friction>) ->
     Some(())
 }
 
-/// What falls.
+/// Reads the terms of a coefficient that falls with slip velocity.
 pub(crate) fn terms(block: &mut Object, name: &str) -> Option<Vec<FallTermWords>> {
     let elements = block.array(name, 1..=2, TERMS)?;
     let pointer = block.pointer_to(name);

@@ -3,7 +3,7 @@
 //! A part is halved along its larger side, whatever the point: only how far the halving goes depends on the distance. So the parts of a region
 //! are a tree that is the same for all points, and each part is worked out once.
 //!
-//! How large parts of the loads look from a point: how many points of a quadrature each needs along and across.
+//! Chooses the quadrature of each part of the loads by its size and its distance from a point: how many points along and across.
 
 use std::ops::Range;
 

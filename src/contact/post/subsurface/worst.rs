@@ -113,11 +113,11 @@ pub fn worst_place(
     columns.place(best)
 }
 
-/// The highest place that steps along the axes lead to from a start, with its height and what else was found there; steps are halved where none
-/// leads higher. The evaluations end with the round in which they reach their number.
+/// Searches for the place with the largest height by steps along the axes, and returns it with its height and with what else `height` found there. Steps
+/// are halved where none leads higher. The search ends with the round in which its evaluations reach their limit.
 ///
 /// # Errors
-/// Those of `height`.
+/// Errors of `height`.
 pub(crate) fn climb<const N: usize, T: Copy, E>(
     start: [f64; N],
     mut steps: [f64; N],

@@ -336,7 +336,7 @@ impl<'a> LevelRun<'a> {
             .solve(&law, &mut tractions, self.workspace, self.monitor)?;
         let mut work = count(&report, of.newton);
         if !report.exit.converged() {
-            // The start may be what hinders the iteration.
+            // Try again without a start, which may be why the iteration did not converge.
             tractions.fill(0.0);
             report = of
                 .newton
