@@ -17,7 +17,7 @@ const STEP: f64 = 0.25;
 /// Digits of a coordinate in mm that are kept.
 const ROUNDED: f64 = 1e4;
 /// Length in mm of profile needed beyond a contact.
-pub(crate) const BEYOND: f64 = 5.0;
+const BEYOND: f64 = 5.0;
 
 impl CheckedCase {
     /// What can be said of the contact without solving it.

@@ -9,14 +9,13 @@
 //!
 //! Coefficients of friction by a place, across and along: linear between points, constant outside; two points at one place are a jump.
 
-use std::borrow::Borrow;
-use std::sync::Arc;
-
+use crate::contact::friction::coefficient_table::CoefficientTable;
 use crate::contact::friction::path_dependent::HeatedLaw;
 use crate::contact::friction::velocity_weakening::{FallingLaw, Softening};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::footprint::{Footprint, LoadAcross};
 use crate::contact::normal::hertz::Patch;
+use std::borrow::Borrow;
 
 /// How the coefficient of friction varies over the contact.
 #[derive(Debug, Clone, PartialEq)]
@@ -200,50 +199,6 @@ pub(crate) fn on_rail(
     });
     let (y, coefficient): (Vec<f64>, Vec<f64>) = found.unzip();
     FrictionLaw::Across(AcrossLaw::new(AcrossPlace::Y, &y, &coefficient))
-}
-
-/// Coefficients in the order of their places, at least one.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CoefficientTable {
-    points: Arc<[(f64, f64)]>,
-}
-
-impl CoefficientTable {
-    /// A table of as many places, in order, as coefficients, of which there is at least one.
-    #[must_use]
-    pub fn new(at: &[f64], coefficient: &[f64]) -> CoefficientTable {
-        let points = at.iter().copied().zip(coefficient.iter().copied());
-        CoefficientTable {
-            points: points.collect(),
-        }
-    }
-
-    /// Places with their coefficients.
-    #[must_use]
-    pub fn points(&self) -> &[(f64, f64)] {
-        &self.points
-    }
-
-    /// The coefficient at a place and its slope there; on a jump those of the side of larger places.
-    #[must_use]
-    pub fn at(&self, place: f64) -> (f64, f64) {
-        let table = &self.points;
-        let above = table.partition_point(|(at, _)| *at <= place);
-        match (above.checked_sub(1).map(|k| table[k]), table.get(above)) {
-            (Some((low, mu)), Some((high, next))) => {
-                let slope = (next - mu) / (high - low);
-                (mu + slope * (place - low), slope)
-            }
-            (Some((_, mu)), None) | (None, Some(&(_, mu))) => (mu, 0.0),
-            (None, None) => (0.0, 0.0),
-        }
-    }
-
-    /// The largest coefficient.
-    #[must_use]
-    pub fn largest(&self) -> f64 {
-        self.points.iter().fold(0.0, |most, (_, mu)| most.max(*mu))
-    }
 }
 
 /// What the places of a table are.

@@ -3,7 +3,7 @@
 //! Both only look ahead, to where the point has been: along a strip every bound follows from the slips of the cells ahead and of its own.
 //! The method solves with bounds that are given, finds the bounds that belong to the slips, and repeats until they agree.
 
-use crate::contact::friction::law::CoefficientTable;
+use crate::contact::friction::coefficient_table::CoefficientTable;
 use crate::contact::friction::velocity_weakening::{SLIP_OF_CELL, STABILITY_MAX};
 use crate::contact::mesh::Mesh;
 use crate::contact::numerics::roots::{self, CloseEnough, Course};

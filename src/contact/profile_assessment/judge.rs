@@ -2,7 +2,6 @@
 //!
 //! Defects of a profile, described so that whoever measured it can correct them.
 
-use crate::contact::case::understood::BEYOND;
 use crate::contact::geometry::holes::{LENGTH_MIN, WIDE, WIDTH_MIN};
 use crate::contact::geometry::profile::{Body, Profile};
 use crate::contact::geometry::profile_quality::{
@@ -14,6 +13,8 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::damage::{PatchQuality, ProfileQuality};
 
+/// Length in mm of profile needed beyond a contact; with less there is a remark.
+const BEYOND: f64 = 5.0;
 /// Share of the roughness of both bodies from which that of one body is reported.
 const BLAMED: f64 = 0.6;
 /// Ambiguity, relative to the pressure, below which the distance of points does not matter, as on a straight stretch.
