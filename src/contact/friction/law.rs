@@ -9,13 +9,14 @@
 //!
 //! Coefficients of friction by a place, across and along: linear between points, constant outside; two points at one place are a jump.
 
+use std::borrow::Borrow;
+
 use crate::contact::friction::coefficient_table::CoefficientTable;
 use crate::contact::friction::path_dependent::HeatedLaw;
 use crate::contact::friction::velocity_weakening::{FallingLaw, Softening};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::footprint::{Footprint, LoadAcross};
 use crate::contact::normal::hertz::Patch;
-use std::borrow::Borrow;
 
 /// How the coefficient of friction varies over the contact.
 #[derive(Debug, Clone, PartialEq)]
