@@ -1,4 +1,4 @@
-//! What is particular to the build without features.
+//! Tests of the program that is built without optional features.
 #![cfg(not(any(feature = "cluster", feature = "otlp")))]
 
 use std::path::Path;

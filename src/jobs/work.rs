@@ -552,7 +552,7 @@ impl Follower {
     }
 }
 
-/// Identifies a state of work in events: differs between any two states that clients can tell apart.
+/// The identity of a state of a job, batch or run in events. Two states that clients can tell apart have different identities.
 fn tag(work: &Work) -> String {
     match work {
         Work::Job(job) => format!("{} {:.2}", job.version, job.progress),

@@ -107,7 +107,7 @@ pub fn named(item: TokenStream) -> TokenStream {
     let words = item.variants.iter().map(word);
     quote! {
         impl #name {
-            /// The word for it in every text.
+            /// The word that stands for the value in requests, answers and messages.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self {

@@ -181,7 +181,7 @@ async fn a_bound_key_gives_its_label_to_what_it_makes() {
     assert_eq!(me.json["labels"], json!({ "line": "7" }));
 }
 
-/// The same case under the same key of idempotency: nothing of another line may be answered.
+/// A bound key that sends the case and the idempotency key of a job of another line is not answered with that job.
 #[tokio::test]
 async fn a_bound_key_is_not_answered_with_a_job_of_others() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;

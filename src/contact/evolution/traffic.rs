@@ -40,7 +40,7 @@ pub(crate) type SolveStates<'a> = dyn FnMut(&[&[f64]]) -> Result<Vec<Pass>, Solv
 /// A traffic of a few states.
 ///
 /// # Errors
-/// Those of `solve`.
+/// Errors of `solve`.
 pub(crate) fn condensed(
     task: &Evolution,
     solve: &mut SolveStates,

@@ -110,7 +110,7 @@ impl<const N: usize> Search<N> {
     /// Searches from `start` for the unknowns that are not given.
     ///
     /// # Errors
-    /// Those of `f`.
+    /// Errors of `f`.
     pub(crate) fn find<T, E>(
         &mut self,
         start: [f64; N],

@@ -14,10 +14,12 @@ use crate::contact::rolling::strip_mesh::StripMesh;
 /// Points of the rule with most of them.
 const POINTS_MAX: usize = RULES[ORDERS - 1].len();
 
-/// See [`halvings`]. With no halvings across, errors on ellipses with a pole of spin grow from 0.0015 of the largest pressure to 0.0055, where friction
-/// jumps from 0.4 to 0.1 across from 0.0009 to 0.0055, and on a gap of two radii from 0.001 to 0.004.
+/// How often cells are halved along and across under a smooth pressure, see [`halvings`]. With no halvings across, errors on ellipses with a pole of spin
+/// grow from 0.0015 of the largest pressure to 0.0055, where friction jumps from 0.4 to 0.1 across from 0.0009 to 0.0055, and on a gap of two radii from
+/// 0.001 to 0.004.
 const SMOOTH: [u32; 2] = [0, 4];
-/// The same of patches whose pressure is rough or that have hollows: without, errors where the pressure jumps grow from 0.007 to 0.02.
+/// How often they are halved in patches with a rough pressure or with hollows. Without it, errors where the pressure jumps grow from 0.007 of the largest
+/// pressure to 0.02.
 const ROUGH: [u32; 2] = [4, 4];
 /// See [`steepest`]: it is 0.30 at most on ellipses and gaps, where the last cells differ by their width alone, and 0.54 and more where the pressure jumps,
 /// at hollows, and where a gap opens so steeply that the pressure rises towards the edge.
