@@ -1,6 +1,7 @@
 //! The forms of answers as JSON.
 use std::collections::BTreeMap;
 
+use railhead_macros::none_is_absent;
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -115,14 +116,18 @@ fn job_links(job: &Job) -> BTreeMap<String, String> {
         Kind::Evolution => (format!("/v1/evolutions/{}", job.id), "request"),
         _ => (format!("/v1/jobs/{}", job.id), "case"),
     };
-    let mut links = BTreeMap::from([(asked.to_owned(), format!("{own}/{asked}"))]);
-    links.insert("events".to_owned(), format!("{own}/events"));
-    if job.state == JobState::Succeeded {
-        links.insert("result".to_owned(), format!("{own}/result"));
-    }
-    if !job.state.ended() {
-        links.insert("cancel".to_owned(), format!("{own}/cancel"));
-    }
+    let own_state = match job.state {
+        JobState::Succeeded => Some("result"),
+        state => (!state.ended()).then_some("cancel"),
+    };
+    links(own, [asked, "events"].into_iter().chain(own_state))
+}
+
+/// The path of something, and those of its parts.
+fn links<'a>(own: String, parts: impl IntoIterator<Item = &'a str>) -> BTreeMap<String, String> {
+    let below = parts.into_iter();
+    let below = below.map(|name| (name.to_owned(), format!("{own}/{name}")));
+    let mut links: BTreeMap<String, String> = below.collect();
     links.insert("self".to_owned(), own);
     links
 }
@@ -278,13 +283,9 @@ impl From<Batch> for BatchAnswer {
 
 fn batch_links(batch: &Batch) -> BTreeMap<String, String> {
     let own = format!("/v1/batches/{}", batch.id);
-    BTreeMap::from([
-        ("results".to_owned(), format!("{own}/results")),
-        ("cancel".to_owned(), format!("{own}/cancel")),
-        ("events".to_owned(), format!("{own}/events")),
-        ("jobs".to_owned(), format!("/v1/jobs?batch={}", batch.id)),
-        ("self".to_owned(), own),
-    ])
+    let mut links = links(own, ["results", "cancel", "events"]);
+    links.insert("jobs".to_owned(), format!("/v1/jobs?batch={}", batch.id));
+    links
 }
 
 /// Rows to solve: a case, and columns of values that stand in place of some of its members.
@@ -416,11 +417,8 @@ impl From<Run> for RunAnswer {
             unit: column.unit.clone(),
         };
         let own = format!("/v1/runs/{}", chunks.id);
-        let links = ["results", "manifest", "totals", "cancel", "events"];
-        let mut links: BTreeMap<String, String> = links
-            .map(|name| (name.to_owned(), format!("{own}/{name}")))
-            .into();
-        links.insert("self".to_owned(), own);
+        let parts = ["results", "manifest", "totals", "cancel", "events"];
+        let links = links(own, parts);
         RunAnswer {
             id: chunks.id.to_string(),
             state,
@@ -466,7 +464,7 @@ impl JobResult {
     /// # Errors
     /// It cannot be written as JSON.
     pub(crate) fn tail(id: Uuid, cached: bool, outputs: &[Output]) -> Result<String, ApiError> {
-        let outputs: Vec<&str> = outputs.iter().copied().map(name_of).collect();
+        let outputs: Vec<&str> = outputs.iter().copied().map(Output::name).collect();
         let links = serde_json::to_string(&JobResult::links(id, &outputs));
         let links = links.map_err(|error| ApiError::internal(&error))?;
         Ok(format!(",\"cached\":{cached},\"links\":{links}}}"))
@@ -479,31 +477,15 @@ impl JobResult {
         let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
         // Derivatives stand beside the resultants.
         let own_parts = outputs.iter().map(AsRef::as_ref);
-        for name in own_parts.filter(|name| *name != name_of(Output::Gradients)) {
+        for name in own_parts.filter(|name| *name != Output::Gradients.name()) {
             links.insert(name.to_owned(), format!("{own}/{name}"));
-            let small = [Output::Resultants, Output::Subsurface, Output::Damage].map(name_of);
+            let small = [Output::Resultants, Output::Subsurface, Output::Damage].map(Output::name);
             if !small.contains(&name) {
                 links.insert("fields".to_owned(), format!("{own}/fields"));
             }
         }
         links.insert("job".to_owned(), own);
         links
-    }
-}
-
-/// The word of an output, in `outputs` and as the last part of its path.
-#[must_use]
-pub(crate) fn name_of(output: Output) -> &'static str {
-    match output {
-        Output::Resultants => "resultants",
-        Output::Zones => "zones",
-        Output::Tractions => "tractions",
-        Output::Pressure => "pressure",
-        Output::Slip => "slip",
-        Output::Subsurface => "subsurface",
-        Output::Damage => "damage",
-        Output::Temperature => "temperature",
-        Output::Gradients => "gradients",
     }
 }
 
@@ -690,20 +672,20 @@ pub(crate) fn sums(solution: &Solution) -> Vec<Sum> {
 
 /// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run
 /// counter-clockwise, holes clockwise.
+#[none_is_absent(nullable)]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub(crate) struct Outlines {
     /// The border of the patch.
     pub patch: Vec<Vec<[f64; 2]>>,
     /// Around the cells that stick; only with zones.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stick: Option<Vec<Vec<[f64; 2]>>>,
     /// Around the cells that slip; only with zones.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub slip: Option<Vec<Vec<[f64; 2]>>>,
 }
 
 /// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have
 /// the same length; those of other fields are absent.
+#[none_is_absent(nullable)]
 #[derive(Serialize, ToSchema)]
 pub(crate) struct Cells {
     /// Centre of the cell along x in mm.
@@ -717,30 +699,24 @@ pub(crate) struct Cells {
     /// Number of the strip, counted from 0.
     pub strip: Vec<u32>,
     /// Stick or slip.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub zone: Option<Vec<Zone>>,
     /// Pressure in MPa.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub pressure_mpa: Option<Vec<f64>>,
     /// Traction on the lower body along x in MPa.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub traction_x_mpa: Option<Vec<f64>>,
     /// Traction on the lower body across in MPa.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub traction_y_mpa: Option<Vec<f64>>,
     /// Slip along x, divided by rolling speed.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub slip_x: Option<Vec<f64>>,
     /// Slip across, divided by rolling speed.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub slip_y: Option<Vec<f64>>,
     /// Temperature of both surfaces in °C.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<Vec<f64>>,
 }
 
 /// Values on a regular grid over the bounding box of the patch: `values[iy][ix]` at `(x_mm[ix], y_mm[iy])`, null
 /// outside the patch; those of other fields are absent.
+#[none_is_absent(nullable)]
 #[derive(Serialize, ToSchema)]
 pub(crate) struct GriddedField {
     /// Number of the patch, counted from 0.
@@ -754,25 +730,18 @@ pub(crate) struct GriddedField {
     /// Samples across in mm, ascending.
     pub y_mm: Vec<f64>,
     /// Stick or slip.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub zone: Option<Vec<Vec<Option<Zone>>>>,
     /// Pressure in MPa.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub pressure_mpa: Option<Vec<Vec<Option<f64>>>>,
     /// Traction on the lower body along x in MPa.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub traction_x_mpa: Option<Vec<Vec<Option<f64>>>>,
     /// Traction on the lower body across in MPa.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub traction_y_mpa: Option<Vec<Vec<Option<f64>>>>,
     /// Slip along x, divided by rolling speed.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub slip_x: Option<Vec<Vec<Option<f64>>>>,
     /// Slip across, divided by rolling speed.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub slip_y: Option<Vec<Vec<Option<f64>>>>,
     /// Temperature of both surfaces in °C.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<Vec<Vec<Option<f64>>>>,
 }
 

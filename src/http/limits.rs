@@ -1,16 +1,14 @@
 //! What requests may take at once: places, memory, and turns at long work.
 use std::collections::HashMap;
-use std::pin::Pin;
 use std::sync::{Arc, Mutex};
-use std::task::{Context, Poll};
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
-use axum::body::{Body, Bytes, HttpBody};
+use axum::body::Body;
 use axum::extract::Request;
 use axum::middleware::Next;
 use axum::response::Response;
-use hyper::body::{Frame, SizeHint};
+use http_body_util::BodyExt;
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
@@ -313,32 +311,15 @@ fn too_many(detail: &str) -> ApiError {
     ApiError::new(ProblemKind::TooManyRequests, detail)
 }
 
-/// A body and the resource that it holds.
-struct HoldingBody<T>(Body, T);
-
 /// The same answer; `held` is dropped when its body has been sent.
-pub(crate) fn hold_while_sent<T: Send + Unpin + 'static>(response: Response, held: T) -> Response {
-    response.map(|body| Body::new(HoldingBody(body, held)))
-}
-
-impl<T: Unpin> HttpBody for HoldingBody<T> {
-    type Data = Bytes;
-    type Error = axum::Error;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, axum::Error>>> {
-        Pin::new(&mut self.0).poll_frame(context)
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.0.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.0.size_hint()
-    }
+pub(crate) fn hold_while_sent<T: Send + 'static>(response: Response, held: T) -> Response {
+    response.map(|body| {
+        Body::new(body.map_err(move |error| {
+            // The closure lives as long as the body.
+            let _held = &held;
+            error
+        }))
+    })
 }
 
 /// Permits that a request holds until its answer has been sent; in its extensions.

@@ -143,6 +143,7 @@ impl ProblemKind {
 }
 
 /// A failure as the client reads it (RFC 9457).
+#[none_is_absent(nullable)]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = Problem)]
 pub(crate) struct ProblemBody {
@@ -158,23 +159,18 @@ pub(crate) struct ProblemBody {
     /// What happened this time: what was given and what is allowed.
     pub detail: String,
     /// Path of the resource that the request was for.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub instance: Option<String>,
     /// Every fault found, not only the first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false)]
     pub errors: Vec<Fault>,
     /// Line of malformed JSON, counted from 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<usize>,
     /// Column of malformed JSON, counted from 1; 0 at the start of a line.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<usize>,
     /// Best residual of a solve that did not converge, relative to the traction scale of the case.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub residual: Option<f64>,
     /// Iterations of a solve that did not converge.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<u32>,
 }
 
@@ -305,13 +301,13 @@ impl ProblemBody {
 }
 
 /// A kind of problem, explained.
-#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
+#[derive(Debug, Clone, Serialize, ToSchema)]
 #[schema(as = ProblemKind)]
 pub(crate) struct ProblemMeaning {
     /// The `type` that problems of this kind carry.
     #[serde(rename = "type")]
-    #[schema(value_type = String, example = "/problems/faulty-case")]
-    path: ProblemPath,
+    #[schema(example = "/problems/faulty-case")]
+    path: String,
     /// The kind in a few words.
     title: &'static str,
     /// HTTP status code.
@@ -320,20 +316,10 @@ pub(crate) struct ProblemMeaning {
     meaning: &'static str,
 }
 
-/// Written as `/problems/{slug}`.
-#[derive(Debug, Clone, Copy)]
-struct ProblemPath(&'static str);
-
-impl Serialize for ProblemPath {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(&format_args!("/problems/{}", self.0))
-    }
-}
-
 impl From<ProblemKind> for ProblemMeaning {
     fn from(kind: ProblemKind) -> Self {
         ProblemMeaning {
-            path: ProblemPath(kind.slug()),
+            path: format!("/problems/{}", kind.slug()),
             title: kind.title(),
             status: kind.status(),
             meaning: kind.meaning(),
@@ -551,10 +537,10 @@ impl From<JobsError> for ApiError {
     fn from(error: JobsError) -> Self {
         let kind = match error {
             JobsError::Case(faults) => return faults.into(),
-            JobsError::NoSuchPatch { .. } => {
+            JobsError::NoSuchPatch(_) => {
                 return ApiError::bad_parameter("patch", error.to_string());
             }
-            JobsError::NoSuchPoint { .. } => {
+            JobsError::NoSuchPoint(_) => {
                 return ApiError::bad_parameter("point", error.to_string());
             }
             JobsError::BadCursor => return ApiError::bad_parameter("cursor", error.to_string()),
@@ -568,11 +554,11 @@ impl From<JobsError> for ApiError {
             JobsError::NotSucceeded(_) => ProblemKind::JobFailed,
             JobsError::NotEnded(kind) => ProblemKind::not_ended(kind),
             JobsError::IdempotencyConflict => ProblemKind::IdempotencyConflict,
-            JobsError::QueueFull { .. } | JobsError::StagingFull { .. } => ProblemKind::QueueFull,
-            JobsError::QuotaExceeded { .. } | JobsError::StagingQuotaExceeded { .. } => {
+            JobsError::QueueFull(_) | JobsError::StagingFull(_) => ProblemKind::QueueFull,
+            JobsError::QuotaExceeded(_) | JobsError::StagingQuotaExceeded(_) => {
                 ProblemKind::QuotaExceeded
             }
-            JobsError::StoredQuotaExceeded { .. } => ProblemKind::StoredQuotaExceeded,
+            JobsError::StoredQuotaExceeded(_) => ProblemKind::StoredQuotaExceeded,
             JobsError::ProfilesFull(_) => ProblemKind::ProfilesFull,
             JobsError::TooManyRows(_) => ProblemKind::BodyTooLarge,
             JobsError::BoundKey { .. } => ProblemKind::Forbidden,

@@ -73,31 +73,19 @@ impl Blobs {
         Blobs { objects, root }
     }
 
-    /// Stores a result and returns its key; durable once it returns.
+    /// Stores a result and returns its key; durable once it returns. For a slice of a sweep, `{lease token}-{number of the slice}` stands in
+    /// place of the lease token.
     ///
     /// # Errors
     /// The result could not be written.
-    pub async fn put(&self, claim: &Claim, result: EncodedResult) -> Result<String, JobsError> {
-        let folder = job_folder(claim.id).join(claim.lease_token.to_string());
-        self.put_into(folder, result).await
-    }
-
-    /// As [`Blobs::put`], of one slice of a sweep: `{lease token}-{number of the slice}` stands in place of the lease
-    /// token.
-    ///
-    /// # Errors
-    /// The result could not be written.
-    pub async fn put_slice(
+    pub async fn put(
         &self,
         claim: &Claim,
-        number: u32,
+        slice: Option<u32>,
         result: EncodedResult,
     ) -> Result<String, JobsError> {
-        let folder = job_folder(claim.id).join(format!("{}-{number}", claim.lease_token));
-        self.put_into(folder, result).await
-    }
-
-    async fn put_into(&self, folder: Path, result: EncodedResult) -> Result<String, JobsError> {
+        let slice = slice.map_or_else(String::new, |number| format!("-{number}"));
+        let folder = job_folder(claim.id).join(format!("{}{slice}", claim.lease_token));
         let name = if result.is_rows() { ROWS } else { FIELDS };
         if let Some(fields) = result.fields {
             self.objects
@@ -227,7 +215,7 @@ impl Blobs {
         let body = body as u64;
         let points = header.points(patch);
         if point.is_some_and(|point| point >= points) {
-            return Err(JobsError::NoSuchPoint { points });
+            return Err(JobsError::NoSuchPoint(points));
         }
         let ranges: Vec<_> = header
             .ranges(patch, point)
@@ -437,8 +425,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let results = Blobs::open(folder.path()).unwrap();
         let id = Uuid::now_v7();
-        let first = results.put(&claim(id, 1), encoded("1")).await.unwrap();
-        let second = results.put(&claim(id, 2), encoded("2")).await.unwrap();
+        let first = results
+            .put(&claim(id, 1), None, encoded("1"))
+            .await
+            .unwrap();
+        let second = results
+            .put(&claim(id, 2), None, encoded("2"))
+            .await
+            .unwrap();
         assert_ne!(first, second);
         // What a process killed in the middle of a write leaves behind.
         std::fs::write(folder.path().join(&first).join("fields.bin#1"), b"half").unwrap();
@@ -460,7 +454,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let results = Blobs::open(folder.path()).unwrap();
         let claim = claim(Uuid::now_v7(), 1);
-        let key = results.put(&claim, encoded("1")).await.unwrap();
+        let key = results.put(&claim, None, encoded("1")).await.unwrap();
         let key = folder.path().join(key);
         for name in [SOLUTION, FIELDS] {
             let about = std::fs::metadata(key.join(name)).unwrap();

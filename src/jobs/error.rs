@@ -77,41 +77,26 @@ pub enum JobsError {
     #[error(transparent)]
     Case(#[from] CaseError),
     /// The queue is full; nothing was stored.
-    #[error("{queue_max} jobs are waiting, which is the limit; nothing was stored")]
-    QueueFull {
-        /// Bound of queued jobs.
-        queue_max: u64,
-    },
+    #[error("{0} jobs are waiting, which is the limit; nothing was stored")]
+    QueueFull(u64),
     /// The tenant has as many queued jobs as it may; nothing was stored.
-    #[error("{queue_max} jobs of this tenant are waiting, which is its limit; nothing was stored")]
-    QuotaExceeded {
-        /// Bound of queued jobs of one tenant.
-        queue_max: u64,
-    },
+    #[error("{0} jobs of this tenant are waiting, which is its limit; nothing was stored")]
+    QuotaExceeded(u64),
     /// What the tenant has stored would take more bytes than it may; nothing was stored.
     #[error(
-        "the cases, templates and results of this tenant would take more than the {bytes_max} bytes that it may store; delete ended jobs, batches or runs"
+        "the cases, templates and results of this tenant would take more than the {0} bytes that it may store; delete ended jobs, batches or runs"
     )]
-    StoredQuotaExceeded {
-        /// Bound of stored bytes of one tenant.
-        bytes_max: u64,
-    },
+    StoredQuotaExceeded(u64),
     /// The batches of the tenant that are being received are as large as they may be together.
     #[error(
-        "batches of this tenant that are being received stand for {bytes_max} bytes, which is the limit; try again later, or send fewer cases at once"
+        "batches of this tenant that are being received stand for {0} bytes, which is the limit; try again later, or send fewer cases at once"
     )]
-    StagingQuotaExceeded {
-        /// Bound of staged bytes of one tenant.
-        bytes_max: u64,
-    },
+    StagingQuotaExceeded(u64),
     /// The batches that are being received are as large as they may be together.
     #[error(
-        "the batches that are being received stand for {bytes_max} bytes, which is the limit of the service; try again later"
+        "the batches that are being received stand for {0} bytes, which is the limit of the service; try again later"
     )]
-    StagingFull {
-        /// Bound of all staged bytes.
-        bytes_max: u64,
-    },
+    StagingFull(u64),
     /// The name cannot be that of a tenant.
     #[error("a tenant is named by 1 to 64 letters, digits, dots, dashes and underscores")]
     BadTenant,
@@ -152,18 +137,12 @@ pub enum JobsError {
     /// The job ended without a result; the job says why.
     #[error("{}", without_result(.0))]
     NotSucceeded(Box<Job>),
-    /// The patch asked for is not among the stored fields.
-    #[error("`patch` is too large; allowed: 0 to {}", patches.saturating_sub(1))]
-    NoSuchPatch {
-        /// Patches with stored fields; 0 if the case asked for no field.
-        patches: usize,
-    },
-    /// The motion asked for is not among the stored fields.
-    #[error("`point` is too large; allowed: 0 to {}", points.saturating_sub(1))]
-    NoSuchPoint {
-        /// Motions of the case.
-        points: usize,
-    },
+    /// The patch asked for is not among those with stored fields, of which there are this many; 0 if the case asked for no field.
+    #[error("`patch` is too large; allowed: 0 to {}", .0.saturating_sub(1))]
+    NoSuchPatch(usize),
+    /// The motion asked for is not among those with stored fields, of which there are this many.
+    #[error("`point` is too large; allowed: 0 to {}", .0.saturating_sub(1))]
+    NoSuchPoint(usize),
     /// The cursor was not made by this service, or for another filter.
     #[error(
         "`cursor` is not one that this service gave out for the same filters; start again without it"

@@ -151,21 +151,12 @@ impl Jobs {
                 .spawn(move || runtime.block_on(runs))
                 .map_err(JobsError::Thread)?;
         }
-        self.shared
-            .tasks
-            .spawn(maintenance::reap_expired(self.shared.clone()));
-        self.shared
-            .tasks
-            .spawn(maintenance::sweep_orphans(self.shared.clone()));
-        self.shared
-            .tasks
-            .spawn(maintenance::recover(self.shared.clone()));
-        self.shared
-            .tasks
-            .spawn(maintenance::expire_jobs(self.shared.clone()));
-        self.shared
-            .tasks
-            .spawn(maintenance::watch_deadlines(self.shared.clone()));
+        let (tasks, shared) = (&self.shared.tasks, || self.shared.clone());
+        tasks.spawn(maintenance::reap_expired(shared()));
+        tasks.spawn(maintenance::sweep_orphans(shared()));
+        tasks.spawn(maintenance::recover(shared()));
+        tasks.spawn(maintenance::expire_jobs(shared()));
+        tasks.spawn(maintenance::watch_deadlines(shared()));
         nodes::start(&self.shared);
         Ok(())
     }

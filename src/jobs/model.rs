@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use railhead_macros::Names;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -11,34 +12,8 @@ use uuid::Uuid;
 use crate::contact::error::SolveError;
 use crate::contact::remark::entry::RemarkEntry;
 
-/// Gives an enum the list of its values and their names in the database, the API and the logs.
-macro_rules! names {
-    ($vis:vis $type:ident { $($value:ident = $name:literal),* $(,)? }) => {
-        impl $type {
-            /// Every value, in the order of their declaration.
-            $vis const ALL: [$type; [$($name),*].len()] = [$($type::$value),*];
-
-            /// The name in the database, the API and the logs.
-            #[must_use]
-            $vis fn name(self) -> &'static str {
-                match self {
-                    $($type::$value => $name,)*
-                }
-            }
-
-            /// The value of this name.
-            #[must_use]
-            $vis fn from_name(name: &str) -> Option<$type> {
-                $type::ALL.into_iter().find(|value| value.name() == name)
-            }
-        }
-    };
-}
-
-pub(crate) use names;
-
 /// A kind of work.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Names)]
 pub enum Kind {
     /// One case: a job.
     #[default]
@@ -49,15 +24,6 @@ pub enum Kind {
     Rows,
     /// Profiles that wear step by step: one job, whose slices are steps.
     Evolution,
-}
-
-names! {
-    pub Kind {
-        Case = "case",
-        Cases = "cases",
-        Rows = "rows",
-        Evolution = "evolution",
-    }
 }
 
 impl Kind {
@@ -152,7 +118,9 @@ pub(crate) fn is_tenant(name: &str) -> bool {
 }
 
 /// Which of its queued jobs a tenant wants solved first. Among tenants it means nothing: they take turns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, ToSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, ToSchema, Names,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Priority {
     /// Before all others.
@@ -162,14 +130,6 @@ pub enum Priority {
     Normal,
     /// When nothing else of the tenant is queued.
     Low,
-}
-
-names! {
-    pub Priority {
-        High = "high",
-        Normal = "normal",
-        Low = "low",
-    }
 }
 
 impl Priority {
@@ -312,7 +272,18 @@ pub struct QueuePlace {
 
 /// Where a job stands.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, ToSchema,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    ToSchema,
+    Names,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum State {
@@ -347,7 +318,7 @@ pub struct Failure {
 }
 
 /// The kinds of failure a client can meet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Names)]
 #[serde(rename_all = "snake_case")]
 pub enum FailureKind {
     /// The iteration ended without meeting its tolerance.
@@ -364,28 +335,6 @@ pub enum FailureKind {
     WorkerLost,
     /// The service could not do its part, for example store the result.
     Internal,
-}
-
-names! {
-    pub FailureKind {
-        NotConverged = "not_converged",
-        Unsolvable = "unsolvable",
-        OutOfTime = "out_of_time",
-        DeadlinePassed = "deadline_passed",
-        Panic = "panic",
-        WorkerLost = "worker_lost",
-        Internal = "internal",
-    }
-}
-
-names! {
-    pub State {
-        Queued = "queued",
-        Running = "running",
-        Succeeded = "succeeded",
-        Failed = "failed",
-        Cancelled = "cancelled",
-    }
 }
 
 impl State {

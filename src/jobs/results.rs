@@ -164,9 +164,7 @@ impl Jobs {
     ) -> Result<PatchFields, JobsError> {
         let (_, stored) = self.stored(id).await?;
         if patch >= stored.field_patches {
-            return Err(JobsError::NoSuchPatch {
-                patches: stored.field_patches,
-            });
+            return Err(JobsError::NoSuchPatch(stored.field_patches));
         }
         match &stored.result {
             StoredResult::Blob(key, _) => {

@@ -23,14 +23,10 @@ impl StagedBytes {
         let mut staged = lock(&self.0);
         let of_tenant = staged.get(tenant).copied().unwrap_or(0);
         if of_tenant + bytes > bounds.tenant {
-            return Err(JobsError::StagingQuotaExceeded {
-                bytes_max: bounds.tenant,
-            });
+            return Err(JobsError::StagingQuotaExceeded(bounds.tenant));
         }
         if staged.values().sum::<u64>() + bytes > bounds.all {
-            return Err(JobsError::StagingFull {
-                bytes_max: bounds.all,
-            });
+            return Err(JobsError::StagingFull(bounds.all));
         }
         staged.insert(tenant.into(), of_tenant + bytes);
         Ok(())
@@ -68,15 +64,9 @@ mod tests {
         let (a, b): (Arc<str>, Arc<str>) = ("a".into(), "b".into());
         staged.add(&a, 100, bounds).unwrap();
         let refused = staged.add(&a, 1, bounds);
-        assert!(matches!(
-            refused,
-            Err(JobsError::StagingQuotaExceeded { bytes_max: 100 })
-        ));
+        assert!(matches!(refused, Err(JobsError::StagingQuotaExceeded(100))));
         let refused = staged.add(&b, 51, bounds);
-        assert!(matches!(
-            refused,
-            Err(JobsError::StagingFull { bytes_max: 150 })
-        ));
+        assert!(matches!(refused, Err(JobsError::StagingFull(150))));
         staged.add(&b, 50, bounds).unwrap();
         staged.give_back(&a, 100);
         staged.add(&b, 50, bounds).unwrap();

@@ -226,15 +226,9 @@ impl Jobs {
     pub(crate) fn refused(&self, refusal: Refusal) -> JobsError {
         let bounds = self.queue_bounds();
         match refusal {
-            Refusal::Quota => JobsError::QuotaExceeded {
-                queue_max: bounds.tenant,
-            },
-            Refusal::Queue => JobsError::QueueFull {
-                queue_max: bounds.all,
-            },
-            Refusal::Stored => JobsError::StoredQuotaExceeded {
-                bytes_max: bounds.stored.unwrap_or(u64::MAX),
-            },
+            Refusal::Quota => JobsError::QuotaExceeded(bounds.tenant),
+            Refusal::Queue => JobsError::QueueFull(bounds.all),
+            Refusal::Stored => JobsError::StoredQuotaExceeded(bounds.stored.unwrap_or(u64::MAX)),
         }
     }
 

@@ -13,11 +13,13 @@ use syn::{
 /// contract as never `null`.
 ///
 /// It adds `#[serde(skip_serializing_if = "Option::is_none")]` and `#[schema(nullable = false)]` to each of them, so it stands above the
-/// derives. A member with a `#[schema(nullable …)]` of its own keeps that; a member with `#[or_null]` is `null` while it is `None`. A member
+/// derives. With the argument `nullable` the contract lets them be `null`. A member with a `#[schema(nullable …)]` of its own keeps that; a member with `#[or_null]` is `null` while it is `None`. A member
 /// with `#[member(positive(…))]` is more than 0 in the contract too.
 #[proc_macro_attribute]
-pub fn none_is_absent(_: TokenStream, item: TokenStream) -> TokenStream {
+pub fn none_is_absent(argument: TokenStream, item: TokenStream) -> TokenStream {
     let mut item = parse_macro_input!(item as Item);
+    let nullable = !argument.is_empty();
+    let declare = |field: &mut Field| declare(field, nullable);
     match &mut item {
         Item::Struct(item) => item.fields.iter_mut().for_each(declare),
         Item::Enum(item) => {
@@ -29,7 +31,7 @@ pub fn none_is_absent(_: TokenStream, item: TokenStream) -> TokenStream {
     item.into_token_stream().into()
 }
 
-fn declare(field: &mut Field) {
+fn declare(field: &mut Field, null_too: bool) {
     let positive =
         |item: &Expr| matches!(item, Expr::Call(call) if name_of(&call.func) == "positive");
     if items(&field.attrs, "member").iter().any(positive) {
@@ -45,10 +47,10 @@ fn declare(field: &mut Field) {
     }
     let omitted = parse_quote!(#[serde(skip_serializing_if = "Option::is_none")]);
     field.attrs.push(omitted);
-    let nullable = |it: &Attribute| {
+    let declared = |it: &Attribute| {
         it.path().is_ident("schema") && it.to_token_stream().to_string().contains("nullable")
     };
-    if !field.attrs.iter().any(nullable) {
+    if !null_too && !field.attrs.iter().any(declared) {
         field.attrs.push(parse_quote!(#[schema(nullable = false)]));
     }
 }
@@ -113,6 +115,30 @@ pub fn named(item: TokenStream) -> TokenStream {
                 match self {
                     #(#name::#variants => #words,)*
                 }
+            }
+        }
+    }
+    .into()
+}
+
+/// Gives an enum of unit variants `ALL`, `name` and `from_name`: its values and their words, as by [`Words`](macro@Words).
+#[proc_macro_derive(Names, attributes(serde))]
+pub fn names(item: TokenStream) -> TokenStream {
+    let named = Tokens::from(named(item.clone()));
+    let item = parse_macro_input!(item as ItemEnum);
+    let (vis, name, count) = (&item.vis, &item.ident, item.variants.len());
+    let variants = item.variants.iter().map(|it| &it.ident);
+    quote! {
+        #named
+
+        impl #name {
+            /// Every value, in the order of their declaration.
+            #vis const ALL: [#name; #count] = [#(#name::#variants),*];
+
+            /// The value of this name.
+            #[must_use]
+            #vis fn from_name(name: &str) -> Option<#name> {
+                #name::ALL.into_iter().find(|value| value.name() == name)
             }
         }
     }

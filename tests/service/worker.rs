@@ -60,11 +60,11 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
     );
     assert!(matches!(
         jobs.patch_fields(id, 1).await,
-        Err(JobsError::NoSuchPatch { patches: 1 })
+        Err(JobsError::NoSuchPatch(1))
     ));
     assert!(matches!(
         jobs.point_fields(id, 0, 1).await,
-        Err(JobsError::NoSuchPoint { points: 1 })
+        Err(JobsError::NoSuchPoint(1))
     ));
     let in_folder = !files_below(&folder.path().join("results")).is_empty();
     assert_eq!(in_folder, small_result_max_bytes == 0);

@@ -74,17 +74,9 @@ fn is_number(text: &str) -> bool {
 ///
 /// # Errors
 /// None that memory does not have.
-pub(crate) fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
+fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
     out.into_inner()
         .map_err(|error| csv::Error::from(error.into_error()))
-}
-
-/// The shortest text that reads back as the same number; empty for NaN.
-#[must_use]
-pub(crate) fn number(value: f64) -> String {
-    let mut text = String::new();
-    write_number(&mut text, value, Precision::Double, "");
-    text
 }
 
 /// The nearest number of 32 bits; NaN stays NaN.
@@ -125,6 +117,11 @@ mod tests {
 
     #[test]
     fn numbers_read_back_as_they_were() {
+        let text = |value| {
+            let mut text = String::new();
+            write_number(&mut text, value, Precision::Double, "");
+            text
+        };
         for value in [
             0.0,
             -0.0,
@@ -133,7 +130,7 @@ mod tests {
             123_456_789.123_456_78,
             f64::MAX,
         ] {
-            let text = number(value);
+            let text = text(value);
             assert!(text.len() < 26, "{text}");
             assert_eq!(
                 text.parse::<f64>().unwrap().to_bits(),
@@ -141,6 +138,6 @@ mod tests {
                 "{text}"
             );
         }
-        assert_eq!(number(f64::NAN), "");
+        assert_eq!(text(f64::NAN), "");
     }
 }

@@ -3,9 +3,10 @@
 use axum::body::Body;
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
+use railhead_macros::Named;
 
 /// A form in which something can be answered.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Format {
     /// `application/json`.
     Json,
@@ -30,23 +31,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// The name that `?format=` takes.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Format::Json => "json",
-            Format::Ndjson => "ndjson",
-            Format::Csv => "csv",
-            Format::Npz => "npz",
-            Format::Vtk => "vtk",
-            Format::Svg => "svg",
-            Format::Png => "png",
-            Format::Arrow => "arrow",
-            Format::Parquet => "parquet",
-            Format::Events => "events",
-        }
-    }
-
     /// The content type of the answer.
     #[must_use]
     pub fn media_type(self) -> &'static str {

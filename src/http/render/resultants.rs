@@ -2,42 +2,31 @@
 
 use crate::contact::solution::words::answer::HistoryPoint;
 use crate::http::dto::{Resultants, Sum};
-use crate::http::render::csv::{finish, number};
 use crate::http::render::forces::Forces;
+use crate::jobs::codec::table::{RowTable, TableColumn};
 
-/// Before and behind the columns of [`Forces`].
-const PLACE: [&str; 2] = ["patch", "point"];
-const REST: [&str; 3] = [
-    "friction_power_n",
-    "friction_power_without_spin_n",
-    "saturated",
-];
+type OfHistory = fn(&HistoryPoint) -> Option<f64>;
 
 /// Columns of a history, behind all others; other cases do not have them.
-const HISTORY: [&str; 9] = [
-    "distance_mm",
-    "dissipated_n_mm",
-    "shift_x_mm",
-    "shift_y_mm",
-    "turn_rad",
-    "creepage_x_error",
-    "creepage_y_error",
-    "shift_x_error_mm",
-    "shift_y_error_mm",
+const HISTORY: [(&str, OfHistory); 9] = [
+    ("distance_mm", |at| Some(at.distance_mm)),
+    ("dissipated_n_mm", |at| Some(at.dissipated_n_mm)),
+    ("shift_x_mm", |at| at.shift_x_mm),
+    ("shift_y_mm", |at| at.shift_y_mm),
+    ("turn_rad", |at| at.turn_rad),
+    ("creepage_x_error", |at| at.creepage_x_error),
+    ("creepage_y_error", |at| at.creepage_y_error),
+    ("shift_x_error_mm", |at| at.shift_x_error_mm),
+    ("shift_y_error_mm", |at| at.shift_y_error_mm),
 ];
 
+/// Name of a patch, number of a motion, and what there is of both.
+type Line = (String, usize, Sum, Forces);
+
 /// One line per patch and motion, then one per motion with the sums over all patches.
-///
-/// # Errors
-/// Never, as memory takes all that is written.
-pub(crate) fn csv(resultants: &Resultants, sums: &[Sum]) -> Result<Vec<u8>, csv::Error> {
-    let mut out = csv::Writer::from_writer(Vec::new());
-    let history: &[&str] = match sums.first().and_then(|sum| sum.history) {
-        Some(_) => &HISTORY,
-        None => &[],
-    };
-    let columns = PLACE.iter().chain(&Forces::COLUMNS).chain(&REST);
-    out.write_record(columns.chain(history))?;
+#[must_use]
+pub(crate) fn table(resultants: &Resultants, sums: &[Sum]) -> RowTable {
+    let mut lines: Vec<Line> = Vec::new();
     for patch in &resultants.patches {
         for point in &patch.points {
             let sum = Sum {
@@ -53,8 +42,7 @@ pub(crate) fn csv(resultants: &Resultants, sums: &[Sum]) -> Result<Vec<u8>, csv:
                 resultants: [point.force_x_n, point.force_y_n, point.moment_z_n_mm],
                 error: point.error_estimate,
             };
-            let number = patch.patch.to_string();
-            out.write_record(csv_line(&number, point.point, &sum, &forces))?;
+            lines.push((patch.patch.to_string(), point.point, sum, forces));
         }
     }
     // The numbers of the motions are those of any patch.
@@ -62,47 +50,47 @@ pub(crate) fn csv(resultants: &Resultants, sums: &[Sum]) -> Result<Vec<u8>, csv:
     for (point, total) in points.into_iter().flatten().zip(&resultants.total) {
         if let Some(sum) = sums.get(point.point) {
             let forces = Forces::of_total(Some(sum.motion), total);
-            out.write_record(csv_line("total", point.point, sum, &forces))?;
+            lines.push(("total".to_owned(), point.point, *sum, forces));
         }
     }
-    finish(out)
-}
-
-/// The values of the columns of a history.
-fn of_history(history: &HistoryPoint) -> [Option<f64>; 9] {
-    [
-        Some(history.distance_mm),
-        Some(history.dissipated_n_mm),
-        history.shift_x_mm,
-        history.shift_y_mm,
-        history.turn_rad,
-        history.creepage_x_error,
-        history.creepage_y_error,
-        history.shift_x_error_mm,
-        history.shift_y_error_mm,
-    ]
-}
-
-fn csv_line(
-    patch: &str,
-    point: usize,
-    sum: &Sum,
-    forces: &Forces,
-) -> impl IntoIterator<Item = String> {
-    let values = Forces::COLUMNS.map(|name| match name {
-        "normal_force_n" => number(sum.normal_force_n),
-        name => forces.number(name).map_or_else(String::new, number),
-    });
-    let rest = [
-        number(sum.friction_power_n),
-        number(sum.friction_power_without_spin_n),
-        sum.saturated.to_string(),
+    let text = |of: &dyn Fn(&Line) -> String| {
+        TableColumn::Texts(lines.iter().map(|line| Some(of(line))).collect())
+    };
+    let number = |of: &dyn Fn(&Line) -> Option<f64>| {
+        let values = lines.iter().map(|line| of(line).unwrap_or(f64::NAN));
+        TableColumn::Numbers(values.collect())
+    };
+    let points = lines.iter().map(|(_, point, ..)| *point as i64);
+    let mut columns = vec![
+        ("patch", text(&|(patch, ..)| patch.clone())),
+        ("point", TableColumn::Integers(points.collect())),
     ];
-    let place = [patch.to_owned(), point.to_string()];
-    let history = sum.history.as_ref().map(of_history);
-    let text = |value: Option<f64>| value.map_or_else(String::new, number);
-    let history = history.into_iter().flatten().map(text);
-    place.into_iter().chain(values).chain(rest).chain(history)
+    columns.extend(Forces::COLUMNS.map(|name| {
+        let values = number(&|(.., sum, forces)| match name {
+            "normal_force_n" => Some(sum.normal_force_n),
+            name => forces.number(name),
+        });
+        (name, values)
+    }));
+    let power = number(&|(.., sum, _)| Some(sum.friction_power_n));
+    let without_spin = number(&|(.., sum, _)| Some(sum.friction_power_without_spin_n));
+    columns.extend([
+        ("friction_power_n", power),
+        ("friction_power_without_spin_n", without_spin),
+        ("saturated", text(&|(.., sum, _)| sum.saturated.to_string())),
+    ]);
+    if sums.first().is_some_and(|sum| sum.history.is_some()) {
+        columns.extend(HISTORY.map(|(name, of)| {
+            let of_line = |(.., sum, _): &Line| of(sum.history.as_ref()?);
+            (name, number(&of_line))
+        }));
+    }
+    let columns = columns.into_iter();
+    RowTable {
+        columns: columns
+            .map(|(name, column)| (name.to_owned(), column))
+            .collect(),
+    }
 }
 
 #[cfg(test)]
@@ -167,10 +155,9 @@ mod tests {
                 saturated: false,
                 history: None,
             };
-            let table = csv(&resultants(patches, points), &vec![sum; points]).unwrap();
-            let lines = String::from_utf8(table).unwrap().lines().count();
+            let lines = table(&resultants(patches, points), &vec![sum; points]).row_count();
             let totals = if patches == 0 { 0 } else { points };
-            assert_eq!(lines, 1 + patches * points + totals);
+            assert_eq!(lines, patches * points + totals);
         }
     }
 }

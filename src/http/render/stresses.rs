@@ -1,7 +1,7 @@
-//! Stresses below the surface as CSV: one line per point.
+//! Stresses below the surface as a table: one line per point.
 
 use crate::contact::solution::words::evolution::StressPoint;
-use crate::http::render::csv::{Precision, head, lines, write_number};
+use crate::jobs::codec::table::{RowTable, TableColumn};
 
 type Column = (&'static str, fn(&StressPoint) -> f64);
 
@@ -25,12 +25,13 @@ const COLUMNS: [Column; 16] = [
 ];
 
 /// The table.
-///
-/// # Errors
-/// Never, as memory takes all that is written.
-pub(crate) fn csv(points: &[StressPoint]) -> Result<Vec<u8>, csv::Error> {
-    let lines = lines(COLUMNS.len(), 0..points.len(), |out, column, row| {
-        write_number(out, COLUMNS[column].1(&points[row]), Precision::Double, "");
-    });
-    Ok([head(COLUMNS.map(|(name, _)| name))?, lines?].concat())
+#[must_use]
+pub(crate) fn table(points: &[StressPoint]) -> RowTable {
+    let column = |(name, of): Column| {
+        let values = points.iter().map(of).collect();
+        (name.to_owned(), TableColumn::Numbers(values))
+    };
+    RowTable {
+        columns: COLUMNS.map(column).into(),
+    }
 }

@@ -9,11 +9,9 @@ use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::{PatchCells, PointFields};
-use crate::http::dto::{Cells, GriddedField, Outlines, name_of};
+use crate::http::dto::{Cells, GriddedField, Outlines};
 use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::query::{
-    Parameters, Reader, index, query, reader, require_index, whole, word,
-};
+use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole, word};
 use crate::http::limits::{Rendering, hold_while_sent};
 use crate::http::problem::ApiError;
 use crate::http::render::csv::Precision;
@@ -21,7 +19,9 @@ use crate::http::render::format::Format;
 use crate::http::render::pieces::{csv_body, json_body};
 use crate::http::render::table::{File, Table};
 use crate::http::render::{npz, vtk};
-use crate::http::routes::parts::{FieldProblems, PARTS, PartRequest, has, not_asked, stored};
+use crate::http::routes::parts::{
+    FieldProblems, PARTS, PartRequest, has, motion_of, not_asked, stored,
+};
 use crate::http::routes::plots::{PlotOptions, View, WIDTH_DEFAULT, picture};
 use crate::jobs::Jobs;
 
@@ -223,7 +223,7 @@ async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiEr
             Output::Zones => sizes_of_zones(&request.jobs, request.id, selection).await?,
             _ => String::new(),
         };
-        let name = name_of(output);
+        let name = output.name();
         write_parts(request, rendering, selection, vec![output], (members, name)).await
     };
     request.unless_known(selection.format, answer).await
@@ -357,10 +357,10 @@ query! {
 
 /// Names of parts with commas between.
 fn parts() -> Reader<Vec<Output>> {
-    let names = PARTS.map(|part| format!("`{}`", name_of(part)));
+    let names = PARTS.map(|part| format!("`{}`", part.name()));
     let allowed = format!("{} with commas between, each once", names.join(", "));
     reader(allowed, |text| {
-        let part = |name: &str| PARTS.into_iter().find(|part| name_of(*part) == name);
+        let part = |name: &str| PARTS.into_iter().find(|part| part.name() == name);
         let mut parts = Vec::new();
         for name in text.split(',') {
             let part = part(name)?;
@@ -444,10 +444,7 @@ pub(crate) struct ZoneCells {
 /// The areas and numbers of cells of the zones as members of JSON; `None` if the case did not ask for zones.
 async fn sizes_of_zones(jobs: &Jobs, id: Uuid, selection: Selection) -> Result<String, ApiError> {
     let solution = jobs.solution(id).await?;
-    require_index("patch", Some(selection.patch), solution.patches.len())?;
-    let points = &solution.patches[selection.patch].points;
-    require_index("point", Some(selection.point), points.len())?;
-    let point = &points[selection.point];
+    let (_, point) = motion_of(&solution, [selection.patch, selection.point])?;
     let sizes = || {
         Some([
             ("stick_area_mm2", json!(point.stick_area_mm2?)),

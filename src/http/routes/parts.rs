@@ -6,9 +6,11 @@ use axum::response::Response;
 use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::{PatchCells, PointFields};
-use crate::http::dto::name_of;
+use crate::contact::solution::words::answer::{
+    PatchCells, PatchSolution, PointFields, PointSolution, Solution,
+};
 use crate::http::extract::caller::{Caller, JobId};
+use crate::http::extract::query::require_index;
 use crate::http::layers::etag::{Precondition, tagged};
 use crate::http::limits::Rendering;
 use crate::http::problem::{ApiError, ProblemKind, problems};
@@ -101,9 +103,9 @@ pub(crate) async fn stored(
 ) -> Result<(PatchCells, PointFields), ApiError> {
     let mut fields = match jobs.point_fields(id, patch, point).await {
         // Nothing is stored per cell when the case asked for no field at all.
-        Err(JobsError::NoSuchPatch { patches: 0 }) => {
+        Err(JobsError::NoSuchPatch(0)) => {
             let Some(output) = wanted.first() else {
-                let names = PARTS.map(|part| format!("`{}`", name_of(part))).join(", ");
+                let names = PARTS.map(|part| format!("`{}`", part.name())).join(", ");
                 let detail = format!(
                     "the case asked for nothing per cell; submit it again with some of {names} among its `outputs`"
                 );
@@ -120,6 +122,20 @@ pub(crate) async fn stored(
         Some(missing) => not_asked(jobs, id, *missing).await,
         None => Ok((cells, values)),
     }
+}
+
+/// A patch of a solution and one of its motions.
+///
+/// # Errors
+/// `bad-query`: there is no such patch or motion.
+pub(crate) fn motion_of(
+    solution: &Solution,
+    [patch, point]: [usize; 2],
+) -> Result<(&PatchSolution, &PointSolution), ApiError> {
+    require_index("patch", Some(patch), solution.patches.len())?;
+    let patch = &solution.patches[patch];
+    require_index("point", Some(point), patch.points.len())?;
+    Ok((patch, &patch.points[point]))
 }
 
 /// Is the output among what was stored?
@@ -145,9 +161,9 @@ pub(crate) async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Resul
         .outputs(id)
         .await?
         .into_iter()
-        .map(|output| format!("`{}`", name_of(output)))
+        .map(|output| format!("`{}`", output.name()))
         .collect();
-    let name = name_of(output);
+    let name = output.name();
     Err(ApiError::new(
         ProblemKind::OutputNotAsked,
         format!(

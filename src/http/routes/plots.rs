@@ -1,6 +1,7 @@
 //! `/v1/jobs/{id}/plot.svg` and `plot.png`: pictures of a result.
 use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
+use railhead_macros::Names;
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -8,7 +9,7 @@ use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
-use crate::http::extract::query::{Parameters, count, index, query, reader, require_index, word};
+use crate::http::extract::query::{Parameters, count, index, query, reader, word};
 use crate::http::limits::hold_while_sent;
 use crate::http::problem::ApiError;
 use crate::http::render::format::Format;
@@ -19,13 +20,12 @@ use crate::http::render::picture::raster;
 use crate::http::render::picture::scene::Scene;
 use crate::http::render::picture::section::{self, Sections};
 use crate::http::render::table::File;
-use crate::http::routes::parts::{FieldProblems, PartRequest, stored};
+use crate::http::routes::parts::{FieldProblems, PartRequest, motion_of, stored};
 use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
-use crate::jobs::model::names;
 
 /// What a picture shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Names)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum View {
     /// One patch from above.
@@ -36,15 +36,6 @@ pub(crate) enum View {
     Section,
     /// The patches on wheel and rail; of `profiles`.
     Profiles,
-}
-
-names! {
-    pub(crate) View {
-        Patch = "patch",
-        Curve = "curve",
-        Section = "section",
-        Profiles = "profiles",
-    }
 }
 
 /// What a picture shows, and how wide it is.
@@ -145,10 +136,37 @@ pub(crate) async fn drawing(
     let (jobs, id) = (&request.jobs, request.id);
     let solution = jobs.solution(id).await?;
     match wish.view {
-        View::Curve => of_curve(title, &solution),
-        View::Profiles => of_profiles(jobs, id, title, solution).await,
-        View::Section | View::Patch => of_section(jobs, id, title, wish, &solution).await,
+        View::Curve => return of_curve(title, &solution),
+        View::Profiles => return of_profiles(jobs, id, title, solution).await,
+        View::Section | View::Patch => {}
     }
+    let place = [wish.patch, wish.point];
+    let (patch, point) = motion_of(&solution, place)?;
+    let (cells, values) = stored(jobs, id, place, &[wish.shown]).await?;
+    let counted = counted(wish, solution.patches.len(), patch.points.len());
+    let remarks = remarks(point, patch.normal_force_n, &counted);
+    if wish.view == View::Patch {
+        let scene = Scene {
+            title,
+            remarks,
+            shown: wish.shown,
+            range: wish.range,
+            fields: cells,
+            values,
+        };
+        return Ok(Box::new(move |width| Ok(draw(&scene, width))));
+    }
+    let asked = solution.asked.as_ref();
+    let sections = Sections {
+        title,
+        remarks,
+        cells,
+        values,
+        friction: asked
+            .filter(|asked| !asked.friction_varies)
+            .map(|asked| asked.friction_coefficient),
+    };
+    Ok(Box::new(move |width| Ok(section::draw(&sections, width))))
 }
 
 fn of_curve(title: String, solution: &Solution) -> Result<Drawing, ApiError> {
@@ -233,33 +251,6 @@ fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
     (name, points.iter().map(of).collect())
 }
 
-async fn of_section(
-    jobs: &Jobs,
-    id: Uuid,
-    title: String,
-    wish: PlotOptions,
-    solution: &Solution,
-) -> Result<Drawing, ApiError> {
-    let patches = solution.patches.len();
-    require_index("patch", Some(wish.patch), patches)?;
-    let patch = &solution.patches[wish.patch];
-    require_index("point", Some(wish.point), patch.points.len())?;
-    let (cells, values) = stored(jobs, id, [wish.patch, wish.point], &[Output::Tractions]).await?;
-    let counted = counted(wish, patches, patch.points.len());
-    let sections = Sections {
-        title,
-        remarks: remarks(&patch.points[wish.point], patch.normal_force_n, &counted),
-        cells,
-        values,
-        friction: solution
-            .asked
-            .as_ref()
-            .filter(|asked| !asked.friction_varies)
-            .map(|asked| asked.friction_coefficient),
-    };
-    Ok(Box::new(move |width| Ok(section::draw(&sections, width))))
-}
-
 async fn of_profiles(
     jobs: &Jobs,
     id: Uuid,
@@ -276,7 +267,7 @@ async fn of_profiles(
             ));
         };
         let cells = match jobs.point_fields(id, number, 0).await {
-            Err(JobsError::NoSuchPatch { .. }) => PatchCells::default(),
+            Err(JobsError::NoSuchPatch(_)) => PatchCells::default(),
             fields => fields?.meshes.pop().unwrap_or_default(),
         };
         patches.push(ProfileViewPatch { position, cells });
@@ -468,10 +459,7 @@ pub(crate) async fn picture(
     let (jobs, id) = (&request.jobs, request.id);
     let job = jobs.get(id).await?;
     let title = job.name.unwrap_or_else(|| format!("job {id}"));
-    let drawing = match wish.view {
-        View::Patch => of_patch(request, title, wish).await?,
-        _ => drawing(request, title, wish).await?,
-    };
+    let drawing = drawing(request, title, wish).await?;
     let draw = move || {
         let svg = drawing(wish.width)?;
         match format {
@@ -492,32 +480,6 @@ pub(crate) async fn picture(
         .headers_mut()
         .extend(format.disposition(&format!("plot-{id}")));
     Ok(hold_while_sent(response, share))
-}
-
-/// What draws one patch from above.
-async fn of_patch(
-    request: &PartRequest,
-    title: String,
-    wish: PlotOptions,
-) -> Result<Drawing, ApiError> {
-    let (jobs, id) = (&request.jobs, request.id);
-    let solution = jobs.solution(id).await?;
-    let patches = solution.patches.len();
-    require_index("patch", Some(wish.patch), patches)?;
-    let points = &solution.patches[wish.patch].points;
-    require_index("point", Some(wish.point), points.len())?;
-    let (fields, values) = stored(jobs, id, [wish.patch, wish.point], &[wish.shown]).await?;
-    let normal = solution.patches[wish.patch].normal_force_n;
-    let counted = counted(wish, patches, points.len());
-    let scene = Scene {
-        title,
-        remarks: remarks(&points[wish.point], normal, &counted),
-        shown: wish.shown,
-        range: wish.range,
-        fields,
-        values,
-    };
-    Ok(Box::new(move |width| Ok(draw(&scene, width))))
 }
 
 #[cfg(test)]

@@ -24,11 +24,13 @@ use crate::http::layers::etag::{Precondition, tagged};
 use crate::http::limits::{Memory, Permit, SMALL_BYTES, hold_while_sent};
 use crate::http::problem::{ApiError, problems};
 use crate::http::render::format::Format;
+use crate::http::render::row_tables::RowWriter;
 use crate::http::render::{resultants, stresses};
-use crate::http::routes::parts::{FieldProblems, PartRequest, not_asked, stored};
+use crate::http::routes::parts::{FieldProblems, PartRequest, motion_of, not_asked, stored};
 use crate::http::routes::wait::{Wait, WaitQuery};
 use crate::http::routes::work::await_end;
 use crate::jobs::Jobs;
+use crate::jobs::codec::table::RowTable;
 
 problems! {
     /// What every part of a result can fail with.
@@ -157,9 +159,7 @@ async fn write_resultants(
         let sums = sums(&solution);
         let resultants = Resultants::select(solution, point, patch);
         match format {
-            Format::Csv => {
-                resultants::csv(&resultants, &sums).map_err(|error| ApiError::internal(&error))
-            }
+            Format::Csv => csv(resultants::table(&resultants, &sums)),
             _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error)),
         }
     };
@@ -168,7 +168,10 @@ async fn write_resultants(
     Ok(hold_while_sent(response, share))
 }
 
-/// The forms that stresses come in.
+fn csv(table: RowTable) -> Result<Vec<u8>, ApiError> {
+    RowWriter::whole(Format::Csv, table).map_err(|error| ApiError::internal(&error))
+}
+
 /// What a point takes as text, in bytes.
 const POINT_BYTES: usize = 900;
 
@@ -238,10 +241,8 @@ async fn write_stresses(
     let output = Output::Subsurface;
     let (_, values) = stored(jobs, id, [patch, point], &[output]).await?;
     let solution = jobs.solution(id).await?;
-    require_index("patch", Some(patch), solution.patches.len())?;
-    let motions = &solution.patches[patch].points;
-    require_index("point", Some(point), motions.len())?;
-    let Some(summary) = motions[point].subsurface else {
+    let (_, motion) = motion_of(&solution, [patch, point])?;
+    let Some(summary) = motion.subsurface else {
         return not_asked(jobs, id, output).await;
     };
     let kept = values.subsurface.unwrap_or_default();
@@ -249,7 +250,7 @@ async fn write_stresses(
     let write = move || {
         let points = points(&kept);
         if format == Format::Csv {
-            return stresses::csv(&points).map_err(|error| ApiError::internal(&error));
+            return csv(stresses::table(&points));
         }
         let answer = SubsurfaceAnswer {
             patch,
@@ -317,10 +318,8 @@ async fn write_damage(
 ) -> Result<Response, ApiError> {
     let (jobs, id) = (&request.jobs, request.id);
     let solution = jobs.solution(id).await?;
-    require_index("patch", Some(patch), solution.patches.len())?;
-    let motions = &solution.patches[patch].points;
-    require_index("point", Some(point), motions.len())?;
-    let damage = motions[point].damage.as_deref();
+    let (_, motion) = motion_of(&solution, [patch, point])?;
+    let damage = motion.damage.as_deref();
     let (Some(damage), Some(parameters)) = (damage, &solution.damage_parameters) else {
         return not_asked(jobs, id, Output::Damage).await;
     };

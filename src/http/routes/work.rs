@@ -37,12 +37,16 @@ use crate::jobs::work::{Follower, Work};
 /// Every kind of work.
 pub(crate) const KINDS: [Kind; 4] = [Kind::Case, Kind::Cases, Kind::Evolution, Kind::Rows];
 
-/// Work as a client sees it.
-#[derive(Debug, Serialize)]
+/// What an event of `/v1/events` tells, one by the name of the event.
+#[derive(Debug, Serialize, ToSchema)]
+#[schema(as = TenantEvent)]
 #[serde(untagged)]
 pub(crate) enum WorkAnswer {
+    /// `job` and `evolution`: the job or evolution as its own address answers it.
     Job(Box<JobAnswer>),
+    /// `batch`: the batch as `/v1/batches/{id}` answers it.
     Batch(Box<BatchAnswer>),
+    /// `run`: the run as `/v1/runs/{id}` answers it.
     Run(Box<RunAnswer>),
 }
 
@@ -379,19 +383,6 @@ pub(crate) fn route(
     (schemas(), paths, handler)
 }
 
-/// What an event of `/v1/events` tells, one by the name of the event.
-#[derive(Debug, Serialize, ToSchema)]
-#[serde(untagged)]
-#[expect(dead_code, reason = "names the data of an event in the contract")]
-pub(crate) enum TenantEvent {
-    /// `job` and `evolution`: the job or evolution as its own address answers it.
-    Job(Box<JobAnswer>),
-    /// `batch`: the batch as `/v1/batches/{id}` answers it.
-    Batch(Box<BatchAnswer>),
-    /// `run`: the run as `/v1/runs/{id}` answers it.
-    Run(Box<RunAnswer>),
-}
-
 /// One event of the stream, in the contract.
 pub(crate) struct TenantEventSent;
 
@@ -406,8 +397,8 @@ impl PartialSchema for TenantEventSent {
 
 impl ToSchema for TenantEventSent {
     fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((TenantEvent::name().into_owned(), TenantEvent::schema()));
-        TenantEvent::schemas(schemas);
+        schemas.push((WorkAnswer::name().into_owned(), WorkAnswer::schema()));
+        WorkAnswer::schemas(schemas);
     }
 }
 

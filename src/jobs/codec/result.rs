@@ -63,7 +63,7 @@ impl EncodedResult {
             Header::read(file.get(PREFIX_BYTES..body).ok_or_else(cut)?).map_err(damaged)?;
         let points = header.points(patch);
         if point.is_some_and(|point| point >= points) {
-            return Err(JobsError::NoSuchPoint { points });
+            return Err(JobsError::NoSuchPoint(points));
         }
         let mut pieces = Vec::new();
         for range in header.ranges(patch, point) {

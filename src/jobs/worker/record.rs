@@ -98,41 +98,21 @@ pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Di
     }
 }
 
-/// What became of a slice that was to be stored.
-pub(crate) enum SliceOutcome {
-    /// It is stored.
-    Stored,
-    /// The lease is gone.
-    Lost,
-}
-
 impl Worker {
-    /// Stores a solved slice of a member, which goes on from there.
+    /// Stores a solved slice of a member, which goes on from there; `false` if the lease is lost.
     pub(crate) async fn keep_slice(
         &self,
         attempt: &mut Attempt,
         place: usize,
         mut sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
-    ) -> Result<SliceOutcome, JobsError> {
+    ) -> Result<bool, JobsError> {
         let shared = &self.shared;
         let member = &mut attempt.members[place];
         if let Some((note, part)) = part {
             let claim = &member.claim;
             let (number, done) = (note.number, sliced.done_after_next());
-            let result = match part.bytes() <= shared.options.small_result_max_bytes {
-                true => StoredResult::Inline(part),
-                false => {
-                    let bytes = part.bytes() as u64;
-                    let put = || shared.blobs.put_slice(claim, number, part.clone());
-                    StoredResult::Blob(
-                        shared
-                            .write_with_retries(StoragePlace::Results, put)
-                            .await?,
-                        bytes,
-                    )
-                }
-            };
+            let result = self.store_result(claim, Some(number), part).await?;
             let slice = NewSlice {
                 rest_us: u64::from(microseconds(sliced.seconds_left(done))),
                 note,
@@ -148,14 +128,14 @@ impl Worker {
                 if let StoredResult::Blob(key, _) = &slice.result {
                     self.abandon_blob(key).await;
                 }
-                return Ok(SliceOutcome::Lost);
+                return Ok(false);
             }
             tracing::debug!(job = %claim.id, number, done, "slice stored");
             sliced.advance(slice.note.spent);
             member.claim.slices = number + 1;
         }
         member.sliced = Some(sliced);
-        Ok(SliceOutcome::Stored)
+        Ok(true)
     }
 
     /// What is to be done next for a sweep.
@@ -319,8 +299,8 @@ impl Worker {
                 part,
                 stopped,
             } => match self.keep_slice(attempt, place, sliced, part).await {
-                Ok(SliceOutcome::Lost) => return pending.lost.push(claim.id),
-                Ok(SliceOutcome::Stored) => match stopped {
+                Ok(false) => return pending.lost.push(claim.id),
+                Ok(true) => match stopped {
                     Some(StopReason::TooLong) => return pending.long.push(claim),
                     Some(_) => return pending.back.push(claim),
                     None if self.makes_room(attempt).await => return pending.back.push(claim),
@@ -333,7 +313,7 @@ impl Worker {
                 remarks,
                 field_patches,
             } => self
-                .store_result(&claim, result)
+                .store_result(&claim, None, result)
                 .await
                 .map(|result| Ending::Succeeded {
                     remarks,
@@ -433,6 +413,7 @@ impl Worker {
     async fn store_result(
         &self,
         claim: &Claim,
+        slice: Option<u32>,
         result: EncodedResult,
     ) -> Result<StoredResult, JobsError> {
         let shared = &self.shared;
@@ -443,7 +424,7 @@ impl Worker {
         let bytes = result.bytes() as u64;
         let key = shared
             .write_with_retries(StoragePlace::Results, || {
-                shared.blobs.put(claim, result.clone())
+                shared.blobs.put(claim, slice, result.clone())
             })
             .await?;
         Ok(StoredResult::Blob(key, bytes))

@@ -112,7 +112,18 @@ pub struct MeshSizeWords {
 
 /// What a case may ask for. What is not asked for is not part of the answer.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema, Words,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    ToSchema,
+    Words,
+    Named,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Output {
