@@ -154,12 +154,13 @@ async fn rows_of_a_table_are_kept_without_their_template() {
 
 #[tokio::test]
 async fn staged_bytes_are_bounded_as_expanded() {
-    let mut setup = Setup::idle();
-    setup.options.staging = StagingBounds {
-        all: 1 << 20,
-        tenant: 100_000,
-    };
-    let server = setup.start().await;
+    let server = Server::idle_with(|setup| {
+        setup.options.staging = StagingBounds {
+            all: 1 << 20,
+            tenant: 100_000,
+        }
+    })
+    .await;
     let template = small("template");
     let id = server.keep(&template).await;
     let rows = 100_000 / template.to_string().len() + 1;

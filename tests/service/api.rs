@@ -168,17 +168,6 @@ async fn running_job_is_cancelled_on_request() {
 }
 
 #[tokio::test]
-async fn deleted_job_is_gone_with_its_result() {
-    let server = Server::start().await;
-    let path = path_of(&server.solve(&example("spin.case.json")).await);
-    assert_eq!(server.delete(&path).await.status, 204);
-    for part in ["", "/result", "/tractions", "/case"] {
-        server.get(&format!("{path}{part}")).await.is(404);
-    }
-    assert_eq!(server.delete(&path).await.status, 404);
-}
-
-#[tokio::test]
 async fn checking_a_case_tells_its_cost_and_makes_no_job() {
     let server = Server::idle().await;
     let check = async |file: &str| server.post("/v1/cases/check", &example(file)).await.json;

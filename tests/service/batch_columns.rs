@@ -2,9 +2,10 @@
 
 use serde_json::{Value, json};
 
+use crate::csv_table::Csv;
 use crate::errors::assert_problem;
 use crate::results::number;
-use crate::server::{Answer, Server, example, link};
+use crate::server::{Server, example, link};
 
 fn case(file: &str, name: &str, km: &str) -> Value {
     let mut case = example(&format!("{file}.case.json"));
@@ -14,20 +15,8 @@ fn case(file: &str, name: &str, km: &str) -> Value {
     case
 }
 
-/// Header and rows of a CSV.
-fn table(answer: &Answer) -> (Vec<String>, Vec<Vec<String>>) {
-    assert_eq!(answer.status, 200, "{}", answer.text);
-    let mut reader = csv::Reader::from_reader(answer.text.as_bytes());
-    let head = reader
-        .headers()
-        .expect("a header")
-        .iter()
-        .map(str::to_owned)
-        .collect();
-    let rows = reader
-        .records()
-        .map(|row| row.expect("a row").iter().map(str::to_owned).collect());
-    (head, rows.collect())
+async fn table(server: &Server, path: &str) -> Csv {
+    Csv::read(&server.get(path).await.is(200).text)
 }
 
 /// The path of the results of these cases, all ended, and their lines as NDJSON.
@@ -51,36 +40,23 @@ async fn columns_are_those_asked_for_and_say_what_the_result_says() {
     ];
     let (path, lines) = solved(&server, &cases).await;
     let columns = "label:km,name,area_mm2,pressure_max_mpa,stick_share,friction_limit_n,target_met,saturated,error";
-    let (head, rows) = table(
-        &server
-            .get(&format!("{path}?format=csv&columns={columns}"))
-            .await,
-    );
+    let Csv { head, rows } = table(&server, &format!("{path}?format=csv&columns={columns}")).await;
     assert_eq!(head.join(","), columns);
     assert_eq!(rows.len(), 3);
     assert_eq!((rows[0][0].as_str(), rows[0][1].as_str()), ("1", "'=a"));
     for (row, line) in rows.iter().zip(&lines).take(2) {
         let patches = line["result"]["patches"].as_array().expect("patches");
-        let sum = |name: &str| {
-            patches
-                .iter()
-                .map(|patch| number(&patch[name]))
-                .sum::<f64>()
+        let each = |pointer: &'static str| {
+            let of = move |patch: &Value| number(patch.pointer(pointer).expect("a member"));
+            patches.iter().map(of)
         };
+        let sum = |name| each(name).sum::<f64>();
         let read = |column: usize| row[column].parse::<f64>().expect("a number");
-        let largest = patches
-            .iter()
-            .map(|patch| number(&patch["pressure_max_mpa"]))
-            .fold(0.0, f64::max);
-        let stick: f64 = patches
-            .iter()
-            .map(|patch| number(&patch["points"][0]["stick_area_mm2"]))
-            .sum();
         let expected = [
-            sum("area_mm2"),
-            largest,
-            stick / sum("area_mm2"),
-            sum("friction_limit_n"),
+            sum("/area_mm2"),
+            each("/pressure_max_mpa").fold(0.0, f64::max),
+            sum("/points/0/stick_area_mm2") / sum("/area_mm2"),
+            sum("/friction_limit_n"),
         ];
         for (column, expected) in expected.into_iter().enumerate() {
             assert!(
@@ -105,11 +81,10 @@ async fn columns_are_those_asked_for_and_say_what_the_result_says() {
 async fn without_columns_there_are_the_usual_ones_and_unknown_ones_are_refused() {
     let server = Server::start().await;
     let (path, _) = solved(&server, &[case("spin", "a", "1")]).await;
-    let (head, rows) = table(&server.get(&format!("{path}?format=csv")).await);
+    let table = table(&server, &format!("{path}?format=csv")).await;
     for name in ["area_mm2", "pressure_max_mpa", "target_met"] {
-        assert!(head.iter().any(|column| column == name), "{name}");
+        assert_eq!(table.column(name).len(), 1);
     }
-    assert_eq!(rows.len(), 1);
     for (query, word) in [
         ("format=csv&columns=colour", "columns"),
         ("columns=index", "columns"),
@@ -126,11 +101,7 @@ async fn a_table_by_patch_has_the_forces_of_each_in_track_axes() {
     let server = Server::start().await;
     let (path, lines) = solved(&server, &[case("wheel-rail-flange", "curve", "1")]).await;
     let columns = "patch,normal_force_n,force_x_n,contact_angle_rad,rolling_radius_mm,force_track_y_n,force_track_z_n";
-    let (_, rows) = table(
-        &server
-            .get(&format!("{path}?format=csv&columns={columns}"))
-            .await,
-    );
+    let Csv { rows, .. } = table(&server, &format!("{path}?format=csv&columns={columns}")).await;
     let result = &lines[0]["result"];
     let patches = result["patches"].as_array().expect("patches");
     assert!(patches.len() > 1 && rows.len() == patches.len());

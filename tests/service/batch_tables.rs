@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use crate::batches::{results, send, small};
+use crate::csv_table::Csv;
 use crate::errors::assert_problem;
 use crate::server::{Server, link};
 
@@ -108,19 +109,24 @@ async fn faults_of_a_table_are_named_by_line() {
 }
 
 #[tokio::test]
-async fn names_that_look_like_formulas_are_texts_in_a_table() {
+async fn names_and_labels_that_look_like_formulas_are_texts_in_a_table() {
     let server = Server::start().await;
     let names = ["=1+1", "+1+1", "-1", "@SUM(1)", "plain=1"];
-    let cases: Vec<_> = names.iter().map(|name| small(name)).collect();
+    let mut cases = names.map(small);
+    cases[0]["labels"] = json!({ "km": "-5", "line": "=1+1" });
+    cases[1]["labels"] = json!({ "km": "-5,25" });
     let batch = server.post("/v1/batches", &json!(cases)).await.json;
     let path = link(&batch, "results");
     let table = server.get(&format!("{path}?wait=60&format=csv")).await.text;
-    let found: Vec<&str> = table
-        .lines()
-        .skip(1)
-        .filter_map(|line| line.split(',').nth(2))
-        .collect();
-    assert_eq!(found, ["'=1+1", "'+1+1", "-1", "'@SUM(1)", "plain=1"]);
+    let table = Csv::read(&table);
+    assert_eq!(table.head[2], "name");
+    assert_eq!(
+        table.column("name"),
+        ["'=1+1", "'+1+1", "-1", "'@SUM(1)", "plain=1"]
+    );
+    assert_eq!(table.column("label:km")[..2], ["-5", "-5,25"]);
+    let lines = ["'=1+1", "", "A12", "A12", "A12"];
+    assert_eq!(table.column("label:line"), lines);
 }
 
 #[tokio::test]

@@ -3,16 +3,16 @@
 use std::time::Duration;
 
 use railhead::contact::solve;
-use railhead::jobs::Options;
 use railhead::jobs::model::Kind;
-use railhead::jobs::store::QueueBounds;
+use railhead::jobs::store::NewBatch;
 use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
+use crate::lab::Lab;
 use crate::server::{Answer, Server, Setup, count, link};
-use crate::store::{new_batch, open_beside};
-use crate::support::{Service, case, endless_case, open, pause, tick_forever};
+use crate::store::{begin, new_batch, new_job, open_beside};
+use crate::support::{case, pause, tick_forever};
 
 pub fn lines(cases: &[Value]) -> String {
     let lines: Vec<String> = cases.iter().map(Value::to_string).collect();
@@ -24,6 +24,13 @@ pub fn small(name: &str) -> Value {
     let mut case = case(name);
     case["solver"] = json!({ "method": "boundary_element", "mesh": { "strips": 2, "cells": 2 } });
     case["outputs"] = json!(["resultants"]);
+    case
+}
+
+/// The same with this normal force.
+pub fn small_loaded(name: &str, newtons: usize) -> Value {
+    let mut case = small(name);
+    case["load"]["normal_force_n"] = json!(newtons);
     case
 }
 
@@ -230,11 +237,9 @@ async fn a_panic_in_a_group_fails_that_job_only() {
         solve(checked, monitor)
     });
     let server = setup.start().await;
-    let mut cases = ["a", "bad", "c"].map(small);
     // Of identical cases only the first would be solved.
-    for (number, case) in cases.iter_mut().enumerate() {
-        case["load"]["normal_force_n"] = json!(50_000 + number);
-    }
+    let cases = [("a", 50_000), ("bad", 50_001), ("c", 50_002)];
+    let cases = cases.map(|(name, load)| small_loaded(name, load));
     let batch = send(&server, "", "application/x-ndjson", lines(&cases)).await;
     let lines = results(&server, &batch.json, "?wait=60").await;
     let states: Vec<_> = lines.iter().map(|line| line["state"].as_str()).collect();
@@ -272,78 +277,33 @@ async fn a_running_group_stops_when_its_batch_is_cancelled() {
 }
 
 #[tokio::test]
-async fn a_batch_outlives_two_kills_and_every_case_is_answered_once() {
-    let (folder, service) = Service::fresh(&["--workers", "2"]);
-    let count = 600;
-    let cases: Vec<Value> = (0..count).map(|i| case(&format!("{i}"))).collect();
-    let batch = service
-        .post("/v1/batches", &json!(cases))
-        .await
-        .is(202)
-        .json;
-    let path = link(&batch, "self").to_owned();
-    let mut service = service;
-    for kill in 1..=2 {
-        while service.get(&path).await["states"]["succeeded"]
-            .as_u64()
-            .unwrap()
-            < kill * 100
-        {
-            pause().await;
-        }
-        service.kill();
-        service = Service::start(folder.path(), &["--workers", "2"]);
-    }
-    let results = format!("{path}/results?wait=120");
-    let lines = service.ask(&results).await.lines();
-    assert_eq!(lines.len(), count);
-    for (index, line) in lines.iter().enumerate() {
-        assert_eq!(
-            (&line["index"], &line["state"]),
-            (&json!(index), &json!("succeeded"))
-        );
-        assert_eq!(line["name"], index.to_string());
-    }
-}
-
-#[tokio::test]
 async fn an_incomplete_batch_is_gone_after_a_restart() {
-    use railhead::jobs::store::{BatchBegun, NewBatch};
-    let folder = tempfile::tempdir().unwrap();
-    let store = open_beside(folder.path()).await;
+    let mut lab = Lab::idle(|_| {}).await;
+    lab.jobs.shutdown(Duration::ZERO).await;
+    let store = open_beside(lab.folder.path()).await;
     let new = NewBatch {
         idempotency: Some(("k".to_owned(), [1; 32])),
         ..new_batch("anonymous", 2)
     };
-    let begun = store.begin_batch(&new, &|_| false, QueueBounds::NONE).await;
-    assert_eq!(begun.unwrap(), BatchBegun::Created);
-    let job = crate::store::new_job();
+    let job = new_job();
     let id = job.id;
-    store.fill_batch(new.id, &[(0, job)]).await.unwrap();
+    begin(&*store, &new, [job]).await;
     store.close().await;
-    let jobs = open(Options::new(folder.path()), solve).await;
-    assert!(jobs.get(id).await.is_err());
-    assert!(jobs.of_kind(Kind::Cases).work(new.id).await.is_err());
-    jobs.shutdown(Duration::ZERO).await;
+    lab.reopen(Duration::ZERO).await;
+    assert!(lab.jobs.get(id).await.is_err());
+    assert!(lab.jobs.of_kind(Kind::Cases).work(new.id).await.is_err());
 }
 
 #[tokio::test]
 async fn a_group_is_handed_back_when_the_service_stops() {
-    let folder = tempfile::tempdir().unwrap();
-    let jobs = open(Options::new(folder.path()), |_, monitor| {
-        Err(tick_forever(monitor))
-    })
-    .await;
-    jobs.start().unwrap();
+    let mut lab = Lab::start(|_| {}).await;
     let mut ids = Vec::new();
-    for case in [endless_case("long"), small("a"), small("b")] {
-        ids.push(jobs.submit(case, None).await.unwrap().id);
+    for case in [case("long"), small("long a"), small("long b")] {
+        ids.push(lab.submit(case).await);
     }
-    jobs.shutdown(Duration::from_millis(20)).await;
-    let jobs = open(Options::new(folder.path()), solve).await;
+    lab.reopen(Duration::from_millis(20)).await;
     for id in ids {
-        let job = jobs.get(id).await.unwrap();
+        let job = lab.get(id).await;
         assert_eq!((job.state.name(), job.attempt), ("queued", 0));
     }
-    jobs.shutdown(Duration::ZERO).await;
 }

@@ -106,19 +106,6 @@ async fn what_changes_the_answer_or_refuses_the_cache_is_solved() {
 }
 
 #[tokio::test]
-async fn a_failure_is_not_used_again() {
-    let server = Setup::new()
-        .solving(|_, _| Err(Stop::OutOfTime.into()))
-        .start()
-        .await;
-    for _ in 0..2 {
-        let job = server.solve(&case("fails")).await;
-        assert_eq!(job["state"], "failed");
-        assert_eq!(job["cached"], false);
-    }
-}
-
-#[tokio::test]
 async fn either_job_can_be_deleted_without_the_other() {
     for small_result_max_bytes in [32 << 10, 0] {
         for first_goes in [true, false] {
@@ -237,6 +224,11 @@ async fn identical_cases_that_fail_all_say_why() {
         );
     }
     assert_eq!((lines.len(), solves.load(Ordering::SeqCst)), (100, 100));
+    let later = server.solve(&case("hopeless")).await;
+    assert_eq!(
+        (&later["state"], &later["cached"]),
+        (&json!("failed"), &json!(false))
+    );
 }
 
 #[tokio::test]

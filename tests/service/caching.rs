@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::errors::assert_problem;
 use crate::results::path_of;
-use crate::server::{Answer, Server, Setup, example, example_text, unpacked};
+use crate::server::{Answer, Server, example, example_text, unpacked};
 use crate::support::{Service, case};
 
 #[tokio::test]
@@ -195,13 +195,14 @@ async fn packed_cases_and_batches_are_unpacked() {
 
 #[tokio::test]
 async fn limits_hold_before_and_after_unpacking() {
-    let mut setup = Setup::idle();
-    setup.http = HttpOptions {
-        body_max_bytes: 20_000,
-        batch_max_bytes: 60_000,
-        ..HttpOptions::default()
-    };
-    let server = setup.start().await;
+    let server = Server::idle_with(|setup| {
+        setup.http = HttpOptions {
+            body_max_bytes: 20_000,
+            batch_max_bytes: 60_000,
+            ..HttpOptions::default()
+        }
+    })
+    .await;
     let case = example_text("spin.case.json");
     let padded = " ".repeat(20_000 - case.len()) + &case;
     let json = "application/json";
@@ -224,9 +225,7 @@ async fn limits_hold_before_and_after_unpacking() {
         let answer = send_packed(&generous, "/v1/batches", lines, coding, bomb).await;
         assert_problem(&answer, 413, "body-too-large", "200 times its size");
     }
-    let mut setup = Setup::idle();
-    setup.http.body_max_bytes = 20_000;
-    let server = setup.start().await;
+    let server = Server::idle_with(|setup| setup.http.body_max_bytes = 20_000).await;
     // Empty blocks without end: nothing comes out, but more goes in than is allowed; the length is not declared.
     let head = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 0xff];
     let blocks = std::iter::repeat_n([0, 0, 0, 0xff, 0xff].repeat(100), 1000);

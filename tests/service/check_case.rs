@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use crate::results::{number, numbers};
-use crate::server::{Server, Setup, example};
+use crate::server::{Server, example};
 
 async fn understood(server: &Server, case: &Value) -> Value {
     let answer = server.post("/v1/cases/check", case).await.is(200);
@@ -126,9 +126,8 @@ async fn the_time_is_that_of_a_solve_where_one_ends_soon() {
         (1, &longer, "part_of_solve"),
         (0, &case, "formulas"),
     ] {
-        let mut setup = Setup::new();
-        setup.http.check_trial = Duration::from_millis(trial_ms);
-        let server = setup.start().await;
+        let server =
+            Server::with(|setup| setup.http.check_trial = Duration::from_millis(trial_ms)).await;
         let answer = server.post("/v1/cases/check", case).await.is(200);
         let estimate = &answer.json["estimate"];
         assert_eq!(estimate["found_by"], found_by, "{estimate}");
@@ -138,9 +137,7 @@ async fn the_time_is_that_of_a_solve_where_one_ends_soon() {
 
 #[tokio::test]
 async fn a_solve_that_fails_while_it_is_tried_is_told() {
-    let mut setup = Setup::new();
-    setup.http.check_trial = Duration::from_secs(3600);
-    let server = setup.start().await;
+    let server = Server::with(|setup| setup.http.check_trial = Duration::from_secs(3600)).await;
     let mut case = example("uic60-crown.case.json");
     // Overlaps so deeply that the contact reaches the ends of the samples.
     case["load"] = json!({ "normal_force_n": 1e9 });

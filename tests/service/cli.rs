@@ -6,6 +6,8 @@ use std::process::{Output, Stdio};
 
 use serde_json::{Value, json};
 
+use crate::results::number;
+use crate::server::count;
 use crate::support::{Service, case, endless_case, railhead};
 
 fn example(name: &str) -> PathBuf {
@@ -23,35 +25,36 @@ fn solve(text: &str) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    child
-        .stdin
-        .take()
-        .unwrap()
-        .write_all(text.as_bytes())
-        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(text.as_bytes()).unwrap();
+    drop(input);
     child.wait_with_output().unwrap()
 }
 
-fn complaints(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
+/// A run that ends with a code and complains with a word; its complaints.
+#[track_caller]
+fn fails(output: &Output, code: i32, word: &str) -> String {
+    let complaints = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{complaints}");
+    assert!(complaints.contains(word), "{complaints}");
+    complaints
+}
+
+/// What a run says as JSON.
+fn said(output: &Output) -> Value {
+    assert!(output.status.success(), "{output:?}");
+    serde_json::from_slice(&output.stdout).unwrap()
 }
 
 #[test]
 fn a_case_is_solved_without_a_server() {
     let file = example("hertz-steel.case.json");
     let output = railhead().arg("solve").arg(&file).output().unwrap();
-    assert!(output.status.success(), "{}", complaints(&output));
-    let from_file: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(from_file["total"][0]["force_x_n"].as_f64().unwrap().abs() > 1.0);
-    assert!(
-        from_file["patches"][0]["points"][0]["slip_area_mm2"]
-            .as_f64()
-            .unwrap()
-            > 0.0
-    );
+    let from_file = said(&output);
+    assert!(number(&from_file["total"][0]["force_x_n"]).abs() > 1.0);
+    assert!(number(&from_file["patches"][0]["points"][0]["slip_area_mm2"]) > 0.0);
 
-    let from_input = solve(&std::fs::read_to_string(file).unwrap());
-    let from_input: Value = serde_json::from_slice(&from_input.stdout).unwrap();
+    let from_input = said(&solve(&std::fs::read_to_string(file).unwrap()));
     assert_eq!(from_input["total"], from_file["total"]);
     assert_eq!(from_input["case_digest"], from_file["case_digest"]);
 }
@@ -60,31 +63,17 @@ fn a_case_is_solved_without_a_server() {
 fn values_per_cell_come_along_only_if_asked_for() {
     let mut asked = case("with fields");
     asked["outputs"] = json!(["zones", "tractions", "slip", "pressure"]);
-    let answer: Value = serde_json::from_slice(&solve(&asked.to_string()).stdout).unwrap();
-    let cells = answer["fields"][0]["meshes"][0]["x_mm"]
-        .as_array()
-        .unwrap()
-        .len();
+    let answer = said(&solve(&asked.to_string()));
+    let fields = &answer["fields"][0];
+    let cells = count(&fields["meshes"][0]["x_mm"]);
     assert!(cells > 0);
-    assert_eq!(
-        answer["fields"][0]["meshes"][0]["pressure_mpa"]
-            .as_array()
-            .unwrap()
-            .len(),
-        cells
-    );
-    for name in [
-        "zone",
-        "traction_x_mpa",
-        "traction_y_mpa",
-        "slip_x",
-        "slip_y",
-    ] {
-        let values = answer["fields"][0]["points"][0][name].as_array().unwrap();
-        assert_eq!(values.len(), cells, "{name}");
+    assert_eq!(count(&fields["meshes"][0]["pressure_mpa"]), cells);
+    let names = "zone traction_x_mpa traction_y_mpa slip_x slip_y";
+    for name in names.split(' ') {
+        assert_eq!(count(&fields["points"][0][name]), cells, "{name}");
     }
     asked["outputs"] = json!(["resultants"]);
-    let answer: Value = serde_json::from_slice(&solve(&asked.to_string()).stdout).unwrap();
+    let answer = said(&solve(&asked.to_string()));
     assert_eq!(answer.get("fields"), None);
 }
 
@@ -95,43 +84,24 @@ fn a_faulty_case_names_every_fault_and_exits_with_2() {
         .arg(example("faulty.case.json"))
         .output()
         .unwrap();
-    assert_eq!(output.status.code(), Some(2));
     assert_eq!(output.stdout, b"");
-    let faults = complaints(&output);
+    let faults = fails(&output, 2, "");
     assert!(faults.lines().count() > 1, "{faults}");
     assert!(
         faults.lines().all(|line| line.starts_with("railhead: /")),
         "{faults}"
     );
 
-    let broken = solve("{\"name\": ");
-    assert_eq!(broken.status.code(), Some(2));
-    assert!(
-        complaints(&broken).contains("line 1 column 9"),
-        "{}",
-        complaints(&broken)
-    );
+    fails(&solve("{\"name\": "), 2, "line 1 column 9");
 }
 
 #[test]
 fn a_case_without_answer_exits_with_1() {
     let mut hurried = case("hurried");
     hurried["solver"]["time_limit_s"] = json!(1e-9);
-    let output = solve(&hurried.to_string());
-    assert_eq!(output.status.code(), Some(1));
-    assert!(
-        complaints(&output).contains("out of time"),
-        "{}",
-        complaints(&output)
-    );
-
-    let output = railhead().args(["solve", "no/such.json"]).output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
-    assert!(
-        complaints(&output).contains("no/such.json"),
-        "{}",
-        complaints(&output)
-    );
+    fails(&solve(&hurried.to_string()), 1, "out of time");
+    let output = railhead().args(["solve", "no/such.json"]).output();
+    fails(&output.unwrap(), 1, "no/such.json");
 }
 
 #[test]
@@ -157,11 +127,9 @@ fn a_health_check_tells_a_ready_service_from_none() {
     let url = |path: &str| format!("http://{}{path}", service.address());
     let (ready, elsewhere) = (url("/readyz"), url("/nothing"));
     assert!(check(&ready).status.success());
-    let wrong = check(&elsewhere);
-    assert_eq!(wrong.status.code(), Some(1));
-    assert!(complaints(&wrong).contains("404"), "{}", complaints(&wrong));
+    fails(&check(&elsewhere), 1, "404");
     service.kill();
-    assert_eq!(check(&ready).status.code(), Some(1));
+    fails(&check(&ready), 1, "");
 }
 
 #[test]
@@ -169,49 +137,24 @@ fn settings_come_from_the_environment_too_and_flags_win() {
     let folder = tempfile::tempdir().unwrap();
     let serve = |flags: &[&str]| {
         let mut command = railhead();
-        command
-            .arg("serve")
-            .args(flags)
-            .env("RAILHEAD_DATA_DIR", folder.path());
-        command
-            .env("RAILHEAD_LISTEN", "127.0.0.1:1:1")
-            .output()
-            .unwrap()
+        command.env("RAILHEAD_DATA_DIR", folder.path());
+        command.env("RAILHEAD_LISTEN", "127.0.0.1:1:1");
+        command.arg("serve").args(flags).output().unwrap()
     };
-    let output = serve(&[]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        complaints(&output).contains("127.0.0.1:1:1"),
-        "{}",
-        complaints(&output)
-    );
+    fails(&serve(&[]), 2, "127.0.0.1:1:1");
 
     let running = Service::start(folder.path(), &[]);
-    let output = serve(&["--listen", "127.0.0.1:0"]);
-    assert_eq!(output.status.code(), Some(1));
-    assert!(
-        complaints(&output).contains("in use"),
-        "{}",
-        complaints(&output)
-    );
+    fails(&serve(&["--listen", "127.0.0.1:0"]), 1, "in use");
     running.kill();
 }
 
 #[test]
 fn config_tells_every_setting_and_where_it_comes_from() {
-    let out = railhead()
-        .args([
-            "config",
-            "--queue-max",
-            "7",
-            "--cors-origin",
-            "http://a,http://b",
-        ])
-        .env("RAILHEAD_RETENTION", "30d")
-        .output()
-        .unwrap();
-    assert!(out.status.success(), "{out:?}");
-    let told: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let mut config = railhead();
+    config.env("RAILHEAD_RETENTION", "30d");
+    config.args(["config", "--queue-max", "7"]);
+    config.args(["--cors-origin", "http://a,http://b"]);
+    let told = said(&config.output().unwrap());
     for (setting, value, source) in [
         ("queue-max", json!(7), "flag"),
         ("retention", json!("30d"), "environment"),
@@ -275,12 +218,8 @@ async fn a_backup_of_a_working_service_can_be_started() {
     };
     let made = backup();
     assert!(made.status.success(), "{made:?}");
-    let again = backup();
-    assert_eq!(
-        again.status.code(),
-        Some(1),
-        "nothing is overwritten: {again:?}"
-    );
+    // Nothing is overwritten.
+    fails(&backup(), 1, "");
     service.kill();
     std::fs::remove_dir_all(&data_dir).unwrap();
 

@@ -21,16 +21,8 @@ async fn a_python_client_made_from_the_contract_solves_a_case() {
     let text = |path: &Path| path.to_string_lossy().into_owned();
     let client = text(&folder.path().join("railhead_client"));
     let contract = text(&root.join("api/openapi.json"));
-    let made = [
-        "generate",
-        "--meta",
-        "none",
-        "--path",
-        &contract,
-        "--output-path",
-        &client,
-    ];
-    run(&program, &made);
+    let made = ["generate", "--meta", "none", "--path", &contract];
+    run(&program, &[&made[..], &["--output-path", &client]].concat());
     let service = Service::start(&folder.path().join("data"), &[]);
     let address = format!("http://{}", service.address());
     let script = text(&root.join("tests/service/client.py"));

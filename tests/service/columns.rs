@@ -4,9 +4,10 @@ use railhead::jobs::codec::table::{COLUMNS_MAX, RowTable, TableColumn};
 use serde_json::{Value, json};
 
 use crate::batches::{results, send, small};
+use crate::csv_table::Csv;
 use crate::errors::assert_problem;
 use crate::runs::answers;
-use crate::server::{Answer, Server, link};
+use crate::server::{Answer, Server};
 use crate::table_forms::{ARROW, NPZ, forms, kept_template, send_rows};
 
 async fn rows_of(server: &Server, sent: &Answer) -> Vec<Value> {
@@ -207,27 +208,6 @@ async fn a_table_of_a_batch_is_read_with_units_semicolons_and_decimal_commas() {
 }
 
 #[tokio::test]
-async fn the_usual_table_of_a_batch_has_its_labels() {
-    let server = Server::start().await;
-    let mut cases = [small("a"), small("b")];
-    cases[0]["labels"] = json!({ "km": "-5", "line": "=1+1" });
-    cases[1]["labels"] = json!({ "km": "-5,25" });
-    let batch = server.post("/v1/batches", &json!(cases)).await.json;
-    let path = link(&batch, "results");
-    let table = server.get(&format!("{path}?wait=60&format=csv")).await.text;
-    let mut reader = csv::Reader::from_reader(table.as_bytes());
-    let head = reader.headers().expect("a header").clone();
-    let place = |name: &str| head.iter().position(|column| column == name);
-    let (km, line) = (
-        place("label:km").expect("km"),
-        place("label:line").expect("line"),
-    );
-    let rows: Vec<_> = reader.records().map(|row| row.expect("a row")).collect();
-    let found: Vec<_> = rows.iter().map(|row| (&row[km], &row[line])).collect();
-    assert_eq!(found, [("-5", "'=1+1"), ("-5,25", "")]);
-}
-
-#[tokio::test]
 async fn texts_of_rows_come_back_as_they_were_and_are_no_formulas_in_csv() {
     let server = Server::start().await;
     let template = kept_template(&server).await;
@@ -249,17 +229,9 @@ async fn texts_of_rows_come_back_as_they_were_and_are_no_formulas_in_csv() {
     assert_eq!(sections, expected.iter().collect::<Vec<_>>());
     let run = sent.header("location").expect("a location");
     let table = server.get(&format!("{run}/results?format=csv")).await.text;
-    let mut reader = csv::Reader::from_reader(table.as_bytes());
-    let head = reader.headers().expect("a header").clone();
-    assert!(head.iter().any(|name| name == "'=1+1"), "{head:?}");
-    let place = head
-        .iter()
-        .position(|name| name == "section")
-        .expect("sections");
-    let found: Vec<_> = reader
-        .records()
-        .map(|row| row.expect("a row")[place].to_owned())
-        .collect();
+    let table = Csv::read(&table);
+    assert!(table.head.iter().any(|name| name == "'=1+1"));
+    let found = table.column("section");
     let expected = [
         "'=HYPERLINK(\"a\")",
         "' =1",

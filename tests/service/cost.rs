@@ -1,15 +1,15 @@
 //! What a request may cost: memory is bounded however large or clever bodies and answers are, and others are served.
 
-use std::io::Write;
 use std::time::Duration;
 
 use railhead::http::{HttpOptions, router};
 use reqwest::Method;
 use serde_json::{Value, json};
-use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
+use tokio::io::AsyncReadExt;
 use tower::ServiceExt;
 
+use crate::caching::gzip;
+use crate::crowds::silent;
 use crate::errors::assert_problem;
 use crate::server::{Server, Setup, example};
 use crate::support::Service;
@@ -17,18 +17,12 @@ use crate::support::Service;
 /// Memory that the whole process may take with idle workers.
 const RESIDENT_MAX: usize = 1 << 30;
 
-/// The most memory that a process ever took.
-fn peak_bytes(process: u32) -> usize {
+/// Memory of a process by the name of a line: `VmRSS:` resident now, `VmHWM:` the most it ever took.
+pub fn memory_bytes(process: u32, name: &str) -> usize {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("a process");
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let line = status.lines().find_map(|line| line.strip_prefix(name));
     let text = line.expect("its memory").trim().trim_end_matches(" kB");
     text.parse::<usize>().expect("a number") * 1024
-}
-
-fn gzip(text: &[u8]) -> Vec<u8> {
-    let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
-    out.write_all(text).expect("packed");
-    out.finish().expect("packed")
 }
 
 /// An array of so many bytes that repeats an element.
@@ -95,7 +89,7 @@ async fn large_bodies_at_once_take_bounded_memory_and_others_are_served() {
         let status = answer.await.unwrap().unwrap().status().as_u16();
         assert!([413, 422, 503].contains(&status), "{status}");
     }
-    let peak = peak_bytes(service.id());
+    let peak = memory_bytes(service.id(), "VmHWM:");
     assert!(peak < RESIDENT_MAX, "{} MiB", peak >> 20);
 }
 
@@ -112,17 +106,13 @@ async fn solved(service: &Service) -> String {
 async fn grids_that_nobody_reads_take_bounded_memory_and_others_are_served() {
     let (_folder, service) = Service::fresh(&[]);
     let job = solved(&service).await;
-    let mut silent = Vec::new();
+    let mut held = Vec::new();
     for number in 0..16 {
         let format = ["csv", "json", "npz", "vtk"][number % 4];
-        let mut stream = TcpStream::connect(service.address()).await.unwrap();
-        let request = format!(
-            "GET {job}/slip?grid=500x500&format={format} HTTP/1.1\r\nhost: localhost\r\n\r\n"
-        );
-        stream.write_all(request.as_bytes()).await.unwrap();
-        silent.push(stream);
+        let path = format!("{job}/slip?grid=500x500&format={format}");
+        held.push(silent(service.address(), &path).await);
     }
-    for stream in silent.iter_mut().take(2) {
+    for stream in held.iter_mut().take(2) {
         let mut begun = [0; 12];
         stream.read_exact(&mut begun).await.unwrap();
         // Or 503, where the memory for answers is taken.
@@ -132,9 +122,9 @@ async fn grids_that_nobody_reads_take_bounded_memory_and_others_are_served() {
     service.get(&format!("{job}/tractions")).await;
     let answer = service.request(Method::GET, &format!("{job}/plot.png?field=zones"));
     assert_eq!(answer.send().await.unwrap().status(), 200);
-    let peak = peak_bytes(service.id());
+    let peak = memory_bytes(service.id(), "VmHWM:");
     assert!(peak < RESIDENT_MAX, "{} MiB", peak >> 20);
-    drop(silent);
+    drop(held);
 }
 
 #[tokio::test]

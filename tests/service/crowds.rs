@@ -1,5 +1,6 @@
 //! Many clients at once: silent ones make way, followers and waits have their own limits, probes are always answered.
 
+use std::net::SocketAddr;
 use std::time::Duration;
 
 use reqwest::Method;
@@ -9,17 +10,23 @@ use tokio::net::TcpStream;
 
 use crate::errors::assert_problem;
 use crate::server::{Server, Setup, example};
-use crate::support::{Service, endless_case, railhead};
+use crate::support::{Service, endless_case, pause, railhead};
 
 /// A request on a connection of its own, of which nothing is read.
-async fn send(address: std::net::SocketAddr, request: &str) -> TcpStream {
+pub async fn send(address: SocketAddr, request: &str) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.expect("a connection");
     stream.write_all(request.as_bytes()).await.expect("sent");
     stream
 }
 
+/// A GET on a connection of its own, of which nothing is read.
+pub async fn silent(address: SocketAddr, path: &str) -> TcpStream {
+    let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
+    send(address, &request).await
+}
+
 /// The whole answer to a request on a connection of its own.
-async fn ask(address: std::net::SocketAddr, path: &str) -> String {
+async fn ask(address: SocketAddr, path: &str) -> String {
     let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n");
     let mut stream = send(address, &request).await;
     let mut answer = String::new();
@@ -29,8 +36,12 @@ async fn ask(address: std::net::SocketAddr, path: &str) -> String {
     answer
 }
 
-fn followed(job: &str) -> String {
-    format!("GET {job}/events HTTP/1.1\r\nhost: localhost\r\n\r\n")
+/// A follower of the events of a job, and how the answer to it begins.
+async fn follow(server: &Server, job: &str) -> (TcpStream, [u8; 12]) {
+    let mut stream = silent(server.address, &format!("{job}/events")).await;
+    let mut begun = [0; 12];
+    stream.read_exact(&mut begun).await.unwrap();
+    (stream, begun)
 }
 
 #[tokio::test]
@@ -48,7 +59,7 @@ async fn silent_connections_and_followers_do_not_shut_the_port() {
     let job = format!("/v1/jobs/{}", service.submit(&endless_case("long")).await);
     let mut held = Vec::new();
     for _ in 0..150 {
-        held.push(send(service.address(), &followed(&job)).await);
+        held.push(silent(service.address(), &format!("{job}/events")).await);
     }
     for _ in 0..400 {
         held.push(TcpStream::connect(service.address()).await.unwrap());
@@ -63,9 +74,7 @@ async fn silent_connections_and_followers_do_not_shut_the_port() {
 
 #[tokio::test]
 async fn the_oldest_silent_connection_makes_way_for_a_new_one() {
-    let mut setup = Setup::new();
-    setup.http.connections_max = 3;
-    let server = setup.start().await;
+    let server = Server::with(|setup| setup.http.connections_max = 3).await;
     let mut silent = Vec::new();
     for _ in 0..3 {
         silent.push(TcpStream::connect(server.address).await.unwrap());
@@ -81,34 +90,26 @@ async fn the_oldest_silent_connection_makes_way_for_a_new_one() {
 
 #[tokio::test]
 async fn probes_are_answered_while_every_connection_is_busy() {
-    let mut setup = Setup::idle();
-    setup.http.connections_max = 3;
-    let server = setup.start().await;
+    let server = Server::idle_with(|setup| setup.http.connections_max = 3).await;
     let job = server.submit(&example("spin.case.json")).await;
     let mut busy = Vec::new();
     for _ in 0..3 {
-        let mut stream = send(server.address, &followed(&job)).await;
-        let mut begun = [0; 8];
-        stream.read_exact(&mut begun).await.unwrap();
-        busy.push(stream);
+        busy.push(follow(&server, &job).await);
     }
-    for (path, status) in [
-        ("/healthz", 200),
-        ("/readyz", 200),
-        ("/metrics", 200),
-        ("/v1/jobs", 503),
-    ] {
-        let answer = ask(server.address, path).await;
-        assert!(
-            answer.starts_with(&format!("HTTP/1.1 {status}")),
-            "{path}: {answer}"
-        );
-        assert_eq!(
-            answer.contains("/problems/overloaded"),
-            status == 503,
-            "{answer}"
-        );
+    let refused = assert_probed(server.address, 503).await;
+    assert!(refused.contains("/problems/overloaded"), "{refused}");
+}
+
+/// Probes are answered, everything else with a status; that answer.
+async fn assert_probed(address: SocketAddr, status: u16) -> String {
+    let mut last = String::new();
+    let probes = ["/healthz", "/readyz", "/metrics"].map(|path| (path, 200));
+    for (path, status) in probes.into_iter().chain([("/v1/jobs", status)]) {
+        last = ask(address, path).await;
+        let begin = format!("HTTP/1.1 {status}");
+        assert!(last.starts_with(&begin), "{path}: {last}");
     }
+    last
 }
 
 #[tokio::test]
@@ -120,9 +121,7 @@ async fn a_tenant_may_follow_and_wait_so_often_and_no_more() {
     let job = server.submit(&example("spin.case.json")).await;
     let mut streams = Vec::new();
     for _ in 0..2 {
-        let mut stream = send(server.address, &followed(&job)).await;
-        let mut begun = [0; 12];
-        stream.read_exact(&mut begun).await.unwrap();
+        let (stream, begun) = follow(&server, &job).await;
         assert_eq!(&begun, b"HTTP/1.1 200");
         streams.push(stream);
     }
@@ -137,61 +136,34 @@ async fn a_tenant_may_follow_and_wait_so_often_and_no_more() {
     assert_eq!(answer.header("preference-applied"), None);
     // Its place is free again when a follower has gone.
     streams.pop();
-    loop {
-        let mut stream = send(server.address, &followed(&job)).await;
-        let mut begun = [0; 12];
-        stream.read_exact(&mut begun).await.unwrap();
-        if &begun == b"HTTP/1.1 200" {
-            break;
-        }
-    }
+    while &follow(&server, &job).await.1 != b"HTTP/1.1 200" {}
 }
 
 #[tokio::test]
 async fn a_tenant_may_have_so_many_requests_under_way_and_no_more() {
-    let mut setup = Setup::idle();
-    setup.http.tenant_requests_max = 1;
-    let server = setup.start().await;
+    let server = Server::idle_with(|setup| setup.http.tenant_requests_max = 1).await;
     // A body that does not come: its request is under way until it does.
     let begun = "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: 2\r\n\r\n";
     let held = send(server.address, begun).await;
-    while !ask(server.address, "/v1/jobs")
-        .await
-        .contains("/problems/too-many-requests")
-    {
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
+    let until = async |part: &str| {
+        while !ask(server.address, "/v1/jobs").await.contains(part) {
+            pause().await;
+        }
+    };
+    until("/problems/too-many-requests").await;
     drop(held);
-    while !ask(server.address, "/v1/jobs")
-        .await
-        .starts_with("HTTP/1.1 200")
-    {
-        tokio::time::sleep(Duration::from_millis(5)).await;
-    }
+    until("HTTP/1.1 200").await;
 }
 
 #[tokio::test]
 async fn probes_can_have_a_port_of_their_own() {
     let (_folder, service) = Service::fresh(&["--probe-listen", "127.0.0.1:0"]);
     let log = service.log_text();
-    let event = log
-        .lines()
-        .find(|line| line.contains("listening for probes"));
+    let mut lines = log.lines();
+    let event = lines.find(|line| line.contains("listening for probes"));
     let event: serde_json::Value = serde_json::from_str(event.expect("its address")).unwrap();
-    let address = event["address"].as_str().unwrap();
-    let address = address.parse().unwrap();
-    for (path, status) in [
-        ("/healthz", 200),
-        ("/readyz", 200),
-        ("/metrics", 200),
-        ("/v1/jobs", 404),
-    ] {
-        let answer = ask(address, path).await;
-        assert!(
-            answer.starts_with(&format!("HTTP/1.1 {status}")),
-            "{path}: {answer}"
-        );
-    }
+    let address = event["address"].as_str().unwrap().parse().unwrap();
+    assert_probed(address, 404).await;
     service.signal("INT");
     // The other port is closed at once; this one answers for as long as the process lives.
     assert_eq!(service.wait().code(), Some(0));
@@ -202,61 +174,59 @@ async fn without_a_key_foreign_names_pages_and_proxies_are_refused() {
     let server = Server::idle().await;
     let job = server.submit(&example("spin.case.json")).await;
     let cancel = format!("{job}/cancel");
+    let (get, post, delete) = (Method::GET, Method::POST, Method::DELETE);
     for (method, path, header, status, slug) in [
         (
-            Method::GET,
+            &get,
             "/v1/jobs",
-            ("host", "evil.example"),
+            "host: evil.example",
             403,
             "host-not-allowed",
         ),
         (
-            Method::GET,
+            &get,
             &job,
-            ("x-forwarded-for", "192.0.2.1"),
+            "x-forwarded-for: 192.0.2.1",
             401,
             "unauthorized",
         ),
         (
-            Method::GET,
+            &get,
             "/metrics",
-            ("forwarded", "for=192.0.2.1"),
+            "forwarded: for=192.0.2.1",
             401,
             "unauthorized",
         ),
         (
-            Method::POST,
+            &post,
             &cancel,
-            ("origin", "http://evil.example"),
+            "origin: http://evil.example",
             403,
             "cross-site",
         ),
         (
-            Method::POST,
+            &post,
             &cancel,
-            ("sec-fetch-site", "cross-site"),
+            "sec-fetch-site: cross-site",
             403,
             "cross-site",
         ),
         (
-            Method::DELETE,
+            &delete,
             &job,
-            ("sec-fetch-site", "same-site"),
+            "sec-fetch-site: same-site",
             403,
             "cross-site",
         ),
     ] {
-        let (name, value) = header;
+        let (name, value) = header.split_once(": ").unwrap();
         let shape = |request: reqwest::RequestBuilder| request.header(name, value);
-        let answer = server.send(method, path, shape).await;
+        let answer = server.send(method.clone(), path, shape).await;
         assert_problem(&answer, status, slug, "");
     }
     assert_eq!(server.read(&job).await["state"], json!("queued"));
-    let mut stream = send(
-        server.address,
-        "GET /healthz HTTP/1.1\r\nconnection: close\r\n\r\n",
-    )
-    .await;
+    let nameless = "GET /healthz HTTP/1.1\r\nconnection: close\r\n\r\n";
+    let mut stream = send(server.address, nameless).await;
     let mut answer = String::new();
     stream.read_to_string(&mut answer).await.unwrap();
     assert!(
@@ -269,15 +239,8 @@ async fn without_a_key_foreign_names_pages_and_proxies_are_refused() {
 async fn a_log_that_nobody_reads_holds_up_nobody() {
     let folder = tempfile::tempdir().unwrap();
     let mut child = railhead()
-        .args([
-            "serve",
-            "--listen",
-            "127.0.0.1:0",
-            "--log-format",
-            "json",
-            "--data-dir",
-        ])
-        .arg(folder.path())
+        .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
+        .args(["--data-dir".as_ref(), folder.path()])
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();

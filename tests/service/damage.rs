@@ -1,27 +1,34 @@
 //! Is a damaged job table noticed, and said so?
 
-use railhead::jobs::{Jobs, JobsError, Options};
+use railhead::jobs::{Jobs, JobsError};
 
 use crate::batches::small;
 use crate::errors::assert_problem;
-use crate::support::{Service, open};
+use crate::lab::Lab;
+use crate::support::Service;
+
+/// A data folder after an orderly end, with so many jobs and so many bytes damaged from the middle of its table on.
+async fn damaged(jobs: usize, bytes: usize) -> Lab {
+    let lab = Lab::idle(|_| {}).await;
+    for number in 0..jobs {
+        lab.submit(small(&number.to_string())).await;
+    }
+    lab.jobs.shutdown(std::time::Duration::ZERO).await;
+    let file = lab.folder.path().join("jobs.db");
+    let mut table = std::fs::read(&file).unwrap();
+    let middle = table.len() / 2;
+    let end = middle.saturating_add(bytes).min(table.len());
+    table[middle..end].fill(0xA5);
+    std::fs::write(&file, table).unwrap();
+    lab
+}
 
 #[tokio::test]
 async fn a_table_that_was_damaged_is_refused_after_an_unclean_end() {
-    let folder = tempfile::tempdir().unwrap();
-    let jobs = open(Options::new(folder.path()), railhead::contact::solve).await;
-    for number in 0..200 {
-        jobs.submit(small(&number.to_string()), None).await.unwrap();
-    }
-    jobs.shutdown(std::time::Duration::ZERO).await;
-    let file = folder.path().join("jobs.db");
-    let mut bytes = std::fs::read(&file).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle..middle + 8192].fill(0xA5);
-    std::fs::write(&file, bytes).unwrap();
+    let lab = damaged(200, 8192).await;
     // As after a kill: nothing says that the table was closed.
-    std::fs::remove_file(folder.path().join("closed")).unwrap();
-    match Jobs::open(Options::new(folder.path())).await {
+    std::fs::remove_file(lab.folder.path().join("closed")).unwrap();
+    match Jobs::open(lab.options).await {
         Err(JobsError::TableDamaged(_)) => {}
         Err(JobsError::Store(error)) => {
             assert!(error.to_string().contains("malformed"), "{error}");
@@ -32,20 +39,10 @@ async fn a_table_that_was_damaged_is_refused_after_an_unclean_end() {
 
 #[tokio::test]
 async fn a_table_that_is_damaged_under_a_service_is_told_by_probes_metrics_and_refusals() {
-    let folder = tempfile::tempdir().unwrap();
-    let jobs = open(Options::new(folder.path()), railhead::contact::solve).await;
-    for number in 0..400 {
-        jobs.submit(small(&number.to_string()), None).await.unwrap();
-    }
-    jobs.shutdown(std::time::Duration::ZERO).await;
     // After an orderly end nobody looks for damage at the start: it is met while the service runs. What the tables begin with
     // lies in front.
-    let file = folder.path().join("jobs.db");
-    let mut bytes = std::fs::read(&file).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle..].fill(0xA5);
-    std::fs::write(&file, bytes).unwrap();
-    let service = Service::start(folder.path(), &["--cache", "false"]);
+    let lab = damaged(400, usize::MAX).await;
+    let service = Service::start(lab.folder.path(), &["--cache", "false"]);
     let mut refusal = None;
     for _ in 0..50 {
         let answer = service.post("/v1/jobs", &small("more")).await;

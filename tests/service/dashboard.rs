@@ -5,17 +5,11 @@ use std::time::Duration;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-use crate::batches::small;
+use crate::batches::{small, small_loaded as case};
 use crate::errors::assert_problem;
 use crate::events::Reader;
 use crate::evolutions::request as evolution;
 use crate::server::{Server, count, example, link};
-
-fn case(name: &str, load: u32) -> Value {
-    let mut case = small(name);
-    case["load"]["normal_force_n"] = json!(load);
-    case
-}
 
 #[tokio::test]
 async fn a_list_is_narrowed_counted_and_not_sent_twice() {

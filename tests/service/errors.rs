@@ -163,14 +163,16 @@ async fn work_that_has_not_ended_says_when_to_ask_again_and_is_cancelled_before_
         }
         server.delete(&work).await.is(204);
         server.get(&work).await.is(404);
+        for part in &parts {
+            server.get(&format!("{work}/{part}")).await.is(404);
+        }
+        server.delete(&work).await.is(404);
     }
 }
 
 #[tokio::test]
 async fn full_queue_refuses_and_stores_nothing() {
-    let mut setup = Setup::idle();
-    setup.options.queue_max = 2;
-    let server = setup.start().await;
+    let server = Server::idle_with(|setup| setup.options.queue_max = 2).await;
     let case = example("spin.case.json");
     let keyed = async || {
         server

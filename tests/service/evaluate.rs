@@ -65,9 +65,7 @@ fn values_of(archive: &[u8], name: &str, bytes: usize) -> Vec<u8> {
 
 #[tokio::test]
 async fn arrays_of_numpy_come_in_and_go_out() {
-    let mut setup = Setup::new();
-    setup.http.evaluate_max_bytes = 20_000;
-    let server = setup.start().await;
+    let server = Server::with(|setup| setup.http.evaluate_max_bytes = 20_000).await;
     let mut case = template("table");
     case["load"]["normal_force_n"] = json!(1e5);
     case["motion"]["creepage_x"] = json!(0.0);
@@ -240,9 +238,8 @@ async fn auto_solves_the_rows_that_the_table_leaves() {
 
 #[tokio::test]
 async fn rows_beyond_the_budget_of_the_solver_belong_to_a_run() {
-    let mut setup = Setup::idle();
-    setup.http.evaluate_time = std::time::Duration::ZERO;
-    let server = setup.start().await;
+    let server =
+        Server::idle_with(|setup| setup.http.evaluate_time = std::time::Duration::ZERO).await;
     let (case, columns) = wheel_on_rail();
     let late = evaluate(&server, case.clone(), columns).await;
     assert_problem(&late, 422, "evaluation-too-long", "/v1/runs");

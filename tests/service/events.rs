@@ -5,8 +5,6 @@ use std::time::Duration;
 use futures_util::StreamExt;
 use reqwest::Response;
 use serde_json::{Value, json};
-use tokio::io::AsyncWriteExt;
-use tokio::net::TcpStream;
 use tokio::time::timeout;
 
 use crate::results::path_of;
@@ -185,25 +183,6 @@ async fn draining_closes_the_streams() {
     );
     server.jobs.drain();
     assert_eq!((job.next().await, batch.next().await), (None, None));
-}
-
-#[tokio::test]
-async fn client_that_never_reads_blocks_nobody() {
-    let server = Server::start().await;
-    let path = server.submit(&endless_case("followed in silence")).await;
-    let mut silent = Vec::new();
-    for _ in 0..50 {
-        let mut stream = TcpStream::connect(server.address)
-            .await
-            .expect("a connection");
-        let request = format!("GET {path}/events HTTP/1.1\r\nhost: localhost\r\n\r\n");
-        stream.write_all(request.as_bytes()).await.expect("sent");
-        silent.push(stream);
-    }
-    server.cancel(&path).await;
-    let job = server.solve(&example("spin.case.json")).await;
-    assert_eq!(job["state"], "succeeded");
-    drop(silent);
 }
 
 #[tokio::test]

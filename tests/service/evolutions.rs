@@ -6,7 +6,8 @@ use railhead::jobs::codec::parquet::TableReader;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
-use crate::server::{Server, Setup, example};
+use crate::runs::ended;
+use crate::server::{Server, example};
 use crate::support::{Service, pause};
 
 /// Ends of a guard: something hangs.
@@ -29,21 +30,9 @@ pub fn request(records: u32) -> Value {
     })
 }
 
-async fn ended(server: &Server, path: &str) -> Value {
-    let begun = Instant::now();
-    loop {
-        let answer = server.get(path).await.is(200);
-        if answer.json["ended_at"].is_string() {
-            return answer.json;
-        }
-        assert!(begun.elapsed() < WITHIN, "{}", answer.text);
-        pause().await;
-    }
-}
-
 #[tokio::test]
 async fn an_evolution_is_answered_as_json_tables_and_sections() {
-    let server = Setup::new().start().await;
+    let server = Server::start().await;
     let answer = server
         .post("/v1/evolutions?name=short&label=line:A", &request(2))
         .await;
@@ -136,7 +125,7 @@ async fn an_evolution_is_answered_as_json_tables_and_sections() {
 
 #[tokio::test]
 async fn a_cancelled_evolution_has_no_answer() {
-    let server = Setup::new().start().await;
+    let server = Server::start().await;
     let mut long = request(100);
     long["accuracy"]["step_depth_mm"] = json!(1e-5);
     let path = server

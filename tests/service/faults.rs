@@ -72,29 +72,6 @@ async fn faults_of_a_case_have_codes_values_ranges_units_and_words() {
 }
 
 #[tokio::test]
-async fn faults_of_a_query_have_codes_and_values() {
-    let server = Server::idle().await;
-    let answer = server
-        .get("/v1/jobs?limit=0&colour=red&cursor=a&cursor=b")
-        .await;
-    let faults = answer.json["errors"].as_array().expect("faults");
-    let codes = faults
-        .iter()
-        .map(|fault| [&fault["parameter"], &fault["code"], &fault["value"]]);
-    let codes: Vec<_> = codes.collect();
-    for expected in [
-        [json!("colour"), json!("unknown-parameter"), json!("red")],
-        [json!("limit"), json!("invalid"), json!("0")],
-        [json!("cursor"), json!("repeated"), Value::Null],
-    ] {
-        assert!(
-            codes.contains(&expected.each_ref()),
-            "{expected:?} in {codes:?}"
-        );
-    }
-}
-
-#[tokio::test]
 async fn faults_of_a_batch_say_the_same_with_their_case() {
     let server = Server::idle().await;
     let mut case = example("hertz-steel.case.json");

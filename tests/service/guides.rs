@@ -1,8 +1,11 @@
 //! The guides are true: their blocks run as they stand, against the real program.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
+use tempfile::TempDir;
+
+use crate::schemathesis::{environment, said_by};
 use crate::support::{Service, skip};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -10,47 +13,31 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// The blocks of a language in a guide, one after the other, with the address of the service under test.
 fn blocks(guide: &str, language: &str, service: &Service) -> String {
     let text = std::fs::read_to_string(Path::new(ROOT).join(guide)).expect("a guide");
-    let mut inside = false;
-    let mut lines = Vec::new();
-    for line in text.lines() {
-        if let Some(fence) = line.strip_prefix("```") {
-            inside = !inside && fence == language;
-            continue;
-        }
-        if inside {
-            lines.push(line);
-        }
-    }
-    assert!(lines.len() > 3, "{guide} has no blocks of {language}");
+    let fences = format!("```{language}\n");
+    let blocks = text.split(&fences).skip(1);
+    let blocks = blocks.map(|rest| rest.split("```").next().expect("a block"));
+    let blocks: String = blocks.collect();
+    assert!(
+        blocks.lines().count() > 3,
+        "{guide} has no blocks of {language}"
+    );
     let address = service.address().to_string();
-    lines.join("\n").replace("localhost:8080", &address)
+    blocks.replace("localhost:8080", &address)
 }
 
 /// A folder in which `api/examples` is found as in the repository.
-fn folder() -> tempfile::TempDir {
+fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     std::os::unix::fs::symlink(Path::new(ROOT).join("api"), folder.path().join("api"))
         .expect("a link");
     folder
 }
 
-fn run(program: &Path, arguments: &[&str], folder: &Path) -> Output {
-    let output = Command::new(program)
-        .args(arguments)
-        .current_dir(folder)
-        .env("MPLCONFIGDIR", folder)
-        .output()
-        .expect("the program runs");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    assert!(
-        output.status.success(),
-        "{}: {}\n{}\n{}",
-        program.display(),
-        output.status,
-        text(&output.stdout),
-        text(&output.stderr)
-    );
-    output
+/// What a program says in a folder, where it has to succeed.
+fn run(program: &Path, arguments: &[&str], folder: &Path) -> String {
+    let mut command = Command::new(program);
+    let command = command.args(arguments).current_dir(folder);
+    said_by(command.env("MPLCONFIGDIR", folder))
 }
 
 fn succeeds(program: &Path, arguments: &[&str]) -> bool {
@@ -67,25 +54,24 @@ fn begins_with(file: &Path, mark: &[u8]) {
     );
 }
 
-fn has_shell_tools() -> bool {
-    let there =
-        succeeds(Path::new("curl"), &["--version"]) && succeeds(Path::new("jq"), &["--version"]);
-    if !there {
+/// Runs the blocks of a guide for the shell; the folder where they ran, and what they said.
+fn run_shell(guide: &str) -> Option<(TempDir, String)> {
+    let there = |program: &str| succeeds(Path::new(program), &["--version"]);
+    if !there("curl") || !there("jq") {
         skip("the guides need curl and jq");
+        return None;
     }
-    there
+    let (_data, service) = Service::fresh(&[]);
+    let (folder, script) = (folder(), blocks(guide, "sh", &service));
+    let said = run(Path::new("bash"), &["-euc", &script], folder.path());
+    Some((folder, said))
 }
 
 #[test]
 fn guide_to_forms_runs_as_it_stands() {
-    if !has_shell_tools() {
+    let Some((folder, said)) = run_shell("docs/formats.md") else {
         return;
-    }
-    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
-    let service = Service::start(data.path(), &[]);
-    let script = blocks("docs/formats.md", "sh", &service);
-    let output = run(Path::new("bash"), &["-euc", &script], folder.path());
-    let said = String::from_utf8_lossy(&output.stdout);
+    };
     assert!(
         said.contains("x_mm,y_mm,dx_mm,dy_mm,strip,traction_x_mpa"),
         "{said}"
@@ -107,14 +93,9 @@ fn guide_to_forms_runs_as_it_stands() {
 
 #[test]
 fn guide_to_wheelsets_runs_as_it_stands() {
-    if !has_shell_tools() {
+    let Some((_folder, said)) = run_shell("docs/wheelset.md") else {
         return;
-    }
-    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
-    let service = Service::start(data.path(), &[]);
-    let script = blocks("docs/wheelset.md", "sh", &service);
-    let output = run(Path::new("bash"), &["-euc", &script], folder.path());
-    let said = String::from_utf8_lossy(&output.stdout);
+    };
     assert!(
         said.contains("\"radius_difference_mm\": 0.75") && said.contains("\"conicity\": 0.180"),
         "{said}"
@@ -123,14 +104,9 @@ fn guide_to_wheelsets_runs_as_it_stands() {
 
 #[test]
 fn guide_to_runs_runs_as_it_stands() {
-    if !has_shell_tools() {
+    let Some((folder, said)) = run_shell("docs/runs.md") else {
         return;
-    }
-    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
-    let service = Service::start(data.path(), &[]);
-    let script = blocks("docs/runs.md", "sh", &service);
-    let output = run(Path::new("bash"), &["-euc", &script], folder.path());
-    let said = String::from_utf8_lossy(&output.stdout);
+    };
     assert!(
         said.contains("row,km,section,status,method,normal_force_n,force_x_n"),
         "{said}"
@@ -141,14 +117,9 @@ fn guide_to_runs_runs_as_it_stands() {
 
 #[test]
 fn creep_curve_from_the_shell_runs_as_it_stands() {
-    if !has_shell_tools() {
+    let Some((folder, said)) = run_shell("docs/python.md") else {
         return;
-    }
-    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
-    let service = Service::start(data.path(), &[]);
-    let script = blocks("docs/python.md", "sh", &service);
-    let output = run(Path::new("bash"), &["-euc", &script], folder.path());
-    let said = String::from_utf8_lossy(&output.stdout);
+    };
     let curve: Vec<f64> = said
         .lines()
         .filter_map(|line| line.split_once('\t')?.1.parse().ok())
@@ -170,13 +141,9 @@ fn creep_curve_from_python_runs_as_it_stands() {
     let Some(python) = python() else {
         return;
     };
-    let (folder, data) = (folder(), tempfile::tempdir().expect("a folder"));
-    let service = Service::start(data.path(), &[]);
-    let script = blocks("docs/python.md", "python", &service);
-    let file = folder.path().join("creep_curve.py");
-    std::fs::write(&file, script).expect("a script");
-    let output = run(&python, &["creep_curve.py"], folder.path());
-    let said = String::from_utf8_lossy(&output.stdout);
+    let (_data, service) = Service::fresh(&[]);
+    let (folder, script) = (folder(), blocks("docs/python.md", "python", &service));
+    let said = run(&python, &["-c", &script], folder.path());
     assert!(said.contains("largest force: 0.9"), "{said}");
     for picture in ["creep-curve.png", "tractions.png", "picture.png"] {
         begins_with(&folder.path().join(picture), b"\x89PNG");
@@ -192,24 +159,8 @@ pub fn python() -> Option<PathBuf> {
         return Some(python);
     }
     if std::env::var_os("CI").is_some() {
-        let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join("guide-venv");
-        let own = place.join("bin/python");
-        let made = succeeds(&python, &["-m", "venv", &place.to_string_lossy()])
-            && succeeds(
-                &own,
-                &[
-                    "-m",
-                    "pip",
-                    "install",
-                    "--quiet",
-                    "httpx",
-                    "numpy",
-                    "matplotlib",
-                ],
-            );
-        if made && succeeds(&own, &packages) {
-            return Some(own);
-        }
+        let packages = ["httpx", "numpy", "matplotlib"];
+        return Some(environment("guide", &packages).join("python"));
     }
     skip(
         "the guide for Python and NumPy need httpx, numpy and matplotlib; name a Python that has them in RAILHEAD_TEST_PYTHON",

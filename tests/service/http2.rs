@@ -78,9 +78,7 @@ async fn without_a_key_the_name_in_the_address_is_judged() {
 
 #[tokio::test]
 async fn a_client_that_grants_no_window_for_its_answer_is_let_go() {
-    let mut setup = Setup::new();
-    setup.http.write_timeout = Duration::from_millis(300);
-    let server = setup.start().await;
+    let server = Server::with(|setup| setup.http.write_timeout = Duration::from_millis(300)).await;
     let (mut sender, connection) = connect(&server, 100).await;
     // A follower of events waits for the service, which is no fault of its own.
     let events = request(Method::GET, &server, "/v1/events");

@@ -5,7 +5,7 @@ use std::process::Output;
 use std::time::{Duration, Instant};
 
 use reqwest::Method;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server};
@@ -17,16 +17,31 @@ fn keys(data_dir: &Path, args: &[&str]) -> Output {
     command.arg("--data-dir").arg(data_dir).output().unwrap()
 }
 
+/// What a command about keys says, which has to succeed.
+fn said(data_dir: &Path, args: &[&str]) -> String {
+    let done = keys(data_dir, args);
+    assert!(done.status.success(), "{done:?}");
+    String::from_utf8(done.stdout).unwrap()
+}
+
 fn make_key(data_dir: &Path, tenant: &str) -> String {
-    let made = keys(
+    let text = said(
         data_dir,
         &["create", "--tenant", tenant, "--name", "a test"],
     );
-    assert!(made.status.success(), "{made:?}");
-    let text = String::from_utf8(made.stdout).unwrap();
     let key = text.trim().to_owned();
     assert_eq!(key.len(), "rh_".len() + 12 + 1 + 64, "{text:?}");
     key
+}
+
+fn id_of(key: &str) -> &str {
+    key.split('_').nth(1).unwrap()
+}
+
+/// The columns of a key in the list.
+fn listed<'a>(list: &'a str, key: &str) -> Vec<&'a str> {
+    let line = list.lines().find(|line| line.starts_with(id_of(key)));
+    line.unwrap().split('\t').collect()
 }
 
 #[tokio::test]
@@ -34,24 +49,19 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
     let (folder, service) = Service::fresh(&["--anonymous", "loopback"]);
     // Made beside the running service.
     let key = make_key(folder.path(), "north");
-    let ask = async || {
-        let request = service.request(Method::GET, "/v1/jobs").bearer_auth(&key);
-        request.send().await.unwrap().status()
-    };
+    let jobs = || (Method::GET, "/v1/jobs");
+    let ask = async || ask(&service, &key, jobs(), None).await.status;
     assert_eq!(ask().await, 200);
-    let id = key.split('_').nth(1).unwrap();
-    let revoked = keys(folder.path(), &["revoke", id]);
-    assert!(revoked.status.success(), "{revoked:?}");
+    said(folder.path(), &["revoke", id_of(&key)]);
     let since = Instant::now();
     while ask().await != 401 {
         assert!(since.elapsed() < Duration::from_secs(60), "still accepted");
         pause().await;
     }
-    let list = String::from_utf8(keys(folder.path(), &["list"]).stdout).unwrap();
-    let line = list.lines().find(|line| line.starts_with(id)).unwrap();
-    let columns: Vec<&str> = line.split('\t').collect();
-    assert_eq!((columns[1], columns[5]), ("north", "-"), "{line}");
-    assert_ne!(columns[3], "-", "{line}");
+    let list = said(folder.path(), &["list"]);
+    let columns = listed(&list, &key);
+    assert_eq!((columns[1], columns[5]), ("north", "-"), "{list}");
+    assert_ne!(columns[3], "-", "{list}");
     let unknown = keys(folder.path(), &["revoke", "000000000000"]);
     assert_eq!(unknown.status.code(), Some(1));
 
@@ -88,7 +98,7 @@ async fn a_key_that_may_only_read_changes_nothing() {
     let (folder, service) = Service::fresh(&["--anonymous", "always"]);
     let own = make_key(folder.path(), "north");
     let flags = ["create", "--tenant", "north", "--read-only"];
-    let made = String::from_utf8(keys(folder.path(), &flags).stdout).unwrap();
+    let made = said(folder.path(), &flags);
     let reader = made.trim();
     let ask = async |key: &str, method: Method, path: &str, body: Option<&Value>| {
         ask(&service, key, (method, path), body).await
@@ -101,7 +111,7 @@ async fn a_key_that_may_only_read_changes_nothing() {
     }
     let checked = ask(reader, Method::POST, "/v1/cases/check", Some(&case));
     checked.await.is(200);
-    let cases = Value::Array(vec![case.clone()]);
+    let cases = json!([case]);
     for (method, changed, body) in [
         (Method::POST, "/v1/jobs".to_owned(), Some(&case)),
         (Method::POST, "/v1/batches".to_owned(), Some(&cases)),
@@ -111,44 +121,24 @@ async fn a_key_that_may_only_read_changes_nothing() {
         let refused = ask(reader, method, &changed, body).await;
         assert_problem(&refused, 403, "forbidden", "");
     }
-    let listed = String::from_utf8(keys(folder.path(), &["list"]).stdout).unwrap();
-    let may = |key: &str| {
-        let id = key.split('_').nth(1).unwrap();
-        let line = listed.lines().find(|line| line.starts_with(id)).unwrap();
-        line.split('\t').nth(4).unwrap().to_owned()
-    };
-    assert_eq!(
-        (may(&own), may(reader)),
-        ("all".to_owned(), "read".to_owned())
-    );
+    let list = said(folder.path(), &["list"]);
+    let may = [&own, reader].map(|key| listed(&list, key)[4]);
+    assert_eq!(may, ["all", "read"]);
 }
 
 #[tokio::test]
 async fn a_revoked_key_ends_the_streams_that_it_opened() {
     let (folder, service) = Service::fresh(&[]);
     let key = make_key(folder.path(), "north");
-    let request = service
-        .request(Method::POST, "/v1/batches")
-        .bearer_auth(&key);
-    let batch: Value = request
-        .json(&[endless_case("long")])
-        .send()
-        .await
-        .unwrap()
-        .json()
-        .await
-        .unwrap();
+    let cases = json!([endless_case("long")]);
+    let batch = ask(&service, &key, (Method::POST, "/v1/batches"), Some(&cases));
+    let batch = batch.await.is(202).location();
     let mut open = Vec::new();
-    for path in ["events", "results"] {
-        let link = batch["links"][path].as_str().unwrap();
-        let request = service.request(
-            Method::GET,
-            &format!("{link}?wait=600").replace("events?wait=600", "events"),
-        );
+    for part in ["events", "results?wait=600"] {
+        let request = service.request(Method::GET, &format!("{batch}/{part}"));
         open.push(request.bearer_auth(&key).send().await.unwrap());
     }
-    let revoked = keys(folder.path(), &["revoke", key.split('_').nth(1).unwrap()]);
-    assert!(revoked.status.success(), "{revoked:?}");
+    said(folder.path(), &["revoke", id_of(&key)]);
     // The stream of events ends, lines of results break off.
     for (answer, complete) in open.into_iter().zip([true, false]) {
         assert_eq!(answer.status(), 200);
@@ -168,15 +158,9 @@ fn reading_keys_makes_no_data_folder() {
             assert_eq!(answer.status.code(), Some(1), "{answer:?}");
         }
     }
-    assert_eq!(
-        keys(
-            &folder.path().join("mistyped"),
-            &["create", "--tenant", "a"]
-        )
-        .status
-        .code(),
-        Some(1)
-    );
+    let mistyped = folder.path().join("mistyped");
+    let refused = keys(&mistyped, &["create", "--tenant", "a"]);
+    assert_eq!(refused.status.code(), Some(1));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
@@ -216,15 +200,13 @@ async fn a_service_that_nobody_or_everybody_could_use_says_so_at_the_start() {
     let service = Service::start(folder.path(), &[]);
     assert_eq!(service.logged(open), 1);
     let proxied = service.request(Method::GET, "/v1/jobs");
-    let proxied = proxied.header("via", "1.1 proxy").send().await.unwrap();
-    assert_eq!(proxied.status(), 401);
+    Answer::to(proxied.header("via", "1.1 proxy")).await.is(401);
     service.kill();
     let service = Service::start(folder.path(), &["--listen", "0.0.0.0:0"]);
     assert_eq!(service.logged(open), 0);
-    let request = || service.request(Method::GET, "/v1/jobs");
-    assert_eq!(request().send().await.unwrap().status(), 401);
-    let known = request().bearer_auth(&key).send().await.unwrap();
-    assert_eq!(known.status(), 200);
+    service.ask("/v1/jobs").await.is(401);
+    let known = ask(&service, &key, (Method::GET, "/v1/jobs"), None);
+    known.await.is(200);
 }
 
 #[tokio::test]
@@ -238,29 +220,19 @@ async fn only_pages_of_listed_origins_may_read_answers() {
         ("https://b.example", false),
         ("http://a.example", false),
     ] {
-        let get = service
-            .request(Method::GET, "/v1/jobs")
-            .header("origin", origin);
-        let preflight = service
-            .request(Method::OPTIONS, "/v1/jobs")
-            .header("origin", origin)
-            .header("access-control-request-method", "POST")
-            .header(
-                "access-control-request-headers",
-                "authorization,content-type",
-            );
-        for request in [get, preflight] {
-            let answer = request.send().await.unwrap();
-            let header = answer.headers().get("access-control-allow-origin");
-            let told = header.map(|value| value.to_str().unwrap());
+        for method in [Method::GET, Method::OPTIONS] {
+            // What a browser asks with before it sends.
+            let request = service.request(method, "/v1/jobs").header("origin", origin);
+            let request = request.header("access-control-request-method", "POST");
+            let headers = "authorization,content-type";
+            let request = request.header("access-control-request-headers", headers);
+            let answer = Answer::to(request).await;
+            let told = answer.header("access-control-allow-origin");
             assert_eq!(told, allowed.then_some(origin));
         }
     }
-    let mut command = railhead();
-    let bad = command
-        .args(["serve", "--cors-origin", "*"])
-        .output()
-        .unwrap();
+    let mut bad = railhead();
+    let bad = bad.args(["serve", "--cors-origin", "*"]).output().unwrap();
     assert_eq!(bad.status.code(), Some(2));
 }
 
@@ -276,22 +248,18 @@ async fn browsers_are_told_to_be_careful_with_every_answer() {
         "/openapi.json",
     ] {
         let answer = server.get(path).await;
-        assert_eq!(
-            answer.header("x-content-type-options"),
-            Some("nosniff"),
-            "{path}"
-        );
-        assert_eq!(answer.header("x-frame-options"), Some("DENY"), "{path}");
-        assert_eq!(
-            answer.header("referrer-policy"),
-            Some("no-referrer"),
-            "{path}"
-        );
+        for (name, value) in [
+            ("x-content-type-options", Some("nosniff")),
+            ("x-frame-options", Some("DENY")),
+            ("referrer-policy", Some("no-referrer")),
+            ("access-control-allow-origin", None),
+        ] {
+            assert_eq!(answer.header(name), value, "{name} of {path}");
+        }
         let policy = answer.header("content-security-policy").unwrap_or_default();
         assert!(
             policy.contains("frame-ancestors 'none'"),
             "{path}: {policy}"
         );
-        assert_eq!(answer.header("access-control-allow-origin"), None, "{path}");
     }
 }

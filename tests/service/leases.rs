@@ -1,93 +1,46 @@
 //! Does nobody lose a job, or solve it twice, while the table or the results cannot be written for longer than a lease?
 
-use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, mpsc};
 use std::time::Duration;
 
-use railhead::contact::solve;
-use railhead::jobs::{Jobs, Options, State};
+use railhead::jobs::State;
 use uuid::Uuid;
 
-use crate::support::{case, open};
+use crate::lab::{AT_MOST, Lab};
+use crate::support::case;
 
-const AT_MOST: Duration = Duration::from_secs(60);
 const LEASE: Duration = Duration::from_millis(600);
 
-/// A service on which every case ticks until it is let go.
-struct Shop {
-    jobs: Jobs,
-    let_go: Arc<AtomicBool>,
-    begun: Arc<AtomicUsize>,
-    folder: tempfile::TempDir,
+/// A service whose results are kept outside the table, and its job that is being solved.
+async fn solving() -> (Lab, Uuid) {
+    let lab = Lab::start(|options| {
+        options.lease = LEASE;
+        options.small_result_max_bytes = 0;
+    })
+    .await;
+    let id = lab.begin(case("long")).await;
+    (lab, id)
 }
 
-impl Shop {
-    async fn open() -> Shop {
-        let folder = tempfile::tempdir().unwrap();
-        let (let_go, begun) = (Arc::new(AtomicBool::new(false)), Arc::default());
-        let options = Options {
-            lease: LEASE,
-            small_result_max_bytes: 0,
-            ..Options::new(folder.path())
-        };
-        let (go, count): (_, Arc<AtomicUsize>) = (let_go.clone(), Arc::clone(&begun));
-        let jobs = open(options, move |case, monitor| {
-            count.fetch_add(1, Ordering::SeqCst);
-            while !go.load(Ordering::SeqCst) {
-                if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.5) {
-                    return Err(stop.into());
-                }
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            solve(case, monitor)
-        })
-        .await;
-        jobs.start().unwrap();
-        Shop {
-            jobs,
-            let_go,
-            begun,
-            folder,
-        }
-    }
+fn table(lab: &Lab) -> rusqlite::Connection {
+    rusqlite::Connection::open(lab.folder.path().join("jobs.db")).unwrap()
+}
 
-    /// Submits a case and waits until it is being solved.
-    async fn running(&self) -> Uuid {
-        let id = self.jobs.submit(case("one"), None).await.unwrap().id;
-        while self.begun.load(Ordering::SeqCst) == 0 {
-            tokio::time::sleep(Duration::from_millis(2)).await;
-        }
-        id
-    }
-
-    fn table(&self) -> rusqlite::Connection {
-        rusqlite::Connection::open(self.folder.path().join("jobs.db")).unwrap()
-    }
-
-    async fn succeeds_at_once(&self, id: Uuid) {
-        let job = self.jobs.wait(id, AT_MOST).await.unwrap();
-        assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
-        assert_eq!(self.begun.load(Ordering::SeqCst), 1, "it was solved once");
-        self.jobs.solution(id).await.unwrap();
-        self.jobs.shutdown(Duration::from_secs(10)).await;
-    }
+async fn assert_solved_once(lab: Lab, id: Uuid) {
+    lab.succeeds_at_once(id).await;
+    assert_eq!(lab.gate.begun(), 1, "it was solved once");
+    lab.jobs.solution(id).await.unwrap();
+    lab.end().await;
 }
 
 #[tokio::test]
 async fn results_that_cannot_be_stored_for_longer_than_a_lease_are_kept_under_it() {
-    let shop = Shop::open().await;
-    let id = shop.running().await;
+    let (lab, id) = solving().await;
     // The place of the results is not there.
-    let results = shop.folder.path().join("results");
-    let away = shop.folder.path().join("away");
-    let had: PathBuf = match results.exists() {
-        true => std::fs::rename(&results, &away).map(|()| away).unwrap(),
-        false => away,
-    };
+    let results = lab.folder.path().join("results");
+    assert!(!results.exists());
     std::fs::write(&results, b"no folder").unwrap();
-    shop.let_go.store(true, Ordering::SeqCst);
-    let table = shop.table();
+    lab.gate.set_open(true);
+    let table = table(&lab);
     let mut leases = Vec::new();
     for _ in 0..5 {
         tokio::time::sleep(LEASE).await;
@@ -97,63 +50,42 @@ async fn results_that_cannot_be_stored_for_longer_than_a_lease_are_kept_under_it
     }
     assert!(leases.is_sorted() && leases[0] < leases[4], "{leases:?}");
     std::fs::remove_file(&results).unwrap();
-    if had.exists() {
-        std::fs::rename(&had, &results).unwrap();
-    }
-    shop.succeeds_at_once(id).await;
+    assert_solved_once(lab, id).await;
 }
 
 #[tokio::test]
 async fn a_table_that_is_locked_for_longer_than_a_lease_gives_no_job_away() {
     // While it is being solved, and while its end is to be written.
     for solved_meanwhile in [false, true] {
-        let shop = Shop::open().await;
-        let id = shop.running().await;
-        let other = shop.table();
+        let (lab, id) = solving().await;
+        let other = table(&lab);
         other.execute_batch("BEGIN IMMEDIATE").unwrap();
-        shop.let_go.store(solved_meanwhile, Ordering::SeqCst);
+        lab.gate.set_open(solved_meanwhile);
         tokio::time::sleep(4 * LEASE).await;
         other.execute_batch("ROLLBACK").unwrap();
         // Some looks of whoever takes jobs from silent workers.
         tokio::time::sleep(2 * LEASE).await;
-        shop.let_go.store(true, Ordering::SeqCst);
-        shop.succeeds_at_once(id).await;
+        lab.gate.set_open(true);
+        assert_solved_once(lab, id).await;
     }
 }
 
-#[tokio::test(flavor = "multi_thread")]
+#[tokio::test]
 async fn more_deaf_solvers_than_allowed_break_the_service_and_no_fewer() {
-    let folder = tempfile::tempdir().unwrap();
-    let options = Options {
-        abandoned_max: 1,
-        lease: LEASE,
-        ..Options::new(folder.path())
-    };
-    let (release, released) = mpsc::channel::<()>();
-    let released = std::sync::Mutex::new(released);
-    let (begun, began) = mpsc::channel();
-    let jobs = open(options, move |case, monitor| {
-        if case.label.name.as_deref() == Some("deaf") {
-            begun.send(()).unwrap();
-            // Until the test is over.
-            let _ = released.lock().unwrap().recv();
-        }
-        solve(case, monitor)
+    let lab = Lab::start(|options| {
+        options.abandoned_max = 1;
+        options.lease = LEASE;
     })
     .await;
-    jobs.start().unwrap();
-    for _ in 0..2 {
-        assert!(!jobs.broken().is_cancelled());
-        let id = jobs.submit(case("deaf"), None).await.unwrap().id;
+    for name in ["deaf", "deaf as well"] {
+        assert!(!lab.jobs.broken().is_cancelled());
         // The second is begun once the thread of the first was left behind.
-        tokio::task::block_in_place(|| began.recv()).unwrap();
-        assert!(!jobs.broken().is_cancelled());
-        jobs.cancel(id).await.unwrap();
-        let job = jobs.wait(id, AT_MOST).await.unwrap();
-        assert_eq!(job.state, State::Cancelled);
+        let id = lab.begin(case(name)).await;
+        assert!(!lab.jobs.broken().is_cancelled());
+        lab.jobs.cancel(id).await.unwrap();
+        assert_eq!(lab.wait(id).await.state, State::Cancelled);
     }
-    let broken = tokio::time::timeout(AT_MOST, jobs.broken().cancelled());
+    let broken = tokio::time::timeout(AT_MOST, lab.jobs.broken().cancelled());
     broken.await.expect("two are more than one");
-    drop(release);
-    jobs.shutdown(Duration::from_secs(10)).await;
+    lab.end().await;
 }

@@ -7,7 +7,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::server::{Server, Setup, example};
-use crate::support::case;
+use crate::support::{case, loaded};
 
 /// The samples of `/metrics`: name with labels, value.
 pub async fn samples(server: &Server) -> BTreeMap<String, f64> {
@@ -104,9 +104,7 @@ async fn waiting_failed_cancelled_and_large_jobs_are_seen() {
 
 #[tokio::test]
 async fn results_outside_the_table_are_weighed_until_they_are_deleted() {
-    let mut setup = Setup::new();
-    setup.options.small_result_max_bytes = 0;
-    let server = setup.start().await;
+    let server = Server::with(|setup| setup.options.small_result_max_bytes = 0).await;
     let job = server.solve(&case("one")).await;
     let stored = value(&samples(&server).await, "railhead_result_bytes");
     assert!(stored > 1000.0, "{stored}");
@@ -118,13 +116,7 @@ async fn results_outside_the_table_are_weighed_until_they_are_deleted() {
 #[tokio::test]
 async fn a_batch_is_counted_job_by_job() {
     let server = Server::start().await;
-    let cases: Vec<Value> = (1..=20)
-        .map(|number| {
-            let mut case = case("one of many");
-            case["load"]["normal_force_n"] = json!(10_000 * number);
-            case
-        })
-        .collect();
+    let cases: Vec<Value> = (1..=20).map(|number| loaded(10_000 * number)).collect();
     let answer = server.post("/v1/batches", &json!(cases)).await;
     let results = format!("{}/results?wait=60", answer.header("location").unwrap());
     assert_eq!(server.get(&results).await.text.lines().count(), 20);

@@ -8,7 +8,8 @@ use reqwest::Method;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::server::{example, example_text};
+use crate::csv_table::Csv;
+use crate::server::{Answer, example, example_text};
 use crate::support::{Service, case, pause, railhead};
 
 /// A data folder of a form of the embedded table, and what the program that wrote it answered.
@@ -34,50 +35,33 @@ struct Client<'a> {
 
 impl Client<'_> {
     async fn text(&self, path: &str) -> String {
-        let request = self
-            .service
-            .request(Method::GET, path)
-            .bearer_auth(self.key);
-        let answer = request.send().await.unwrap();
-        let status = answer.status();
-        let text = answer.text().await.unwrap();
-        assert!(status.is_success(), "{path}: {status} {text}");
-        text
+        let request = self.service.request(Method::GET, path);
+        Answer::to(request.bearer_auth(self.key)).await.is(200).text
     }
 
     async fn get(&self, path: &str) -> Value {
         serde_json::from_str(&self.text(path).await).unwrap()
     }
 
-    /// Submits again under a key; the id that is answered, and whether it is that of the first submission.
+    /// Submits once more under a key.
+    async fn send_again(&self, path: &str, key: &str, form: &str, body: String) -> Answer {
+        let request = self.service.request(Method::POST, path).body(body);
+        let request = request.bearer_auth(self.key).header("content-type", form);
+        Answer::to(request.header("idempotency-key", key)).await
+    }
+
+    /// The id that is answered then, and whether it is that of the first submission.
     async fn again(&self, path: &str, key: &str, form: &str, body: String) -> (Value, bool) {
-        let request = self
-            .service
-            .request(Method::POST, path)
-            .bearer_auth(self.key);
-        let request = request
-            .header("idempotency-key", key)
-            .header("content-type", form);
-        let answer = request.body(body).send().await.unwrap();
-        let replayed = answer.headers().contains_key("idempotency-replayed");
-        let answer: Value = answer.json().await.unwrap();
-        assert!(answer["id"].is_string(), "{path}: {answer}");
-        (answer["id"].clone(), replayed)
+        let answer = self.send_again(path, key, form, body).await;
+        let replayed = answer.header("idempotency-replayed").is_some();
+        assert!(answer.json["id"].is_string(), "{path}: {}", answer.text);
+        (answer.json["id"].clone(), replayed)
     }
 
     /// Submits again under a key that now stands for another digest.
     async fn assert_conflict(&self, path: &str, key: &str, form: &str, body: String) {
-        let request = self
-            .service
-            .request(Method::POST, path)
-            .bearer_auth(self.key);
-        let request = request
-            .header("idempotency-key", key)
-            .header("content-type", form);
-        let answer = request.body(body).send().await.unwrap();
-        assert_eq!(answer.status(), 422, "{path}");
-        let problem: Value = answer.json().await.unwrap();
-        assert_eq!(problem["type"], "/problems/idempotency-conflict");
+        let answer = self.send_again(path, key, form, body).await.is(422);
+        assert_eq!(answer.json["type"], "/problems/idempotency-conflict");
     }
 
     async fn until_ended(&self, path: &str) -> Value {
@@ -89,20 +73,6 @@ impl Client<'_> {
             pause().await;
         }
     }
-}
-
-/// Column of a CSV text.
-fn column(text: &str, title: &str) -> Vec<String> {
-    let mut lines = text.lines();
-    let place = lines
-        .next()
-        .unwrap()
-        .split(',')
-        .position(|name| name == title);
-    let place = place.unwrap_or_else(|| panic!("no column {title} in {text}"));
-    lines
-        .map(|line| line.split(',').nth(place).unwrap().to_owned())
-        .collect()
 }
 
 /// Starts the service several times and kills it. A process may die at any moment of its first starts.
@@ -160,7 +130,8 @@ async fn opens_with_all_that_is_in_it(form: u32) {
         .text(&format!("/v1/runs/{}/results?format=csv", id("run")))
         .await;
     for (now, then) in [(batch, text("batch_results")), (run, text("run_results"))] {
-        assert_eq!(column(&now, "force_x_n"), column(&then, "force_x_n"));
+        let (now, then) = (Csv::read(&now), Csv::read(&then));
+        assert_eq!(now.column("force_x_n"), then.column("force_x_n"));
     }
     let row = client.get(&format!("/v1/runs/{}/rows/1", id("run"))).await;
     assert_eq!(row["case"]["load"]["normal_force_n"], json!(74000.0));

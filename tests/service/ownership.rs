@@ -9,7 +9,7 @@ use crate::batches::results;
 use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Server, Setup, link};
-use crate::support::{Turned, case, files_below};
+use crate::support::{Turned, case, files_below, loaded};
 
 /// A service that keeps every result in a folder, ended jobs for 30 days, and the clock that it uses.
 async fn in_folders() -> (Server, PathBuf, Turned) {
@@ -83,9 +83,7 @@ async fn an_expiring_lender_leaves_its_result_to_the_borrower() {
 async fn reads_that_race_with_removal_are_answered_404_or_410_and_never_500() {
     let (server, _, _) = in_folders().await;
     for round in 0..6 {
-        let mut fresh = case("read while it is removed");
-        fresh["load"]["normal_force_n"] = json!(50_000 + round);
-        let path = path_of(&server.solve(&fresh).await);
+        let path = path_of(&server.solve(&loaded(50_000 + round)).await);
         let reads = ["tractions", "result"].map(|part| format!("{path}/{part}"));
         let read = async |path: &str| {
             let mut seen = Vec::new();
@@ -95,7 +93,7 @@ async fn reads_that_race_with_removal_are_answered_404_or_410_and_never_500() {
             seen
         };
         let delete = async {
-            tokio::time::sleep(Duration::from_millis(3 * round)).await;
+            tokio::time::sleep(Duration::from_millis(3) * round as u32).await;
             server.delete(&path).await.status
         };
         let (fields, result, deleted) = tokio::join!(read(&reads[0]), read(&reads[1]), delete);
@@ -109,13 +107,7 @@ async fn reads_that_race_with_removal_are_answered_404_or_410_and_never_500() {
 #[tokio::test]
 async fn a_result_whose_file_is_gone_costs_one_line_of_a_batch() {
     let (server, folder, _) = in_folders().await;
-    let cases: Vec<Value> = (0..3)
-        .map(|number| {
-            let mut case = case("one of three");
-            case["load"]["normal_force_n"] = json!(60_000 + number);
-            case
-        })
-        .collect();
+    let cases = [60_000, 60_001, 60_002].map(loaded);
     let batch = solved_batch(&server, &cases).await;
     let lines = results(&server, &batch, "").await;
     let lost = lines[1]["id"].as_str().expect("an id");

@@ -3,16 +3,9 @@
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
-use crate::formats::{bits, column, flat, read_npz};
+use crate::formats::{PARTS, bits, flat, read_npz};
 use crate::results::{area, number, path_of};
 use crate::server::{Server, example, link};
-
-const PARTS: [(&str, &[&str]); 4] = [
-    ("pressure", &["pressure_mpa"]),
-    ("tractions", &["traction_x_mpa", "traction_y_mpa"]),
-    ("slip", &["slip_x", "slip_y"]),
-    ("zones", &["zone"]),
-];
 
 async fn solved(server: &Server, outputs: Value) -> Value {
     let mut case = example("spin.case.json");
@@ -82,12 +75,9 @@ async fn single_precision_rounds_each_number_and_is_smaller() {
     let path = path_of(&solved(&server, all).await);
     let whole = format!("{path}/fields?grid=60x40");
     let exact = server.get(&whole).await;
-    let (json, npz) = (
-        server.get(&format!("{whole}&precision=single")).await,
-        server
-            .get(&format!("{whole}&precision=single&format=npz"))
-            .await,
-    );
+    let single = format!("{whole}&precision=single");
+    let json = server.get(&single).await;
+    let npz = server.get(&format!("{single}&format=npz")).await;
     let double = server.get(&format!("{whole}&format=npz")).await;
     assert!(json.bytes.len() < exact.bytes.len() && npz.bytes.len() < double.bytes.len());
     let archive = read_npz(&npz);
@@ -109,12 +99,7 @@ async fn single_precision_rounds_each_number_and_is_smaller() {
         assert_eq!(bits(&read), bits(&expected), "{name} as JSON");
     }
     let border = &exact.json["outlines"]["patch"][0];
-    let corners: Vec<f64> = border
-        .as_array()
-        .expect("corners")
-        .iter()
-        .flat_map(column)
-        .collect();
+    let corners = flat(border);
     let (shape, values) = &archive["outline_patch_mm"];
     assert_eq!(*shape, format!("{}, 2", corners.len() / 2));
     assert_eq!(bits(values), bits(&rounded(corners)));

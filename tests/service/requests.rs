@@ -6,8 +6,9 @@ use std::time::Duration;
 use reqwest::Method;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
+use crate::crowds::send;
 use crate::errors::assert_problem;
-use crate::server::{Server, Setup, example, example_text};
+use crate::server::{Server, example, example_text};
 
 #[tokio::test]
 async fn malformed_json_is_answered_with_its_position() {
@@ -68,9 +69,7 @@ async fn body_must_be_declared_as_json() {
 #[tokio::test]
 async fn body_size_is_limited_exactly() {
     let case = example_text("spin.case.json");
-    let mut setup = Setup::idle();
-    setup.http.body_max_bytes = case.len();
-    let server = setup.start().await;
+    let server = Server::idle_with(|setup| setup.http.body_max_bytes = case.len()).await;
     let send = |body: String| server.post_as("/v1/jobs", "application/json", body);
     assert_eq!(send(case.clone()).await.status, 202);
     let answer = send(format!("{case} ")).await;
@@ -79,64 +78,44 @@ async fn body_size_is_limited_exactly() {
 
 /// Writes raw bytes to the service and reads the whole answer.
 async fn raw(server: &Server, request: &str) -> String {
-    let mut stream = tokio::net::TcpStream::connect(server.address)
-        .await
-        .expect("a connection");
-    stream
-        .write_all(request.as_bytes())
-        .await
-        .expect("the request is written");
+    let mut stream = send(server.address, request).await;
     let mut answer = Vec::new();
-    stream
-        .read_to_end(&mut answer)
-        .await
-        .expect("the answer is read");
+    let read = stream.read_to_end(&mut answer).await;
+    read.expect("the answer is read");
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-const RAW_HEAD: &str = "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/json\r\n";
-
 #[tokio::test]
-async fn body_of_unknown_length_is_limited_too() {
-    let mut setup = Setup::new();
-    setup.http.body_max_bytes = 100;
-    let server = setup.start().await;
-    let chunk = format!("c8\r\n{}\r\n0\r\n\r\n", " ".repeat(200));
-    let answer = raw(
-        &server,
-        &format!("{RAW_HEAD}Transfer-Encoding: chunked\r\n\r\n{chunk}"),
-    )
+async fn bodies_too_long_of_unknown_length_broken_or_missing_are_refused() {
+    let server = Server::with(|setup| {
+        setup.http.body_max_bytes = 100;
+        setup.http.body_timeout = Duration::from_millis(20);
+    })
     .await;
-    assert!(
-        answer.starts_with("HTTP/1.1 413") && answer.contains("/problems/body-too-large"),
-        "{answer}"
-    );
-}
-
-#[tokio::test]
-async fn body_that_never_comes_is_given_up() {
-    let mut setup = Setup::new();
-    setup.http.body_timeout = Duration::from_millis(20);
-    let server = setup.start().await;
-    let answer = raw(&server, &format!("{RAW_HEAD}Content-Length: 10\r\n\r\n{{")).await;
-    assert!(
-        answer.starts_with("HTTP/1.1 408") && answer.contains("/problems/body-timeout"),
-        "{answer}"
-    );
-}
-
-#[tokio::test]
-async fn body_that_breaks_is_refused() {
-    let server = Server::idle().await;
-    let answer = raw(
-        &server,
-        &format!("{RAW_HEAD}Transfer-Encoding: chunked\r\n\r\nno chunk\r\n"),
-    )
-    .await;
-    assert!(
-        answer.starts_with("HTTP/1.1 400") && answer.contains("/problems/unreadable-body"),
-        "{answer}"
-    );
+    let long = format!("c8\r\n{}\r\n0\r\n\r\n", " ".repeat(200));
+    for (length, body, status, slug) in [
+        (
+            "Transfer-Encoding: chunked",
+            long.as_str(),
+            413,
+            "body-too-large",
+        ),
+        (
+            "Transfer-Encoding: chunked",
+            "no chunk\r\n",
+            400,
+            "unreadable-body",
+        ),
+        ("Content-Length: 10", "{", 408, "body-timeout"),
+    ] {
+        let head = "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/json";
+        let answer = raw(&server, &format!("{head}\r\n{length}\r\n\r\n{body}")).await;
+        assert!(
+            answer.starts_with(&format!("HTTP/1.1 {status}")),
+            "{answer}"
+        );
+        assert!(answer.contains(&format!("/problems/{slug}")), "{answer}");
+    }
 }
 
 #[tokio::test]
@@ -147,19 +126,12 @@ async fn a_refusal_in_the_middle_of_a_body_leaves_the_connection_usable_or_says_
             "POST /v1/batches HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{{"
         )
     };
-    let rest = " ".repeat(99_999);
-    let mut stream = tokio::net::TcpStream::connect(server.address)
-        .await
-        .expect("a connection");
+    let mut stream = send(server.address, &head(100_000)).await;
+    tokio::time::sleep(Duration::from_millis(100)).await;
     let mut answer = Vec::new();
     let again = "GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
-    for (piece, pause) in [
-        (head(100_000), 100),
-        (rest.clone(), 0),
-        (again.to_owned(), 0),
-    ] {
+    for piece in [" ".repeat(99_999).as_str(), again] {
         stream.write_all(piece.as_bytes()).await.expect("sent");
-        tokio::time::sleep(Duration::from_millis(pause)).await;
     }
     stream.read_to_end(&mut answer).await.expect("two answers");
     let answer = String::from_utf8_lossy(&answer);
@@ -184,23 +156,20 @@ async fn bad_query_names_every_parameter_with_its_value() {
     let answer = server.get("/v1/jobs?limit=0&state=done&label=x&created_after=yesterday&colour=red&cursor=a&cursor=b").await;
     assert_problem(&answer, 400, "bad-query", "1 to 1000");
     let errors = answer.json["errors"].as_array().expect("errors");
-    let named: BTreeSet<&str> = errors
+    let codes = errors
         .iter()
-        .filter_map(|error| error["parameter"].as_str())
-        .collect();
-    assert_eq!(
-        named,
-        BTreeSet::from([
-            "limit",
-            "state",
-            "label",
-            "created_after",
-            "colour",
-            "cursor"
-        ]),
-        "{}",
-        answer.text
-    );
+        .map(|error| ["parameter", "code", "value"].map(|name| error[name].as_str()));
+    let codes: BTreeSet<_> = codes.collect();
+    let named: BTreeSet<_> = codes.iter().filter_map(|[name, ..]| *name).collect();
+    let expected = "colour created_after cursor label limit state";
+    assert!(named.into_iter().eq(expected.split(' ')), "{}", answer.text);
+    for expected in [
+        ["colour", "unknown-parameter", "red"].map(Some),
+        ["limit", "invalid", "0"].map(Some),
+        [Some("cursor"), Some("repeated"), None],
+    ] {
+        assert!(codes.contains(&expected), "{expected:?} in {codes:?}");
+    }
     let state = errors
         .iter()
         .find(|error| error["parameter"] == "state")
@@ -269,13 +238,10 @@ async fn a_body_that_is_refused_early_may_be_sent_to_its_end() {
     const BYTES: usize = 40 << 20;
     let server = Server::idle().await;
     for path in ["/v1/jobs", "/v1/evaluate", "/v1/runs"] {
-        let mut stream = tokio::net::TcpStream::connect(server.address)
-            .await
-            .expect("a connection");
         let head = format!(
             "POST {path} HTTP/1.1\r\nhost: localhost\r\ncontent-type: text/plain\r\ncontent-length: {BYTES}\r\n\r\n"
         );
-        stream.write_all(head.as_bytes()).await.expect("sent");
+        let mut stream = send(server.address, &head).await;
         for piece in vec![b' '; BYTES].chunks(1 << 20) {
             stream.write_all(piece).await.expect("the service reads on");
         }

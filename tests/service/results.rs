@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::{Value, json};
 
+use crate::errors::assert_problem;
 use crate::server::{Server, Setup, example, link};
 
 /// The numbers of an array.
@@ -287,13 +288,11 @@ async fn each_motion_of_a_sweep_is_fetched_by_its_number() {
         "resultants?patch=1",
     ] {
         let answer = server.get(&format!("{path}/{query}")).await;
-        assert_eq!(answer.status, 400, "{}", answer.text);
-        assert_eq!(answer.json["type"], "/problems/bad-query");
+        assert_problem(&answer, 400, "bad-query", "");
     }
     for query in ["point=11", "patch=1"] {
         let fields = path_of(&server.solve(&example("spin.case.json")).await);
         let answer = server.get(&format!("{fields}/tractions?{query}")).await;
-        assert_eq!(answer.status, 400, "{}", answer.text);
-        assert_eq!(answer.json["type"], "/problems/bad-query");
+        assert_problem(&answer, 400, "bad-query", "");
     }
 }

@@ -12,7 +12,7 @@ use crate::server::{Answer, Server, Setup};
 use crate::support::files_below;
 
 /// Ends of a guard: something hangs.
-const WITHIN: Duration = Duration::from_secs(90);
+const WITHIN: Duration = Duration::from_secs(240);
 
 pub fn template(method: &str) -> Value {
     json!({

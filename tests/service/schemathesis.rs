@@ -22,15 +22,8 @@ pub fn python_program(name: &str, package: &str, version: &str, variable: &str) 
         return Some(program);
     }
     if std::env::var_os("CI").is_some() {
-        let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{package}-venv"));
-        run(
-            Path::new("python3"),
-            &["-m", "venv", &place.to_string_lossy()],
-        );
-        let package = format!("{package}=={version}");
-        let install = ["-m", "pip", "install", "--quiet", &package];
-        run(&place.join("bin/python"), &install);
-        let own = place.join("bin").join(name);
+        let place = environment(package, &[&format!("{package}=={version}")]);
+        let own = place.join(name);
         assert!(fits(&own), "{}", own.display());
         return Some(own);
     }
@@ -40,13 +33,29 @@ pub fn python_program(name: &str, package: &str, version: &str, variable: &str) 
     None
 }
 
+/// The programs of an environment of Python with these packages, made for a test.
+pub fn environment(name: &str, packages: &[&str]) -> PathBuf {
+    let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-venv"));
+    let python = Path::new("python3");
+    run(python, &["-m", "venv", &place.to_string_lossy()]);
+    let programs = place.join("bin");
+    let install = [&["-m", "pip", "install", "--quiet"], packages].concat();
+    run(&programs.join("python"), &install);
+    programs
+}
+
 /// Runs a program that has to succeed; what it prints.
 pub fn run(program: &Path, arguments: &[&str]) -> String {
-    let output = Command::new(program).args(arguments).output();
-    let output = output.unwrap_or_else(|error| panic!("{}: {error}", program.display()));
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{}: {told}", program.display());
-    String::from_utf8_lossy(&output.stdout).into_owned()
+    said_by(Command::new(program).args(arguments))
+}
+
+/// The same of a program as it was prepared.
+pub fn said_by(program: &mut Command) -> String {
+    let output = program.output();
+    let output = output.unwrap_or_else(|error| panic!("{program:?}: {error}"));
+    let [said, told] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    assert!(output.status.success(), "{program:?}: {said}\n{told}");
+    said.into_owned()
 }
 
 fn schemathesis() -> Option<PathBuf> {

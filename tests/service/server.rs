@@ -118,6 +118,22 @@ impl Server {
         vec![embedded]
     }
 
+    /// Like [`Server::start`], with one thing changed.
+    pub async fn with(change: impl FnOnce(&mut Setup)) -> Server {
+        let mut setup = Setup::new();
+        change(&mut setup);
+        setup.start().await
+    }
+
+    /// Like [`Server::idle`], with one thing changed.
+    pub async fn idle_with(change: impl FnOnce(&mut Setup)) -> Server {
+        let own = |setup: &mut Setup| {
+            setup.working = false;
+            change(setup);
+        };
+        Server::with(own).await
+    }
+
     /// A service that takes jobs and never solves them.
     pub async fn idle() -> Server {
         Setup::idle().start().await

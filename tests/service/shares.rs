@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use axum::response::Response;
 use railhead::http::{AddressRange, HttpOptions, Peer};
 use railhead::jobs::{Jobs, Options};
 use reqwest::Method;
@@ -49,13 +50,7 @@ async fn an_address_without_a_key_may_ask_so_often_and_no_more() {
     };
     let router = railhead::http::router(jobs, options);
     let ask = async |address: &str| {
-        let mut request = axum::http::Request::get("/v1/jobs")
-            .header("host", "localhost")
-            .body(axum::body::Body::empty())
-            .unwrap();
-        let peer = Peer(address.parse().unwrap());
-        request.extensions_mut().insert(peer);
-        let answer = router.clone().oneshot(request).await.unwrap();
+        let answer = ask(&router, address, None).await;
         let later = answer.headers().contains_key("retry-after");
         (answer.status().as_u16(), later)
     };
@@ -69,17 +64,20 @@ async fn an_address_without_a_key_may_ask_so_often_and_no_more() {
     }
 }
 
-/// The status of an answer to a request from this address with this key.
-async fn with_key(router: &axum::Router, address: &str, key: &str) -> u16 {
-    let mut request = axum::http::Request::get("/v1/jobs")
-        .header("host", "localhost")
-        .header("authorization", format!("Bearer {key}"))
-        .body(axum::body::Body::empty())
-        .unwrap();
+/// The answer to a request from this address, with a key if there is one.
+async fn ask(router: &axum::Router, address: &str, key: Option<&str>) -> Response {
+    let mut request = axum::http::Request::get("/v1/jobs").header("host", "localhost");
+    if let Some(key) = key {
+        request = request.header("authorization", format!("Bearer {key}"));
+    }
+    let mut request = request.body(axum::body::Body::empty()).unwrap();
     let peer = Peer(address.parse().unwrap());
     request.extensions_mut().insert(peer);
-    let answer = router.clone().oneshot(request).await.unwrap();
-    answer.status().as_u16()
+    router.clone().oneshot(request).await.unwrap()
+}
+
+async fn with_key(router: &axum::Router, address: &str, key: &str) -> u16 {
+    ask(router, address, Some(key)).await.status().as_u16()
 }
 
 /// A key that no service knows.

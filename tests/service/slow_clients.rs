@@ -7,7 +7,9 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpSocket, TcpStream};
 
-use crate::server::{Server, Setup, example, link};
+use crate::cost::memory_bytes;
+use crate::crowds::silent;
+use crate::server::{Server, example, link};
 use crate::support::{Service, long_case, pause};
 
 /// Between two bytes of a slow client.
@@ -45,9 +47,8 @@ async fn drip(mut stream: TcpStream, bytes: impl Iterator<Item = u8>) -> String 
 
 #[tokio::test]
 async fn heads_that_never_end_are_given_up_and_others_are_served_meanwhile() {
-    let mut setup = Setup::new();
-    setup.http.first_head_timeout = Duration::from_millis(300);
-    let server = setup.start().await;
+    let server =
+        Server::with(|setup| setup.http.first_head_timeout = Duration::from_millis(300)).await;
     let mut slow = Vec::new();
     for _ in 0..100 {
         let head = "GET /healthz HTTP/1.1\r\nhost: localhost\r\nx-slow: ".bytes();
@@ -73,9 +74,7 @@ async fn heads_that_never_end_are_given_up_and_others_are_served_meanwhile() {
 
 #[tokio::test]
 async fn bodies_that_come_byte_by_byte_are_cut_off() {
-    let mut setup = Setup::new();
-    setup.http.body_timeout = Duration::from_millis(300);
-    let server = setup.start().await;
+    let server = Server::with(|setup| setup.http.body_timeout = Duration::from_millis(300)).await;
     for path in ["/v1/jobs", "/v1/batches", "/v1/evaluate", "/v1/runs"] {
         let mut stream = connect(&server).await;
         let head = format!(
@@ -93,9 +92,7 @@ async fn bodies_that_come_byte_by_byte_are_cut_off() {
 
 #[tokio::test]
 async fn rows_that_keep_coming_may_take_longer_than_a_piece_of_them() {
-    let mut setup = Setup::new();
-    setup.http.body_timeout = Duration::from_secs(2);
-    let server = setup.start().await;
+    let server = Server::with(|setup| setup.http.body_timeout = Duration::from_secs(2)).await;
     let template = crate::runs::template("fastsim");
     let rows: Vec<f64> = (0..4000).map(|row| 1e-6 * f64::from(row)).collect();
     let body = json!({ "template": template, "columns": { "/motion/creepage_x": rows } });
@@ -124,9 +121,7 @@ async fn rows_that_keep_coming_may_take_longer_than_a_piece_of_them() {
 
 #[tokio::test]
 async fn an_answer_that_is_not_taken_is_given_up() {
-    let mut setup = Setup::new();
-    setup.http.write_timeout = Duration::from_millis(300);
-    let server = setup.start().await;
+    let server = Server::with(|setup| setup.http.write_timeout = Duration::from_millis(300)).await;
     let (path, whole) = large_results(&server).await;
     let socket = TcpSocket::new_v4().expect("a socket");
     socket.set_recv_buffer_size(4096).expect("a small buffer");
@@ -193,23 +188,18 @@ async fn clients_that_read_nothing_cost_little_memory() {
     let results = format!("{}?wait=60", link(&batch, "results"));
     let events = link(&batch, "events").to_owned();
     let whole = service.ask(&results).await.bytes.len();
-    let before = resident_bytes(service.id());
-    let mut silent = Vec::new();
+    let before = memory_bytes(service.id(), "VmRSS:");
+    let mut held = Vec::new();
     for path in [&results, &events] {
         for _ in 0..40 {
-            let mut stream = TcpStream::connect(service.address())
-                .await
-                .expect("a connection");
-            let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
-            stream.write_all(request.as_bytes()).await.expect("sent");
-            silent.push(stream);
+            held.push(silent(service.address(), path).await);
         }
     }
     tokio::time::sleep(Duration::from_secs(2)).await;
-    let grown = resident_bytes(service.id()).saturating_sub(before);
+    let grown = memory_bytes(service.id(), "VmRSS:").saturating_sub(before);
     assert!(grown < 40 * whole / 4, "{grown} bytes for 40 times {whole}");
     service.submit(&example("spin.case.json")).await;
-    drop(silent);
+    drop(held);
 }
 
 #[tokio::test]
@@ -227,17 +217,13 @@ async fn a_large_result_that_nobody_reads_is_not_held_in_memory() {
         let path = format!("/v1/jobs/{id}/{part}");
         let whole = service.ask(&path).await.bytes.len();
         assert!(whole > 1 << 20, "{part}: {whole} bytes fill no buffer");
-        let before = resident_bytes(service.id());
-        let mut silent = Vec::new();
+        let before = memory_bytes(service.id(), "VmRSS:");
+        let mut held = Vec::new();
         for _ in 0..CLIENTS {
-            let stream = TcpStream::connect(service.address()).await;
-            let mut stream = stream.expect("a connection");
-            let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
-            stream.write_all(request.as_bytes()).await.expect("sent");
-            silent.push(stream);
+            held.push(silent(service.address(), &path).await);
         }
         tokio::time::sleep(Duration::from_secs(2)).await;
-        let grown = resident_bytes(service.id()).saturating_sub(before);
+        let grown = memory_bytes(service.id(), "VmRSS:").saturating_sub(before);
         // A stored text is read as it is taken. What is cut out of it is held as numbers and counted; the allocator keeps
         // some of what was freed.
         let allowed = match part {
@@ -254,19 +240,4 @@ async fn a_large_result_that_nobody_reads_is_not_held_in_memory() {
         );
         service.submit(&example("spin.case.json")).await;
     }
-}
-
-/// Resident memory of a process.
-fn resident_bytes(process: u32) -> usize {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).expect("a process");
-    let line = status
-        .lines()
-        .find_map(|line| line.strip_prefix("VmRSS:"))
-        .expect("its memory");
-    let kilobytes: usize = line
-        .trim()
-        .trim_end_matches(" kB")
-        .parse()
-        .expect("a number");
-    kilobytes * 1024
 }

@@ -8,10 +8,10 @@ use reqwest::Method;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::batches::small;
+use crate::batches::{small, small_loaded};
 use crate::errors::assert_problem;
 use crate::server::Answer;
-use crate::support::{Service, case, endless_case, long_case, pause, railhead, skip};
+use crate::support::{Service, case, endless_case, loaded, long_case, pause, railhead, skip};
 use crate::sweeps::sliced_case;
 
 /// A small file system of its own, unmounted when dropped.
@@ -36,6 +36,18 @@ impl Disk {
 
     fn data_dir(&self) -> PathBuf {
         self.folder.path().join("data")
+    }
+
+    /// A service with one worker that solves everything anew, on this disk.
+    fn serve(&self, flags: &[&str]) -> Service {
+        let own = ["--cache", "false", "--workers", "1"];
+        Service::start(&self.data_dir(), &[&own[..], flags].concat())
+    }
+
+    fn remount(&self, options: &str) {
+        let mut mount = Command::new("mount");
+        let mount = mount.args(["-o", &format!("remount,{options}")]);
+        assert!(mount.arg(self.folder.path()).status().unwrap().success());
     }
 
     /// Takes all the room that is left.
@@ -77,9 +89,7 @@ async fn ready(service: &Service) -> Answer {
 async fn submit_until_refused(service: &Service) -> (Vec<String>, Answer) {
     let mut accepted = Vec::new();
     for number in 0..5000 {
-        let mut case = case(&format!("number {number}"));
-        case["load"]["normal_force_n"] = json!(50_000 + number);
-        let answer = submit(service, &case).await;
+        let answer = submit(service, &loaded(50_000 + number)).await;
         match answer.status {
             202 => accepted.push(answer.json["id"].as_str().unwrap().to_owned()),
             _ => return (accepted, answer),
@@ -114,8 +124,7 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     let Some(disk) = Disk::mount("size=24m") else {
         return;
     };
-    let flags = ["--cache", "false", "--workers", "1"];
-    let service = Service::start(&disk.data_dir(), &flags);
+    let service = disk.serve(&[]);
     let large = service.submit(&large_case()).await;
     service.until(&large, "running").await;
     let ballast = disk.fill();
@@ -137,7 +146,7 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     until_ready(&service).await;
     accepted.push(large);
     all_succeed(&service, &accepted).await;
-    submit(&service, &case("after")).await.is(202);
+    service.submit(&case("after")).await;
     let list = service.get("/v1/jobs?limit=1000").await;
     let known = list["jobs"].as_array().unwrap().len();
     assert_eq!(known, accepted.len() + 1, "no more than were acknowledged");
@@ -145,12 +154,8 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
 
 /// Sends a batch under a key.
 async fn send_batch(service: &Service, key: &str, cases: &[Value]) -> Answer {
-    let request = service.request(Method::POST, "/v1/batches");
-    let lines: String = cases.iter().map(|case| format!("{case}\n")).collect();
-    let request = request
-        .header("Idempotency-Key", key)
-        .header("Content-Type", "application/x-ndjson");
-    Answer::to(request.body(lines)).await
+    let request = service.request(Method::POST, "/v1/batches").json(cases);
+    Answer::to(request.header("Idempotency-Key", key)).await
 }
 
 #[tokio::test]
@@ -158,14 +163,9 @@ async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once(
     let Some(disk) = Disk::mount("size=64m") else {
         return;
     };
-    let flags = ["--cache", "false", "--workers", "1"];
-    let service = Service::start(&disk.data_dir(), &flags);
+    let service = disk.serve(&[]);
     let cases: Vec<Value> = (0..6000)
-        .map(|number| {
-            let mut case = small(&number.to_string());
-            case["load"]["normal_force_n"] = json!(50_000 + number);
-            case
-        })
+        .map(|number| small_loaded(&number.to_string(), 50_000 + number))
         .collect();
     let bytes: usize = cases.iter().map(|case| case.to_string().len() + 1).sum();
     // Room for the staged cases and some of the rows.
@@ -176,26 +176,20 @@ async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once(
     assert_eq!(list["jobs"], json!([]), "nothing is listed");
     std::fs::remove_file(ballast).unwrap();
     let again = send_batch(&service, "k", &cases).await.is(202);
-    let path = format!("/v1/batches/{}", again.json["id"].as_str().unwrap());
+    let path = again.location();
     while service.get(&path).await["states"]["succeeded"] != json!(cases.len()) {
         pause().await;
     }
     // A job is counted just after its end is stored.
     let name = "\nrailhead_jobs_ended_total{state=\"succeeded\"} ";
-    let solved = loop {
+    let mut solved = 0;
+    while solved < cases.len() {
         let metrics = service.ask("/metrics").await.text;
         let (_, value) = metrics.split_once(name).expect("the sample is there");
-        let value: usize = value.lines().next().unwrap().parse().unwrap();
-        if value >= cases.len() {
-            break value;
-        }
+        solved = value.lines().next().unwrap().parse().unwrap();
         pause().await;
-    };
-    assert_eq!(
-        solved,
-        cases.len(),
-        "no case of the refused batch was solved"
-    );
+    }
+    assert_eq!(solved, cases.len(), "those of the refused batch were not");
 }
 
 #[tokio::test]
@@ -210,21 +204,17 @@ async fn starts_on_a_full_disk(killed: bool) {
     let Some(disk) = Disk::mount("size=16m") else {
         return;
     };
-    let flags = ["--cache", "false", "--workers", "1"];
-    let flags = [&flags[..], &["--shutdown-grace-s", "0"]].concat();
-    let service = Service::start(&disk.data_dir(), &flags);
+    let service = disk.serve(&["--shutdown-grace-s", "0"]);
     let solved = service.submit(&case("solved")).await;
     service.until(&solved, "succeeded").await;
     let running = service.submit(&endless_case("running")).await;
     service.until(&running, "running").await;
-    if killed {
-        service.kill();
-    } else {
-        service.signal("TERM");
-        assert!(service.wait().success());
+    match killed {
+        true => service.kill(),
+        false => service.stop().await,
     }
     let ballast = disk.fill();
-    let service = Service::start(&disk.data_dir(), &flags);
+    let service = disk.serve(&[]);
     service.get(&format!("/v1/jobs/{solved}/result")).await;
     if killed {
         // The other one has the room that was kept for its start.
@@ -235,8 +225,8 @@ async fn starts_on_a_full_disk(killed: bool) {
     std::fs::remove_file(ballast).unwrap();
     until_ready(&service).await;
     service.until(&running, "running").await;
-    let after = submit(&service, &case("after")).await.is(202);
-    all_succeed(&service, &[after.json["id"].as_str().unwrap().to_owned()]).await;
+    let after = service.submit(&case("after")).await;
+    all_succeed(&service, &[after]).await;
 }
 
 #[tokio::test]
@@ -244,15 +234,7 @@ async fn a_full_disk_costs_a_sweep_no_slice() {
     let Some(disk) = Disk::mount("size=16m") else {
         return;
     };
-    let flags = [
-        "--cache",
-        "false",
-        "--workers",
-        "1",
-        "--log",
-        "info,railhead::jobs=debug",
-    ];
-    let service = Service::start(&disk.data_dir(), &flags);
+    let service = disk.serve(&["--log", "info,railhead::jobs=debug"]);
     let question = sliced_case("long", 150);
     let problem = railhead::contact::check(&question, &Limits::default()).unwrap();
     let slices = railhead::contact::slices::slices(&problem).len();
@@ -280,15 +262,14 @@ async fn a_full_disk_and_a_kill_lose_nothing_either() {
     let Some(disk) = Disk::mount("size=16m") else {
         return;
     };
-    let flags = ["--cache", "false", "--workers", "1"];
-    let service = Service::start(&disk.data_dir(), &flags);
+    let service = disk.serve(&[]);
     service.submit(&case("first")).await;
     let ballast = disk.fill();
     let (accepted, refusal) = submit_until_refused(&service).await;
     assert_problem(&refusal, 507, "storage-full", "");
     service.kill();
     std::fs::remove_file(ballast).unwrap();
-    let service = Service::start(&disk.data_dir(), &flags);
+    let service = disk.serve(&[]);
     for id in &accepted {
         service.until(id, "succeeded").await;
     }
@@ -299,11 +280,7 @@ fn a_read_only_disk_is_named_at_the_start() {
     let Some(disk) = Disk::mount("size=1m") else {
         return;
     };
-    let remounted = Command::new("mount")
-        .args(["-o", "remount,ro"])
-        .arg(disk.folder.path())
-        .status();
-    assert!(remounted.unwrap().success());
+    disk.remount("ro");
     let mut serve = railhead();
     let serve = serve.arg("serve").arg("--data-dir").arg(disk.data_dir());
     let refused = serve.output().unwrap();
@@ -341,11 +318,7 @@ async fn results_without_room_are_told_although_the_table_takes_data() {
         assert_problem(&ready(&service).await, 507, "storage-full", "");
         assert!(failing(&service).await);
     }
-    let grown = Command::new("mount")
-        .args(["-o", "remount,size=16m"])
-        .arg(disk.folder.path())
-        .status();
-    assert!(grown.unwrap().success());
+    disk.remount("size=16m");
     until_ready(&service).await;
     assert!(!failing(&service).await);
     all_succeed(&service, &accepted).await;
@@ -356,7 +329,7 @@ async fn a_body_that_fills_the_disk_is_told_until_there_is_room() {
     let Some(disk) = Disk::mount("size=32m") else {
         return;
     };
-    let service = Service::start(&disk.data_dir(), &["--workers", "1"]);
+    let service = disk.serve(&[]);
     let job = service.submit(&small("the template")).await;
     service.until(&job, "succeeded").await;
     let rows: String = (0..200_000)
@@ -404,18 +377,14 @@ async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     assert_problem(&refusal, 503, "storage-unwritable", "cannot be written");
     assert_problem(&ready(&service).await, 503, "storage-unwritable", "");
     service.get(&format!("/v1/jobs/{first}")).await;
-    let metrics = service.ask("/metrics").await.text;
-    assert!(
-        metrics.contains("\nrailhead_storage_failing 1\n"),
-        "{metrics}"
-    );
+    assert!(failing(&service).await);
     while service.logged("could not be written yet") == 0 {
         pause().await;
     }
     limit_files(&service, "unlimited");
     until_ready(&service).await;
     all_succeed(&service, &[first]).await;
-    submit(&service, &case("after")).await.is(202);
+    service.submit(&case("after")).await;
     assert_eq!(service.logged("the disk takes data again"), 1);
 }
 
@@ -431,10 +400,6 @@ async fn a_table_locked_by_another_process_is_waited_for_and_then_told() {
     service.get(&format!("/v1/jobs/{before}/result")).await;
     other.execute_batch("ROLLBACK").unwrap();
     until_ready(&service).await;
-    let mut another = case("after");
-    another["load"]["normal_force_n"] = json!(70_000);
-    let after = submit(&service, &another).await.is(202);
-    service
-        .until(after.json["id"].as_str().unwrap(), "succeeded")
-        .await;
+    let after = service.submit(&loaded(70_000)).await;
+    service.until(&after, "succeeded").await;
 }

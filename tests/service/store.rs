@@ -12,8 +12,8 @@ use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::remark::list::Remark;
 use railhead::jobs::model::{Kind, Queue, SubmitOptions};
 use railhead::jobs::store::{
-    Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Filter, Lease, NewBatch, NewJob,
-    Page, QueueBounds, ReleaseReason, ResultRef, Store, StoredResult,
+    BatchBegun, Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Filter, Lease, NewBatch,
+    NewJob, Page, QueueBounds, ReleaseReason, ResultRef, Store, StoredResult,
 };
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
@@ -188,22 +188,44 @@ pub fn queue_of(tenant: &str) -> Queue {
     }
 }
 
+/// A claim of at most `jobs` small jobs that were not begun.
+pub fn request(queue: &Queue, jobs: usize, now: i64) -> ClaimRequest<'_> {
+    ClaimRequest {
+        worker: "w",
+        queue,
+        jobs,
+        cost_us: 1_000_000,
+        kind: ClaimKind::New,
+        each_slice_us: None,
+        suspects: true,
+        waiting: 0,
+        lease: Lease { now, ms: LEASE },
+        now,
+        late_before: now,
+    }
+}
+
+/// Begins a batch that nobody knows, and fills it from its start.
+pub async fn begin(store: &dyn Store, new: &NewBatch, jobs: impl IntoIterator<Item = NewJob>) {
+    let begun = store.begin_batch(new, &|_| false, QueueBounds::NONE).await;
+    assert_eq!(begun.unwrap(), BatchBegun::Created);
+    let jobs: Vec<_> = (0..).zip(jobs).collect();
+    for some in jobs.chunks(1000) {
+        store.fill_batch(new.id, some).await.unwrap();
+    }
+}
+
+pub fn ids(jobs: &[Job]) -> Vec<Uuid> {
+    jobs.iter().map(|job| job.id).collect()
+}
+
 /// Claims at most `jobs` small jobs of the first queue that has any.
 pub async fn claim_up_to(store: &dyn Store, now: i64, lease_ms: i64, jobs: usize) -> Vec<Claim> {
     let queues = store.queues().await.unwrap();
     for (queue, _) in &queues {
         let request = ClaimRequest {
-            worker: "w",
-            queue,
-            jobs,
-            cost_us: 1_000_000,
-            kind: ClaimKind::New,
-            each_slice_us: None,
-            suspects: true,
-            waiting: 0,
             lease: Lease { now, ms: lease_ms },
-            now,
-            late_before: now,
+            ..request(queue, jobs, now)
         };
         let claims = store.claim(&request).await.unwrap();
         if !claims.is_empty() {

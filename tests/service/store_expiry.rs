@@ -1,11 +1,9 @@
 //! What is removed together once its time is over?
 
 use railhead::jobs::model::Kind;
-use railhead::jobs::store::{BatchBegun, Claim, NewBatch, NewJob, QueueBounds, RetentionRule};
+use railhead::jobs::store::{Claim, NewBatch, NewJob, RetentionRule};
 
-use crate::store::{
-    LEASE, StoreKind, Table, claim_up_to, conformance, new_batch, new_job, success,
-};
+use crate::store::*;
 
 conformance!(the_chunks_of_a_run_expire_together_with_the_last_of_them);
 
@@ -36,18 +34,11 @@ async fn the_chunks_of_a_run_expire_together_with_the_last_of_them(kind: StoreKi
         kind: Kind::Rows,
         ..new_batch("anonymous", 3)
     };
-    let none = |_| false;
-    let created = table.store.begin_batch(&run, &none, QueueBounds::NONE);
-    assert_eq!(created.await.unwrap(), BatchBegun::Created);
-    let chunk = |index| {
-        let chunk = NewJob {
-            kind: Kind::Rows,
-            ..new_job()
-        };
-        (index, chunk)
+    let chunk = || NewJob {
+        kind: Kind::Rows,
+        ..new_job()
     };
-    let chunks = [chunk(0), chunk(1), chunk(2)];
-    table.store.fill_batch(run.id, &chunks).await.unwrap();
+    begin(&*table.store, &run, [chunk(), chunk(), chunk()]).await;
     table.store.complete_batch(run.id).await.unwrap();
     let claims = claim_up_to(&*table.store, begun, 100 * LEASE, 3).await;
     assert_eq!(claims.len(), 3);

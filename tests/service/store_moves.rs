@@ -15,7 +15,7 @@ use railhead::jobs::{Failure, FailureKind, State};
 use uuid::Uuid;
 
 use crate::model::{ATTEMPTS_MAX, BOUNDS, Model, Row};
-use crate::store::{Table, new_job, queue_of};
+use crate::store::{Table, new_job, queue_of, request};
 use crate::store_back::Saved;
 
 pub const LEASE: i64 = 10;
@@ -37,6 +37,13 @@ pub struct Pair {
 }
 
 impl Pair {
+    fn lease(&self) -> Lease {
+        Lease {
+            now: self.now,
+            ms: LEASE,
+        }
+    }
+
     pub fn new_job(&self, tenant: &'static str, rank: u8) -> NewJob {
         NewJob {
             tenant: tenant.into(),
@@ -98,26 +105,14 @@ impl Pair {
     }
 
     pub async fn claim(&mut self, tenant: &'static str, jobs: usize, begun: bool) {
-        let request = ClaimRequest {
-            worker: "w",
-            queue: &queue_of(tenant),
-            kind: if begun {
-                ClaimKind::Begun
-            } else {
-                ClaimKind::New
-            },
-            jobs,
-            cost_us: 1_000_000,
-            each_slice_us: None,
-            suspects: true,
-            waiting: 0,
-            lease: Lease {
-                now: self.now,
-                ms: LEASE,
-            },
-            now: self.now,
-            late_before: self.now,
+        let queue = queue_of(tenant);
+        let mut request = ClaimRequest {
+            lease: self.lease(),
+            ..request(&queue, jobs, self.now)
         };
+        if begun {
+            request.kind = ClaimKind::Begun;
+        }
         let claims = self.store.claim(&request).await.unwrap();
         let expected = self.model.choose(tenant, jobs, begun, self.now);
         let ids: Vec<Uuid> = claims.iter().map(|claim| claim.id).collect();
@@ -195,11 +190,8 @@ impl Pair {
 
     pub async fn renew(&mut self, claim: &Claim) {
         let until = self.now + LEASE;
-        let lease = Lease {
-            now: self.now,
-            ms: LEASE,
-        };
-        let renewals = self.store.renew(&[(claim, 0.5)], lease).await.unwrap();
+        let held = [(claim, 0.5)];
+        let renewals = self.store.renew(&held, self.lease()).await.unwrap();
         let held = self.model.held(claim.id, claim.lease_token);
         let expected = held.map_or(Renewal::Lost, |row| {
             row.lease_until = until;

@@ -3,12 +3,11 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
+use futures_util::future::try_join_all;
 use railhead::jobs::store::{BatchBegun, Enqueued, NewJob, QueueBounds, Store};
 use uuid::Uuid;
 
-use crate::store::{
-    LEASE, StoreKind, Table, claim_up_to, conformance, finish_one, new_batch, new_job, success,
-};
+use crate::store::*;
 
 /// The same store twice, as two processes have it.
 async fn two(kind: StoreKind) -> (Table, [Arc<dyn Store>; 2]) {
@@ -28,12 +27,7 @@ async fn submit(
         let store = stores[number % 2].clone();
         tokio::spawn(async move { store.enqueue(&job, bounds).await.unwrap() })
     });
-    let submitted: Vec<_> = submitted.collect();
-    let mut answers = Vec::new();
-    for answer in submitted {
-        answers.push(answer.await.unwrap());
-    }
-    answers
+    try_join_all(submitted).await.unwrap()
 }
 
 async fn one_key_makes_one_job_whoever_asks_at_the_same_moment(kind: StoreKind) {
@@ -93,14 +87,9 @@ async fn one_key_makes_one_batch_and_is_known_once_it_is_acknowledged(kind: Stor
     };
     let (first, second) = (keyed(), keyed());
     let filled = |id| id == first.id;
-    let begun = stores[0]
-        .begin_batch(&first, &filled, QueueBounds::NONE)
-        .await;
-    assert_eq!(begun.unwrap(), BatchBegun::Created);
-    let begun = stores[1]
-        .begin_batch(&second, &filled, QueueBounds::NONE)
-        .await;
-    assert_eq!(begun.unwrap(), BatchBegun::Unfinished);
+    begin(&*stores[0], &first, []).await;
+    let begun = stores[1].begin_batch(&second, &filled, QueueBounds::NONE);
+    assert_eq!(begun.await.unwrap(), BatchBegun::Unfinished);
     // No job of it is claimed before all are there.
     stores[0]
         .fill_batch(first.id, &[(0, new_job())])
@@ -116,12 +105,7 @@ async fn one_key_makes_one_batch_and_is_known_once_it_is_acknowledged(kind: Stor
 async fn what_was_given_up_is_neither_filled_nor_acknowledged(kind: StoreKind) {
     let (_table, stores) = two(kind).await;
     let batch = new_batch("anonymous", 3);
-    let begun = stores[0]
-        .begin_batch(&batch, &|_| false, QueueBounds::NONE)
-        .await;
-    assert_eq!(begun.unwrap(), BatchBegun::Created);
-    let jobs = [(0, new_job()), (1, new_job())];
-    stores[0].fill_batch(batch.id, &jobs).await.unwrap();
+    begin(&*stores[0], &batch, [new_job(), new_job()]).await;
     // Somebody else takes it for abandoned and has begun to remove it.
     assert!(!stores[1].drop_batch(batch.id, 1).await.unwrap());
     let late = [(2, new_job())];
@@ -152,11 +136,7 @@ async fn each_job_is_claimed_and_ended_once_by_many(kind: StoreKind) {
             ended
         })
     });
-    let workers: Vec<_> = workers.collect();
-    let mut ended = Vec::new();
-    for worker in workers {
-        ended.extend(worker.await.unwrap());
-    }
+    let ended = try_join_all(workers).await.unwrap().concat();
     let distinct: HashSet<_> = ended.iter().collect();
     assert_eq!((ended.len(), distinct.len()), (60, 60));
 }

@@ -2,12 +2,10 @@
 
 use railhead::jobs::State;
 use railhead::jobs::model::Kind;
-use railhead::jobs::store::{
-    BatchBegun, Change, Filter, Membership, NewBatch, NewJob, QueueBounds, Total, Usage,
-};
+use railhead::jobs::store::{Change, Filter, Membership, NewBatch, NewJob, Total, Usage};
 use uuid::Uuid;
 
-use crate::store::{StoreKind, Table, conformance, failure, new_batch, new_job, success};
+use crate::store::*;
 
 conformance!(
     several_states_labels_and_words_of_the_name_are_found_page_by_page,
@@ -110,13 +108,8 @@ async fn a_search_that_finds_little_ends_its_page_and_goes_on_from_there(kind: S
     };
     let wanted = table.add(wanted).await.id;
     let batch = new_batch("anonymous", 20_500);
-    let none = |_| false;
-    let begun = table.store.begin_batch(&batch, &none, QueueBounds::NONE);
-    assert_eq!(begun.await.unwrap(), BatchBegun::Created);
-    let jobs: Vec<_> = (0..20_500).map(|index| (index, new_job())).collect();
-    for some in jobs.chunks(1_000) {
-        table.store.fill_batch(batch.id, some).await.unwrap();
-    }
+    let jobs = (0..20_500).map(|_| new_job());
+    begin(&*table.store, &batch, jobs).await;
     for states in [vec![], vec![State::Queued, State::Failed]] {
         let filter = Filter {
             name: Some("needle".to_owned()),
@@ -127,10 +120,7 @@ async fn a_search_that_finds_little_ends_its_page_and_goes_on_from_there(kind: S
         let first = list(None).await;
         assert!(first.entries.is_empty() && first.next_cursor.is_some());
         let second = list(filter.read_cursor(&first.next_cursor.unwrap())).await;
-        assert_eq!(
-            second.entries.iter().map(|job| job.id).collect::<Vec<_>>(),
-            [wanted]
-        );
+        assert_eq!(ids(&second.entries), [wanted]);
         assert_eq!(second.next_cursor, None);
     }
     let all = Filter {
@@ -218,12 +208,7 @@ async fn four_batches(table: &Table) -> Vec<Uuid> {
             labels: [("part".to_owned(), (number % 2).to_string())].into(),
             ..new_batch("anonymous", 2)
         };
-        store
-            .begin_batch(&new, &|_| false, QueueBounds::NONE)
-            .await
-            .unwrap();
-        let jobs = [(0, new_job()), (1, new_job())];
-        store.fill_batch(new.id, &jobs).await.unwrap();
+        begin(&**store, &new, [new_job(), new_job()]).await;
         if name != "unfinished" {
             store.complete_batch(new.id).await.unwrap();
         }

@@ -6,30 +6,20 @@ use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::SubmitOptions;
 use railhead::jobs::store::{
-    Claim, ClaimKind, ClaimRequest, Ending, Lease, Moment, NewJob, NewSlice, Reap, ReleaseReason,
+    Claim, ClaimKind, ClaimRequest, Ending, Moment, NewJob, NewSlice, Reap, ReleaseReason,
     SliceRecord, Store, StoredResult,
 };
 use railhead::jobs::{Failure, State};
 use uuid::Uuid;
 
-use crate::store::{
-    StoreKind, Table, claim_up_to, conformance, finish_one, new_job, queue_of, success,
-};
+use crate::store::*;
 
 /// Claims a job of which some slices are solved.
 async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
+    let queue = queue_of("anonymous");
     let request = ClaimRequest {
-        worker: "w",
-        queue: &queue_of("anonymous"),
         kind: ClaimKind::Begun,
-        jobs: 1,
-        cost_us: 1_000_000,
-        each_slice_us: None,
-        suspects: true,
-        waiting: 0,
-        lease: Lease { now, ms: 1000 },
-        now,
-        late_before: now,
+        ..request(&queue, 1, now)
     };
     store.claim(&request).await.unwrap().pop()
 }
@@ -179,6 +169,7 @@ async fn the_end_releases_slices(kind: StoreKind, end: &str) {
 /// Ends a claimed job in one of the ways there are.
 async fn end_it(store: &dyn Store, claim: &Claim, end: &str, created_at: i64) {
     let lost = || Ending::Failed(Failure::worker_lost(1));
+    let released = store.release(std::slice::from_ref(claim), ReleaseReason::NotBegun, 1);
     match end {
         "succeeded" => drop(finish_one(store, claim, &success(), 1).await.unwrap()),
         "failed" => drop(finish_one(store, claim, &lost(), 1).await.unwrap()),
@@ -188,18 +179,12 @@ async fn end_it(store: &dyn Store, claim: &Claim, end: &str, created_at: i64) {
                 .unwrap(),
         ),
         "cancelled queued" => {
-            store
-                .release(std::slice::from_ref(claim), ReleaseReason::NotBegun, 1)
-                .await
-                .unwrap();
+            released.await.unwrap();
             store.cancel("anonymous", claim.id, 2).await.unwrap();
         }
         "reaped" => drop(store.reap(Reap::Dead, 1, 1).await.unwrap()),
         _ => {
-            store
-                .release(std::slice::from_ref(claim), ReleaseReason::NotBegun, 1)
-                .await
-                .unwrap();
+            released.await.unwrap();
             let now = created_at + 2000;
             let moment = Moment {
                 now,

@@ -1,37 +1,18 @@
 //! In which order are jobs claimed, and what is held against them when their process dies?
 
-use railhead::jobs::model::{Kind, Queue};
+use railhead::jobs::model::Kind;
 use railhead::jobs::store::{
-    BatchBegun, ClaimKind, ClaimRequest, Enqueued, Lease, NewBatch, NewJob, QueueBounds, Reap,
-    Refusal, ReleaseReason,
+    BatchBegun, ClaimRequest, Enqueued, NewBatch, NewJob, QueueBounds, Reap, Refusal, ReleaseReason,
 };
 use railhead::jobs::{Filter, State, Total};
 
-use crate::store::{
-    StoreKind, Table, claim_up_to, conformance, new_batch, new_job, queue_of, success,
-};
+use crate::store::*;
 
 conformance!(
     a_bystander_of_a_dead_process_counts_no_attempt,
     a_job_that_was_longer_than_thought_is_known_as_long,
     jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together,
 );
-
-fn request(queue: &Queue) -> ClaimRequest<'_> {
-    ClaimRequest {
-        worker: "w",
-        queue,
-        jobs: 8,
-        cost_us: 200_000,
-        kind: ClaimKind::New,
-        each_slice_us: None,
-        suspects: true,
-        waiting: 0,
-        lease: Lease { now: 0, ms: 1000 },
-        now: 2,
-        late_before: 2,
-    }
-}
 
 async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
     let table = Table::new(kind).await;
@@ -52,7 +33,7 @@ async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
     let queue = queue_of("anonymous");
     let without = ClaimRequest {
         suspects: false,
-        ..request(&queue)
+        ..request(&queue, 8, 2)
     };
     assert_eq!(store.claim(&without).await.unwrap(), []);
     let beside = table.add(new_job()).await.id;
@@ -86,7 +67,7 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long(kind: StoreKind) {
     let queue = queue_of("anonymous");
     let request = |each_slice_us| ClaimRequest {
         each_slice_us,
-        ..request(&queue)
+        ..request(&queue, 8, 2)
     };
     assert!(
         store
@@ -107,10 +88,6 @@ async fn a_job_that_was_longer_than_thought_is_known_as_long(kind: StoreKind) {
 async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind: StoreKind) {
     let table = Table::new(kind).await;
     let store = &*table.store;
-    let bounds = QueueBounds {
-        tenant: 3,
-        ..QueueBounds::NONE
-    };
     let of_kind = |kind| NewJob { kind, ..new_job() };
     let none = |_| false;
     let run = NewBatch {
@@ -118,14 +95,17 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
         idempotency: Some(("key".to_owned(), [1; 32])),
         ..new_batch("anonymous", 2)
     };
-    let created = store.begin_batch(&run, &none, bounds).await.unwrap();
-    assert_eq!(created, BatchBegun::Created);
-    let chunks = [(0, of_kind(Kind::Rows)), (1, of_kind(Kind::Rows))];
-    store.fill_batch(run.id, &chunks).await.unwrap();
+    let chunks = [of_kind(Kind::Rows), of_kind(Kind::Rows)];
+    let chunk = chunks[0].id;
+    begin(store, &run, chunks).await;
     store.complete_batch(run.id).await.unwrap();
     let job = table.add(of_kind(Kind::Case)).await.id;
 
     // The quota is one for both.
+    let bounds = QueueBounds {
+        tenant: 3,
+        ..QueueBounds::NONE
+    };
     let refused = store.enqueue(&new_job(), bounds).await.unwrap();
     assert_eq!(refused, Enqueued::Refused(Refusal::Quota));
     assert_eq!(
@@ -135,12 +115,8 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
     // A chunk is no job for clients, and a run is no batch.
     let listed = store.list("anonymous", &Filter::default(), None, 9).await;
     let listed = listed.unwrap();
-    assert_eq!(
-        listed.entries.iter().map(|job| job.id).collect::<Vec<_>>(),
-        [job]
-    );
+    assert_eq!(ids(&listed.entries), [job]);
     assert_eq!(listed.total, Total::Exactly(1));
-    let chunk = chunks[0].1.id;
     assert_eq!(store.job("anonymous", chunk).await.unwrap(), None);
     assert_eq!(store.result("anonymous", chunk).await.unwrap(), None);
     assert_eq!(store.cancel("anonymous", chunk, 1).await.unwrap(), None);

@@ -11,11 +11,7 @@ use std::time::Duration;
 
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::solution::words::answer::{Fields, Solution};
 use railhead::jobs::clock::Clock;
-use railhead::jobs::engine::Engine;
-use railhead::jobs::{Jobs, Options};
 use reqwest::header::HeaderMap;
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
@@ -43,33 +39,6 @@ pub fn loaded(newtons: usize) -> Value {
     let mut case = case("one of many");
     case["load"]["normal_force_n"] = json!(newtons);
     case
-}
-
-/// Jobs on a data folder, solved by the given function.
-pub async fn jobs_with<F>(data_dir: &Path, solve: F) -> Jobs
-where
-    F: Fn(&CheckedCase, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
-        + Send
-        + Sync
-        + 'static,
-{
-    open(Options::new(data_dir), solve).await
-}
-
-/// Jobs with options of one's own, solved by the given function, each anew.
-pub async fn open<F>(options: Options, solve: F) -> Jobs
-where
-    F: Fn(&CheckedCase, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
-        + Send
-        + Sync
-        + 'static,
-{
-    let recipe = Engine::contact().solving(solve);
-    let options = Options {
-        cache: false,
-        ..options
-    };
-    Jobs::open_with(options, recipe).await.unwrap()
 }
 
 /// An answer. `json` is null where the body is not JSON.
@@ -143,13 +112,15 @@ pub struct Service {
     address: SocketAddr,
     log: Arc<Mutex<Vec<Value>>>,
     client: reqwest::Client,
+    /// A data folder that goes with it.
+    _folder: Option<TempDir>,
 }
 
 impl Service {
     /// Starts `railhead serve` on a data folder and returns when it listens.
     pub fn start(data_dir: &Path, flags: &[&str]) -> Service {
         let mut program = railhead();
-        Service::spawn(&mut program, "serve", data_dir, flags)
+        Service::spawn(&mut program, "serve", (data_dir, None), flags)
     }
 
     /// Starts `railhead serve` on a data folder of its own.
@@ -159,10 +130,12 @@ impl Service {
         (folder, service)
     }
 
-    /// Starts `railhead worker` and returns when it can be asked how it is.
+    /// A program as it was prepared, `serve` or `worker`, on a data folder that goes with it.
     #[cfg(feature = "cluster")]
-    pub fn start_worker(data_dir: &Path, flags: &[&str]) -> Service {
-        Service::spawn(&mut railhead(), "worker", data_dir, flags)
+    pub fn alone(program: &mut Command, role: &str, flags: &[&str]) -> Service {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().to_owned();
+        Service::spawn(program, role, (&path, Some(folder)), flags)
     }
 
     /// The same, by a program that is given the real one and its flags.
@@ -171,15 +144,20 @@ impl Service {
             program.env_remove(name);
         }
         program.arg(env!("CARGO_BIN_EXE_railhead"));
-        Service::spawn(program, "serve", data_dir, flags)
+        Service::spawn(program, "serve", (data_dir, None), flags)
     }
 
     /// The real program as it was prepared, `serve` or `worker`.
     pub fn start_as(program: &mut Command, role: &str, data_dir: &Path, flags: &[&str]) -> Service {
-        Service::spawn(program, role, data_dir, flags)
+        Service::spawn(program, role, (data_dir, None), flags)
     }
 
-    fn spawn(program: &mut Command, role: &str, data_dir: &Path, flags: &[&str]) -> Service {
+    fn spawn(
+        program: &mut Command,
+        role: &str,
+        (data_dir, folder): (&Path, Option<TempDir>),
+        flags: &[&str],
+    ) -> Service {
         let mut child = program
             .args([role, "--log-format", "json"])
             .env("RAILHEAD_LISTEN", "127.0.0.1:0")
@@ -216,6 +194,7 @@ impl Service {
             address,
             log,
             client: reqwest::Client::new(),
+            _folder: folder,
         }
     }
 
@@ -306,6 +285,13 @@ impl Service {
                 .unwrap()
                 .success()
         );
+    }
+
+    /// Ends it in good order.
+    pub async fn stop(self) {
+        self.signal("TERM");
+        let status = tokio::task::spawn_blocking(|| self.wait());
+        assert!(status.await.unwrap().success());
     }
 
     /// Waits until it has ended by itself.

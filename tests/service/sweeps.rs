@@ -1,7 +1,7 @@
 //! Do long sweeps go on where their last slice ended, whatever ends the process, and give the same answer?
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use railhead::contact;
@@ -9,15 +9,14 @@ use railhead::contact::case::solver::Limits;
 use railhead::contact::monitor::{Monitor, Unmonitored};
 use railhead::contact::solution::words::answer::{PatchFields, Solution};
 use railhead::jobs::engine::Engine;
-use railhead::jobs::{FailureKind, Jobs, Options, State};
+use railhead::jobs::{FailureKind, Options, State};
 use serde_json::{Value, json};
 use uuid::Uuid;
 
-use crate::batches::small;
+use crate::batches::small_loaded;
+use crate::lab::{Gate, Lab};
 use crate::store::open_beside;
 use crate::support::{Service, files_below, long_case, pause};
-
-const AT_MOST: Duration = Duration::from_secs(60);
 
 /// Slow by its estimate, and so cut into slices; fast in truth, since everything slips.
 pub fn sliced_case(name: &str, motions: u32) -> Value {
@@ -32,53 +31,40 @@ pub fn sliced_case(name: &str, motions: u32) -> Value {
 /// A service whose solver cuts every sweep after each second motion, counts slices, and holds the slices of a case named
 /// `held` beyond the first two until it is let go.
 struct Shop {
+    lab: Lab,
     solved: Arc<AtomicUsize>,
-    let_go: Arc<AtomicBool>,
-    folder: tempfile::TempDir,
 }
 
 impl Shop {
-    fn new() -> Shop {
-        Shop {
-            solved: Arc::default(),
-            let_go: Arc::default(),
-            folder: tempfile::tempdir().unwrap(),
-        }
-    }
-
-    /// Opens the service, once more if it was open before.
-    async fn open(&self, change: impl FnOnce(&mut Options)) -> Jobs {
+    async fn open(change: impl FnOnce(&mut Options)) -> Shop {
         let real = Engine::contact();
-        let (solved, go) = (self.solved.clone(), self.let_go.clone());
-        let recipe = Engine {
+        let (solved, gate) = (Arc::<AtomicUsize>::default(), Gate::default());
+        let (count, holds) = (solved.clone(), gate.clone());
+        let engine = Engine {
             slices: Arc::new(|checked| {
                 let motions = checked.problem.motions.len();
                 let cuts = (0..motions).step_by(2);
                 cuts.map(|from| from..(from + 2).min(motions)).collect()
             }),
             solve: Arc::new(move |checked, slice, monitor: &dyn Monitor| {
-                let held = checked.label.name.as_deref() == Some("held") && slice.start >= 4;
-                while held && !go.load(Ordering::SeqCst) {
-                    if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.3) {
-                        return Err(stop.into());
-                    }
-                    std::thread::sleep(Duration::from_millis(1));
+                if checked.label.name.as_deref() == Some("held") && slice.start >= 4 {
+                    holds.hold(monitor)?;
                 }
                 let answer = (real.solve)(checked, slice, monitor)?;
-                solved.fetch_add(1, Ordering::SeqCst);
+                count.fetch_add(1, Ordering::SeqCst);
                 Ok(answer)
             }),
             ..Engine::contact()
         };
-        let mut options = Options {
-            slice: Duration::from_millis(10),
+        let own = |options: &mut Options| {
+            options.slice = Duration::from_millis(10);
             // Some parts lie in the table, others outside it.
-            small_result_max_bytes: 4000,
-            cache: false,
-            ..Options::new(self.folder.path())
+            options.small_result_max_bytes = 4000;
+            change(options);
         };
-        change(&mut options);
-        Jobs::open_with(options, recipe).await.unwrap()
+        let lab = Lab::of(gate, engine, own).await;
+        lab.jobs.start().unwrap();
+        Shop { lab, solved }
     }
 
     fn solved(&self) -> usize {
@@ -87,7 +73,19 @@ impl Shop {
 
     /// Files of stored results.
     fn files(&self) -> usize {
-        files_below(&self.folder.path().join("results")).len()
+        files_below(&self.lab.folder.path().join("results")).len()
+    }
+
+    async fn until_slices(&self, id: Uuid, done: f64) {
+        while self.lab.get(id).await.progress < done {
+            tokio::time::sleep(Duration::from_millis(2)).await;
+        }
+    }
+
+    async fn answer(&self, id: Uuid) -> (Value, PatchFields) {
+        let fields = self.lab.jobs.patch_fields(id, 0).await.unwrap();
+        let solution = self.lab.jobs.solution(id).await.unwrap();
+        (timeless(solution), fields)
     }
 }
 
@@ -99,12 +97,6 @@ fn sweep(name: &str, motions: u32) -> Value {
     sweep
 }
 
-async fn until_slices(jobs: &Jobs, id: Uuid, done: f64) {
-    while jobs.get(id).await.unwrap().progress < done {
-        tokio::time::sleep(Duration::from_millis(2)).await;
-    }
-}
-
 /// An answer without its times.
 fn timeless(mut solution: Solution) -> Value {
     let patches = solution.patches.iter_mut();
@@ -114,129 +106,111 @@ fn timeless(mut solution: Solution) -> Value {
     serde_json::to_value(solution).unwrap()
 }
 
-async fn answer(jobs: &Jobs, id: Uuid) -> (Value, PatchFields) {
-    let fields = jobs.patch_fields(id, 0).await.unwrap();
-    (timeless(jobs.solution(id).await.unwrap()), fields)
-}
-
 #[tokio::test]
 async fn a_sweep_goes_on_after_a_restart_and_solves_no_slice_twice() {
-    let shop = Shop::new();
-    let jobs = shop.open(|_| {}).await;
-    jobs.start().unwrap();
-    let whole = jobs.submit(sweep("whole", 11), None).await.unwrap().id;
-    let job = jobs.wait(whole, AT_MOST).await.unwrap();
-    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    let mut shop = Shop::open(|_| {}).await;
+    let whole = shop.lab.submit(sweep("whole", 11)).await;
+    shop.lab.succeeds_at_once(whole).await;
     assert_eq!(shop.solved(), 6);
-    jobs.sweep_expired().await.unwrap();
+    shop.lab.jobs.sweep_expired().await.unwrap();
     let files = shop.files();
-    let expected = answer(&jobs, whole).await;
+    let expected = shop.answer(whole).await;
 
-    let held = jobs.submit(sweep("held", 11), None).await.unwrap().id;
-    until_slices(&jobs, held, 4.0 / 11.0).await;
-    jobs.shutdown(Duration::ZERO).await;
+    let held = shop.lab.submit(sweep("held", 11)).await;
+    shop.until_slices(held, 4.0 / 11.0).await;
+    shop.lab.jobs.shutdown(Duration::ZERO).await;
     assert_eq!(
         shop.files(),
         files + 2 * 2,
         "two parts lie outside the table"
     );
     assert_eq!(shop.solved(), 6 + 2);
-    shop.let_go.store(true, Ordering::SeqCst);
-    let jobs = shop.open(|_| {}).await;
-    let job = jobs.get(held).await.unwrap();
+    shop.lab.gate.set_open(true);
+    shop.lab.reopen(Duration::ZERO).await;
+    let job = shop.lab.get(held).await;
     assert_eq!((job.state, job.attempt), (State::Queued, 0));
     assert!(
         (job.progress - 4.0 / 11.0).abs() < 1e-12,
         "{}",
         job.progress
     );
-    jobs.start().unwrap();
-    let job = jobs.wait(held, AT_MOST).await.unwrap();
-    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    shop.lab.jobs.start().unwrap();
+    shop.lab.succeeds_at_once(held).await;
     assert_eq!(shop.solved(), 12, "two slices were there already");
-    let mut found = answer(&jobs, held).await;
+    let mut found = shop.answer(held).await;
     // The name is part of the question and not of the answer; everything else is.
     assert_eq!(found.0["patches"], expected.0["patches"]);
     found.0["case_digest"] = expected.0["case_digest"].clone();
     assert_eq!(found, expected);
-    jobs.sweep_expired().await.unwrap();
+    shop.lab.jobs.sweep_expired().await.unwrap();
     assert_eq!(shop.files(), 2 * files, "parts go with the whole");
-    jobs.shutdown(Duration::from_secs(10)).await;
+    shop.lab.end().await;
 }
 
 #[tokio::test]
 async fn a_sweep_that_ends_before_its_time_leaves_no_parts() {
-    let shop = Shop::new();
-    let jobs = shop.open(|_| {}).await;
-    jobs.start().unwrap();
+    let shop = Shop::open(|_| {}).await;
     for ends_by_itself in [false, true] {
         let options = railhead::jobs::model::SubmitOptions {
             ends_within: ends_by_itself.then_some(Duration::from_secs(1)),
             ..Default::default()
         };
-        let submitted = jobs.submit_with(sweep("held", 11), options.into()).await;
+        let submitted = shop
+            .lab
+            .jobs
+            .submit_with(sweep("held", 11), options.into())
+            .await;
         let id = submitted.unwrap().0.id;
         if !ends_by_itself {
-            until_slices(&jobs, id, 0.3).await;
+            shop.until_slices(id, 0.3).await;
             assert!(shop.files() > 0);
-            jobs.cancel(id).await.unwrap();
+            shop.lab.jobs.cancel(id).await.unwrap();
         }
-        let job = jobs.wait(id, AT_MOST).await.unwrap();
+        let job = shop.lab.wait(id).await;
         let expected = match ends_by_itself {
             true => State::Failed,
             false => State::Cancelled,
         };
         assert_eq!(job.state, expected, "{:?}", job.failure);
     }
-    jobs.sweep_expired().await.unwrap();
+    shop.lab.jobs.sweep_expired().await.unwrap();
     assert_eq!(shop.files(), 0);
-    jobs.shutdown(Duration::from_secs(10)).await;
+    shop.lab.end().await;
 }
 
 #[tokio::test]
 async fn the_time_limit_counts_every_slice_and_every_process() {
-    let shop = Shop::new();
-    let limit = |options: &mut Options| options.time_limit = Duration::from_millis(600);
-    let jobs = shop.open(limit).await;
-    jobs.start().unwrap();
-    let id = jobs.submit(sweep("held", 11), None).await.unwrap().id;
-    until_slices(&jobs, id, 4.0 / 11.0).await;
-    let about = open_beside(shop.folder.path()).await;
+    let limit = Duration::from_millis(600);
+    let mut shop = Shop::open(|options| options.time_limit = limit).await;
+    let id = shop.lab.submit(sweep("held", 11)).await;
+    shop.until_slices(id, 4.0 / 11.0).await;
+    let about = open_beside(shop.lab.folder.path()).await;
     let spent = about.slices(id).await.unwrap()[1].spent;
-    assert!(
-        spent > Duration::ZERO && spent < Duration::from_millis(600),
-        "{spent:?}"
-    );
-    jobs.shutdown(Duration::ZERO).await;
+    assert!(spent > Duration::ZERO && spent < limit, "{spent:?}");
     // A limit that is used up by what the first process has stored.
-    let used_up = |options: &mut Options| options.time_limit = spent;
-    let jobs = shop.open(used_up).await;
-    shop.let_go.store(true, Ordering::SeqCst);
-    jobs.start().unwrap();
-    let job = jobs.wait(id, AT_MOST).await.unwrap();
+    shop.lab.options.time_limit = spent;
+    shop.lab.reopen(Duration::ZERO).await;
+    shop.lab.gate.set_open(true);
+    shop.lab.jobs.start().unwrap();
+    let job = shop.lab.wait(id).await;
     let failure = job.failure.unwrap();
     assert_eq!(failure.kind, FailureKind::OutOfTime);
     assert!(failure.detail.contains("4 of 11"), "{}", failure.detail);
     assert_eq!(shop.solved(), 2);
-    jobs.shutdown(Duration::from_secs(10)).await;
+    shop.lab.end().await;
 }
 
 #[tokio::test]
 async fn short_jobs_pass_a_sweep_at_its_cuts_and_it_still_goes_on() {
-    let shop = Shop::new();
-    let jobs = shop
-        .open(|options| options.slice = Duration::from_micros(1))
-        .await;
-    jobs.start().unwrap();
-    let long = jobs.submit(sweep("long", 400), None).await.unwrap().id;
-    until_slices(&jobs, long, 1e-6).await;
+    let shop = Shop::open(|options| options.slice = Duration::from_micros(1)).await;
+    let long = shop.lab.submit(sweep("long", 400)).await;
+    shop.until_slices(long, 1e-6).await;
     let (mut passed, mut progress) = (0, Vec::new());
     for number in 0..20 {
-        let mut short = small("short");
-        short["load"]["normal_force_n"] = json!(50_000 + number);
-        let id = jobs.submit(short, None).await.unwrap().id;
-        jobs.wait(id, AT_MOST).await.unwrap();
-        let job = jobs.get(long).await.unwrap();
+        let short = small_loaded("short", 50_000 + number);
+        let id = shop.lab.submit(short).await;
+        shop.lab.wait(id).await;
+        let job = shop.lab.get(long).await;
         passed += usize::from(!job.state.ended());
         progress.push(job.progress);
     }
@@ -245,28 +219,23 @@ async fn short_jobs_pass_a_sweep_at_its_cuts_and_it_still_goes_on() {
         progress.is_sorted() && progress[0] < progress[19],
         "{progress:?}"
     );
-    let job = jobs.wait(long, AT_MOST).await.unwrap();
-    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+    shop.lab.succeeds_at_once(long).await;
     assert!(shop.solved() >= 200 + 20);
-    jobs.shutdown(Duration::from_secs(10)).await;
+    shop.lab.end().await;
 }
 
 #[tokio::test]
 async fn parts_that_cannot_be_read_are_solved_again() {
-    let shop = Shop::new();
-    let jobs = shop
-        .open(|options| options.small_result_max_bytes = 0)
-        .await;
-    jobs.start().unwrap();
-    let id = jobs.submit(sweep("held", 7), None).await.unwrap().id;
-    until_slices(&jobs, id, 4.0 / 7.0).await;
-    std::fs::remove_dir_all(shop.folder.path().join("results")).unwrap();
-    shop.let_go.store(true, Ordering::SeqCst);
-    let job = jobs.wait(id, AT_MOST).await.unwrap();
+    let shop = Shop::open(|options| options.small_result_max_bytes = 0).await;
+    let id = shop.lab.submit(sweep("held", 7)).await;
+    shop.until_slices(id, 4.0 / 7.0).await;
+    std::fs::remove_dir_all(shop.lab.folder.path().join("results")).unwrap();
+    shop.lab.gate.set_open(true);
+    let job = shop.lab.wait(id).await;
     assert_eq!(job.state, State::Succeeded);
     assert_eq!(shop.solved(), 4 + 4);
-    assert_eq!(jobs.solution(id).await.unwrap().total.len(), 7);
-    jobs.shutdown(Duration::from_secs(10)).await;
+    assert_eq!(shop.lab.jobs.solution(id).await.unwrap().total.len(), 7);
+    shop.lab.end().await;
 }
 
 /// The answer of a job without its times.

@@ -10,6 +10,7 @@ use reqwest::Body;
 use serde_json::{Value, json};
 
 use crate::batches::results;
+use crate::csv_table::Csv;
 use crate::errors::assert_problem;
 use crate::evaluate::npz;
 use crate::runs::{columns, ended, template};
@@ -151,22 +152,15 @@ fn lines_of(format: &str, answer: &Answer) -> Vec<Value> {
     let lines: Vec<Value> = match format {
         "ndjson" => answer.lines(),
         "csv" => {
-            let mut reader = csv::Reader::from_reader(answer.text.as_bytes());
-            let names: Vec<String> = reader
-                .headers()
-                .expect("names")
-                .iter()
-                .map(Into::into)
-                .collect();
-            let lines = reader.records().map(|record| {
-                let record = record.expect("a line");
-                let cells = record.iter().map(|cell| match cell {
+            let table = Csv::read(&answer.text);
+            let lines = table.rows.iter().map(|row| {
+                let cells = row.iter().map(|cell| match cell.as_str() {
                     "" => Value::Null,
                     cell => cell
                         .parse::<f64>()
                         .map_or_else(|_| json!(cell), |number| json!(number)),
                 });
-                names.iter().cloned().zip(cells).collect()
+                table.head.iter().cloned().zip(cells).collect()
             });
             lines.collect()
         }

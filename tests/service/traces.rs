@@ -15,7 +15,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::server::link;
-use crate::support::{Service, case, endless_case};
+use crate::support::{Answer, Service, case, endless_case, loaded};
 
 /// A collector of spans, as OTLP over HTTP has it.
 struct Collector {
@@ -85,21 +85,10 @@ fn told(span: &Span, key: &str) -> String {
 
 /// Sends a body inside a trace; the flags say whether the trace is wanted.
 async fn send(service: &Service, path: &str, body: &Value, trace: &str, flags: &str) -> Value {
-    let request = service.request(Method::POST, path);
-    let request = request.header(
-        "traceparent",
-        format!("00-{trace}-00f067aa0ba902b7-{flags}"),
-    );
-    let request = request.header("prefer", "wait=60").json(body);
-    let answer = request.send().await.unwrap();
-    assert!(answer.status().is_success(), "{}", answer.status());
-    answer.json().await.unwrap()
-}
-
-async fn stop(service: Service) {
-    service.signal("TERM");
-    let status = tokio::task::spawn_blocking(move || service.wait());
-    assert!(status.await.unwrap().success());
+    let request = service.request(Method::POST, path).json(body);
+    let parent = format!("00-{trace}-00f067aa0ba902b7-{flags}");
+    let request = request.header("traceparent", parent);
+    Answer::to(request).await.json
 }
 
 const TRACE: &str = "4bf92f3577b34da6a3ce929d0e0e4736";
@@ -109,16 +98,14 @@ const OTHER: &str = "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa";
 async fn a_job_is_one_trace_from_its_submission_to_its_stored_result() {
     let collector = Collector::start().await;
     let (_folder, service) = Service::fresh(&["--otlp-endpoint", &collector.endpoint()]);
-    let job = send(&service, "/v1/jobs", &case("traced"), TRACE, "01").await;
+    let job = send(&service, "/v1/jobs?wait=60", &case("traced"), TRACE, "01").await;
     assert_eq!(job["state"], "succeeded");
-    let mut other = case("not wanted");
-    other["load"]["normal_force_n"] = json!(90_000);
-    send(&service, "/v1/jobs", &other, OTHER, "00").await;
+    send(&service, "/v1/jobs?wait=60", &loaded(90_000), OTHER, "00").await;
     assert!(
         service.log_text().contains(TRACE),
         "the log names the trace"
     );
-    stop(service).await;
+    service.stop().await;
 
     let spans = collector.trace(TRACE);
     let request = "POST /v1/jobs";
@@ -161,10 +148,9 @@ async fn cases_of_a_batch_belong_to_its_trace() {
     let cases = json!([case("first"), unsolvable]);
     let batch = send(&service, "/v1/batches", &cases, TRACE, "01").await;
     let results = link(&batch, "results");
-    let results = service.request(Method::GET, &format!("{results}?wait=60"));
-    let results = results.send().await.unwrap().text().await.unwrap();
+    let results = service.ask(&format!("{results}?wait=60")).await.text;
     assert_eq!(results.lines().count(), 2, "{results}");
-    stop(service).await;
+    service.stop().await;
 
     let spans = collector.trace(TRACE);
     for (name, count) in [("submit", 1), ("queue", 2), ("solve", 2), ("store", 2)] {
@@ -193,10 +179,7 @@ async fn a_trace_goes_on_in_the_process_that_solves_the_job() {
     let folder = tempfile::tempdir().unwrap();
     let collected = ["--workers", "1", "--otlp-endpoint", &collector.endpoint()];
     let submit = async |service: &Service, case: &Value, trace: &str| {
-        let request = service.request(Method::POST, "/v1/jobs");
-        let parent = format!("00-{trace}-00f067aa0ba902b7-01");
-        let answer = request.header("traceparent", parent).json(case).send();
-        let job: Value = answer.await.unwrap().json().await.unwrap();
+        let job = send(service, "/v1/jobs", case, trace, "01").await;
         job["id"].as_str().unwrap().to_owned()
     };
     let service = Service::start(folder.path(), &["--workers", "1"]);
@@ -206,16 +189,14 @@ async fn a_trace_goes_on_in_the_process_that_solves_the_job() {
     let untraced = submit(&service, &case("while nobody collected"), OTHER).await;
     service.kill();
     let service = Service::start(folder.path(), &collected);
-    let mut other = case("while somebody collected");
-    other["load"]["normal_force_n"] = json!(90_000);
-    let traced = submit(&service, &other, TRACE).await;
+    let traced = submit(&service, &loaded(90_000), TRACE).await;
     service.kill();
 
     let service = Service::start(folder.path(), &collected);
     service.cancel(&ahead).await;
     service.until(&untraced, "succeeded").await;
     service.until(&traced, "succeeded").await;
-    stop(service).await;
+    service.stop().await;
     // The process that died took its own spans with it.
     let spans = collector.trace(TRACE);
     let last = &spans[spans.len().saturating_sub(3)..];
@@ -236,7 +217,14 @@ async fn a_collector_that_is_not_there_holds_up_nothing() {
     let folder = tempfile::tempdir().unwrap();
     // Port 9 takes what it is sent and says nothing, or is closed.
     let service = Service::start(folder.path(), &["--otlp-endpoint", "http://127.0.0.1:9"]);
-    let job = send(&service, "/v1/jobs", &case("traced in vain"), TRACE, "01").await;
+    let job = send(
+        &service,
+        "/v1/jobs?wait=60",
+        &case("traced in vain"),
+        TRACE,
+        "01",
+    )
+    .await;
     assert_eq!(job["state"], "succeeded");
-    stop(service).await;
+    service.stop().await;
 }

@@ -1,287 +1,172 @@
 //! Are short jobs served beside long solves, and is the job found that has killed a process?
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
-use railhead::contact::solve;
+use railhead::jobs::clock::Clock;
+use railhead::jobs::model::SubmitOptions;
 use railhead::jobs::store::Reap;
-use railhead::jobs::{Jobs, Options, State};
+use railhead::jobs::{Options, State};
 use serde_json::json;
+use uuid::Uuid;
 
-use crate::batches::small;
+use crate::batches::{small, small_loaded};
+use crate::lab::{AT_MOST, Lab};
 use crate::store::{claim_up_to, open_beside};
-use crate::support::{case, open};
+use crate::support::{case, endless_case};
 
-const AT_MOST: Duration = Duration::from_secs(60);
-
-/// A service with one worker and short slices, on which a case named `long` ticks until it is let go.
-struct Shop {
-    jobs: Jobs,
-    let_go: Arc<AtomicBool>,
-    /// Solvers at work at this moment, and the most there ever were.
-    working: Arc<[AtomicUsize; 2]>,
-    folder: tempfile::TempDir,
-}
-
-async fn shop(change: impl FnOnce(&mut Options)) -> Shop {
-    let folder = tempfile::tempdir().unwrap();
-    let let_go = Arc::new(AtomicBool::new(false));
-    let working = Arc::new([AtomicUsize::new(0), AtomicUsize::new(0)]);
-    let mut options = Options {
-        slice: Duration::from_millis(20),
-        ..Options::new(folder.path())
+/// A service with one worker and short slices.
+async fn lab(change: impl FnOnce(&mut Options)) -> Lab {
+    let short = |options: &mut Options| {
+        options.slice = Duration::from_millis(20);
+        change(options);
     };
-    change(&mut options);
-    let (go, count) = (let_go.clone(), working.clone());
-    let jobs = open(options, move |case, monitor| {
-        while case
-            .label
-            .name
-            .as_deref()
-            .is_some_and(|name| name.starts_with("long"))
-        {
-            if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.5) {
-                return Err(stop.into());
-            }
-            let now = count[0].fetch_add(1, Ordering::SeqCst) + 1;
-            count[1].fetch_max(now, Ordering::SeqCst);
-            std::thread::sleep(Duration::from_millis(1));
-            count[0].fetch_sub(1, Ordering::SeqCst);
-            if go.load(Ordering::SeqCst) {
-                break;
-            }
-        }
-        solve(case, monitor)
-    })
-    .await;
-    Shop {
-        jobs,
-        let_go,
-        working,
-        folder,
-    }
+    Lab::idle(short).await
 }
 
-/// Waits until a job runs.
-async fn until_running(jobs: &Jobs, id: uuid::Uuid) {
-    while jobs.get(id).await.unwrap().state != State::Running {
+/// Submits so many long cases.
+async fn submit_long(lab: &Lab, count: usize) -> Vec<Uuid> {
+    let mut ids = Vec::new();
+    for number in 0..count {
+        ids.push(lab.submit(case(&format!("long {number}"))).await);
+    }
+    ids
+}
+
+async fn until_running(lab: &Lab, id: Uuid) {
+    while lab.get(id).await.state != State::Running {
         tokio::time::sleep(Duration::from_millis(2)).await;
     }
 }
 
 #[tokio::test]
 async fn short_jobs_are_served_beside_a_long_solve_which_goes_on() {
-    let shop = shop(|_| {}).await;
-    let jobs = &shop.jobs;
-    jobs.start().unwrap();
-    let long = jobs.submit(case("long"), None).await.unwrap().id;
-    until_running(jobs, long).await;
+    let lab = lab(|_| {}).await;
+    lab.jobs.start().unwrap();
+    let long = lab.begin(case("long")).await;
     for round in 0..5 {
-        let mut short = small("short");
-        short["load"]["normal_force_n"] = json!(50_000 + round);
-        let id = jobs.submit(short, None).await.unwrap().id;
-        let job = jobs.wait(id, AT_MOST).await.unwrap();
-        assert_eq!(job.state, State::Succeeded);
-        assert_eq!(jobs.get(long).await.unwrap().state, State::Running);
+        let id = lab.submit(small_loaded("short", 50_000 + round)).await;
+        assert_eq!(lab.wait(id).await.state, State::Succeeded);
+        assert_eq!(lab.get(long).await.state, State::Running);
     }
-    let other = jobs.of("other".into());
-    let theirs = other
-        .submit(small("another tenant's"), None)
-        .await
-        .unwrap()
-        .id;
-    let job = other.wait(theirs, AT_MOST).await.unwrap();
+    let other = lab.jobs.of("other".into());
+    let theirs = other.submit(small("another tenant's"), None).await;
+    let job = other.wait(theirs.unwrap().id, AT_MOST).await.unwrap();
     assert_eq!(job.state, State::Succeeded);
-    shop.let_go.store(true, Ordering::SeqCst);
-    let job = jobs.wait(long, AT_MOST).await.unwrap();
-    assert_eq!(
-        (job.state, job.attempt),
-        (State::Succeeded, 1),
-        "it was not begun again"
-    );
-    jobs.shutdown(Duration::from_secs(10)).await;
+    lab.gate.set_open(true);
+    // It was not begun again.
+    lab.succeeds_at_once(long).await;
+    lab.end().await;
 }
 
 #[tokio::test]
 async fn a_process_without_workers_solves_nothing() {
-    let shop = shop(|options| options.workers = 0).await;
-    let jobs = &shop.jobs;
-    jobs.start().unwrap();
-    let id = jobs.submit(small("short"), None).await.unwrap().id;
-    let job = jobs.wait(id, Duration::from_millis(500)).await.unwrap();
+    let lab = Lab::start(|options| options.workers = 0).await;
+    let id = lab.submit(small("short")).await;
+    let job = lab.jobs.wait(id, Duration::from_millis(500)).await.unwrap();
     assert_eq!((job.state, job.attempt), (State::Queued, 0));
-    jobs.shutdown(Duration::ZERO).await;
+    lab.end().await;
 }
 
 #[tokio::test]
 async fn beside_a_long_solve_jobs_that_turn_out_to_be_long_go_back() {
-    let shop = shop(|_| {}).await;
-    let jobs = &shop.jobs;
-    let mut ids = Vec::new();
-    for number in 0..6 {
-        ids.push(
-            jobs.submit(case(&format!("long {number}")), None)
-                .await
-                .unwrap()
-                .id,
-        );
-    }
-    let last = jobs.submit(small("short"), None).await.unwrap().id;
-    jobs.start().unwrap();
-    let job = jobs.wait(last, AT_MOST).await.unwrap();
-    assert_eq!(job.state, State::Succeeded);
+    let lab = lab(|_| {}).await;
+    let mut ids = submit_long(&lab, 6).await;
+    let last = lab.submit(small("short")).await;
+    lab.jobs.start().unwrap();
+    assert_eq!(lab.wait(last).await.state, State::Succeeded);
     // One can be cancelled wherever it is.
-    jobs.cancel(ids[1]).await.unwrap();
-    let job = jobs.wait(ids[1], AT_MOST).await.unwrap();
-    assert_eq!(job.state, State::Cancelled);
-    shop.let_go.store(true, Ordering::SeqCst);
+    let cancelled = ids.remove(1);
+    lab.jobs.cancel(cancelled).await.unwrap();
+    assert_eq!(lab.wait(cancelled).await.state, State::Cancelled);
+    lab.gate.set_open(true);
     for id in ids {
-        let job = jobs.wait(id, AT_MOST).await.unwrap();
-        if job.state != State::Cancelled {
-            assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
-        }
+        lab.succeeds_at_once(id).await;
     }
-    let most = shop.working[1].load(Ordering::SeqCst);
-    assert_eq!(most, 2, "one worker and the spare one");
-    jobs.shutdown(Duration::from_secs(10)).await;
+    assert_eq!(lab.gate.most(), 2, "one worker and the spare one");
+    lab.end().await;
 }
 
 #[tokio::test]
 async fn long_solves_are_handed_back_at_the_end() {
-    let shop = shop(|options| options.workers = 2).await;
-    let jobs = &shop.jobs;
-    jobs.start().unwrap();
-    let mut ids = Vec::new();
-    for number in 0..2 {
-        ids.push(
-            jobs.submit(case(&format!("long {number}")), None)
-                .await
-                .unwrap()
-                .id,
-        );
-    }
+    let mut lab = lab(|options| options.workers = 2).await;
+    lab.jobs.start().unwrap();
+    let ids = submit_long(&lab, 2).await;
     for id in &ids {
-        until_running(jobs, *id).await;
+        until_running(&lab, *id).await;
     }
-    jobs.shutdown(Duration::from_millis(50)).await;
-    let again = Jobs::open(Options::new(shop.folder.path())).await.unwrap();
+    lab.reopen(Duration::from_millis(50)).await;
     for id in ids {
-        let job = again.get(id).await.unwrap();
+        let job = lab.get(id).await;
         assert_eq!((job.state, job.attempt), (State::Queued, 0));
     }
 }
 
 #[tokio::test]
 async fn suspects_are_solved_one_after_the_other_and_hold_nobody_up() {
-    let shop = shop(|options| options.workers = 3).await;
-    let jobs = &shop.jobs;
-    let store = open_beside(shop.folder.path()).await;
-    let mut ids = Vec::new();
-    for number in 0..3 {
-        ids.push(
-            jobs.submit(case(&format!("long {number}")), None)
-                .await
-                .unwrap()
-                .id,
-        );
-    }
+    let lab = lab(|options| options.workers = 3).await;
+    let store = open_beside(lab.folder.path()).await;
+    let ids = submit_long(&lab, 3).await;
     for _ in 0..3 {
         claim_up_to(&*store, 0, 1000, 1).await;
     }
     store.reap(Reap::Dead, 1, 5).await.unwrap();
-    let beside = jobs.submit(small("beside them"), None).await.unwrap().id;
-    jobs.start().unwrap();
-    let job = jobs.wait(beside, AT_MOST).await.unwrap();
-    assert_eq!(job.state, State::Succeeded);
-    until_running(jobs, ids[0]).await;
+    let beside = lab.submit(small("beside them")).await;
+    lab.jobs.start().unwrap();
+    assert_eq!(lab.wait(beside).await.state, State::Succeeded);
+    until_running(&lab, ids[0]).await;
     tokio::time::sleep(Duration::from_millis(200)).await;
-    shop.let_go.store(true, Ordering::SeqCst);
+    lab.gate.set_open(true);
     for id in ids {
-        let job = jobs.wait(id, AT_MOST).await.unwrap();
-        assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
+        lab.succeeds_at_once(id).await;
     }
-    assert_eq!(shop.working[1].load(Ordering::SeqCst), 1);
-    jobs.shutdown(Duration::from_secs(10)).await;
+    assert_eq!(lab.gate.most(), 1);
+    lab.end().await;
 }
 
 #[tokio::test]
 async fn the_time_limit_of_the_operator_holds_for_every_case() {
-    let shop = shop(|options| options.time_limit = Duration::from_millis(1)).await;
-    let mut greedy = crate::support::endless_case("asks for more");
-    greedy["solver"]["time_limit_s"] = serde_json::json!(3600);
-    let mut ids = Vec::new();
-    for case in [crate::support::endless_case("no limit of its own"), greedy] {
-        ids.push(shop.jobs.submit(case, None).await.unwrap().id);
+    let lab = Lab::start(|options| options.time_limit = Duration::from_millis(1)).await;
+    let mut greedy = endless_case("asks for more");
+    greedy["solver"]["time_limit_s"] = json!(3600);
+    for case in [endless_case("no limit of its own"), greedy] {
+        let id = lab.submit(case).await;
+        let failure = lab.wait(id).await.failure.unwrap();
+        assert_eq!(failure.kind.name(), "out_of_time");
     }
-    shop.jobs.start().unwrap();
-    for id in ids {
-        let job = shop.jobs.wait(id, AT_MOST).await.unwrap();
-        assert_eq!(job.failure.unwrap().kind.name(), "out_of_time");
-    }
-    shop.jobs.shutdown(Duration::from_secs(10)).await;
+    lab.end().await;
 }
 
 #[tokio::test]
 async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
-    let folder = tempfile::tempdir().unwrap();
-    let set = Arc::new(std::sync::atomic::AtomicI64::new(0));
-    let system = railhead::jobs::clock::Clock::system();
+    let (set, system) = (Arc::new(AtomicI64::new(0)), Clock::system());
     let shown = set.clone();
-    let clock = railhead::jobs::clock::Clock::that_is_set(move || {
-        system.now_ms() + shown.load(Ordering::SeqCst)
-    });
-    let let_go = Arc::new(AtomicBool::new(false));
-    let go = let_go.clone();
-    let options = Options {
-        clock,
-        retention: Some(Duration::from_secs(30 * 24 * 3600)),
-        lease: Duration::from_secs(2),
-        ..Options::new(folder.path())
-    };
-    let jobs = open(options, move |case, monitor| {
-        while case.label.name.as_deref() == Some("long") && !go.load(Ordering::SeqCst) {
-            assert!(
-                monitor.tick(0.5).is_continue(),
-                "it is neither late nor lost"
-            );
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        solve(case, monitor)
+    let lab = Lab::start(|options| {
+        options.clock = Clock::that_is_set(move || system.now_ms() + shown.load(Ordering::SeqCst));
+        options.retention = Some(Duration::from_secs(30 * 24 * 3600));
+        options.lease = Duration::from_secs(2);
     })
     .await;
-    jobs.start().unwrap();
-    let old = jobs.submit(small("old"), None).await.unwrap().id;
-    assert_eq!(
-        jobs.wait(old, AT_MOST).await.unwrap().state,
-        State::Succeeded
-    );
-    let options = railhead::jobs::model::SubmitOptions {
+    let old = lab.submit(small("old")).await;
+    assert_eq!(lab.wait(old).await.state, State::Succeeded);
+    let options = SubmitOptions {
         ends_within: Some(Duration::from_secs(1800)),
         ..Default::default()
     };
-    let long = jobs
-        .submit_with(case("long"), options.into())
-        .await
-        .unwrap()
-        .0
-        .id;
-    until_running(&jobs, long).await;
+    let long = lab.jobs.submit_with(case("long"), options.into()).await;
+    let long = long.unwrap().0.id;
+    until_running(&lab, long).await;
     set.store(40 * 24 * 3600 * 1000, Ordering::SeqCst);
     // Some looks of whoever watches deadlines, leases and ages.
     tokio::time::sleep(Duration::from_millis(2500)).await;
-    jobs.sweep_expired().await.unwrap();
-    assert_eq!(
-        jobs.get(old).await.unwrap().state,
-        State::Succeeded,
-        "nothing is removed"
-    );
-    let job = jobs.get(long).await.unwrap();
+    lab.jobs.sweep_expired().await.unwrap();
+    let kept = lab.get(old).await.state;
+    assert_eq!(kept, State::Succeeded, "nothing is removed");
+    let job = lab.get(long).await;
     assert_eq!((job.state, job.attempt), (State::Running, 1));
-    let_go.store(true, Ordering::SeqCst);
-    assert_eq!(
-        jobs.wait(long, AT_MOST).await.unwrap().state,
-        State::Succeeded
-    );
-    jobs.shutdown(Duration::from_secs(10)).await;
+    lab.gate.set_open(true);
+    // Its solver was told neither that it is late nor that its job is lost.
+    lab.succeeds_at_once(long).await;
+    lab.end().await;
 }

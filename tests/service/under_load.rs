@@ -97,15 +97,18 @@ async fn flood(
     known
 }
 
-/// A service on this folder that is ended in the middle of a flood, so many times, and what its clients know.
-async fn ended_in_floods(
-    folder: &Path,
-    times: usize,
-    end: impl Fn(Service),
-) -> (Vec<Known>, BTreeMap<String, Option<String>>) {
+/// What clients and batches are known after a service was ended in floods, and the jobs that had succeeded by then.
+struct Flooded {
+    clients: Vec<Known>,
+    batches: BTreeMap<String, Option<String>>,
+    succeeded: BTreeMap<String, Value>,
+}
+
+/// A service on this folder that is ended in the middle of a flood, so many times.
+async fn ended_in_floods(folder: &Path, times: usize, end: impl Fn(Service)) -> Flooded {
     let mut random = Random(7);
     let mut clients: Vec<Known> = (0..CLIENTS).map(|_| Known::default()).collect();
-    let mut batches = BTreeMap::new();
+    let (mut batches, mut succeeded) = (BTreeMap::new(), BTreeMap::new());
     for round in 0..times {
         let service = Service::start(folder, &FLAGS);
         let url = format!("http://{}", service.address());
@@ -130,6 +133,7 @@ async fn ended_in_floods(
             })
         });
         tokio::time::sleep(Duration::from_millis(30 + random.below(500))).await;
+        succeeded.extend(all_jobs(&service, "&state=succeeded").await);
         end(service);
         stop.store(true, Ordering::SeqCst);
         for flood in floods {
@@ -139,14 +143,19 @@ async fn ended_in_floods(
             batches.extend([batch.await.unwrap()]);
         }
     }
-    (clients, batches)
+    Flooded {
+        clients,
+        batches,
+        succeeded,
+    }
 }
 
-/// Every job of the service by id, page by page.
-async fn all_jobs(service: &Service) -> BTreeMap<String, Value> {
+/// Every job of the service that a query finds by id, page by page.
+async fn all_jobs(service: &Service, query: &str) -> BTreeMap<String, Value> {
     let (mut jobs, mut cursor) = (BTreeMap::new(), String::new());
     loop {
-        let page = service.get(&format!("/v1/jobs?limit=1000{cursor}")).await;
+        let path = format!("/v1/jobs?limit=1000{query}{cursor}");
+        let page = service.get(&path).await;
         for job in page["jobs"].as_array().unwrap() {
             let id = job["id"].as_str().unwrap().to_owned();
             assert_eq!(jobs.insert(id, job.clone()), None, "listed twice");
@@ -159,11 +168,10 @@ async fn all_jobs(service: &Service) -> BTreeMap<String, Value> {
 }
 
 /// A last service answers what was never answered; then every accepted case has one job, and it succeeds.
-async fn assert_all_is_there(
-    folder: &Path,
-    clients: Vec<Known>,
-    batches: BTreeMap<String, Option<String>>,
-) {
+async fn assert_all_is_there(folder: &Path, flooded: Flooded) {
+    let Flooded {
+        clients, batches, ..
+    } = flooded;
     let service = Service::start(folder, &FLAGS);
     let url = format!("http://{}", service.address());
     let stop = Arc::new(AtomicBool::new(false));
@@ -193,7 +201,10 @@ async fn assert_all_is_there(
     {
         pause().await;
     }
-    let jobs = all_jobs(&service).await;
+    let jobs = all_jobs(&service, "").await;
+    for (id, before) in flooded.succeeded {
+        assert_eq!(jobs[&id], before, "what had succeeded is not touched again");
+    }
     let unsuccessful: Vec<_> = jobs
         .values()
         .filter(|job| job["state"] != "succeeded")
@@ -211,10 +222,15 @@ async fn assert_all_is_there(
             .or_default() += 1;
     }
     for id in batches.values().flatten() {
-        assert!(
-            in_batch.contains_key(id.as_str()),
-            "batch {id} was acknowledged and is lost"
-        );
+        // Lost if it was acknowledged and is not there.
+        let lines = service.ask(&format!("/v1/batches/{id}/results")).await;
+        for (index, line) in lines.is(200).lines().iter().enumerate() {
+            assert_eq!(
+                (&line["index"], &line["state"]),
+                (&json!(index), &json!("succeeded"))
+            );
+        }
+        assert!(in_batch.contains_key(id.as_str()), "{id}");
     }
     assert!(
         in_batch.values().all(|jobs| *jobs == BATCH),
@@ -229,8 +245,8 @@ async fn assert_all_is_there(
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn twenty_kills_lose_nothing_and_double_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let (clients, batches) = ended_in_floods(folder.path(), KILLS, Service::kill).await;
-    assert_all_is_there(folder.path(), clients, batches).await;
+    let flooded = ended_in_floods(folder.path(), KILLS, Service::kill).await;
+    assert_all_is_there(folder.path(), flooded).await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -240,6 +256,6 @@ async fn stopping_under_load_ends_well_and_loses_nothing() {
         service.signal("TERM");
         assert_eq!(service.wait().code(), Some(0));
     };
-    let (clients, batches) = ended_in_floods(folder.path(), STOPS, stop).await;
-    assert_all_is_there(folder.path(), clients, batches).await;
+    let flooded = ended_in_floods(folder.path(), STOPS, stop).await;
+    assert_all_is_there(folder.path(), flooded).await;
 }

@@ -1,15 +1,17 @@
 //! Do workers solve what is queued, and survive what they solve?
 
-use std::sync::{Mutex, mpsc};
+use std::sync::mpsc;
 use std::time::Duration;
 
+use futures_util::future::join_all;
 use railhead::contact::solve;
+use railhead::jobs::engine::Engine;
 use railhead::jobs::model::SubmitOptions;
 use railhead::jobs::{JobsError, Options, State};
 use serde_json::json;
-use tokio::sync::mpsc::unbounded_channel;
 
-use crate::support::{case, files_below, open};
+use crate::lab::{Gate, Lab};
+use crate::support::{case, files_below, pause};
 
 #[tokio::test]
 async fn a_solved_job_keeps_its_answer_and_its_remarks() {
@@ -20,20 +22,15 @@ async fn a_solved_job_keeps_its_answer_and_its_remarks() {
 }
 
 async fn keeps_its_answer(small_result_max_bytes: usize) {
-    let folder = tempfile::tempdir().unwrap();
     let (answer, answers) = mpsc::channel();
-    let jobs = open(
-        Options {
-            small_result_max_bytes,
-            ..Options::new(folder.path())
-        },
-        move |case, monitor| {
-            let solved = solve(case, monitor)?;
-            answer.send(solved.clone()).unwrap();
-            Ok(solved)
-        },
-    )
-    .await;
+    let engine = Engine::contact().solving(move |case, monitor| {
+        let solved = solve(case, monitor)?;
+        answer.send(solved.clone()).unwrap();
+        Ok(solved)
+    });
+    let change = |options: &mut Options| options.small_result_max_bytes = small_result_max_bytes;
+    let lab = Lab::of(Gate::default(), engine, change).await;
+    let (jobs, folder) = (&lab.jobs, &lab.folder);
     let mut worker = jobs.worker("w").unwrap();
     assert!(!worker.step().await.unwrap().busy);
 
@@ -82,60 +79,26 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
 
 #[tokio::test]
 async fn a_ticking_solver_keeps_its_lease_and_shows_its_progress() {
-    let folder = tempfile::tempdir().unwrap();
-    let (finish, may_finish) = mpsc::channel::<()>();
-    let may_finish = Mutex::new(may_finish);
-    let options = Options {
-        lease: Duration::from_millis(1_500),
-        ..Options::new(folder.path())
-    };
-    let jobs = open(options, move |case, monitor| {
-        let may_finish = may_finish.lock().unwrap();
-        while may_finish.try_recv().is_err() {
-            assert!(monitor.tick(0.5).is_continue());
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        solve(case, monitor)
-    })
-    .await;
-    let id = jobs.submit(case("long"), None).await.unwrap().id;
-    jobs.start().unwrap();
+    let lab = Lab::start(|options| options.lease = Duration::from_millis(1_500)).await;
+    let id = lab.submit(case("long")).await;
     // Two heartbeats reach the table: the version grows with the claim and with the first progress only.
-    while jobs.get(id).await.unwrap().progress < 0.5 {
+    while lab.get(id).await.progress < 0.5 {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
-    finish.send(()).unwrap();
-    let job = jobs.wait(id, Duration::from_secs(60)).await.unwrap();
-    assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
-    jobs.shutdown(Duration::from_secs(10)).await;
+    lab.gate.set_open(true);
+    lab.succeeds_at_once(id).await;
+    lab.end().await;
 }
 
 #[tokio::test]
 async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
-    let folder = tempfile::tempdir().unwrap();
-    let (release, released) = mpsc::channel::<()>();
-    let released = Mutex::new(Some(released));
-    let options = Options {
-        lease: Duration::from_secs(2),
-        ..Options::new(folder.path())
-    };
-    let jobs = open(options, move |case, monitor| {
-        let first_time = released.lock().unwrap().take();
-        if let Some(released) = first_time {
-            // The first attempt hangs, without a tick, until the test is over.
-            let _ = released.recv();
-        }
-        solve(case, monitor)
-    })
-    .await;
-    let id = jobs.submit(case("hangs once"), None).await.unwrap().id;
-    jobs.start().unwrap();
-    let job = jobs.wait(id, Duration::from_secs(60)).await.unwrap();
+    let lab = Lab::start(|options| options.lease = Duration::from_secs(2)).await;
+    let id = lab.submit(case("deaf at the first attempt")).await;
+    let job = lab.wait(id).await;
     assert_eq!(job.state, State::Succeeded);
     // A slow machine may lose the lease once more.
     assert!(job.attempt >= 2, "{}", job.attempt);
-    drop(release);
-    jobs.shutdown(Duration::from_secs(10)).await;
+    lab.end().await;
 }
 
 #[tokio::test]
@@ -155,70 +118,33 @@ async fn a_solver_deaf_to_its_deadline_is_left_behind() {
 
 /// How a job ends whose solver does not listen, at its deadline or else by cancellation; the next one is solved.
 async fn end_of_deaf(lease: Duration, deadline: Option<Duration>) -> State {
-    let folder = tempfile::tempdir().unwrap();
-    let (started, mut has_started) = unbounded_channel();
-    let (release, released) = mpsc::channel::<()>();
-    let released = Mutex::new(Some(released));
-    let options = Options {
-        lease,
-        ..Options::new(folder.path())
-    };
-    let jobs = open(options, move |case, monitor| {
-        let first_time = released.lock().unwrap().take();
-        if let Some(released) = first_time {
-            started.send(()).unwrap();
-            let _ = released.recv();
-        }
-        solve(case, monitor)
-    })
-    .await;
+    let lab = Lab::start(|options| options.lease = lease).await;
     let asked = SubmitOptions {
         ends_within: deadline,
         ..SubmitOptions::default()
     };
-    let submitted = jobs.submit_with(case("deaf"), asked.into()).await;
+    let submitted = lab.jobs.submit_with(case("deaf"), asked.into()).await;
     let deaf = submitted.unwrap().0.id;
-    jobs.start().unwrap();
-    has_started.recv().await.unwrap();
-    if deadline.is_none() {
-        jobs.cancel(deaf).await.unwrap();
+    while lab.gate.begun() == 0 {
+        pause().await;
     }
-    let next = jobs.submit(case("next"), None).await.unwrap().id;
-    let at_most = Duration::from_secs(60);
-    let ended = jobs.wait(deaf, at_most).await.unwrap().state;
-    assert_eq!(
-        jobs.wait(next, at_most).await.unwrap().state,
-        State::Succeeded
-    );
-    drop(release);
-    jobs.shutdown(Duration::from_secs(10)).await;
+    if deadline.is_none() {
+        lab.jobs.cancel(deaf).await.unwrap();
+    }
+    let next = lab.submit(case("next")).await;
+    let ended = lab.wait(deaf).await.state;
+    assert_eq!(lab.wait(next).await.state, State::Succeeded);
+    lab.end().await;
     ended
 }
 
 #[tokio::test]
 async fn a_pool_solves_everything_and_waiting_callers_hear_of_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let options = Options {
-        workers: 3,
-        ..Options::new(folder.path())
-    };
-    let jobs = open(options, solve).await;
-    jobs.start().unwrap();
-    let mut waiting = Vec::new();
+    let lab = Lab::start(|options| options.workers = 3).await;
+    let mut ids = Vec::new();
     for number in 0..40 {
-        let id = jobs
-            .submit(case(&number.to_string()), None)
-            .await
-            .unwrap()
-            .id;
-        let jobs = jobs.clone();
-        waiting.push(tokio::spawn(async move {
-            jobs.wait(id, Duration::from_secs(60)).await.unwrap()
-        }));
+        ids.push(lab.submit(case(&number.to_string())).await);
     }
-    for job in waiting {
-        let job = job.await.unwrap();
-        assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
-    }
-    jobs.shutdown(Duration::from_secs(10)).await;
+    join_all(ids.into_iter().map(|id| lab.succeeds_at_once(id))).await;
+    lab.end().await;
 }

@@ -1,15 +1,13 @@
 //! Nodes whose clocks are wrong, as real processes: is a lease judged by the clock of the database alone, and are all times told by it?
 
+use std::path::Path;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use railhead::jobs::store::postgres::schema::migrate;
-use reqwest::Method;
 use serde_json::Value;
-use tempfile::TempDir;
 
 use crate::cluster::faketime::{library, set_ahead, with_clock};
-use crate::cluster::postgres::database;
+use crate::cluster::{node_by, tables};
 use crate::support::{Service, case, endless_case, railhead};
 
 /// The lease, in seconds.
@@ -19,17 +17,12 @@ const LEASE: u64 = 2;
 const TOLD_WITHIN_MS: i64 = 1000;
 
 /// A node whose clock is ahead by so many seconds.
-fn start(url: &str, role: &str, ahead: i32, folder: &TempDir) -> Option<Service> {
-    let file = folder.path().join("clock");
-    set_ahead(&file, ahead);
+fn start(url: &str, role: &str, ahead: i32, file: &Path) -> Option<Service> {
+    set_ahead(file, ahead);
     let mut program = railhead();
-    with_clock(&mut program, &library()?, &file);
-    let workers = if role == "worker" { "1" } else { "0" };
+    with_clock(&mut program, &library()?, file);
     let lease = LEASE.to_string();
-    let flags = ["--database-url", url, "--workers", workers];
-    let flags = [&flags[..], &["--lease-s", &lease, "--cache", "false"]].concat();
-    let data = folder.path().join("data");
-    Some(Service::start_as(&mut program, role, &data, &flags))
+    Some(node_by(program, url, role, &["--lease-s", &lease]))
 }
 
 /// By how much a node found its clock ahead, in ms.
@@ -61,23 +54,17 @@ fn assert_within(job: &Value, member: &str, from: Timestamp, to: Timestamp) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn clocks_that_are_off_by_40_seconds_cost_no_lease_and_shift_no_time() {
-    let (Some(url), Some(_)) = (database().await, library()) else {
+    let (Some(url), Some(_)) = (tables().await, library()) else {
         return;
     };
-    migrate(&url).await.unwrap();
-    let folders: [TempDir; 4] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
-    let nodes = [
-        ("serve", 0),
-        ("serve", -10),
-        ("worker", 40),
-        ("worker", -40),
-    ];
+    let clocks = tempfile::tempdir().unwrap();
     let begun = Timestamp::now();
-    let start = |number: usize| {
-        let (role, ahead) = nodes[number];
-        start(&url, role, ahead, &folders[number]).expect("the library is there")
+    let start = |role: &str, ahead: i32| {
+        let file = clocks.path().join(ahead.to_string());
+        start(&url, role, ahead, &file).expect("the library is there")
     };
-    let [right, behind, fast, slow] = std::array::from_fn(start);
+    let [right, behind] = [0, -10].map(|ahead| start("serve", ahead));
+    let [fast, slow] = [40, -40].map(|ahead| start("worker", ahead));
     for (node, ahead) in [(&behind, -10_000), (&fast, 40_000), (&slow, -40_000)] {
         let found = found_ahead(node);
         assert!((found - ahead).abs() < TOLD_WITHIN_MS, "{found} ms");
@@ -86,10 +73,8 @@ async fn clocks_that_are_off_by_40_seconds_cost_no_lease_and_shift_no_time() {
     // Each worker holds a job for longer than a lease, and its deadline does not come early.
     let mut held = Vec::new();
     for api in [&right, &behind] {
-        let posted = api.request(Method::POST, "/v1/jobs?deadline_s=35");
-        let job = posted.json(&endless_case("held")).send().await.unwrap();
-        assert_eq!(job.status(), 202);
-        let job: Value = job.json().await.unwrap();
+        let case = endless_case("held");
+        let job = api.post("/v1/jobs?deadline_s=35", &case).await.is(202).json;
         held.push(job["id"].as_str().unwrap().to_owned());
     }
     for id in &held {

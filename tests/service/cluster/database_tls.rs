@@ -1,10 +1,10 @@
 //! Is the connection to the database encrypted as its URL asks for, and is the other end who it says it is?
 
 use railhead::jobs::store::postgres::doctor::examine;
-use railhead::jobs::store::postgres::schema::migrate;
 use sqlx::{Connection, PgConnection};
 
-use crate::cluster::postgres::{database, encrypted, with_parameter};
+use crate::cluster::postgres::{encrypted, with_parameter};
+use crate::cluster::tables;
 
 /// What the program says when it connects: nothing, or why it does not.
 async fn connect(url: &str) -> String {
@@ -19,8 +19,7 @@ async fn a_connection_is_encrypted_and_the_certificate_checked_as_the_url_asks_f
     let Some((port, authority)) = encrypted() else {
         return;
     };
-    let plain = database().await.unwrap();
-    migrate(&plain).await.unwrap();
+    let plain = tables().await.unwrap();
     let (_, name) = plain.rsplit_once('/').unwrap();
     let name = name.split('?').next().unwrap();
     let at = |host: &str, query: &str| format!("postgres://railhead@{host}:{port}/{name}?{query}");

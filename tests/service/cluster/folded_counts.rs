@@ -2,10 +2,9 @@
 
 use railhead::jobs::store::Store;
 use railhead::jobs::store::postgres::database::PostgresStore;
-use railhead::jobs::store::postgres::schema::migrate;
 use sqlx::{Connection, PgConnection};
 
-use crate::cluster::postgres::database;
+use crate::cluster::tables;
 
 const FILL: &str = "INSERT INTO jobs (id, tenant, kind, state, labels, method, outputs, cost_us, slice_us, bypass_cache, rank, created_at, updated_at) \
      SELECT gen_random_uuid(), $1, $2, 'queued', '{}', 'auto', '[]', 3000, 3000, 1, 1, n, n FROM generate_series(1, $3) AS n";
@@ -15,10 +14,9 @@ const SUMS: &str = "SELECT tenant, kind, CAST(SUM(number) AS bigint) FROM job_co
 
 #[tokio::test]
 async fn adding_up_the_counts_keeps_their_sums_and_leaves_one_row_of_each() {
-    let Some(url) = database().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    migrate(&url).await.unwrap();
     let mut connection = PgConnection::connect(&url).await.unwrap();
     for (tenant, kind, number) in [
         ("north", "case", 2),

@@ -1,38 +1,24 @@
 //! Are the tables of a database made once, brought forward once, and used only by programs that can?
 
+use futures_util::future::try_join_all;
 use railhead::jobs::store::postgres::doctor::examine;
 use railhead::jobs::store::postgres::schema::{Migrated, migrate};
 use sqlx::{Connection, PgConnection};
-use tempfile::TempDir;
-use tokio::task::JoinSet;
 
-use crate::cluster::old_tables;
 use crate::cluster::postgres::database;
+use crate::cluster::{node, old_tables, said_by, tables};
 use crate::support::{Service, case, railhead};
 
 /// Starts five nodes at once, each as its unit file does: the tables first, then the node. What the commands said, and the nodes.
-fn five_starts(url: &str) -> Vec<(String, Service, TempDir)> {
+fn five_starts(url: &str) -> [(String, Service); 5] {
     let start = |number: usize| {
-        let folder = tempfile::tempdir().unwrap();
-        let mut migrate = railhead();
-        let done = migrate.args(["migrate", "--database-url", url]).output();
-        let done = done.unwrap();
-        assert!(done.status.success(), "{done:?}");
-        let role = ["serve", "worker"][number % 2];
-        let workers = ["0", "1"][number % 2];
-        let flags = ["--database-url", url, "--workers", workers];
-        let service = Service::start_as(&mut railhead(), role, folder.path(), &flags);
-        let said = String::from_utf8(done.stdout).unwrap();
-        (said, service, folder)
+        let (done, said) = said_by(&mut railhead(), &["migrate", "--database-url", url]);
+        assert!(done, "{said}");
+        (said, node(url, ["serve", "worker"][number % 2], &[]))
     };
     std::thread::scope(|scope| {
-        let starts: Vec<_> = (0..5)
-            .map(|number| scope.spawn(move || start(number)))
-            .collect();
-        starts
-            .into_iter()
-            .map(|start| start.join().unwrap())
-            .collect()
+        let starts: [_; 5] = std::array::from_fn(|number| scope.spawn(move || start(number)));
+        starts.map(|start| start.join().unwrap())
     })
 }
 
@@ -51,9 +37,9 @@ async fn five_nodes_start_at_once_on_an_empty_and_on_an_old_database() {
         }
         let nodes = tokio::task::block_in_place(|| five_starts(&url));
         let (did, found): (Vec<_>, Vec<_>) =
-            nodes.iter().partition(|(said, _, _)| said.contains(says));
+            nodes.iter().partition(|(said, _)| said.contains(says));
         assert_eq!(did.len(), 1, "{before:?}");
-        assert!(found.iter().all(|(said, _, _)| said.contains("is there")));
+        assert!(found.iter().all(|(said, _)| said.contains("is there")));
         // Nodes 0, 2 and 4 answer requests, 1 and 3 solve.
         let apis = [&nodes[0].1, &nodes[2].1, &nodes[4].1];
         for (number, api) in apis.iter().enumerate() {
@@ -63,18 +49,11 @@ async fn five_nodes_start_at_once_on_an_empty_and_on_an_old_database() {
     }
 }
 
-/// What five commands that run at once say.
-async fn five(url: &str) -> Vec<Migrated> {
-    let mut commands = JoinSet::new();
-    for _ in 0..5 {
-        let url = url.to_owned();
-        commands.spawn(async move { migrate(&url).await.unwrap() });
-    }
-    commands.join_all().await
-}
-
-fn count(said: &[Migrated], what: Migrated) -> usize {
-    said.iter().filter(|said| **said == what).count()
+/// Five commands run at once: one of them does something, the others find it done.
+async fn assert_done_once(url: &str, what: Migrated) {
+    let said = try_join_all([(); 5].map(|()| migrate(url))).await.unwrap();
+    let count = |what| said.iter().filter(|said| **said == what).count();
+    assert_eq!((count(what), count(Migrated::AlreadyCurrent)), (1, 4));
 }
 
 #[tokio::test]
@@ -82,14 +61,7 @@ async fn tables_are_made_once_and_old_ones_brought_forward_once_whoever_does_so_
     let Some(url) = database().await else {
         return;
     };
-    let said = five(&url).await;
-    assert_eq!(
-        (
-            count(&said, Migrated::Made),
-            count(&said, Migrated::AlreadyCurrent)
-        ),
-        (1, 4)
-    );
+    assert_done_once(&url, Migrated::Made).await;
 
     let old = database().await.unwrap();
     let mut connection = PgConnection::connect(&old).await.unwrap();
@@ -101,14 +73,7 @@ async fn tables_are_made_once_and_old_ones_brought_forward_once_whoever_does_so_
         refused.contains("earlier version") && refused.contains("railhead migrate"),
         "{refused}"
     );
-    let said = five(&old).await;
-    assert_eq!(
-        (
-            count(&said, Migrated::Upgraded),
-            count(&said, Migrated::AlreadyCurrent)
-        ),
-        (1, 4)
-    );
+    assert_done_once(&old, Migrated::Upgraded).await;
     examine(&old).await.unwrap();
     let kept: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM api_keys")
         .fetch_one(&mut connection)
@@ -119,12 +84,10 @@ async fn tables_are_made_once_and_old_ones_brought_forward_once_whoever_does_so_
 
 #[tokio::test]
 async fn a_program_goes_on_beside_newer_tables_unless_they_say_that_it_cannot() {
-    let Some(url) = database().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    migrate(&url).await.unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let start = || Service::start(folder.path(), &["--database-url", &url, "--workers", "1"]);
+    let start = || node(&url, "serve", &["--workers", "1"]);
     let before = start();
     let mut connection = PgConnection::connect(&url).await.unwrap();
     // What the next version does to a table in use: it adds.

@@ -1,72 +1,17 @@
 //! Several nodes on one database, as real processes: does each job end once, and is it seen everywhere, whoever dies?
 
 use std::collections::BTreeSet;
-use std::process::Command;
-use std::time::{Duration, Instant};
 
 use reqwest::Method;
-use serde_json::{Value, json};
-use tempfile::TempDir;
+use serde_json::Value;
 
 use crate::cluster::cable::Cable;
-use crate::cluster::postgres;
-use crate::support::{Service, case, endless_case, long_case, pause, railhead};
-
-/// Ends of a guard: something hangs.
-const WITHIN: Duration = Duration::from_secs(90);
-
-/// Nodes on one database. Each has a folder of its own.
-struct Nodes {
-    url: String,
-    folders: Vec<TempDir>,
-}
-
-impl Nodes {
-    /// An empty database with the job table in it.
-    async fn new() -> Option<Nodes> {
-        let url = postgres::database().await?;
-        let made = railhead_with(&url, &["migrate"]);
-        assert!(made.contains("was made"), "{made}");
-        Some(Nodes {
-            url,
-            folders: Vec::new(),
-        })
-    }
-
-    fn start(&mut self, worker: bool, flags: &[&str]) -> Service {
-        let folder = tempfile::tempdir().unwrap();
-        let mut all = vec!["--database-url", &self.url, "--lease-s", "2"];
-        if !flags.contains(&"--cache") {
-            all.extend(["--cache", "false"]);
-        }
-        all.extend(flags);
-        let service = match worker {
-            true => Service::start_worker(folder.path(), &all),
-            false => Service::start(folder.path(), &all),
-        };
-        self.folders.push(folder);
-        service
-    }
-
-    fn api(&mut self) -> Service {
-        self.start(false, &["--workers", "0"])
-    }
-
-    fn worker(&mut self) -> Service {
-        self.start(true, &["--workers", "1"])
-    }
-}
+use crate::cluster::{WITHIN, node, postgres, said_by, tables, until};
+use crate::support::{Answer, Service, case, endless_case, long_case, railhead};
 
 /// What the program says about a database.
 fn railhead_with(url: &str, words: &[&str]) -> String {
-    let done = railhead()
-        .args(words)
-        .env("RAILHEAD_DATABASE_URL", url)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&done.stdout).into_owned();
-    let error = String::from_utf8_lossy(&done.stderr).into_owned();
-    format!("{said}{error}")
+    said_by(railhead().env("RAILHEAD_DATABASE_URL", url), words).1
 }
 
 async fn in_state(service: &Service, state: &str) -> Vec<Value> {
@@ -76,45 +21,22 @@ async fn in_state(service: &Service, state: &str) -> Vec<Value> {
     list["jobs"].as_array().unwrap().clone()
 }
 
-async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
-    let since = Instant::now();
-    while !done().await {
-        assert!(since.elapsed() < WITHIN, "{what}");
-        pause().await;
-    }
-}
-
-fn has_log(service: &Service, text: &str) -> bool {
-    service.log_text().contains(text)
-}
-
 /// The path of a batch of 60 cases with a key, and whether it was there.
-async fn send_batch(service: &Service) -> (String, bool) {
-    let lines: Vec<String> = (0..60)
-        .map(|n| case(&format!("line {n}")).to_string())
-        .collect();
-    let answer = service
-        .request(Method::POST, "/v1/batches")
-        .header("Content-Type", "application/x-ndjson")
-        .header("Idempotency-Key", "one-batch")
-        .body(lines.join("\n"))
-        .send()
-        .await
-        .unwrap();
-    assert!(answer.status().is_success(), "{}", answer.status());
-    let replayed = answer.headers().contains_key("Idempotency-Replayed");
-    let batch: Value = answer.json().await.unwrap();
-    let path = format!("/v1/batches/{}", batch["id"].as_str().unwrap());
-    (path, replayed)
+pub async fn send_batch(service: &Service) -> (String, bool) {
+    let cases: Vec<Value> = (0..60).map(|n| case(&format!("line {n}"))).collect();
+    let request = service.request(Method::POST, "/v1/batches").json(&cases);
+    let answer = Answer::to(request.header("Idempotency-Key", "one-batch")).await;
+    let replayed = answer.header("Idempotency-Replayed").is_some();
+    (answer.location(), replayed)
 }
 
 #[tokio::test]
 async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_node_are_killed() {
-    let Some(mut nodes) = Nodes::new().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    let (first, second) = (nodes.api(), nodes.api());
-    let (doomed, survivor) = (nodes.worker(), nodes.worker());
+    let (first, second) = (node(&url, "serve", &[]), node(&url, "serve", &[]));
+    let (doomed, survivor) = (node(&url, "worker", &[]), node(&url, "worker", &[]));
     let mut ids = BTreeSet::new();
     for number in 0..24 {
         let api = if number % 2 == 0 { &first } else { &second };
@@ -133,7 +55,7 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
     .await;
     doomed.kill();
     first.kill();
-    let third = nodes.api();
+    let third = node(&url, "serve", &[]);
     until("all jobs end", async || {
         // One look: between two of them a job could go back to the queue and be in neither.
         in_state(&second, "succeeded").await.len() == ids.len() + 60
@@ -157,50 +79,37 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
     // The key of the batch is known to all.
     assert_eq!(send_batch(&third).await, (batch, true));
     assert_eq!(in_state(&third, "succeeded").await.len(), ids.len() + 60);
-    assert!(!has_log(&survivor, "panicked"));
-    let said = railhead_with(&nodes.url, &["doctor"]);
+    assert!(!survivor.log_text().contains("panicked"));
+    let said = railhead_with(&url, &["doctor"]);
     assert!(said.contains("ok\tnodes seen within 20 s"), "{said}");
 }
 
 #[tokio::test]
 async fn a_job_is_cancelled_and_waited_for_at_a_node_that_does_not_solve_it() {
-    let Some(mut nodes) = Nodes::new().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    let (one, other) = (nodes.api(), nodes.api());
-    let worker = nodes.worker();
+    let (one, other) = (node(&url, "serve", &[]), node(&url, "serve", &[]));
+    let worker = node(&url, "worker", &[]);
     let endless = one.submit(&endless_case("endless")).await;
     one.until(&endless, "running").await;
     // A client waits at one node for the end that is requested at the other.
-    let waiting = one
-        .request(Method::GET, &format!("/v1/jobs/{endless}"))
-        .header("Prefer", "wait=30")
-        .send();
-    let cancel = other
-        .request(Method::POST, &format!("/v1/jobs/{endless}/cancel"))
-        .send();
-    let (waited, cancelled) = tokio::join!(waiting, cancel);
-    assert_eq!(cancelled.unwrap().status(), 202);
-    let waited: Value = waited.unwrap().json().await.unwrap();
-    assert_eq!(waited["state"], "cancelled", "{waited}");
+    let waiting = one.request(Method::GET, &format!("/v1/jobs/{endless}"));
+    let waiting = Answer::to(waiting.header("Prefer", "wait=30"));
+    let (waited, ()) = tokio::join!(waiting, other.cancel(&endless));
+    assert_eq!(waited.json["state"], "cancelled", "{}", waited.text);
 
     // A key that is made by the command opens every node.
-    let secret = railhead_with(&nodes.url, &["keys", "create", "--tenant", "depot"]);
-    let secret = secret.lines().next().unwrap().to_owned();
-    let answer = other
-        .request(Method::GET, "/v1/me")
-        .bearer_auth(&secret)
-        .send()
-        .await
-        .unwrap();
-    let me: Value = answer.json().await.unwrap();
-    assert_eq!(me["tenant"], "depot", "{me}");
+    let secret = railhead_with(&url, &["keys", "create", "--tenant", "depot"]);
+    let secret = secret.lines().next().unwrap();
+    let me = other.request(Method::GET, "/v1/me").bearer_auth(secret);
+    let me = Answer::to(me).await;
+    assert_eq!(me.json["tenant"], "depot", "{}", me.text);
 
     // An orderly end hands a running job back without counting the attempt.
     let endless = one.submit(&endless_case("endless")).await;
     one.until(&endless, "running").await;
-    worker.signal("TERM");
-    assert!(worker.wait().success());
+    worker.stop().await;
     let job = one.until(&endless, "queued").await;
     assert_eq!(job["attempt"], 0, "{job}");
 }
@@ -225,43 +134,39 @@ async fn until_event(stream: &mut reqwest::Response, passes: impl Fn(&Value) -> 
 
 #[tokio::test]
 async fn progress_and_events_are_seen_and_results_used_again_at_every_node() {
-    let Some(mut nodes) = Nodes::new().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    let flags = ["--workers", "0", "--cache", "true"];
-    let (one, other) = (nodes.start(false, &flags), nodes.start(false, &flags));
-    let _worker = nodes.start(true, &["--workers", "1", "--cache", "true"]);
+    let start = |role: &str| node(&url, role, &["--cache", "true"]);
+    let (one, other, _worker) = (start("serve"), start("serve"), start("worker"));
     let watched = one.submit(&endless_case("watched")).await;
     let events = other.request(Method::GET, &format!("/v1/jobs/{watched}/events"));
     let mut events = events.send().await.unwrap();
     until_event(&mut events, |job| job["progress"].as_f64() > Some(0.0)).await;
-    let cancel = format!("/v1/jobs/{watched}/cancel");
-    one.request(Method::POST, &cancel).send().await.unwrap();
+    one.cancel(&watched).await;
     until_event(&mut events, |job| job["state"] == "cancelled").await;
 
     let solved = one.submit(&case("solved once")).await;
     one.until(&solved, "succeeded").await;
-    let again = other.request(Method::POST, "/v1/jobs").json(&case("again"));
-    let again: Value = again.send().await.unwrap().json().await.unwrap();
-    assert_eq!(again["cached"], true, "{again}");
+    let again = other.post("/v1/jobs", &case("again")).await.is(202);
+    assert_eq!(again.json["cached"], true, "{}", again.text);
 }
 
 #[tokio::test]
 async fn a_worker_that_stood_still_for_longer_than_its_lease_changes_nothing() {
-    let Some(mut nodes) = Nodes::new().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    let api = nodes.api();
-    let paused = nodes.worker();
+    let api = node(&url, "serve", &[]);
+    let paused = node(&url, "worker", &[]);
     let id = api.submit(&long_case("taken over", 60)).await;
     let path = format!("/v1/jobs/{id}");
     api.until(&id, "running").await;
     paused.signal("STOP");
-    let other = nodes.worker();
+    let other = node(&url, "worker", &[]);
     let job = api.until(&id, "succeeded").await;
     let result = api.get(&format!("{path}/result")).await;
-    other.signal("TERM");
-    assert!(other.wait().success());
+    other.stop().await;
     paused.signal("CONT");
     // It works on: with what it held it is done.
     let next = api.submit(&case("next")).await;
@@ -272,7 +177,7 @@ async fn a_worker_that_stood_still_for_longer_than_its_lease_changes_nothing() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn rows_of_a_worker_that_was_cut_off_inside_a_transaction_are_free_soon() {
-    let Some(mut nodes) = Nodes::new().await else {
+    let Some(url) = tables().await else {
         return;
     };
     // The first claim takes a second; a sequence counts those that are rolled back, too.
@@ -280,15 +185,12 @@ async fn rows_of_a_worker_that_was_cut_off_inside_a_transaction_are_free_soon() 
          BEGIN IF nextval('claims') = 1 THEN PERFORM pg_sleep(1); END IF; RETURN NULL; END $$; \
          CREATE TRIGGER slow AFTER UPDATE ON jobs FOR EACH ROW \
          WHEN (NEW.state = 'running' AND OLD.state = 'queued') EXECUTE FUNCTION slow()";
-    let pool = sqlx::PgPool::connect(&nodes.url).await.unwrap();
+    let pool = sqlx::PgPool::connect(&url).await.unwrap();
     sqlx::raw_sql(slow).execute(&pool).await.unwrap();
-    let direct = nodes.url.clone();
-    let (with_port, port) = postgres::at_port(&direct);
+    let (with_port, port) = postgres::at_port(&url);
     let cable = Cable::to(port).await;
-    let api = nodes.api();
-    nodes.url = with_port(cable.address.port());
-    let _cut_off = nodes.worker();
-    nodes.url.clone_from(&direct);
+    let api = node(&url, "serve", &[]);
+    let _cut_off = node(&with_port(cable.address.port()), "worker", &[]);
     let id = api.submit(&case("claimed twice")).await;
     let sleeping = "SELECT COUNT(*) FROM pg_stat_activity WHERE datname = current_database() AND wait_event = 'PgSleep'";
     until("the claim is under way", async || {
@@ -297,11 +199,10 @@ async fn rows_of_a_worker_that_was_cut_off_inside_a_transaction_are_free_soon() 
     })
     .await;
     cable.swallow();
-    let _other = nodes.worker();
-    let since = Instant::now();
-    let job = api.until(&id, "succeeded").await;
+    let _other = node(&url, "worker", &[]);
+    let ended = tokio::time::timeout(WITHIN, api.until(&id, "succeeded"));
+    let job = ended.await.expect("the rows are free soon");
     assert_eq!(job["attempt"], 1, "the first claim never happened: {job}");
-    assert!(since.elapsed() < WITHIN);
 }
 
 #[tokio::test]
@@ -311,11 +212,11 @@ async fn a_node_says_what_is_wrong_with_its_database() {
     };
     let folder = tempfile::tempdir().unwrap();
     let serve = |words: &[&str]| {
-        let mut command: Command = railhead();
+        let mut command = railhead();
         command.args(words).arg("--data-dir").arg(folder.path());
-        let done = command.args(["--listen", "127.0.0.1:0"]).output().unwrap();
-        assert!(!done.status.success());
-        String::from_utf8_lossy(&done.stderr).into_owned()
+        let (done, said) = said_by(&mut command, &["--listen", "127.0.0.1:0"]);
+        assert!(!done);
+        said
     };
     let said = serve(&["serve", "--database-url", &url]);
     assert!(said.contains("railhead migrate"), "{said}");
@@ -332,25 +233,16 @@ async fn a_node_says_what_is_wrong_with_its_database() {
     let said = serve(&["serve", "--database-url", &url]);
     assert!(said.contains("--data-dir"), "{said}");
     // Several may make the tables at once; one of them does.
-    let makers: Vec<_> = (0..4)
-        .map(|_| {
-            let mut command = railhead();
-            command.arg("migrate").env("RAILHEAD_DATABASE_URL", &url);
-            command.stdout(std::process::Stdio::piped());
-            command.spawn().unwrap()
-        })
-        .collect();
-    let made = makers.into_iter().map(|maker| {
-        let done = maker.wait_with_output().unwrap();
-        assert!(done.status.success());
-        String::from_utf8_lossy(&done.stdout).contains("was made")
+    let words = ["migrate", "--database-url", &url];
+    let made = std::thread::scope(|scope| {
+        let makers = [(); 4].map(|()| scope.spawn(|| said_by(&mut railhead(), &words)));
+        makers.map(|maker| maker.join().unwrap())
     });
-    assert_eq!(made.filter(|made| *made).count(), 1);
-    let configured = railhead()
-        .args(["config", "--database-url", "postgres://u:hush@h/d"])
-        .output()
-        .unwrap();
-    let configured = String::from_utf8_lossy(&configured.stdout).into_owned();
+    assert!(made.iter().all(|(done, _)| *done), "{made:?}");
+    let made = made.iter().filter(|(_, said)| said.contains("was made"));
+    assert_eq!(made.count(), 1);
+    let words = ["config", "--database-url", "postgres://u:hush@h/d"];
+    let (_, configured) = said_by(&mut railhead(), &words);
     assert!(!configured.contains("hush"), "{configured}");
-    assert_eq!(json!(configured.contains("database-url")), json!(true));
+    assert!(configured.contains("database-url"), "{configured}");
 }

@@ -1,20 +1,13 @@
 //! Are large results in an object store read back at every node, and does nothing get lost when it fails?
 
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
 
-use railhead::jobs::store::postgres::schema::migrate;
-use reqwest::Method;
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
 use crate::cluster::faulty_server::FaultyServer;
-use crate::cluster::postgres::database;
 use crate::cluster::seaweed::{railhead_at, server};
-use crate::support::{Service, long_case, pause};
-
-/// Ends of a guard: something hangs.
-const WITHIN: Duration = Duration::from_secs(60);
+use crate::cluster::{node_by, said_by, tables, until};
+use crate::support::{Service, long_case};
 
 const PLACE: &str = "s3://results/of/tests";
 
@@ -25,59 +18,24 @@ fn large_case(name: &str) -> Value {
     case
 }
 
-/// Nodes on one database, with their results in one bucket.
-struct Nodes {
-    url: String,
-    port: u16,
-    folders: Vec<TempDir>,
-}
-
-impl Nodes {
-    fn start(&mut self, role: &str, flags: &[&str]) -> Service {
-        let folder = tempfile::tempdir().unwrap();
-        let mut all = vec!["--database-url", &self.url, "--results-url", PLACE];
-        all.extend(["--cache", "false", "--lease-s", "2"]);
-        all.extend(flags);
-        let mut program = railhead_at(self.port);
-        let service = Service::start_as(&mut program, role, folder.path(), &all);
-        self.folders.push(folder);
-        service
-    }
-
-    fn doctor(&self, place: &str) -> (bool, String) {
-        let mut command = railhead_at(self.port);
-        command.args([
-            "doctor",
-            "--database-url",
-            &self.url,
-            "--results-url",
-            place,
-        ]);
-        let done = command.output().unwrap();
-        let said = String::from_utf8_lossy(&done.stdout).into_owned();
-        let line = said
-            .lines()
-            .find(|line| line.contains("place of the results"));
-        let line = line.unwrap_or_else(|| panic!("{said}"));
-        (line.starts_with("ok"), line.to_owned())
-    }
+/// What the doctor says about the place of the results, and whether it is well.
+fn doctor(port: u16, url: &str, place: &str) -> (bool, String) {
+    let words = ["doctor", "--database-url", url, "--results-url", place];
+    let (_, said) = said_by(&mut railhead_at(port), &words);
+    let mut lines = said.lines();
+    let line = lines.find(|line| line.contains("place of the results"));
+    let line = line.unwrap_or_else(|| panic!("{said}"));
+    (line.starts_with("ok"), line.to_owned())
 }
 
 async fn result(service: &Service, id: &str) -> (u16, Value) {
-    let path = format!("/v1/jobs/{id}/result");
-    let answer = service.request(Method::GET, &path).send().await.unwrap();
-    let status = answer.status().as_u16();
-    (status, answer.json().await.unwrap_or_default())
+    let answer = service.ask(&format!("/v1/jobs/{id}/result")).await;
+    (answer.status, answer.json)
 }
 
 /// A counter of `/metrics`, summed over the series whose labels have all these words.
 async fn requests(service: &Service, labels: &[&str]) -> f64 {
-    let answer = service
-        .request(Method::GET, "/metrics")
-        .send()
-        .await
-        .unwrap();
-    let text = answer.text().await.unwrap();
+    let text = service.ask("/metrics").await.text;
     let series = text.lines().filter(|line| {
         line.starts_with("railhead_result_store_requests_total")
             && labels.iter().all(|label| line.contains(label))
@@ -103,20 +61,14 @@ async fn assert_few_requests(service: &Service, id: &str) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn results_in_s3_survive_its_faults_and_are_read_at_every_node() {
-    let (Some(url), Some(port)) = (database().await, server()) else {
+    let (Some(url), Some(port)) = (tables().await, server()) else {
         return;
     };
-    migrate(&url).await.unwrap();
     let way = FaultyServer::to(port).await;
     let faults = &way.faults;
-    let mut nodes = Nodes {
-        url,
-        port: way.address.port(),
-        folders: Vec::new(),
-    };
-    let one = nodes.start("serve", &["--workers", "0"]);
-    let other = nodes.start("serve", &["--workers", "0"]);
-    let worker = nodes.start("worker", &["--workers", "1"]);
+    let port = way.address.port();
+    let start = |role: &str| node_by(railhead_at(port), &url, role, &["--results-url", PLACE]);
+    let [one, other, worker] = ["serve", "serve", "worker"].map(start);
 
     // Now and then: no client and no job notices.
     faults.refused.store(4, Ordering::Relaxed);
@@ -148,18 +100,17 @@ async fn results_in_s3_survive_its_faults_and_are_read_at_every_node() {
         (answer.0, &answer.1["type"]),
         (503, &json!("/problems/storage-unreachable"))
     );
-    let since = Instant::now();
-    while worker.logged("could not be written yet") == 0 {
-        assert!(since.elapsed() < WITHIN, "the result was written");
-        pause().await;
-    }
+    until("the result cannot be written", async || {
+        worker.logged("could not be written yet") > 0
+    })
+    .await;
     faults.refused.store(0, Ordering::Relaxed);
     faults.cut.store(0, Ordering::Relaxed);
     let job = one.until(&waiting, "succeeded").await;
     assert_eq!(job["attempt"], 1, "{job}");
     assert_few_requests(&other, &waiting).await;
 
-    let (well, said) = nodes.doctor(PLACE);
+    let (well, said) = doctor(port, &url, PLACE);
     assert!(well && said.contains("written, read and removed"), "{said}");
-    assert!(!nodes.doctor("s3://results/of/others").0);
+    assert!(!doctor(port, &url, "s3://results/of/others").0);
 }

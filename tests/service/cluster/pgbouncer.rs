@@ -1,15 +1,11 @@
 //! A PgBouncer of our own before the PostgreSQL of the tests, in transaction mode; gone with the process.
 
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Child, Command};
 
-use crate::cluster::postgres::{at_port, shell};
+use crate::cluster::postgres::{at_port, free_port, left_folder, shell, started};
 use crate::support::skip;
-
-/// How long it may take to start.
-const STARTS_WITHIN: Duration = Duration::from_secs(30);
 
 /// The first version that carries prepared statements in transaction mode.
 const FIRST: (u32, u32) = (1, 21);
@@ -30,15 +26,7 @@ impl Pooler {
             return None;
         };
         let (_, server) = at_port(url);
-        let port = TcpListener::bind("127.0.0.1:0")
-            .and_then(|listener| listener.local_addr())
-            .expect("a port")
-            .port();
-        let folder = tempfile::Builder::new()
-            .prefix("railhead-pgbouncer")
-            .tempdir()
-            .expect("a folder")
-            .keep();
+        let (folder, port) = (left_folder("railhead-pgbouncer"), free_port());
         // Whoever comes is let in as the user of the line.
         let settings = format!(
             "[databases]\n* = user=railhead host=127.0.0.1 port={server}\n[pgbouncer]\nlisten_addr = 127.0.0.1\nlisten_port = {port}\n\
@@ -51,18 +39,8 @@ impl Pooler {
             data = folder.display(),
             program = program.display(),
         );
-        let mut command = shell(&folder);
-        command.args(["-c", &script]).stdin(Stdio::piped());
-        let shell = command.spawn().expect("a shell");
-        let until = Instant::now() + STARTS_WITHIN;
-        while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            assert!(
-                Instant::now() < until,
-                "no PgBouncer in {}",
-                folder.display()
-            );
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        let ready = || TcpStream::connect(("127.0.0.1", port)).is_ok();
+        let shell = started(shell(&folder), &script, ready);
         Some(Pooler { port, shell })
     }
 

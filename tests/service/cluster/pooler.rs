@@ -4,11 +4,12 @@ use std::time::{Duration, Instant};
 
 use railhead::jobs::store::postgres::schema::migrate;
 use reqwest::Method;
-use serde_json::{Value, json};
 
+use crate::cluster::nodes::send_batch;
 use crate::cluster::pgbouncer::Pooler;
 use crate::cluster::postgres::database;
-use crate::support::{Service, case, endless_case, railhead};
+use crate::cluster::{node, until};
+use crate::support::{Answer, Service, case, endless_case};
 
 /// Fewer sessions than the nodes have connections, so that they change hands all the time.
 const SESSIONS: u32 = 4;
@@ -26,26 +27,10 @@ async fn nodes_behind_a_pooler_in_transaction_mode_work_and_hear_each_other() {
     };
     let url = pooler.url(&direct);
     migrate(&url).await.unwrap();
-    let folders: [_; 3] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
-    let start = |number: usize, role: &str, workers: &str| {
-        let flags = ["--database-url", &url, "--database-direct-url", &direct];
-        let more = ["--workers", workers, "--cache", "false", "--lease-s", "2"];
-        let flags = [&flags[..], &more].concat();
-        Service::start_as(&mut railhead(), role, folders[number].path(), &flags)
-    };
-    let one = start(0, "serve", "0");
-    let other = start(1, "serve", "0");
-    let worker = start(2, "worker", "1");
+    let start = |role: &str| node(&url, role, &["--database-direct-url", &direct]);
+    let [one, other, worker] = ["serve", "serve", "worker"].map(start);
 
-    let lines: Vec<String> = (0..60)
-        .map(|number| case(&format!("line {number}")).to_string())
-        .collect();
-    let batch = one
-        .request(Method::POST, "/v1/batches")
-        .header("Content-Type", "application/x-ndjson")
-        .body(lines.join("\n"));
-    let batch: Value = batch.send().await.unwrap().json().await.unwrap();
-    let batch = format!("/v1/batches/{}", batch["id"].as_str().unwrap());
+    let (batch, _) = send_batch(&one).await;
     let mut ids = Vec::new();
     for number in 0..40 {
         let api = [&one, &other][number % 2];
@@ -57,9 +42,10 @@ async fn nodes_behind_a_pooler_in_transaction_mode_work_and_hear_each_other() {
         let result = one.get(&format!("/v1/jobs/{id}/result")).await;
         assert!(result["patches"].is_array(), "{result}");
     }
-    while other.get(&batch).await["states"]["succeeded"] != json!(60) {
-        crate::support::pause().await;
-    }
+    until("the batch ends", async || {
+        other.get(&batch).await["states"]["succeeded"] == 60
+    })
+    .await;
     assert_heard(&one, &other).await;
     for node in [&one, &other, &worker] {
         let log = node.log_text();
@@ -79,17 +65,14 @@ async fn assert_heard(one: &Service, other: &Service) {
             .submit(&endless_case(&format!("waited for {number}")))
             .await;
         one.until(&id, "running").await;
-        let waiting = one
-            .request(Method::GET, &format!("/v1/jobs/{id}"))
-            .header("Prefer", "wait=30");
-        let waiting = tokio::spawn(waiting.send());
+        let waiting = one.request(Method::GET, &format!("/v1/jobs/{id}"));
+        let waiting = tokio::spawn(Answer::to(waiting.header("Prefer", "wait=30")));
         // The wait begins before the end.
         tokio::time::sleep(Duration::from_millis(100)).await;
         let asked = Instant::now();
-        let cancel = format!("/v1/jobs/{id}/cancel");
-        other.request(Method::POST, &cancel).send().await.unwrap();
-        let job: Value = waiting.await.unwrap().unwrap().json().await.unwrap();
-        assert_eq!(job["state"], "cancelled", "{job}");
+        other.cancel(&id).await;
+        let job = waiting.await.unwrap();
+        assert_eq!(job.json["state"], "cancelled", "{}", job.text);
         fastest = fastest.min(asked.elapsed());
         if fastest < HEARD_WITHIN {
             return;

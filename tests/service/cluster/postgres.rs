@@ -1,7 +1,6 @@
 //! A PostgreSQL of our own, started once for all tests that need one: found in the usual places, its data in a folder of its
 //! own, gone with the process. `RAILHEAD_TEST_POSTGRES` names the URL of another one, of a role that may make databases.
 
-use std::io::Read;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -10,10 +9,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use railhead::jobs::store::postgres::schema::migrate;
+use sqlx::{Connection, PgConnection};
 
 use crate::support::skip;
 
-/// How long the server may take to start.
+/// How long a server may take to start.
 const STARTS_WITHIN: Duration = Duration::from_secs(60);
 
 /// An address of this machine, of a network of 24 bits that is trusted, on which the server listens as well; to be set before it starts.
@@ -103,19 +103,22 @@ pub fn with_parameter(url: &str, parameter: &str) -> String {
     format!("{url}{mark}{parameter}")
 }
 
-/// A database of its own in that server.
-pub async fn database() -> Option<String> {
+/// Makes something in that server, a `DATABASE` or a `SCHEMA`; the URL of the server and the new name.
+async fn make(what: &str) -> Option<(&'static str, String)> {
     static MADE: AtomicU32 = AtomicU32::new(0);
     let url = server()?;
     let number = MADE.fetch_add(1, Ordering::Relaxed);
     let name = format!("test_{}_{number}", std::process::id());
-    let pool = sqlx::PgPool::connect(url).await.expect("the server");
-    let statement = format!("CREATE DATABASE {name}");
-    sqlx::query(sqlx::AssertSqlSafe(statement))
-        .execute(&pool)
-        .await
-        .expect("a database");
-    pool.close().await;
+    let mut server = PgConnection::connect(url).await.expect("the server");
+    let statement = sqlx::AssertSqlSafe(format!("CREATE {what} {name}"));
+    let made = sqlx::query(statement).execute(&mut server).await;
+    made.unwrap_or_else(|error| panic!("{what}: {error}"));
+    Some((url, name))
+}
+
+/// A database of its own in that server.
+pub async fn database() -> Option<String> {
+    let (url, name) = make("DATABASE").await?;
     let (address, query) = url.split_once('?').unwrap_or((url, ""));
     let (front, _) = address.rsplit_once('/').expect("a URL with a database");
     Some(format!("{front}/{name}?{query}"))
@@ -123,17 +126,7 @@ pub async fn database() -> Option<String> {
 
 /// A schema of its own with the tables of the service, which is made faster than a database.
 pub async fn schema() -> Option<String> {
-    static MADE: AtomicU32 = AtomicU32::new(0);
-    let url = server()?;
-    let number = MADE.fetch_add(1, Ordering::Relaxed);
-    let name = format!("test_{}_{number}", std::process::id());
-    let pool = sqlx::PgPool::connect(url).await.expect("the server");
-    let statement = format!("CREATE SCHEMA {name}");
-    sqlx::query(sqlx::AssertSqlSafe(statement))
-        .execute(&pool)
-        .await
-        .expect("a schema");
-    pool.close().await;
+    let (url, name) = make("SCHEMA").await?;
     let url = with_parameter(url, &format!("options=-c%20search_path%3D{name}"));
     migrate(&url).await.expect("tables");
     Some(url)
@@ -205,17 +198,34 @@ fn certify(folder: &Path) -> PathBuf {
     write("authority.pem", authority.pem())
 }
 
+/// A folder that is left to a program of our own, which removes it.
+pub fn left_folder(name: &str) -> PathBuf {
+    let mut folder = tempfile::Builder::new();
+    folder.prefix(name).tempdir().expect("a folder").keep()
+}
+
+/// A port that is free at this moment.
+pub fn free_port() -> u16 {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    listener.local_addr().expect("an address").port()
+}
+
+/// Has a shell start something in its folder, and waits until it is ready. It ends with the standard input of the shell, however this
+/// process ends.
+pub fn started(mut shell: Command, script: &str, ready: impl Fn() -> bool) -> Child {
+    let shell = shell.args(["-c", script]).stdin(Stdio::piped());
+    let child = shell.spawn().expect("a shell");
+    let until = Instant::now() + STARTS_WITHIN;
+    while !ready() {
+        assert!(Instant::now() < until, "not ready: {script}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    child
+}
+
 fn start() -> Option<Server> {
     let programs = programs()?;
-    let folder = tempfile::Builder::new()
-        .prefix("railhead-pg")
-        .tempdir()
-        .expect("a folder")
-        .keep();
-    let port = std::net::TcpListener::bind("127.0.0.1:0")
-        .and_then(|listener| listener.local_addr())
-        .expect("a port")
-        .port();
+    let (folder, port) = (left_folder("railhead-pg"), free_port());
     let authority = certify(&folder);
     let (more, trusted) = match ALSO_AT.get() {
         Some(address) => (
@@ -228,40 +238,19 @@ fn start() -> Option<Server> {
     let script = format!(
         "cd '{data}' && mkdir tls && cp server.pem server.key tls && chmod 600 tls/server.key && '{bin}/initdb' -D db -U railhead -A trust -E UTF8 --no-locale -N > init.log 2>&1 && {trusted}\
          {{ while [ ! -e stop ]; do '{bin}/postgres' -D db -k '{data}' -c listen_addresses=127.0.0.1{more} -p {port} -c fsync=off \
-         -c ssl=on -c ssl_cert_file='{data}/tls/server.pem' -c ssl_key_file='{data}/tls/server.key' -c max_connections=400 -c shared_buffers=64MB -c deadlock_timeout=200ms; done > log 2>&1 & }} && echo started && \
+         -c ssl=on -c ssl_cert_file='{data}/tls/server.pem' -c ssl_key_file='{data}/tls/server.key' -c max_connections=400 -c shared_buffers=64MB -c deadlock_timeout=200ms; done > log 2>&1 & }} && \
          read nothing; touch stop; while kill -0 $!; do kill -QUIT $(head -n 1 db/postmaster.pid); sleep 0.1; done 2> /dev/null; \
          wait; rm -rf '{data}'",
         data = folder.display(),
         bin = programs.display(),
     );
-    let mut command = shell(&folder);
-    command
-        .args(["-c", &script])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped());
-    let mut child: Child = command.spawn().expect("a shell");
-    let mut started = [0];
-    let heard = child.stdout.take().map(|mut out| out.read(&mut started));
-    assert!(
-        matches!(heard, Some(Ok(1))),
-        "initdb failed in {}",
-        folder.display()
-    );
-    let url = format!("postgres://railhead@127.0.0.1:{port}/postgres?sslmode=disable");
-    let until = Instant::now() + STARTS_WITHIN;
     let ready = || {
         let mut asked = Command::new(programs.join("pg_isready"));
         asked.args(["-q", "-h", "127.0.0.1", "-p", &port.to_string()]);
         asked.status().is_ok_and(|status| status.success())
     };
-    while !ready() {
-        assert!(
-            Instant::now() < until,
-            "no PostgreSQL in {}",
-            folder.display()
-        );
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    let child = started(shell(&folder), &script, ready);
+    let url = format!("postgres://railhead@127.0.0.1:{port}/postgres?sslmode=disable");
     Some(Server {
         url,
         authority: Some(authority),

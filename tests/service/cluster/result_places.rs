@@ -6,11 +6,10 @@ use std::time::{Duration, SystemTime};
 use railhead::jobs::options::{Database, NotifyMode};
 use railhead::jobs::result_place::examine_results;
 use railhead::jobs::result_place::url::ResultsPlace;
-use railhead::jobs::store::postgres::schema::migrate;
 use railhead::jobs::{Jobs, Options};
 use uuid::Uuid;
 
-use crate::cluster::postgres::database;
+use crate::cluster::tables;
 use crate::support::{case, files_below};
 
 fn folder_place(folder: &Path, shared: bool) -> ResultsPlace {
@@ -52,10 +51,9 @@ async fn solve_one(options: Options) {
 
 #[tokio::test]
 async fn a_node_is_refused_that_would_look_for_the_results_elsewhere() {
-    let Some(url) = database().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    migrate(&url).await.unwrap();
     let folders: [_; 4] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
     let [data, place, elsewhere, embedded] = &folders;
     let shared = folder_place(place.path(), true);
@@ -89,8 +87,7 @@ async fn a_node_is_refused_that_would_look_for_the_results_elsewhere() {
     );
 
     // Another database, pointed at these results; one that has its own in itself.
-    let second = database().await.unwrap();
-    migrate(&second).await.unwrap();
+    let second = tables().await.unwrap();
     let said = refusal(options(&second, data.path(), Some(shared.clone()))).await;
     assert!(said.contains("results of another database"), "{said}");
     solve_one(options(&second, data.path(), None)).await;
@@ -109,10 +106,9 @@ async fn a_node_is_refused_that_would_look_for_the_results_elsewhere() {
 
 #[tokio::test]
 async fn only_old_results_that_no_job_refers_to_are_swept() {
-    let Some(url) = database().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    migrate(&url).await.unwrap();
     let (data, place) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let options = || options(&url, data.path(), Some(folder_place(place.path(), true)));
     solve_one(options()).await;

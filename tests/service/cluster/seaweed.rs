@@ -3,14 +3,11 @@
 
 use std::net::TcpListener;
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command};
 use std::sync::OnceLock;
-use std::time::{Duration, Instant};
 
+use super::postgres::{left_folder, started};
 use crate::support::{railhead, skip};
-
-/// How long the server may take to start.
-const STARTS_WITHIN: Duration = Duration::from_secs(60);
 
 /// What requests are signed with.
 const KEYS: [(&str, &str); 3] = [
@@ -59,11 +56,7 @@ fn ports() -> [u16; 4] {
 }
 
 fn start(program: &std::path::Path) -> Server {
-    let folder = tempfile::Builder::new()
-        .prefix("railhead-s3")
-        .tempdir()
-        .expect("a folder")
-        .keep();
+    let folder = left_folder("railhead-s3");
     let [s3, master, volume, filer] = ports();
     let script = format!(
         "cd '{data}' && {{ '{weed}' -logdir=. server -master.telemetry=false -dir=. -ip=127.0.0.1 -ip.bind=127.0.0.1 -filer -s3 \
@@ -73,20 +66,9 @@ fn start(program: &std::path::Path) -> Server {
         weed = program.display(),
     );
     let mut command = Command::new("sh");
-    command
-        .args(["-c", &script])
-        .envs(KEYS)
-        .stdin(Stdio::piped());
-    let shell = command.spawn().expect("a shell");
-    let until = Instant::now() + STARTS_WITHIN;
-    while std::net::TcpStream::connect(("127.0.0.1", s3)).is_err() {
-        assert!(
-            Instant::now() < until,
-            "no SeaweedFS in {}",
-            folder.display()
-        );
-        std::thread::sleep(Duration::from_millis(50));
-    }
+    command.envs(KEYS);
+    let ready = || std::net::TcpStream::connect(("127.0.0.1", s3)).is_ok();
+    let shell = started(command, &script, ready);
     Server {
         port: s3,
         _shell: shell,

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use railhead::jobs::model::{Kind, Queue};
 use railhead::jobs::store::postgres::database::PostgresStore;
-use railhead::jobs::store::postgres::schema::migrate;
 use railhead::jobs::store::{
     Claim, ClaimKind, ClaimRequest, Enqueued, Filter, Lease, Membership, Moment, NewJob,
     QueueBounds, Reap, ReleaseReason, RetentionRule, Store,
@@ -15,8 +14,9 @@ use serde_json::Value;
 use sqlx::PgPool;
 use uuid::Uuid;
 
-use crate::cluster::postgres::{database, log_lines, with_parameter};
-use crate::store::{new_job, queue_of, success};
+use crate::cluster::postgres::{log_lines, with_parameter};
+use crate::cluster::tables;
+use crate::store::{self, new_job, queue_of, success};
 
 const TENANT: &str = "north";
 const GROUP: usize = 32;
@@ -35,17 +35,10 @@ const EXPLAINED: &str = "options=-c%20session_preload_libraries%3Dauto_explain%2
 
 fn request(queue: &Queue, kind: ClaimKind) -> ClaimRequest<'_> {
     ClaimRequest {
-        worker: "w",
-        queue,
         kind,
-        jobs: GROUP,
-        cost_us: u64::MAX,
-        each_slice_us: None,
-        suspects: true,
         waiting: 10_000,
         lease: Lease { now: 0, ms: 60_000 },
-        now: 1,
-        late_before: 1,
+        ..store::request(queue, GROUP, 1)
     }
 }
 
@@ -186,8 +179,7 @@ fn faults(step: &Value, faults: &mut Vec<String>) {
 
 /// Fills a queue, makes the calls, and looks at the plans of all statements; returns their number.
 pub async fn look_at_plans(queued: i64) -> Option<usize> {
-    let url = database().await?;
-    migrate(&url).await.unwrap();
+    let url = tables().await?;
     let pool = PgPool::connect(&url).await.unwrap();
     sqlx::query(FILL).bind(queued).execute(&pool).await.unwrap();
     sqlx::raw_sql("VACUUM ANALYZE")

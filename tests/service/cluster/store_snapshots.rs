@@ -3,14 +3,13 @@
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::Queue;
 use railhead::jobs::store::postgres::database::PostgresStore;
-use railhead::jobs::store::postgres::schema::migrate;
 use railhead::jobs::store::{
-    ClaimKind, ClaimRequest, Claims, Ending, Ends, Lease, ReleaseReason, StoredResult,
+    ClaimRequest, Claims, Ending, Ends, Lease, ReleaseReason, StoredResult,
 };
 use sqlx::{Connection, PgConnection};
 
-use crate::cluster::postgres::database;
-use crate::store::queue_of;
+use crate::cluster::tables;
+use crate::store::{self, queue_of};
 
 const QUEUED: i64 = 9000;
 const GROUP: usize = 32;
@@ -33,17 +32,9 @@ async fn read(connection: &mut PgConnection, index: &str) -> i64 {
 
 fn request(queue: &Queue) -> ClaimRequest<'_> {
     ClaimRequest {
-        worker: "w",
-        queue,
-        kind: ClaimKind::New,
-        jobs: GROUP,
-        cost_us: u64::MAX,
-        each_slice_us: None,
-        suspects: true,
         waiting: QUEUED.unsigned_abs(),
         lease: Lease { now: 0, ms: 30_000 },
-        now: 0,
-        late_before: 0,
+        ..store::request(queue, GROUP, 0)
     }
 }
 
@@ -60,10 +51,9 @@ fn success() -> Ending {
 
 #[tokio::test]
 async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_back() {
-    let Some(url) = database().await else {
+    let Some(url) = tables().await else {
         return;
     };
-    migrate(&url).await.unwrap();
     let mut connection = PgConnection::connect(&url).await.unwrap();
     sqlx::query(FILL)
         .bind(QUEUED)
