@@ -166,9 +166,7 @@ async fn every_form_of_a_grid_says_the_same_numbers() {
 #[tokio::test]
 async fn numpy_reads_the_archive() {
     // Without it the archive is read by this test's own reader only.
-    let Some(python) = python() else {
-        return;
-    };
+    let python = or_skip!(python());
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("spin.case.json")).await);
     let folder = tempfile::tempdir().expect("a folder");

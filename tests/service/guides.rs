@@ -69,9 +69,7 @@ fn run_shell(guide: &str) -> Option<(TempDir, String)> {
 
 #[test]
 fn guide_to_forms_runs_as_it_stands() {
-    let Some((folder, said)) = run_shell("docs/formats.md") else {
-        return;
-    };
+    let (folder, said) = or_skip!(run_shell("docs/formats.md"));
     assert!(
         said.contains("x_mm,y_mm,dx_mm,dy_mm,strip,traction_x_mpa"),
         "{said}"
@@ -93,9 +91,7 @@ fn guide_to_forms_runs_as_it_stands() {
 
 #[test]
 fn guide_to_wheelsets_runs_as_it_stands() {
-    let Some((_folder, said)) = run_shell("docs/wheelset.md") else {
-        return;
-    };
+    let (_folder, said) = or_skip!(run_shell("docs/wheelset.md"));
     assert!(
         said.contains("\"radius_difference_mm\": 0.75") && said.contains("\"conicity\": 0.180"),
         "{said}"
@@ -104,9 +100,7 @@ fn guide_to_wheelsets_runs_as_it_stands() {
 
 #[test]
 fn guide_to_runs_runs_as_it_stands() {
-    let Some((folder, said)) = run_shell("docs/runs.md") else {
-        return;
-    };
+    let (folder, said) = or_skip!(run_shell("docs/runs.md"));
     assert!(
         said.contains("row,km,section,status,method,normal_force_n,force_x_n"),
         "{said}"
@@ -117,9 +111,7 @@ fn guide_to_runs_runs_as_it_stands() {
 
 #[test]
 fn creep_curve_from_the_shell_runs_as_it_stands() {
-    let Some((folder, said)) = run_shell("docs/python.md") else {
-        return;
-    };
+    let (folder, said) = or_skip!(run_shell("docs/python.md"));
     let curve: Vec<f64> = said
         .lines()
         .filter_map(|line| line.split_once('\t')?.1.parse().ok())
@@ -138,9 +130,7 @@ fn creep_curve_from_the_shell_runs_as_it_stands() {
 
 #[test]
 fn creep_curve_from_python_runs_as_it_stands() {
-    let Some(python) = python() else {
-        return;
-    };
+    let python = or_skip!(python());
     let (_data, service) = Service::fresh(&[]);
     let (folder, script) = (folder(), blocks("docs/python.md", "python", &service));
     let said = run(&python, &["-c", &script], folder.path());

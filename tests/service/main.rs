@@ -1,5 +1,13 @@
 //! Does the service behave?
 
+/// What a test needs. Where it is not there, which has been said, the test is not run.
+macro_rules! or_skip {
+    ($needed:expr) => {{
+        let Some(there) = $needed else { return };
+        there
+    }};
+}
+
 mod access;
 mod admission;
 mod api;

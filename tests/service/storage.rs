@@ -121,9 +121,7 @@ async fn all_succeed(service: &Service, accepted: &[String]) {
 
 #[tokio::test]
 async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
-    let Some(disk) = Disk::mount("size=24m") else {
-        return;
-    };
+    let disk = or_skip!(Disk::mount("size=24m"));
     let service = disk.serve(&[]);
     let large = service.submit(&large_case()).await;
     service.until(&large, "running").await;
@@ -160,9 +158,7 @@ async fn send_batch(service: &Service, key: &str, cases: &[Value]) -> Answer {
 
 #[tokio::test]
 async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once() {
-    let Some(disk) = Disk::mount("size=64m") else {
-        return;
-    };
+    let disk = or_skip!(Disk::mount("size=64m"));
     let service = disk.serve(&[]);
     let cases: Vec<Value> = (0..6000)
         .map(|number| small_loaded(&number.to_string(), 50_000 + number))
@@ -201,9 +197,7 @@ async fn a_service_starts_on_a_full_disk_and_serves_what_it_has() {
 }
 
 async fn starts_on_a_full_disk(killed: bool) {
-    let Some(disk) = Disk::mount("size=16m") else {
-        return;
-    };
+    let disk = or_skip!(Disk::mount("size=16m"));
     let service = disk.serve(&["--shutdown-grace-s", "0"]);
     let solved = service.submit(&case("solved")).await;
     service.until(&solved, "succeeded").await;
@@ -231,9 +225,7 @@ async fn starts_on_a_full_disk(killed: bool) {
 
 #[tokio::test]
 async fn a_full_disk_costs_a_sweep_no_slice() {
-    let Some(disk) = Disk::mount("size=16m") else {
-        return;
-    };
+    let disk = or_skip!(Disk::mount("size=16m"));
     let service = disk.serve(&["--log", "info,railhead::jobs=debug"]);
     let question = sliced_case("long", 150);
     let problem = railhead::contact::check(&question, &Limits::default()).unwrap();
@@ -259,9 +251,7 @@ async fn a_full_disk_costs_a_sweep_no_slice() {
 
 #[tokio::test]
 async fn a_full_disk_and_a_kill_lose_nothing_either() {
-    let Some(disk) = Disk::mount("size=16m") else {
-        return;
-    };
+    let disk = or_skip!(Disk::mount("size=16m"));
     let service = disk.serve(&[]);
     service.submit(&case("first")).await;
     let ballast = disk.fill();
@@ -277,9 +267,7 @@ async fn a_full_disk_and_a_kill_lose_nothing_either() {
 
 #[test]
 fn a_read_only_disk_is_named_at_the_start() {
-    let Some(disk) = Disk::mount("size=1m") else {
-        return;
-    };
+    let disk = or_skip!(Disk::mount("size=1m"));
     disk.remount("ro");
     let mut serve = railhead();
     let serve = serve.arg("serve").arg("--data-dir").arg(disk.data_dir());
@@ -299,9 +287,7 @@ async fn failing(service: &Service) -> bool {
 
 #[tokio::test]
 async fn results_without_room_are_told_although_the_table_takes_data() {
-    let Some(disk) = Disk::mount("size=64k") else {
-        return;
-    };
+    let disk = or_skip!(Disk::mount("size=64k"));
     let folder = tempfile::tempdir().unwrap();
     let results = folder.path().join("results");
     std::os::unix::fs::symlink(disk.folder.path(), results).unwrap();
@@ -326,9 +312,7 @@ async fn results_without_room_are_told_although_the_table_takes_data() {
 
 #[tokio::test]
 async fn a_body_that_fills_the_disk_is_told_until_there_is_room() {
-    let Some(disk) = Disk::mount("size=32m") else {
-        return;
-    };
+    let disk = or_skip!(Disk::mount("size=32m"));
     let service = disk.serve(&[]);
     let job = service.submit(&small("the template")).await;
     service.until(&job, "succeeded").await;

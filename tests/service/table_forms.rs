@@ -49,10 +49,7 @@ fn rows(texts: Option<&str>) -> RowTable {
 
 /// The table in every form that a request may have, with its media type. NPZ holds numbers only.
 pub fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
-    let columns = table.columns.iter();
-    let kinds = columns.map(|(name, column)| (name.clone(), column.kind()));
-    let kinds: Vec<_> = kinds.collect();
-    let mut arrow = ArrowWriter::new(Vec::new(), &kinds).expect("a stream");
+    let mut arrow = ArrowWriter::new(Vec::new(), &table.kinds()).expect("a stream");
     arrow.write(table.clone()).expect("a batch");
     arrow.finish().expect("the end");
     let value = |column: &TableColumn, row: usize| match column {

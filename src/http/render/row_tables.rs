@@ -61,11 +61,7 @@ impl RowWriter {
     /// # Errors
     /// It cannot be written.
     pub(crate) fn whole(format: Format, table: RowTable) -> Result<Vec<u8>, WriteError> {
-        let columns = table.columns.iter();
-        let columns: Vec<_> = columns
-            .map(|(name, column)| (name.clone(), column.kind()))
-            .collect();
-        let mut writer = RowWriter::new(format, &columns)?;
+        let mut writer = RowWriter::new(format, &table.kinds())?;
         Ok([writer.head()?, writer.write(table)?, writer.finish()?].concat())
     }
 

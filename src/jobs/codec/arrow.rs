@@ -188,12 +188,7 @@ mod tests {
                 ),
             ],
         };
-        let kinds: Vec<_> = table
-            .columns
-            .iter()
-            .map(|(name, column)| (name.clone(), column.kind()))
-            .collect();
-        let mut writer = ArrowWriter::new(Vec::new(), &kinds).unwrap();
+        let mut writer = ArrowWriter::new(Vec::new(), &table.kinds()).unwrap();
         for _ in 0..2 {
             writer.write(table.clone()).unwrap();
         }
@@ -214,12 +209,7 @@ mod tests {
         let table = RowTable {
             columns: vec![("a".to_owned(), numbers), ("b".to_owned(), texts)],
         };
-        let kinds: Vec<_> = table
-            .columns
-            .iter()
-            .map(|(name, column)| (name.clone(), column.kind()))
-            .collect();
-        let mut writer = ArrowWriter::new(Vec::new(), &kinds).unwrap();
+        let mut writer = ArrowWriter::new(Vec::new(), &table.kinds()).unwrap();
         writer.write(table).unwrap();
         writer.finish().unwrap();
         let stream = std::mem::take(writer.inner_mut());

@@ -135,13 +135,8 @@ fn field(name: &str, kind: TableKind) -> Result<Arc<Type>> {
 /// # Errors
 /// It cannot be written.
 pub fn encode(table: &RowTable) -> Result<Vec<u8>> {
-    let columns: Vec<_> = table
-        .columns
-        .iter()
-        .map(|(name, column)| (name.clone(), column.kind()))
-        .collect();
     let mut file = Vec::new();
-    let mut writer = TableWriter::new(&mut file, &columns)?;
+    let mut writer = TableWriter::new(&mut file, &table.kinds())?;
     writer.write(table)?;
     writer.finish()?;
     drop(writer);
@@ -332,13 +327,8 @@ mod tests {
 
     #[test]
     fn several_tables_are_groups_of_one_file() {
-        let columns: Vec<_> = table()
-            .columns
-            .iter()
-            .map(|(name, column)| (name.clone(), column.kind()))
-            .collect();
         let mut file = Vec::new();
-        let mut writer = TableWriter::new(&mut file, &columns).unwrap();
+        let mut writer = TableWriter::new(&mut file, &table().kinds()).unwrap();
         for _ in 0..2 {
             writer.write(&table()).unwrap();
         }

@@ -95,6 +95,15 @@ impl TableKind {
 }
 
 impl RowTable {
+    /// Names of the columns with what they hold.
+    #[must_use]
+    pub fn kinds(&self) -> Vec<(String, TableKind)> {
+        let columns = self.columns.iter();
+        columns
+            .map(|(name, column)| (name.clone(), column.kind()))
+            .collect()
+    }
+
     /// Number of rows.
     #[must_use]
     pub fn row_count(&self) -> usize {

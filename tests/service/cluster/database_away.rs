@@ -41,9 +41,7 @@ async fn until_ready(service: &Service) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_database_that_is_away_is_no_full_disk_and_costs_no_job() {
-    let Some((service, cable)) = node_at_a_cable(&[]).await else {
-        return;
-    };
+    let (service, cable) = or_skip!(node_at_a_cable(&[]).await);
     let done = service.submit(&case("done")).await;
     service.until(&done, "succeeded").await;
     let solving = service.submit(&long_case("solving", 60)).await;
@@ -72,9 +70,7 @@ async fn a_database_that_is_away_is_no_full_disk_and_costs_no_job() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_way_that_swallows_everything_keeps_no_connection_and_no_request() {
     // Two connections: no request is served while one of them is kept.
-    let Some((service, cable)) = node_at_a_cable(&["--database-connections", "2"]).await else {
-        return;
-    };
+    let (service, cable) = or_skip!(node_at_a_cable(&["--database-connections", "2"]).await);
     let done = service.submit(&case("done")).await;
     service.until(&done, "succeeded").await;
 

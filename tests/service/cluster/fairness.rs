@@ -64,9 +64,7 @@ async fn node(url: &str, folder: &Path, spent: Arc<[AtomicU64; 3]>) -> Jobs {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn tenants_share_two_nodes_equally_with_jobs_of_1_10_and_100_times_the_length() {
-    let Some(url) = schema().await else {
-        return;
-    };
+    let url = or_skip!(schema().await);
     let spent: Arc<[AtomicU64; 3]> = Arc::default();
     let folders = [0, 1].map(|_| tempfile::tempdir().unwrap());
     let one = node(&url, folders[0].path(), spent.clone()).await;

@@ -14,9 +14,7 @@ const SUMS: &str = "SELECT tenant, kind, CAST(SUM(number) AS bigint) FROM job_co
 
 #[tokio::test]
 async fn adding_up_the_counts_keeps_their_sums_and_leaves_one_row_of_each() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let mut connection = PgConnection::connect(&url).await.unwrap();
     for (tenant, kind, number) in [
         ("north", "case", 2),

@@ -28,9 +28,7 @@ async fn five_nodes_start_at_once_on_an_empty_and_on_an_old_database() {
         (None, "was made"),
         (Some(old_tables::newest() - 1), "was brought forward"),
     ] {
-        let Some(url) = database().await else {
-            return;
-        };
+        let url = or_skip!(database().await);
         if let Some(form) = before {
             let mut connection = PgConnection::connect(&url).await.unwrap();
             old_tables::make(&mut connection, form).await;
@@ -58,9 +56,7 @@ async fn assert_done_once(url: &str, what: Migrated) {
 
 #[tokio::test]
 async fn tables_are_made_once_and_old_ones_brought_forward_once_whoever_does_so_at_once() {
-    let Some(url) = database().await else {
-        return;
-    };
+    let url = or_skip!(database().await);
     assert_done_once(&url, Migrated::Made).await;
 
     let old = database().await.unwrap();
@@ -84,9 +80,7 @@ async fn tables_are_made_once_and_old_ones_brought_forward_once_whoever_does_so_
 
 #[tokio::test]
 async fn a_program_goes_on_beside_newer_tables_unless_they_say_that_it_cannot() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let start = || node(&url, "serve", &["--workers", "1"]);
     let before = start();
     let mut connection = PgConnection::connect(&url).await.unwrap();

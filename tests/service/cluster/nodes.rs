@@ -32,9 +32,7 @@ pub async fn send_batch(service: &Service) -> (String, bool) {
 
 #[tokio::test]
 async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_node_are_killed() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let (first, second) = (node(&url, "serve", &[]), node(&url, "serve", &[]));
     let (doomed, survivor) = (node(&url, "worker", &[]), node(&url, "worker", &[]));
     let mut ids = BTreeSet::new();
@@ -86,9 +84,7 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
 
 #[tokio::test]
 async fn a_job_is_cancelled_and_waited_for_at_a_node_that_does_not_solve_it() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let (one, other) = (node(&url, "serve", &[]), node(&url, "serve", &[]));
     let worker = node(&url, "worker", &[]);
     let endless = one.submit(&endless_case("endless")).await;
@@ -134,9 +130,7 @@ async fn until_event(stream: &mut reqwest::Response, passes: impl Fn(&Value) -> 
 
 #[tokio::test]
 async fn progress_and_events_are_seen_and_results_used_again_at_every_node() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let start = |role: &str| node(&url, role, &["--cache", "true"]);
     let (one, other, _worker) = (start("serve"), start("serve"), start("worker"));
     let watched = one.submit(&endless_case("watched")).await;
@@ -154,9 +148,7 @@ async fn progress_and_events_are_seen_and_results_used_again_at_every_node() {
 
 #[tokio::test]
 async fn a_worker_that_stood_still_for_longer_than_its_lease_changes_nothing() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let api = node(&url, "serve", &[]);
     let paused = node(&url, "worker", &[]);
     let id = api.submit(&long_case("taken over", 60)).await;
@@ -177,9 +169,7 @@ async fn a_worker_that_stood_still_for_longer_than_its_lease_changes_nothing() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn rows_of_a_worker_that_was_cut_off_inside_a_transaction_are_free_soon() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     // The first claim takes a second; a sequence counts those that are rolled back, too.
     let slow = "CREATE SEQUENCE claims; CREATE FUNCTION slow() RETURNS trigger LANGUAGE plpgsql AS $$ \
          BEGIN IF nextval('claims') = 1 THEN PERFORM pg_sleep(1); END IF; RETURN NULL; END $$; \
@@ -207,9 +197,7 @@ async fn rows_of_a_worker_that_was_cut_off_inside_a_transaction_are_free_soon() 
 
 #[tokio::test]
 async fn a_node_says_what_is_wrong_with_its_database() {
-    let Some(url) = postgres::database().await else {
-        return;
-    };
+    let url = or_skip!(postgres::database().await);
     let folder = tempfile::tempdir().unwrap();
     let serve = |words: &[&str]| {
         let mut command = railhead();

@@ -61,9 +61,7 @@ async fn assert_few_requests(service: &Service, id: &str) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn results_in_s3_survive_its_faults_and_are_read_at_every_node() {
-    let (Some(url), Some(port)) = (tables().await, server()) else {
-        return;
-    };
+    let (url, port) = (or_skip!(tables().await), or_skip!(server()));
     let way = FaultyServer::to(port).await;
     let faults = &way.faults;
     let port = way.address.port();

@@ -19,12 +19,8 @@ const HEARD_WITHIN: Duration = Duration::from_millis(700);
 
 #[tokio::test(flavor = "multi_thread")]
 async fn nodes_behind_a_pooler_in_transaction_mode_work_and_hear_each_other() {
-    let Some(direct) = database().await else {
-        return;
-    };
-    let Some(pooler) = Pooler::before(&direct, SESSIONS) else {
-        return;
-    };
+    let direct = or_skip!(database().await);
+    let pooler = or_skip!(Pooler::before(&direct, SESSIONS));
     let url = pooler.url(&direct);
     migrate(&url).await.unwrap();
     let start = |role: &str| node(&url, role, &["--database-direct-url", &direct]);

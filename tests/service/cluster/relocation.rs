@@ -83,9 +83,7 @@ fn make_key(folder: &str) -> String {
 
 #[tokio::test]
 async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
-    let Some(url) = database().await else {
-        return;
-    };
+    let url = or_skip!(database().await);
     let [from, place] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let folder = from.path().to_str().unwrap();
     let secret = make_key(folder);
@@ -132,9 +130,7 @@ async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
 
 #[tokio::test]
 async fn results_of_a_database_move_to_another_place_and_from_there_to_a_third() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let [first, second] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let places =
         [first, second].map(|folder| (format!("file://{}", folder.path().display()), folder));
@@ -164,9 +160,7 @@ async fn results_of_a_database_move_to_another_place_and_from_there_to_a_third()
 
 #[tokio::test]
 async fn results_of_a_database_move_into_a_bucket_and_from_there_into_another() {
-    let (Some(url), Some(port)) = (tables().await, server()) else {
-        return;
-    };
+    let (url, port) = (or_skip!(tables().await), or_skip!(server()));
     let mut service = node(&url, "serve", &SOLVES);
     let paths = fill(&service).await;
     let known = read(&service, &paths).await;

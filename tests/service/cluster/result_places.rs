@@ -51,9 +51,7 @@ async fn solve_one(options: Options) {
 
 #[tokio::test]
 async fn a_node_is_refused_that_would_look_for_the_results_elsewhere() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let folders: [_; 4] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
     let [data, place, elsewhere, embedded] = &folders;
     let shared = folder_place(place.path(), true);
@@ -106,9 +104,7 @@ async fn a_node_is_refused_that_would_look_for_the_results_elsewhere() {
 
 #[tokio::test]
 async fn only_old_results_that_no_job_refers_to_are_swept() {
-    let Some(url) = tables().await else {
-        return;
-    };
+    let url = or_skip!(tables().await);
     let (data, place) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let options = || options(&url, data.path(), Some(folder_place(place.path(), true)));
     solve_one(options()).await;
