@@ -1,6 +1,6 @@
 //! The errors of `contact`: a case with faults, and a solve without an answer.
 
-use railhead_macros::Named;
+use railhead_macros::Code;
 use serde_json::{Number, Value};
 use thiserror::Error;
 
@@ -20,7 +20,6 @@ pub struct Fault {
 
 impl Fault {
     /// A fault described by its sentence alone.
-    #[must_use]
     pub fn new(pointer: impl Into<String>, detail: impl Into<String>) -> Fault {
         Fault {
             pointer: pointer.into(),
@@ -50,7 +49,7 @@ pub struct FaultFigures {
 }
 
 /// Kinds of faults.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Named)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Code)]
 pub enum FaultCode {
     /// Another kind, described by the sentence.
     #[default]
@@ -58,19 +57,14 @@ pub enum FaultCode {
     /// A member that is needed is not there.
     Missing,
     /// A member is not known here.
-    #[serde(rename = "unknown-member")]
     UnknownMember,
     /// A value of another type is needed.
-    #[serde(rename = "wrong-type")]
     WrongType,
     /// A number is too small or too large.
-    #[serde(rename = "out-of-range")]
     OutOfRange,
     /// A word is none of those allowed.
-    #[serde(rename = "unknown-word")]
     UnknownWord,
     /// A text is too long.
-    #[serde(rename = "too-long")]
     TooLong,
 }
 

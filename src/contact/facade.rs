@@ -49,7 +49,6 @@ impl Case {
     /// assert!(patch.points[0].force_x_n > 0.0);
     /// # Ok::<(), railhead_contact::Error>(())
     /// ```
-    #[must_use]
     pub fn new(material: Material, friction: Friction, contact: Contact) -> Case {
         Case {
             name: None,
@@ -179,7 +178,6 @@ impl Case {
 
 impl Material {
     /// Steel on steel: G = 82 000 MPa, ν = 0.28.
-    #[must_use]
     pub fn steel() -> Material {
         Material::Same(Elastic::of_shear_modulus(82_000.0, 0.28))
     }
@@ -187,7 +185,6 @@ impl Material {
 
 impl Elastic {
     /// From the shear modulus in MPa and Poisson's ratio.
-    #[must_use]
     pub fn of_shear_modulus(shear_modulus_mpa: f64, poisson_ratio: f64) -> Elastic {
         Elastic {
             shear_modulus_mpa: Some(shear_modulus_mpa),
@@ -212,7 +209,6 @@ impl Elastic {
     /// assert!(solution.material.difference_parameter != 0.0);
     /// # Ok::<(), railhead_contact::Error>(())
     /// ```
-    #[must_use]
     pub fn of_young_modulus(young_modulus_mpa: f64, poisson_ratio: f64) -> Elastic {
         Elastic {
             shear_modulus_mpa: None,
@@ -224,7 +220,6 @@ impl Elastic {
 
 impl Friction {
     /// Coulomb friction with a constant coefficient.
-    #[must_use]
     pub fn coulomb(coefficient: f64) -> Friction {
         Friction {
             coefficient: Some(coefficient),
@@ -235,7 +230,6 @@ impl Friction {
 
 impl Contact {
     /// Bodies with the relative radii of curvature along and across the rolling direction, in mm.
-    #[must_use]
     pub fn radii(rolling_mm: f64, lateral_mm: f64) -> Contact {
         Contact::Radii {
             rolling_mm,
@@ -244,7 +238,6 @@ impl Contact {
     }
 
     /// An elliptic patch with the semi-axes along and across the rolling direction, in mm, under Hertz's pressure.
-    #[must_use]
     pub fn ellipse(a_mm: f64, b_mm: f64) -> Contact {
         Contact::Ellipse { a_mm, b_mm }
     }
@@ -265,7 +258,6 @@ impl Contact {
     /// assert!((solution.total[0].force_z_n.unwrap() + 75e3).abs() < 5e-4 * 75e3);
     /// # Ok::<(), railhead_contact::Error>(())
     /// ```
-    #[must_use]
     pub fn profiles(
         rail: CrossSection,
         wheel: CrossSection,
@@ -346,7 +338,6 @@ impl Contact {
 
 impl CrossSection {
     /// Points `[y, z]` in mm, in order along the cross-section; y positive to the field side, z positive down.
-    #[must_use]
     pub fn points(points_mm: Vec<[f64; 2]>) -> CrossSection {
         CrossSection {
             points_mm: Some(points_mm),
@@ -355,7 +346,6 @@ impl CrossSection {
     }
 
     /// The content of a file.
-    #[must_use]
     pub fn text(format: FormatName, text: impl Into<String>) -> CrossSection {
         CrossSection {
             format: Some(format),
@@ -380,7 +370,6 @@ impl CrossSection {
 
 impl Load {
     /// Normal force in N.
-    #[must_use]
     pub fn normal_force(normal_force_n: f64) -> Load {
         Load {
             normal_force_n: Some(normal_force_n),
@@ -389,7 +378,6 @@ impl Load {
     }
 
     /// Vertical force of the wheel or the wheelset in N.
-    #[must_use]
     pub fn vertical_force(vertical_force_n: f64) -> Load {
         Load {
             vertical_force_n: Some(vertical_force_n),
@@ -413,7 +401,6 @@ impl Load {
     /// assert!((force(0.08)? / force(0.02)? - 8.0).abs() < 1e-6);
     /// # Ok::<(), railhead_contact::Error>(())
     /// ```
-    #[must_use]
     pub fn approach(approach_mm: f64) -> Load {
         Load {
             approach_mm: Some(approach_mm),
@@ -439,7 +426,6 @@ impl AskedMotion {
     /// assert!(forces.is_sorted() && forces[9] <= 0.3 * 100e3);
     /// # Ok::<(), railhead_contact::Error>(())
     /// ```
-    #[must_use]
     pub fn creepages(creepage_x: f64, creepage_y: f64, spin_per_mm: f64) -> AskedMotion {
         AskedMotion {
             creepage_x: Some(creepage_x),
@@ -462,7 +448,6 @@ impl AskedMotion {
     /// assert!(point.motion.creepage_x > 0.0 && (point.force_x_n - 10e3).abs() < 200.0);
     /// # Ok::<(), railhead_contact::Error>(())
     /// ```
-    #[must_use]
     pub fn forces(force_x_n: f64, force_y_n: f64, spin_per_mm: f64) -> AskedMotion {
         AskedMotion {
             force_x_n: Some(force_x_n),
@@ -475,7 +460,6 @@ impl AskedMotion {
 
 impl Wheelset {
     /// A wheelset at a speed in mm/s whose wheels roll freely at a radius in mm, without lateral velocity, yaw rate and roll rate.
-    #[must_use]
     pub fn rolling_freely(speed_mm_per_s: f64, radius_mm: f64) -> Wheelset {
         Wheelset {
             speed_mm_per_s,

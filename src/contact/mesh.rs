@@ -20,7 +20,6 @@ pub struct Grading {
 
 impl Grading {
     /// Edges `−cos(kπ/n)`, nodes at the mid-angles: cells are smallest at both ends, where traction varies as the square root of distance.
-    #[must_use]
     pub fn cosine(cells: usize) -> Grading {
         let at = |k: f64| -(k * PI / cells as f64).cos();
         let mut edges: Vec<f64> = (0..=cells).map(|k| at(k as f64)).collect();
@@ -32,7 +31,6 @@ impl Grading {
     }
 
     /// Equal cells with nodes at their centres.
-    #[must_use]
     pub fn uniform(cells: usize) -> Grading {
         let at = |k: f64| 2.0 * k / cells as f64 - 1.0;
         let edges = (0..=cells).map(|k| at(k as f64)).collect();
@@ -41,7 +39,6 @@ impl Grading {
     }
 
     /// Cells graded toward both ends and toward `pole`: their density is `(1 − β)/2 + β/(π√(1 − ξ²)) + g L(ξ − pole)`.
-    #[must_use]
     pub fn about(pole: f64, cells: usize) -> Grading {
         let gathering = PoleGrading {
             pole,
@@ -67,7 +64,6 @@ impl Grading {
     }
 
     /// Number of cells.
-    #[must_use]
     pub fn cells(&self) -> usize {
         self.nodes.len()
     }
@@ -166,7 +162,6 @@ pub struct Mesh {
 
 impl Mesh {
     /// Divides every chord in the same way. Chords come sorted by patch, then y, then x.
-    #[must_use]
     pub fn new(chords: &[Chord], grading: &Grading) -> Mesh {
         let n = grading.cells();
         let mut mesh = Mesh {
@@ -194,13 +189,11 @@ impl Mesh {
     }
 
     /// Number of cells.
-    #[must_use]
     pub fn cells(&self) -> usize {
         self.node.len()
     }
 
     /// Area of every cell, in the square of the mesh's length unit.
-    #[must_use]
     pub fn areas(&self) -> Vec<f64> {
         let mut areas = Vec::with_capacity(self.cells());
         for segment in &self.segments {
@@ -215,7 +208,6 @@ impl Mesh {
     }
 
     /// y in mm at which every cell's traction acts.
-    #[must_use]
     pub fn cell_load_y(&self) -> Vec<f64> {
         let mut ys = Vec::with_capacity(self.cells());
         for (segment, y) in self.segments.iter().zip(&self.load_y) {
@@ -271,7 +263,6 @@ impl Mesh {
 
     /// Is every segment its own image under x → −x, to the last bit? The influence of cells on points is then that of their images on the images
     /// of the points.
-    #[must_use]
     pub fn is_reversible(&self) -> bool {
         let own_image = |segment: &Segment| {
             let cells = segment.cells.clone();
@@ -285,7 +276,6 @@ impl Mesh {
 
     /// The y about which segment `j` is the mirror image of segment `m − 1 − j` for every `j`, if there is one and
     /// no segment is its own image. Lengths are compared to 1e-9 of the extent of the mesh, so that rounding to single precision keeps the line.
-    #[must_use]
     pub fn mirror_line(&self) -> Option<f64> {
         let m = self.segments.len();
         if m == 0 || m % 2 == 1 {
@@ -313,7 +303,6 @@ impl Mesh {
 }
 
 /// `count` equal strips between `low` and `high` as `(y, dy)`, from smaller to larger y.
-#[must_use]
 pub fn equal_strips(low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
     let dy = (high - low) / count as f64;
     let middle = 0.5 * (low + high);
@@ -323,7 +312,6 @@ pub fn equal_strips(low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
 }
 
 /// `count` strips between `low` and `high` as `(y, dy)`, narrower about `pole`, a place between −1 and 1.
-#[must_use]
 pub fn strips_about(pole: f64, low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
     let gathering = PoleGrading { pole, at_ends: 0.0 };
     let mut edges = vec![-1.0];
@@ -369,14 +357,12 @@ pub struct Chord {
 
 impl Chord {
     /// x in mm of the place `−half · cosine` from the middle.
-    #[must_use]
     pub fn along(&self, cosine: f64) -> f64 {
         0.5 * (self.left + self.right) - 0.5 * (self.right - self.left) * cosine
     }
 }
 
 /// The observation points of a segment: its nodes, its leading edge, and its last two nodes reflected in that edge.
-#[must_use]
 pub fn observation_points(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
     let mut points = Vec::with_capacity(segment.cells.len() + 3);
     observe(mesh, segment, &mut points);

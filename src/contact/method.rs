@@ -3,9 +3,10 @@
 use railhead_macros::Named;
 
 /// A method; each is a file or folder of this name in [`rolling::methods`](crate::contact::rolling::methods).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Named)]
 pub enum Method {
     /// Semismooth Newton iteration with strip-preconditioned GMRES.
+    #[default]
     BoundaryElement,
     /// The method of Liu and Hsu.
     LiuHsu,
@@ -27,7 +28,6 @@ pub enum TractionBound {
 
 impl Method {
     /// Does it solve for tractions and slips, rather than for resultants only?
-    #[must_use]
     pub fn has_fields(self) -> bool {
         match self {
             Method::BoundaryElement | Method::LiuHsu | Method::Fastsim => true,

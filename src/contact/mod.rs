@@ -54,6 +54,7 @@ pub mod error;
 pub mod evaluate;
 pub mod evolution;
 pub mod facade;
+pub mod finite;
 pub mod friction;
 pub mod geometry;
 pub mod half_space;

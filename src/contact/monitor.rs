@@ -18,6 +18,17 @@ pub trait Monitor {
     fn tick(&self, progress: f64) -> ControlFlow<Stop>;
     /// Time since the solve began.
     fn elapsed(&self) -> Duration;
+
+    /// The same as [`tick`](Monitor::tick), with an error as the end.
+    ///
+    /// # Errors
+    /// Why the solve is to end.
+    fn go_on(&self, progress: f64) -> Result<(), Stop> {
+        match self.tick(progress) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(stop) => Err(stop),
+        }
+    }
 }
 
 /// The monitor of a part of the work.

@@ -93,7 +93,6 @@ impl From<NormalError> for SolveError {
 
 impl NormalWork {
     /// The report as the client reads it, with the wall time in s.
-    #[must_use]
     pub fn with_time(self, seconds: f64) -> NormalReport {
         NormalReport {
             cells: self.cells.map(|n| u32::try_from(n).unwrap_or(u32::MAX)),

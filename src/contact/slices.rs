@@ -21,7 +21,6 @@ const CELLS_FINE: u32 = 1000;
 
 /// Where a case is cut: ranges of motions in order, one after the other, at least one. The same case gives the same slices, whatever the
 /// load, limits and machine.
-#[must_use]
 pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
     let motions = case.problem.motions.len();
     // The points of a history follow from each other, and one motion is not cut.

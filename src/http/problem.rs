@@ -232,7 +232,7 @@ impl Fault {
     #[must_use]
     pub fn invalid(detail: impl Into<String>) -> Self {
         Fault {
-            code: FaultCode::default().name().into(),
+            code: FaultCode::default().code().into(),
             detail: detail.into(),
             ..Fault::default()
         }
@@ -244,7 +244,7 @@ impl From<CaseFault> for Fault {
         let figures = *fault.figures;
         Fault {
             pointer: Some(fault.pointer),
-            code: figures.code.name().into(),
+            code: figures.code.code().into(),
             value: figures.value,
             minimum: figures.minimum,
             minimum_excluded: figures.minimum_excluded.then_some(true),

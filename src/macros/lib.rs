@@ -13,8 +13,9 @@ use syn::{
 /// contract as never `null`.
 ///
 /// It adds `#[serde(skip_serializing_if = "Option::is_none")]` and `#[schema(nullable = false)]` to each of them, so it stands above the
-/// derives. With the argument `nullable` the contract lets them be `null`. A member with a `#[schema(nullable …)]` of its own keeps that; a member with `#[or_null]` is `null` while it is `None`. A member
-/// with `#[member(positive(…))]` is more than 0 in the contract too.
+/// derives. With the argument `nullable` the contract lets them be `null`. A member with a `#[schema(nullable …)]` of its own keeps that; a
+/// member with `#[or_null]` is `null` while it is `None`. A member with `#[member(positive(…))]` is more than 0 in the contract too, and one
+/// with a default may be left out.
 #[proc_macro_attribute]
 pub fn none_is_absent(argument: TokenStream, item: TokenStream) -> TokenStream {
     let mut item = parse_macro_input!(item as Item);
@@ -32,11 +33,18 @@ pub fn none_is_absent(argument: TokenStream, item: TokenStream) -> TokenStream {
 }
 
 fn declare(field: &mut Field, null_too: bool) {
-    let positive =
-        |item: &Expr| matches!(item, Expr::Call(call) if name_of(&call.func) == "positive");
-    if items(&field.attrs, "member").iter().any(positive) {
-        let range = parse_quote!(#[schema(exclusive_minimum = 0.0)]);
-        field.attrs.push(range);
+    for item in items(&field.attrs, "member") {
+        let name = match &item {
+            Expr::Call(call) => name_of(&call.func),
+            Expr::Assign(given) => name_of(&given.left),
+            item => name_of(item),
+        };
+        let declared = match name.as_str() {
+            "positive" => parse_quote!(#[schema(exclusive_minimum = 0.0)]),
+            "default" | "empty" => parse_quote!(#[schema(required = false)]),
+            _ => continue,
+        };
+        field.attrs.push(declared);
     }
     if argument(&field.ty, "Option").is_none() {
         return;
@@ -139,6 +147,48 @@ pub fn names(item: TokenStream) -> TokenStream {
             #[must_use]
             #vis fn from_name(name: &str) -> Option<#name> {
                 #name::ALL.into_iter().find(|value| value.name() == name)
+            }
+        }
+    }
+    .into()
+}
+
+/// Gives an enum the function `code`: the name of the variant of a value in kebab case. It never changes, as clients know it.
+#[proc_macro_derive(Code)]
+pub fn code(item: TokenStream) -> TokenStream {
+    let item = parse_macro_input!(item as ItemEnum);
+    let (name, variants) = (&item.ident, item.variants.iter().map(|it| &it.ident));
+    let codes = item.variants.iter().map(|it| word(it).replace('_', "-"));
+    quote! {
+        impl #name {
+            /// The code that stands for the kind of the value.
+            pub fn code(&self) -> &'static str {
+                match self {
+                    #(#name::#variants { .. } => #codes,)*
+                }
+            }
+        }
+    }
+    .into()
+}
+
+/// Implements `Finite` for a struct, member by member, or for an enum without numbers.
+#[proc_macro_derive(Finite)]
+pub fn finite(item: TokenStream) -> TokenStream {
+    let (name, fields) = match parse_macro_input!(item as Item) {
+        Item::Struct(item) => (item.ident, item.fields),
+        Item::Enum(item) => (item.ident, Fields::Unit),
+        _ => return quote!(compile_error! { "a struct or an enum is needed" }).into(),
+    };
+    let members = fields.iter().filter_map(|it| it.ident.as_ref());
+    let finite = quote!(crate::contact::finite::Finite);
+    quote! {
+        impl #finite for #name {
+            fn not_finite(&self) -> Option<String> {
+                #(if let Some(path) = #finite::not_finite(&self.#members) {
+                    return Some(format!(".{}{path}", stringify!(#members)));
+                })*
+                None
             }
         }
     }

@@ -5,6 +5,7 @@
 const ORDER: &[&str] = &[
     "macros::lib",
     "contact::conventions",
+    "contact::finite",
     "contact::monitor",
     "contact::remark",
     "contact::lazy_field",

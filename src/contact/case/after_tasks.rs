@@ -2,33 +2,18 @@
 //!
 //! From words to task: where stresses below the surface are computed, and in which body.
 
-use crate::contact::case::motions::ExpandedMotions;
 use crate::contact::case::solver::Limits;
-use crate::contact::case::words::material::{Material, ThermalBodyWords, ThermalWords};
+use crate::contact::case::words::material::{Material, ThermalWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{Case, Output};
 use crate::contact::case::words::subsurface::{
-    BodyName, DamageModel, DamageWords, DepthLineAt, FoundPlace, GridAxis, StressGrid,
-    SubsurfaceWords,
+    BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,
 };
 use crate::contact::error::Fault;
 use crate::contact::post::damage::DamageTask;
-use crate::contact::post::local_power::{ThermalBody, ThermalTask};
-use crate::contact::post::subsurface::states::{
-    LoadedBody, PassageTask, StressPlaces, SubsurfaceTask,
-};
+use crate::contact::post::local_power::ThermalTask;
+use crate::contact::post::subsurface::states::{StressPlaces, SubsurfaceTask};
 use crate::contact::problem::physics::AfterTasks;
-
-impl Case {
-    /// The words of what it asks for.
-    pub(crate) fn after_words(&self) -> AfterWords<'_> {
-        AfterWords {
-            subsurface: self.subsurface.as_ref(),
-            damage: self.damage.as_ref(),
-            thermal: self.thermal.as_ref(),
-        }
-    }
-}
 
 impl AfterTasks {
     /// What a case asks for.
@@ -45,65 +30,14 @@ impl AfterTasks {
     }
 }
 
-/// The words of what a case asks for, as far as they could be read.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct AfterWords<'a> {
-    pub(crate) subsurface: Option<&'a SubsurfaceWords>,
-    pub(crate) damage: Option<&'a DamageWords>,
-    pub(crate) thermal: Option<&'a ThermalWords>,
-}
-
-impl AfterWords<'_> {
-    /// Points of every motion at which stresses are answered.
-    pub(crate) fn stress_points(&self) -> usize {
-        self.subsurface.map_or(0, count)
-    }
-
-    /// Faults beside the motions, which were written as `given`.
-    pub(crate) fn faults(
-        &self,
-        given: &Motions,
-        motions: &ExpandedMotions,
-        limits: &Limits,
-    ) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        if let Some(words) = self.subsurface {
-            faults.extend(fault(words, motions.motions.len(), limits));
-            faults.extend(passage_fault(words, given));
-        }
-        let archard = self
-            .damage
-            .is_some_and(|damage| damage.models.contains(&DamageModel::ArchardWear));
-        let needed = match (self.thermal, archard) {
-            (Some(_), _) => Some("temperature"),
-            (None, true) => Some("archard_wear"),
-            (None, false) => None,
-        };
-        faults.extend(needed.and_then(|what| motions.speed_fault(given, what)));
-        faults
-    }
-}
-
 impl From<ThermalWords> for ThermalTask {
     fn from(words: ThermalWords) -> ThermalTask {
-        let (lower, upper) = match words {
-            ThermalWords::Same(both) => (both, both),
-            ThermalWords::Pair { lower, upper } => (lower, upper),
-        };
-        ThermalTask {
-            lower: lower.into(),
-            upper: upper.into(),
-        }
-    }
-}
-
-impl From<ThermalBodyWords> for ThermalBody {
-    fn from(words: ThermalBodyWords) -> ThermalBody {
-        ThermalBody {
-            conductivity: words.conductivity_w_per_mk,
-            density: words.density_kg_per_m3,
-            specific_heat: words.specific_heat_j_per_kgk,
-            bulk: words.bulk_c,
+        match words {
+            ThermalWords::Same(both) => ThermalTask {
+                lower: both,
+                upper: both,
+            },
+            ThermalWords::Pair { lower, upper } => ThermalTask { lower, upper },
         }
     }
 }
@@ -148,22 +82,17 @@ pub(crate) fn passage_fault(words: &SubsurfaceWords, motion: &Motions) -> Option
 
 /// The task of a checked case.
 pub(crate) fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTask {
-    let (lower, upper) = match material {
-        Material::Same(both) => (both, both),
-        Material::Pair { lower, upper } => (lower, upper),
-    };
-    let (body, elastic) = match words.body {
-        BodyName::Lower => (LoadedBody::Lower, lower),
-        BodyName::Upper => (LoadedBody::Upper, upper),
+    let [lower, upper] = material.bodies();
+    let elastic = match words.body {
+        BodyName::Lower => lower,
+        BodyName::Upper => upper,
     };
     SubsurfaceTask {
         places: places(words),
-        body,
+        body: words.body,
         poisson_ratio: elastic.poisson_ratio,
         worst: words.worst,
-        passage: words.passage.map(|passage| PassageTask {
-            dang_van_slope: passage.dang_van_slope,
-        }),
+        passage: words.passage,
     }
 }
 
@@ -193,7 +122,6 @@ fn places(words: &SubsurfaceWords) -> StressPlaces {
 
 impl GridAxis {
     /// Number of coordinates.
-    #[must_use]
     pub fn count(&self) -> usize {
         match self {
             GridAxis::One(_) => 1,
@@ -203,7 +131,6 @@ impl GridAxis {
     }
 
     /// The coordinates.
-    #[must_use]
     pub fn values(&self) -> Vec<f64> {
         match self {
             GridAxis::One(value) => vec![*value],

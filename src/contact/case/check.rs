@@ -44,7 +44,9 @@ impl CheckedCase {
             motion: Some(&case.motion),
             solver: Some(&case.solver),
             outputs: &case.outputs,
-            after: case.after_words(),
+            subsurface: case.subsurface.as_ref(),
+            damage: case.damage.as_ref(),
+            thermal: case.thermal.as_ref(),
             known,
         };
         let (parts, mut faults) = CheckedParts::check(given, limits);
@@ -215,7 +217,6 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
 
 impl CheckedCase {
     /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.
-    #[must_use]
     pub fn quality(&self) -> Option<PairQuality> {
         let NormalTask::Wheel(contact) = &self.problem.task else {
             return None;

@@ -2,15 +2,15 @@
 //!
 //! Combines the elastic constants of two bodies into those of the pair.
 
-use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::motions::{BesideHistory, ExpandedMotions};
 use crate::contact::case::solver::{KnownPair, Limits, resolution};
 use crate::contact::case::words::contact::{Contact, InfluenceName, Load, SurfaceName};
 use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::material::{Elastic, Material, ThermalWords};
+use crate::contact::case::words::material::{Material, ThermalWords};
 use crate::contact::case::words::motion::Motions;
 use crate::contact::case::words::solver::{MethodName, Output, RelativeToName, Solver};
-use crate::contact::case::{contact_task, motions, wheel_task, wheelsets};
+use crate::contact::case::words::subsurface::{DamageModel, DamageWords, SubsurfaceWords};
+use crate::contact::case::{after_tasks, contact_task, motions, wheel_task, wheelsets};
 use crate::contact::error::Fault;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::half_space::bent_surface::Influence;
@@ -38,7 +38,9 @@ pub(crate) struct PartialCase<'a> {
     pub(crate) motion: Option<&'a Motions>,
     pub(crate) solver: Option<&'a Solver>,
     pub(crate) outputs: &'a [Output],
-    pub(crate) after: AfterWords<'a>,
+    pub(crate) subsurface: Option<&'a SubsurfaceWords>,
+    pub(crate) damage: Option<&'a DamageWords>,
+    pub(crate) thermal: Option<&'a ThermalWords>,
     /// Cross-sections that were read for another case.
     pub(crate) known: &'a KnownPair,
 }
@@ -114,7 +116,7 @@ impl CheckedParts {
                 history: motions.as_ref().is_some_and(|m| m.history.is_some()),
                 pressed: motions.as_ref().is_some_and(ExpandedMotions::begin_pressed),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
-                stress_points: given.after.stress_points(),
+                stress_points: given.subsurface.map_or(0, after_tasks::count),
                 ellipse: region.and_then(length_over_width),
                 store: limits.operator_store_bytes,
             };
@@ -124,7 +126,7 @@ impl CheckedParts {
             let patches = task.as_ref()?.0.known_patches().unwrap_or_default();
             falls_too_fast(
                 given.friction?,
-                given.after.thermal,
+                given.thermal,
                 elasticity?,
                 &patches,
                 &motions.as_ref()?.speeds,
@@ -251,14 +253,38 @@ fn motion_faults(
         faults.push(Fault::new("/friction/along", detail));
     }
     if let Some(what) = given.friction.and_then(Friction::falls_with) {
-        // Temperatures need speeds whatever they are for, see `AfterWords::faults`.
+        // Temperatures need speeds whatever they are for, see `after_faults`.
         if what == "slip" {
             faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
         }
         faults.extend(expanded.force_fault(motion, what));
         faults.extend(pull_fault(motion, what));
     }
-    faults.extend(given.after.faults(motion, expanded, limits));
+    faults.extend(after_faults(given, motion, expanded, limits));
+    faults
+}
+
+/// Faults of what a case asks for beside its contact, with its motions.
+fn after_faults(
+    given: &PartialCase,
+    motion: &Motions,
+    motions: &ExpandedMotions,
+    limits: &Limits,
+) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    if let Some(words) = given.subsurface {
+        faults.extend(after_tasks::fault(words, motions.motions.len(), limits));
+        faults.extend(after_tasks::passage_fault(words, motion));
+    }
+    let archard = given
+        .damage
+        .is_some_and(|damage| damage.models.contains(&DamageModel::ArchardWear));
+    let needed = match (given.thermal, archard) {
+        (Some(_), _) => Some("temperature"),
+        (None, true) => Some("archard_wear"),
+        (None, false) => None,
+    };
+    faults.extend(needed.and_then(|what| motions.speed_fault(motion, what)));
     faults
 }
 
@@ -397,13 +423,9 @@ impl Elasticity {
     /// Elastic constants of the pair: `1/G = ½(1/G₁ + 1/G₂)`, `ν/G = ½(ν₁/G₁ + ν₂/G₂)`,
     /// `K/G = ¼((1−2ν₁)/G₁ − (1−2ν₂)/G₂)` with 1 the upper and 2 the lower body; `G = E/(2(1+ν))` where Young's
     /// modulus is given. G in MPa, ν from 0 to 0.5. Source: Kalker 1990, eq. 1.44.
-    #[must_use]
     pub fn combine(material: &Material) -> Elasticity {
-        let (lower, upper) = match material {
-            Material::Same(both) => (both, both),
-            Material::Pair { lower, upper } => (lower, upper),
-        };
-        let (g1, g2) = (shear_modulus(upper), shear_modulus(lower));
+        let [lower, upper] = material.bodies();
+        let [g1, g2] = [upper, lower].map(|body| body.shear().unwrap_or(f64::NAN));
         let (nu1, nu2) = (upper.poisson_ratio, lower.poisson_ratio);
         if g1 == g2 && nu1 == nu2 {
             return Elasticity {
@@ -456,19 +478,10 @@ fn rounded(of_pair: f64, of_like_bodies: f64) -> f64 {
     }
 }
 
-fn shear_modulus(body: &Elastic) -> f64 {
-    let from_young = || {
-        body.young_modulus_mpa
-            .map(|e| e / (2.0 * (1.0 + body.poisson_ratio)))
-    };
-    body.shear_modulus_mpa
-        .or_else(from_young)
-        .unwrap_or(f64::NAN)
-}
-
 #[cfg(test)]
 mod elasticity_tests {
     use super::*;
+    use crate::contact::case::words::material::Elastic;
 
     fn body(g: f64, nu: f64) -> Elastic {
         Elastic {

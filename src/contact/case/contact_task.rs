@@ -50,7 +50,7 @@ pub(crate) fn hertz(
         | Contact::PressureGrid { .. }
         | Contact::Profiles { .. }
         | Contact::Wheelset { .. } => {
-            return Err(fault(
+            return Err(Fault::new(
                 "/contact/type",
                 "neither gaps nor profiles nor pressures on a grid make an ellipse".to_owned(),
             ));
@@ -73,13 +73,13 @@ pub(crate) fn given(
 ) -> Result<(NormalTask, Vec<RemarkEntry>), Fault> {
     let samples = x.len().saturating_mul(y.len());
     if samples > samples_max {
-        return Err(fault(
+        return Err(Fault::new(
             "/contact/pressure_mpa",
             format!("{samples} samples given; at most {samples_max} are allowed"),
         ));
     }
     let (field, remarks) = PressureField::new(x, y, pressure)
-        .map_err(|detail| fault("/contact/pressure_mpa", detail))?;
+        .map_err(|detail| Fault::new("/contact/pressure_mpa", detail))?;
     for patch in field.patches() {
         plausible(&patch, "/contact/pressure_mpa")?;
     }
@@ -107,10 +107,10 @@ pub(crate) fn gap(
             let samples = x_mm.len().saturating_mul(y_mm.len());
             (GapSurface::grid(x_mm, y_mm, gap_mm), samples)
         }
-        _ => return Err(fault("/contact/type", "not a gap".to_owned())),
+        _ => return Err(Fault::new("/contact/type", "not a gap".to_owned())),
     };
     if samples > samples_max {
-        return Err(fault(
+        return Err(Fault::new(
             "/contact/gap_mm",
             format!("{samples} samples given; at most {samples_max} are allowed"),
         ));
@@ -123,7 +123,7 @@ pub(crate) fn gap(
     };
     contact
         .check()
-        .map_err(|(pointer, reason)| fault(pointer, reason))?;
+        .map_err(|(pointer, reason)| Fault::new(pointer, reason))?;
     Ok(NormalTask::Gap(Box::new(contact)))
 }
 
@@ -133,7 +133,7 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
     let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
     let semi_axes = SEMI_AXIS_MIN..=SEMI_AXIS_MAX;
     if !semi_axes.contains(&a) || !semi_axes.contains(&b) {
-        return Err(fault(
+        return Err(Fault::new(
             "/contact",
             format!(
                 "a patch of {} mm by {} mm (semi-axes) comes out; {SEMI_AXIS_MIN:e} to {SEMI_AXIS_MAX:e} mm are allowed",
@@ -143,13 +143,13 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
         ));
     }
     if patch.area.is_nan() || patch.area <= 0.0 {
-        return Err(fault(
+        return Err(Fault::new(
             load_pointer,
             "the edge of a patch cannot be told from these samples; a finer or more even grid is needed".to_owned(),
         ));
     }
     if a.max(b) > SLENDERNESS_MAX * a.min(b) {
-        return Err(fault(
+        return Err(Fault::new(
             "/contact",
             format!(
                 "a patch of {} mm by {} mm (semi-axes) comes out; a ratio of at most {SLENDERNESS_MAX:e} is allowed",
@@ -159,7 +159,7 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
         ));
     }
     if !(PRESSURE_MIN..=PRESSURE_MAX).contains(&patch.pressure_max) {
-        return Err(fault(
+        return Err(Fault::new(
             load_pointer,
             format!(
                 "the largest pressure of a patch comes out as {} MPa; {PRESSURE_MIN:e} to {PRESSURE_MAX:e} MPa are allowed",
@@ -175,10 +175,6 @@ fn loading(load: &Load) -> NormalLoad {
         (Some(force), _) => NormalLoad::Force(force),
         (None, approach) => NormalLoad::Approach(approach.unwrap_or(f64::NAN)),
     }
-}
-
-fn fault(pointer: &str, detail: String) -> Fault {
-    Fault::new(pointer, detail)
 }
 
 /// y of the back in mm where the origin is the running circle, as in EN 13715.
@@ -312,7 +308,7 @@ pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
     let remark = |(pointer, length_mm, usual): (&str, Option<f64>, f64)| {
         let length_mm = length_mm?;
         let unit = LengthUnit::likely(length_mm, usual).filter(|unit| *unit != LengthUnit::Mm)?;
-        let unit = unit.symbol();
+        let unit = unit.name();
         Some(Remark::LengthUnusual { length_mm, unit }.at_pointer(pointer))
     };
     lengths.into_iter().filter_map(remark).collect()

@@ -8,7 +8,8 @@ use crate::contact::case::words::motion::MotionWords;
 use crate::contact::case::words::solver::{
     MeshSizeWords, MethodName, Output, RelativeToName, TractionBoundName,
 };
-use crate::contact::friction::law::{AcrossLaw, AcrossPlace, AlongLaw, FrictionLaw};
+use crate::contact::friction::coefficient_table::CoefficientTable;
+use crate::contact::friction::law::{AcrossLaw, AcrossPlace, FrictionLaw};
 use crate::contact::friction::path_dependent::{HeatedLaw, Interface, LayerYield};
 use crate::contact::friction::velocity_weakening::{FallForm, FallingLaw, SofteningTerm};
 use crate::contact::geometry::formats::Format;
@@ -81,7 +82,7 @@ impl FrictionLaw {
             return FrictionLaw::Across(AcrossLaw::new(place, at, &across.coefficient));
         }
         if let Some(along) = &words.along {
-            return FrictionLaw::Along(AlongLaw::new(&along.x_mm, &along.coefficient));
+            return FrictionLaw::Along(CoefficientTable::new(&along.x_mm, &along.coefficient));
         }
         let Some(law) = words.law else {
             return FrictionLaw::Constant(words.coefficient.unwrap_or(0.0));
@@ -130,7 +131,6 @@ impl From<MeshSizeWords> for MeshSize {
 
 impl Output {
     /// Has it a value per cell?
-    #[must_use]
     pub fn is_per_cell(self) -> bool {
         match self {
             Output::Resultants | Output::Subsurface | Output::Damage | Output::Gradients => false,

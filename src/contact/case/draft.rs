@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::contact::case::after_tasks::AfterWords;
 use crate::contact::case::checks::{PartialCase, faults_of};
 use crate::contact::case::solver::{KnownPair, Limits};
 use crate::contact::case::words::contact::{Contact, Load};
@@ -88,11 +87,9 @@ impl CaseDraft {
             motion: self.motion.as_ref(),
             solver: self.solver.as_ref(),
             outputs: self.outputs.as_deref().unwrap_or_default(),
-            after: AfterWords {
-                subsurface: self.subsurface.as_ref().and_then(Option::as_ref),
-                damage: self.damage.as_ref().and_then(Option::as_ref),
-                thermal: self.thermal.as_ref().and_then(Option::as_ref),
-            },
+            subsurface: self.subsurface.as_ref().and_then(Option::as_ref),
+            damage: self.damage.as_ref().and_then(Option::as_ref),
+            thermal: self.thermal.as_ref().and_then(Option::as_ref),
         };
         faults_of(given, limits)
     }

@@ -87,7 +87,6 @@ fn at_rest(task: &WheelTask) -> f64 {
 
 impl CheckedCase {
     /// Expected time of this case in s, on one core of the machine the figures were taken on.
-    #[must_use]
     pub fn solve_seconds(&self) -> f64 {
         let (half, normal) = expected_patches(&self.problem.task);
         let rolling = match (self.run.method, self.run.resolution) {
@@ -195,7 +194,6 @@ impl CheckedCase {
     }
 
     /// Estimated time and memory of this solve: operators of the meshes, matrices of the dense method, and the answer. The time is rough.
-    #[must_use]
     pub fn cost(&self) -> Cost {
         let size = self.size_input();
         Cost {
@@ -219,7 +217,6 @@ pub struct Cost {
 
 impl Cost {
     /// Memory in bytes that nobody shares.
-    #[must_use]
     pub fn own_bytes(&self) -> u64 {
         self.bytes.saturating_sub(self.operator_store_bytes)
     }

@@ -45,7 +45,6 @@ impl CheckedCase {
 
 impl CheckedCase {
     /// Remarks on the place of first touch: on the tip of the flange, or near the end of a profile. The solve judges every patch anew.
-    #[must_use]
     pub fn touch_remarks(&self) -> Vec<RemarkEntry> {
         let sides = match &self.problem.task {
             NormalTask::Wheel(task) => vec![&task.geometry],

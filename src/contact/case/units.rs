@@ -38,23 +38,14 @@ const PRESSURES: [f64; 2] = [200.0, 3500.0];
 /// Pressure in MPa above which lengths are doubted where the patch follows from them alone: the static limit of ball bearings (ISO 76).
 const PRESSURE_DOUBTED: f64 = 4200.0;
 
-/// A number that looks as if it were in another unit.
-struct Suspect {
-    pointer: String,
-    value: f64,
-    unit: &'static str,
-    likely: String,
-}
-
-impl Suspect {
-    fn new(pointer: &str, value: f64, unit: &'static str, likely: &str) -> Suspect {
-        Suspect {
-            pointer: pointer.to_owned(),
-            value,
-            unit,
-            likely: likely.to_owned(),
-        }
-    }
+/// The remark on a number that looks as if it were in another unit.
+fn suspect(pointer: &str, given: f64, unit: &str, likely_unit: &str) -> RemarkEntry {
+    let remark = Remark::UnitSuspected {
+        given,
+        unit: unit.to_owned(),
+        likely_unit: likely_unit.to_owned(),
+    };
+    remark.at_pointer(pointer)
 }
 
 fn is_within(value: f64, [low, high]: [f64; 2]) -> bool {
@@ -69,19 +60,7 @@ pub(crate) fn remarks(case: &Case, patches: &[Patch]) -> Vec<RemarkEntry> {
     suspects.extend(lengths_of_patch(contact, patches));
     suspects.extend(of_place(contact));
     suspects.extend(of_motion(&case.motion));
-    suspects.into_iter().map(remark).collect()
-}
-
-fn remark(suspect: Suspect) -> RemarkEntry {
-    RemarkEntry {
-        pointer: Some(suspect.pointer),
-        ..Remark::UnitSuspected {
-            given: suspect.value,
-            unit: suspect.unit.to_owned(),
-            likely_unit: suspect.likely,
-        }
-        .into()
-    }
+    suspects
 }
 
 fn bodies(material: &Material) -> Vec<(&'static str, &Elastic)> {
@@ -93,7 +72,7 @@ fn bodies(material: &Material) -> Vec<(&'static str, &Elastic)> {
     }
 }
 
-fn of_material(material: &Material) -> Vec<Suspect> {
+fn of_material(material: &Material) -> Vec<RemarkEntry> {
     let mut suspects = Vec::new();
     for (pointer, body) in bodies(material) {
         let moduli = [
@@ -103,12 +82,7 @@ fn of_material(material: &Material) -> Vec<Suspect> {
         for (name, modulus, range) in moduli {
             let modulus = modulus.filter(|value| is_within(*value, range));
             if let Some(value) = modulus.filter(|_| body.poisson_ratio < POISSON_METAL) {
-                suspects.push(Suspect::new(
-                    &format!("{pointer}/{name}"),
-                    value,
-                    "MPa",
-                    "GPa",
-                ));
+                suspects.push(suspect(&format!("{pointer}/{name}"), value, "MPa", "GPa"));
             }
         }
     }
@@ -119,12 +93,11 @@ fn of_material(material: &Material) -> Vec<Suspect> {
 fn is_metal(material: &Material) -> bool {
     let suspects = of_material(material);
     bodies(material).into_iter().all(|(pointer, body)| {
-        let shear = body.shear_modulus_mpa.or_else(|| {
-            let young = body.young_modulus_mpa?;
-            Some(young / (2.0 * (1.0 + body.poisson_ratio)))
-        });
-        shear.is_some_and(|shear| shear >= SHEAR_METAL)
-            || suspects.iter().any(|s| s.pointer.starts_with(pointer))
+        let at_body = |suspect: &RemarkEntry| {
+            let own = suspect.pointer.as_deref();
+            own.is_some_and(|own| own.starts_with(pointer))
+        };
+        body.shear().is_some_and(|shear| shear >= SHEAR_METAL) || suspects.iter().any(at_body)
     })
 }
 
@@ -133,7 +106,7 @@ fn of_load(
     contact: &Contact,
     load: Option<&Load>,
     patches: &[Patch],
-) -> Option<Suspect> {
+) -> Option<RemarkEntry> {
     let load = load?;
     let given = [
         ("/load/normal_force_n", load.normal_force_n),
@@ -163,7 +136,7 @@ fn of_load(
         Contact::GapGrid { .. } | Contact::PressureGrid { .. } => false,
     };
     (of_wheel && force < wheels * LOAD_LEAST && is_metal(material))
-        .then(|| Suspect::new(pointer, force, "N", "kN"))
+        .then(|| suspect(pointer, force, "N", "kN"))
 }
 
 /// Units in which a length would make the pressure of a patch usual, which falls with this power of the length.
@@ -171,32 +144,27 @@ fn units_by_pressure(patches: &[Patch], power: f64) -> Option<String> {
     let pressure = patches.first()?.pressure_max;
     let usual = |unit: &LengthUnit| is_within(pressure / unit.mm().powf(power), PRESSURES);
     let units = [LengthUnit::M, LengthUnit::Cm, LengthUnit::Inch].into_iter();
-    let units: Vec<&str> = units.filter(usual).map(LengthUnit::symbol).collect();
+    let units: Vec<&str> = units.filter(usual).map(LengthUnit::name).collect();
     (pressure > PRESSURE_DOUBTED && !units.is_empty()).then(|| units.join(" or "))
 }
 
-fn lengths_of_patch(contact: &Contact, patches: &[Patch]) -> Option<Suspect> {
+fn lengths_of_patch(contact: &Contact, patches: &[Patch]) -> Option<RemarkEntry> {
     match *contact {
         Contact::Radii { rolling_mm, .. } if rolling_mm < RADIUS_LEAST => {
             // Hertz: p grows with R to the power −2/3.
             let units = units_by_pressure(patches, 2.0 / 3.0)?;
-            Some(Suspect::new(
-                "/contact/rolling_mm",
-                rolling_mm,
-                "mm",
-                &units,
-            ))
+            Some(suspect("/contact/rolling_mm", rolling_mm, "mm", &units))
         }
         Contact::Ellipse { a_mm, .. } => {
             let units = units_by_pressure(patches, 2.0)?;
-            Some(Suspect::new("/contact/a_mm", a_mm, "mm", &units))
+            Some(suspect("/contact/a_mm", a_mm, "mm", &units))
         }
         _ => None,
     }
 }
 
 /// Angles of the place of wheel and rail.
-fn of_place(contact: &Contact) -> Vec<Suspect> {
+fn of_place(contact: &Contact) -> Vec<RemarkEntry> {
     let angles = match contact {
         Contact::Profiles {
             cant_rad,
@@ -217,9 +185,7 @@ fn of_place(contact: &Contact) -> Vec<Suspect> {
     let large = names.into_iter().zip(angles);
     large
         .filter(|((_, most), angle)| angle.abs() > *most)
-        .map(|((name, _), angle)| {
-            Suspect::new(&format!("/contact/{name}"), angle, "rad", "degrees")
-        })
+        .map(|((name, _), angle)| suspect(&format!("/contact/{name}"), angle, "rad", "degrees"))
         .collect()
 }
 
@@ -252,52 +218,35 @@ type MotionNumbers = (String, [Option<f64>; 3]);
 fn numbers_of(motion: &Motions) -> Vec<MotionNumbers> {
     let swept = |swept: &Option<Swept>| swept.as_ref().map(|s| largest(&swept_values_of(s)));
     let course = |c: &Option<HistoryCourse>| c.as_ref().map(|c| largest(&course_values(c)));
-    let speed_alone = |of: String, speed: f64| (of, [None, None, Some(speed)]);
+    let asked = |one: &AskedMotion| [one.creepage_x, one.creepage_y, one.speed_mm_per_s];
+    let rolling = |one: &Wheelset| [None, None, Some(one.speed_mm_per_s)];
+    let alone = |of: &str, numbers| vec![(of.to_owned(), numbers)];
     match motion {
-        Motions::One(one) => vec![(
-            "/motion".to_owned(),
-            [one.creepage_x, one.creepage_y, one.speed_mm_per_s],
-        )],
+        Motions::One(one) => alone("/motion", asked(one)),
         Motions::Many(all) => {
-            let one = |(k, one): (usize, &AskedMotion)| {
-                let numbers = [one.creepage_x, one.creepage_y, one.speed_mm_per_s];
-                (format!("/motion/{k}"), numbers)
-            };
-            all.iter().enumerate().map(one).collect()
+            let all = all.iter().enumerate();
+            all.map(|(k, one)| (format!("/motion/{k}"), asked(one)))
+                .collect()
         }
-        Motions::Sweep { sweep } => vec![(
-            "/motion/sweep".to_owned(),
-            [
-                swept(&sweep.creepage_x),
-                swept(&sweep.creepage_y),
-                sweep.speed_mm_per_s,
-            ],
-        )],
-        Motions::History { history, .. } => vec![(
-            "/motion/history".to_owned(),
-            [
-                course(&history.creepage_x),
-                course(&history.creepage_y),
-                history.speed_mm_per_s,
-            ],
-        )],
-        Motions::Wheelset { wheelset } => {
-            vec![speed_alone(
-                "/motion/wheelset".to_owned(),
-                wheelset.speed_mm_per_s,
-            )]
+        Motions::Sweep { sweep } => {
+            let [x, y] = [&sweep.creepage_x, &sweep.creepage_y].map(swept);
+            alone("/motion/sweep", [x, y, sweep.speed_mm_per_s])
         }
+        Motions::History { history, .. } => {
+            let [x, y] = [&history.creepage_x, &history.creepage_y].map(course);
+            alone("/motion/history", [x, y, history.speed_mm_per_s])
+        }
+        Motions::Wheelset { wheelset } => alone("/motion/wheelset", rolling(wheelset)),
         Motions::Wheelsets { wheelset } => {
-            let one = |(k, one): (usize, &Wheelset)| {
-                speed_alone(format!("/motion/wheelset/{k}"), one.speed_mm_per_s)
-            };
-            wheelset.iter().enumerate().map(one).collect()
+            let all = wheelset.iter().enumerate();
+            all.map(|(k, one)| (format!("/motion/wheelset/{k}"), rolling(one)))
+                .collect()
         }
     }
 }
 
 /// Creepages and speeds; of several motions the first that is unusual.
-fn of_motion(motion: &Motions) -> Vec<Suspect> {
+fn of_motion(motion: &Motions) -> Vec<RemarkEntry> {
     let all = numbers_of(motion);
     let names = ["creepage_x", "creepage_y", "speed_mm_per_s"];
     let first = |(k, name): (usize, &str)| {
@@ -306,10 +255,10 @@ fn of_motion(motion: &Motions) -> Vec<Suspect> {
             let pointer = format!("{of}/{name}");
             if name == "speed_mm_per_s" {
                 (0.0 < value && value < SPEED_LEAST)
-                    .then(|| Suspect::new(&pointer, value, "mm/s", "m/s or km/h"))
+                    .then(|| suspect(&pointer, value, "mm/s", "m/s or km/h"))
             } else {
                 is_within(value.abs(), CREEPAGE_PERCENT)
-                    .then(|| Suspect::new(&pointer, value, "as a ratio", "per cent"))
+                    .then(|| suspect(&pointer, value, "as a ratio", "per cent"))
             }
         })
     };

@@ -40,7 +40,7 @@ pub(crate) fn task(
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
     let (geometry, flange_back) = wheel_rail(contact, known)?;
     if let Err(detail) = ContactLocus::new(&geometry) {
-        let faults = vec![fault("/contact".to_owned(), detail)];
+        let faults = vec![Fault::new("/contact", detail)];
         return Err(with_reasons(faults, &reasons(geometry.profiles())));
     }
     let mut remarks = geometry.remarks();
@@ -186,7 +186,7 @@ fn wheel_rail(
         influence: _,
     } = contact
     else {
-        return Err(vec![fault(
+        return Err(vec![Fault::new(
             "/contact/type".to_owned(),
             "no profiles".to_owned(),
         )]);
@@ -244,7 +244,7 @@ pub(crate) fn both(
 ) -> Result<[Profile; 2], Vec<Fault>> {
     let load_mismatch = |profile: &Profile, body: Body, pointer: &str| {
         let remark = checked_case::load_mismatch(profile, body)?;
-        Some(fault(pointer.to_owned(), remark.detail))
+        Some(Fault::new(pointer.to_owned(), remark.detail))
     };
     let faults = match read {
         (Ok(rail), Ok(wheel)) => return Ok([rail, wheel]),
@@ -267,7 +267,7 @@ pub(crate) fn unplaced(reason: NotPlaced, [rail, radius]: [&str; 2]) -> Fault {
         NotPlaced::NoGaugeFace { .. } => rail,
         NotPlaced::ReachesAxle { .. } => radius,
     };
-    fault(pointer.to_owned(), reason.to_string())
+    Fault::new(pointer.to_owned(), reason.to_string())
 }
 
 /// Faults of two profiles that both look like the other body's, at the pointers of both; one of them alone may be an unusual shape.
@@ -287,8 +287,8 @@ pub(crate) fn exchanged(
         )
     };
     Err(vec![
-        fault(pointers[0].to_owned(), refused(rail)),
-        fault(pointers[1].to_owned(), refused(wheel)),
+        Fault::new(pointers[0].to_owned(), refused(rail)),
+        Fault::new(pointers[1].to_owned(), refused(wheel)),
     ])
 }
 
@@ -346,9 +346,9 @@ pub(crate) fn profile_at(
             None | Some(1.0) => Profile::new(body, points, reading),
             Some(mm) => Profile::new(body, &scaled(points, mm), reading),
         };
-        return profile.map_err(|detail| fault(format!("{pointer}/points_mm"), detail));
+        return profile.map_err(|detail| Fault::new(format!("{pointer}/points_mm"), detail));
     };
-    let refuse = |detail| fault(format!("{pointer}/text"), detail);
+    let refuse = |detail| Fault::new(format!("{pointer}/text"), detail);
     let mut contents = formats::read(format.into(), text).map_err(refuse)?;
     let is_wheel = body == Body::Wheel;
     if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
@@ -403,8 +403,4 @@ fn senses_of(body: Body, format: FormatName, contents: &ProfileFile) -> FormatSe
             mirror_z: contents.mirror_z,
         },
     }
-}
-
-fn fault(pointer: String, detail: String) -> Fault {
-    Fault::new(pointer, detail)
 }

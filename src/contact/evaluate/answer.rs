@@ -1,11 +1,12 @@
 //! What rows are answered with: columns of numbers, a word for each row, the method that answered it, and why there is no answer.
 
+use railhead_macros::{Named, Names};
+
 use crate::contact::case::words::solver::{MethodName, Output};
 use crate::contact::error::{CaseError, SolveError};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::Problem;
 use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
-use railhead_macros::Named;
 
 /// What became of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
@@ -34,7 +35,6 @@ pub enum RowStatus {
 
 impl RowStatus {
     /// The row has resultants.
-    #[must_use]
     pub fn has_answer(self) -> bool {
         matches!(self, RowStatus::Ok | RowStatus::TargetMissed)
     }
@@ -119,20 +119,17 @@ impl RowsAnswer {
     }
 
     /// Bytes that it takes.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         (size_of::<f64>() * self.numbers.len() + 1) * self.status.len()
     }
 
     /// The columns of numbers with their names, in their order.
-    #[must_use]
     pub fn columns(&self) -> Vec<(&'static str, &[f64])> {
         let columns = self.numbers.iter();
         columns.map(|(name, column)| (*name, &column[..])).collect()
     }
 
     /// The numbers of a column; none if there is no such column.
-    #[must_use]
     pub fn column(&self, name: &str) -> &[f64] {
         let found = self.numbers.iter().find(|(own, _)| *own == name);
         found.map_or(&[], |(_, numbers)| numbers)
@@ -242,7 +239,7 @@ const NUMBERS_LEFT_OUT: [&str; 4] = [
 pub type RowNumbers = [f64; NUMBER_NAMES.len()];
 
 /// An unknown that is solved for where a row prescribes a force or a torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Names)]
 pub enum Found {
     /// Longitudinal creepage.
     CreepageX,
@@ -258,7 +255,6 @@ pub enum Found {
 
 impl Found {
     /// The unknowns that a case of one motion leaves to the solver.
-    #[must_use]
     pub fn of(problem: &Problem) -> Vec<Found> {
         let [creep_x, creep_y] = problem.forces.first().copied().unwrap_or_default();
         let [along, across] = problem.wheelset_forces;
@@ -302,7 +298,6 @@ pub struct NumberColumns {
 
 impl NumberColumns {
     /// The columns that a case of one motion asks for.
-    #[must_use]
     pub fn of(case: &CheckedCase) -> NumberColumns {
         NumberColumns {
             found: Found::of(&case.problem),
@@ -311,22 +306,14 @@ impl NumberColumns {
     }
 
     /// The columns that some case asks for.
-    #[must_use]
     pub fn all() -> NumberColumns {
-        let found = vec![
-            Found::CreepageX,
-            Found::CreepageY,
-            Found::AngularVelocity,
-            Found::LateralVelocity,
-        ];
         NumberColumns {
-            found,
+            found: Found::ALL.to_vec(),
             gradients: true,
         }
     }
 
     /// Their names: those of every answer, what was found, derivatives.
-    #[must_use]
     pub fn names(&self) -> Vec<&'static str> {
         let more: &[&str] = if self.gradients { &GRADIENT_NAMES } else { &[] };
         let found = self.found.iter().map(|found| found.name());
@@ -403,7 +390,6 @@ impl ManyAnswer {
     }
 
     /// Rows without an answer.
-    #[must_use]
     pub fn without_answer(&self) -> usize {
         let mut rows = self.status.iter();
         rows.by_ref().filter(|row| !row.has_answer()).count()

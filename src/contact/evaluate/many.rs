@@ -132,7 +132,6 @@ pub fn evaluate_at_once<E>(
 }
 
 /// How long the rows of a task take, in s on one core of the machine the figures were taken on; rough, and the same for the same rows.
-#[must_use]
 pub fn expected_seconds(task: &ManyTask) -> f64 {
     let rows = task.rows() as f64;
     let Ok(checked) = contact::check_with(task.known, task.case, task.limits) else {
@@ -420,7 +419,6 @@ impl ManyTask<'_> {
 }
 
 /// The fault of a case that has several answers, so that no row stands for it.
-#[must_use]
 pub fn several_answers(checked: &CheckedCase) -> Option<Fault> {
     let problem = &checked.problem;
     let (motions, positions) = (problem.motions.len(), problem.task.positions());

@@ -104,13 +104,11 @@ impl Rows {
     }
 
     /// Is there a method that answers such rows? Otherwise all of them are left to the solver.
-    #[must_use]
     pub fn has_method(&self) -> bool {
         !matches!(self.method, RowMethod::Solver)
     }
 
     /// The answers.
-    #[must_use]
     pub fn evaluate(&self) -> RowsAnswer {
         let Ok(answer) = self.evaluate_to(|_| Ok::<_, Infallible>(()));
         answer
@@ -128,7 +126,6 @@ impl Rows {
     }
 
     /// The answers, and of each row its normal force in N and √(ab) in mm.
-    #[must_use]
     pub fn evaluate_with_patches(&self) -> (RowsAnswer, Vec<[f64; 2]>) {
         let mut patches = Vec::with_capacity(self.rows);
         let Ok(answer) = self.evaluate_to(|patch| {

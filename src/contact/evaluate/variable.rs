@@ -74,14 +74,12 @@ impl Variable {
     }
 
     /// The variable at a place of the case.
-    #[must_use]
     pub fn at(pointer: &str) -> Option<Variable> {
         let found = VARIABLES.iter().find(|(_, at, _)| *at == pointer);
         found.map(|(variable, ..)| *variable)
     }
 
     /// Its number in a case that leaves it out: creepages and spin are 0 then, anything else is not asked for.
-    #[must_use]
     pub fn absent(self) -> f64 {
         match self {
             Variable::CreepageX | Variable::CreepageY | Variable::Spin => 0.0,
@@ -90,7 +88,6 @@ impl Variable {
     }
 
     /// Its place in the case, a JSON pointer.
-    #[must_use]
     pub fn pointer(self) -> &'static str {
         VARIABLES[self as usize].1
     }

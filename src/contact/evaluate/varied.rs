@@ -33,7 +33,6 @@ pub struct VariedColumn {
 
 impl Values {
     /// Number of rows.
-    #[must_use]
     pub fn len(&self) -> usize {
         match self {
             Values::Numbers(numbers) => numbers.len(),
@@ -42,7 +41,6 @@ impl Values {
     }
 
     /// There is no row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -61,7 +59,6 @@ impl Values {
     }
 
     /// The value of a row as a case has it.
-    #[must_use]
     pub fn value(&self, row: usize) -> Value {
         match self {
             Values::Numbers(numbers) => Value::from(numbers[row]),
@@ -118,7 +115,6 @@ const PROFILE: &str = "profile";
 const POINTS: [&str; 3] = ["points_mm", "format", "text"];
 
 /// The cross-sections that a case names: where, and by which name.
-#[must_use]
 pub fn named_sections(case: &Value) -> Vec<(&'static str, String)> {
     let named = |place: &&'static str| {
         let name = case.pointer(place)?.get(PROFILE)?.as_str()?;
@@ -128,7 +124,6 @@ pub fn named_sections(case: &Value) -> Vec<(&'static str, String)> {
 }
 
 /// The first cross-section that is both named and given.
-#[must_use]
 pub fn named_and_given(case: &Value) -> Option<&'static str> {
     let both = |place: &&&'static str| {
         let section = case.pointer(place);
@@ -156,13 +151,11 @@ pub fn put_section(case: &mut Value, place: &str, section: &Value) {
 }
 
 /// The pointer of a column in the request.
-#[must_use]
 pub fn column_pointer(name: &str) -> String {
     format!("/columns/{}", name.replace('~', "~0").replace('/', "~1"))
 }
 
 /// Faults of the case of the first row, with pointers into the request; of each column the pointer into the case and its name.
-#[must_use]
 pub fn of_first_row(CaseError(faults): CaseError, columns: &[(&str, &str)]) -> CaseError {
     in_template(CaseError(faults), |pointer| {
         let (_, name) = columns.iter().find(|(known, _)| *known == pointer)?;
@@ -172,7 +165,6 @@ pub fn of_first_row(CaseError(faults): CaseError, columns: &[(&str, &str)]) -> C
 
 /// Faults of the case of a row, with pointers into the request: that of a column where `column` knows the pointer into the case, below the template
 /// elsewhere.
-#[must_use]
 pub fn in_template(
     CaseError(faults): CaseError,
     column: impl Fn(&str) -> Option<String>,
@@ -186,7 +178,6 @@ pub fn in_template(
 
 /// Faults of some values of a column, the first of which belongs to the row `first`: numbers that are not finite, or that no case may have at
 /// this place, as far as that is known of the place alone.
-#[must_use]
 pub fn of_values(name: &str, pointer: &str, values: &Values, first: u64) -> Vec<Fault> {
     let Values::Numbers(numbers) = values else {
         return Vec::new();
@@ -219,7 +210,6 @@ pub fn of_values(name: &str, pointer: &str, values: &Values, first: u64) -> Vec<
 }
 
 /// The members of a JSON pointer (RFC 6901).
-#[must_use]
 pub fn members(pointer: &str) -> Vec<String> {
     let parts = pointer.split('/').skip(1);
     parts

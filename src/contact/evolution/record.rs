@@ -173,7 +173,6 @@ fn range(states: &[StateContact]) -> ContactRange {
 
 impl Evolution {
     /// The answer of an evolution that is over, from all its records.
-    #[must_use]
     pub fn answer(&self, state: &EvolutionState, records: Vec<EvolutionRecord>) -> EvolutionAnswer {
         EvolutionAnswer {
             limits: self.limits_reached(&records),

@@ -40,7 +40,6 @@ const BODIES: [Body; 2] = [Body::Rail, Body::Wheel];
 
 impl Evolution {
     /// An evolution before its first step.
-    #[must_use]
     pub fn begin(&self) -> EvolutionState {
         EvolutionState {
             next: 1.0 / f64::from(self.plan.records),
@@ -60,7 +59,6 @@ impl Evolution {
     }
 
     /// Is everything done?
-    #[must_use]
     pub fn is_over(&self, state: &EvolutionState) -> bool {
         state.share >= 1.0 && state.recorded && self.due(state).is_none()
     }

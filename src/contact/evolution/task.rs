@@ -124,7 +124,7 @@ impl Evolution {
             shares: passes.iter().map(|passes| passes / all).collect(),
             events: events(&mut plan)?,
             geometry: wheel.geometry.clone(),
-            figures: damage.used(),
+            figures: damage.figures.clone(),
             amounts: [0.0; 2],
             mgt: 0.0,
             limits: *limits,
@@ -207,7 +207,6 @@ impl Evolution {
     }
 
     /// Rough solve time in s on one core: two solves of each state for each step that the records need.
-    #[must_use]
     pub fn expected_seconds(&self) -> f64 {
         let states = f64::from(self.plan.accuracy.states_max).min(self.shares.len() as f64);
         2.0 * states * f64::from(self.plan.records).max(STEPS_USUAL) * self.state_seconds

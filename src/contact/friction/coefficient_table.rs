@@ -10,7 +10,6 @@ pub struct CoefficientTable {
 
 impl CoefficientTable {
     /// A table of as many places, in order, as coefficients, of which there is at least one.
-    #[must_use]
     pub fn new(at: &[f64], coefficient: &[f64]) -> CoefficientTable {
         let points = at.iter().copied().zip(coefficient.iter().copied());
         CoefficientTable {
@@ -19,13 +18,11 @@ impl CoefficientTable {
     }
 
     /// Places with their coefficients.
-    #[must_use]
     pub fn points(&self) -> &[(f64, f64)] {
         &self.points
     }
 
     /// The coefficient at a place and its slope there; on a jump those of the side of larger places.
-    #[must_use]
     pub fn at(&self, place: f64) -> (f64, f64) {
         let table = &self.points;
         let above = table.partition_point(|(at, _)| *at <= place);
@@ -40,8 +37,33 @@ impl CoefficientTable {
     }
 
     /// The largest coefficient.
-    #[must_use]
     pub fn largest(&self) -> f64 {
         self.points.iter().fold(0.0, |most, (_, mu)| most.max(*mu))
+    }
+
+    /// The same with its origin moved to `x`.
+    #[must_use]
+    pub fn about(&self, x: f64) -> CoefficientTable {
+        let points = self.points.iter().map(|(at, mu)| (at - x, *mu));
+        CoefficientTable {
+            points: points.collect(),
+        }
+    }
+
+    /// The mean coefficient between two places, of which the second lies beyond the first.
+    pub fn mean_between(&self, from: f64, to: f64) -> f64 {
+        let first = self.points.partition_point(|(at, _)| *at <= from);
+        let inside = self.points[first..].iter().map(|(at, _)| *at);
+        let ends = inside.take_while(|at| *at < to).chain([to]);
+        let (mut sum, mut before) = (0.0, from);
+        for end in ends {
+            // Of a straight line, the mean is the value in the middle.
+            sum += (end - before) * self.at(0.5 * (before + end)).0;
+            before = end;
+        }
+        match sum / (to - from) {
+            mean if mean.is_finite() => mean.min(self.largest()),
+            _ => self.at(from).0,
+        }
     }
 }

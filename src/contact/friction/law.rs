@@ -31,12 +31,11 @@ pub enum FrictionLaw {
     Heated(HeatedLaw),
     /// A coefficient that varies along the track, which a history passes over. Bounds and limits told here are those of the largest one; the
     /// history takes its part of them step by step.
-    Along(AlongLaw),
+    Along(CoefficientTable),
 }
 
 impl FrictionLaw {
     /// The largest coefficient, which scales the tractions.
-    #[must_use]
     pub fn largest(&self) -> f64 {
         match self {
             FrictionLaw::Constant(coefficient) => *coefficient,
@@ -48,14 +47,12 @@ impl FrictionLaw {
     }
 
     /// Is there no friction at all?
-    #[must_use]
     pub fn is_frictionless(&self) -> bool {
         self.largest() == 0.0
     }
 
     /// How the bounds of cells fall with their slip at a rolling speed in mm/s, for slips counted in `slip_unit`; nothing where they
     /// do not.
-    #[must_use]
     pub fn bound_fall(&self, rolling_speed: Option<f64>, slip_unit: f64) -> Option<Softening> {
         match self {
             FrictionLaw::Falling(law) => Some(law.bound_fall(rolling_speed?, slip_unit)),
@@ -64,14 +61,12 @@ impl FrictionLaw {
     }
 
     /// Do bounds depend on slips, at once or by the heat that they make?
-    #[must_use]
     pub fn depends_on_slip(&self) -> bool {
         matches!(self, FrictionLaw::Falling(_) | FrictionLaw::Heated(_))
     }
 
     /// Why friction falls too fast for one reliable answer on patches at rolling speeds, if it does: by the largest stability number, see
     /// [`FallingLaw::stability`] and [`HeatedLaw::stability`]; nothing for other laws, without patches or without speeds.
-    #[must_use]
     pub fn too_fast(
         &self,
         patches: &[Patch],
@@ -97,7 +92,6 @@ impl FrictionLaw {
     }
 
     /// The law by temperature, where the coefficient falls with it.
-    #[must_use]
     pub fn heated(&self) -> Option<&HeatedLaw> {
         match self {
             FrictionLaw::Heated(law) => Some(law),
@@ -106,7 +100,6 @@ impl FrictionLaw {
     }
 
     /// The table of a coefficient that varies across, where it does.
-    #[must_use]
     pub fn across(&self) -> Option<&AcrossLaw> {
         match self {
             FrictionLaw::Across(law) => Some(law),
@@ -115,8 +108,7 @@ impl FrictionLaw {
     }
 
     /// The table of a coefficient that varies along the track, where it does.
-    #[must_use]
-    pub fn along(&self) -> Option<&AlongLaw> {
+    pub fn along(&self) -> Option<&CoefficientTable> {
         match self {
             FrictionLaw::Along(law) => Some(law),
             _ => None,
@@ -125,21 +117,18 @@ impl FrictionLaw {
 
     /// The mean coefficient over loads at places y of a strip, relative to the largest. Exactly 1 where it does not vary across, so that
     /// bounds keep the last digit of the pressure and a contact without friction has bounds too.
-    #[must_use]
     pub fn share(&self, loads: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
         self.across()
             .map_or(1.0, |law| law.mean(loads) / law.largest())
     }
 
     /// Friction limit in N of a patch: the largest tangential force it can carry, `μN` for a constant coefficient.
-    #[must_use]
     pub fn limit(&self, footprint: &Footprint, patch: usize) -> f64 {
         let force = footprint.patches()[patch].normal_force;
         self.limit_under(force, || footprint.load_across(patch))
     }
 
     /// The same of a patch with a normal force in N and a load, which is asked for where the coefficient varies across.
-    #[must_use]
     pub fn limit_under<L: Borrow<LoadAcross>>(
         &self,
         normal_force: f64,
@@ -150,7 +139,6 @@ impl FrictionLaw {
     }
 
     /// Friction limit in N of all patches together.
-    #[must_use]
     pub fn limit_of_all(&self, footprint: &Footprint) -> f64 {
         let patches = footprint.patches();
         match self {
@@ -221,7 +209,6 @@ pub struct AcrossLaw {
 
 impl AcrossLaw {
     /// A law from as many places, in order, as coefficients, of which there is at least one.
-    #[must_use]
     pub fn new(place: AcrossPlace, at: &[f64], coefficient: &[f64]) -> AcrossLaw {
         AcrossLaw {
             place,
@@ -230,19 +217,16 @@ impl AcrossLaw {
     }
 
     /// The coefficient at a place; on a jump that of the side of larger places.
-    #[must_use]
     pub fn at(&self, place: f64) -> f64 {
         self.table.at(place).0
     }
 
     /// The largest coefficient.
-    #[must_use]
     pub fn largest(&self) -> f64 {
         self.table.largest()
     }
 
     /// The mean coefficient of loads at places; the plain mean where nothing is carried.
-    #[must_use]
     pub fn mean(&self, loads: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
         let weighted = |weight: fn(f64) -> f64| {
             let sums = loads.clone().map(|(y, load)| (weight(load), self.at(y)));
@@ -260,62 +244,8 @@ impl AcrossLaw {
     }
 
     /// The mean coefficient over a load.
-    #[must_use]
     pub fn mean_over(&self, load: &LoadAcross) -> f64 {
         load.mean(self.table.points())
-    }
-}
-
-/// A coefficient of friction by its place along the track: linear between points, constant outside; two points at one place are a jump.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AlongLaw {
-    table: CoefficientTable,
-}
-
-impl AlongLaw {
-    /// A law from as many places in mm, in order, as coefficients, of which there is at least one.
-    #[must_use]
-    pub fn new(at: &[f64], coefficient: &[f64]) -> AlongLaw {
-        AlongLaw {
-            table: CoefficientTable::new(at, coefficient),
-        }
-    }
-
-    /// This table with its origin moved to `x` in mm.
-    #[must_use]
-    pub fn about(&self, x: f64) -> AlongLaw {
-        let (at, coefficient): (Vec<f64>, Vec<f64>) = self
-            .table
-            .points()
-            .iter()
-            .map(|(at, mu)| (at - x, *mu))
-            .unzip();
-        AlongLaw::new(&at, &coefficient)
-    }
-
-    /// The largest coefficient.
-    #[must_use]
-    pub fn largest(&self) -> f64 {
-        self.table.largest()
-    }
-
-    /// The mean coefficient between two places in mm, of which the second lies beyond the first.
-    #[must_use]
-    pub fn mean(&self, from: f64, to: f64) -> f64 {
-        let points = self.table.points();
-        let first = points.partition_point(|(at, _)| *at <= from);
-        let inside = points[first..].iter().map(|(at, _)| *at);
-        let ends = inside.take_while(|at| *at < to).chain([to]);
-        let (mut sum, mut before) = (0.0, from);
-        for end in ends {
-            // Of a straight line, the mean is the value in the middle.
-            sum += (end - before) * self.table.at(0.5 * (before + end)).0;
-            before = end;
-        }
-        match sum / (to - from) {
-            mean if mean.is_finite() => mean.min(self.largest()),
-            _ => self.table.at(from).0,
-        }
     }
 }
 
@@ -377,7 +307,7 @@ mod coefficient_table_tests {
 
     #[test]
     fn means_are_integrals_over_their_length() {
-        let law = AlongLaw::new(&[-1.0, 1.0, 1.0, 2.0], &[0.1, 0.3, 0.5, 0.2]);
+        let law = CoefficientTable::new(&[-1.0, 1.0, 1.0, 2.0], &[0.1, 0.3, 0.5, 0.2]);
         let known = [
             (-5.0, -2.0, 0.1),
             (-1.0, 1.0, 0.2),
@@ -387,17 +317,20 @@ mod coefficient_table_tests {
             (3.0, 9.0, 0.2),
         ];
         for (from, to, mean) in known {
-            assert!((law.mean(from, to) - mean).abs() < 1e-15, "{from} to {to}");
+            assert!(
+                (law.mean_between(from, to) - mean).abs() < 1e-15,
+                "{from} to {to}"
+            );
         }
-        assert_eq!(law.mean(0.5, 0.5), law.table.at(0.5).0);
+        assert_eq!(law.mean_between(0.5, 0.5), law.at(0.5).0);
         assert_eq!(law.largest(), 0.5);
     }
 
     #[test]
     fn an_even_table_has_its_coefficient_everywhere() {
-        let law = AlongLaw::new(&[0.0, 1.0], &[0.3, 0.3]);
+        let law = CoefficientTable::new(&[0.0, 1.0], &[0.3, 0.3]);
         for from in [-1e6, -0.3, 0.4, 0.99, 7.0] {
-            assert!((law.mean(from, from + 0.7) - 0.3).abs() < 1e-15);
+            assert!((law.mean_between(from, from + 0.7) - 0.3).abs() < 1e-15);
         }
     }
 }

@@ -26,7 +26,6 @@ pub struct HeatedLaw {
 impl HeatedLaw {
     /// A law from temperatures, rising, with as many coefficients, never rising, of which there is at least one; see the members for the
     /// others.
-    #[must_use]
     pub fn new(at: &[f64], coefficient: &[f64], base: f64, rise: f64) -> HeatedLaw {
         HeatedLaw {
             table: CoefficientTable::new(at, coefficient),
@@ -36,7 +35,6 @@ impl HeatedLaw {
     }
 
     /// The coefficient of the coldest contact, which is the largest.
-    #[must_use]
     pub fn largest(&self) -> f64 {
         self.table.largest()
     }
@@ -48,7 +46,6 @@ impl HeatedLaw {
 
     /// Stability number `1.7 max|dμ/dT| (dT/ds) p_max/G` at a rolling speed in mm/s, with dT/ds the largest temperature rise per relative slip
     /// of a patch of this half-length in mm: how fast bounds fall with slip, compared with how fast slips fall as tractions grow.
-    #[must_use]
     pub fn stability(
         &self,
         speed: f64,
@@ -69,7 +66,6 @@ impl HeatedLaw {
     }
 
     /// Why there is no answer one can rely on at this stability number, if it is too large.
-    #[must_use]
     pub fn too_fast(stability: f64) -> Option<String> {
         (stability > STABILITY_MAX).then(|| {
             format!(
@@ -91,7 +87,6 @@ pub struct PathDependentLaws<'a> {
 
 impl<'a> PathDependentLaws<'a> {
     /// The laws in the units of a level: of slip, of length in mm and of traction in MPa.
-    #[must_use]
     pub fn on_level(&self, slip: f64, length: f64, traction: f64) -> PathDependentFriction<'a> {
         PathDependentFriction {
             heated: self.heated.map(|(law, speed)| CellHeat {
@@ -140,7 +135,6 @@ impl Heated {
 impl PathDependentFriction<'_> {
     /// The bounds of the first cells of a mesh, as many as there are slips, that belong to these slips. `rest` are the bounds of a cold
     /// contact whose layer does not yield; cells that stick have the slip 0.
-    #[must_use]
     pub fn bounds(&self, mesh: &Mesh, rest: &[f64], slip: &[f64]) -> Vec<f64> {
         let mut bounds = rest.to_vec();
         let mut heated = Heated::default();

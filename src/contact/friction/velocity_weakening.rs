@@ -56,13 +56,11 @@ pub struct FallingLaw {
 
 impl FallingLaw {
     /// The coefficient at rest, which is the largest.
-    #[must_use]
     pub fn at_rest(&self) -> f64 {
         self.limit + self.terms.iter().map(|term| term.coefficient).sum::<f64>()
     }
 
     /// The coefficient at a speed of slip in mm/s, and its derivative in s/mm, which is never positive.
-    #[must_use]
     pub fn at(&self, speed: f64) -> (f64, f64) {
         let mut sum = (self.limit, 0.0);
         for (k, term) in self.terms.iter().enumerate() {
@@ -87,7 +85,6 @@ impl FallingLaw {
     }
 
     /// A bound in s/mm of the size of the derivative, which is reached unless two terms are steepest at different speeds.
-    #[must_use]
     pub fn steepest(&self) -> f64 {
         // 3√3/8: the largest slope of 1/(1 + x²).
         let second = 3.0 * 3.0_f64.sqrt() / 8.0;
@@ -104,13 +101,11 @@ impl FallingLaw {
 
     /// Stability number `1.7 V max|μ′| p_max/G` at a rolling speed in mm/s, pressure and shear modulus in MPa: how fast bounds fall with
     /// slip, compared with how fast slips fall as tractions grow. Up to 1 the contact has one state.
-    #[must_use]
     pub fn stability(&self, rolling_speed: f64, pressure_max: f64, shear_modulus: f64) -> f64 {
         SLIP_OF_CELL * rolling_speed * self.steepest() * pressure_max / shear_modulus
     }
 
     /// Why there is no answer one can rely on at this stability number, if it is too large.
-    #[must_use]
     pub fn too_fast(stability: f64) -> Option<String> {
         (stability > STABILITY_MAX).then(|| {
             format!(
@@ -121,7 +116,6 @@ impl FallingLaw {
     }
 
     /// The bounds of cells that roll at a speed in mm/s, for slips counted in `slip_unit`.
-    #[must_use]
     pub fn bound_fall(&self, rolling_speed: f64, slip_unit: f64) -> Softening {
         Softening {
             law: *self,
@@ -140,7 +134,6 @@ pub struct Softening {
 
 impl Softening {
     /// Bound over the bound at rest at a slip, and its derivative.
-    #[must_use]
     pub fn at(&self, slip: f64) -> (f64, f64) {
         let rest = self.law.at_rest();
         let (value, slope) = self.law.at(self.speed * slip);
@@ -148,14 +141,12 @@ impl Softening {
     }
 
     /// The largest size of the derivative.
-    #[must_use]
     pub fn steepest(&self) -> f64 {
         self.speed * self.law.steepest() / self.law.at_rest()
     }
 
     /// The slip σ with `g(σ) + r σ = length`, where `g` is the bound of a cell whose bound at rest is `rest`, for a `length` above
     /// that; with it `g(σ)` and `g′(σ)`. There is one such σ if r exceeds the largest `|g′|`.
-    #[must_use]
     pub fn resolvent(&self, rest: f64, r: f64, length: f64) -> Slipping {
         let ends = [(length - rest) / r, length / r];
         let close = CloseEnough {

@@ -83,7 +83,6 @@ struct Rest {
 
 impl RadiusDifference {
     /// From shifts in mm, strictly increasing and at least two, and differences `left − right` in mm, both as long.
-    #[must_use]
     pub fn new(shift: Vec<f64>, difference: Vec<f64>) -> RadiusDifference {
         let mut integral = vec![0.0; shift.len()];
         for k in 1..shift.len() {
@@ -98,14 +97,12 @@ impl RadiusDifference {
     }
 
     /// First and last shift in mm.
-    #[must_use]
     pub fn range(&self) -> [f64; 2] {
         [self.shift[0], self.shift[self.shift.len() - 1]]
     }
 
     /// The shift in mm at which the radii are equal and to which a free wheelset steers back, the nearest to 0; the middle of the shifts with
     /// equal radii if there are several. None if there is no such shift.
-    #[must_use]
     pub fn rest(&self) -> Option<f64> {
         let sign = |k: usize| {
             let difference = self.difference[k];

@@ -122,7 +122,6 @@ impl<'g> ContactLocus<'g> {
     }
 
     /// Parameters of rail and wheel where they touch first; of several such places, the one at the smallest y.
-    #[must_use]
     pub fn first_touch(&self) -> [f64; 2] {
         let mut lines = self.lines.iter();
         let first = lines.find(|line| line.clearance <= 0.0);
@@ -134,7 +133,6 @@ impl<'g> ContactLocus<'g> {
     ///
     /// Every patch is taken for a circle of the area that half the lowering makes overlap, pressed by a sphere, as if
     /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids. Near ones act on each other.
-    #[must_use]
     pub fn estimated_lowering(&self, force: f64) -> f64 {
         let below = |lowering: f64| -> Vec<LocusPoint> {
             let inside = |line: &&LocusPoint| line.clearance < 0.5 * lowering;

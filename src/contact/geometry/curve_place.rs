@@ -15,21 +15,18 @@ pub struct CurvePlace {
 
 impl CurvePlace {
     /// Unit tangent `[y, z]`.
-    #[must_use]
     pub fn tangent(&self) -> [f64; 2] {
         let (sin, cos) = self.angle.sin_cos();
         [cos, sin]
     }
 
     /// Unit normal `[y, z]` out of the rail.
-    #[must_use]
     pub fn normal(&self) -> [f64; 2] {
         let (sin, cos) = self.angle.sin_cos();
         [-sin, cos]
     }
 
     /// The point `[x, y, z]` in track axes at a distance along the normal, in mm.
-    #[must_use]
     pub fn point(&self, x: f64, gap: f64) -> [f64; 3] {
         let normal = self.normal();
         [

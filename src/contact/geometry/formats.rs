@@ -20,9 +20,10 @@
 //!
 //! A header and rows of numbers.
 
-use railhead_macros::Named;
 use std::borrow::Cow;
 use std::f64::consts::TAU;
+
+use railhead_macros::Named;
 
 use crate::contact::geometry::profile::LengthUnit;
 
@@ -310,15 +311,11 @@ pub(crate) fn read_miniprof(text: &str) -> Result<ProfileFile, String> {
             _ => {}
         }
     }
-    let points = table.points(columns)?;
-    let counts = [points.len(), points.len() + table.remarked];
     let mm = table.stated_unit().map(LengthUnit::mm);
-    let scale = mm.unwrap_or(1.0);
+    let points = table.points(columns, mm)?;
+    let counts = [points.len(), points.len() + table.remarked];
     Ok(ProfileFile {
-        points: points
-            .into_iter()
-            .map(|point| point.map(|part| part * scale))
-            .collect(),
+        points,
         unit_mm: mm,
         mirror_y: Some(true),
         wrong_count: stated.filter(|count| !counts.contains(count)),
@@ -668,13 +665,8 @@ pub(crate) fn read_columns(text: &str) -> Result<ProfileFile, String> {
     }
     let columns = columns.unwrap_or([0, 1]);
     let mm = unit.or(table.stated_unit()).map(LengthUnit::mm);
-    let scale = mm.unwrap_or(1.0);
-    let points = table.points(columns)?;
     Ok(ProfileFile {
-        points: points
-            .into_iter()
-            .map(|point| point.map(|part| part * scale))
-            .collect(),
+        points: table.points(columns, mm)?,
         unit_mm: mm,
         header_rows: table.header_rows,
         ..ProfileFile::default()
@@ -962,15 +954,20 @@ impl Table<'_> {
         unreadable(line, needed, self.comma)
     }
 
-    /// The values in two columns of every row.
+    /// The values in two columns of every row, in mm.
     ///
     /// # Errors
     /// The first row that is too short.
-    pub(crate) fn points(&self, columns: [usize; 2]) -> Result<Vec<[f64; 2]>, String> {
+    pub(crate) fn points(
+        &self,
+        columns: [usize; 2],
+        unit_mm: Option<f64>,
+    ) -> Result<Vec<[f64; 2]>, String> {
+        let scale = unit_mm.unwrap_or(1.0);
         let point = |row: &Row| {
             let value = |column: usize| row.numbers.get(column).copied();
             match columns.map(value) {
-                [Some(y), Some(z)] => Ok([y, z]),
+                [Some(y), Some(z)] => Ok([y * scale, z * scale]),
                 _ => {
                     let count = columns[0].max(columns[1]) + 1;
                     let needed = format!("a row of at least {count} finite numbers");

@@ -27,7 +27,6 @@ pub struct Hole {
 
 impl Hole {
     /// Length in mm below which chords can be ignored beside a contact of the given width in mm.
-    #[must_use]
     pub fn least(width: f64) -> f64 {
         LENGTH_MIN.max(WIDTH_MIN * width)
     }
@@ -35,7 +34,6 @@ impl Hole {
 
 /// The chords over which the other body comes within the largest bulge that the tangents at their ends allow, with the wheel lowered by
 /// `lowering` mm below first touch; `width` in mm is that of the widest patch.
-#[must_use]
 pub fn holes(search: &ContactLocus, lowering: f64, width: f64) -> Vec<Hole> {
     let geometry = search.geometry;
     let sign = geometry.placement.side.sign();

@@ -15,6 +15,12 @@ pub struct Senses {
     pub mirror_z: bool,
 }
 
+impl Senses {
+    const fn new(mirror_y: bool, mirror_z: bool) -> Senses {
+        Senses { mirror_y, mirror_z }
+    }
+}
+
 /// Senses as far as they are stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StatedSenses {
@@ -146,22 +152,10 @@ pub(crate) fn orient_rail(
 
 /// All senses, the documented one first.
 const ALL: [Senses; 4] = [
-    Senses {
-        mirror_y: false,
-        mirror_z: false,
-    },
-    Senses {
-        mirror_y: true,
-        mirror_z: false,
-    },
-    Senses {
-        mirror_y: false,
-        mirror_z: true,
-    },
-    Senses {
-        mirror_y: true,
-        mirror_z: true,
-    },
+    Senses::new(false, false),
+    Senses::new(true, false),
+    Senses::new(false, true),
+    Senses::new(true, true),
 ];
 
 /// Spacing in mm at which a section is sampled along its length.
@@ -242,7 +236,6 @@ pub enum SureBody {
 }
 
 /// The points with y to the field side, z up, in order from the track centre to the field side.
-#[must_use]
 pub fn in_senses(points: &[[f64; 2]], senses: Senses) -> Vec<[f64; 2]> {
     let y_sign = if senses.mirror_y { -1.0 } else { 1.0 };
     let z_sign = if senses.mirror_z { 1.0 } else { -1.0 };
@@ -259,7 +252,6 @@ pub fn in_senses(points: &[[f64; 2]], senses: Senses) -> Vec<[f64; 2]> {
 }
 
 /// The senses in which points of a wheel show a flange, and whether it is a whole one. Whole flanges count before parts of one.
-#[must_use]
 pub fn wheel_senses(points: &[[f64; 2]]) -> (Vec<Senses>, bool) {
     let found = ALL.map(|senses| flange(&in_senses(points, senses)).map(|flange| (senses, flange)));
     let found: Vec<(Senses, Flange)> = found.into_iter().flatten().collect();
@@ -271,13 +263,9 @@ pub fn wheel_senses(points: &[[f64; 2]]) -> (Vec<Senses>, bool) {
 }
 
 /// Whether z of points of a rail is positive up; `None` if the shape does not show it.
-#[must_use]
 pub fn rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
     let crowns = |mirror_z: bool| -> f64 {
-        let senses = Senses {
-            mirror_y: false,
-            mirror_z,
-        };
+        let senses = Senses::new(false, mirror_z);
         let points = in_senses(points, senses);
         let heads = Section::new(&points).heads();
         heads.iter().map(|head| head.crown).sum()
@@ -290,13 +278,9 @@ pub fn rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
 }
 
 /// Whether z of points is positive up, if they can only be those of a rail with at least one of its faces.
-#[must_use]
 pub fn sure_rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
     let mirror_z = rail_mirror_z(points)?;
-    let senses = Senses {
-        mirror_y: false,
-        mirror_z,
-    };
+    let senses = Senses::new(false, mirror_z);
     let heads = Section::new(&in_senses(points, senses)).heads();
     let sure = |head: &Head| {
         let faces = head.falls.iter().flatten();
@@ -306,7 +290,6 @@ pub fn sure_rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
 }
 
 /// The body that the points show in any sense; `None` where another body may have the shape.
-#[must_use]
 pub fn sure_body(points: &[[f64; 2]]) -> Option<SureBody> {
     let rail = ALL.iter().any(|senses| {
         let points = in_senses(points, *senses);
@@ -323,7 +306,6 @@ pub fn sure_body(points: &[[f64; 2]]) -> Option<SureBody> {
 }
 
 /// The flange of a wheel whose points run from the track centre to the field side, z up.
-#[must_use]
 pub fn flange(points: &[[f64; 2]]) -> Option<Flange> {
     let section = Section::new(points);
     let mut treads = section.flat_runs(TREAD);

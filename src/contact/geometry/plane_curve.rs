@@ -40,14 +40,12 @@ pub struct CurvePoint {
 
 impl CurvePoint {
     /// Unit tangent, from the track centre to the field side along the curve.
-    #[must_use]
     pub fn tangent(&self) -> [f64; 2] {
         let length = self.slope[0].hypot(self.slope[1]);
         self.slope.map(|part| part / length)
     }
 
     /// Curvature in 1/mm, positive where the curve bends upward.
-    #[must_use]
     pub fn curvature(&self) -> f64 {
         let [y, z] = self.slope;
         (y * self.bend[1] - z * self.bend[0]) / y.hypot(z).powi(3)
@@ -57,7 +55,6 @@ impl CurvePoint {
 impl PlaneCurve {
     /// The curve through points `at` in mm, whose parameters are `along`: splines that end at sharp corners. Waves shorter than about
     /// `cut_wavelength` mm are smoothed away, 0 for interpolation.
-    #[must_use]
     pub fn through(at: &[[f64; 2]], along: &[f64], cut_wavelength: f64) -> PlaneCurve {
         let last = at.len() - 1;
         let corners = (1..last).filter(|k| is_corner(at, *k));
@@ -73,7 +70,6 @@ impl PlaneCurve {
     }
 
     /// Akima's curve through points `at` in mm, whose parameters are `along`; only its first derivative is continuous.
-    #[must_use]
     pub fn akima(at: &[[f64; 2]], along: &[f64]) -> PlaneCurve {
         let [y, z] = [0, 1].map(|part| {
             let values: Vec<f64> = at.iter().map(|at| at[part]).collect();
@@ -137,13 +133,11 @@ impl PlaneCurve {
     }
 
     /// First and last parameter.
-    #[must_use]
     pub fn range(&self) -> [f64; 2] {
         self.range
     }
 
     /// The curve at a parameter; beyond the ends the tangent there.
-    #[must_use]
     #[inline]
     pub fn at(&self, s: f64) -> CurvePoint {
         let [first, last] = self.range();
@@ -208,7 +202,6 @@ impl PlaneCurve {
     }
 
     /// Parameters at most `step` apart over the whole curve, ends included.
-    #[must_use]
     pub fn parameters(&self, step: f64) -> Vec<f64> {
         let [first, last] = self.range();
         let count = ((last - first) / step).ceil().max(1.0);
@@ -268,7 +261,6 @@ fn chord(points: &[[f64; 2]], k: usize) -> [f64; 2] {
 }
 
 /// Two chords that are no neighbours and cross, by their first points.
-#[must_use]
 pub fn first(points: &[[f64; 2]]) -> Option<[[f64; 2]; 2]> {
     let chords = points.len().checked_sub(1).filter(|count| *count > 2)?;
     let tree = Tree::new(points, chords);

@@ -5,8 +5,9 @@
 //!
 //! Units of length in which cross-sections are given.
 
-use railhead_macros::Named;
 use std::sync::Arc;
+
+use railhead_macros::Named;
 
 use crate::contact::geometry::orientation::{
     self, Flange, FormatSenses, FoundSenses, StatedSenses, SureBody,
@@ -116,7 +117,7 @@ impl Profile {
         if !(shortest..=longest).contains(&length) {
             let hint = match likely_unit(body, &points) {
                 Some((width, unit)) => {
-                    let unit = unit.symbol();
+                    let unit = unit.name();
                     format!(
                         "the section is {width:.4} mm wide; if its numbers are in {unit} and not in mm, state unit: \"{unit}\""
                     )
@@ -131,7 +132,7 @@ impl Profile {
             remarks.push(Remark::ProfileSizeUnusual {
                 profile: body.name(),
                 width_mm,
-                unit: unit.symbol(),
+                unit: unit.name(),
             });
         }
         let flange = orient(body, &mut points, reading, format, &mut remarks)?;
@@ -216,7 +217,6 @@ impl Profile {
     }
 
     /// The points the curve was made from, z up, by increasing parameter of the curve.
-    #[must_use]
     pub fn points(&self) -> Points<'_> {
         Points {
             at: &self.measured.points,
@@ -225,7 +225,6 @@ impl Profile {
     }
 
     /// The points and the curve through them.
-    #[must_use]
     pub fn read(&self) -> PointsRead<'_> {
         PointsRead {
             points: self.points(),
@@ -237,14 +236,12 @@ impl Profile {
     }
 
     /// Median distance of neighbouring points in mm.
-    #[must_use]
     pub fn usual_chord(&self) -> f64 {
         let mut chords: Vec<f64> = self.chords().collect();
         profile_quality::median(&mut chords)
     }
 
     /// Largest distance of neighbouring points in mm.
-    #[must_use]
     pub fn longest_chord(&self) -> f64 {
         self.chords().fold(0.0, f64::max)
     }
@@ -254,37 +251,31 @@ impl Profile {
     }
 
     /// Cut wavelength of the smoothing in mm; 0 for none.
-    #[must_use]
     pub fn smoothing(&self) -> f64 {
         self.measured.smoothing
     }
 
     /// The step in mm of which the coordinates were given as multiples, if it is 0.001 mm or more.
-    #[must_use]
     pub fn rounding(&self) -> Option<f64> {
         self.measured.rounding
     }
 
     /// The curve, y to the field side, z up.
-    #[must_use]
     pub fn curve(&self) -> &PlaneCurve {
         &self.curve
     }
 
     /// First and last parameter, in mm along the chords of the points.
-    #[must_use]
     pub fn range(&self) -> [f64; 2] {
         self.curve.range()
     }
 
     /// The curve at a parameter; beyond the ends the tangent there.
-    #[must_use]
     pub fn at(&self, s: f64) -> CurvePoint {
         self.curve.at(s)
     }
 
     /// Parameters at most `step` apart over the whole curve, ends included.
-    #[must_use]
     pub fn parameters(&self, step: f64) -> Vec<f64> {
         self.curve.parameters(step)
     }
@@ -421,23 +412,15 @@ fn straighten(
 /// Drops one or two points at an end that a long chord separates from all others, as they occur in measurements.
 fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Remark>) {
     let [first, last] = profile_quality::stray_ends(points);
-    let profile = body.name();
-    if let Some((count, distance_mm)) = last {
-        points.truncate(points.len() - count);
-        remarks.push(Remark::ProfileEndDropped {
-            profile,
-            count,
-            distance_mm,
-        });
-    }
-    if let Some((count, distance_mm)) = first {
-        points.drain(..count);
-        remarks.push(Remark::ProfileEndDropped {
-            profile,
-            count,
-            distance_mm,
-        });
-    }
+    let stray = |end: Option<(usize, f64)>| end.map_or(0, |(count, _)| count);
+    points.truncate(points.len() - stray(last));
+    points.drain(..stray(first));
+    let dropped = |(count, distance_mm)| Remark::ProfileEndDropped {
+        profile: body.name(),
+        count,
+        distance_mm,
+    };
+    remarks.extend([last, first].into_iter().flatten().map(dropped));
 }
 
 fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
@@ -445,7 +428,7 @@ fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
 }
 
 /// A unit of length.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum LengthUnit {
     /// Millimetre.
     Mm,
@@ -457,29 +440,21 @@ pub enum LengthUnit {
     Inch,
 }
 
-/// All units, with their symbol and their length in mm.
-const UNITS: [(LengthUnit, &str, f64); 4] = [
-    (LengthUnit::Mm, "mm", 1.0),
-    (LengthUnit::Cm, "cm", 10.0),
-    (LengthUnit::M, "m", 1000.0),
-    (LengthUnit::Inch, "inch", 25.4),
+/// All units, with their length in mm.
+const UNITS: [(LengthUnit, f64); 4] = [
+    (LengthUnit::Mm, 1.0),
+    (LengthUnit::Cm, 10.0),
+    (LengthUnit::M, 1000.0),
+    (LengthUnit::Inch, 25.4),
 ];
 
 impl LengthUnit {
     /// Its length in mm.
-    #[must_use]
     pub fn mm(self) -> f64 {
-        UNITS[self as usize].2
-    }
-
-    /// Its symbol.
-    #[must_use]
-    pub fn symbol(self) -> &'static str {
         UNITS[self as usize].1
     }
 
     /// The unit that a word of a file names, in any case and possibly in brackets or quotes.
-    #[must_use]
     pub fn named(word: &str) -> Option<LengthUnit> {
         let word = word
             .trim_matches(|c: char| !c.is_alphanumeric() && c != '"')
@@ -498,14 +473,13 @@ impl LengthUnit {
     }
 
     /// The unit in which `width` is nearest to a usual width in mm; none if it is far from that in every unit.
-    #[must_use]
     pub fn likely(width: f64, usual: f64) -> Option<LengthUnit> {
         // Half of the smallest ratio of two units, cm and inch, so that at most one unit fits.
         let nearest = 25.4_f64.ln() - 10.0_f64.ln();
         UNITS
             .iter()
-            .find(|(_, _, mm)| (width * mm / usual).ln().abs() < 0.5 * nearest)
-            .map(|(unit, ..)| *unit)
+            .find(|(_, mm)| (width * mm / usual).ln().abs() < 0.5 * nearest)
+            .map(|(unit, _)| *unit)
     }
 }
 

@@ -108,7 +108,6 @@ impl Oddity {
 ///
 /// For points more than 0.75 mm apart, half of the windows may contain the junction of two arcs. The lower quartile divided by 0.3186
 /// is then used, if it exceeds the contribution of the shape.
-#[must_use]
 pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
     let (mut fine, mut coarse) = (Vec::new(), Vec::new());
     let mut length = 0.0;
@@ -138,7 +137,6 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
 }
 
 /// Whether the fourth differences of the points of a range are those of white noise, whose signs alternate, and not of waves.
-#[must_use]
 pub fn is_white(points: Points, range: [usize; 2]) -> bool {
     let differences: Vec<f64> = (range[0]..range[1].saturating_sub(NOISE_CHORDS))
         .filter_map(|k| window_at(points, k).and_then(fourth_difference))
@@ -172,7 +170,6 @@ fn fourth_difference(window: &[[f64; 2]; NOISE_CHORDS + 1]) -> Option<(f64, f64)
 /// points of such a group are therefore compared with the cubic through the sound points on both sides of it. If that cubic and a step between
 /// two points fit all of them, it is a step. Where two arcs meet, the curvature jumps by some 0.06/mm, which makes points 0.25 mm apart
 /// deviate by 0.2 µm; for points farther apart the deviation grows with the square of the distance.
-#[must_use]
 pub fn oddity(points: Points, range: [usize; 2]) -> Option<Oddity> {
     let around = [
         range[0].saturating_sub(ODD_WINDOW),
@@ -314,7 +311,6 @@ fn off_neighbours(points: Points, k: usize) -> Option<f64> {
 /// two next to it). `digits` is the step in mm of which all coordinates are multiples: it moves a point by up to `digits/√2` and changes a
 /// turn by up to `√2 digits (1/a + 1/b)` between chords of lengths a and b. A kink turns by more than three times this, and has points
 /// that turn by no more than this on both sides. On a smooth curve the turn cannot be both.
-#[must_use]
 pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
     let bound = |k: usize| {
         let [before, after] = [points.chord(k - 1), points.chord(k)];
@@ -357,7 +353,6 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
 }
 
 /// The digits that points were given with: the coarser of the steps in mm of which all y and all z are multiples, and at least 1e-9 mm.
-#[must_use]
 pub fn digits(given: &[[f64; 2]]) -> f64 {
     let of = |part| step_of(given, part, DIGITS_MAX, 1e-4).unwrap_or(DIGITS_LEAST);
     of(0).max(of(1))
@@ -376,7 +371,6 @@ fn step_of(given: &[[f64; 2]], part: usize, digits: i32, tolerance: f64) -> Opti
 }
 
 /// The step in mm of which every height is a multiple (0.1, 0.01 or 0.001), if there is one.
-#[must_use]
 pub fn rounding(given: &[[f64; 2]]) -> Option<f64> {
     step_of(given, 1, 3, 1e-6)
 }
@@ -422,7 +416,6 @@ fn fitted<const N: usize, const POINTS: usize>(points: [[f64; 2]; POINTS], t: f6
 }
 
 /// The median; 0 for an empty list.
-#[must_use]
 pub fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     if values.is_empty() {
@@ -440,7 +433,6 @@ const STRAY_POINTS_MAX: usize = 2;
 
 /// Points at either end that lie beyond a stray chord, with the length of that chord in mm: `[count, length]` at the first and
 /// at the last end.
-#[must_use]
 pub fn stray_ends(points: &[[f64; 2]]) -> [Option<(usize, f64)>; 2] {
     let chords: Vec<f64> = points
         .windows(2)
@@ -472,7 +464,6 @@ pub struct Points<'a> {
 
 impl<'a> Points<'a> {
     /// Indices of the points in a range of the length: the first, and one past the last.
-    #[must_use]
     pub fn numbers(&self, range: [f64; 2]) -> [usize; 2] {
         let first = self.along.partition_point(|s| *s < range[0]);
         let last = self.along.partition_point(|s| *s <= range[1]);
@@ -563,7 +554,6 @@ fn stretch_about(points: Points, [low, high]: [f64; 2]) -> [f64; 2] {
 
 impl ProfileStretch {
     /// The readings compared about a contact, given by its ends in mm along the profile.
-    #[must_use]
     pub fn about(reading: &PointsRead, contact: [f64; 2]) -> ProfileStretch {
         let window = stretch_about(reading.points, contact);
         let PointsRead {
@@ -610,7 +600,6 @@ impl ProfileStretch {
     }
 
     /// Roughness at the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
-    #[must_use]
     pub fn roughness(&self, [low, high]: [f64; 2], modulus: f64) -> Roughness {
         let place = |k: usize| self.first + self.step * k as f64;
         let over_contact = |pressures: &[f64]| {
@@ -685,7 +674,6 @@ pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
 
 /// Pressure in MPa that white noise of deviation `noise` mm at a spacing of `spacing` mm leaves after a smoothing that halves
 /// waves of `cut` mm: `2.34 E* s √(h/L³)`, from `2 (π E*)² s² h / L³ · ∫ x²/(1+x⁴)² dx` with the integral `π√2/16`.
-#[must_use]
 pub fn noise_pressure(modulus: f64, noise: f64, spacing: f64, cut: f64) -> f64 {
     2.34 * modulus * noise * (spacing / cut.powi(3)).sqrt()
 }
@@ -730,20 +718,17 @@ pub struct UnderContact {
 
 /// Standard deviation in mm of the noise of the points in a range, along the normal; `None` if too few of them are close enough together to
 /// determine it. Heights that were rounded have at least the noise of the rounding: where a profile is level, neighbours are equal.
-#[must_use]
 pub fn noise_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
     let least = ROUNDED * reading.rounding.unwrap_or(0.0);
     Some(noise(reading.points, range)?.max(least))
 }
 
 /// Length in mm of the chords if the points of a range were interpolated linearly between fewer points.
-#[must_use]
 pub fn polygon_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
     polygon(reading.points, range, reading.digits)
 }
 
 /// Quality of the points of a body under the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
-#[must_use]
 pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> UnderContact {
     let points = reading.points;
     let [low, high] = contact;
@@ -801,7 +786,6 @@ pub struct Grain {
 /// `L = (2.34 E* √(s₁² h₁ + s₂² h₂) / (0.07 p))^(2/3)` leaves noise of 7 % of the pressure (see [`noise_pressure`]); it is limited to 2 to
 /// 8 mm. A body whose own noise without smoothing is below 1 % of the pressure is not smoothed; a polygon is smoothed by at least two
 /// chords.
-#[must_use]
 pub fn advised_smoothing(bodies: [Grain; 2], modulus: f64, pressure: f64) -> [f64; 2] {
     let share = |body: &Grain| body.noise * body.spacing.sqrt();
     let both = share(&bodies[0]).hypot(share(&bodies[1]));

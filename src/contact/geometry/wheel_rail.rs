@@ -28,7 +28,6 @@ pub enum Side {
 
 impl Side {
     /// Sign of the track's y on this side.
-    #[must_use]
     pub fn sign(self) -> f64 {
         match self {
             Side::Left => 1.0,
@@ -285,7 +284,6 @@ impl WheelRail {
     }
 
     /// Distance of the origin of the rail's profile from the middle of the track, in mm.
-    #[must_use]
     pub fn rail_origin(&self) -> f64 {
         self.origin[0]
     }
@@ -317,7 +315,6 @@ impl WheelRail {
     }
 
     /// The profiles of rail (before cant) and wheel.
-    #[must_use]
     pub fn profiles(&self) -> [&Profile; 2] {
         [&self.rail_given, &self.wheel]
     }
@@ -343,31 +340,26 @@ impl WheelRail {
     }
 
     /// Unit vector along the axle, to the left.
-    #[must_use]
     pub fn axle(&self) -> [f64; 3] {
         self.axes.axle
     }
 
     /// First and last parameter of the rail's and of the wheel's curve.
-    #[must_use]
     pub fn ranges(&self) -> [[f64; 2]; 2] {
         [self.rail.range(), self.wheel.range()]
     }
 
     /// Parameters at most `step` apart along the rail and the wheel.
-    #[must_use]
     pub fn parameters(&self, step: f64) -> [Vec<f64>; 2] {
         [self.rail.parameters(step), self.wheel.parameters(step)]
     }
 
     /// The rail's curve in track axes `[y, z]`, with derivatives to the parameter.
-    #[must_use]
     pub fn rail_at(&self, s: f64) -> CurvePoint {
         self.rail.at(s)
     }
 
     /// The wheel's meridian at a parameter of its profile.
-    #[must_use]
     pub fn meridian(&self, s: f64) -> Meridian {
         let sign = self.placement.side.sign();
         let place = self.wheel.at(s);
@@ -393,7 +385,6 @@ impl WheelRail {
 
     /// The point of a wheel circle where the surface's normal has no part along x, relative to the wheel's centre but
     /// shifted sideways with it: where the circle meets a rail that is straight along x. None where the yaw hides it.
-    #[must_use]
     pub fn lowest(&self, s: f64) -> Option<[f64; 3]> {
         self.lowest_of(&self.circle(s))
     }
@@ -418,7 +409,6 @@ impl WheelRail {
     }
 
     /// The wheel's cross-section below its axle in track axes `[y, z]`, z from the height of the wheelset's centre.
-    #[must_use]
     pub fn wheel_section(&self, s: f64) -> [f64; 2] {
         let circle = self.meridian(s);
         let at = |k: usize| circle.along * self.axes.axle[k] + circle.radius * self.axes.down[k];
@@ -426,21 +416,18 @@ impl WheelRail {
     }
 
     /// Position on the rail's profile as it was given (before cant): y to the field side, z down.
-    #[must_use]
     pub fn on_rail(&self, s: f64) -> [f64; 2] {
         let [y, z] = self.rail_given.at(s).at;
         [y, -z]
     }
 
     /// Position on the wheel's profile: y to the field side, z down.
-    #[must_use]
     pub fn on_wheel(&self, s: f64) -> [f64; 2] {
         let [y, z] = self.wheel.at(s).at;
         [y, -z]
     }
 
     /// Remarks on the two profiles.
-    #[must_use]
     pub fn remarks(&self) -> Vec<RemarkEntry> {
         let placed = |pointer: &'static str, profile: &Profile| {
             let remarks = profile.remarks.clone().into_iter();

@@ -45,13 +45,11 @@ pub struct RigidPose {
 
 impl RigidPose {
     /// Rolling radius of the left wheel less that of the right one, in mm.
-    #[must_use]
     pub fn radius_difference(&self) -> f64 {
         self.touches[0].radius - self.touches[1].radius
     }
 
     /// Distance of the places of contact across the track in mm.
-    #[must_use]
     pub fn contact_distance(&self) -> f64 {
         self.touches[0].at[1] - self.touches[1].at[1]
     }
@@ -59,7 +57,6 @@ impl RigidPose {
 
 impl PairOfRails {
     /// Left and right side.
-    #[must_use]
     pub fn new(sides: [WheelRail; 2]) -> PairOfRails {
         let tops = [RailTop::new(&sides[0]), RailTop::new(&sides[1])];
         PairOfRails { sides, tops }
@@ -154,7 +151,6 @@ impl PairOfRails {
     }
 
     /// Where the wheels touch, on the cross-sections of rail and wheel, `[y, z]` in mm, y to the field side and z down.
-    #[must_use]
     pub fn on_profiles(&self, side: usize, touch: &RigidTouch) -> [[f64; 2]; 2] {
         [
             self.sides[side].on_rail(touch.rail),

@@ -1,7 +1,5 @@
 //! GMRES with right preconditioning (Saad & Schultz 1986): linear systems known only through products.
 
-use std::ops::ControlFlow;
-
 use crate::contact::monitor::Stop;
 
 /// Basis vectors kept before a restart. A Newton step takes 4 products on average; 30 gives the same work on the 160 ellipses that
@@ -47,13 +45,11 @@ pub enum GmresTermination {
 
 impl GmresTermination {
     /// Whether the tolerance was met.
-    #[must_use]
     pub fn converged(self) -> bool {
         self == GmresTermination::Converged
     }
 
     /// The reason as a clause for messages.
-    #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
             GmresTermination::Converged => "the residual fell by the tolerance",
@@ -68,8 +64,11 @@ pub trait LinearSystem {
     fn product(&mut self, x: &[f64], out: &mut [f64]);
     /// `x ← P⁻¹ x` with P close to A.
     fn precondition(&mut self, x: &mut [f64]);
-    /// Called once per product; may stop the work.
-    fn tick(&mut self) -> ControlFlow<Stop>;
+    /// Called once per product.
+    ///
+    /// # Errors
+    /// Why the work is to end.
+    fn tick(&mut self) -> Result<(), Stop>;
 }
 
 impl Gmres {
@@ -144,9 +143,7 @@ impl Gmres {
         self.set_basis(0, residual, beta);
         let mut k = 0;
         while k < BASIS_MAX {
-            if let ControlFlow::Break(stop) = system.tick() {
-                return Err(stop);
-            }
+            system.tick()?;
             if self.directions.len() <= k {
                 self.directions.push(Vec::new());
             }
@@ -248,7 +245,6 @@ fn column_start(k: usize) -> usize {
 }
 
 /// Inner product in eight running sums, so that it can be vectorised and rounds alike everywhere.
-#[must_use]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));
@@ -295,8 +291,8 @@ mod tests {
             }
         }
 
-        fn tick(&mut self) -> ControlFlow<Stop> {
-            ControlFlow::Continue(())
+        fn tick(&mut self) -> Result<(), Stop> {
+            Ok(())
         }
     }
 
@@ -365,8 +361,8 @@ mod tests {
 
             fn precondition(&mut self, _: &mut [f64]) {}
 
-            fn tick(&mut self) -> ControlFlow<Stop> {
-                ControlFlow::Continue(())
+            fn tick(&mut self) -> Result<(), Stop> {
+                Ok(())
             }
         }
         let mut b = vec![0.0; 2000];

@@ -55,7 +55,6 @@ impl Place {
 
 /// Values at any places of the curve that has no extreme between its nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat.
 /// Comput. 5, 1984); beyond the first and last node their values. Nodes ascend; none of two at the same place counts twice.
-#[must_use]
 pub fn monotone(axis: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
     let last = axis.len() - 1;
     if last == 0 {
@@ -262,7 +261,6 @@ pub(crate) fn polynomial_weights<const N: usize>(nodes: &[f64; N], at: f64) -> [
 }
 
 /// Value at `at` of the polynomial of least degree through points `(place, value)`, of which there is at least one.
-#[must_use]
 pub fn polynomial_value(points: &[(f64, f64)], at: f64) -> f64 {
     let mut sum = 0.0;
     for (i, (node, value)) in points.iter().enumerate() {
@@ -297,7 +295,6 @@ impl Spline {
     /// The splines through two series of `values` at strictly increasing `knots`, at least 2; waves shorter than about `cut_wavelength`
     /// (same unit as the knots) are smoothed away, 0 for interpolation. Smoothed splines pass exactly through the first and the last value
     /// where `ends` says so.
-    #[must_use]
     pub fn pair(
         knots: &[f64],
         values: [Vec<f64>; 2],
@@ -365,25 +362,21 @@ impl Spline {
     }
 
     /// First and last knot.
-    #[must_use]
     pub fn range(&self) -> [f64; 2] {
         [self.knots[0], self.knots[self.knots.len() - 1]]
     }
 
     /// The knots.
-    #[must_use]
     pub fn knots(&self) -> &[f64] {
         &self.knots
     }
 
     /// Value and derivatives; beyond the ends the tangent there.
-    #[must_use]
     pub fn at(&self, s: f64) -> SplineValue {
         self.at_in(self.interval(s), s)
     }
 
     /// Coefficients of the cubic between the knots i and i + 1, by powers of the distance from knot i.
-    #[must_use]
     pub fn cubic(&self, i: usize) -> [f64; 4] {
         let step = self.knots[i + 1] - self.knots[i];
         let [first, last] = [self.bends[i], self.bends[i + 1]];
@@ -398,14 +391,12 @@ impl Spline {
     }
 
     /// The interval of knots that a place lies in, or the nearest one.
-    #[must_use]
     pub fn interval(&self, s: f64) -> usize {
         let after = self.knots.partition_point(|knot| *knot <= s);
         after.clamp(1, self.knots.len() - 1) - 1
     }
 
     /// [`Spline::at`] for a place whose [`Spline::interval`] is known.
-    #[must_use]
     pub fn at_in(&self, i: usize, s: f64) -> SplineValue {
         let [first, last] = self.range();
         if s < first || s > last {

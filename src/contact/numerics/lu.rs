@@ -7,8 +7,6 @@
 //!
 //! Least-squares fits of a few functions, by their normal equations on the stack.
 
-use std::ops::ControlFlow;
-
 use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Mat, MatMut};
 use pulp::NullaryFnOnce;
@@ -21,9 +19,9 @@ use crate::contact::numerics::simd;
 /// # Errors
 /// Only if the monitor stops the work; it is called before and after the factorisation.
 pub fn solve(matrix: &Mat<f64>, rhs: MatMut<'_, f64>, monitor: &dyn Monitor) -> Result<(), Stop> {
-    check(monitor)?;
+    monitor.go_on(0.0)?;
     let factors = PartialPivLu::new(matrix.as_ref());
-    check(monitor)?;
+    monitor.go_on(0.0)?;
     factors.solve_in_place(rhs);
     Ok(())
 }
@@ -36,17 +34,6 @@ pub(crate) fn inverse(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (0..n)
         .map(|i| (0..n).map(|j| unit[(i, j)]).collect())
         .collect()
-}
-
-/// Calls the monitor.
-///
-/// # Errors
-/// The reason to stop, if the monitor gives one.
-pub fn check(monitor: &dyn Monitor) -> Result<(), Stop> {
-    match monitor.tick(0.0) {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(stop) => Err(stop),
-    }
 }
 
 /// Factors a square matrix, stored column by column, into `P A = L U`: below the diagonal is L, whose own diagonal is 1, and U elsewhere.

@@ -23,7 +23,6 @@ pub struct SimdLevel(Arch);
 
 impl SimdLevel {
     /// All levels of the processor, the lowest first.
-    #[must_use]
     pub fn available() -> Vec<SimdLevel> {
         let mut levels = vec![Arch::Scalar];
         #[cfg(target_arch = "x86_64")]
@@ -39,7 +38,6 @@ impl SimdLevel {
     }
 
     /// The level that kernels use on this thread.
-    #[must_use]
     pub fn current() -> SimdLevel {
         SimdLevel(CHOSEN.get().unwrap_or_default())
     }
@@ -175,7 +173,6 @@ number!(
 
 /// `√(x² + y²)` of numbers whose squares are numbers too, as those of everything dimensionless are. `f64::hypot` takes any numbers, and a creep
 /// map of 1000 motions took 6 % longer with it.
-#[must_use]
 pub fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }

@@ -18,7 +18,6 @@ use crate::contact::solution::words::damage::{
 };
 
 /// Wear rate in µg per m rolled and mm² of contact, for a power per area `x` in N/mm².
-#[must_use]
 pub fn usfd_rate(map: &UsfdFigures, x: f64) -> f64 {
     let severe = map.mild_slope * map.mild_until;
     let beyond = map.catastrophic_slope * (x - map.severe_until).max(0.0);
@@ -26,7 +25,6 @@ pub fn usfd_rate(map: &UsfdFigures, x: f64) -> f64 {
 }
 
 /// The regime of the wear map at a power per area.
-#[must_use]
 pub fn usfd_regime(map: &UsfdFigures, x: f64) -> WearRegime {
     match x {
         x if x < map.mild_until => WearRegime::Mild,
@@ -37,7 +35,6 @@ pub fn usfd_regime(map: &UsfdFigures, x: f64) -> WearRegime {
 
 /// Archard's coefficient and its regime at a sliding speed in mm/s and a pressure over hardness: the geometric mean of the range, and
 /// the range.
-#[must_use]
 pub fn archard_coefficient(
     map: &ArchardFigures,
     speed: f64,
@@ -60,7 +57,6 @@ pub fn archard_coefficient(
 }
 
 /// Damage of one pass by the Whole Life Rail Model at Tγ in N.
-#[must_use]
 pub fn wlrm_damage(function: &WlrmFigures, t_gamma: f64) -> f64 {
     let WlrmFigures {
         threshold_n,
@@ -79,7 +75,6 @@ pub fn wlrm_damage(function: &WlrmFigures, t_gamma: f64) -> f64 {
 
 /// A function of a number that is known up to an interval: its value, and the least and the largest over the interval; `turns` are
 /// places where the function may turn.
-#[must_use]
 pub fn over(x: Ranged, turns: &[f64], function: impl Fn(f64) -> f64) -> Ranged {
     let value = function(x.value);
     let (Some(low), Some(high)) = (x.low, x.high) else {
@@ -105,7 +100,6 @@ pub fn over(x: Ranged, turns: &[f64], function: impl Fn(f64) -> f64) -> Ranged {
 }
 
 /// A number with the same error in both directions, not below 0.
-#[must_use]
 pub fn about(value: f64, error: Option<f64>) -> Ranged {
     Ranged {
         value,
@@ -115,7 +109,6 @@ pub fn about(value: f64, error: Option<f64>) -> Ranged {
 }
 
 /// The product of two numbers that are not negative.
-#[must_use]
 pub fn times(a: Ranged, b: Ranged) -> Ranged {
     let both = |a: Option<f64>, b: Option<f64>| Some(a? * b?);
     Ranged {
@@ -146,142 +139,81 @@ pub struct DamageTask {
     pub models: Vec<DamageModel>,
     /// Strip by strip too?
     pub across: bool,
-    /// The figures.
-    pub figures: DamageFigures,
+    /// The figures, as they are answered.
+    pub figures: DamageFiguresUsed,
 }
 
 impl DamageTask {
     /// The task that a case asks for.
-    #[must_use]
     pub fn new(words: &DamageWords) -> DamageTask {
+        let (named, own) = match &words.parameters {
+            None => (DamageSetName::default(), None),
+            Some(DamageParameterWords::Named(name)) => (*name, None),
+            Some(DamageParameterWords::Own(own)) => (DamageSetName::default(), Some(&**own)),
+        };
+        let named = named_figures(named);
+        let own = own.copied().unwrap_or_default();
+        // Neither confirmed nor the client's.
+        let doubtful = |model: &DamageModel| match model {
+            DamageModel::TGamma | DamageModel::UsfdWear => false,
+            DamageModel::ArchardWear => own.archard.is_none(),
+            DamageModel::Wlrm => own.wlrm.is_none(),
+            DamageModel::SurfaceFatigueIndex | DamageModel::Shakedown => {
+                own.shear_yield_mpa.is_none()
+            }
+        };
         DamageTask {
             models: words.models.clone(),
             across: words.across,
-            figures: DamageFigures::new(words.parameters.as_ref()),
+            figures: DamageFiguresUsed {
+                density_kg_per_m3: own.density_kg_per_m3.unwrap_or(named.density_kg_per_m3),
+                shear_yield_mpa: own.shear_yield_mpa.unwrap_or(named.shear_yield_mpa),
+                hardness_mpa: own.hardness_mpa.unwrap_or(named.hardness_mpa),
+                usfd: own.usfd.unwrap_or(named.usfd),
+                archard: own.archard.unwrap_or(named.archard),
+                wlrm: own.wlrm.unwrap_or(named.wlrm),
+                unconfirmed: words.models.iter().copied().filter(doubtful).collect(),
+                ..named
+            },
         }
     }
 
     /// Is this model asked for?
-    #[must_use]
     pub fn wants(&self, model: DamageModel) -> bool {
         self.models.contains(&model)
     }
+}
 
-    /// The figures as they are answered.
-    #[must_use]
-    pub fn used(&self) -> DamageFiguresUsed {
-        let figures = &self.figures;
-        DamageFiguresUsed {
-            set: figures.set,
-            density_kg_per_m3: figures.density,
-            shear_yield_mpa: figures.shear_yield,
-            hardness_mpa: figures.hardness,
-            usfd: figures.usfd,
-            archard: figures.archard,
-            wlrm: figures.wlrm,
-            unconfirmed: self.unconfirmed(),
+/// The figures of a named set.
+fn named_figures(set: DamageSetName) -> DamageFiguresUsed {
+    match set {
+        DamageSetName::Rail900aWheelR8t => DamageFiguresUsed {
+            set,
+            density_kg_per_m3: 7850.0,
+            shear_yield_mpa: 300.0,
+            hardness_mpa: 2550.0,
+            usfd: UsfdFigures {
+                mild_slope: 5.3,
+                mild_until: 10.4,
+                severe_until: 77.2,
+                catastrophic_slope: 61.9,
+            },
+            archard: ArchardFigures {
+                mild: [1e-4, 1e-3],
+                severe: [3e-3, 4e-3],
+                seizure: [3e-2, 4e-2],
+                speeds_mm_per_s: [200.0, 700.0],
+                seizure_pressure: 0.8,
+            },
+            wlrm: WlrmFigures {
+                threshold_n: 15.0,
+                peak_at_n: 65.0,
+                zero_at_n: 175.0,
+                peak: 1e-5,
+            },
+            unconfirmed: Vec::new(),
             sources: SOURCES.map(str::to_owned).into(),
-        }
-    }
-
-    /// The models asked for whose figures are neither confirmed nor the client's.
-    #[must_use]
-    pub fn unconfirmed(&self) -> Vec<DamageModel> {
-        let own = &self.figures.own;
-        let doubtful = |model: &DamageModel| match model {
-            DamageModel::TGamma | DamageModel::UsfdWear => false,
-            DamageModel::ArchardWear => !own.archard,
-            DamageModel::Wlrm => !own.wlrm,
-            DamageModel::SurfaceFatigueIndex | DamageModel::Shakedown => !own.shear_yield,
-        };
-        self.models.iter().copied().filter(doubtful).collect()
-    }
-}
-
-/// All figures, with where they are from.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DamageFigures {
-    /// The set that figures come from that are not the client's.
-    pub set: DamageSetName,
-    /// Density in kg/m³.
-    pub density: f64,
-    /// Yield in shear in MPa.
-    pub shear_yield: f64,
-    /// Hardness in MPa.
-    pub hardness: f64,
-    /// Wear map.
-    pub usfd: UsfdFigures,
-    /// Archard's coefficients.
-    pub archard: ArchardFigures,
-    /// Damage function.
-    pub wlrm: WlrmFigures,
-    /// Which are the client's.
-    pub own: OwnFigures,
-}
-
-/// Which figures are the client's.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct OwnFigures {
-    /// Yield in shear.
-    pub shear_yield: bool,
-    /// Archard's coefficients.
-    pub archard: bool,
-    /// Damage function.
-    pub wlrm: bool,
-}
-
-impl DamageFigures {
-    fn new(words: Option<&DamageParameterWords>) -> DamageFigures {
-        let named = DamageFigures::named(DamageSetName::default());
-        match words {
-            None => named,
-            Some(DamageParameterWords::Named(name)) => DamageFigures::named(*name),
-            Some(DamageParameterWords::Own(own)) => DamageFigures {
-                set: named.set,
-                density: own.density_kg_per_m3.unwrap_or(named.density),
-                shear_yield: own.shear_yield_mpa.unwrap_or(named.shear_yield),
-                hardness: own.hardness_mpa.unwrap_or(named.hardness),
-                usfd: own.usfd.unwrap_or(named.usfd),
-                archard: own.archard.unwrap_or(named.archard),
-                wlrm: own.wlrm.unwrap_or(named.wlrm),
-                own: OwnFigures {
-                    shear_yield: own.shear_yield_mpa.is_some(),
-                    archard: own.archard.is_some(),
-                    wlrm: own.wlrm.is_some(),
-                },
-            },
-        }
-    }
-
-    fn named(set: DamageSetName) -> DamageFigures {
-        match set {
-            DamageSetName::Rail900aWheelR8t => DamageFigures {
-                set,
-                density: 7850.0,
-                shear_yield: 300.0,
-                hardness: 2550.0,
-                usfd: UsfdFigures {
-                    mild_slope: 5.3,
-                    mild_until: 10.4,
-                    severe_until: 77.2,
-                    catastrophic_slope: 61.9,
-                },
-                archard: ArchardFigures {
-                    mild: [1e-4, 1e-3],
-                    severe: [3e-3, 4e-3],
-                    seizure: [3e-2, 4e-2],
-                    speeds_mm_per_s: [200.0, 700.0],
-                    seizure_pressure: 0.8,
-                },
-                wlrm: WlrmFigures {
-                    threshold_n: 15.0,
-                    peak_at_n: 65.0,
-                    zero_at_n: 175.0,
-                    peak: 1e-5,
-                },
-                own: OwnFigures::default(),
-            },
-        }
+        },
     }
 }
 
@@ -299,7 +231,6 @@ pub struct DamagedPatch<'a> {
 }
 
 /// The damage that the task asks for, but for wear strip by strip.
-#[must_use]
 pub fn damage(task: &DamageTask, of: DamagedPatch) -> Damage {
     let (figures, wanted) = (&task.figures, |model| task.wants(model));
     let t_gamma = t_gamma(of);
@@ -351,11 +282,11 @@ fn mean_length(patch: &Patch) -> f64 {
     patch.area / (patch.extent[3] - patch.extent[2])
 }
 
-fn usfd(figures: &DamageFigures, of: DamagedPatch, t_gamma: TGamma) -> UsfdWear {
+fn usfd(figures: &DamageFiguresUsed, of: DamagedPatch, t_gamma: TGamma) -> UsfdWear {
     let x = t_gamma.over_area_n_per_mm2;
     let rate = over(x, &[], |x| usfd_rate(&figures.usfd, x));
     // kg/m³ are µg/mm³.
-    let depth = mean_length(of.patch) * METRES / figures.density * NANOMETRES;
+    let depth = mean_length(of.patch) * METRES / figures.density_kg_per_m3 * NANOMETRES;
     UsfdWear {
         regime: usfd_regime(&figures.usfd, x.value),
         rate_ug_per_m_mm2: rate,
@@ -365,17 +296,17 @@ fn usfd(figures: &DamageFigures, of: DamagedPatch, t_gamma: TGamma) -> UsfdWear 
 }
 
 /// Volume per length rolled: K ∬ p |s| dA/H, where p |s| is the power over μ.
-fn archard(figures: &DamageFigures, of: DamagedPatch, t_gamma: TGamma) -> Option<ArchardWear> {
+fn archard(figures: &DamageFiguresUsed, of: DamagedPatch, t_gamma: TGamma) -> Option<ArchardWear> {
     let (patch, force) = (of.patch, of.patch.normal_force);
     if of.limit <= 0.0 {
         return None;
     }
     let slip = t_gamma.with_spin_n.value / of.limit;
     let sliding_speed_mm_per_s = slip * of.speed?;
-    let pressure = force / patch.area / figures.hardness;
+    let pressure = force / patch.area / figures.hardness_mpa;
     let (regime, coefficient) =
         archard_coefficient(&figures.archard, sliding_speed_mm_per_s, pressure);
-    let sliding = scaled(t_gamma.with_spin_n, force / of.limit / figures.hardness);
+    let sliding = scaled(t_gamma.with_spin_n, force / of.limit / figures.hardness_mpa);
     // mm³ per mm rolled.
     let volume = times(coefficient, sliding);
     let width = patch.extent[3] - patch.extent[2];
@@ -397,21 +328,21 @@ fn utilisation(of: DamagedPatch) -> Ranged {
     about(point.force_x_n.hypot(point.force_y_n) / force, error)
 }
 
-fn surface_fatigue(figures: &DamageFigures, of: DamagedPatch) -> SurfaceFatigue {
+fn surface_fatigue(figures: &DamageFiguresUsed, of: DamagedPatch) -> SurfaceFatigue {
     let utilisation = utilisation(of);
     // 2π a b k/(3 N), with the area in the place of π a b.
-    let limit = 2.0 * of.patch.area * figures.shear_yield / (3.0 * of.patch.normal_force);
+    let limit = 2.0 * of.patch.area * figures.shear_yield_mpa / (3.0 * of.patch.normal_force);
     let traction = of.point.traction_max_mpa;
     SurfaceFatigue {
         utilisation,
         index: over(utilisation, &[], |utilisation| utilisation - limit),
-        traction_excess_mpa: traction.map(|traction| traction - figures.shear_yield),
+        traction_excess_mpa: traction.map(|traction| traction - figures.shear_yield_mpa),
     }
 }
 
-fn shakedown(figures: &DamageFigures, of: DamagedPatch) -> ShakedownPlace {
+fn shakedown(figures: &DamageFiguresUsed, of: DamagedPatch) -> ShakedownPlace {
     let utilisation = utilisation(of);
-    let load_factor = of.patch.pressure_max / figures.shear_yield;
+    let load_factor = of.patch.pressure_max / figures.shear_yield_mpa;
     let limit = |utilisation: f64| SHAKEDOWN_LIMIT.min(1.0 / utilisation.max(f64::MIN_POSITIVE));
     let over_limit = over(utilisation, &[], |utilisation| {
         load_factor / limit(utilisation)
@@ -439,7 +370,6 @@ pub struct CellWear<'a> {
 }
 
 /// Wear of the strips of a patch. Segments of one strip are added up.
-#[must_use]
 pub fn across(task: &DamageTask, of: CellWear, patch: usize) -> WearAcross {
     let figures = &task.figures;
     let mut found = WearAcross::default();
@@ -463,8 +393,8 @@ pub fn across(task: &DamageTask, of: CellWear, patch: usize) -> WearAcross {
             let over_area = of.power[i] / of.level.area[i];
             let rate = usfd_rate(&figures.usfd, over_area);
             usfd[place][regime(usfd_regime(&figures.usfd, over_area))] +=
-                rate * length * METRES / figures.density * NANOMETRES;
-            let pressure = of.level.pressure[i] / figures.hardness;
+                rate * length * METRES / figures.density_kg_per_m3 * NANOMETRES;
+            let pressure = of.level.pressure[i] / figures.hardness_mpa;
             let speed = of.slip[i] * of.speed.unwrap_or(0.0);
             let (of_archard, coefficient) = archard_coefficient(&figures.archard, speed, pressure);
             archard[place][regime(of_archard)] +=
@@ -496,18 +426,9 @@ fn regime(regime: WearRegime) -> usize {
 mod tests {
     use super::*;
 
-    const WEAR: UsfdFigures = UsfdFigures {
-        mild_slope: 5.3,
-        mild_until: 10.4,
-        severe_until: 77.2,
-        catastrophic_slope: 61.9,
-    };
-    const FATIGUE: WlrmFigures = WlrmFigures {
-        threshold_n: 15.0,
-        peak_at_n: 65.0,
-        zero_at_n: 175.0,
-        peak: 1e-5,
-    };
+    fn set() -> DamageFiguresUsed {
+        named_figures(DamageSetName::default())
+    }
 
     #[test]
     fn the_wear_map_has_its_three_regimes_and_no_steps() {
@@ -518,14 +439,14 @@ mod tests {
             (50.0, 55.12),
             (77.2, 55.12),
         ] {
-            assert!((usfd_rate(&WEAR, x) - rate).abs() < 1e-12, "{x}");
+            assert!((usfd_rate(&set().usfd, x) - rate).abs() < 1e-12, "{x}");
         }
         // 61.9 x − 4723.56 beyond the second limit.
-        assert!((usfd_rate(&WEAR, 100.0) - (6190.0 - 4723.56)).abs() < 1e-9);
+        assert!((usfd_rate(&set().usfd, 100.0) - (6190.0 - 4723.56)).abs() < 1e-9);
         let steps = (0..2000).map(|k| 0.05 * f64::from(k));
         for x in steps {
             assert!(
-                usfd_rate(&WEAR, x + 1e-9) - usfd_rate(&WEAR, x) < 1e-6,
+                usfd_rate(&set().usfd, x + 1e-9) - usfd_rate(&set().usfd, x) < 1e-6,
                 "{x}"
             );
         }
@@ -535,19 +456,19 @@ mod tests {
     fn the_damage_function_rises_peaks_and_goes_below_zero() {
         for (t_gamma, damage) in [(15.0, 0.0), (40.0, 5e-6), (65.0, 1e-5), (175.0, 0.0)] {
             assert!(
-                (wlrm_damage(&FATIGUE, t_gamma) - damage).abs() < 1e-18,
+                (wlrm_damage(&set().wlrm, t_gamma) - damage).abs() < 1e-18,
                 "{t_gamma}"
             );
         }
         // Slopes +2e-7 and −9.1e-8 per N.
-        assert!((wlrm_damage(&FATIGUE, 16.0) - 2e-7).abs() < 1e-12);
-        assert!((wlrm_damage(&FATIGUE, 176.0) + 9.0909e-8).abs() < 1e-11);
+        assert!((wlrm_damage(&set().wlrm, 16.0) - 2e-7).abs() < 1e-12);
+        assert!((wlrm_damage(&set().wlrm, 176.0) + 9.0909e-8).abs() < 1e-11);
     }
 
     #[test]
     fn an_interval_over_the_peak_has_the_peak_as_its_largest() {
         let t_gamma = about(60.0, Some(20.0));
-        let found = over(t_gamma, &[15.0, 65.0], |x| wlrm_damage(&FATIGUE, x));
+        let found = over(t_gamma, &[15.0, 65.0], |x| wlrm_damage(&set().wlrm, x));
         assert!((found.high.unwrap() - 1e-5).abs() < 1e-18);
         assert!((found.low.unwrap() - 5e-6).abs() < 1e-18);
         assert!((found.value - 9e-6).abs() < 1e-18);

@@ -15,6 +15,7 @@
 
 use std::ops::Range;
 
+use crate::contact::case::words::material::ThermalBodyWords;
 use crate::contact::half_space::strip_operator::assembly::{CellEdges, SegmentRows};
 use crate::contact::half_space::strip_operator::kind::Precision;
 use crate::contact::mesh::{Mesh, Segment};
@@ -212,9 +213,7 @@ impl Differences {
         let mut edges = CellEdges::<T>::new(mesh);
         let mut rows = Vec::new();
         for segment in &mesh.segments {
-            if let std::ops::ControlFlow::Break(stop) = monitor.tick(0.0) {
-                return Err(stop);
-            }
+            monitor.go_on(0.0)?;
             rows.resize(3 * cells * segment.cells.len(), T::ZERO);
             edges.observe_from(mesh, segment.chord.y);
             simd::dispatch(SegmentRows {
@@ -304,30 +303,16 @@ fn carry(power: &mut [f64], slips: &[bool], cells: Range<usize>) {
     }
 }
 
-/// What a body does with heat.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ThermalBody {
-    /// Heat conductivity λ in W/(m K).
-    pub conductivity: f64,
-    /// Density ρ in kg/m³.
-    pub density: f64,
-    /// Specific heat c in J/(kg K).
-    pub specific_heat: f64,
-    /// Temperature before the contact, in °C.
-    pub bulk: f64,
-}
-
-impl ThermalBody {
+impl ThermalBodyWords {
     /// Thermal penetration coefficient β in J/(m² √s K).
-    #[must_use]
     pub fn penetration(&self) -> f64 {
-        (self.conductivity * self.density * self.specific_heat).sqrt()
+        (self.conductivity_w_per_mk * self.density_kg_per_m3 * self.specific_heat_j_per_kgk).sqrt()
     }
 
     /// Péclet number `V L/(2 κ)` of a contact of half-length L in mm, rolled over at V in mm/s.
-    #[must_use]
     pub fn peclet(&self, speed: f64, half_length: f64) -> f64 {
-        let diffusivity = self.conductivity / (self.density * self.specific_heat);
+        let diffusivity =
+            self.conductivity_w_per_mk / (self.density_kg_per_m3 * self.specific_heat_j_per_kgk);
         speed * METRES * half_length * METRES / (2.0 * diffusivity)
     }
 }
@@ -336,28 +321,25 @@ impl ThermalBody {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThermalTask {
     /// The lower body.
-    pub lower: ThermalBody,
+    pub lower: ThermalBodyWords,
     /// The upper body.
-    pub upper: ThermalBody,
+    pub upper: ThermalBodyWords,
 }
 
 impl ThermalTask {
     /// Share of the friction heat that flows into the lower body while it is in contact.
-    #[must_use]
     pub fn share_of_lower(&self) -> f64 {
         let [lower, upper] = [self.lower, self.upper].map(|body| body.penetration());
         lower / (lower + upper)
     }
 
     /// Temperature of both surfaces in the contact without friction heat, in °C.
-    #[must_use]
     pub fn without_heat(&self) -> f64 {
         let share = self.share_of_lower();
-        share * self.lower.bulk + (1.0 - share) * self.upper.bulk
+        share * self.lower.bulk_c + (1.0 - share) * self.upper.bulk_c
     }
 
     /// Temperature rise in K per unit of [`heating`], at a speed in mm/s: lengths in mm and heat in MPa mm/s give `1000 √0.001`.
-    #[must_use]
     pub fn rise_of(&self, speed: f64) -> f64 {
         let both = self.lower.penetration() + self.upper.penetration();
         // MPa mm/s are 1000 W/m².
@@ -369,7 +351,6 @@ impl ThermalTask {
 ///
 /// `edges` has one value more than `heat`, from the trailing to the leading end; `heat` are means of the cells. Slopes are those of the
 /// neighbours, 0 at extrema and at most twice the one-sided ones, so that no cell gets a negative heat.
-#[must_use]
 pub fn heating(edges: &[f64], heat: &[f64], points: &[f64]) -> Vec<f64> {
     let slopes = slopes(edges, heat);
     let at = |x: f64| {
@@ -538,11 +519,11 @@ mod heat_tests {
 
     #[test]
     fn bodies_without_slip_meet_in_the_middle() {
-        let steel = |bulk| ThermalBody {
-            conductivity: 50.0,
-            density: 7850.0,
-            specific_heat: 450.0,
-            bulk,
+        let steel = |bulk_c| ThermalBodyWords {
+            conductivity_w_per_mk: 50.0,
+            density_kg_per_m3: 7850.0,
+            specific_heat_j_per_kgk: 450.0,
+            bulk_c,
         };
         let task = ThermalTask {
             lower: steel(120.0),

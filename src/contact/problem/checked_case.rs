@@ -69,7 +69,6 @@ impl CheckedCase {
     }
 
     /// May `auto` take the resultants of a motion from the creep table? Creepages and a target must be given, and the table must cover the contact.
-    #[must_use]
     pub(crate) fn may_take_table(&self, index: usize) -> bool {
         let CheckedCase { problem, run, .. } = self;
         run.method_asked == MethodName::Auto
@@ -80,7 +79,6 @@ impl CheckedCase {
     }
 
     /// What is asked of the tangential problem on a footprint.
-    #[must_use]
     pub fn rolling_task<'a>(&'a self, footprint: &'a Footprint) -> RollingTask<'a> {
         let CheckedCase { problem, run, .. } = self;
         RollingTask {
@@ -123,7 +121,6 @@ pub fn tells_noise(profile: &Profile) -> bool {
 }
 
 /// The quality of both profiles as far as it is known before the solve, with the contact modulus in MPa.
-#[must_use]
 pub fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {
     let profiles = geometry.profiles();
     let advised = advised_smoothing(profiles.map(grain), modulus, PRESSURE_USUAL);
@@ -151,7 +148,6 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
 }
 
 /// The remark on a profile whose shape can only be that of the other body.
-#[must_use]
 pub fn load_mismatch(profile: &Profile, body: Body) -> Option<RemarkEntry> {
     let (looks, like, pointer) = match body {
         Body::Rail => (SureBody::Wheel, "a wheel with its flange", "/contact/rail"),

@@ -104,7 +104,6 @@ impl Problem {
     }
 
     /// The same question about a wheelset that moves in this way.
-    #[must_use]
     pub(crate) fn of_move(&self, motion: WheelsetMotion, drive_torque: Option<f64>) -> Problem {
         Problem {
             wheelset: Some(motion),
@@ -115,7 +114,6 @@ impl Problem {
     }
 
     /// This problem with its wheel replaced.
-    #[must_use]
     pub(crate) fn with_wheel(&self, wheel: Arc<WheelTask>) -> Problem {
         Problem {
             task: NormalTask::Wheel(wheel),
@@ -124,7 +122,6 @@ impl Problem {
     }
 
     /// The same question about one wheel of a wheelset that moves as a whole.
-    #[must_use]
     pub(crate) fn of_wheel(&self, wheel: Arc<WheelTask>, wheelset: WheelsetMotion) -> Problem {
         Problem {
             task: NormalTask::Wheel(wheel),
@@ -188,7 +185,6 @@ impl Problem {
     }
 
     /// The same question about a wheel that moves as given.
-    #[must_use]
     pub(crate) fn moving(&self, motion: Motion, wheelset: Option<WheelsetMotion>) -> Problem {
         Problem {
             motions: vec![motion],
@@ -200,7 +196,6 @@ impl Problem {
     }
 
     /// The same question about one gap of a wheel, with friction in its axes and motions about its origin.
-    #[must_use]
     pub(crate) fn of_gap(&self, friction: FrictionLaw, motions: Vec<Motion>) -> Problem {
         Problem {
             friction,
@@ -259,7 +254,6 @@ impl Run {
     }
 
     /// Target of the resultants' error relative to μN; infinite where a mesh is given.
-    #[must_use]
     pub fn target(&self) -> f64 {
         match self.resolution {
             Resolution::Target(target) => target,
@@ -268,7 +262,6 @@ impl Run {
     }
 
     /// Allowed error of an answer relative to μN, where an error is asked for; `limit` is μN of all patches in N.
-    #[must_use]
     pub fn allowed_error(&self, answer: &MotionAnswer, limit: f64) -> Option<f64> {
         let target = self.resolution.target()?;
         Some(match self.relative_to {
@@ -278,7 +271,6 @@ impl Run {
     }
 
     /// The finest resolution that the case may need: that of a force close to 0 where the target is relative to it.
-    #[must_use]
     pub fn least_resolution(&self) -> Resolution {
         match (self.resolution, self.relative_to) {
             (Resolution::Target(_), RelativeTo::Force) => Resolution::Target(TARGET_LEAST),
@@ -287,14 +279,12 @@ impl Run {
     }
 
     /// Is anything asked for that follows from the cells of a mesh?
-    #[must_use]
     pub fn needs_cells(&self) -> bool {
         self.outputs.iter().any(|output| output.needs_fields())
             || self.after.needs_power(&self.outputs)
     }
 
     /// Is this output asked for?
-    #[must_use]
     pub fn wants(&self, output: Output) -> bool {
         self.outputs.contains(&output)
     }
@@ -313,7 +303,6 @@ pub struct AfterTasks {
 
 impl AfterTasks {
     /// Is the power of every cell needed?
-    #[must_use]
     pub fn needs_power(&self, outputs: &[Output]) -> bool {
         let across = self.damage.as_ref().is_some_and(|task| task.across);
         across || self.thermal.is_some() || outputs.contains(&Output::Slip)
@@ -329,7 +318,6 @@ const PART_OF_TARGET: f64 = 0.1;
 impl Problem {
     /// Error of forces, relative to μN, that is left if only tractions feel the other: 0 where the bodies are alike or without friction, and
     /// where the pressure is given, since it is that of the contact whatever the tractions are.
-    #[must_use]
     pub fn first_order_error(&self, method: Method) -> f64 {
         let coupled = method == Method::BoundaryElement
             && !self.friction.is_frictionless()
@@ -344,7 +332,6 @@ impl Problem {
 
     /// Returns whether the pressures belong to the tractions of bodies that differ. On the curve of a rail they do, in a history to those of its last point.
     /// Elsewhere they do in motions and in one pressing alone, where the gap is known. Points of a history that goes on share their patches.
-    #[must_use]
     pub fn is_coupled(&self, run: &Run) -> bool {
         let on_curve = |wheel: &WheelTask| matches!(wheel.surface, ReferenceSurface::Curve { .. });
         match &self.task {

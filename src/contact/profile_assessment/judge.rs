@@ -153,7 +153,6 @@ fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
 
 /// The quality of both profiles under a patch, and the findings. Roughness is always among them, however small. `auto` says whose smoothing
 /// is chosen automatically.
-#[must_use]
 pub fn judge(
     geometry: &WheelRail,
     patch: FoundPatch,

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::contact::finite::Finite;
 use crate::contact::remark::kind::Severity;
 use crate::contact::remark::kind::{AsFigure, Figure};
 use crate::contact::remark::list::Remark;
@@ -79,9 +80,15 @@ impl From<Remark> for RemarkEntry {
     }
 }
 
+// Figures are finite, see [`AsFigure`].
+impl Finite for RemarkEntry {
+    fn not_finite(&self) -> Option<String> {
+        None
+    }
+}
+
 impl Remark {
     /// The remark on one patch.
-    #[must_use]
     pub fn at_patch(self, patch: usize) -> RemarkEntry {
         RemarkEntry {
             patch: Some(patch),
@@ -90,7 +97,6 @@ impl Remark {
     }
 
     /// The remark on one motion.
-    #[must_use]
     pub fn at_point(self, point: usize) -> RemarkEntry {
         RemarkEntry {
             point: Some(point),
@@ -99,7 +105,6 @@ impl Remark {
     }
 
     /// The remark on a part of the case.
-    #[must_use]
     pub fn at_pointer(self, pointer: &str) -> RemarkEntry {
         RemarkEntry {
             pointer: Some(pointer.to_owned()),
@@ -110,7 +115,6 @@ impl Remark {
 
 impl RemarkEntry {
     /// Whether it applies to this motion, alone or as one of all.
-    #[must_use]
     pub fn holds_at(&self, point: usize) -> bool {
         let among = |range: &[usize; 2]| (range[0]..=range[1]).contains(&point);
         self.point.is_none_or(|own| own == point) || self.also_at_points.iter().any(among)
@@ -128,7 +132,6 @@ impl RemarkEntry {
 
 /// The remarks of an answer without repetitions. Of those that differ only in motion and figures the first few are
 /// kept, and the first one lists the motions of those left out.
-#[must_use]
 pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry> {
     let mut kept: Vec<RemarkEntry> = Vec::new();
     // For each kind and place: the index of the first remark in `kept`, and the number of remarks kept.

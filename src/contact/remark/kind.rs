@@ -103,21 +103,20 @@ impl Display for Rounded {
     }
 }
 
-/// Declares the enum `Remark`. The documentation of a variant is the explanation that clients read; every figure has a value for the
-/// example; `detail` is an expression that forms the sentence from references to the figures.
+/// Declares the enum `Remark`. The documentation of a variant is the explanation that clients read, and its name in kebab case is the code
+/// that they filter by. Every figure has a value for the example. `detail` is an expression that forms the sentence from references to the
+/// figures.
 macro_rules! remarks {
     (; $(
         $(#[doc = $meaning:literal])+
-        $name:ident {
+        $severity:ident $name:ident {
             $( $(#[doc = $about:literal])+ $figure:ident: $kind:ty = $example:expr, )*
         }
-        code: $code:literal,
-        severity: $severity:ident,
         advice: $advice:literal,
         detail: $detail:expr,
     )+) => {
         /// Something a client should know about an answer.
-        #[derive(Debug, Clone, PartialEq)]
+        #[derive(Debug, Clone, PartialEq, railhead_macros::Code)]
         pub enum Remark {
             $(
                 $(#[doc = $meaning])+
@@ -128,20 +127,12 @@ macro_rules! remarks {
         }
 
         impl Remark {
-            /// The stable code of this kind of remark, as clients filter by it.
-            #[must_use]
-            pub fn code(&self) -> &'static str {
-                match self { $( Remark::$name { .. } => $code, )+ }
-            }
-
             /// How much it asks of the client.
-            #[must_use]
             pub fn severity(&self) -> Severity {
                 match self { $( Remark::$name { .. } => Severity::$severity, )+ }
             }
 
             /// The sentence with the figures of this occurrence.
-            #[must_use]
             #[allow(
                 unused_variables,
                 clippy::useless_format,
@@ -152,7 +143,6 @@ macro_rules! remarks {
             }
 
             /// The figures by name; one that is no finite number is left out.
-            #[must_use]
             pub fn figures(&self) -> BTreeMap<String, Figure> {
                 let all: Vec<(&str, Option<Figure>)> = match self {
                     $( Remark::$name { $($figure),* } => vec![
@@ -165,13 +155,11 @@ macro_rules! remarks {
             }
 
             /// One remark of each kind, with invented figures.
-            #[must_use]
             pub fn examples() -> Vec<Remark> {
                 vec![ $( Remark::$name { $($figure: $example),* }, )+ ]
             }
 
             /// Every kind, explained, in the order of the list.
-            #[must_use]
             pub fn kinds() -> Vec<RemarkKind> {
                 let said: &[(&str, &str, &[&str])] = &[ $(
                     (concat!($($meaning),+), $advice, &[ $(stringify!($figure)),* ]),

@@ -12,7 +12,7 @@ use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::Motion;
 
 /// The tangential answer on one level for one motion, dimensionless, one value per cell.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LevelAnswer {
     /// Tractions along x and across, for forces.
     pub traction: [Vec<f64>; 2],
@@ -33,7 +33,7 @@ pub struct LevelAnswer {
 }
 
 /// How the tractions of a level came about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LevelOutcome {
     /// Nothing moves: they are 0.
     NoMotion,
@@ -42,6 +42,7 @@ pub enum LevelOutcome {
     /// The rigid slip is so large that they follow it, to one part in a million.
     RigidSlip,
     /// The method solved for them.
+    #[default]
     Solved,
 }
 
@@ -160,7 +161,6 @@ pub enum Skip {
 
 impl Skip {
     /// The sentence a client reads.
-    #[must_use]
     pub fn text(self) -> &'static str {
         match self {
             Skip::Mesh => "the bound of the creep table meets the target: no mesh",
@@ -181,7 +181,7 @@ impl Skip {
 pub type RelativeErrors = Vec<Option<f64>>;
 
 /// The answer for one motion.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct MotionAnswer {
     /// The motion it was solved for.
     pub motion: Motion,
@@ -257,16 +257,13 @@ impl MotionAnswer {
     }
 
     /// Tangential force of all patches over their friction limit in N; 0 without friction.
-    #[must_use]
     pub fn force_share(&self, limit: f64) -> f64 {
-        let sum = Resultants::default();
-        let sum = self.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
+        let sum: Resultants = self.resultants.iter().sum();
         let force = sum.force_x.hypot(sum.force_y);
         if limit > 0.0 { force / limit } else { 0.0 }
     }
 
     /// Estimated error of the sum over the patches.
-    #[must_use]
     pub fn error(&self) -> Option<f64> {
         self.errors.last().copied().flatten()
     }
@@ -283,6 +280,12 @@ pub struct Resultants {
     pub moment_z: f64,
 }
 
+impl<'a> std::iter::Sum<&'a Resultants> for Resultants {
+    fn sum<I: Iterator<Item = &'a Resultants>>(all: I) -> Resultants {
+        all.fold(Resultants::default(), |sum, own| sum.plus(*own))
+    }
+}
+
 impl Resultants {
     /// `F_x = Σ T_x A`, `F_y = Σ T_y A`, `M_z = Σ (x T_y − y T_x) A` over the cells of one patch. `traction` is dimensionless as on the
     /// level; the moment is about the origin of the case.
@@ -290,7 +293,6 @@ impl Resultants {
     /// x is taken in the middle of the cell, where the moment of its constant traction is exact; at the node the error of M_z is about
     /// twice as large. y is taken halfway between the mid-line and the centre of the load: at the mid-line the moment of a vortex comes
     /// out too large, at the centre too small, because the mean of `y²` over a strip exceeds the square of the mean.
-    #[must_use]
     pub fn of_patch(level: &StripMesh, traction: &[Vec<f64>; 2], patch: usize) -> Resultants {
         let mut sum = Resultants::default();
         let mesh = &level.mesh;
@@ -358,7 +360,6 @@ impl Resultants {
 
     /// Largest component of the difference to `other`: forces relative to `force`, moments to `force × length`; the
     /// moments should be about a point in the patch.
-    #[must_use]
     pub fn distance(&self, other: &Resultants, force: f64, length: f64) -> f64 {
         let x = (self.force_x - other.force_x).abs();
         let y = (self.force_y - other.force_y).abs();

@@ -16,7 +16,6 @@ pub struct LeadingEdges {
 
 impl LeadingEdges {
     /// Edges of a dimensionless mesh; with a parity of the first half of its strips, which feel their mirror images.
-    #[must_use]
     pub fn new(mesh: &Mesh, nu: f64, parity: Option<Parity>) -> LeadingEdges {
         let strips = match parity {
             None => mesh.segments.len(),

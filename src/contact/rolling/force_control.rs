@@ -208,7 +208,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
 
     /// The forces of an answer, relative to μN.
     fn relative(&self, point: &MotionAnswer) -> [f64; 2] {
-        let sum = total(&point.resultants);
+        let sum: Resultants = point.resultants.iter().sum();
         [sum.force_x / self.limit, sum.force_y / self.limit]
     }
 
@@ -289,12 +289,6 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
 /// A search for the places of prescribed forces: a force over μN is close to its place.
 fn new_search(forces: PrescribedForces) -> Search<2> {
     Search::new(forces.map(|force| force.map(|_| 1.0)), [PLACE_MAX; 2])
-}
-
-/// The sum of the resultants of all patches.
-fn total(resultants: &[Resultants]) -> Resultants {
-    let sum = Resultants::default();
-    resultants.iter().fold(sum, |sum, r| sum.plus(*r))
 }
 
 /// Length of two components.

@@ -15,7 +15,6 @@ pub const RATIOS: usize = 21;
 pub const POISSON_RATIOS: [f64; 5] = [0.0, 0.125, 0.25, 0.375, 0.5];
 
 /// a/b of a row.
-#[must_use]
 pub fn ratio(row: usize) -> f64 {
     (0.5 * (row as f64 - 0.5 * (RATIOS - 1) as f64)).exp2()
 }
@@ -24,7 +23,6 @@ pub fn ratio(row: usize) -> f64 {
 ///
 /// Between the entries `ln C` is a cubic in `ln a/b` and a quartic in ν (to one part in a thousand); beyond 1/32 and 32 the
 /// last entry is continued in proportion to the limits of slender ellipses.
-#[must_use]
 pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     let inside = a_over_b.clamp(ratio(0), ratio(RATIOS - 1));
     let (first, along, across) = places(inside, poisson_ratio);
@@ -48,7 +46,6 @@ pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
 }
 
 /// C33 for a/b from 1/32 to 32, the nearer of these beyond, and Poisson's ratio 0 to 0.5; interpolated like [`coefficients`].
-#[must_use]
 pub fn spin_coefficient(a_over_b: f64, poisson_ratio: f64) -> f64 {
     let (first, along, across) = places(a_over_b.clamp(ratio(0), ratio(RATIOS - 1)), poisson_ratio);
     let row = |r: usize| -> f64 {

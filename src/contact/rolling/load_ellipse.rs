@@ -37,7 +37,6 @@ struct EllipsePart {
 
 impl LoadEllipse {
     /// The ellipse of one patch of a footprint.
-    #[must_use]
     pub fn of(footprint: &Footprint, patch: usize) -> LoadEllipse {
         let known = &footprint.patches()[patch];
         if let Some(semi_axes) = known.semi_axes {
@@ -72,7 +71,6 @@ impl LoadEllipse {
     }
 
     /// The ellipse of one patch of a pressure from its samples alone, for a forecast: load_mismatch load is not counted.
-    #[must_use]
     pub(crate) fn of_samples(field: &PressureField, patch: usize) -> LoadEllipse {
         LoadEllipse {
             centre: field.load_centre(Some(patch)),
@@ -82,13 +80,11 @@ impl LoadEllipse {
     }
 
     /// c = √(ab) in mm.
-    #[must_use]
     pub fn length(&self) -> f64 {
         (self.semi_axes[0] * self.semi_axes[1]).sqrt()
     }
 
     /// a/b.
-    #[must_use]
     pub fn ratio(&self) -> f64 {
         self.semi_axes[0] / self.semi_axes[1]
     }
@@ -155,7 +151,6 @@ pub struct StripChord {
 impl StripChord {
     /// Mean pressure in MPa over `x0 < x < x1` of the chord: the pressure of the line, stretched and scaled with the
     /// length so that its profile keeps its form (exact for Hertz's semi-ellipse).
-    #[must_use]
     pub fn mean_pressure(&self, footprint: &Footprint, x0: f64, x1: f64) -> f64 {
         let ratio = self.stretch();
         let middle = 0.5 * (self.line.left + self.line.right);
@@ -164,13 +159,11 @@ impl StripChord {
     }
 
     /// Length of the chord over that of the line.
-    #[must_use]
     pub fn stretch(&self) -> f64 {
         (self.chord.right - self.chord.left) / (self.line.right - self.line.left)
     }
 
     /// Loads over width at equally spaced places y of the strip.
-    #[must_use]
     pub fn loads(&self, footprint: &Footprint, patch: usize, samples: usize) -> Vec<(f64, f64)> {
         let step = self.line.dy / samples as f64;
         let places =
@@ -192,7 +185,6 @@ impl StripChord {
 /// forces. `(1 − θ)` of the one and θ of the other, `θ = ½ / (1 + ½ (a/b)²)` with the longest half chord a and the half
 /// width b of the patch, lowers the errors of the resultants on 62 Hertz cases by a third and Kalker's C33 with it.
 /// Where a strip has several chords the mid-line's are kept.
-#[must_use]
 pub fn chords(footprint: &Footprint, patch: usize, strips: &[(f64, f64)]) -> Vec<StripChord> {
     let lines = footprint.chords(patch, strips);
     let alone = |line: &Chord| {

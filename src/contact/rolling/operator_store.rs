@@ -22,7 +22,6 @@ pub const BYTES_DEFAULT: u64 = 128 << 20;
 const LARGEST_PART: u64 = 2;
 
 /// Bytes that a store of `bytes_max` keeps of an operator of so many: all or nothing.
-#[must_use]
 pub(crate) fn kept_bytes(bytes: u64, bytes_max: u64) -> u64 {
     if bytes <= bytes_max / LARGEST_PART {
         bytes
@@ -44,7 +43,6 @@ pub struct OperatorKind {
 
 impl OperatorKind {
     /// Bytes of the operator of a mesh.
-    #[must_use]
     pub fn bytes(self, segments: usize, cells: usize) -> u64 {
         operator::bytes(cells, segments, self.folded, self.precision)
     }
@@ -89,7 +87,6 @@ impl Default for OperatorStore {
 
 impl OperatorStore {
     /// A store of at most so many bytes; 0 keeps nothing, which changes no answer.
-    #[must_use]
     pub fn new(bytes_max: u64) -> OperatorStore {
         OperatorStore {
             bytes_max,
@@ -134,7 +131,6 @@ impl OperatorStore {
     }
 
     /// Bytes of the operators that are kept.
-    #[must_use]
     pub fn bytes(&self) -> u64 {
         self.shelf().bytes
     }
@@ -194,7 +190,6 @@ struct Held {
 
 impl CaseOperators {
     /// Those of a case whose store is this.
-    #[must_use]
     pub fn new(store: &Arc<OperatorStore>) -> Arc<CaseOperators> {
         Arc::new(CaseOperators {
             store: Arc::clone(store),

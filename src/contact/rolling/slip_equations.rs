@@ -3,7 +3,7 @@
 //! Everything is dimensionless: lengths by the scale of the patch, tractions by a reference traction P, slips by P/G.
 //! Vectors hold all x components, then all y components, each padded with zeros to the operator's length.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::half_space::strip_operator::operator::{
@@ -62,7 +62,6 @@ pub struct SlipScratch {
 impl<'a> SlipEquations<'a> {
     /// Sets up a rule for a mesh and its operator. With a parity only the first half of the segments has unknowns; it is ignored if the
     /// operator is not folded.
-    #[must_use]
     pub fn new(
         rule: Rule,
         mesh: &Mesh,
@@ -124,25 +123,21 @@ impl<'a> SlipEquations<'a> {
     }
 
     /// Number of cells with unknowns.
-    #[must_use]
     pub fn cells(&self) -> usize {
         self.cells.last().map_or(0, |c| c.end)
     }
 
     /// Length of one component of a vector.
-    #[must_use]
     pub fn padded(&self) -> usize {
         self.padded
     }
 
     /// Number of segments with unknowns.
-    #[must_use]
     pub fn segments(&self) -> usize {
         self.cells.len()
     }
 
     /// Cells of a segment.
-    #[must_use]
     pub fn segment(&self, j: usize) -> Range<usize> {
         self.cells[j].clone()
     }
@@ -208,7 +203,6 @@ impl<'a> SlipEquations<'a> {
     }
 
     /// What multiplies the displacements in the slip of a step; 0 without a memory.
-    #[must_use]
     pub fn memory_factor(&self) -> f64 {
         self.memory.map_or(0.0, |memory| memory.factor)
     }
@@ -233,13 +227,11 @@ impl<'a> SlipEquations<'a> {
     }
 
     /// Rigid slip `q` of a motion, in the units of the motion: `(ν_x − φ y, ν_y + φ x)` as the rule samples it.
-    #[must_use]
     pub fn rigid(&self, motion: &Motion) -> Vec<f64> {
         self.given(motion, None)
     }
 
     /// Rigid slip of a motion with the slip of a source added.
-    #[must_use]
     pub fn given(&self, motion: &Motion, source: Option<SlipSource>) -> Vec<f64> {
         let mut slip = vec![0.0; 2 * self.padded];
         let (sx, sy) = slip.split_at_mut(self.padded);
@@ -325,10 +317,8 @@ impl<'a> SlipEquations<'a> {
             .zip(from_y.chunks_exact_mut(2 * n));
         let mut differences: [Vec<f64>; 4] = Default::default();
         for (cell, (from_x, from_y)) in columns.enumerate() {
-            if cell % 64 == 0
-                && let ControlFlow::Break(stop) = monitor.tick(0.0)
-            {
-                return Err(stop);
+            if cell % 64 == 0 {
+                monitor.go_on(0.0)?;
             }
             let ((xx, yx), (xy, yy)) = (from_x.split_at_mut(n), from_y.split_at_mut(n));
             for (cells, rows) in self.cells.iter().zip(&self.rows) {
@@ -352,7 +342,6 @@ impl<'a> SlipEquations<'a> {
     }
 
     /// Entries of the operator that one product touches.
-    #[must_use]
     pub fn entries(&self) -> usize {
         self.differences.entries(self.parity)
     }

@@ -4,8 +4,9 @@
 //! leading edge: that is what selects the solution that vanishes there and keeps the problem well posed. Slip is in
 //! units of G⁻¹ × traction, lengths in the unit of the mesh.
 
-use railhead_macros::Named;
 use std::ops::Range;
+
+use railhead_macros::Named;
 
 use crate::contact::mesh::{Mesh, Segment, observe};
 
@@ -38,7 +39,6 @@ pub struct Stencils {
 
 impl Stencils {
     /// Prepares a rule for the segments of a mesh, or for the first of them.
-    #[must_use]
     pub fn new(rule: Rule, mesh: &Mesh, segments: &[Segment]) -> Stencils {
         let cells = segments.last().map_or(0, |segment| segment.cells.end);
         let mut stencils = Stencils {
@@ -56,7 +56,6 @@ impl Stencils {
     }
 
     /// The same for a quantity that is nothing beyond the leading edge, instead of going on there as in a mirror.
-    #[must_use]
     pub fn ending_at_the_edge(rule: Rule, mesh: &Mesh, segments: &[Segment]) -> Stencils {
         let mut stencils = Stencils::new(rule, mesh, segments);
         let mut points = Vec::new();

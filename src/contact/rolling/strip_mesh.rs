@@ -36,7 +36,6 @@ pub struct Scale {
 
 impl Scale {
     /// Unit of slip: traction / G, or 1 without friction, where slips are the rigid ones.
-    #[must_use]
     pub fn slip(&self) -> f64 {
         if self.traction > 0.0 {
             self.traction / self.shear_modulus
@@ -46,13 +45,11 @@ impl Scale {
     }
 
     /// What changes bounds on the way through the contact, in these units.
-    #[must_use]
     pub fn passage<'a>(&self, laws: &PathDependentLaws<'a>) -> PathDependentFriction<'a> {
         laws.on_level(self.slip(), self.length, self.traction)
     }
 
     /// A motion about the origin of the case becomes one about [`Scale::origin`], in units of rigid slip.
-    #[must_use]
     pub fn motion(&self, motion: &Motion) -> Motion {
         let unit = self.shear_modulus / self.traction;
         Motion {
@@ -63,7 +60,6 @@ impl Scale {
     }
 
     /// The motion about the origin of the case of a dimensionless one.
-    #[must_use]
     pub fn creepages(&self, motion: &Motion) -> Motion {
         let unit = self.traction / self.shear_modulus;
         let spin = motion.spin_per_mm * unit / self.length;
@@ -75,18 +71,9 @@ impl Scale {
     }
 
     /// The displacement of the upper body in mm and rad of a dimensionless one.
-    #[must_use]
     pub fn shift(&self, motion: &Motion) -> Motion {
-        let Motion {
-            creepage_x,
-            creepage_y,
-            spin_per_mm,
-        } = self.creepages(motion);
-        Motion {
-            creepage_x: creepage_x * self.length,
-            creepage_y: creepage_y * self.length,
-            spin_per_mm: spin_per_mm * self.length,
-        }
+        let creepages = self.creepages(motion).components();
+        Motion::of(creepages.map(|part| part * self.length))
     }
 }
 
@@ -223,7 +210,6 @@ impl StripMesh {
 
     /// The parity of the tractions under a dimensionless motion, if the level has a mirror line and the motion is symmetric or
     /// antisymmetric about it.
-    #[must_use]
     pub fn parity(&self, motion: &Motion) -> Option<Parity> {
         if !self.mirrored {
             return None;
@@ -239,25 +225,21 @@ impl StripMesh {
     }
 
     /// Poisson's ratio of the pair.
-    #[must_use]
     pub fn poisson_ratio(&self) -> f64 {
         self.poisson_ratio
     }
 
     /// Width of the numbers of its operator.
-    #[must_use]
     pub fn precision(&self) -> Precision {
         self.precision
     }
 
     /// Are patch and bounds mirror-symmetric, so that half of the operator is enough?
-    #[must_use]
     pub fn is_mirrored(&self) -> bool {
         self.mirrored
     }
 
     /// Cells of one patch.
-    #[must_use]
     pub fn patch_cells(&self, patch: usize) -> std::ops::Range<usize> {
         let mut cells = self
             .mesh
@@ -281,8 +263,15 @@ impl StripMesh {
         }
     }
 
+    /// Values, of the unknowns of a parity, that are the same in both halves, over the whole mesh.
+    pub(crate) fn whole(&self, parity: Option<Parity>, values: &[f64]) -> Vec<f64> {
+        match parity {
+            Some(_) => self.unfold(values, 1.0),
+            None => values[..self.mesh.cells()].to_vec(),
+        }
+    }
+
     /// Values of the first half of the segments continued to the mirrored half: `sign` is that of the image.
-    #[must_use]
     pub fn unfold(&self, half: &[f64], sign: f64) -> Vec<f64> {
         let cells = self.mesh.cells();
         let mut values = vec![0.0; cells];

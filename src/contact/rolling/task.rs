@@ -60,16 +60,11 @@ pub struct RollingTask<'a> {
 
 impl RollingTask<'_> {
     /// The allowed error of the resultants, where an error is asked for rather than a mesh.
-    #[must_use]
     pub fn target(&self) -> Option<f64> {
-        match self.resolution {
-            Resolution::Target(target) => Some(target),
-            Resolution::Mesh(_) => None,
-        }
+        self.resolution.target()
     }
 
     /// Residual to reach for motion `index`: far below the target, but no further, because iterating further does not improve the answer.
-    #[must_use]
     pub fn tolerance(&self, index: usize) -> f64 {
         let is_prescribed =
             self.is_differenced || self.forces.get(index).is_some_and(|f| *f != [None; 2]);
@@ -87,14 +82,12 @@ impl RollingTask<'_> {
     }
 
     /// How the bounds of the cells fall with their slip in motion `index`, where they do; slips are counted in `slip_unit`.
-    #[must_use]
     pub fn bound_fall(&self, index: usize, slip_unit: f64) -> Option<Softening> {
         let speed = self.speeds.get(index).copied().flatten();
         self.friction.bound_fall(speed, slip_unit)
     }
 
     /// What changes the bounds of motion `index` on the way through the contact, if anything does.
-    #[must_use]
     pub fn passage(&self, index: usize) -> Option<PathDependentLaws<'_>> {
         let speed = self.speeds.get(index).copied().flatten();
         let laws = PathDependentLaws {
@@ -105,7 +98,6 @@ impl RollingTask<'_> {
     }
 
     /// Why friction falls too fast with slip or temperature for an answer, if it does.
-    #[must_use]
     pub fn falls_too_fast(&self) -> Option<String> {
         let modulus = self.interface.reduction * self.elasticity.shear_modulus;
         let patches = self.footprint.patches();
@@ -113,26 +105,22 @@ impl RollingTask<'_> {
     }
 
     /// Does the pressure make the surfaces slip, because the bodies differ and the method takes account of it?
-    #[must_use]
     pub fn is_coupled(&self) -> bool {
         self.elasticity.difference != 0.0 && self.method == Method::BoundaryElement
     }
 
     /// Is a force prescribed for any motion?
-    #[must_use]
     pub fn has_prescribed_forces(&self) -> bool {
         self.forces.iter().any(|forces| *forces != [None; 2])
     }
 
     /// Single precision serves any target that the residuals of single precision can meet.
-    #[must_use]
     pub fn precision(&self) -> Precision {
         precision_of(self.resolution)
     }
 }
 
 /// See [`RollingTask::precision`].
-#[must_use]
 pub fn precision_of(resolution: Resolution) -> Precision {
     match resolution {
         Resolution::Target(target) if target >= SINGLE_PRECISION_FROM => Precision::Single,
@@ -170,7 +158,6 @@ pub enum Resolution {
 
 impl Resolution {
     /// The target, if there is one.
-    #[must_use]
     pub fn target(self) -> Option<f64> {
         match self {
             Resolution::Target(target) => Some(target),
@@ -179,7 +166,6 @@ impl Resolution {
     }
 
     /// The target, or what stands for it with an explicit mesh.
-    #[must_use]
     pub fn target_or_usual(self) -> f64 {
         self.target().unwrap_or(TARGET_USUAL)
     }
@@ -223,6 +209,28 @@ pub struct Motion {
     pub creepage_y: f64,
     /// Spin φ in 1/mm, or dimensionless where lengths are.
     pub spin_per_mm: f64,
+}
+
+impl Motion {
+    /// The motion of ξ, η and φ.
+    #[must_use]
+    pub fn of([creepage_x, creepage_y, spin_per_mm]: [f64; 3]) -> Motion {
+        Motion {
+            creepage_x,
+            creepage_y,
+            spin_per_mm,
+        }
+    }
+
+    /// ξ, η and φ.
+    pub fn components(&self) -> [f64; 3] {
+        [self.creepage_x, self.creepage_y, self.spin_per_mm]
+    }
+
+    /// Do the bodies roll without creepage and spin?
+    pub fn is_still(&self) -> bool {
+        self.components() == [0.0; 3]
+    }
 }
 
 /// The forces prescribed along x and across instead of creepages, in N, where they are.

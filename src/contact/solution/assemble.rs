@@ -50,7 +50,6 @@ pub struct Assembly<'a> {
 
 impl<'a> Assembly<'a> {
     /// No motion yet.
-    #[must_use]
     pub fn new(case: &'a CheckedCase, solved: &'a SolvedFootprint) -> Assembly<'a> {
         let patches = solved.footprint.patches().to_vec();
         let limit = |k| case.problem.friction.limit(&solved.footprint, k);
@@ -69,7 +68,6 @@ impl<'a> Assembly<'a> {
     }
 
     /// The case and the footprint that it answers.
-    #[must_use]
     pub fn of(&self) -> (&'a CheckedCase, &'a SolvedFootprint) {
         (self.case, self.solved)
     }
@@ -80,7 +78,6 @@ impl<'a> Assembly<'a> {
     }
 
     /// Is no motion in it yet?
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.total.is_empty()
     }
@@ -126,11 +123,9 @@ impl<'a> Assembly<'a> {
                 method: point.method,
                 speed,
             };
-            let kept = match point.history {
-                // Slips are those of the step, not of steady rolling.
-                Some(_) => maintain::add_of_history(case, solved, &mut points, monitor)?,
-                None => maintain::add_rest(case, solved, &mut points, monitor)?,
-            };
+            // Slips are those of the step, not of steady rolling.
+            let is_of_history = point.history.is_some();
+            let kept = maintain::add_rest(case, solved, is_of_history, &mut points, monitor)?;
             let number = case.problem.part.before + index;
             self.remarks
                 .extend(kept.remarks.into_iter().map(|r| r.at_point(number)));
@@ -177,7 +172,6 @@ impl<'a> Assembly<'a> {
     }
 
     /// The answer.
-    #[must_use]
     pub fn finish(self) -> (Solution, Fields) {
         let case = self.case;
         let patches = self.patches.iter().zip(self.limits).zip(self.points);
@@ -216,14 +210,13 @@ impl<'a> Assembly<'a> {
                 .after
                 .damage
                 .as_ref()
-                .map(|task| Box::new(task.used())),
+                .map(|task| Box::new(task.figures.clone())),
         };
         (solution, self.fields)
     }
 }
 
 /// Whether any output is requested that is kept beside the solution.
-#[must_use]
 pub fn wants_fields(case: &CheckedCase) -> bool {
     let kept = |output: &Output| output.is_per_cell() || *output == Output::Subsurface;
     case.run.outputs.iter().any(kept)
@@ -342,41 +335,35 @@ fn gradient_words(
         && problem.interface.layer == 0.0
         && problem.interface.yielding.is_none()
         && problem.elasticity.difference == 0.0;
-    let resultants = point.resultants[index];
-    let resultants = [resultants.force_x, resultants.force_y, resultants.moment_z];
     let creepages = [point.motion.creepage_x, point.motion.creepage_y];
-    let powers = [1.0, 1.0, 4.0 / 3.0];
-    let by_normal_force = is_similar.then(|| {
-        [0, 1, 2].map(|row| {
-            let moved = creepages[0] * found.values[row][0] + creepages[1] * found.values[row][1];
-            (powers[row] * resultants[row] - moved / 3.0) / patch.normal_force
+    let by_normal_force = |of: [f64; 3], by_creepage: &[[f64; 3]; 3], creepages: [f64; 2]| {
+        let powers = [1.0, 1.0, 4.0 / 3.0];
+        is_similar.then(|| {
+            [0, 1, 2].map(|row| {
+                let slopes = by_creepage[row];
+                let moved = creepages[0] * slopes[0] + creepages[1] * slopes[1];
+                (powers[row] * of[row] - moved / 3.0) / patch.normal_force
+            })
         })
-    });
+    };
+    let own = point.resultants[index];
+    let own = [own.force_x, own.force_y, own.moment_z];
     let [force_x_n, force_y_n, moment_z_n_mm] = found.values;
     let error_estimate = found.errors.map(|errors| {
-        let of_resultants = point.errors[index].map_or(ErrorEstimate::default(), |error| {
+        let own = point.errors[index].map_or(ErrorEstimate::default(), |error| {
             absolute(std::slice::from_ref(patch), limit, error)
         });
-        let of_resultants = [
-            of_resultants.force_x_n,
-            of_resultants.force_y_n,
-            of_resultants.moment_z_n_mm,
-        ];
-        let by_normal_force = is_similar.then(|| {
-            [0, 1, 2].map(|row| {
-                let moved =
-                    creepages[0].abs() * errors[row][0] + creepages[1].abs() * errors[row][1];
-                (powers[row] * of_resultants[row] + moved / 3.0) / patch.normal_force
-            })
-        });
+        let own = [own.force_x_n, own.force_y_n, own.moment_z_n_mm];
         let [force_x_n, force_y_n, moment_z_n_mm] = errors;
         GradientErrors {
             force_x_n,
             force_y_n,
             moment_z_n_mm,
-            by_normal_force,
+            // Errors add up.
+            by_normal_force: by_normal_force(own, &errors, creepages.map(|part| -part.abs())),
         }
     });
+    let by_normal_force = by_normal_force(own, &found.values, creepages);
     Gradients {
         force_x_n,
         force_y_n,
@@ -474,10 +461,7 @@ fn absolute(patches: &[Patch], limit: f64, relative: f64) -> ErrorEstimate {
 }
 
 fn total(patches: &[Patch], limits: &[f64], point: &MotionAnswer) -> Total {
-    let sum = point
-        .resultants
-        .iter()
-        .fold(Resultants::default(), |sum, r| sum.plus(*r));
+    let sum: Resultants = point.resultants.iter().sum();
     Total {
         force_x_n: sum.force_x,
         force_y_n: sum.force_y,
@@ -513,8 +497,7 @@ fn remarks(
 
 fn unreachable(case: &CheckedCase, index: usize, point: &MotionAnswer) -> Option<Remark> {
     let [wanted_x_n, wanted_y_n] = case.problem.forces[index];
-    let sum = Resultants::default();
-    let found = point.resultants.iter().fold(sum, |sum, r| sum.plus(*r));
+    let found: Resultants = point.resultants.iter().sum();
     point.saturated.then_some(Remark::ForceUnreachable {
         wanted_x_n,
         wanted_y_n,

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::error::SolveError;
+use crate::contact::finite::Finite;
 use crate::contact::numerics::simd::length;
 use crate::contact::post::subsurface::states::STORED;
 use crate::contact::problem::checked_case;
@@ -18,7 +19,6 @@ use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::answer::{LevelAnswer, SolvedFields};
 use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::solution::finite;
 use crate::contact::solution::words::answer::{
     Fields, GradientErrors, Gradients, PatchCells, PatchFields, PatchSolution, PointFields,
     PointSolution, Solution, Zone,
@@ -37,12 +37,20 @@ pub fn finish(
     (mut solution, fields): (Solution, Fields),
     took: Duration,
 ) -> Result<(Solution, Fields), SolveError> {
-    finite::require(&solution, &fields)?;
+    require_finite(&solution, &fields)?;
     clear_dust(case, &mut solution);
     scale_seconds(&mut solution, took.as_secs_f64());
     let said = implausible(&solution, case.problem.part.before);
     solution.remarks = merged(solution.remarks.into_iter().chain(said));
     Ok((solution, fields))
+}
+
+fn require_finite(solution: &Solution, fields: &Fields) -> Result<(), SolveError> {
+    let path = solution.not_finite().or_else(|| fields.not_finite());
+    path.map_or(Ok(()), |path| {
+        let quantity = path.trim_start_matches('.').to_owned();
+        Err(SolveError::NotFinite { quantity })
+    })
 }
 
 /// Divides the wall time of each motion, which stands in each of its patches, among them by their areas.
@@ -302,5 +310,26 @@ fn moved([x, y, m]: [&mut [f64; 3]; 3], [along, across]: [f64; 2]) {
     *m = [0, 1, 2].map(|k| m[k] + along * x[k] + across * y[k]);
     for row in [x, y, m] {
         row[2] += along * row[0] + across * row[1];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_searched_for_numbers_that_are_not_finite() {
+        let mut patch = PatchFields {
+            meshes: vec![PatchCells::default()],
+            points: vec![PointFields::default(); 2],
+        };
+        let path = |patch: &PatchFields| {
+            let patches = vec![PatchFields::default(), patch.clone()];
+            Fields { patches }.not_finite()
+        };
+        assert_eq!(path(&patch), None);
+        patch.points[1].slip_y = Some(vec![0.0, f64::NEG_INFINITY]);
+        let found = path(&patch);
+        assert_eq!(found.as_deref(), Some(".patches[1].points[1].slip_y[1]"));
     }
 }

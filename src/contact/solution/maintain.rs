@@ -1,7 +1,5 @@
 //! What follows from a solved motion for maintenance: stresses below the surface, temperatures, wear across the patch.
 
-use std::ops::ControlFlow;
-
 use crate::contact::case::words::solver::Output;
 use crate::contact::case::words::subsurface::BodyName;
 use crate::contact::method::Method;
@@ -12,7 +10,7 @@ use crate::contact::post::damage::{CellWear, DamageTask, DamagedPatch, across, d
 use crate::contact::post::local_power::{CellPower, PowerTask, ThermalTask, cell_power, heating};
 use crate::contact::post::subsurface::load_parts::LoadResolution;
 use crate::contact::post::subsurface::states::{
-    LoadedBody, STORED, StressPlaces, SubsurfaceTask, in_patch_axes, point, stored,
+    STORED, StressPlaces, SubsurfaceTask, in_patch_axes, point, stored,
 };
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 use crate::contact::post::subsurface::worst::{GAP, worst_place};
@@ -78,16 +76,31 @@ pub(crate) fn add_damage(
     }
 }
 
-/// What follows from the cells of a motion: summaries into its points; the rest is returned.
+/// What follows from the cells of a motion: summaries into its points; the rest is returned. The slips of a point of a history are those of
+/// its step.
 pub(crate) fn add_rest(
     case: &CheckedCase,
     solved: SolvedMotion,
+    is_of_history: bool,
     points: &mut [PointSolution],
     monitor: &dyn Monitor,
 ) -> Result<KeptValues, Stop> {
     let run = &case.run;
     let mut kept = vec![PointFields::default(); points.len()];
-    if run.after.needs_power(&run.outputs) {
+    let keep_slips = |slips: &[Vec<f64>; 2], kept: &mut [PointFields]| {
+        let kept = kept.iter_mut().enumerate();
+        for (k, kept) in kept.filter(|_| run.wants(Output::Slip)) {
+            let cells = solved.level.patch_cells(k);
+            let [x, y] = [0, 1].map(|c| slips[c][cells.clone()].to_vec());
+            (kept.slip_x, kept.slip_y) = (Some(x), Some(y));
+        }
+    };
+    if is_of_history {
+        let unit = solved.level.scale.slip();
+        let slips = solved.answer.slip.each_ref();
+        let slips = slips.map(|slips| slips.iter().map(|slip| unit * slip).collect());
+        keep_slips(&slips, &mut kept);
+    } else if run.after.needs_power(&run.outputs) {
         let totals: Vec<f64> = points.iter().map(|p| p.friction_power_n).collect();
         let task = PowerTask {
             level: solved.level,
@@ -97,13 +110,7 @@ pub(crate) fn add_rest(
             totals: &totals,
         };
         let power = cell_power(&task, monitor)?;
-        if run.wants(Output::Slip) {
-            for (k, kept) in kept.iter_mut().enumerate() {
-                let cells = solved.level.patch_cells(k);
-                let [x, y] = [0, 1].map(|c| power.slip[c][cells.clone()].to_vec());
-                (kept.slip_x, kept.slip_y) = (Some(x), Some(y));
-            }
-        }
+        keep_slips(&power.slip, &mut kept);
         if let Some(task) = run.after.damage.as_ref().filter(|task| task.across) {
             let found = wear_across(task, solved, &power);
             for (point, found) in points.iter_mut().zip(found) {
@@ -128,30 +135,6 @@ pub(crate) fn add_rest(
     Ok(KeptValues {
         fields: kept,
         remarks: slow.into_iter().chain(stresses).collect(),
-    })
-}
-
-/// The same of a point of a history, whose slips are those of its step.
-pub(crate) fn add_of_history(
-    case: &CheckedCase,
-    solved: SolvedMotion,
-    points: &mut [PointSolution],
-    monitor: &dyn Monitor,
-) -> Result<KeptValues, Stop> {
-    let mut kept = vec![PointFields::default(); points.len()];
-    if case.run.wants(Output::Slip) {
-        let unit = solved.level.scale.slip();
-        for (k, kept) in kept.iter_mut().enumerate() {
-            let cells = solved.level.patch_cells(k);
-            let slip = |c: usize| solved.answer.slip[c][cells.clone()].iter();
-            let [x, y] = [0, 1].map(|c| slip(c).map(|slip| unit * slip).collect());
-            (kept.slip_x, kept.slip_y) = (Some(x), Some(y));
-        }
-    }
-    let stresses = add_stresses(case, solved, points, &mut kept, monitor)?;
-    Ok(KeptValues {
-        fields: kept,
-        remarks: stresses.into_iter().collect(),
     })
 }
 
@@ -208,23 +191,14 @@ fn least_depth(patch: &Patch) -> f64 {
     LEAST_DEPTH * 0.5 * (x_max - x_min).min(y_max - y_min)
 }
 
-/// The body and the loads on it.
-fn loaded<'a>(task: &SubsurfaceTask, of: SolvedMotion<'a>) -> (BodyName, SurfaceLoad<'a>) {
+/// The loads on the body that is asked for.
+fn loaded<'a>(task: &SubsurfaceTask, of: SolvedMotion<'a>) -> SurfaceLoad<'a> {
     // The lower body's normal is up, the upper's down, and tractions on it are the reactions.
-    let (body, sign) = match task.body {
-        LoadedBody::Lower => (BodyName::Lower, 1.0),
-        LoadedBody::Upper => (BodyName::Upper, -1.0),
+    let sign = match task.body {
+        BodyName::Lower => 1.0,
+        BodyName::Upper => -1.0,
     };
-    let load = SurfaceLoad::new(of.level, of.footprint, of.answer, sign, task.poisson_ratio);
-    (body, load)
-}
-
-/// Goes on unless the monitor wants an end.
-fn ask(monitor: &dyn Monitor) -> Result<(), Stop> {
-    match monitor.tick(0.0) {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(stop) => Err(stop),
-    }
+    SurfaceLoad::new(of.level, of.footprint, of.answer, sign, task.poisson_ratio)
 }
 
 /// Stresses below every patch. Patches of one frame load the same body: each point feels all of them.
@@ -233,7 +207,7 @@ fn subsurface(
     of: SolvedMotion,
     monitor: &dyn Monitor,
 ) -> Result<Vec<PatchStresses>, Stop> {
-    let (body, load) = loaded(task, of);
+    let load = loaded(task, of);
     let patches = of.footprint.patches();
     let depths = patches.iter().map(least_depth);
     let least = depths.fold(f64::INFINITY, f64::min);
@@ -241,7 +215,7 @@ fn subsurface(
     let evaluate = |places: &[[f64; 3]], workspace: &mut LoadWorkspace| {
         let mut values = Vec::with_capacity(places.len() * STORED);
         for places in places.chunks(POINTS_UNASKED) {
-            ask(monitor)?;
+            monitor.go_on(0.0)?;
             let deep = |[x, y, depth]: &[f64; 3]| [*x, *y, depth.max(least)];
             let places: Vec<[f64; 3]> = places.iter().map(deep).collect();
             let stresses = load.stresses(&places, LoadResolution::FINE, workspace);
@@ -255,7 +229,7 @@ fn subsurface(
     let mut found = Vec::with_capacity(patches.len());
     let mut shared: Option<([f64; 2], Vec<f64>)> = None;
     for (k, patch) in patches.iter().enumerate() {
-        ask(monitor)?;
+        monitor.go_on(0.0)?;
         let place = PassagesOf {
             load: &load,
             footprint: of.footprint,
@@ -291,7 +265,7 @@ fn subsurface(
         let judged = asked.map(|(asked, worst)| passage(asked, place, worst, monitor));
         let judged = judged.transpose()?;
         let summary = SubsurfaceSummary {
-            body,
+            body: task.body,
             least_depth_mm: least,
             worst: worst.filter(|_| task.worst || below_worst).map(|at| {
                 point(

@@ -2,6 +2,5 @@
 
 pub mod assemble;
 pub mod finish;
-pub mod finite;
 pub mod maintain;
 pub mod words;

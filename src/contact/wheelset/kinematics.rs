@@ -4,7 +4,6 @@
 //! EN 15302 holds the axle level: each wheel touches where it would without the roll. The values with the roll stand beside them.
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 
 use crate::contact::error::SolveError;
 use crate::contact::geometry::conicity::{Conicity, NoConicity, RadiusDifference};
@@ -128,9 +127,7 @@ fn over_shifts(
     for sign in [-1.0, 1.0] {
         let mut roll = centred.roll;
         for k in 1..=steps {
-            if let ControlFlow::Break(stop) = monitor.tick(1.0) {
-                return Err(stop.into());
-            }
+            monitor.go_on(1.0)?;
             let shift = sign * asked.reach * f64::from(k) / f64::from(steps);
             match pose(shift, roll) {
                 Ok(pose) => {

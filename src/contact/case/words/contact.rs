@@ -1,6 +1,6 @@
 //! Where the bodies touch, and how hard they are pressed together.
 
-use railhead_macros::{Members, Words, none_is_absent};
+use railhead_macros::{Finite, Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -98,11 +98,9 @@ pub enum Contact {
         rail_origin_mm: Option<f64>,
         /// Turn of the rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
         /// when left out.
-        #[schema(required = false)]
         #[member(closed(-0.5, 0.5, "rad"), default)]
         cant_rad: f64,
         /// Distance of the backs of the two flanges, in mm; 1360 when left out.
-        #[schema(required = false)]
         #[member(closed(0.0, 1e5, "mm"), default = 1360.0)]
         flange_back_distance_mm: f64,
         /// y of the back of the flange in the wheel's cross-section, in mm. When left out it is found from the points; -70 where they agree with
@@ -110,21 +108,17 @@ pub enum Contact {
         #[member(closed(-1e3, 1e3, "mm"))]
         flange_back_position_mm: Option<f64>,
         /// Shift of the wheelset to the left, in mm; 0 when left out.
-        #[schema(required = false)]
         #[member(closed(-1e3, 1e3, "mm"), default)]
         lateral_shift_mm: f64,
         /// Yaw of the wheelset in rad, positive from x to y; 0 when left out.
-        #[schema(required = false)]
         #[member(closed(-0.3, 0.3, "rad"), default)]
         yaw_rad: f64,
         /// Roll of the wheelset in rad, positive from y to z; 0 when left out.
-        #[schema(required = false)]
         #[member(closed(-0.3, 0.3, "rad"), default)]
         roll_rad: f64,
         /// Solve even if the points of a profile are so coarse or rough under the contact that an answer would mislead, or if rail and wheel
         /// seem exchanged. When `false` or left out, the job fails in these cases and says where the fault is.
         #[serde(skip_serializing_if = "is_false")]
-        #[schema(required = false)]
         #[member(default)]
         accept_rough_profiles: bool,
         /// The surface on which the contact is solved. When left out, the curve where it can be solved, else planes with the remark `on-planes`.
@@ -159,11 +153,9 @@ pub enum Contact {
         rail_origin_mm: Option<f64>,
         /// Turn of each rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
         /// when left out.
-        #[schema(required = false)]
         #[member(closed(-0.5, 0.5, "rad"), default)]
         cant_rad: f64,
         /// Distance of the backs of the two flanges, in mm; 1360 when left out.
-        #[schema(required = false)]
         #[member(closed(0.0, 1e5, "mm"), default = 1360.0)]
         flange_back_distance_mm: f64,
         /// y of the back of the flange in the wheels' cross-section, in mm. When left out it is found from the points of each wheel; -70 where they
@@ -172,15 +164,14 @@ pub enum Contact {
         flange_back_position_mm: Option<f64>,
         /// Shift of the wheelset to the left, in mm: a number, or several; 0 when left out. A shift and a yaw make a position, and every
         /// position has its own patches.
-        #[schema(required = false, inline = false)]
+        #[schema(inline = false)]
         #[member(with = swept, closed(-1e3, 1e3, "mm"), default = Swept::Constant(0.0))]
         lateral_shift_mm: Swept,
         /// Yaw of the wheelset in rad, positive from x to y: a number, or several; 0 when left out.
-        #[schema(required = false, inline = false)]
+        #[schema(inline = false)]
         #[member(with = swept, closed(-0.3, 0.3, "rad"), default = Swept::Constant(0.0))]
         yaw_rad: Swept,
         /// How several shifts and several yaws make positions: `together` (default) or `grid`, yaw fastest.
-        #[schema(required = false)]
         #[member(default)]
         combine: Combine,
         /// Asks for the difference of the rolling radii over the shift, and for the equivalent conicity.
@@ -188,7 +179,6 @@ pub enum Contact {
         kinematics: Option<KinematicsWords>,
         /// As of `profiles`.
         #[serde(skip_serializing_if = "is_false")]
-        #[schema(required = false)]
         #[member(default)]
         accept_rough_profiles: bool,
         /// As of `profiles`.
@@ -219,26 +209,23 @@ pub struct RightSide {
 }
 
 /// What is asked of the rigid wheelset over a range of shifts, without yaw.
+#[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_kinematics)]
 pub struct KinematicsWords {
     /// Largest shift to either side, in mm; 10 when left out.
-    #[schema(required = false, exclusive_minimum = 0.0)]
     #[member(positive(50.0, "mm"), default = 10.0)]
     pub reach_mm: f64,
     /// Distance of the shifts, in mm; 0.1 when left out.
-    #[schema(required = false, exclusive_minimum = 0.0)]
     #[member(positive(5.0, "mm"), default = 0.1)]
     pub step_mm: f64,
     /// Amplitudes in mm at which the equivalent conicity is answered; 1 to 7 when left out. That of vehicle acceptance is 3.
-    #[schema(required = false)]
     #[member(with = amplitudes, default = (1..=7).map(f64::from).collect())]
     pub amplitudes_mm: Vec<f64>,
 }
 
 impl Contact {
     /// Are patches found from cross-sections?
-    #[must_use]
     pub fn has_profiles(&self) -> bool {
         matches!(self, Contact::Profiles { .. } | Contact::Wheelset { .. })
     }
@@ -263,7 +250,7 @@ impl Contact {
 
 /// How hard the bodies are pressed together; exactly one member is given, for `wheelset` with `left_share` beside it.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Load {
     /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
     #[schema(exclusive_minimum = 0.0)]

@@ -38,7 +38,6 @@ pub struct CrossSection {
     pub mirror_z: Option<bool>,
     /// Waves along the cross-section that are shorter than about this are smoothed away, in mm; 0 (no smoothing) when left out. `auto` chooses
     /// 0, or 2 to 8 mm, by the noise of the points and the pressure; the answer says what was used.
-    #[schema(required = false)]
     #[member(with = smoothing, default = Smoothing::Length(0.0))]
     pub smoothing_mm: Smoothing,
 }

@@ -144,30 +144,28 @@ pub struct EvolutionExtent {
 }
 
 /// Tolerances of an evolution.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
 pub struct EvolutionAccuracy {
     /// Largest number of representative states; 100 when left out.
-    #[schema(required = false, minimum = 1, maximum = 2000)]
+    #[schema(minimum = 1, maximum = 2000)]
     #[member(1..=2000, default = 100)]
     pub states_max: u32,
     /// Error of the representative states relative to the worn area, at which no more are added; 0.03 when left out.
-    #[schema(required = false, exclusive_minimum = 0.0)]
     #[member(positive(1.0, ""), default = 0.03)]
     pub states_tolerance: f64,
     /// Change of the distribution of wear over a step, relative to the worn area; 0.1 when left out.
-    #[schema(required = false, exclusive_minimum = 0.0)]
     #[member(positive(1.0, ""), default = 0.1)]
     pub step_tolerance: f64,
     /// Largest depth that one step removes, in mm; 0.03 when left out.
-    #[schema(required = false, exclusive_minimum = 0.0)]
     #[member(positive(1.0, "mm"), default = 0.03)]
     pub step_depth_mm: f64,
     /// Most steps; 1000 when left out.
-    #[schema(required = false, minimum = 1)]
+    #[schema(minimum = 1)]
     #[member(1..=100_000, default = 1000)]
     pub steps_max: u32,
     /// Standard deviation in mm of the kernel that smooths the wear of a step along the section; 0.5 when left out.
-    #[schema(required = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     #[member(closed(0.0, 5.0, "mm"), default = 0.5)]
     pub smoothing_mm: f64,
 }
@@ -195,7 +193,6 @@ pub struct WearLosses {
 
 impl WearLosses {
     /// Names and values, first those of the rail.
-    #[must_use]
     pub fn named(&self) -> [(&'static str, Option<f64>); 5] {
         [
             ("height_mm", self.height_mm),

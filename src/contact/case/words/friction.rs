@@ -24,7 +24,7 @@ pub struct Friction {
     pub limit: Option<f64>,
     /// What falls: one or two terms; with `law`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    #[schema(required = false, min_items = 1, max_items = 2)]
+    #[schema(min_items = 1, max_items = 2)]
     #[member(with = terms, default)]
     pub terms: Vec<FallTermWords>,
     /// A coefficient that varies across the contact.
@@ -146,7 +146,6 @@ pub struct LayerWords {
 
 impl Friction {
     /// The largest coefficient.
-    #[must_use]
     pub fn largest(&self) -> f64 {
         let falling = |limit: f64| limit + self.terms.iter().map(|t| t.coefficient).sum::<f64>();
         let across = self.across.iter().flat_map(|across| &across.coefficient);
@@ -157,7 +156,6 @@ impl Friction {
     }
 
     /// What the coefficient falls with, if it falls.
-    #[must_use]
     pub fn falls_with(&self) -> Option<&'static str> {
         match (self.law, &self.by_temperature) {
             (Some(_), _) => Some("slip"),
@@ -167,7 +165,6 @@ impl Friction {
     }
 
     /// The coefficient, if that is all there is.
-    #[must_use]
     pub fn constant(&self) -> Option<f64> {
         let softer = self.layer.is_some() || self.reduction.is_some();
         self.coefficient.filter(|_| !softer)
@@ -232,16 +229,9 @@ pub(crate) fn faults_of_friction(block: &mut Object, read: Option<&Friction>) ->
 /// Reads the terms of a coefficient that falls with slip velocity.
 pub(crate) fn terms(block: &mut Object, name: &str) -> Option<Vec<FallTermWords>> {
     let elements = block.array(name, 1..=2, TERMS)?;
-    let pointer = block.pointer_to(name);
-    let one = |(k, element)| {
-        FallTermWords::members(&mut Object::open(
-            element,
-            join(&pointer, k),
-            block.faults(),
-        )?)
-    };
-    let read: Vec<Option<FallTermWords>> = elements.iter().enumerate().map(one).collect();
-    read.into_iter().collect()
+    block.each(name, elements, |element, pointer, faults| {
+        FallTermWords::members(&mut Object::open(element, pointer, faults)?)
+    })
 }
 
 /// Places are given in one way, and in order.

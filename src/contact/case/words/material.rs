@@ -21,6 +21,16 @@ pub enum Material {
     },
 }
 
+impl Material {
+    /// The lower and the upper body.
+    pub fn bodies(&self) -> [&Elastic; 2] {
+        match self {
+            Material::Same(both) => [both; 2],
+            Material::Pair { lower, upper } => [lower, upper],
+        }
+    }
+}
+
 /// Isotropic linear elasticity. Exactly one of the two moduli is given.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
@@ -36,6 +46,14 @@ pub struct Elastic {
     #[schema(minimum = 0.0, maximum = 0.5)]
     #[member(closed(0.0, 0.5, ""))]
     pub poisson_ratio: f64,
+}
+
+impl Elastic {
+    /// The shear modulus in MPa, given or from Young's.
+    pub fn shear(&self) -> Option<f64> {
+        let from_young = || Some(self.young_modulus_mpa? / (2.0 * (1.0 + self.poisson_ratio)));
+        self.shear_modulus_mpa.or_else(from_young)
+    }
 }
 
 /// Thermal constants: one set for both bodies, or one for each.

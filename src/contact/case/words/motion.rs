@@ -2,7 +2,7 @@
 //!
 //! Rolling that changes, as a client writes it: motions or forces in the distance rolled.
 
-use railhead_macros::{Members, Words, none_is_absent};
+use railhead_macros::{Finite, Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 use crate::contact::case::words::object::{AllowedRange, Faults, Member, Object, join, shown};
 
 /// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 #[schema(as = Motion)]
 pub struct MotionWords {
     /// Longitudinal creepage, dimensionless.
@@ -37,7 +37,6 @@ pub struct AskedMotion {
     #[member(closed(-1e6, 1e6, ""))]
     pub creepage_y: Option<f64>,
     /// Spin in 1/mm.
-    #[schema(required = false)]
     #[member(closed(-1e6, 1e6, "1/mm"), default)]
     pub spin_per_mm: f64,
     /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`; with `profiles` in one motion alone.
@@ -119,11 +118,9 @@ pub struct Wheelset {
     #[member(closed(-1e15, 1e15, "N"))]
     pub force_y_n: Option<f64>,
     /// Rate of the yaw in rad/s; 0 when left out.
-    #[schema(required = false)]
     #[member(closed(-1e6, 1e6, "rad/s"), default)]
     pub yaw_rate_rad_per_s: f64,
     /// Rate of the roll in rad/s; 0 when left out.
-    #[schema(required = false)]
     #[member(closed(-1e6, 1e6, "rad/s"), default)]
     pub roll_rate_rad_per_s: f64,
 }
@@ -154,7 +151,6 @@ pub struct Sweep {
     /// `together` (default): all components that vary have the same number of values, and motion n has value n of each; `grid`: every
     /// combination of values. In a grid, the last component of this list varies fastest; a force takes the position of the creepage it
     /// replaces.
-    #[schema(required = false)]
     #[member(default)]
     pub combine: Combine,
 }
@@ -192,7 +188,6 @@ pub struct ValueList {
 
 impl Swept {
     /// Number of values.
-    #[must_use]
     pub fn points(&self) -> usize {
         match self {
             Swept::Constant(_) => 1,
@@ -275,7 +270,6 @@ pub enum HistoryCourse {
 
 impl HistoryCourse {
     /// Number of values; 1 of a constant.
-    #[must_use]
     pub fn points(&self) -> usize {
         match self {
             HistoryCourse::Constant(_) => 1,
@@ -285,7 +279,6 @@ impl HistoryCourse {
     }
 
     /// The values at `points` points.
-    #[must_use]
     pub fn values(&self, points: usize) -> Vec<f64> {
         match self {
             HistoryCourse::Constant(value) => vec![*value; points],
@@ -322,7 +315,6 @@ pub struct Range {
 
 impl Range {
     /// The values; the ends are exact.
-    #[must_use]
     pub fn values(&self) -> Vec<f64> {
         let last = self.points.saturating_sub(1);
         (0..self.points)
@@ -386,8 +378,10 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
             }
             match members.get("wheelset") {
                 Some(Value::Array(motions)) if of_wheelset && !motions.is_empty() => {
-                    let pointer = block.pointer_to("wheelset");
-                    wheelsets(motions, &pointer, block.faults())
+                    let wheelset = block.each("wheelset", motions, |motion, pointer, faults| {
+                        wheelset(&mut Object::open(motion, pointer, faults)?, true)
+                    })?;
+                    Some(Motions::Wheelsets { wheelset })
                 }
                 _ => {
                     let wheelset = wheelset(&mut block.child("wheelset")?, of_wheelset)?;
@@ -403,15 +397,7 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
         }
         Value::Object(_) => motion(value, pointer, faults).map(Motions::One),
         Value::Array(elements) if !elements.is_empty() => {
-            let motions: Vec<Option<AskedMotion>> = elements
-                .iter()
-                .enumerate()
-                .map(|(k, element)| motion(element, join(&pointer, k), faults))
-                .collect();
-            motions
-                .into_iter()
-                .collect::<Option<_>>()
-                .map(Motions::Many)
+            case.each("motion", elements, motion).map(Motions::Many)
         }
         _ => {
             faults.add(pointer, format!("{} given; {what} is needed", shown(value)));
@@ -428,20 +414,6 @@ fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMo
         creepage_y: read.creepage_y.or(left_out(read.force_y_n)),
         ..read
     })
-}
-
-/// Several motions of a wheelset on both rails.
-fn wheelsets(motions: &[Value], pointer: &str, faults: &mut Faults) -> Option<Motions> {
-    let read: Vec<Option<Wheelset>> = motions
-        .iter()
-        .enumerate()
-        .map(|(k, motion)| {
-            let mut block = Object::open(motion, join(pointer, k), faults)?;
-            wheelset(&mut block, true)
-        })
-        .collect();
-    let wheelset = read.into_iter().collect::<Option<_>>()?;
-    Some(Motions::Wheelsets { wheelset })
 }
 
 /// The motion of a wheelset; on both rails a torque can be balanced, on one a longitudinal and a lateral force.

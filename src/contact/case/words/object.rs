@@ -246,6 +246,21 @@ impl<'v, 'f> Object<'v, 'f> {
         }
     }
 
+    /// Reads every element of the array `name`, given with its pointer; `None` if one of them is faulty.
+    pub(crate) fn each<T>(
+        &mut self,
+        name: &str,
+        elements: &'v [Value],
+        read: impl Fn(&'v Value, String, &mut Faults) -> Option<T>,
+    ) -> Option<Vec<T>> {
+        let pointer = self.pointer_to(name);
+        let elements = elements.iter().enumerate();
+        let all: Vec<Option<T>> = elements
+            .map(|(k, element)| read(element, join(&pointer, k), self.faults))
+            .collect();
+        all.into_iter().collect()
+    }
+
     /// The members of `{"from": …, "to": …, "points": …}`.
     pub(crate) fn range(
         &mut self,

@@ -7,10 +7,11 @@
 //!
 //! A case in the form of which its digest is taken.
 
-use railhead_macros::{Members, Named, Words, none_is_absent};
+use std::collections::BTreeMap;
+
+use railhead_macros::{Finite, Members, Named, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 use crate::contact::case::words::contact::{Contact, Load};
@@ -19,7 +20,7 @@ use crate::contact::case::words::material::{Material, ThermalWords};
 use crate::contact::case::words::motion::{
     History, HistoryStartName, MotionWords, Motions, Wheelset,
 };
-use crate::contact::case::words::object::{Object, join, names, shown, word};
+use crate::contact::case::words::object::{Object, names, shown, word};
 use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
 use crate::contact::rolling::task::{PrescribedForces, TARGET_LEAST, TARGET_USUAL};
 
@@ -29,7 +30,6 @@ use crate::contact::rolling::task::{PrescribedForces, TARGET_LEAST, TARGET_USUAL
 #[members(mismatches)]
 pub struct Solver {
     /// The method.
-    #[schema(required = false)]
     #[member(default)]
     pub method: MethodName,
     /// Allowed error of the resultants relative to μN (moment: μN√(A/π)), 1e-4 to 0.5. Excludes `mesh`.
@@ -53,7 +53,18 @@ pub struct Solver {
 
 /// The methods a client can choose.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words, Named,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Default,
+    Serialize,
+    Deserialize,
+    ToSchema,
+    Words,
+    Named,
+    Finite,
 )]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Method)]
@@ -149,7 +160,6 @@ pub enum Output {
 
 impl Output {
     /// Is it made from tractions, slips or zones, which only some methods compute?
-    #[must_use]
     pub fn needs_fields(self) -> bool {
         !matches!(
             self,
@@ -193,6 +203,7 @@ pub struct Case {
 }
 
 /// Everything that determines the answer, in a fixed order; name and labels do not.
+#[none_is_absent(nullable)]
 #[derive(Serialize)]
 pub(crate) struct Canonical<'a> {
     pub(crate) solver_version: &'static str,
@@ -200,38 +211,30 @@ pub(crate) struct Canonical<'a> {
     pub(crate) elasticity: [f64; 3],
     /// Revision of the method for bodies that differ, and the lower body's share of the displacement. Absent for equal bodies, whose digests do not depend
     /// on that method.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) coupling: Option<(u32, f64)>,
     pub(crate) friction: FrictionForm<'a>,
     pub(crate) contact: &'a Contact,
+    #[or_null]
     pub(crate) load: Option<&'a Load>,
     pub(crate) motions: Vec<MotionWords>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) forces: Option<&'a [PrescribedForces]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) wheelset: Option<&'a Wheelset>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) wheelsets: Option<&'a [Wheelset]>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) history: Option<(&'a History, HistoryStartName)>,
     pub(crate) method: MethodName,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) traction_bound: Option<TractionBoundName>,
+    #[or_null]
     pub(crate) target_error: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) relative_to: Option<RelativeToName>,
+    #[or_null]
     pub(crate) mesh: Option<MeshSizeWords>,
+    #[or_null]
     pub(crate) time_limit_s: Option<f64>,
     pub(crate) outputs: &'a [Output],
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) subsurface: Option<&'a SubsurfaceWords>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) bodies: Option<&'a Material>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) damage: Option<&'a DamageWords>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) thermal: Option<&'a ThermalWords>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) speeds: Option<&'a [Option<f64>]>,
 }
 
@@ -314,27 +317,19 @@ pub(crate) fn read_outputs(
     }
     let what = format!("an array with at least one of {}", names(Output::WORDS));
     let elements = case.array("outputs", 1..=usize::MAX, &what)?;
-    let pointer = case.pointer_to("outputs");
-    let faults = case.faults();
-    let read: Vec<Option<Output>> = elements
-        .iter()
-        .enumerate()
-        .map(|(k, element)| {
-            let pointer = join(&pointer, k);
-            let output = word(element, &pointer, Output::WORDS, faults)?;
-            let detail = match without_fields {
-                Some(method) if output.needs_fields() => format!(
-                    "{} given; \"method\": \"{}\" computes only \"resultants\", \"gradients\" and \"damage\"",
-                    shown(element),
-                    method.name()
-                ),
-                _ => return Some(output),
-            };
-            faults.add(pointer, detail);
-            None
-        })
-        .collect();
-    let mut outputs: Vec<Output> = read.into_iter().collect::<Option<_>>()?;
+    let mut outputs = case.each("outputs", elements, |element, pointer, faults| {
+        let output = word(element, &pointer, Output::WORDS, faults)?;
+        let detail = match without_fields {
+            Some(method) if output.needs_fields() => format!(
+                "{} given; \"method\": \"{}\" computes only \"resultants\", \"gradients\" and \"damage\"",
+                shown(element),
+                method.name()
+            ),
+            _ => return Some(output),
+        };
+        faults.add(pointer, detail);
+        None
+    })?;
     outputs.sort_unstable();
     outputs.dedup();
     Some(outputs)

@@ -2,7 +2,7 @@
 //!
 //! Which damage models a case asks for, and with which figures.
 
-use railhead_macros::{Members, Words, none_is_absent};
+use railhead_macros::{Finite, Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -31,11 +31,9 @@ pub struct SubsurfaceWords {
     /// A grid of points, usually in a plane.
     pub plane: Option<StressGrid>,
     /// The body: `lower` when left out.
-    #[schema(required = false)]
     #[member(default)]
     pub body: BodyName,
     /// Find the point of every patch where von Mises' stress is largest; `true` when left out.
-    #[schema(required = false)]
     #[member(default = true)]
     pub worst: bool,
     /// Judge what a point of the body lives through while the contact rolls over it: Dang Van's criterion and shakedown.
@@ -106,7 +104,9 @@ pub enum GridAxis {
 }
 
 /// One of the two bodies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words, Finite,
+)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = Body)]
 pub enum BodyName {
@@ -123,21 +123,30 @@ pub enum BodyName {
 #[schema(as = Damage)]
 pub struct DamageWords {
     /// Models to evaluate. When left out: `t_gamma` and `usfd_wear`, the models whose parameters are confirmed.
-    #[schema(required = false)]
     #[member(with = models, default = MODELS_USUAL.to_vec())]
     pub models: Vec<DamageModel>,
     /// The name of a set of figures, or figures in place of some of the default set's.
     #[member(with = parameters)]
     pub parameters: Option<DamageParameterWords>,
     /// Wear strip by strip across the patch, from the power of every cell, beside that of the patch as a whole; `false` when left out.
-    #[schema(required = false)]
     #[member(default)]
     pub across: bool,
 }
 
 /// A damage model.
 #[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema, Words,
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    ToSchema,
+    Words,
+    Finite,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum DamageModel {
@@ -166,7 +175,9 @@ pub enum DamageParameterWords {
 }
 
 /// Named sets of figures; a set that is changed gets another name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words, Finite,
+)]
 pub enum DamageSetName {
     /// Rail UIC 900A, wheel R8T.
     #[default]
@@ -176,7 +187,7 @@ pub enum DamageSetName {
 
 /// Figures of the client's; those left out are the default set's.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema, Members)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema, Members)]
 pub struct OwnDamageFigures {
     /// Density of the worn material in kg/m³.
     #[member(positive(1e5, "kg/m³"))]
@@ -196,7 +207,7 @@ pub struct OwnDamageFigures {
 }
 
 /// Wear rate over power per area x in N/mm²: proportional to x, then constant, then rising again; without steps.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members, Finite)]
 #[members(faults_of_usfd)]
 pub struct UsfdFigures {
     /// Rate over x where wear is mild, in µg/(m mm²) per N/mm².
@@ -214,7 +225,7 @@ pub struct UsfdFigures {
 }
 
 /// Archard's coefficients, each as the range `[low, high]` that measurements leave.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members, Finite)]
 pub struct ArchardFigures {
     /// Of mild wear, below the first and above the second sliding speed.
     #[member(with = pair)]
@@ -234,7 +245,7 @@ pub struct ArchardFigures {
 }
 
 /// Damage of one pass over Tγ without spin: 0 up to a threshold, linear to a peak, linear down to 0 and on below it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members, Finite)]
 #[members(faults_of_wlrm)]
 pub struct WlrmFigures {
     /// No damage up to this Tγ in N.
@@ -281,11 +292,9 @@ pub(crate) fn models(block: &mut Object, name: &str) -> Option<Vec<DamageModel>>
         names(DamageModel::WORDS)
     );
     let elements = block.array(name, 1..=usize::MAX, &what)?;
-    let pointer = block.pointer_to(name);
-    let faults = block.faults();
-    let one = |(k, element)| word(element, &join(&pointer, k), DamageModel::WORDS, faults);
-    let read: Vec<Option<DamageModel>> = elements.iter().enumerate().map(one).collect();
-    let mut models: Vec<DamageModel> = read.into_iter().collect::<Option<_>>()?;
+    let mut models = block.each(name, elements, |element, pointer, faults| {
+        word(element, &pointer, DamageModel::WORDS, faults)
+    })?;
     models.sort_unstable();
     models.dedup();
     Some(models)
@@ -398,29 +407,20 @@ pub(crate) fn faults_of_places(block: &mut Object, _: Option<&SubsurfaceWords>) 
 pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 3]>> {
     let what = "an array of points [x, y, depth] in mm";
     let elements = block.array(name, 1..=usize::MAX, what)?;
-    let pointer = block.pointer_to(name);
-    let faults = block.faults();
-    let mut read = Vec::with_capacity(elements.len());
-    for (k, element) in elements.iter().enumerate() {
-        let pointer = join(&pointer, k);
+    block.each(name, elements, |element, pointer, faults| {
         let Some([x, y, depth]) = element.as_array().map(Vec::as_slice) else {
+            let given = shown(element);
             faults.add(
                 pointer,
-                format!(
-                    "{} given; three numbers [x, y, depth] in mm are needed",
-                    shown(element)
-                ),
+                format!("{given} given; three numbers [x, y, depth] in mm are needed"),
             );
-            continue;
+            return None;
         };
         let x = number(x, &join(&pointer, 0), COORDINATE, faults);
         let y = number(y, &join(&pointer, 1), COORDINATE, faults);
         let depth = number(depth, &join(&pointer, 2), DEPTH, faults);
-        if let (Some(x), Some(y), Some(depth)) = (x, y, depth) {
-            read.push([x, y, depth]);
-        }
-    }
-    (read.len() == elements.len()).then_some(read)
+        Some([x?, y?, depth?])
+    })
 }
 
 /// A place on the surface, or the worst one.

@@ -41,7 +41,6 @@ impl LoadPart {
     }
 
     /// Its halves, along the strips or across them.
-    #[must_use]
     pub fn halves(self, along: bool) -> [LoadPart; 2] {
         if along {
             return self.along.halves().map(|along| LoadPart { along, ..self });
@@ -76,7 +75,6 @@ pub struct LoadParts {
 
 impl LoadParts {
     /// The parts to begin with.
-    #[must_use]
     pub fn new(first: impl Iterator<Item = (LoadPart, PartBox)>) -> LoadParts {
         let nodes: Vec<Node> = first.map(|(part, seen)| Node::new(part, seen)).collect();
         LoadParts {
@@ -98,31 +96,26 @@ impl LoadParts {
     }
 
     /// Number of parts to begin with.
-    #[must_use]
     pub fn first(&self) -> usize {
         self.first
     }
 
     /// A part.
-    #[must_use]
     pub fn part(&self, number: usize) -> LoadPart {
         self.nodes[number].part
     }
 
     /// How large a part is.
-    #[must_use]
     pub fn seen(&self, number: usize) -> PartBox {
         self.nodes[number].seen
     }
 
     /// Can only halving along the strips make a part smaller?
-    #[must_use]
     pub fn narrow(&self, number: usize) -> bool {
         self.nodes[number].part.across.level >= HALVINGS_MAX
     }
 
     /// All packs.
-    #[must_use]
     pub fn packs(&self) -> &[LoadPack] {
         &self.packs
     }
@@ -194,7 +187,6 @@ impl Piece {
     }
 
     /// Its halves.
-    #[must_use]
     pub fn halves(self) -> [Piece; 2] {
         [0, 1].map(|k| Piece {
             level: self.level + 1,
@@ -203,13 +195,11 @@ impl Piece {
     }
 
     /// A place in the piece, from 0 to 1, as one in the interval.
-    #[must_use]
     pub fn share(self, inside: f64) -> f64 {
         (f64::from(self.index) + inside) * self.width()
     }
 
     /// Its width over that of the interval.
-    #[must_use]
     pub fn width(self) -> f64 {
         1.0 / f64::from(1_u32 << self.level)
     }
@@ -249,7 +239,6 @@ pub struct PartBox {
 
 impl LoadResolution {
     /// Which rules a part needs along and across as seen from a point `[x, y, z]` in mm; [`ORDERS`] where it has to be divided.
-    #[must_use]
     pub fn orders(&self, PartBox { sides, squares }: PartBox, [x, y, z]: [f32; 3]) -> [usize; 2] {
         let [x0, x1, y0, y1] = sides;
         let dx = (x0 - x).max(x - x1).max(0.0);

@@ -347,7 +347,6 @@ pub(crate) struct RunOutline<'a> {
 
 impl RunOutline<'_> {
     /// y in mm of a place in the run, from 0 to 1.
-    #[must_use]
     pub(crate) fn y(&self, share: f64) -> f64 {
         self.low + self.width * share
     }

@@ -1,5 +1,6 @@
 //! From a stress tensor to what is read off it.
 
+use crate::contact::case::words::subsurface::{BodyName, PassageWords};
 use crate::contact::half_space::kernels::Stress;
 use crate::contact::solution::words::evolution::{StressPoint, StressTensor};
 
@@ -7,7 +8,6 @@ use crate::contact::solution::words::evolution::{StressPoint, StressTensor};
 pub const STORED: usize = 9;
 
 /// Von Mises' stress.
-#[must_use]
 pub fn von_mises([xx, yy, zz, xy, xz, yz]: Stress) -> f64 {
     let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
     let shear = xy * xy + xz * xz + yz * yz;
@@ -15,17 +15,15 @@ pub fn von_mises([xx, yy, zz, xy, xz, yz]: Stress) -> f64 {
 }
 
 /// A stress in axes with z into the body becomes one in the axes of the patch, with z up.
-#[must_use]
-pub fn in_patch_axes(stress: Stress, body: LoadedBody) -> Stress {
+pub fn in_patch_axes(stress: Stress, body: BodyName) -> Stress {
     let [xx, yy, zz, xy, xz, yz] = stress;
     match body {
-        LoadedBody::Lower => [xx, yy, zz, xy, -xz, -yz],
-        LoadedBody::Upper => stress,
+        BodyName::Lower => [xx, yy, zz, xy, -xz, -yz],
+        BodyName::Upper => stress,
     }
 }
 
 /// A point as it is stored.
-#[must_use]
 pub fn stored(at: [f64; 3], stress: Stress) -> [f64; STORED] {
     let [x, y, depth] = at;
     let [xx, yy, zz, xy, xz, yz] = stress;
@@ -33,7 +31,6 @@ pub fn stored(at: [f64; 3], stress: Stress) -> [f64; STORED] {
 }
 
 /// The points of a stored list.
-#[must_use]
 pub fn points(stored: &[f64]) -> Vec<StressPoint> {
     let (all, _) = stored.as_chunks::<STORED>();
     all.iter()
@@ -42,7 +39,6 @@ pub fn points(stored: &[f64]) -> Vec<StressPoint> {
 }
 
 /// Everything that is answered of a stress in the axes of the patch.
-#[must_use]
 pub fn point(at: [f64; 3], stress: Stress) -> StressPoint {
     let [xx, yy, zz, xy, xz, yz] = stress;
     let Principal {
@@ -84,7 +80,6 @@ pub struct Principal {
 }
 
 /// Of a tensor `xx, yy, zz, xy, xz, yz`, by Jacobi's rotations.
-#[must_use]
 pub fn principal([xx, yy, zz, xy, xz, yz]: Stress) -> Principal {
     let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -128,15 +123,6 @@ fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
     }
 }
 
-/// Which body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LoadedBody {
-    /// Body 2, the rail: z up is out of it.
-    Lower,
-    /// Body 1, the wheel: z up is into it.
-    Upper,
-}
-
 /// Where stresses are asked for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StressPlaces {
@@ -148,7 +134,6 @@ pub enum StressPlaces {
 
 impl StressPlaces {
     /// Number of points.
-    #[must_use]
     pub fn count(&self) -> usize {
         match self {
             StressPlaces::Points(points) => points.len(),
@@ -163,20 +148,13 @@ pub struct SubsurfaceTask {
     /// Where.
     pub places: StressPlaces,
     /// In which body.
-    pub body: LoadedBody,
+    pub body: BodyName,
     /// Poisson's ratio of that body.
     pub poisson_ratio: f64,
     /// Is the worst point of every patch to be found?
     pub worst: bool,
     /// What is judged of a passage of the contact, if anything.
-    pub passage: Option<PassageTask>,
-}
-
-/// What is judged of a passage of the contact: shakedown always.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PassageTask {
-    /// Weight of the hydrostatic stress in Dang Van's criterion; not evaluated without.
-    pub dang_van_slope: Option<f64>,
+    pub passage: Option<PassageWords>,
 }
 
 #[cfg(test)]

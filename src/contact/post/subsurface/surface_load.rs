@@ -48,7 +48,6 @@ pub struct LoadWorkspace {
 
 impl<'a> SurfaceLoad<'a> {
     /// The pressures and tractions of a level on a body; tractions on the lower body times `sign` act on it.
-    #[must_use]
     pub fn new(
         level: &StripMesh,
         footprint: &'a Footprint,
@@ -99,7 +98,6 @@ impl<'a> SurfaceLoad<'a> {
     }
 
     /// A workspace for this load, which serves no other.
-    #[must_use]
     pub fn workspace(&self) -> LoadWorkspace {
         LoadWorkspace {
             parts: LoadParts::new(self.first_parts.iter().copied()),

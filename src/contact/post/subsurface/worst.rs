@@ -58,7 +58,6 @@ impl PatchColumns<'_> {
 }
 
 /// `[x, y, depth]` in mm of the worst point of a patch, at least `least` deep.
-#[must_use]
 pub fn worst_place(
     load: &SurfaceLoad,
     footprint: &Footprint,
@@ -169,7 +168,6 @@ pub struct EnclosingBall {
 }
 
 /// The smallest ball whose centre has only the first `free` coordinates. Without points it is a point.
-#[must_use]
 pub fn enclosing_ball(points: &[Deviator], free: usize) -> EnclosingBall {
     ball_within(points, free, STEPS_MAX)
 }

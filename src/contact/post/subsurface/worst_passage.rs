@@ -14,13 +14,13 @@
 //! everywhere, has only σ_xx, σ_yy and σ_xy. Each depth is judged by itself.
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
-use std::ops::ControlFlow;
 
+use crate::contact::case::words::subsurface::PassageWords;
 use crate::contact::half_space::kernels::Stress;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::post::subsurface::load_parts::LoadResolution;
-use crate::contact::post::subsurface::states::{PassageTask, principal, von_mises};
+use crate::contact::post::subsurface::states::{principal, von_mises};
 use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 use crate::contact::post::subsurface::worst::{DEPTHS, Deviator, STEPS, climb, enclosing_ball};
 use crate::contact::solution::words::evolution::{PassagePlace, PassageSummary};
@@ -68,7 +68,7 @@ pub struct JudgedPassage {
 ///
 /// The monitor wants an end.
 pub fn passage(
-    task: PassageTask,
+    task: PassageWords,
     of: PassagesOf,
     worst: [f64; 3],
     monitor: &dyn Monitor,
@@ -80,9 +80,7 @@ pub fn passage(
     let mut starts = vec![(f64::NEG_INFINITY, [0.0; 2]); measures.len()];
     for across in ACROSS {
         for depth in DEPTHS {
-            if let ControlFlow::Break(stop) = monitor.tick(0.0) {
-                return Err(stop);
-            }
+            monitor.go_on(0.0)?;
             let at = [across, depth.ln()];
             let states = lines.states(at, LoadResolution::COARSE, workspace);
             let stresses: Vec<Stress> = states.into_iter().map(|(_, state)| state).collect();
@@ -215,15 +213,10 @@ impl<'a> Lines<'a> {
         workspace: &mut LoadWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<(PassagePlace, f64), Stop> {
-        let (at, (best, gap)) = climb(
-            start,
-            [STEPS[1], STEPS[2]],
-            EVALUATIONS,
-            |at| match monitor.tick(0.0) {
-                ControlFlow::Continue(()) => Ok(self.value(measure, at, workspace)),
-                ControlFlow::Break(stop) => Err(stop),
-            },
-        )?;
+        let (at, (best, gap)) = climb(start, [STEPS[1], STEPS[2]], EVALUATIONS, |at| {
+            monitor.go_on(0.0)?;
+            Ok(self.value(measure, at, workspace))
+        })?;
         let place = PassagePlace {
             at_mm: self.place(at),
             stress_mpa: best,
@@ -256,7 +249,6 @@ pub struct PassageValue {
 }
 
 /// What stresses on a line along x amount to; the stress-free state before and after is added.
-#[must_use]
 pub fn judge(measure: PassageMeasure, states: &[Stress]) -> PassageValue {
     let mut points: Vec<Deviator> = states.iter().map(|state| deviator(*state)).collect();
     points.push([0.0; 5]);

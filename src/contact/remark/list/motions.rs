@@ -8,7 +8,7 @@ macro_rules! motion_remarks {
             $($before)*
 
             /// Creepages are so large that they are no longer a small part of the rolling speed.
-            CreepageLarge {
+            Warning CreepageLarge {
                 /// Longitudinal creepage.
                 creepage_x: f64 = 5.0,
                 /// Lateral creepage.
@@ -18,8 +18,6 @@ macro_rules! motion_remarks {
                 /// The largest that passes without a remark.
                 usual_max: f64 = 0.2,
             }
-            code: "creepage-large",
-            severity: Warning,
             advice: "Check the unit (creepages are ratios, spin is in 1/mm). At such sliding speeds forces also depend on heat and wear.",
             detail: {
                 let spin = spin_times_length.map_or_else(String::new, |spin| format!(" and the spin times the length of the patch is {}", short(spin)));
@@ -27,19 +25,15 @@ macro_rules! motion_remarks {
             },
 
             /// The second discretisation rule did not converge; forces come from the first alone.
-            SecondRuleFailed {}
-            code: "second-rule-failed",
-            severity: Warning,
+            Warning SecondRuleFailed {}
             advice: "Use the forces with their larger error estimate, or try another mesh or target.",
             detail: "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger".to_owned(),
 
             /// Friction falls so fast with slip that the contact has a second state.
-            SeveralSolutions {
+            Warning SeveralSolutions {
                 /// Difference of the two forces relative to the friction limit.
                 force_change: f64 = 0.08,
             }
-            code: "several-solutions",
-            severity: Warning,
             advice: "The answer is the state reached from small slip. Ask with less speed, pressure or fall to see where the two part.",
             detail: format!(
                 "friction falls so fast with slip that a second state exists, reached from sliding, whose force differs by {} of \
@@ -48,14 +42,12 @@ macro_rules! motion_remarks {
             ),
 
             /// The contact passes so slowly that heat also flows along the surface.
-            HeatSpreads {
+            Warning HeatSpreads {
                 /// Péclet number.
                 peclet: f64 = 0.24,
                 /// The least that passes without a remark.
                 least: f64 = 10.0,
             }
-            code: "heat-spreads",
-            severity: Warning,
             advice: "Take the temperatures as an upper bound; check the speed, which is in mm/s.",
             detail: format!(
                 "the Péclet number is {}; temperatures are computed as if heat flowed only into the depth, which holds from about {least} on",
@@ -63,7 +55,7 @@ macro_rules! motion_remarks {
             ),
 
             /// The error is not known to be below the target.
-            TargetMissed {
+            Warning TargetMissed {
                 /// What error and target are relative to.
                 relative_to: &'static str = "μN",
                 /// Estimated error; absent if it is unknown.
@@ -71,8 +63,6 @@ macro_rules! motion_remarks {
                 /// The target.
                 target: f64 = 1e-3,
             }
-            code: "target-missed",
-            severity: Warning,
             advice: "Use the numbers with their error estimate, or ask for a larger target.",
             detail: match estimate {
                 Some(estimate) => format!(
@@ -82,7 +72,7 @@ macro_rules! motion_remarks {
             },
 
             /// The error is a large part of the force, although it is a small part of μN.
-            ErrorLargeForForce {
+            Info ErrorLargeForForce {
                 /// Estimated error over the tangential force.
                 error_over_force: f64 = 0.25,
                 /// Tangential force over μN.
@@ -90,8 +80,6 @@ macro_rules! motion_remarks {
                 /// Largest error over the force that passes without a remark.
                 usual_max: f64 = 0.1,
             }
-            code: "error-large-for-force",
-            severity: Info,
             advice: "Give `solver.relative_to: \"force\"` to solve to a share of the force, or a smaller `target_error`.",
             detail: format!(
                 "the force is {} of μN, and its estimated error is {:.0} % of it; the target counts relative to μN",
@@ -100,7 +88,7 @@ macro_rules! motion_remarks {
             ),
 
             /// No creepage gives the prescribed force; the answer has the nearest force found.
-            ForceUnreachable {
+            Warning ForceUnreachable {
                 /// Force asked for along rolling; absent if none was.
                 wanted_x_n: Option<f64> = Some(29_000.0),
                 /// Force asked for across; absent if none was.
@@ -110,8 +98,6 @@ macro_rules! motion_remarks {
                 /// Force found across.
                 found_y_n: f64 = -350.0,
             }
-            code: "force-unreachable",
-            severity: Warning,
             advice: "Ask for a smaller force: the tractions due to spin use up a part of μN. The motion has `saturated: true`.",
             detail: {
                 let wanted = |force: &Option<f64>| {
@@ -124,7 +110,7 @@ macro_rules! motion_remarks {
             },
 
             /// An iteration ended before it met its tolerance, and its result was used all the same.
-            IterationInexact {
+            Warning IterationInexact {
                 /// Which iteration.
                 iteration: &'static str = "force control",
                 /// How it ended, as a clause.
@@ -134,48 +120,40 @@ macro_rules! motion_remarks {
                 /// The residual that was wanted.
                 tolerance: f64 = 2e-6,
             }
-            code: "iteration-inexact",
-            severity: Warning,
             advice: "Judge by `residual` against `tolerance` whether the answer is still good enough; it is not part of the error estimate.",
             detail: format!(
                 "{iteration} ended before its tolerance was met: {reason}; the residual is {residual:.2e}, {tolerance:.2e} was wanted"
             ),
 
             /// The scatter of the wear coefficients is not published; a stated factor stands for it.
-            CoefficientScatterStated {
+            Info CoefficientScatterStated {
                 /// The factor.
                 factor: f64 = 2.0,
             }
-            code: "coefficient-scatter-stated",
-            severity: Info,
             advice: "Give the factor that your own measurements leave as `coefficient_factor`.",
             detail: format!(
                 "no scatter of the coefficients of this wear map is published; it is taken as a factor of {factor}, with a probability of 90 %"
             ),
 
             /// A profile has worn to a pressure at which steel flows.
-            PressureAboveHardness {
+            Warning PressureAboveHardness {
                 /// Largest pressure of the evolution.
                 largest_mpa: f64 = 3100.0,
                 /// Hardness.
                 hardness_mpa: f64 = 2550.0,
             }
-            code: "pressure-above-hardness",
-            severity: Warning,
             advice: "Plastic flow would round the section there. Add states of traction, braking and other shifts to the traffic: a traffic without them leaves a ridge where nothing slips.",
             detail: format!(
                 "the largest pressure is {largest_mpa:.0} MPa, above the hardness of {hardness_mpa:.0} MPa; plastic flow is not modelled"
             ),
 
             /// A condensed traffic does not meet its tolerance.
-            TrafficCoarse {
+            Warning TrafficCoarse {
                 /// Its error.
                 traffic_error: f64 = 0.06,
                 /// The tolerance.
                 tolerance_asked: f64 = 0.03,
             }
-            code: "traffic-coarse",
-            severity: Warning,
             advice: "Raise `accuracy.states_max`.",
             detail: format!(
                 "twice the states would change the distribution of wear by {} %; {} % were asked for",
@@ -184,12 +162,10 @@ macro_rules! motion_remarks {
             ),
 
             /// Some of the traffic has no answer and wears nothing.
-            StatesUnsolved {
+            Warning StatesUnsolved {
                 /// Largest share of the traffic without an answer.
                 unsolved_share: f64 = 0.03,
             }
-            code: "states-unsolved",
-            severity: Warning,
             advice: "`failure` in the states of the records says why.",
             detail: format!(
                 "up to {} % of the traffic have no answer; they wear nothing",

@@ -12,21 +12,17 @@ macro_rules! normal_remarks {
             $($before)*
 
             /// Pressure and region still change when the grid of the normal problem is refined.
-            GapRough {}
-            code: "gap-rough",
-            severity: Warning,
+            Warning GapRough {}
             advice: "Smooth the gap; if the surfaces are really as rough as this, give it on a finer grid.",
             detail: "the gap is rough: pressure and region still change when the grid of the normal problem is refined".to_owned(),
 
             /// A patch that carries a noticeable part of the load has few cells in the normal problem.
-            PatchCoarse {
+            Warning PatchCoarse {
                 /// Cells across its narrower side.
                 cells_across: f64 = 4.0,
                 /// Its part of the load.
                 load_share: f64 = 0.059,
             }
-            code: "patch-coarse",
-            severity: Warning,
             advice: "Take the width and the pressure of this patch as uncertain by some per cent; if it matters, solve it in a case of its own.",
             detail: format!(
                 "the patch carries {} % of the load and has only {cells_across:.0} cells across: its width and its pressure are uncertain by \
@@ -35,21 +31,17 @@ macro_rules! normal_remarks {
             ),
 
             /// A given pressure does not fall to 0 at the edge of its grid.
-            PressureCutAtEdge {}
-            code: "pressure-cut-at-edge",
-            severity: Warning,
+            Warning PressureCutAtEdge {}
             advice: "Give the pressure over the whole region where it is more than 0, with one row of zeros around it.",
             detail: "the pressure does not fall to 0 at the edge of the grid; the contact is taken to end within the next spacing".to_owned(),
 
             /// A patch of a given pressure has few samples.
-            PressureCoarse {
+            Warning PressureCoarse {
                 /// Samples along rolling.
                 samples_x: usize = 4,
                 /// Samples across.
                 samples_y: usize = 7,
             }
-            code: "pressure-coarse",
-            severity: Warning,
             advice: "Give the pressure on a finer grid.",
             detail: format!(
                 "the patch has only {samples_x} by {samples_y} samples of pressure; its force and its edge are uncertain by some per cent"
@@ -57,7 +49,7 @@ macro_rules! normal_remarks {
 
             /// The given pressure jumps from one sample to the next, more than it would at the edge of a contact. Strips and cells do not follow
             /// the jump, and errors may be larger than estimated.
-            PressureJumps {
+            Warning PressureJumps {
                 /// Where, halfway between the two samples; the largest jump.
                 x_mm: f64 = 1.5,
                 /// The same across.
@@ -65,8 +57,6 @@ macro_rules! normal_remarks {
                 /// The fall over the largest pressure.
                 share_of_largest: f64 = 0.8,
             }
-            code: "pressure-jumps",
-            severity: Warning,
             advice: "Give finer samples, or smooth the pressure over two or three of them.",
             detail: format!(
                 "the pressure jumps by {} of its largest value between samples at ({}, {}) mm, which strips and cells do not follow",
@@ -76,14 +66,12 @@ macro_rules! normal_remarks {
             ),
 
             /// The contact is long compared with the rolling radius: the bodies are nearly conformal.
-            NearlyConformal {
+            Warning NearlyConformal {
                 /// Length of the contact along rolling.
                 length_mm: f64 = 14.2,
                 /// Rolling radius.
                 rolling_radius_mm: f64 = 20.0,
             }
-            code: "nearly-conformal",
-            severity: Warning,
             advice: "Half-spaces do not describe such bodies: take the answer as approximate.",
             detail: format!(
                 "the contact is {} mm long, compared with a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
@@ -92,14 +80,12 @@ macro_rules! normal_remarks {
             ),
 
             /// The bodies overlap so deeply that strains are too large for linear elasticity.
-            StrainsTooLarge {
+            Warning StrainsTooLarge {
                 /// Approach from first touch.
                 overlap_mm: f64 = 1.1,
                 /// Smaller half width of the contact.
                 half_width_mm: f64 = 3.4,
             }
-            code: "strains-too-large",
-            severity: Warning,
             advice: "Check units and load. If they are right, the bodies yield and pressures are lower than the answer says.",
             detail: format!(
                 "the bodies overlap by {} mm, compared with a half width of {} mm of the contact: strains are too large for linear elasticity",
@@ -108,7 +94,7 @@ macro_rules! normal_remarks {
             ),
 
             /// The patch is large compared with the radii of the bodies, so that half-spaces do not describe them.
-            PatchLarge {
+            Warning PatchLarge {
                 /// `rolling` or `lateral`.
                 direction: &'static str = "rolling",
                 /// Half width of the patch in this direction.
@@ -116,8 +102,6 @@ macro_rules! normal_remarks {
                 /// Relative radius in this direction.
                 radius_mm: f64 = 460.0,
             }
-            code: "patch-large",
-            severity: Warning,
             advice: "Check the units of load and radii: bodies are like half-spaces only if the half width is below a third of the radius.",
             detail: format!(
                 "the patch has a half width of {} mm in the {direction} direction, compared with a radius of {radius_mm} mm",
@@ -125,14 +109,12 @@ macro_rules! normal_remarks {
             ),
 
             /// The largest pressure is far beyond what steel bears.
-            PressureImplausible {
+            Warning PressureImplausible {
                 /// Largest pressure.
                 pressure_max_mpa: f64 = 8100.0,
                 /// The largest that passes without a remark.
                 usual_max_mpa: f64 = 5000.0,
             }
-            code: "pressure-implausible",
-            severity: Warning,
             advice: "Check the units of load and geometry. If they are right, the bodies yield and the pressure is lower than the answer says.",
             detail: format!(
                 "the largest pressure is {} MPa, more than {usual_max_mpa} MPa: bodies of steel would yield",
@@ -140,26 +122,22 @@ macro_rules! normal_remarks {
             ),
 
             /// A length of the track or the wheelset would be usual in another unit than mm.
-            LengthUnusual {
+            Warning LengthUnusual {
                 /// The length as given.
                 length_mm: f64 = 1.435,
                 /// The unit in which it would be usual.
                 unit: &'static str = "m",
             }
-            code: "length-unusual",
-            severity: Warning,
             advice: "Check its unit: lengths are in mm.",
             detail: format!("{length_mm} mm is unusual here and would be usual in {unit}: lengths are in mm"),
 
             /// The largest pressure is above the shakedown limit of rail steel.
-            PressureAboveShakedown {
+            Info PressureAboveShakedown {
                 /// Largest pressure.
                 pressure_max_mpa: f64 = 1900.0,
                 /// The shakedown limit.
                 shakedown_limit_mpa: f64 = 1500.0,
             }
-            code: "pressure-above-shakedown",
-            severity: Info,
             advice: "The answer is elastic. Harder steel has a higher limit; traction lowers it.",
             detail: format!(
                 "the largest pressure of {pressure_max_mpa:.0} MPa is above {shakedown_limit_mpa} MPa, the shakedown limit of rail steel R260 in \
@@ -167,14 +145,12 @@ macro_rules! normal_remarks {
             ),
 
             /// The load is larger than any wheel bears.
-            LoadImplausible {
+            Warning LoadImplausible {
                 /// Normal force of all patches.
                 normal_force_n: f64 = 1e12,
                 /// The largest that passes without a remark.
                 usual_max_n: f64 = 1e7,
             }
-            code: "load-implausible",
-            severity: Warning,
             advice: "Check its unit: forces are in N.",
             detail: format!("the normal force is {} N, more than {usual_max_n:e} N", short(normal_force_n)),
         }
@@ -190,19 +166,17 @@ macro_rules! case_remarks {
             $($before)*
 
             /// The friction coefficient is larger than is usual.
-            FrictionUnusual {
+            Warning FrictionUnusual {
                 /// The coefficient given.
                 coefficient: f64 = 1.5,
                 /// The largest that passes without a remark.
                 usual_max: f64 = 1.0,
             }
-            code: "friction-unusual",
-            severity: Warning,
             advice: "Check `friction.coefficient`: dry steel has about 0.3 to 0.6.",
             detail: format!("the friction coefficient {coefficient} is more than {usual_max}"),
 
             /// A number is unusual for wheel and rail, but usual in another unit.
-            UnitSuspected {
+            Warning UnitSuspected {
                 /// The number given.
                 given: f64 = 75.0,
                 /// The unit that it is taken in.
@@ -210,18 +184,14 @@ macro_rules! case_remarks {
                 /// The unit that it is likely given in.
                 likely_unit: String = "kN".to_owned(),
             }
-            code: "unit-suspected",
-            severity: Warning,
             advice: "Check the unit of the member that `pointer` names; if the number is meant as it stands, nothing is wrong.",
             detail: format!("{given} {unit} is unusual for wheel and rail: is it given in {likely_unit}?"),
 
             /// The two bodies differ. Their materials are combined, but pressure and traction are solved one after the other.
-            CouplingNeglected {
+            Warning CouplingNeglected {
                 /// Difference parameter K (Kalker 1990, eq. 1.44).
                 difference_parameter: f64 = 0.021,
             }
-            code: "coupling-neglected",
-            severity: Warning,
             advice: "Expect errors of the order of K in tractions, or take `boundary_element`, which couples them.",
             detail: format!(
                 "the two bodies differ (K = {}); the coupling of pressure and traction is neglected",
@@ -229,14 +199,12 @@ macro_rules! case_remarks {
             ),
 
             /// The two bodies differ. Tractions follow from the pressure, but the pressure is that without tractions.
-            CouplingFirstOrder {
+            Warning CouplingFirstOrder {
                 /// Difference parameter K (Kalker 1990, eq. 1.44).
                 difference_parameter: f64 = 0.1,
                 /// Error of forces that this leaves, relative to the friction limit; it is part of the error estimates.
                 error: f64 = 0.018,
             }
-            code: "coupling-first-order",
-            severity: Warning,
             advice: "The error is part of the estimates. Steady motions also include the effect of tractions on pressure, but for those whose tractions part or join patches.",
             detail: format!(
                 "the two bodies differ (K = {}); the effect of pressure on tractions is included, the effect of tractions on \
@@ -257,14 +225,12 @@ macro_rules! wheel_remarks {
             $($before)*
 
             /// The contact is on the tip of the flange, as on a wheel that climbs or has derailed.
-            ContactOnFlangeTip {
+            Warning ContactOnFlangeTip {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// Where on the profile, from and to.
                 y_mm: [f64; 2] = [-58.0, -52.0],
             }
-            code: "contact-on-flange-tip",
-            severity: Warning,
             advice: "Check lateral shift, gauge, flange-back distance and position.",
             detail: format!(
                 "the contact at y {:.1} to {:.1} mm of the {profile} is on the tip of its flange, as on a wheel that climbs or has derailed: check lateral \
@@ -272,7 +238,7 @@ macro_rules! wheel_remarks {
             ),
 
             /// The contact is near the end of a profile, so that part of it may be cut off.
-            ContactAtProfileEnd {
+            Warning ContactAtProfileEnd {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// Where on the profile, from and to.
@@ -280,8 +246,6 @@ macro_rules! wheel_remarks {
                 /// What is left of the profile beyond the contact.
                 left_mm: f64 = 2.0,
             }
-            code: "contact-at-profile-end",
-            severity: Warning,
             advice: "Check lateral shift and gauge, or send at least 5 mm of profile beyond the contact.",
             detail: format!(
                 "the contact at y {:.1} to {:.1} mm of the {profile} is {} mm from the end of its profile: check lateral shift and gauge, or send \
@@ -289,14 +253,12 @@ macro_rules! wheel_remarks {
             ),
 
             /// The target is smaller than the uncertainty that the measurement of the profiles leaves: a finer solve adds nothing.
-            TargetBelowProfileUncertainty {
+            Info TargetBelowProfileUncertainty {
                 /// The target, relative to μN.
                 target: f64 = 1e-3,
                 /// Uncertainty of the forces that the profiles leave, relative to μN.
                 uncertainty: f64 = 0.02,
             }
-            code: "target-below-profile-uncertainty",
-            severity: Info,
             advice: "A better measurement reduces the uncertainty; a smaller target does not.",
             detail: format!(
                 "the profiles leave forces uncertain by {} % of μN, more than the target of {} %",
@@ -304,24 +266,20 @@ macro_rules! wheel_remarks {
             ),
 
             /// The case does not ask for a reference surface, and the curve of the rail does not solve it: it is solved on planes of contact.
-            OnPlanes {
+            Warning OnPlanes {
                 /// Why.
                 reason: String = "only boundary_element is solved on the curve of the rail".to_owned(),
             }
-            code: "on-planes",
-            severity: Warning,
             advice: "Expect larger errors than the error estimate where the rail bends under a patch: 15 % of μN at a gauge corner. Give `reference_surface` \"plane\" to solve on planes without this remark.",
             detail: format!("solved on planes of contact: {reason}"),
 
             /// The surface turns over the contact by more than the factors of the influence are known for.
-            TurnBeyondRange {
+            Info TurnBeyondRange {
                 /// Turn of the rail's surface from one end of the contact to the other.
                 turn_rad: f64 = 1.4,
                 /// Turn up to which the factors were compared with boundary elements.
                 range_rad: f64 = 1.25,
             }
-            code: "turn-beyond-range",
-            severity: Info,
             advice: "Take the forces as approximate: the influence between the ends of the contact is extrapolated, and the rail head is no half-space there.",
             detail: format!(
                 "the surface turns by {} rad over the contact; the influence between its ends is known up to {range_rad} rad",
@@ -329,19 +287,15 @@ macro_rules! wheel_remarks {
             ),
 
             /// The tractions of a motion in a list change the number of patches, or leave no answer; its pressures are those without tractions.
-            NormalForcesAloneBalance {}
-            code: "normal-forces-alone-balance",
-            severity: Warning,
+            Warning NormalForcesAloneBalance {}
             advice: "Ask for the motion in a case of its own if its tractions should change the pressures, and its friction forces be included in the vertical balance.",
             detail: "the tractions of this motion change the number of patches, of which an answer to several motions has one list, or leave no answer: its pressures are                      those without tractions, and normal forces alone balance the load".to_owned(),
 
             /// A history under a vertical force has the pressures that belong to its last point.
-            PressuresOfLastPoint {
+            Info PressuresOfLastPoint {
                 /// The largest difference of the vertical force of a point to that of the last one, relative to it.
                 part: f64 = 0.12,
             }
-            code: "pressures-of-last-point",
-            severity: Info,
             advice: "Compare `total.force_z_n` of the points with the load; end the history where the forces are needed, or give `normal_force_n`.",
             detail: format!(
                 "all points of a history have the pressures that belong to its last one, at which the vertical force is met; at others friction changes it by up to {} %,                  which the error estimates of their forces contain",

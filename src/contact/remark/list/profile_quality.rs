@@ -8,24 +8,20 @@ macro_rules! profile_remarks {
             $($before)*
 
             /// The shape of a profile shows that its z is positive upward; z was mirrored.
-            ProfileZMirrored {
+            Info ProfileZMirrored {
                 /// Whose.
                 profile: &'static str = "rail",
             }
-            code: "profile-z-mirrored",
-            severity: Info,
             advice: "Give `mirror_z` to decide this yourself.",
             detail: format!("{profile}: z was recognised as positive upward and has been mirrored"),
 
             /// The flange of a wheel lies at the other end of its y than usual for the format; the sense of y was taken from the flange.
-            ProfileYMirrored {
+            Info ProfileYMirrored {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// Whether y grows toward the flange (`positive`) or away from it (`negative`).
                 flange: &'static str = "positive",
             }
-            code: "profile-y-mirrored",
-            severity: Info,
             advice: "Give `mirror_y` to decide this yourself.",
             detail: if *flange == "positive" {
                 format!("{profile}: the flange was found at the positive end of y, so y has been mirrored (mirror_y: true)")
@@ -37,7 +33,7 @@ macro_rules! profile_remarks {
             },
 
             /// A stated sense of y or z contradicts the shape of the profile.
-            ProfileSenseContradicted {
+            Warning ProfileSenseContradicted {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// The member that states it.
@@ -45,29 +41,25 @@ macro_rules! profile_remarks {
                 /// Its value.
                 given: &'static str = "true",
             }
-            code: "profile-sense-contradicted",
-            severity: Warning,
             advice: "Leave out `mirror_y` or `mirror_z`, or check what was measured. The case is solved as stated.",
             detail: format!(
                 "{profile}: {member}: {given} is stated, but the shape of the points shows the opposite; the case is solved as stated"
             ),
 
             /// `flange_back_position_mm` was left out, and the back of the flange was found in the points of the wheel.
-            FlangeBackFound {
+            Info FlangeBackFound {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// y of the back.
                 position_mm: f64 = 0.0,
             }
-            code: "flange-back-found",
-            severity: Info,
             advice: "Give `flange_back_position_mm` to decide this yourself.",
             detail: format!(
                 "{profile}: flange_back_position_mm was left out; the back of the flange was found at y = {position_mm:.2} mm and has been used"
             ),
 
             /// The stated position of the back of a flange differs from that in the points of the wheel.
-            FlangeBackContradicted {
+            Warning FlangeBackContradicted {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// The stated position.
@@ -75,8 +67,6 @@ macro_rules! profile_remarks {
                 /// y of the back in the points.
                 found_mm: f64 = -70.0,
             }
-            code: "flange-back-contradicted",
-            severity: Warning,
             advice: "Leave out `flange_back_position_mm`, or check it. The case is solved as stated.",
             detail: format!(
                 "{profile}: flange_back_position_mm: {given_mm} is stated, but the back of the flange was found at y = {found_mm:.2} mm; the case is \
@@ -84,7 +74,7 @@ macro_rules! profile_remarks {
             ),
 
             /// The header of a profile file states another number of points than the file has, commented-out rows included.
-            ProfileCountDiffers {
+            Warning ProfileCountDiffers {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Points by the header.
@@ -92,13 +82,11 @@ macro_rules! profile_remarks {
                 /// Rows that were read.
                 found: usize = 83,
             }
-            code: "profile-count-differs",
-            severity: Warning,
             advice: "Nothing if the file was edited by hand; otherwise check that it is complete.",
             detail: format!("{profile}: {found} points were read, while the header of the file states {stated}"),
 
             /// Rows of numbers above the points of a profile file were read as a part of its header.
-            ProfileHeaderRows {
+            Info ProfileHeaderRows {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// Rows of numbers in the header.
@@ -106,13 +94,11 @@ macro_rules! profile_remarks {
                 /// Line of the first.
                 line: usize = 7,
             }
-            code: "profile-header-rows",
-            severity: Info,
             advice: "Nothing if these rows are no points: old files state dimensions of the wheel there.",
             detail: format!("{profile}: rows of numbers above the points ({count}, the first in line {line}) were read as a part of the header"),
 
             /// The case states another unit for a profile than its file does; the case was followed.
-            ProfileUnitDiffers {
+            Warning ProfileUnitDiffers {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Length of the stated unit.
@@ -120,13 +106,11 @@ macro_rules! profile_remarks {
                 /// Length of the unit that the file names.
                 file_mm: f64 = 1000.0,
             }
-            code: "profile-unit-differs",
-            severity: Warning,
             advice: "Leave `unit` out to use the unit of the file.",
             detail: format!("{profile}: unit states {stated_mm} mm per unit of length, while the file states {file_mm} mm; unit was used"),
 
             /// A profile has a usual size only if its numbers are in another unit.
-            ProfileSizeUnusual {
+            Warning ProfileSizeUnusual {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Its width.
@@ -134,13 +118,11 @@ macro_rules! profile_remarks {
                 /// The unit in which its width would be usual.
                 unit: &'static str = "cm",
             }
-            code: "profile-size-unusual",
-            severity: Warning,
             advice: "State `unit` of the cross-section if its numbers are not in mm; models of a reduced scale need nothing.",
             detail: format!("{profile}: the profile is {width_mm} mm wide; if its numbers are in {unit}, state unit: \"{unit}\"", width_mm = short(width_mm)),
 
             /// Points of a profile that lie nearly at the same place were merged.
-            ProfilePointsMerged {
+            Info ProfilePointsMerged {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Points left out.
@@ -148,25 +130,21 @@ macro_rules! profile_remarks {
                 /// Points nearer than this are one.
                 nearer_than_mm: f64 = 0.001,
             }
-            code: "profile-points-merged",
-            severity: Info,
             advice: "Nothing: files that repeat points at the joints of arcs are common.",
             detail: format!("{profile}: {count} points less than {nearer_than_mm} mm from another one were merged with it"),
 
             /// Points of a profile that ran back between their neighbours were dropped.
-            ProfilePointsDropped {
+            Warning ProfilePointsDropped {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Points left out.
                 count: usize = 2,
             }
-            code: "profile-points-dropped",
-            severity: Warning,
             advice: "Check the measurement where pieces are joined.",
             detail: format!("{profile}: {count} points that ran back (zig-zag) were dropped"),
 
             /// One or two points at an end of a profile, far from all others, were dropped.
-            ProfileEndDropped {
+            Info ProfileEndDropped {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// Points left out.
@@ -174,32 +152,26 @@ macro_rules! profile_remarks {
                 /// Their distance from the next point.
                 distance_mm: f64 = 67.0,
             }
-            code: "profile-end-dropped",
-            severity: Info,
             advice: "Nothing if the profile ends there; otherwise check the file.",
             detail: format!("{profile}: {count} stray points at an end, {distance_mm} mm from the next one, were dropped", distance_mm = short(distance_mm)),
 
             /// A profile has the shape of the other body.
-            ProfileOfOtherBody {
+            Warning ProfileOfOtherBody {
                 /// Which.
                 profile: &'static str = "rail",
                 /// What it looks like.
                 like: &'static str = "a wheel with its flange",
             }
-            code: "profile-of-other-body",
-            severity: Warning,
             advice: "Check that rail and wheel were not exchanged. If each looks like the other, the case is refused.",
             detail: format!("the profile given as {profile} looks like {like}; were rail and wheel exchanged?"),
 
             /// The smoothing of a profile was chosen from its noise and the pressure, as the case asked for.
-            SmoothingChosen {
+            Info SmoothingChosen {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Cut wavelength; 0 for none.
                 smoothing_mm: f64 = 3.4,
             }
-            code: "smoothing-chosen",
-            severity: Info,
             advice: "Nothing; give `smoothing_mm` as a number to use the same for other cases.",
             detail: if *smoothing_mm > 0.0 {
                 format!("{profile}: smoothed by {smoothing_mm} mm, chosen from the noise of its points", smoothing_mm = short(smoothing_mm))
@@ -208,14 +180,12 @@ macro_rules! profile_remarks {
             },
 
             /// The points of a profile are too few or too far apart to tell their noise from its shape, so that `smoothing_mm: "auto"` chose no smoothing.
-            SmoothingUndecided {
+            Warning SmoothingUndecided {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Median distance of its points.
                 spacing_mm: f64 = 4.0,
             }
-            code: "smoothing-undecided",
-            severity: Warning,
             advice: "Send points that lie nearer to each other, 0.25 mm at gauge corner and flange, or give `smoothing_mm` as a number.",
             detail: format!(
                 "{profile}: with points {spacing_mm} mm apart noise cannot be told from shape, so no smoothing was chosen and none is used",
@@ -223,7 +193,7 @@ macro_rules! profile_remarks {
             ),
 
             /// One point of a profile near the contact, or a few neighbours, are off the curve of the points on both sides.
-            ProfileOutlier {
+            Warning ProfileOutlier {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Place on the profile of the point farthest off.
@@ -239,8 +209,6 @@ macro_rules! profile_remarks {
                 /// That of both profiles over the largest pressure.
                 share: f64 = 0.4,
             }
-            code: "profile-outlier",
-            severity: Warning,
             advice: "Remove or correct the points; smoothing only spreads their error.",
             detail: if *points == 1 {
                 format!(
@@ -259,7 +227,7 @@ macro_rules! profile_remarks {
             },
 
             /// A profile jumps between two points near the contact.
-            ProfileStep {
+            Warning ProfileStep {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Where on the profile.
@@ -271,8 +239,6 @@ macro_rules! profile_remarks {
                 /// That of both profiles over the largest pressure.
                 share: f64 = 0.4,
             }
-            code: "profile-step",
-            severity: Warning,
             advice: "Measure this part again, or join the pieces better: smoothing does not remove a step, and forces are wrong as well.",
             detail: format!(
                 "the {profile}'s points jump by {} µm at y = {at_y_mm:.2} mm, equivalent to {waviness_mpa} MPa of contact pressure: smoothing does \
@@ -281,7 +247,7 @@ macro_rules! profile_remarks {
             ),
 
             /// The points of a profile lie on straight chords between fewer points, as linear resampling leaves them.
-            ProfilePolygon {
+            Warning ProfilePolygon {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Where on the profile, from and to.
@@ -295,8 +261,6 @@ macro_rules! profile_remarks {
                 /// Smoothing that is advised.
                 smoothing_mm: Option<f64> = Some(2.5),
             }
-            code: "profile-polygon",
-            severity: Warning,
             advice: "Send the points as measured, without resampling, or give the `smoothing_mm` named here.",
             detail: format!(
                 "the {profile}'s points under the patch (y {:.1} to {:.1} mm) lie on straight chords of {chord_mm} mm, as linear resampling leaves \
@@ -308,7 +272,7 @@ macro_rules! profile_remarks {
             ),
 
             /// Noise of the points of a profile, from the measurement or from rounding, changes the pressure considerably.
-            ProfileNoise {
+            Warning ProfileNoise {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Where on the profile, from and to.
@@ -326,8 +290,6 @@ macro_rules! profile_remarks {
                 /// Smoothing that is advised.
                 smoothing_mm: Option<f64> = Some(4.0),
             }
-            code: "profile-noise",
-            severity: Warning,
             advice: "Give the `smoothing_mm` named here, or `\"auto\"`; send points with more decimals where they were rounded.",
             detail: format!(
                 "noise of {noise_um} µm{} at points {spacing_mm} mm apart makes waves on the {profile} (y {:.1} to {:.1} mm) equivalent \
@@ -341,7 +303,7 @@ macro_rules! profile_remarks {
             ),
 
             /// Waves of a profile that are neither noise nor a single fault change the pressure considerably.
-            ProfileWaves {
+            Warning ProfileWaves {
                 /// Whose.
                 profile: &'static str = "wheel",
                 /// Where on the profile, from and to.
@@ -353,8 +315,6 @@ macro_rules! profile_remarks {
                 /// That of both profiles over the largest pressure.
                 share: f64 = 0.17,
             }
-            code: "profile-waves",
-            severity: Warning,
             advice: "If they come from the measurement, remove them with a `smoothing_mm` of about their length; waves that are really there belong to the answer.",
             detail: format!(
                 "waves on the {profile} shorter than {shorter_than_mm} mm (y {:.1} to {:.1} mm) are equivalent to {waviness_mpa} MPa of \
@@ -364,7 +324,7 @@ macro_rules! profile_remarks {
             ),
 
             /// The points of a profile under the contact are so far apart that the curve between them is uncertain.
-            ProfileSpacing {
+            Warning ProfileSpacing {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// The widest distance of neighbouring points, from and to.
@@ -376,8 +336,6 @@ macro_rules! profile_remarks {
                 /// Pressure that flattens the difference of two curves through the points.
                 ambiguity_mpa: f64 = 400.0,
             }
-            code: "profile-spacing",
-            severity: Warning,
             advice: "Send points 0.5 mm apart on the tread, 0.25 mm at gauge corner and flange.",
             detail: format!(
                 "the {profile}'s points are {spacing_mm} mm apart where it touches (y {:.1} to {:.1} mm), {spacing_over_width} times the width of the \
@@ -388,7 +346,7 @@ macro_rules! profile_remarks {
             ),
 
             /// A profile has a stretch without points near the contact over which the bodies may touch as well.
-            ProfileHole {
+            Warning ProfileHole {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// The stretch, from and to.
@@ -396,8 +354,6 @@ macro_rules! profile_remarks {
                 /// Its length.
                 hole_mm: f64 = 50.0,
             }
-            code: "profile-hole",
-            severity: Warning,
             advice: "Send the points there: the contact may be elsewhere than found.",
             detail: format!(
                 "the {profile} has no points from y {:.1} to {:.1} mm ({hole_mm} mm), where the bodies may touch: the contact may be elsewhere than \

@@ -89,19 +89,12 @@ impl LevelRun<'_> {
     pub(super) fn record(&mut self, of: &StepEquations) -> PointRecord {
         let level = self.level;
         let slip = self.workspace.slip();
-        let cells = of.newton.cells();
-        let slides: Vec<f64> = (0..cells)
-            .map(|i| of.newton.slips(&self.bound, &self.state.tractions, slip, i))
-            .map(|slips| f64::from(u8::from(slips)))
-            .collect();
-        let slides = match self.parity {
-            Some(_) => level.unfold(&slides, 1.0),
-            None => slides,
-        };
-        let slips: Vec<bool> = slides.into_iter().map(|slips| slips > 0.5).collect();
+        let tractions = &self.state.tractions;
+        let slips = of.newton.zones(&self.bound, tractions, slip, level);
         let mut traction = self.expand(&self.state.tractions);
         let mut slip = self.expand(slip);
-        slip = project_on_bound(&self.bounds_of_mesh(), &slips, &mut traction, &slip);
+        let bound = level.whole(self.parity, &self.bound);
+        slip = project_on_bound(&bound, &slips, &mut traction, &slip);
         let scale = level.scale;
         let motion = self.state.motion;
         let (shifted, motion) = match of.kind {
@@ -128,14 +121,6 @@ impl LevelRun<'_> {
             slips,
             saturated: std::mem::take(&mut self.state.saturated),
             work: std::mem::take(&mut self.state.work),
-        }
-    }
-
-    /// Bounds of the last step over the whole mesh.
-    fn bounds_of_mesh(&self) -> Vec<f64> {
-        match self.parity {
-            Some(_) => self.level.unfold(&self.bound, 1.0),
-            None => self.bound[..self.level.mesh.cells()].to_vec(),
         }
     }
 

@@ -1,9 +1,8 @@
 //! A history on one level: step by step, with the displacements that each step remembers.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use crate::contact::friction::law::AlongLaw;
+use crate::contact::friction::coefficient_table::CoefficientTable;
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::strip_operator::kind::Parity;
 use crate::contact::half_space::strip_operator::operator::StripOperator;
@@ -16,9 +15,7 @@ use crate::contact::rolling::history::plan::{
     HistoryStep, HistoryTask, PointRecord, StepEquations, StepKind, memory, steady, steps, weights,
 };
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::{
-    Convergence, NewtonTask, STEPS_MAX,
-};
+use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::contact::rolling::slip_rules::Rule;
@@ -153,7 +150,9 @@ impl<'a> LevelRun<'a> {
             if let (Some(friction), StepKind::Roll { .. }) = (&mut self.slip_friction, kind) {
                 friction.damp(&gain, equations.memory_factor() / level.scale.length);
             }
-            let newton = self.newton(kind, &equations).far_reaching(&gain);
+            let newton = Newton::new(&equations)
+                .falling(&self.bound, self.fall(kind))
+                .far_reaching(&gain);
             let of = StepEquations {
                 kind,
                 equations: &equations,
@@ -161,9 +160,8 @@ impl<'a> LevelRun<'a> {
             };
             let mut search = self.search(kind);
             for step in alike {
-                if let ControlFlow::Break(stop) = self.monitor.tick(done / steps.len() as f64) {
-                    return Err((step.point, stop.into()));
-                }
+                let watched = self.monitor.go_on(done / steps.len() as f64);
+                watched.map_err(|stop| (step.point, stop.into()))?;
                 done += 1.0;
                 self.step(&of, step, &mut search)
                     .map_err(|failure| (step.point, failure))?;
@@ -271,21 +269,11 @@ impl<'a> LevelRun<'a> {
             let shift = if step.last { shift } else { Motion::default() };
             let shift = scale.motion(&shift);
             let length = scale.length;
-            return (
-                Motion {
-                    creepage_x: shift.creepage_x / length,
-                    creepage_y: shift.creepage_y / length,
-                    spin_per_mm: shift.spin_per_mm / length,
-                },
-                self.task.forces[point],
-            );
+            let shift = Motion::of(shift.components().map(|part| part / length));
+            return (shift, self.task.forces[point]);
         }
-        let (from, to) = (&motions[before], &motions[point]);
-        let motion = Motion {
-            creepage_x: between(from.creepage_x, to.creepage_x),
-            creepage_y: between(from.creepage_y, to.creepage_y),
-            spin_per_mm: between(from.spin_per_mm, to.spin_per_mm),
-        };
+        let [from, to] = [before, point].map(|k| motions[k].components());
+        let motion = Motion::of([0, 1, 2].map(|k| between(from[k], to[k])));
         (scale.motion(&motion), forces)
     }
 
@@ -334,14 +322,14 @@ impl<'a> LevelRun<'a> {
         let mut report = of
             .newton
             .solve(&law, &mut tractions, self.workspace, self.monitor)?;
-        let mut work = count(&report, of.newton);
+        let mut work = of.newton.work(&report);
         if !report.exit.converged() {
             // Try again without a start, which may be why the iteration did not converge.
             tractions.fill(0.0);
             report = of
                 .newton
                 .solve(&law, &mut tractions, self.workspace, self.monitor)?;
-            work.add(count(&report, of.newton));
+            work.add(of.newton.work(&report));
         }
         self.state.work.add(work);
         if !report.exit.converged() {
@@ -389,26 +377,16 @@ impl<'a> LevelRun<'a> {
 
 /// A motion that has every component that any motion or shift of a history has.
 fn every_motion(task: &RollingTask, history: &HistoryTask) -> Motion {
-    let mut every = Motion::default();
+    let mut every = [0.0; 3];
     for motion in task.motions.iter().chain(&history.shifts) {
-        every.creepage_x += motion.creepage_x.abs();
-        every.creepage_y += motion.creepage_y.abs();
-        every.spin_per_mm += motion.spin_per_mm.abs();
+        let parts = every.iter_mut().zip(motion.components());
+        parts.for_each(|(every, part)| *every += part.abs());
     }
     for forces in task.forces {
-        every.creepage_x += f64::from(u8::from(forces[0].is_some()));
-        every.creepage_y += f64::from(u8::from(forces[1].is_some()));
+        let parts = every.iter_mut().zip(forces);
+        parts.for_each(|(every, force)| *every += f64::from(u8::from(force.is_some())));
     }
-    every
-}
-
-fn count(report: &Convergence, newton: &Newton) -> Work {
-    Work {
-        iterations: report.iterations,
-        products: report.products,
-        entries: u64::from(report.products) * newton.entries() as u64,
-        residual: report.residual,
-    }
+    Motion::of(every)
 }
 
 /// Distance in which bounds follow slips, over that above which disturbances die away; the weight of a step's own displacements, 1.5, counts
@@ -482,7 +460,7 @@ impl SlipFriction {
 
 /// What the bounds of the cells are taken from.
 pub(super) struct TrackFriction {
-    law: AlongLaw,
+    law: CoefficientTable,
     /// Trailing and leading edge of each cell with unknowns in mm, when nothing has been rolled over.
     cells: Vec<[f64; 2]>,
     /// Bounds with the largest coefficient.
@@ -492,7 +470,12 @@ pub(super) struct TrackFriction {
 impl TrackFriction {
     /// The friction of a track under the first cells of a mesh in mm, as many as have unknowns, which would have these bounds with the
     /// largest coefficient everywhere.
-    pub(super) fn new(law: &AlongLaw, mesh: &Mesh, cells: usize, largest: &[f64]) -> TrackFriction {
+    pub(super) fn new(
+        law: &CoefficientTable,
+        mesh: &Mesh,
+        cells: usize,
+        largest: &[f64],
+    ) -> TrackFriction {
         let edges = mesh.left.iter().zip(&mesh.right).take(cells);
         TrackFriction {
             law: law.clone(),
@@ -506,7 +489,7 @@ impl TrackFriction {
         let most = self.law.largest();
         let cells = self.cells.iter().zip(&self.largest);
         for (bound, ([left, right], largest)) in bounds.iter_mut().zip(cells) {
-            let mean = self.law.mean(left + travelled, right + travelled);
+            let mean = self.law.mean_between(left + travelled, right + travelled);
             *bound = largest * (mean / most);
         }
     }

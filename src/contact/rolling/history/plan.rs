@@ -68,7 +68,6 @@ impl HistoryStep {
 }
 
 /// Weights of a backward difference, over the length of the step: of the displacement at its end, at its beginning, and a step earlier.
-#[must_use]
 pub fn weights(growth: f64) -> [f64; 3] {
     [
         (1.0 + 2.0 * growth) / (1.0 + growth),
@@ -109,7 +108,6 @@ fn rolled(distance: f64, longest: f64, before: Option<f64>) -> Vec<f64> {
 }
 
 /// Steps in a history of these distances, none longer than `longest` mm.
-#[must_use]
 pub fn count(history: &HistoryTask, longest: f64) -> f64 {
     let points = 0..history.distances.len();
     let steps = points.map(|k| (history.rolled(k) / longest).ceil().max(1.0));
@@ -127,7 +125,6 @@ fn begins_with_shift(history: &HistoryTask, forced: bool) -> bool {
 
 /// The steps of a history, none longer than `longest` mm. With `forced`, where a force is prescribed, one that is there at once is
 /// brought up by a shift before the bodies roll.
-#[must_use]
 pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistoryStep> {
     let mut steps = Vec::new();
     let whole = |kind, point| HistoryStep {
@@ -239,7 +236,6 @@ pub struct HistoryTask {
 
 impl HistoryTask {
     /// Is pressing all that is asked for?
-    #[must_use]
     pub fn only_presses(&self) -> bool {
         self.start == HistoryStart::Pressed
             && self.distances == [0.0]
@@ -247,7 +243,6 @@ impl HistoryTask {
     }
 
     /// Distance rolled from the point before to point `index`; 0 of a shift.
-    #[must_use]
     pub fn rolled(&self, index: usize) -> f64 {
         let before = index.checked_sub(1).map_or(0.0, |k| self.distances[k]);
         self.distances[index] - before

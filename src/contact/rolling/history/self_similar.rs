@@ -12,8 +12,6 @@
 //!
 //! How the steps of a run take part in friction that falls with slip.
 
-use std::ops::ControlFlow;
-
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::half_space::kernels::{Rectangle, rectangle};
 use crate::contact::half_space::unlike_bodies::displacement;
@@ -22,8 +20,7 @@ use crate::contact::numerics::interpolation;
 use crate::contact::rolling::answer::LevelFailure;
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan::{PRESS_WEIGHTS, StepEquations, StepKind};
-use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
+use crate::contact::rolling::slip_equations::SlipScratch;
 use crate::contact::rolling::task::Motion;
 
 /// What the displacements of a state depend on, over all cells of a dimensionless mesh.
@@ -279,9 +276,7 @@ impl LevelRun<'_> {
         let mut past: Option<[PressedState; 2]> = None;
         let mut change = f64::INFINITY;
         for step in 0..STEPS_MAX {
-            if let ControlFlow::Break(stop) = self.monitor.tick(0.0) {
-                return Err(stop.into());
-            }
+            self.monitor.go_on(0.0)?;
             let mut source =
                 [0, 1].map(|k| given.iter().map(|u| -PRESS_WEIGHTS[0] * u[k]).collect());
             if let Some(past) = &past {
@@ -382,19 +377,6 @@ impl LevelRun<'_> {
     /// The fall that a step follows at once.
     pub(super) fn fall(&self, kind: StepKind) -> Option<Softening> {
         self.slip_friction.as_ref()?.at_once(kind)
-    }
-
-    /// A solver of such a step.
-    pub(super) fn newton<'e>(
-        &self,
-        kind: StepKind,
-        equations: &'e SlipEquations<'e>,
-    ) -> Newton<'e> {
-        let newton = Newton::new(equations);
-        match self.fall(kind) {
-            Some(fall) => newton.falling(&self.bound, &fall),
-            None => newton,
-        }
     }
 
     /// Lets bounds that fall with slip follow the slips of a step.

@@ -5,7 +5,7 @@ use crate::contact::mesh::MeshSize;
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::remark::kind::short;
 use crate::contact::rolling::answer::{
-    HistoryAnswer, LevelAnswer, LevelOutcome, MotionAnswer, Resultants, SolvedFields, Work,
+    HistoryAnswer, LevelAnswer, MotionAnswer, Resultants, SolvedFields, Work,
 };
 use crate::contact::rolling::history::level_run::LevelRun;
 use crate::contact::rolling::history::plan;
@@ -89,7 +89,6 @@ struct Change {
 }
 
 /// Why a history takes more steps than are allowed, if it does; `extents` are those of the patches.
-#[must_use]
 pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -> Option<String> {
     let half = half_length(extents)?;
     let longest = half / (STEPS_PER_CELL * CELLS_FIRST);
@@ -104,7 +103,6 @@ pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -
 }
 
 /// Number of steps of a history on a mesh with `along` cells along x, and number of cells of a patch. Without `along`, those of the usual finest level.
-#[must_use]
 pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64>) -> (f64, f64) {
     let Some(half) = half_length(extents) else {
         return (history.distances.len() as f64, CELLS_FIRST * CELLS_FIRST);
@@ -119,13 +117,11 @@ pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64
 }
 
 /// Most cells that a target leads to where pressing is all that is asked for.
-#[must_use]
 pub fn pressed_cells_max() -> f64 {
     (CELLS_FIRST * FINER.powi(LEVELS_MAX - 1)).powi(2) / SHAPE_PRESSED
 }
 
 /// Bytes that a pressing keeps on a mesh of so many cells.
-#[must_use]
 pub fn pressed_bytes(cells: f64) -> f64 {
     SelfSimilarState::bytes(cells)
 }
@@ -261,11 +257,6 @@ fn on_level(
     })
 }
 
-fn sum(resultants: &[Resultants]) -> Resultants {
-    let zero = Resultants::default();
-    resultants.iter().fold(zero, |sum, r| sum.plus(*r))
-}
-
 /// The changes from one level to the next; at every point at least those of its neighbours, since what travels through the contact comes
 /// to a point a little earlier or later on another level, and a part of the largest.
 fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> Vec<Change> {
@@ -287,7 +278,8 @@ fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> 
                     length(patch.area),
                 )
             });
-            let all = sum(&a.resultants).distance(&sum(&b.resultants), limit, length(area));
+            let [one, other] = [a, b].map(|point| point.resultants.iter().sum::<Resultants>());
+            let all = one.distance(&other, limit, length(area));
             let apart = |of: fn(&PointRecord) -> [f64; 2]| {
                 let (a, b) = (of(a), of(b));
                 [0, 1].map(|k| (a[k] - b[k]).abs())
@@ -348,12 +340,8 @@ fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> boo
 
 /// A shift extrapolated as resultants are; what was given is the same on both levels.
 fn beyond(fine: &Motion, coarse: &Motion) -> Motion {
-    let past = |fine: f64, coarse: f64| fine + EXTRAPOLATED * (fine - coarse);
-    Motion {
-        creepage_x: past(fine.creepage_x, coarse.creepage_x),
-        creepage_y: past(fine.creepage_y, coarse.creepage_y),
-        spin_per_mm: past(fine.spin_per_mm, coarse.spin_per_mm),
-    }
+    let [fine, coarse] = [fine, coarse].map(Motion::components);
+    Motion::of([0, 1, 2].map(|k| fine[k] + EXTRAPOLATED * (fine[k] - coarse[k])))
 }
 
 /// The answers of the points.
@@ -402,23 +390,17 @@ fn answers(
                     level: solved.level,
                     tangential: LevelAnswer {
                         traction: point.traction,
-                        second: None,
                         slip: point.slip,
                         slips: point.slips,
-                        exit: LevelOutcome::Solved,
                         work,
-                        skips: Vec::new(),
-                        remarks: Vec::new(),
+                        ..LevelAnswer::default()
                     },
                 }),
                 resultants: extrapolated.collect(),
-                stick: None,
-                gradients: None,
-                skips: Vec::new(),
-                remarks: Vec::new(),
                 work,
                 method: task.method,
                 seconds,
+                ..MotionAnswer::default()
             }
         })
         .collect()

@@ -16,7 +16,7 @@ use crate::contact::method::{Method, TractionBound};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::normal::hertz::{Ellipse, NormalLoad, Patch};
 use crate::contact::numerics::simd::length;
-use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Work};
+use crate::contact::rolling::answer::{LevelAnswer, Work};
 use crate::contact::rolling::linear_theory;
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -34,7 +34,6 @@ const SIDE_GOOD: u32 = 8;
 /// The error of the resultants relative to μN (moment: μN√(A/π)) that is stated for every answer of a mesh: the largest
 /// over 62 Hertz contacts with a/b from 0.2 to 5 (median and nine tenths for forces: 0.03 and 0.05 with the elliptic bound,
 /// 0.04 and 0.13 with the parabolic one), and more if a side of the mesh is below 8.
-#[must_use]
 pub fn error_class(bound: TractionBound, mesh: MeshSize) -> f64 {
     let class = match bound {
         TractionBound::Elliptic => 0.12,
@@ -50,7 +49,6 @@ pub fn error_class(bound: TractionBound, mesh: MeshSize) -> f64 {
 /// [`LoadEllipse`](crate::contact::rolling::load_ellipse::LoadEllipse)), and creepages about its load centre; for an ellipse that is the
 /// ellipse. Slips are those of the single flexibility
 /// `(L1|ν_x| + L2|ν_y| + L3|φ|c)/√(ν_x² + ν_y² + φ²c²)`. Tractions with the parabolic bound exceed μp in the middle of a patch.
-#[must_use]
 pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAnswer {
     let parabolic = task.traction_bound == TractionBound::Parabolic;
     if !parabolic && let Some(answer) = full_slip::rigid_answer(level, motion) {
@@ -59,16 +57,13 @@ pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAns
     let cells = level.mesh.cells();
     let mut answer = LevelAnswer {
         traction: [vec![0.0; cells], vec![0.0; cells]],
-        second: None,
         slip: [vec![0.0; cells], vec![0.0; cells]],
         slips: vec![false; cells],
-        exit: LevelOutcome::Solved,
         work: Work {
             iterations: 1,
             ..Work::default()
         },
-        skips: Vec::new(),
-        remarks: Vec::new(),
+        ..LevelAnswer::default()
     };
     let mut bound = level.bound.clone();
     for (p, brush) in brushes(task, level, motion).enumerate() {
@@ -89,7 +84,6 @@ pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAns
 }
 
 /// The tractions of [`solve`] alone, with the elliptic bound.
-#[must_use]
 pub fn tractions(task: &RollingTask, level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
     let cells = level.mesh.cells();
     let mut found = [vec![0.0; cells], vec![0.0; cells]];
@@ -166,17 +160,11 @@ impl EllipseMesh {
     }
 
     /// `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` and the share that sticks, of the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)`.
-    #[must_use]
     pub fn creep(&self, a_over_b: f64, poisson_ratio: f64, creepage: [f64; 3]) -> ([f64; 3], f64) {
         if creepage == [0.0; 3] {
             return ([0.0; 3], 1.0);
         }
-        let [creepage_x, creepage_y, spin_per_mm] = creepage.map(|part| PER_LIMIT * part);
-        let motion = Motion {
-            creepage_x,
-            creepage_y,
-            spin_per_mm,
-        };
+        let motion = Motion::of(creepage.map(|part| PER_LIMIT * part));
         let (a, b) = (a_over_b.sqrt(), 1.0 / a_over_b.sqrt());
         let ellipse = EquivalentEllipse {
             centre: [0.0; 2],

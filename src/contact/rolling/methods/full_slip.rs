@@ -1,7 +1,7 @@
 //! States that need no Newton iteration: nothing slips because nothing moves, or everything slips.
 
 use crate::contact::numerics::simd::length;
-use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Skip, Work};
+use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Skip};
 use crate::contact::rolling::strip_mesh::StripMesh;
 use crate::contact::rolling::task::Motion;
 
@@ -46,13 +46,12 @@ fn along(level: &StripMesh, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
 
 /// The answer where the rigid slip alone decides: no motion, or a rigid slip so large that elastic slip cannot turn the tractions
 /// (relative change below 1e-6).
-#[must_use]
 pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
     let cells = level.mesh.cells();
     let slip = rigid_slip(level, motion);
     let sizes = slip[0].iter().zip(&slip[1]).map(|(x, y)| length(*x, *y));
     let smallest = sizes.fold(f64::INFINITY, f64::min);
-    let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
+    let still = motion.is_still();
     let (exit, skip) = if still {
         (LevelOutcome::NoMotion, Skip::NoMotion)
     } else if smallest > ELASTIC_SLIP_MAX * NEGLIGIBLE && !pole_inside(level, motion) {
@@ -63,25 +62,21 @@ pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
     let traction = along(level, &slip);
     Some(LevelAnswer {
         traction,
-        second: None,
         slips: vec![!still; cells],
         slip,
         exit,
-        work: Work::default(),
         skips: vec![skip],
-        remarks: Vec::new(),
+        ..LevelAnswer::default()
     })
 }
 
 /// Without friction there are no tractions, and the slip is the rigid one.
-#[must_use]
 pub fn frictionless_answer(level: &StripMesh, motion: &Motion) -> LevelAnswer {
     let cells = level.mesh.cells();
     let load_y = level.mesh.cell_load_y();
-    let still = motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0;
+    let still = motion.is_still();
     LevelAnswer {
         traction: [vec![0.0; cells], vec![0.0; cells]],
-        second: None,
         slip: [
             load_y
                 .iter()
@@ -96,9 +91,8 @@ pub fn frictionless_answer(level: &StripMesh, motion: &Motion) -> LevelAnswer {
         ],
         slips: vec![!still; cells],
         exit: LevelOutcome::NoFriction,
-        work: Work::default(),
         skips: vec![Skip::NoFriction],
-        remarks: Vec::new(),
+        ..LevelAnswer::default()
     }
 }
 

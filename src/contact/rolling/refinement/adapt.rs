@@ -228,7 +228,6 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
         };
         MotionAnswer {
             motion: self.asked.motion,
-            saturated: false,
             resultants: estimate.resultants,
             errors: estimate.errors,
             skips: std::mem::take(&mut tangential.skips),
@@ -237,12 +236,10 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
                 level: number,
                 tangential,
             }),
-            stick: None,
-            gradients: None,
-            history: None,
             work: self.work,
             method: self.task.method,
             seconds: self.monitor.elapsed().as_secs_f64() - self.began,
+            ..MotionAnswer::default()
         }
     }
 }

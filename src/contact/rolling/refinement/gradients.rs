@@ -104,13 +104,9 @@ pub(crate) fn slope(values: [f64; 4], step: f64) -> (f64, f64) {
 }
 
 fn moved(motion: Motion, component: usize, step: f64) -> Motion {
-    let mut moved = motion;
-    *[
-        &mut moved.creepage_x,
-        &mut moved.creepage_y,
-        &mut moved.spin_per_mm,
-    ][component] += step;
-    moved
+    let mut moved = motion.components();
+    moved[component] += step;
+    Motion::of(moved)
 }
 
 fn numbers(resultants: Resultants) -> [f64; 3] {

@@ -37,7 +37,6 @@ pub(crate) fn prolonged(
 /// linearly in y between the coarse strips of the same patch. Cells beyond the outermost strip take its value.
 ///
 /// The result is only a first iterate: a segment without counterpart takes the values of the nearest segment of the patch.
-#[must_use]
 pub fn interpolate(coarse: &Mesh, values: &[f64], fine: &Mesh) -> Vec<f64> {
     let mut out = vec![0.0; fine.cells()];
     for segment in &fine.segments {
@@ -120,7 +119,6 @@ pub struct Levels<'a> {
 
 impl<'a> Levels<'a> {
     /// No levels yet; their operators come from a store.
-    #[must_use]
     pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> Levels<'a> {
         Levels {
             task,
@@ -148,7 +146,6 @@ impl<'a> Levels<'a> {
     }
 
     /// A level by its number; it must have been used since the last [`Levels::trim`].
-    #[must_use]
     pub fn get(&self, level: usize) -> Arc<StripMesh> {
         let found = self.kept.iter().rev().find(|(number, _)| *number == level);
         let Some((_, level)) = found else {
@@ -182,7 +179,6 @@ pub struct RefinementState<'a> {
 
 impl<'a> RefinementState<'a> {
     /// The state before the first motion; operators come from a store.
-    #[must_use]
     pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> RefinementState<'a> {
         RefinementState {
             task,

@@ -48,7 +48,6 @@ impl MeshFamily {
     ///
     /// Factors and exponents of the shape lie on flat optima over 62 Hertz contacts with a/b from 0.2 to 5 and 14 random ellipses with
     /// a/b > 5.
-    #[must_use]
     pub fn of(task: &RollingTask, motion: &Motion) -> MeshFamily {
         let patches = task.footprint.patches();
         let heaviest = patches
@@ -73,7 +72,6 @@ impl MeshFamily {
     }
 
     /// The mesh with approximately `cells` cells per patch and an even number of strips.
-    #[must_use]
     pub fn mesh(&self, cells: f64) -> MeshPlan {
         let strips = (2.0 * (0.5 * (cells / self.shape).sqrt()).round()).max(SIDE_MIN);
         let along = (cells / strips).round().max(SIDE_MIN);
@@ -87,13 +85,11 @@ impl MeshFamily {
     }
 
     /// Cells per patch of the coarsest mesh.
-    #[must_use]
     pub fn cells_first(&self) -> f64 {
         CELLS_FIRST.min(self.cells_max() / 2.0_f64.powi(LEVELS_LEAST - 1))
     }
 
     /// Cells per patch of the finest mesh.
-    #[must_use]
     pub fn cells_max(&self) -> f64 {
         (f64::from(CELLS_MAX) / self.patches).max(PATCH_CELLS_MAX_LEAST)
     }
@@ -128,7 +124,6 @@ fn pole(task: &RollingTask, motion: &Motion) -> Option<[f64; 2]> {
 
 /// The meshes that a method takes whatever the motion, coarse to fine: those of half and of a quarter of the cells before an explicit mesh,
 /// the two of Liu and Hsu's method, or the one of the simplified theory. None where the error decides.
-#[must_use]
 pub fn fixed_meshes(resolution: Resolution, method: Method) -> Option<Vec<MeshSize>> {
     let size = |strips, cells| MeshSize { strips, cells };
     match (resolution, method) {

@@ -50,7 +50,6 @@ pub struct DiscreteSolution {
 
 impl DiscreteSolution {
     /// The number of cells.
-    #[must_use]
     pub fn cells(&self) -> f64 {
         self.mesh.mesh.cells() as f64
     }

@@ -53,7 +53,6 @@ impl Predictor {
 
     /// The tractions that are expected for a motion, within their bounds: on the line through the last two motions, on that through the
     /// last one and rest, or those of the last one if it is near.
-    #[must_use]
     pub fn start(&self, mesh: usize, motion: &Motion, bound: &[f64]) -> Option<[Vec<f64>; 2]> {
         let mut steps = self.steps.iter().rev().filter(|step| step.mesh == mesh);
         let last = steps.next()?;
@@ -88,7 +87,7 @@ fn on_line(to: [f64; 3], step: [f64; 3]) -> Option<f64> {
 
 /// The ratio of a motion to the last one, if they are parallel and of similar size: tractions that stick grow in proportion.
 fn from_rest(motion: &Motion, last: &Motion) -> Option<f64> {
-    let along = on_line(components(motion), components(last))?;
+    let along = on_line(motion.components(), last.components())?;
     (1.0 / (1.0 + STEP_MAX)..=1.0 + STEP_MAX)
         .contains(&along)
         .then_some(along)
@@ -96,7 +95,7 @@ fn from_rest(motion: &Motion, last: &Motion) -> Option<f64> {
 
 /// Whether the tractions of the last motion serve as they are.
 fn is_near(motion: &Motion, last: &Motion) -> bool {
-    let (whole, to_go) = (components(motion), difference(motion, last));
+    let (whole, to_go) = (motion.components(), difference(motion, last));
     dot(to_go, to_go) <= NEAR * NEAR * dot(whole, whole)
 }
 
@@ -112,12 +111,8 @@ fn shrink(traction: &mut [Vec<f64>; 2], bound: &[f64]) {
     }
 }
 
-fn components(motion: &Motion) -> [f64; 3] {
-    [motion.creepage_x, motion.creepage_y, motion.spin_per_mm]
-}
-
 fn difference(a: &Motion, b: &Motion) -> [f64; 3] {
-    let (a, b) = (components(a), components(b));
+    let (a, b) = (a.components(), b.components());
     [0, 1, 2].map(|k| a[k] - b[k])
 }
 

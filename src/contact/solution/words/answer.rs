@@ -11,7 +11,7 @@
 //!
 //! What a case was understood as before anything is solved: what is known of its patches, and where wheel and rail lie.
 
-use railhead_macros::{Named, none_is_absent};
+use railhead_macros::{Finite, Named, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -26,7 +26,7 @@ use crate::contact::solution::words::evolution::{SubsurfaceSummary, TemperatureS
 
 /// The answer to one case, without fields.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Solution {
     /// One entry per contact patch.
     pub patches: Vec<PatchSolution>,
@@ -67,7 +67,7 @@ pub struct Solution {
 
 /// What of a case is needed to read its answer.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Asked {
     /// The `type` of the contact.
     pub contact: String,
@@ -82,7 +82,7 @@ pub struct Asked {
 }
 
 /// How the normal problem of a gap was solved.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct NormalReport {
     /// Cells of the finest grid along x and y; of several grids, of the one that carries most.
     pub cells: [u32; 2],
@@ -129,7 +129,7 @@ impl NormalReport {
 }
 
 /// Origin of moments and rigid slip.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Origin {
     /// x in mm, in the coordinates of the answer.
     pub x_mm: f64,
@@ -140,7 +140,7 @@ pub struct Origin {
 }
 
 /// Elastic constants of the pair: 1/G = ½(1/G₁ + 1/G₂), ν/G = ½(ν₁/G₁ + ν₂/G₂), K as Kalker 1990, eq. 1.44.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct CombinedMaterial {
     /// Combined shear modulus G in MPa.
     pub shear_modulus_mpa: f64,
@@ -153,7 +153,7 @@ pub struct CombinedMaterial {
 /// One contact patch with its answers for every motion. Of several motions of bodies that differ its numbers are those of the first; every
 /// point has its own in `region`.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PatchSolution {
     /// Normal force in N.
     pub normal_force_n: f64,
@@ -184,7 +184,7 @@ pub struct PatchSolution {
 /// Place of a patch of wheel and rail, that of its load centre, and the frame of its coordinates.
 ///
 /// Track axes: x along rolling, y to the left from the middle of the track, z up from the top of the rail.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Position {
     /// The load centre in track axes, `[x, y, z]` in mm.
     pub track_mm: [f64; 3],
@@ -203,7 +203,7 @@ pub struct Position {
 
 /// The tangential answer of one patch for one motion.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PointSolution {
     /// The motion this belongs to.
     pub motion: MotionWords,
@@ -267,7 +267,7 @@ pub struct PointSolution {
 
 /// Region and pressure of a patch under one motion.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct MotionRegion {
     /// Normal force in N.
     pub normal_force_n: f64,
@@ -285,7 +285,7 @@ pub struct MotionRegion {
 
 /// A point of a history.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct HistoryPoint {
     /// Distance rolled since the start in mm.
     pub distance_mm: f64,
@@ -308,7 +308,7 @@ pub struct HistoryPoint {
 }
 
 /// Creepages and spin made dimensionless with c = √(A/π) of the patch (√(ab) for an ellipse).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct NormalisedMotion {
     /// E c² ν_x / (μN(1−ν²)); absent without friction.
     pub creepage_x: Option<f64>,
@@ -321,7 +321,7 @@ pub struct NormalisedMotion {
 }
 
 /// Absolute errors, each in the unit of its quantity.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct ErrorEstimate {
     /// Of `force_x_n`, in N.
     pub force_x_n: f64,
@@ -345,7 +345,7 @@ impl ErrorEstimate {
 /// Derivatives of the resultants of a patch at constant region and pressure, each by `[creepage_x, creepage_y, spin_per_mm]`: the creep
 /// coefficients.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Gradients {
     /// Of `force_x_n`, in N, N and N·mm.
     pub force_x_n: [f64; 3],
@@ -362,7 +362,7 @@ pub struct Gradients {
 
 /// Absolute errors of gradients, each in the unit of its quantity.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct GradientErrors {
     /// Of `force_x_n`.
     pub force_x_n: [f64; 3],
@@ -376,7 +376,7 @@ pub struct GradientErrors {
 
 /// How a point was computed.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct SolverReport {
     /// The method that gave the resultants. With `auto` it may be `table`; values per cell are then those of `boundary_element` on `mesh`.
     pub method: MethodName,
@@ -396,7 +396,7 @@ pub struct SolverReport {
 }
 
 /// The mesh that was used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct MeshReport {
     /// Strips across the patch.
     pub strips: u32,
@@ -405,7 +405,7 @@ pub struct MeshReport {
 }
 
 /// Sums over all patches for one motion; for `profiles` in track axes, normal forces included.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Total {
     /// Longitudinal force on the lower body in N.
     pub force_x_n: f64,
@@ -424,14 +424,14 @@ pub struct Total {
 }
 
 /// The values per cell of all patches: what was asked for, nothing else.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct Fields {
     /// One entry per patch, in the order of [`Solution::patches`](crate::contact::solution::words::answer::Solution::patches).
     pub patches: Vec<PatchFields>,
 }
 
 /// The values per cell of one patch, motion by motion, each on the mesh that served it.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct PatchFields {
     /// The meshes that the motions were solved on; several motions may share one.
     pub meshes: Vec<PatchCells>,
@@ -441,7 +441,6 @@ pub struct PatchFields {
 
 impl PatchFields {
     /// The cells that the values of a motion belong to.
-    #[must_use]
     pub fn cells(&self, point: usize) -> &PatchCells {
         &self.meshes[self.points[point].mesh]
     }
@@ -449,7 +448,7 @@ impl PatchFields {
 
 /// Cells of one patch, strip by strip from smaller to larger y, in each strip from smaller to larger x.
 /// All vectors have one value per cell.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct PatchCells {
     /// Centre of the cell along x in mm.
     pub x_mm: Vec<f64>,
@@ -466,7 +465,7 @@ pub struct PatchCells {
 }
 
 /// Values per cell for one motion; absent where not asked for.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct PointFields {
     /// Which of the patch's meshes they belong to.
     pub mesh: usize,
@@ -488,7 +487,7 @@ pub struct PointFields {
 }
 
 /// What a cell of the contact patch does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Named)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Named, Finite)]
 #[serde(rename_all = "snake_case")]
 pub enum Zone {
     /// No relative slip.
@@ -499,7 +498,7 @@ pub enum Zone {
 
 /// What is answered of a wheelset beside its patches.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct WheelsetAnswer {
     /// One entry per position, in the order of the case.
     pub positions: Vec<WheelsetPosition>,
@@ -508,7 +507,7 @@ pub struct WheelsetAnswer {
 }
 
 /// A wheelset at rest on both rails under its load.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct WheelsetPosition {
     /// Shift to the left in mm, as given.
     pub lateral_shift_mm: f64,
@@ -531,7 +530,7 @@ pub struct WheelsetPosition {
 }
 
 /// One wheel of a wheelset; forces act on the rail, in track axes, normal forces included.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct WheelOnRail {
     /// Indices of its patches in `patches`.
     pub patches: Vec<usize>,
@@ -553,7 +552,7 @@ pub struct WheelOnRail {
 
 /// A rigid wheelset without yaw over a range of shifts; lists have one entry per shift.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Kinematics {
     /// Shifts to the left in mm. They end where a wheel leaves its rail or touches at the end of a cross-section.
     pub lateral_shift_mm: Vec<f64>,
@@ -588,7 +587,7 @@ pub struct Kinematics {
 }
 
 /// Where a rigid wheel touches its rail, shift by shift.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct TouchLine {
     /// Radius of the wheel there in mm.
     pub rolling_radius_mm: Vec<f64>,
@@ -602,7 +601,7 @@ pub struct TouchLine {
 
 /// The equivalent conicity tan γ at one amplitude. `reason` explains every absent member.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct EquivalentConicity {
     /// Half the distance of the turning points in mm.
     pub amplitude_mm: f64,

@@ -2,7 +2,7 @@
 //!
 //! The quality of the profiles as the client reads it.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Finite, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -12,7 +12,7 @@ use crate::contact::case::words::subsurface::{
 
 /// A number with the interval that the errors of its inputs leave; without an estimate of these there is none.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Ranged {
     /// The number.
     pub value: f64,
@@ -24,7 +24,7 @@ pub struct Ranged {
 
 /// Damage of one pass over one patch: what the case asked for. Depths are of the body that is passed once.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 #[schema(as = DamageAnswer)]
 pub struct Damage {
     /// Friction power over rolling speed.
@@ -44,7 +44,7 @@ pub struct Damage {
 }
 
 /// Friction power over rolling speed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct TGamma {
     /// ν_x F_x + ν_y F_y + φ M_z in N.
     pub with_spin_n: Ranged,
@@ -55,7 +55,7 @@ pub struct TGamma {
 }
 
 /// A regime of wear.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Finite)]
 #[serde(rename_all = "snake_case")]
 pub enum WearRegime {
     /// Mild.
@@ -69,7 +69,7 @@ pub enum WearRegime {
 }
 
 /// Wear by the power per area.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct UsfdWear {
     /// Regime of the map.
     pub regime: WearRegime,
@@ -82,7 +82,7 @@ pub struct UsfdWear {
 }
 
 /// Wear by Archard's law.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct ArchardWear {
     /// Regime of the coefficients at the mean sliding speed and the mean pressure.
     pub regime: WearRegime,
@@ -97,7 +97,7 @@ pub struct ArchardWear {
 }
 
 /// Rolling contact fatigue by the Whole Life Rail Model.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct RailFatigue {
     /// Tγ that the damage is taken at: without spin, in N.
     pub t_gamma_n: Ranged,
@@ -107,7 +107,7 @@ pub struct RailFatigue {
 
 /// Surface fatigue index.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct SurfaceFatigue {
     /// Tangential over normal force.
     pub utilisation: Ranged,
@@ -118,7 +118,7 @@ pub struct SurfaceFatigue {
 }
 
 /// Place on the shakedown map.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct ShakedownPlace {
     /// Tangential over normal force.
     pub utilisation: Ranged,
@@ -134,7 +134,7 @@ pub struct ShakedownPlace {
 
 /// Wear strip by strip, from smaller to larger y.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct WearAcross {
     /// Middle of the strip in mm.
     pub y_mm: Vec<f64>,
@@ -153,7 +153,7 @@ pub struct WearAcross {
 }
 
 /// The figures that damage was computed with.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct DamageFiguresUsed {
     /// The named set; figures under one name never change.
     pub set: DamageSetName,
@@ -176,7 +176,7 @@ pub struct DamageFiguresUsed {
 }
 
 /// How far the points of both profiles can be trusted under a patch.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PatchQuality {
     /// Of the rail.
     #[schema(inline = false)]
@@ -189,7 +189,7 @@ pub struct PatchQuality {
 /// What the points of a profile are like under a patch. Waviness and ambiguity are pressures, comparable with that of the patch: the
 /// pressure that would flatten the difference between two interpolations of the same points.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct ProfileQuality {
     /// The part of the profile under the patch, from and to y in mm (y to the field side, as `position` has it).
     pub y_mm: [f64; 2],
@@ -248,7 +248,7 @@ pub struct PairQuality {
 
 /// Absolute uncertainty due to the measurement of the profiles: how much the answer changes between plausible interpolations of the
 /// points. Separate from `error_estimate`, which is numerical.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct ProfileUncertainty {
     /// Of `force_x_n`, in N.
     pub force_x_n: f64,

@@ -2,7 +2,7 @@
 //!
 //! What follows from a solved contact, as the client reads it: stresses below the surface, damage and temperatures.
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{Finite, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -230,7 +230,7 @@ pub struct BodyState {
 }
 
 /// A stress tensor in the axes of the patch: x along rolling, y to the left, z up. Tension is positive.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct StressTensor {
     /// σ_xx in MPa.
     pub xx: f64,
@@ -247,7 +247,7 @@ pub struct StressTensor {
 }
 
 /// The stress at one point below the surface.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct StressPoint {
     /// Where: `[x, y, depth]` in mm, depth positive into the body.
     pub at_mm: [f64; 3],
@@ -271,7 +271,7 @@ pub struct StressPoint {
 
 /// Summary of the stresses below a patch. `/subsurface` returns the stresses at the requested points.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct SubsurfaceSummary {
     /// The body whose stresses these are.
     pub body: BodyName,
@@ -286,7 +286,7 @@ pub struct SubsurfaceSummary {
 
 /// The worst places of a passage of the contact in steady rolling. A place is a line along x; stresses belong to all of its history.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PassageSummary {
     /// Where Dang Van's stress is largest; absent without a slope.
     pub dang_van: Option<PassagePlace>,
@@ -297,7 +297,7 @@ pub struct PassageSummary {
 }
 
 /// A stress and the line along x that it belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PassagePlace {
     /// Where: `[y, depth]` in mm.
     pub at_mm: [f64; 2],
@@ -306,7 +306,7 @@ pub struct PassagePlace {
 }
 
 /// Temperatures of both surfaces in the contact in short; both bodies have one temperature there.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct TemperatureSummary {
     /// Highest temperature in °C.
     pub max_c: f64,

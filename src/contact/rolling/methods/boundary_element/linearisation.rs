@@ -36,19 +36,16 @@ impl Linearisation {
     }
 
     /// Does the cell slip with one unknown?
-    #[must_use]
     pub fn slips(&self, cell: usize) -> bool {
         self.stiffness[cell] >= 0.0
     }
 
     /// Direction of the cell's first unknown.
-    #[must_use]
     pub fn direction(&self, cell: usize) -> (f64, f64) {
         self.direction[cell]
     }
 
     /// D of a slipping cell, 0 of a sticking one.
-    #[must_use]
     pub fn stiffness(&self, cell: usize) -> f64 {
         self.stiffness[cell].max(0.0)
     }

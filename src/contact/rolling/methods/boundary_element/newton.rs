@@ -6,12 +6,11 @@
 //! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes). Where the bound falls with the slip, Π is the resolvent
 //! of that law: see [`FallingRow`].
 
-use std::ops::ControlFlow;
-
 use crate::contact::friction::velocity_weakening::Softening;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::gmres::LinearSystem;
 use crate::contact::numerics::simd::length;
+use crate::contact::rolling::answer::Work;
 use crate::contact::rolling::methods::boundary_element::linearisation::{
     FallingRow, Linearisation,
 };
@@ -24,6 +23,7 @@ use crate::contact::rolling::methods::boundary_element::workspace::{
 };
 use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::contact::rolling::slip_rules::Rule;
+use crate::contact::rolling::strip_mesh::StripMesh;
 
 // Sensitivities of the numbers below: each changed alone, on the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
 // targets 0.005 and 0.001, and on 12 sweeps of 9 motions. No change made a solve fail or moved an error beyond its scatter.
@@ -63,7 +63,6 @@ pub struct Newton<'a> {
 
 impl<'a> Newton<'a> {
     /// Collects the own blocks.
-    #[must_use]
     pub fn new(equations: &'a SlipEquations<'a>) -> Newton<'a> {
         let own = OwnBlocks::new(equations);
         let diagonal = own.diagonal(equations);
@@ -81,7 +80,10 @@ impl<'a> Newton<'a> {
     /// The same for bounds that fall with the slip from those at rest: r is at least twice the steepest fall of each cell, so that its
     /// resolvent is unique.
     #[must_use]
-    pub fn falling(mut self, bound: &[f64], fall: &Softening) -> Newton<'a> {
+    pub fn falling(mut self, bound: &[f64], fall: Option<Softening>) -> Newton<'a> {
+        let Some(fall) = fall else {
+            return self;
+        };
         let steepest = fall.steepest();
         for (r, bound) in self.parameter.iter_mut().zip(bound) {
             self.stability = self.stability.max(steepest * bound * PROJECTION / *r);
@@ -102,31 +104,26 @@ impl<'a> Newton<'a> {
 
     /// How fast bounds fall with the slip over how fast slips fall as tractions grow: the largest `|g′| |M_ii|` of a cell. Below 1 every
     /// cell alone has one solution. 0 for bounds that do not fall.
-    #[must_use]
     pub fn stability(&self) -> f64 {
         self.stability
     }
 
     /// The rule in use.
-    #[must_use]
     pub fn rule(&self) -> Rule {
         self.equations.rule
     }
 
     /// A typical `1/M_ii`: the traction that one unit of slip causes on a cell.
-    #[must_use]
     pub fn compliance(&self) -> f64 {
         self.compliance
     }
 
     /// Entries of the influence that one product touches.
-    #[must_use]
     pub fn entries(&self) -> usize {
         self.equations.entries()
     }
 
     /// Number of cells with unknowns.
-    #[must_use]
     pub fn cells(&self) -> usize {
         self.equations.cells()
     }
@@ -220,7 +217,6 @@ impl<'a> Newton<'a> {
     }
 
     /// The bounds of all cells at the slips of an iterate that solves the law: those at rest where they stick.
-    #[must_use]
     pub fn bounds(&self, rest: &[f64], fall: &Softening, t: &[f64], slip: &[f64]) -> Vec<f64> {
         let mut bounds = rest.to_vec();
         for (i, bound) in bounds.iter_mut().enumerate().take(self.equations.cells()) {
@@ -240,9 +236,31 @@ impl<'a> Newton<'a> {
     }
 
     /// Does a cell slip under tractions `t` with the slips that they cause?
-    #[must_use]
     pub fn slips(&self, bound: &[f64], t: &[f64], slip: &[f64], cell: usize) -> bool {
         self.projected(t, slip, cell).1 > bound[cell]
+    }
+
+    /// Which cells of the whole mesh slip at tractions and slips that belong to each other.
+    pub fn zones(&self, bound: &[f64], t: &[f64], slip: &[f64], level: &StripMesh) -> Vec<bool> {
+        let mut zones = Vec::with_capacity(level.mesh.cells());
+        zones.extend((0..self.cells()).map(|i| self.slips(bound, t, slip, i)));
+        if self.cells() < level.mesh.cells() {
+            let segments = &level.mesh.segments;
+            for segment in segments[..segments.len() / 2].iter().rev() {
+                zones.extend_from_within(segment.cells.clone());
+            }
+        }
+        zones
+    }
+
+    /// The work of a solve.
+    pub(crate) fn work(&self, report: &Convergence) -> Work {
+        Work {
+            iterations: report.iterations,
+            products: report.products,
+            entries: u64::from(report.products) * self.entries() as u64,
+            residual: report.residual,
+        }
     }
 
     /// Computes the slips of `t` and the residual of the projected law; the slips are left in the workspace.
@@ -495,7 +513,7 @@ impl LinearSystem for NewtonSystem<'_> {
         self.blocks.apply(x);
     }
 
-    fn tick(&mut self) -> ControlFlow<Stop> {
-        self.monitor.tick(0.0)
+    fn tick(&mut self) -> Result<(), Stop> {
+        self.monitor.go_on(0.0)
     }
 }

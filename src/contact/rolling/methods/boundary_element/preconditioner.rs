@@ -31,7 +31,6 @@ pub struct OwnBlocks {
 
 impl OwnBlocks {
     /// Collects the blocks.
-    #[must_use]
     pub fn new(equations: &SlipEquations) -> OwnBlocks {
         let mut starts = Vec::with_capacity(equations.segments() + 1);
         starts.push(0);
@@ -55,7 +54,6 @@ impl OwnBlocks {
     }
 
     /// `−(M_xx + M_yy)/2` on the diagonal, cell by cell.
-    #[must_use]
     pub fn diagonal(&self, equations: &SlipEquations) -> Vec<f64> {
         let mut diagonal = vec![0.0; equations.cells()];
         for (j, (xx, yy)) in self.blocks().enumerate() {

@@ -116,21 +116,17 @@ impl<'a> RuleSequence<'a> {
     }
 
     fn newton<'e>(&self, equations: &'e SlipEquations<'e>) -> Newton<'e> {
-        let newton = Newton::new(equations);
         // The trapezoid rule keeps the bounds that the three-point rule has found: its own slips alternate from cell
         // to cell, and bounds that follow them would do so too.
-        match self.fall.filter(|_| equations.rule != Rule::Trapezoid) {
-            Some(fall) => newton.falling(&self.bound, &fall),
-            None => newton,
-        }
+        let fall = self.fall.filter(|_| equations.rule != Rule::Trapezoid);
+        Newton::new(equations).falling(&self.bound, fall)
     }
 
     /// The bounds of all cells of the mesh at the slips found.
     pub(super) fn bounds(&self) -> Cow<'a, [f64]> {
         match &self.slipping {
             None => Cow::Borrowed(&self.level.bound),
-            Some(bound) if self.parity.is_some() => Cow::Owned(self.level.unfold(bound, 1.0)),
-            Some(bound) => Cow::Owned(bound[..self.level.mesh.cells()].to_vec()),
+            Some(bound) => Cow::Owned(self.level.whole(self.parity, bound)),
         }
     }
 
@@ -172,12 +168,7 @@ impl<'a> RuleSequence<'a> {
         };
         let Control { workspace, monitor } = &mut self.control;
         let report = newton.solve(&law, t, workspace, *monitor)?;
-        self.work.add(Work {
-            iterations: report.iterations,
-            products: report.products,
-            entries: u64::from(report.products) * newton.entries() as u64,
-            residual: report.residual,
-        });
+        self.work.add(newton.work(&report));
         Ok(report)
     }
 
@@ -206,7 +197,7 @@ impl<'a> RuleSequence<'a> {
         }
         let found = ThreePointAnswer {
             slip: self.own_slip(),
-            slips: self.zones(&newton, t),
+            slips: newton.zones(&self.bound, t, self.control.workspace.slip(), self.level),
             other: None,
         };
         let Some(fall) = self.fall else {
@@ -294,21 +285,6 @@ impl<'a> RuleSequence<'a> {
         Ok((change > SAME_SOLUTION).then_some(change))
     }
 
-    /// Which cells of the whole mesh slip; `newton` has evaluated `t` last.
-    fn zones(&self, newton: &Newton, t: &[f64]) -> Vec<bool> {
-        let slip = self.control.workspace.slip();
-        let slips = |i: usize| newton.slips(&self.bound, t, slip, i);
-        let mut zones = Vec::with_capacity(self.level.mesh.cells());
-        zones.extend((0..newton.cells()).map(slips));
-        if self.parity.is_some() {
-            let segments = &self.level.mesh.segments;
-            for segment in segments[..segments.len() / 2].iter().rev() {
-                zones.extend_from_within(segment.cells.clone());
-            }
-        }
-        zones
-    }
-
     fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
         let equations = self.equations(Rule::Upwind);
         let rigid = self.rigid(&equations);
@@ -335,7 +311,8 @@ impl<'a> RuleSequence<'a> {
             return Ok(None);
         }
         t.copy_from_slice(&found);
-        Ok(Some(self.zones(&newton, t)))
+        let slip = self.control.workspace.slip();
+        Ok(Some(newton.zones(&self.bound, t, slip, self.level)))
     }
 
     /// The slips of the rule that was solved last, over the whole mesh.

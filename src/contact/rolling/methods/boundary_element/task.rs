@@ -76,7 +76,6 @@ pub enum NewtonTermination {
 
 impl NewtonTermination {
     /// Was the tolerance met?
-    #[must_use]
     pub fn converged(self) -> bool {
         self == NewtonTermination::Converged
     }
@@ -99,7 +98,6 @@ pub struct Convergence {
 
 impl Convergence {
     /// A clause that says why there is no answer, as far as is known, and what to do.
-    #[must_use]
     pub(crate) fn advice(&self) -> String {
         let linear = match self.inexact_steps {
             0 => String::new(),

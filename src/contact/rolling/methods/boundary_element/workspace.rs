@@ -34,7 +34,6 @@ thread_local! {
 
 impl NewtonWorkspace {
     /// The workspace that the last solve of this thread gave back, or a new one.
-    #[must_use]
     pub fn of_thread() -> NewtonWorkspace {
         LAST.take().unwrap_or_default()
     }
@@ -59,7 +58,6 @@ pub(crate) struct StepVectors {
 
 impl NewtonWorkspace {
     /// The slips `q + M T` of the iterate that was evaluated last, x then y.
-    #[must_use]
     pub fn slip(&self) -> &[f64] {
         &self.slip
     }

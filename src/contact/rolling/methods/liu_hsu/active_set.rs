@@ -6,7 +6,6 @@ use faer::{Mat, MatMut};
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::lu;
-use crate::contact::numerics::lu::check;
 use crate::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
@@ -37,13 +36,11 @@ pub enum ZonesTermination {
 
 impl ZonesTermination {
     /// Did the residual reach the tolerance?
-    #[must_use]
     pub fn converged(self) -> bool {
         self == ZonesTermination::Converged
     }
 
     /// A clause for messages.
-    #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
             ZonesTermination::Converged => "converged",
@@ -295,7 +292,6 @@ impl InitialGuess {
     ///
     /// Where the direction is undefined (at a pole, or without a previous traction) it is that of the rigid slip, and at
     /// the rigid pole that of x; the iteration works with any direction there.
-    #[must_use]
     pub fn direction(self, motion: &Motion, at: [f64; 2], before: [f64; 2]) -> [f64; 2] {
         let [x, y] = at;
         let rigid = [
@@ -381,7 +377,7 @@ pub fn solve(
         return Ok(end);
     }
     while end.iterations < ITERATIONS_MAX {
-        check(monitor)?;
+        monitor.go_on(0.0)?;
         let step = newton_step(system, bound, t, monitor)?;
         end.iterations += 1;
         let n = bound.len();

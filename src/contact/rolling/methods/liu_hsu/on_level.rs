@@ -2,9 +2,7 @@
 
 use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::answer::{
-    LevelAnswer, LevelFailure, LevelOutcome, Work, project_on_bound,
-};
+use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
 use crate::contact::rolling::methods::boundary_element::newton::Newton;
 use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
 use crate::contact::rolling::methods::full_slip;
@@ -68,13 +66,10 @@ pub fn solve(
     );
     Ok(LevelAnswer {
         traction,
-        second: None,
         slip,
         slips: outcome.slips,
-        exit: LevelOutcome::Solved,
         work,
-        skips: Vec::new(),
-        remarks: Vec::new(),
+        ..LevelAnswer::default()
     })
 }
 

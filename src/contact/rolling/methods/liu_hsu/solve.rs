@@ -27,32 +27,27 @@ pub struct ZonesOutcome {
 
 impl ZonesOutcome {
     /// The run that determines the outcome.
-    #[must_use]
     pub fn last(&self) -> &ZonesRun {
         &self.attempts[self.attempts.len() - 1]
     }
 
     /// How the solve ended.
-    #[must_use]
     pub fn exit(&self) -> ZonesTermination {
         self.last().exit
     }
 
     /// Why the solve did not converge and what to do, as a clause for messages.
-    #[must_use]
     pub fn advice(&self) -> String {
         let reason = self.exit().reason();
         format!("{reason}; use \"boundary_element\", which solves the same equations")
     }
 
     /// Divisions into stick and slip that were solved, over all runs.
-    #[must_use]
     pub fn outer_iterations(&self) -> u32 {
         self.attempts.iter().map(|a| a.outer_iterations).sum()
     }
 
     /// Newton–Raphson steps over all runs.
-    #[must_use]
     pub fn newton_iterations(&self) -> u32 {
         self.attempts.iter().map(|a| a.newton_iterations).sum()
     }
@@ -235,7 +230,6 @@ impl<'a> ZonesSearch<'a> {
 ///
 /// `t` has x of all cells before y. `None` if the tractions do not turn (all parallel, or none at all): the pole is then
 /// nowhere near the patch.
-#[must_use]
 pub fn vortex_centre(t: &[f64], x: &[f64], y: &[f64], weight: &[f64]) -> Option<[f64; 2]> {
     let n = x.len();
     let (mut xx, mut xy, mut yy, mut rhs) = (0.0, 0.0, 0.0, [0.0; 2]);

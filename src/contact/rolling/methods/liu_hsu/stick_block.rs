@@ -5,7 +5,6 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::lu;
-use crate::contact::numerics::lu::check;
 use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
 use crate::contact::rolling::slip_equations::SlipEquations;
 use crate::contact::rolling::slip_rules::Rule;
@@ -43,9 +42,9 @@ impl DenseProblem {
         let DenseTask { equations, law, .. } = stage;
         let (n, padded) = (equations.cells(), equations.padded());
         let values = equations.dense(monitor)?;
-        check(monitor)?;
+        monitor.go_on(0.0)?;
         let map = MatRef::from_column_major_slice(&values, 2 * n, 2 * n).to_owned();
-        check(monitor)?;
+        monitor.go_on(0.0)?;
         Ok(DenseProblem {
             rule: equations.rule,
             cells: n,
@@ -60,14 +59,12 @@ impl DenseProblem {
     }
 
     /// Removes the padding of a vector in the layout of the equations.
-    #[must_use]
     pub fn compact(&self, values: &[f64]) -> Vec<f64> {
         let (n, padded) = (self.cells, self.padded);
         [&values[..n], &values[padded..padded + n]].concat()
     }
 
     /// The inverse of [`compact`](Self::compact).
-    #[must_use]
     pub fn padded(&self, values: &[f64]) -> Vec<f64> {
         let (n, padded) = (self.cells, self.padded);
         let mut out = vec![0.0; 2 * padded];
@@ -126,9 +123,9 @@ impl SlipSystem {
                 }
             })
         };
-        check(monitor)?;
+        monitor.go_on(0.0)?;
         let mut on_slip = known(&slip);
-        check(monitor)?;
+        monitor.go_on(0.0)?;
         let mut on_stick = known(&stick);
         if !stick.is_empty() {
             let part = |rows: &[usize]| {
@@ -137,7 +134,7 @@ impl SlipSystem {
                 })
             };
             lu::solve(&part(&stick), on_stick.as_mut(), monitor)?;
-            check(monitor)?;
+            monitor.go_on(0.0)?;
             let by_stick = part(&slip);
             matmul(
                 on_slip.as_mut(),
@@ -160,7 +157,6 @@ impl SlipSystem {
     }
 
     /// Slip on the slip cells for their tractions.
-    #[must_use]
     pub fn slip(&self, t_slip: &[f64]) -> Vec<f64> {
         let mut slip = self.constant.clone();
         add_product(&mut slip, self.response.as_ref(), t_slip, 1.0);
@@ -168,7 +164,6 @@ impl SlipSystem {
     }
 
     /// Tractions of the stick cells for those of the slip cells.
-    #[must_use]
     pub fn stick_tractions(&self, t_slip: &[f64]) -> Vec<f64> {
         let mut t = vec![0.0; 2 * self.stick_cells.len()];
         let factors = [t_slip, &[1.0]].concat();
@@ -178,7 +173,6 @@ impl SlipSystem {
 }
 
 /// Indices of both components of the given cells in a vector over all `cells`.
-#[must_use]
 pub fn both_components(chosen: &[usize], cells: usize) -> Vec<usize> {
     let y = chosen.iter().map(|i| cells + i);
     chosen.iter().copied().chain(y).collect()

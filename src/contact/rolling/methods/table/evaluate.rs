@@ -71,7 +71,6 @@ struct Sums {
 }
 
 /// f(r), which forces grow with, and its derivative.
-#[must_use]
 #[inline(always)]
 pub fn growth(size: f64) -> [f64; 2] {
     let rest = (1.0 - size / SIZE_FULL).max(0.0);
@@ -79,7 +78,6 @@ pub fn growth(size: f64) -> [f64; 2] {
 }
 
 /// The part of linear theory that is left out of the table, and its derivative by σ.
-#[must_use]
 #[inline(always)]
 pub fn linear_part(sigma: f64) -> [f64; 2] {
     let rest = 1.0 - sigma;
@@ -87,7 +85,6 @@ pub fn linear_part(sigma: f64) -> [f64; 2] {
 }
 
 /// Forces of linear theory with `[C11, C22, C23, C33]` for a creepage.
-#[must_use]
 #[inline(always)]
 pub fn linear([c11, c22, c23, c33]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
     [c11 * x, c22 * y + c23 * z, c33 * z - c23 * y]
@@ -96,7 +93,6 @@ pub fn linear([c11, c22, c23, c33]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
 impl CreepTable {
     /// The table with these values at its nodes, `[a/b][pole][direction][size][ν][function]`: for forces and moment `F/f(r)` without
     /// the part of linear theory, for the share that sticks itself; and the bounds of errors of the cells between them.
-    #[must_use]
     pub fn new(values: &[f32], bounds: &[f32]) -> CreepTable {
         let exact = coefficients(values);
         let mut largest = [f32::MIN_POSITIVE; OUTPUTS];
@@ -122,7 +118,6 @@ impl CreepTable {
     }
 
     /// The table for semi-axes of the ratio a/b, 0.1 to 10, and Poisson's ratio 0 to 0.5; beyond, the nearest of these.
-    #[must_use]
     #[inline(always)]
     pub fn ellipse(&self, ratio: f64, poisson_ratio: f64) -> EllipseTable<'_> {
         let ln_ratio = ratio.ln();
@@ -157,7 +152,6 @@ fn parabola(poisson_ratio: f64) -> [f64; 3] {
 
 impl EllipseTable<'_> {
     /// Creep forces of the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)` with c = √(ab), at most μN.
-    #[must_use]
     #[inline(always)]
     pub fn creep(&self, creepage: [f64; 3]) -> Creep {
         let mut creep = self.interpolated(creepage);
@@ -171,7 +165,6 @@ impl EllipseTable<'_> {
     }
 
     /// The interpolated values before they are limited: the force may exceed μN by the error of the table.
-    #[must_use]
     #[inline(always)]
     pub(crate) fn interpolated(&self, creepage: [f64; 3]) -> Creep {
         let Quarter { inside, signs } = Quarter::of(creepage);
@@ -201,7 +194,6 @@ impl EllipseTable<'_> {
     }
 
     /// The same with the derivatives of the three by the creepages: `[force][creepage]`.
-    #[must_use]
     pub fn with_slopes(&self, creepage: [f64; 3]) -> (Creep, [[f64; 3]; 3]) {
         let Quarter { inside, signs } = Quarter::of(creepage);
         let [c11, c22, c23, c33] = self.kalker;

@@ -32,7 +32,6 @@ static TABLE: LazyLock<CreepTable> = LazyLock::new(|| {
 });
 
 /// The table of the program; it is made ready when it is asked for the first time, which takes some hundredths of a second.
-#[must_use]
 pub fn table() -> &'static CreepTable {
     &TABLE
 }
@@ -93,7 +92,6 @@ impl TableFile {
     }
 
     /// The bytes of a file with these values and bounds; `about` says how they were made.
-    #[must_use]
     pub fn write(about: &Value, values: &[f32], bounds: &[f32]) -> Vec<u8> {
         let mut units = [f32::MIN_POSITIVE; OUTPUTS];
         for (k, value) in values.iter().enumerate() {
@@ -128,7 +126,6 @@ impl TableFile {
     }
 
     /// The table of these values.
-    #[must_use]
     pub fn table(&self) -> CreepTable {
         CreepTable::new(&self.values, &self.bounds)
     }

@@ -17,7 +17,6 @@ pub struct ShapeCoefficients {
 
 impl ShapeCoefficients {
     /// The splines through [`coefficients`] and [`spin_coefficient`].
-    #[must_use]
     pub fn new() -> ShapeCoefficients {
         let places: Vec<u8> = (0..NODES).collect();
         let low = -ln_ratio_max();
@@ -49,7 +48,6 @@ impl ShapeCoefficients {
 
     /// `[C11, C22, C23, C33]` of a material with the weights of its Poisson's ratio (see [`poisson_weights`]), and `[C11, C22]` of
     /// ν = 1/4.
-    #[must_use]
     #[inline(always)]
     pub fn at(&self, ln_ratio: f64, poisson: &[f64; 5]) -> ([f64; 4], [f64; 2]) {
         let weights = self.axis.at(ln_ratio);
@@ -78,7 +76,6 @@ impl Default for ShapeCoefficients {
 }
 
 /// Weights of the values at [`POISSON_RATIOS`]: a polynomial of fourth degree, as in `linear_theory`.
-#[must_use]
 pub fn poisson_weights(poisson_ratio: f64) -> [f64; 5] {
     interpolation::polynomial_weights(&POISSON_RATIOS, poisson_ratio)
 }

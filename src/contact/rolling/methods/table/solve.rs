@@ -1,7 +1,5 @@
 //! The table as a method: resultants of the patches of a footprint for one motion.
 
-use std::ops::ControlFlow;
-
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::friction::path_dependent::Interface;
@@ -9,7 +7,7 @@ use crate::contact::half_space::unlike_bodies::Elasticity;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
 use crate::contact::remark::kind::Rounded;
-use crate::contact::rolling::answer::{MotionAnswer, PatchGradients, Resultants, Work};
+use crate::contact::rolling::answer::{MotionAnswer, PatchGradients, Resultants};
 use crate::contact::rolling::load_ellipse::LoadEllipse;
 use crate::contact::rolling::methods::table::evaluate::Creep;
 use crate::contact::rolling::methods::table::file::table;
@@ -39,9 +37,7 @@ pub fn solve(
     monitor: &dyn Monitor,
 ) -> Result<MotionAnswer, SolveError> {
     let began = monitor.elapsed();
-    if let ControlFlow::Break(stop) = monitor.tick(0.0) {
-        return Err(stop.into());
-    }
+    monitor.go_on(0.0)?;
     let patches = task.footprint.patches();
     let mut found = Vec::with_capacity(patches.len());
     let (mut of_all, mut limits) = (0.0, 0.0);
@@ -69,23 +65,17 @@ pub fn solve(
     });
     Ok(MotionAnswer {
         motion: *motion,
-        saturated: false,
         resultants: found.iter().map(|answer| answer.resultants).collect(),
         errors,
-        fields: None,
         stick: Some(found.iter().map(|answer| answer.stick).collect()),
         gradients: Some(found.iter().map(|answer| answer.gradients).collect()),
-        history: None,
-        skips: Vec::new(),
-        remarks: Vec::new(),
-        work: Work::default(),
         method: Method::Table,
         seconds: (monitor.elapsed() - began).as_secs_f64(),
+        ..MotionAnswer::default()
     })
 }
 
 /// Why the table has no answer for a pair of materials, if it has none.
-#[must_use]
 pub fn unlike(elasticity: &Elasticity) -> Option<String> {
     (elasticity.difference != 0.0).then(|| {
         format!(
@@ -96,7 +86,6 @@ pub fn unlike(elasticity: &Elasticity) -> Option<String> {
 }
 
 /// Why the table has no answer for an ellipse with this ratio of semi-axes, if it has none.
-#[must_use]
 pub fn outside(ratio: f64) -> Option<String> {
     (!(RATIO_MIN..=RATIO_MAX).contains(&ratio)).then(|| {
         format!(
@@ -119,20 +108,14 @@ fn covers(number: usize, load_mismatch: f64, ratio: f64) -> Result<(), SolveErro
     reason.map_or(Ok(()), |reason| Err(SolveError::NotCovered { reason }))
 }
 
-fn still(motion: &Motion) -> bool {
-    motion.creepage_x == 0.0 && motion.creepage_y == 0.0 && motion.spin_per_mm == 0.0
-}
-
 /// Can the table tell where a search should begin? It knows like bodies with nothing between them but a coefficient of friction that does
 /// not fall with slip.
-#[must_use]
 pub(crate) fn tells(elasticity: &Elasticity, interface: Interface, friction: &FrictionLaw) -> bool {
     elasticity.difference == 0.0 && interface.layer == 0.0 && !friction.depends_on_slip()
 }
 
 /// F_x and F_y in N on an ellipse for a motion about the origin of the case, with a limit μN in N; beyond the ratios of its axes that the
 /// table covers, those at the nearest one.
-#[must_use]
 pub(crate) fn forces(
     shear_modulus: f64,
     poisson_ratio: f64,
@@ -198,7 +181,7 @@ fn on_ellipse(
         return PatchAnswer {
             resultants: Resultants::default(),
             error: 0.0,
-            stick: if still(motion) { 1.0 } else { 0.0 },
+            stick: if motion.is_still() { 1.0 } else { 0.0 },
             gradients: PatchGradients::default(),
         };
     }

@@ -46,7 +46,6 @@ const ACROSS_ROLLING: [Mirror; OUTPUTS] = [Odd, Even, Even, Even];
 const OF_SPIN: [[Mirror; 2]; OUTPUTS] = [[Even, Odd], [Odd, Even], [Odd, Even], [Even, Even]];
 
 /// Coefficients `[a/b][pole][direction][size][ν][function]` of the spline through values `[a/b][pole][direction][size][ν][function]`.
-#[must_use]
 pub fn coefficients(values: &[f32]) -> Vec<f32> {
     let along = |matrix: &[Vec<f64>], before: usize, from: &[f32], inner: usize| {
         transformed(matrix, before, from, inner)
@@ -163,38 +162,32 @@ pub const SIZE_STEPS: f64 = 48.0;
 pub const SIZE_HALF: f64 = 1.5;
 
 /// ln(a/b) at its ends.
-#[must_use]
 pub fn ln_ratio_max() -> f64 {
     LN_10
 }
 
 /// a/b of a node.
-#[must_use]
 pub fn ratio(node: usize) -> f64 {
     (LN_10 * (2.0 * node as f64 / (RATIOS - 1) as f64 - 1.0)).exp()
 }
 
 /// θ of a node.
-#[must_use]
 pub fn pole(node: usize) -> f64 {
     FRAC_PI_2 * node as f64 / (POLES - 1) as f64
 }
 
 /// χ of a node.
-#[must_use]
 pub fn direction(node: usize) -> f64 {
     PI * node as f64 / (DIRECTIONS - 1) as f64 - FRAC_PI_2
 }
 
 /// σ = r/(r + 3/2) of a size r, 0 to 1.
-#[must_use]
 pub fn sigma(size: f64) -> f64 {
     // Of any size, also one that is 0 or beyond all numbers.
     1.0 / (1.0 + SIZE_HALF / size)
 }
 
 /// The size r of a σ below 1.
-#[must_use]
 pub fn size(sigma: f64) -> f64 {
     SIZE_HALF * sigma / (1.0 - sigma)
 }
@@ -218,7 +211,6 @@ const SIZE_CELL: [u8; SIZE_STEPS as usize] = {
 };
 
 /// The number of the cell that holds a place, `[a/b][pole][direction][size]`; beyond the ends the last one.
-#[must_use]
 #[inline(always)]
 pub fn cell(ln_ratio: f64, sigma: f64, theta: f64, chi: f64) -> usize {
     let bin = |part: f64, bins: usize| ((part * bins as f64).max(0.0) as usize).min(bins - 1);
@@ -273,7 +265,6 @@ impl Mirror {
 
 impl Axis {
     /// An axis of `nodes` uniform nodes that has one more coefficient before the first node and one behind the last.
-    #[must_use]
     pub fn mirrored(ends: Range<f64>, nodes: usize) -> Axis {
         let piece = [
             [1.0, -3.0, 3.0, -1.0],
@@ -292,7 +283,6 @@ impl Axis {
 
     /// An axis with nodes at whole steps from `places[0] = 0` to the last, `step` wide, whose second and last but one are no knots: as
     /// many coefficients as nodes.
-    #[must_use]
     pub fn free(low: f64, step: f64, places: &[u8]) -> Axis {
         let knots = knots(places);
         let bins = usize::from(places[places.len() - 1]);
@@ -316,7 +306,6 @@ impl Axis {
     }
 
     /// The weights at a place; beyond the ends those of the end.
-    #[must_use]
     #[inline(always)]
     pub fn at(&self, place: f64) -> Weights {
         let last = self.first.len() - 1;
@@ -345,7 +334,6 @@ impl Axis {
 }
 
 /// The matrix from values at uniform nodes to their coefficients and one more at each end, row by row.
-#[must_use]
 pub fn mirrored_coefficients(nodes: usize, ends: [Mirror; 2]) -> Vec<Vec<f64>> {
     let mut system = vec![vec![0.0; nodes]; nodes];
     for (node, row) in system.iter_mut().enumerate() {
@@ -364,7 +352,6 @@ pub fn mirrored_coefficients(nodes: usize, ends: [Mirror; 2]) -> Vec<Vec<f64>> {
 }
 
 /// The matrix from values at the nodes of [`Axis::free`] to coefficients.
-#[must_use]
 pub fn free_coefficients(places: &[u8]) -> Vec<Vec<f64>> {
     let axis = Axis::free(0.0, 1.0, places);
     let mut system = vec![vec![0.0; places.len()]; places.len()];
@@ -514,7 +501,6 @@ pub struct Shape {
 }
 
 /// h of a shape: the factor of the spin in the size of a creepage.
-#[must_use]
 pub fn spin_factor(root: f64, [c11, c22]: [f64; 2]) -> f64 {
     let (x, y) = (c22 * root, c11 / root);
     0.5 * (x * x + y * y).sqrt()
@@ -531,7 +517,6 @@ const BESIDE_SPIN: f64 = 1e-3;
 
 impl Shape {
     /// The shape with √(a/b) and `[C11, C22]` at ν = 1/4.
-    #[must_use]
     pub fn new(root: f64, [c11, c22]: [f64; 2]) -> Shape {
         let h = spin_factor(root, [c11, c22]);
         let (alpha, beta) = (c11 / (root * h), c22 * root / h);
@@ -544,7 +529,6 @@ impl Shape {
     }
 
     /// A creepage (x, y, z) of the angles θ and χ, of any size.
-    #[must_use]
     pub fn creepage(&self, theta: f64, chi: f64) -> [f64; 3] {
         let [alpha, beta, m] = self.squares;
         let (sin, cos) = theta.sin_cos();
@@ -554,7 +538,6 @@ impl Shape {
     }
 
     /// The same of the size r with `[C11, C22]` of the material.
-    #[must_use]
     pub fn creepage_of_size(&self, size: f64, theta: f64, chi: f64, c: [f64; 2]) -> [f64; 3] {
         let direction = self.creepage(theta, chi);
         let factor = size / self.size(direction, c);
@@ -562,14 +545,12 @@ impl Shape {
     }
 
     /// The size r of a creepage with `[C11, C22]` of the material.
-    #[must_use]
     pub fn size(&self, [x, y, z]: [f64; 3], c: [f64; 2]) -> f64 {
         let h = spin_factor(self.root, c);
         (c[0] * x).hypot(c[1] * y).hypot(h * z)
     }
 
     /// The angles `[θ, χ]` of a creepage other than 0 with x, z ≥ 0.
-    #[must_use]
     #[inline(always)]
     pub fn angles(&self, creepage: [f64; 3]) -> [f64; 2] {
         self.angles_of(self.stretched(creepage))
@@ -577,7 +558,6 @@ impl Shape {
 
     /// The angles with their derivatives by x, y and z. At spin alone, where the direction has no derivative, a creepage beside it stands
     /// for it.
-    #[must_use]
     pub fn angles_with_slopes(&self, creepage: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
         let whole = self.stretched(creepage);
         let share = 1.0 / whole[0].abs().max(whole[1].abs()).max(whole[2].abs());
