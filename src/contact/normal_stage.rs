@@ -73,7 +73,7 @@ pub(crate) fn solve_gap(
 ) -> Result<SolvedFootprint, SolveError> {
     let found = task.solve_as(fineness, workspace, monitor)?;
     let solved = SolvedFootprint {
-        footprint: Footprint::computed(found.field, 0.0),
+        footprint: Footprint::computed(found.field, 0.0, found.report.residual),
         report: Some(found.report.with_time(0.0)),
         coupling_error: 0.0,
         remarks: found.remarks,

@@ -10,14 +10,30 @@ const BALANCE: f64 = 1e-3;
 /// Upper limit of that fraction, relative to the target error. Chosen by judgement; how much it matters was not measured.
 const BALANCE_OF_TARGET: f64 = 0.1;
 
-/// The friction to count on next, after rounds that counted on the first of two numbers and found the second: a secant step
-/// where two rounds tell the slope, because friction found may swing about friction counted on where a flange is steep.
-pub(crate) fn next_share((counted, found): (f64, f64), before: Option<(f64, f64)>) -> f64 {
+/// The friction to count on in the next round, after a round that counted on some numbers and found others, `[counted, found]`.
+///
+/// Where the round before gives a slope, it is a secant step with one slope for all numbers: on a steep flange, the friction found may swing about the friction
+/// counted on. A round before on another grid, which has more or fewer numbers, is ignored.
+pub(crate) fn next_share(
+    [counted, found]: [Vec<f64>; 2],
+    before: Option<[Vec<f64>; 2]>,
+) -> Vec<f64> {
+    let less = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>();
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let slope = match before {
-        Some((at, was)) if (counted - at).abs() > f64::EPSILON => (found - was) / (counted - at),
+        Some([at, was]) if at.len() == counted.len() && was.len() == found.len() => {
+            let (step, change) = (less(&counted, &at), less(&found, &was));
+            product(&step, &change) / product(&step, &step).max(f64::MIN_POSITIVE)
+        }
         _ => 0.0,
     };
-    counted + (found - counted) / (1.0 - slope.clamp(SLOPES[0], SLOPES[1]))
+    let factor = 1.0 / (1.0 - slope.clamp(SLOPES[0], SLOPES[1]));
+    let steps = less(&found, &counted);
+    counted
+        .iter()
+        .zip(steps)
+        .map(|(counted, step)| counted + factor * step)
+        .collect()
 }
 
 /// By which part the vertical force may be missed.
@@ -36,20 +52,22 @@ mod tests {
     fn a_second_round_hits_the_balance_of_a_straight_line_however_it_swings() {
         for slope in [-0.8, -0.3, 0.2, 0.5] {
             let found = |counted: f64| 0.1 + slope * counted;
-            let first = (0.3, found(0.3));
-            let counted = next_share(first, None);
+            let first = [vec![0.3, 0.0], vec![found(0.3), 0.0]];
+            let counted = next_share(first.clone(), None);
             assert!(
-                (counted - first.1).abs() < 1e-12,
+                (counted[0] - first[1][0]).abs() < 1e-12,
                 "nothing is known of the slope yet"
             );
-            let balanced = next_share((counted, found(counted)), Some(first));
+            let second = vec![found(counted[0]), 0.0];
+            let balanced = next_share([counted, second], Some(first))[0];
             assert!((found(balanced) - balanced).abs() < 1e-12, "{slope}");
         }
     }
 
     #[test]
     fn a_slope_beyond_belief_makes_no_wild_step() {
-        let step = next_share((0.2, 0.3), Some((0.2 - 1e-6, 0.1))) - 0.2;
+        let before = [vec![0.2 - 1e-6], vec![0.1]];
+        let step = next_share([vec![0.2], vec![0.3]], Some(before))[0] - 0.2;
         assert!((step - 0.25).abs() < 1e-9, "{step}");
     }
 }

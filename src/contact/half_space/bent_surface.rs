@@ -17,7 +17,7 @@
 
 use std::cmp::Ordering;
 
-use pulp::{Simd, WithSimd};
+use pulp::{NullaryFnOnce, Simd, WithSimd};
 use rustfft::num_complex::Complex;
 
 use crate::contact::half_space::grid_operator::{FftPlanners, FftPlans, coefficients, lines};
@@ -307,18 +307,12 @@ impl BentOperator {
 
     /// Adds the gap in mm that changed pressures in MPa open, cell by cell.
     pub fn add_opened(&self, factors: &StripFactors, changes: &[(usize, f64)], gap: &mut [f64]) {
-        let (nx, number) = (self.nx, &self.strips.number);
-        for (cell, pressure) in changes {
-            let (column, strip) = (cell % nx, cell / nx);
-            for (j, row) in gap.chunks_exact_mut(nx).enumerate() {
-                let first = number[j].abs_diff(number[strip]) * (2 * nx - 1) + nx - 1 - column;
-                let line = &self.coefficients[first..first + nx];
-                let share = pressure * f64::from(factors.0[strip * number.len() + j]);
-                for (gap, influence) in row.iter_mut().zip(line) {
-                    *gap += share * influence;
-                }
-            }
-        }
+        simd::dispatch(Changes {
+            operator: self,
+            factors,
+            changes,
+            gap,
+        });
     }
 
     /// The gap in mm that tractions on the rail in MPa, along x and s, open; none under like bodies on a surface without factors for the turn.
@@ -702,6 +696,34 @@ fn smooth(n: usize) -> usize {
         n == 1
     };
     (n.max(1)..).find(is_smooth).unwrap_or(n)
+}
+
+/// Changed pressures, and the gap that they change.
+struct Changes<'a> {
+    operator: &'a BentOperator,
+    factors: &'a StripFactors,
+    changes: &'a [(usize, f64)],
+    gap: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Changes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let (nx, number) = (self.operator.nx, &self.operator.strips.number);
+        for (cell, pressure) in self.changes {
+            let (column, strip) = (cell % nx, cell / nx);
+            for (j, row) in self.gap.chunks_exact_mut(nx).enumerate() {
+                let first = number[j].abs_diff(number[strip]) * (2 * nx - 1) + nx - 1 - column;
+                let line = &self.operator.coefficients[first..first + nx];
+                let share = pressure * f64::from(self.factors.0[strip * number.len() + j]);
+                for (gap, influence) in row.iter_mut().zip(line) {
+                    *gap += share * influence;
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -47,6 +47,8 @@ pub struct NormalUncertainty {
     pub cells_across: Vec<f64>,
     /// By how much, relatively, the load may differ from the one asked for.
     pub load: f64,
+    /// How far, relative to the deepest overlap, the surfaces may be apart or overlap where they touch.
+    pub distance: f64,
 }
 
 /// Cosines and sines of the mid-points of N equal parts of 0 … π.
@@ -103,12 +105,14 @@ impl Footprint {
         }
     }
 
-    /// A pressure that was computed, and whose load may differ from the one asked for by the relative `load_error`.
+    /// A pressure that was computed, and whose load may differ from the one asked for by the relative `load_error`. Where the surfaces
+    /// touch, they are apart or overlap by up to `distance`, relative to the deepest overlap.
     #[must_use]
-    pub fn computed(field: PressureField, load_error: f64) -> Footprint {
+    pub fn computed(field: PressureField, load_error: f64, distance: f64) -> Footprint {
         let uncertainty = NormalUncertainty {
             cells_across: field.cells_across(),
             load: load_error,
+            distance,
         };
         Footprint {
             uncertainty: Some(uncertainty),

@@ -31,6 +31,8 @@ const FIRST: f64 = 24.0;
 const CELLS_MAX: usize = 600;
 /// A finer grid is not needed where the present one has this part of the wanted cells.
 const FINE_ENOUGH: f64 = 0.9;
+/// An intermediate grid is solved where the wanted cells are smaller by more than this factor; chosen on contacts at gauge corners and flanges.
+const FINER_MAX: f64 = 4.0;
 /// Strips whose deformed surfaces come nearer than this part of the deepest overlap are part of the next grid.
 const NEAR: f64 = 0.03;
 /// Normal problems that are solved on one grid at most, and grids.
@@ -114,7 +116,7 @@ struct WeightedStrips<'a> {
 }
 
 impl PressureInfluence for WeightedStrips<'_> {
-    const CHANGES_MAX: usize = 24;
+    const CHANGES_MAX: usize = 80;
     type Workspace = BentWorkspace;
 
     fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut BentWorkspace) {
@@ -149,6 +151,12 @@ impl CurveTask<'_> {
         }
         let share = self.elasticity.lower_share;
         share * rail + (1.0 - share) * wheel
+    }
+
+    /// The same task at the tolerance of a grid that only finds the contact or estimates friction.
+    pub(crate) fn roughly(mut self) -> Self {
+        self.fineness.tolerance = FIRST_TOLERANCE;
+        self
     }
 
     /// Finds the contact on a coarse grid, without friction.
@@ -190,7 +198,7 @@ impl CurveTask<'_> {
                 iterations: 0,
             };
             let none = Friction::default();
-            let found = self.settled(start, &none, FIRST_TOLERANCE, workspace, monitor)?;
+            let found = self.roughly().settled(start, &none, workspace, monitor)?;
             let next = self.touch - found.centre;
             let close = (next / lowering - 1.0).abs() < 0.1;
             lowering = next.max(LOWERING_LEAST);
@@ -220,7 +228,42 @@ impl CurveTask<'_> {
         workspace: &mut Workspace,
         monitor: &dyn Monitor,
     ) -> Result<CurveContact, NormalError> {
-        let step = self.wanted(coarse);
+        self.finer(coarse, self.wanted(coarse), friction, workspace, monitor)
+    }
+
+    /// Finds the contact without friction on cells of an intermediate size, where the answer needs much smaller cells than the coarse grid has, as for a narrow
+    /// patch beside a wide one. Returns `None` elsewhere and on planes.
+    ///
+    /// # Errors
+    /// As [`coarse`](Self::coarse).
+    pub(crate) fn between(
+        &self,
+        coarse: &CurveContact,
+        workspace: &mut Workspace,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<CurveContact>, NormalError> {
+        let (wanted, present) = (self.wanted(coarse), coarse.grid.step);
+        if self.curve.is_flat() || (0..2).all(|axis| present[axis] < FINER_MAX * wanted[axis]) {
+            return Ok(None);
+        }
+        let step = [0, 1].map(|axis| (present[axis] * wanted[axis]).sqrt());
+        let none = Friction::default();
+        let mut found = self
+            .roughly()
+            .finer(coarse, step, &none, workspace, monitor)?;
+        found.overlaps.clone_from(&coarse.overlaps);
+        Ok(Some(found))
+    }
+
+    /// Brings the wheel to rest on a grid with cells of a given size in mm, around the contact found on another grid.
+    fn finer(
+        &self,
+        coarse: &CurveContact,
+        step: [f64; 2],
+        friction: &Friction,
+        workspace: &mut Workspace,
+        monitor: &dyn Monitor,
+    ) -> Result<CurveContact, NormalError> {
         let [first, last] = extent(coarse, 0);
         let margin = coarse.grid.step[0] + (FREE as f64 + 0.5) * step[0];
         let beside = 0.5 * coarse.grid.step[1] + (FREE as f64 + 0.5) * step[1];
@@ -258,8 +301,7 @@ impl CurveTask<'_> {
             centre: coarse.centre,
             iterations: coarse.work.iterations,
         };
-        let tolerance = self.fineness.tolerance;
-        self.settled(start, &friction, tolerance, workspace, monitor)
+        self.settled(start, &friction, workspace, monitor)
     }
 
     /// Brings the wheel to rest with friction on the grid of a rest with other friction.
@@ -282,8 +324,7 @@ impl CurveTask<'_> {
             over: Some(before.over),
             iterations: before.work.iterations,
         };
-        let tolerance = self.fineness.tolerance;
-        let mut found = self.settled(start, friction, tolerance, workspace, monitor)?;
+        let mut found = self.settled(start, friction, workspace, monitor)?;
         found.overlaps = before.overlaps;
         Ok(found)
     }
@@ -357,13 +398,12 @@ impl CurveTask<'_> {
         &self,
         mut start: Start,
         friction: &Friction,
-        tolerance: f64,
         workspace: &mut Workspace,
         monitor: &dyn Monitor,
     ) -> Result<CurveContact, NormalError> {
         let mut friction = friction.clone();
         for _ in 0..GRIDS_MAX {
-            let mut found = self.on_grid(start, &friction, tolerance, workspace, monitor)?;
+            let mut found = self.on_grid(start, &friction, workspace, monitor)?;
             let opened = friction.opened.take();
             let Some(grid) = found.grid.enlarged(self.curve, &found.pressure) else {
                 found.opened = opened;
@@ -437,7 +477,6 @@ impl CurveTask<'_> {
         &self,
         start: Start,
         friction: &Friction,
-        tolerance: f64,
         workspace: &mut Workspace,
         monitor: &dyn Monitor,
     ) -> Result<CurveContact, NormalError> {
@@ -450,6 +489,7 @@ impl CurveTask<'_> {
             over,
             mut iterations,
         } = start;
+        let tolerance = self.fineness.tolerance;
         let nx = grid.x.len();
         let mut over = over.unwrap_or_else(|| grid.over(self.curve, centre));
         let operator = operator.unwrap_or_else(|| self.operator(&grid, &over, &runs, workspace));

@@ -396,7 +396,7 @@ mod strip_chords_tests {
         let [.., low, high] = field.patches()[0].extent;
         let strips = equal_strips(low, high, 8);
         let exact = chords(&Footprint::given(field.clone()), 0, &strips);
-        let found = chords(&Footprint::computed(field, 0.0), 0, &strips);
+        let found = chords(&Footprint::computed(field, 0.0, 0.0), 0, &strips);
         for (exact, found) in exact.iter().zip(&found) {
             let ratio = found.load.unwrap() / exact.load.unwrap();
             assert!((ratio - 1.0).abs() < 5e-4, "{}: {ratio}", exact.line.y);

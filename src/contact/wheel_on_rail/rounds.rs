@@ -27,8 +27,10 @@ const FORECAST_OFF: f64 = 0.3;
 /// The gap opened by tractions is neglected if the table estimates that it changes the forces by less than this part of the target. The estimate may be
 /// ten times too small.
 const OPENS: f64 = 0.01;
-/// Change of the forces relative to μN that ends the rounds on the coarse grid.
-const CHANGE_ROUGH: f64 = 0.02;
+/// Change of the forces relative to μN that ends the rounds with coarse tractions. The step after it leaves about a fiftieth of that.
+const CHANGE_ROUGH: f64 = 0.05;
+/// Change of the vertical force, relative to it, that ends the rounds with the table.
+const CHANGE_TABLE: f64 = 0.02;
 /// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark, and is part of the error estimate. Where a strip at
 /// the edge of a patch comes and goes with the tractions, these jump by the error of their mesh, and rounds do not end.
 const CHANGE_POOR: f64 = 0.03;
@@ -208,44 +210,45 @@ impl WheelSolve<'_> {
         workspace: &mut Workspace,
     ) -> Result<(Friction, CurveContact), SolveError> {
         let CheckedCase { problem, run, .. } = self.case;
-        let task = self.task();
+        let task = self.task().roughly();
         let mut coarse = task.coarse(workspace, self.watch)?;
         let mut friction = Friction::default();
+        if !coupled {
+            return Ok((friction, coarse));
+        }
+        if let Some(between) = task.between(&coarse, workspace, self.watch)? {
+            coarse = between;
+        }
         let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
         let target = run.resolution.target_or_usual();
-        let enough = CHANGE * target / FORECAST_OFF;
+        let limit = problem.friction.largest();
         let mut by_table = problem.history.is_none() && can_estimate(problem);
         let mut earlier = None;
-        for _ in 0..if coupled { ROUNDS_MAX } else { 0 } {
-            let limit = problem.friction.largest() * coarse.normal_force();
-            let by_gap = |from: &Friction, to: &Friction| {
-                let [by_lift, by_gap] = coarse.change_by(from, to, self.shared());
-                (by_lift, by_gap * coarse.normal_force() / limit)
-            };
-            let estimate = match by_table {
-                true => Some(self.estimate(&coarse, workspace)?),
-                false => None,
-            };
-            let estimate = estimate.map(|next| (by_gap(&Friction::default(), &next).1, next));
-            let estimate = estimate.filter(|(opened, _)| *opened <= enough);
-            by_table = estimate.is_some();
-            let next = match estimate {
-                Some((opened, Friction { lift, .. })) if opened <= OPENS * target => {
-                    Friction { lift, opened: None }
+        for _ in 0..ROUNDS_MAX {
+            let of_table = by_table;
+            let next = if of_table {
+                let mut next = self.estimate(&coarse, workspace)?;
+                let [_, opened] = coarse.change_by(&Friction::default(), &next, self.shared());
+                // Where the table is not accurate enough, rounds with tractions begin from its first estimate.
+                by_table = opened <= CHANGE * target / FORECAST_OFF * limit;
+                if opened <= OPENS * target * limit {
+                    next.opened = None;
                 }
-                Some((_, next)) => next,
-                None => {
-                    let parts = self.tractions(&coarse, &rough, 0.0, workspace)?;
-                    self.friction(&coarse, &parts, problem.motions.len() - 1, workspace)
-                }
+                next
+            } else {
+                let parts = self.tractions(&coarse, &rough, 0.0, workspace)?;
+                self.friction(&coarse, &parts, problem.motions.len() - 1, workspace)
             };
-            let (by_lift, by_gap) = by_gap(&friction, &next);
+            let [by_lift, by_gap] = coarse.change_by(&friction, &next, self.shared());
             friction = accelerated(&friction, next, &mut earlier);
-            if by_table && by_lift <= CHANGE_ROUGH || by_lift.max(by_gap) <= CHANGE_ROUGH {
+            if by_table && by_lift <= CHANGE_TABLE {
                 break;
             }
             coarse = task.again(coarse, &friction, workspace, self.watch)?;
             friction.opened.clone_from(&coarse.opened);
+            if !of_table && by_lift.max(by_gap / limit) <= CHANGE_ROUGH {
+                break;
+            }
         }
         Ok((friction, coarse))
     }
@@ -343,17 +346,29 @@ impl WheelSolve<'_> {
     }
 }
 
-/// The friction to count on next: what was found, with a secant step for the vertical force.
+/// The friction to count on in the next round, by secant steps for the vertical force and for the gap. `earlier` holds the friction that the round before counted
+/// on and found; it is replaced by that of this round.
 pub(super) fn accelerated(
     counted: &Friction,
     found: Friction,
-    earlier: &mut Option<(f64, f64)>,
+    earlier: &mut Option<[Friction; 2]>,
 ) -> Friction {
-    let pair = (counted.lift, found.lift);
-    Friction {
-        lift: next_share(pair, earlier.replace(pair)),
-        ..found
-    }
+    let lift = |friction: &Friction| vec![friction.lift];
+    let cells = found.opened.as_ref().map_or(0, Vec::len);
+    let opened = |friction: &Friction| match &friction.opened {
+        Some(opened) => opened.clone(),
+        None => vec![0.0; cells],
+    };
+    let step = |of: &dyn Fn(&Friction) -> Vec<f64>| {
+        let before = earlier.as_ref().map(|pair| pair.each_ref().map(of));
+        next_share([counted, &found].map(of), before)
+    };
+    let next = Friction {
+        lift: step(&lift)[0],
+        opened: found.opened.as_ref().map(|_| step(&opened)),
+    };
+    *earlier = Some([counted.clone(), found]);
+    next
 }
 
 /// A run with tractions and pressures among its outputs.

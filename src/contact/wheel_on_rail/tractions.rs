@@ -157,7 +157,12 @@ impl WheelSolve<'_> {
         };
         let load_error = contact.missed.hypot(unbalanced);
         let solved = SolvedFootprint {
-            footprint: Footprint::computed(field.from_origin(origin), load_error).on_surface(
+            footprint: Footprint::computed(
+                field.from_origin(origin),
+                load_error,
+                contact.work.residual,
+            )
+            .on_surface(
                 slip,
                 by_motion,
                 centres.iter().map(|centre| minus(*centre, origin)),

@@ -209,10 +209,23 @@ fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
     let of = |cells: &f64| {
         let cells = cells.max(1.0);
         let region = REGION * (REGION_CELLS / cells).powf(REGION_POWER);
-        let region = region * (1.0 + (REGION_CELLS_FEW / cells).powi(2));
-        region.hypot(uncertainty.load)
+        region * (1.0 + (REGION_CELLS_FEW / cells).powi(2))
     };
     let mut errors: Vec<f64> = uncertainty.cells_across.iter().map(of).collect();
+    // An error of the deepest patch, or a distance between surfaces that should touch, moves the surface at the other patches by a part of the largest depth.
+    // The load of a patch grows with the power 3/2 of its own depth.
+    let depth = |patch: &Patch| patch.normal_force / patch.area.sqrt();
+    let deepest =
+        (0..patches.len()).max_by(|a, b| depth(&patches[*a]).total_cmp(&depth(&patches[*b])));
+    if let Some(deepest) = deepest {
+        let shift = errors[deepest].hypot(uncertainty.distance) * depth(&patches[deepest]);
+        for k in (0..patches.len()).filter(|k| *k != deepest) {
+            errors[k] = errors[k].hypot(1.5 * shift / depth(&patches[k]));
+        }
+    }
+    errors
+        .iter_mut()
+        .for_each(|error| *error = error.hypot(uncertainty.load));
     let load: f64 = patches.iter().map(|patch| patch.normal_force).sum();
     let pairs = errors.iter().zip(patches);
     let sum = pairs
