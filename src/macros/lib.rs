@@ -129,7 +129,7 @@ pub fn named(item: TokenStream) -> TokenStream {
     .into()
 }
 
-/// Gives an enum of unit variants `ALL`, `name` and `from_name`: its values and their words, as by [`Words`](macro@Words).
+/// Derives `ALL`, `name` and `from_name` for an enum of unit variants: its values and their words, as in [`Words`](macro@Words).
 #[proc_macro_derive(Names, attributes(serde))]
 pub fn names(item: TokenStream) -> TokenStream {
     let named = Tokens::from(named(item.clone()));
@@ -153,7 +153,7 @@ pub fn names(item: TokenStream) -> TokenStream {
     .into()
 }
 
-/// Gives an enum the function `code`: the name of the variant of a value in kebab case. It never changes, as clients know it.
+/// Derives the function `code` for an enum: the name of the variant in kebab case. Clients rely on it, so that it never changes.
 #[proc_macro_derive(Code)]
 pub fn code(item: TokenStream) -> TokenStream {
     let item = parse_macro_input!(item as ItemEnum);

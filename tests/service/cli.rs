@@ -31,7 +31,7 @@ fn solve(text: &str) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// A run that ends with a code and complains with a word; its complaints.
+/// Asserts that a program ended with this exit code and named this word on standard error. Returns standard error.
 #[track_caller]
 fn fails(output: &Output, code: i32, word: &str) -> String {
     let complaints = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -40,7 +40,7 @@ fn fails(output: &Output, code: i32, word: &str) -> String {
     complaints
 }
 
-/// What a run says as JSON.
+/// The output of a run as JSON.
 fn said(output: &Output) -> Value {
     assert!(output.status.success(), "{output:?}");
     serde_json::from_slice(&output.stdout).unwrap()

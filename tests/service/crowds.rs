@@ -19,7 +19,7 @@ pub async fn send(address: SocketAddr, request: &str) -> TcpStream {
     stream
 }
 
-/// A GET on a connection of its own, of which nothing is read.
+/// Sends a GET on a new connection and reads nothing of the answer.
 pub async fn silent(address: SocketAddr, path: &str) -> TcpStream {
     let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
     send(address, &request).await
@@ -36,7 +36,7 @@ async fn ask(address: SocketAddr, path: &str) -> String {
     answer
 }
 
-/// A follower of the events of a job, and how the answer to it begins.
+/// A reader of the events of a job, and the first part of its answer.
 async fn follow(server: &Server, job: &str) -> (TcpStream, [u8; 12]) {
     let mut stream = silent(server.address, &format!("{job}/events")).await;
     let mut begun = [0; 12];
@@ -100,7 +100,7 @@ async fn probes_are_answered_while_every_connection_is_busy() {
     assert!(refused.contains("/problems/overloaded"), "{refused}");
 }
 
-/// Probes are answered, everything else with a status; that answer.
+/// Asserts that probes are answered and that every other request gets this status. Returns that answer.
 async fn assert_probed(address: SocketAddr, status: u16) -> String {
     let mut last = String::new();
     let probes = ["/healthz", "/readyz", "/metrics"].map(|path| (path, 200));

@@ -7,7 +7,7 @@ use crate::errors::assert_problem;
 use crate::lab::Lab;
 use crate::support::Service;
 
-/// A data folder after an orderly end, with so many jobs and so many bytes damaged from the middle of its table on.
+/// A data folder after an orderly shutdown, with this many jobs and this many bytes damaged from the middle of its table on.
 async fn damaged(jobs: usize, bytes: usize) -> Lab {
     let lab = Lab::idle(|_| {}).await;
     for number in 0..jobs {

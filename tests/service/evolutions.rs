@@ -10,7 +10,7 @@ use crate::runs::ended;
 use crate::server::{Server, example};
 use crate::support::{Service, pause};
 
-/// Ends of a guard: something hangs.
+/// Time after which a guard reports that a test hangs.
 const WITHIN: Duration = Duration::from_secs(240);
 
 /// The shipped wheel and rail under two states, over a short extent.

@@ -33,7 +33,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// What a program says in a folder, where it has to succeed.
+/// Runs a program in a folder; it must succeed. Returns its output.
 fn run(program: &Path, arguments: &[&str], folder: &Path) -> String {
     let mut command = Command::new(program);
     let command = command.args(arguments).current_dir(folder);
@@ -54,7 +54,7 @@ fn begins_with(file: &Path, mark: &[u8]) {
     );
 }
 
-/// Runs the blocks of a guide for the shell; the folder where they ran, and what they said.
+/// Runs the shell blocks of a guide. Returns the folder where they ran and their output.
 fn run_shell(guide: &str) -> Option<(TempDir, String)> {
     let there = |program: &str| succeeds(Path::new(program), &["--version"]);
     if !there("curl") || !there("jq") {

@@ -17,7 +17,7 @@ fn keys(data_dir: &Path, args: &[&str]) -> Output {
     command.arg("--data-dir").arg(data_dir).output().unwrap()
 }
 
-/// What a command about keys says, which has to succeed.
+/// Runs a `keys` command, which must succeed. Returns standard output.
 fn said(data_dir: &Path, args: &[&str]) -> String {
     let done = keys(data_dir, args);
     assert!(done.status.success(), "{done:?}");
@@ -221,7 +221,7 @@ async fn only_pages_of_listed_origins_may_read_answers() {
         ("http://a.example", false),
     ] {
         for method in [Method::GET, Method::OPTIONS] {
-            // What a browser asks with before it sends.
+            // The preflight request of a browser.
             let request = service.request(method, "/v1/jobs").header("origin", origin);
             let request = request.header("access-control-request-method", "POST");
             let headers = "authorization,content-type";

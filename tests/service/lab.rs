@@ -18,12 +18,12 @@ use uuid::Uuid;
 
 pub const AT_MOST: Duration = Duration::from_secs(60);
 
-/// Holds solvers until it is opened.
+/// A gate that holds solvers back until it is opened.
 #[derive(Clone, Default)]
 pub struct Gate {
     open: Arc<AtomicBool>,
     begun: Arc<AtomicUsize>,
-    /// Solvers that tick at this moment, and the most there ever were.
+    /// Number of solvers running now, and the largest number so far.
     ticking: Arc<[AtomicUsize; 2]>,
     deaf: Arc<Mutex<BTreeSet<String>>>,
 }
@@ -33,7 +33,7 @@ impl Gate {
         self.open.store(open, Ordering::SeqCst);
     }
 
-    /// How often a solver has begun.
+    /// Number of solves that have begun.
     pub fn begun(&self) -> usize {
         self.begun.load(Ordering::SeqCst)
     }
@@ -150,7 +150,7 @@ impl Lab {
         assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
     }
 
-    /// Lets all go on, and ends when they have.
+    /// Opens the gate and waits until all solvers have gone on.
     pub async fn end(self) {
         self.gate.set_open(true);
         self.jobs.shutdown(Duration::from_secs(10)).await;

@@ -1,6 +1,6 @@
 //! Does the service behave?
 
-/// What a test needs. Where it is not there, which has been said, the test is not run.
+/// Unwraps a resource that a test needs. Without it, which has been reported, the test returns early.
 macro_rules! or_skip {
     ($needed:expr) => {{
         let Some(there) = $needed else { return };

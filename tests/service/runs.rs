@@ -11,7 +11,7 @@ use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
 use crate::support::files_below;
 
-/// Ends of a guard: something hangs.
+/// Time after which a guard reports that a test hangs.
 const WITHIN: Duration = Duration::from_secs(240);
 
 pub fn template(method: &str) -> Value {

@@ -39,7 +39,7 @@ fn inline(value: &mut Value, components: &Value) {
 }
 
 /// Checks that the contract knows this answer: the status, the content type, and every member of the body.
-/// What is refused of addresses that the contract does not have is not checked, nor are pages for people.
+/// Refusals of addresses that the contract does not list are not checked, and neither are pages for people.
 pub fn assert_documented(
     method: &str,
     path: &str,

@@ -49,7 +49,7 @@ pub fn run(program: &Path, arguments: &[&str]) -> String {
     said_by(Command::new(program).args(arguments))
 }
 
-/// The same of a program as it was prepared.
+/// Like the function above, for a prepared command.
 pub fn said_by(program: &mut Command) -> String {
     let output = program.output();
     let output = output.unwrap_or_else(|error| panic!("{program:?}: {error}"));

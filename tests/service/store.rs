@@ -205,7 +205,7 @@ pub fn request(queue: &Queue, jobs: usize, now: i64) -> ClaimRequest<'_> {
     }
 }
 
-/// Begins a batch that nobody knows, and fills it from its start.
+/// Creates an empty batch without an idempotency key and adds its cases.
 pub async fn begin(store: &dyn Store, new: &NewBatch, jobs: impl IntoIterator<Item = NewJob>) {
     let begun = store.begin_batch(new, &|_| false, QueueBounds::NONE).await;
     assert_eq!(begun.unwrap(), BatchBegun::Created);

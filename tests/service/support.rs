@@ -130,7 +130,7 @@ impl Service {
         (folder, service)
     }
 
-    /// A program as it was prepared, `serve` or `worker`, on a data folder that goes with it.
+    /// A prepared `serve` or `worker` process with a data folder that is removed with it.
     #[cfg(feature = "cluster")]
     pub fn alone(program: &mut Command, role: &str, flags: &[&str]) -> Service {
         let folder = tempfile::tempdir().unwrap();

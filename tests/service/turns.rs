@@ -25,7 +25,7 @@ async fn lab(change: impl FnOnce(&mut Options)) -> Lab {
     Lab::idle(short).await
 }
 
-/// Submits so many long cases.
+/// Submits this many long cases.
 async fn submit_long(lab: &Lab, count: usize) -> Vec<Uuid> {
     let mut ids = Vec::new();
     for number in 0..count {
@@ -166,7 +166,7 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
     let job = lab.get(long).await;
     assert_eq!((job.state, job.attempt), (State::Running, 1));
     lab.gate.set_open(true);
-    // Its solver was told neither that it is late nor that its job is lost.
+    // Its solver was not told that it is late or that its job is lost.
     lab.succeeds_at_once(long).await;
     lab.end().await;
 }

@@ -97,14 +97,14 @@ async fn flood(
     known
 }
 
-/// What clients and batches are known after a service was ended in floods, and the jobs that had succeeded by then.
+/// The idempotency keys and batches known after a service was killed under load, and the jobs that had succeeded by then.
 struct Flooded {
     clients: Vec<Known>,
     batches: BTreeMap<String, Option<String>>,
     succeeded: BTreeMap<String, Value>,
 }
 
-/// A service on this folder that is ended in the middle of a flood, so many times.
+/// Ends a service on this folder in the middle of a flood of requests, several times.
 async fn ended_in_floods(folder: &Path, times: usize, end: impl Fn(Service)) -> Flooded {
     let mut random = Random(7);
     let mut clients: Vec<Known> = (0..CLIENTS).map(|_| Known::default()).collect();
@@ -222,7 +222,7 @@ async fn assert_all_is_there(folder: &Path, flooded: Flooded) {
             .or_default() += 1;
     }
     for id in batches.values().flatten() {
-        // Lost if it was acknowledged and is not there.
+        // A batch that was acknowledged and is missing is lost.
         let lines = service.ask(&format!("/v1/batches/{id}/results")).await;
         for (index, line) in lines.is(200).lines().iter().enumerate() {
             assert_eq!(

@@ -153,7 +153,7 @@ impl DamageTask {
         };
         let named = named_figures(named);
         let own = own.copied().unwrap_or_default();
-        // Neither confirmed nor the client's.
+        // It was not confirmed, and it does not belong to the client.
         let doubtful = |model: &DamageModel| match model {
             DamageModel::TGamma | DamageModel::UsfdWear => false,
             DamageModel::ArchardWear => own.archard.is_none(),

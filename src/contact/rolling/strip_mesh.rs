@@ -263,7 +263,7 @@ impl StripMesh {
         }
     }
 
-    /// Values, of the unknowns of a parity, that are the same in both halves, over the whole mesh.
+    /// Values over the whole mesh that are equal in both halves, from those of the unknowns of a parity.
     pub(crate) fn whole(&self, parity: Option<Parity>, values: &[f64]) -> Vec<f64> {
         match parity {
             Some(_) => self.unfold(values, 1.0),

@@ -227,7 +227,7 @@ impl Motion {
         [self.creepage_x, self.creepage_y, self.spin_per_mm]
     }
 
-    /// Do the bodies roll without creepage and spin?
+    /// Whether the bodies roll without creepage and spin.
     pub fn is_still(&self) -> bool {
         self.components() == [0.0; 3]
     }

@@ -76,7 +76,7 @@ pub(crate) fn add_damage(
     }
 }
 
-/// What follows from the cells of a motion: summaries into its points; the rest is returned. The slips of a point of a history are those of
+/// Derives the results of a motion from its cells: summaries are written to its points, the rest is returned. The slips of a point of a history are those of
 /// its step.
 pub(crate) fn add_rest(
     case: &CheckedCase,

@@ -20,7 +20,7 @@ const HISTORY: [(&str, OfHistory); 9] = [
     ("shift_y_error_mm", |at| at.shift_y_error_mm),
 ];
 
-/// Name of a patch, number of a motion, and what there is of both.
+/// Name of the patch, number of the motion, its resultants and its forces on a wheel's axes.
 type Line = (String, usize, Sum, Forces);
 
 /// One line per patch and motion, then one per motion with the sums over all patches.

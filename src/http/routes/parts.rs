@@ -124,7 +124,7 @@ pub(crate) async fn stored(
     }
 }
 
-/// A patch of a solution and one of its motions.
+/// One motion of a patch of a solution.
 ///
 /// # Errors
 /// `bad-query`: there is no such patch or motion.

@@ -37,7 +37,7 @@ use crate::jobs::work::{Follower, Work};
 /// Every kind of work.
 pub(crate) const KINDS: [Kind; 4] = [Kind::Case, Kind::Cases, Kind::Evolution, Kind::Rows];
 
-/// What an event of `/v1/events` tells, one by the name of the event.
+/// The data of an event of `/v1/events`, by the name of the event.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = TenantEvent)]
 #[serde(untagged)]

@@ -47,7 +47,7 @@ async fn clocks_that_are_off_by_40_seconds_cost_no_lease_and_shift_no_time() {
     let (url, library) = (or_skip!(tables().await), or_skip!(library()));
     let clocks = tempfile::tempdir().unwrap();
     let begun = Timestamp::now();
-    // A node whose clock is ahead by so many seconds.
+    // A node whose clock is ahead by this many seconds.
     let start = |role: &str, ahead: i32| {
         let file = clocks.path().join(ahead.to_string());
         set_ahead(&file, ahead);

@@ -20,7 +20,7 @@ async fn node_at_a_cable(flags: &[&str]) -> Option<(Service, Cable)> {
     Some((service, cable))
 }
 
-/// A request is answered that the database cannot be reached, without a word of disks.
+/// Asserts that an answer names the unreachable database and does not mention disks.
 async fn assert_unreachable(request: RequestBuilder) {
     let answer = Answer::to(request).await.is(503);
     assert!(answer.header("retry-after").is_some(), "{}", answer.text);

@@ -15,7 +15,7 @@ use sqlx::{Connection, PgConnection};
 use crate::cluster::postgres::schema;
 use crate::support::{case, pause};
 
-/// Ends of a guard: something hangs.
+/// Time after which a guard reports that a test hangs.
 const WITHIN: Duration = Duration::from_secs(120);
 
 /// Tenants, ms that their jobs take, and how many each has: more than its share.

@@ -47,7 +47,7 @@ async fn five_nodes_start_at_once_on_an_empty_and_on_an_old_database() {
     }
 }
 
-/// Five commands run at once: one of them does something, the others find it done.
+/// Runs five commands at once: one of them does the work, and the others find it done.
 async fn assert_done_once(url: &str, what: Migrated) {
     let said = try_join_all([(); 5].map(|()| migrate(url))).await.unwrap();
     let count = |what| said.iter().filter(|said| **said == what).count();

@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 
 use crate::support::{Service, pause, railhead};
 
-/// Ends of a guard: something hangs.
+/// Time after which a guard reports that a test hangs.
 const WITHIN: Duration = Duration::from_secs(90);
 
 /// A database of its own with the tables of the service.
@@ -61,7 +61,7 @@ async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
     }
 }
 
-/// What a program says, and whether it succeeds.
+/// Runs a program. Returns its output and whether it succeeded.
 fn said_by(program: &mut Command, words: &[&str]) -> (bool, String) {
     let done = program.args(words).output().unwrap();
     let said = [done.stdout, done.stderr].concat();

@@ -18,7 +18,7 @@ fn large_case(name: &str) -> Value {
     case
 }
 
-/// What the doctor says about the place of the results, and whether it is well.
+/// The report of `doctor` on the place of the results, and whether it passed.
 fn doctor(port: u16, url: &str, place: &str) -> (bool, String) {
     let words = ["doctor", "--database-url", url, "--results-url", place];
     let (_, said) = said_by(&mut railhead_at(port), &words);

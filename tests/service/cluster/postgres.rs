@@ -103,7 +103,7 @@ pub fn with_parameter(url: &str, parameter: &str) -> String {
     format!("{url}{mark}{parameter}")
 }
 
-/// Makes something in that server, a `DATABASE` or a `SCHEMA`; the URL of the server and the new name.
+/// Creates a `DATABASE` or a `SCHEMA` on that server. Returns the URL of the server and the new name.
 async fn make(what: &str) -> Option<(&'static str, String)> {
     static MADE: AtomicU32 = AtomicU32::new(0);
     let url = server()?;
@@ -198,7 +198,7 @@ fn certify(folder: &Path) -> PathBuf {
     write("authority.pem", authority.pem())
 }
 
-/// A folder that is left to a program of our own, which removes it.
+/// A folder that a program under test removes.
 pub fn left_folder(name: &str) -> PathBuf {
     let mut folder = tempfile::Builder::new();
     folder.prefix(name).tempdir().expect("a folder").keep()
@@ -210,7 +210,7 @@ pub fn free_port() -> u16 {
     listener.local_addr().expect("an address").port()
 }
 
-/// Has a shell start something in its folder, and waits until it is ready. It ends with the standard input of the shell, however this
+/// Starts a process from a shell in its folder and waits until it is ready. The process ends with the standard input of the shell, however this
 /// process ends.
 pub fn started(mut shell: Command, script: &str, ready: impl Fn() -> bool) -> Child {
     let shell = shell.args(["-c", script]).stdin(Stdio::piped());

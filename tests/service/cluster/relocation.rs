@@ -10,7 +10,7 @@ use crate::cluster::seaweed::{railhead_at, server};
 use crate::cluster::{node, node_by, said_by, tables, until};
 use crate::support::{Answer, Service, case, endless_case, loaded, long_case, railhead};
 
-/// What a node is started with that solves, and ends without a delay.
+/// Options of a node that solves and that shuts down without a delay.
 const SOLVES: [&str; 6] = ["--workers", "1", "--drain-delay-s", "0", "--lease-s", "30"];
 
 /// What the program says about a data folder and a database, and whether it succeeded.
@@ -18,7 +18,7 @@ fn say(words: &[&str]) -> (bool, String) {
     said_by(&mut railhead(), words)
 }
 
-/// Moves what has one large result.
+/// Asserts that the one large result of a store was moved.
 fn assert_moved((moved, said): (bool, String)) {
     let counts = said.contains("large results\t1\n") && said.contains("missing\t0");
     assert!(moved && counts, "{said}");
