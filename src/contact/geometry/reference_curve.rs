@@ -161,7 +161,6 @@ pub struct WheelOver {
 
 impl<'g> ReferenceCurve<'g> {
     /// The curve of a rail, with the wheel in its pose.
-    #[must_use]
     pub fn new(geometry: &'g WheelRail) -> ReferenceCurve<'g> {
         let [_, wheel] = geometry.parameters(WHEEL_STEP);
         let circles: Vec<LowestPoint> = wheel
@@ -234,7 +233,6 @@ impl<'g> ReferenceCurve<'g> {
     }
 
     /// The number of the plane at a coordinate s in mm; 0 on the curve.
-    #[must_use]
     pub fn plane(&self, s: f64) -> usize {
         let last = self.planes.len().saturating_sub(1);
         self.planes
@@ -243,13 +241,11 @@ impl<'g> ReferenceCurve<'g> {
     }
 
     /// Whether planes replace the curve.
-    #[must_use]
     pub fn is_flat(&self) -> bool {
         !self.planes.is_empty()
     }
 
     /// Least and largest arc length in mm. On a right rail, whose points run to the right, arc lengths are negative.
-    #[must_use]
     pub fn range(&self) -> [f64; 2] {
         let last = self.rail[self.rail.len() - 1].s;
         [last.min(0.0), last.max(0.0)]
@@ -260,7 +256,6 @@ impl<'g> ReferenceCurve<'g> {
     }
 
     /// The place at an arc length; beyond the ends the tangent there.
-    #[must_use]
     pub fn at(&self, s: f64) -> CurvePlace {
         if self.last.get().s == s {
             return self.last.get();
@@ -296,7 +291,6 @@ impl<'g> ReferenceCurve<'g> {
     }
 
     /// The place at a parameter of the rail's curve; not on planes.
-    #[must_use]
     pub(crate) fn at_rail(&self, rail: f64) -> CurvePlace {
         let next = self.rail.partition_point(|known| known.rail <= rail);
         let from = self.rail[next.clamp(1, self.rail.len()) - 1];
@@ -306,7 +300,6 @@ impl<'g> ReferenceCurve<'g> {
 
     /// Where the wheel is nearest to the rail on the line along x through a place, with the wheel's centre at a height in mm: x, and the wheel there as
     /// a start for [`over`](Self::over). None where the wheel does not face the rail within 8 mm.
-    #[must_use]
     pub fn nearest(&self, place: &CurvePlace, centre: f64) -> Option<(f64, WheelOver)> {
         let (x, start) = self.about(place, centre, FAR)?;
         Some((x, self.over(place, x, centre, &start)?))
@@ -370,7 +363,6 @@ impl<'g> ReferenceCurve<'g> {
 
     /// The stretches of the rail in which the bodies overlap with the wheel's centre at a height in mm: overlapped places at most [`SPACING`] apart,
     /// with increasing arc length. Where the bodies overlap between two places only, the place at which they overlap most.
-    #[must_use]
     pub fn overlaps(&self, centre: f64) -> Vec<Vec<Nearest>> {
         let seen = self.close_places(centre);
         let gap = |k: usize| seen[k].map_or(f64::INFINITY, |seen| seen.wheel.gap);
@@ -468,7 +460,6 @@ impl<'g> ReferenceCurve<'g> {
 
     /// The wheel over a place, at x and with its centre at a height in mm, by Newton's method from a start nearby. None where the search leaves the
     /// wheel's profile, or finds a surface that does not face the rail.
-    #[must_use]
     pub fn over(
         &self,
         place: &CurvePlace,
@@ -529,7 +520,6 @@ impl<'g> ReferenceCurve<'g> {
 
     /// Points along x at which the gap of a strip is computed, so that a polynomial through them has it between two ends in mm: more where the yaw
     /// moves the contact across the wheel's profile.
-    #[must_use]
     pub fn nodes(&self, [first, last]: [f64; 2]) -> Vec<f64> {
         let across = self.geometry.axle()[0].abs() * (last - first);
         let intervals = (INTERVALS + (across / NODE_DISTANCE) as usize).min(INTERVALS_MAX);
@@ -542,7 +532,6 @@ impl<'g> ReferenceCurve<'g> {
 
     /// The wheel over the points of a line along x with its centre at a height in mm, from that over a place beside it if that is known. None
     /// where one of the points is not below the wheel.
-    #[must_use]
     pub fn over_line(
         &self,
         place: &CurvePlace,
@@ -575,7 +564,6 @@ impl<'g> ReferenceCurve<'g> {
     }
 
     /// Half of the length in mm on which the bodies overlap along x, where the wheel is nearest to a place at x.
-    #[must_use]
     pub fn half_length(&self, wheel: &WheelOver) -> f64 {
         let radius = self.geometry.meridian(wheel.wheel).radius;
         (2.0 * radius * (-wheel.gap).max(0.0) / wheel.lift.abs().max(0.1)).sqrt()
@@ -636,7 +624,6 @@ pub struct RigidMotion {
 
 impl RigidMotion {
     /// That of a wheelset with its centre at a height in mm.
-    #[must_use]
     pub fn of_wheelset(geometry: &WheelRail, centre: f64, motion: &WheelsetMotion) -> RigidMotion {
         let mut turn = geometry.axle().map(|part| motion.angular_velocity * part);
         turn[0] += motion.roll_rate;
@@ -649,7 +636,6 @@ impl RigidMotion {
     }
 
     /// The one that has these creepages and this spin in 1/mm at a point of the wheel's surface over a place, and turns about the normal there alone.
-    #[must_use]
     pub fn of_creepages(point: [f64; 3], place: &CurvePlace, creepages: [f64; 3]) -> RigidMotion {
         let [along, across, spin] = creepages;
         let (tangent, normal) = (place.tangent(), place.normal());
@@ -661,7 +647,6 @@ impl RigidMotion {
     }
 
     /// Rigid slip along x and along the tangent of a place, at a point of the wheel in mm.
-    #[must_use]
     pub fn slip(&self, point: [f64; 3], place: &CurvePlace) -> [f64; 2] {
         let arm = [0, 1, 2].map(|k| point[k] - self.point[k]);
         let turn = &self.turn;
@@ -678,7 +663,6 @@ impl RigidMotion {
     }
 
     /// Turn about the normal of a place in 1/mm.
-    #[must_use]
     pub fn spin(&self, place: &CurvePlace) -> f64 {
         let normal = place.normal();
         self.turn[1] * normal[0] + self.turn[2] * normal[1]

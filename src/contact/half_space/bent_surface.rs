@@ -90,7 +90,6 @@ type Spectrum = Vec<[f32; WAVES]>;
 
 impl BentOperator {
     /// The operator of `nx` cells along x of sizes `step` in mm on some strips.
-    #[must_use]
     pub fn new(
         nx: usize,
         step: [f64; 2],
@@ -227,13 +226,11 @@ impl BentOperator {
     }
 
     /// The angles of the strips in rad.
-    #[must_use]
     pub fn angles(&self) -> &[f64] {
         &self.strips.angle
     }
 
     /// Displacement of a cell by its own unit pressure in mm/MPa.
-    #[must_use]
     pub fn own(&self) -> f64 {
         self.coefficients[self.nx - 1]
     }
@@ -255,7 +252,6 @@ impl BentOperator {
     }
 
     /// The factors of the gaps that pressures open.
-    #[must_use]
     pub fn pressure_factors(&self) -> StripFactors {
         let run = &self.strips.run;
         if !self.strips.corrected {
@@ -266,7 +262,6 @@ impl BentOperator {
     }
 
     /// The same factors over those of a weight of each strip acted on and of each that acts.
-    #[must_use]
     pub fn weighted_pressure_factors(&self, weights: &[f64]) -> StripFactors {
         let StripFactors(mut factors) = self.pressure_factors();
         for (row, of) in factors.chunks_exact_mut(weights.len()).zip(weights) {
@@ -316,7 +311,6 @@ impl BentOperator {
     }
 
     /// The gap in mm that tractions on the rail in MPa, along x and s, open; none under like bodies on a surface without factors for the turn.
-    #[must_use]
     pub fn opened_by_traction(
         &self,
         [x, s]: &[Vec<f64>; 2],
@@ -365,7 +359,6 @@ impl BentOperator {
 
     /// The slip that pressures in MPa cause in steady rolling, along x and s: the derivatives along x of the displacements of the rail relative to the
     /// wheel; none on a surface without factors for the turn.
-    #[must_use]
     pub fn slip_of_pressure(
         &self,
         pressure: &[f64],

@@ -138,7 +138,6 @@ impl<T: FftFloat> GridWorkspace<T> {
 
 impl<T: FftFloat> GridOperator<T> {
     /// Prepares the influence for rectangles of `dx` by `dy` mm and the contact modulus `E*` in MPa.
-    #[must_use]
     pub fn new(
         [nx, ny]: [usize; 2],
         [dx, dy]: [f64; 2],
@@ -172,7 +171,6 @@ impl<T: FftFloat> GridOperator<T> {
     }
 
     /// Displacement at the centre of a cell per unit of its own pressure, in mm/MPa.
-    #[must_use]
     pub fn own(&self) -> f64 {
         self.own
     }

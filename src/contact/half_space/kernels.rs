@@ -54,7 +54,6 @@ const FAR: f64 = 40.0;
 /// 1990), with the factor 2 for two bodies. Terms are 0 where their leading factor is 0, so points on edges and
 /// corners are allowed. The error is about 1e-14 of the largest coefficient near the rectangle; far away a 4×4 Gauss
 /// rule keeps the relative error below 1e-12 where the closed form would lose digits.
-#[must_use]
 pub fn rectangle(x: f64, y: f64, cell: Rectangle, nu: f64) -> Influence {
     let longer = (cell.x1 - cell.x0).max(cell.y1 - cell.y0);
     let dx = (cell.x0 - x).max(x - cell.x1).max(0.0);
@@ -137,7 +136,6 @@ pub mod rectangle_stress {
         ///
         /// Sums of a distance and a negative coordinate are taken as a quotient, and differences of arctangents as one arctangent, so that
         /// nothing cancels near the surface.
-        #[must_use]
         #[inline]
         pub fn at(p: f64, q: f64, z: f64, nu: f64) -> CornerStress {
             let (pp, qq, zz) = (p * p, q * q, z * z);
@@ -185,8 +183,8 @@ pub mod rectangle_stress {
         }
 
         /// The difference of two primitives.
-        #[must_use]
         #[inline]
+        #[must_use]
         pub fn less(&self, other: &CornerStress) -> CornerStress {
             let mut difference = *self;
             for (own, other) in difference.0.iter_mut().zip(&other.0) {
@@ -413,7 +411,6 @@ pub struct LoadPack {
 }
 
 /// The stress in MPa at a point `[x, y, z]` in mm, z more than 0, of these packs of a list, for Poisson's ratio `nu`.
-#[must_use]
 pub fn stress(packs: &[LoadPack], felt: &[Range<usize>], point: [f32; 3], nu: f64) -> Stress {
     simd::dispatch(FeltStress {
         packs,

@@ -55,13 +55,11 @@ fn of_cell([x, y]: [f64; 2], size: [f64; 2]) -> [f64; 2] {
 }
 
 /// Displacements along x and across at a place from a unit pressure on a cell of a size about the origin, times G.
-#[must_use]
 pub fn displacement_by_cell(difference: f64, at: [f64; 2], size: [f64; 2]) -> [f64; 2] {
     of_cell(at, size).map(|sum| difference / PI * sum)
 }
 
 /// Displacements along x and across at a place from pressures on all cells, times G.
-#[must_use]
 pub fn displacement(mesh: &Mesh, difference: f64, pressure: &[f64], at: [f64; 2]) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for segment in &mesh.segments {
@@ -75,7 +73,6 @@ pub fn displacement(mesh: &Mesh, difference: f64, pressure: &[f64], at: [f64; 2]
 
 /// Mean slips of all cells from pressures, along x and across, times G: the differences of the displacements at their two edges over their
 /// lengths.
-#[must_use]
 pub fn pressure_slips(mesh: &Mesh, difference: f64, pressure: &[f64]) -> [Vec<f64>; 2] {
     let mut slips = [0, 1].map(|_| Vec::with_capacity(mesh.cells()));
     for segment in &mesh.segments {
@@ -95,7 +92,6 @@ pub fn pressure_slips(mesh: &Mesh, difference: f64, pressure: &[f64]) -> [Vec<f6
 }
 
 /// By how much tractions on all cells open the gap at a place, times G.
-#[must_use]
 pub fn opening(mesh: &Mesh, difference: f64, traction: &[Vec<f64>; 2], at: [f64; 2]) -> f64 {
     let mut sum = 0.0;
     for segment in &mesh.segments {
@@ -121,13 +117,11 @@ pub struct Elasticity {
 
 impl Elasticity {
     /// Have the bodies different elastic constants?
-    #[must_use]
     pub fn differs(&self) -> bool {
         self.difference != 0.0 || self.lower_share != 0.5
     }
 
     /// Contact modulus `E* = G/(1−ν)` in MPa, that is `1/E* = (1−ν₁²)/E₁ + (1−ν₂²)/E₂`.
-    #[must_use]
     pub fn contact_modulus(&self) -> f64 {
         self.shear_modulus / (1.0 - self.poisson_ratio)
     }

@@ -60,7 +60,6 @@ pub struct LineAngles<const N: usize> {
 
 impl<const N: usize> LineAngles<N> {
     /// Those angles.
-    #[must_use]
     pub fn new() -> LineAngles<N> {
         let angles: [f64; N] = std::array::from_fn(|k| (k as f64 + 0.5) * PI / N as f64);
         LineAngles {
@@ -78,7 +77,6 @@ impl<const N: usize> Default for LineAngles<N> {
 
 impl Footprint {
     /// Hertz's ellipse.
-    #[must_use]
     pub fn hertz(ellipse: Ellipse) -> Footprint {
         Footprint {
             patches: vec![ellipse.patch()],
@@ -92,7 +90,6 @@ impl Footprint {
     }
 
     /// A pressure that was given, and is exact as it stands.
-    #[must_use]
     pub fn given(field: PressureField) -> Footprint {
         Footprint {
             patches: field.patches(),
@@ -107,7 +104,6 @@ impl Footprint {
 
     /// A pressure that was computed, and whose load may differ from the one asked for by the relative `load_error`. Where the surfaces
     /// touch, they are apart or overlap by up to `distance`, relative to the deepest overlap.
-    #[must_use]
     pub fn computed(field: PressureField, load_error: f64, distance: f64) -> Footprint {
         let uncertainty = NormalUncertainty {
             cells_across: field.cells_across(),
@@ -123,7 +119,6 @@ impl Footprint {
     /// Returns this footprint on the surface of a rail: on a curve with a rigid slip of its own in every cell, added to that of the motion; with the part of it that
     /// follows from a motion, for a unit of creepage across and of spin in 1/mm, where motions share the footprint; and for every patch the origin
     /// `[x, y]` in mm of the coordinates that its places are given in.
-    #[must_use]
     pub(crate) fn on_surface(
         self,
         slip: Option<SurfaceSlip>,
@@ -139,31 +134,26 @@ impl Footprint {
     }
 
     /// The origin `[x, y]` in mm of the coordinates that places below a patch are given in.
-    #[must_use]
     pub fn origin(&self, patch: usize) -> [f64; 2] {
         self.origins.get(patch).copied().unwrap_or_default()
     }
 
     /// The slip of the surface beyond the motion of a plane, where it has one.
-    #[must_use]
     pub fn slip(&self) -> Option<&SurfaceSlip> {
         self.slip.as_deref()
     }
 
     /// Additional slip per unit of lateral creepage, and per unit of spin in 1/mm, where motions share the footprint.
-    #[must_use]
     pub fn slip_by_motion(&self) -> Option<&[SurfaceSlip; 2]> {
         self.slip_by_motion.as_deref()
     }
 
     /// The patches, in order of their smallest y.
-    #[must_use]
     pub fn patches(&self) -> &[Patch] {
         &self.patches
     }
 
     /// How the load of a patch is spread across; computed when it is first asked for.
-    #[must_use]
     pub fn load_across(&self, patch: usize) -> &LoadAcross {
         let loads = self.loads.get_or_make(|| match &self.shape {
             FootprintShape::Hertz(ellipse) => vec![LoadAcross::of_ellipse([-ellipse.b, ellipse.b])],
@@ -175,19 +165,16 @@ impl Footprint {
     }
 
     /// The uncertainty of region and pressure, where they were computed.
-    #[must_use]
     pub fn uncertainty(&self) -> Option<&NormalUncertainty> {
         self.uncertainty.as_ref()
     }
 
     /// Is it Hertz's ellipse, in closed form?
-    #[must_use]
     pub fn is_closed_form(&self) -> bool {
         matches!(self.shape, FootprintShape::Hertz(_))
     }
 
     /// Hertz's ellipse, if it is one.
-    #[must_use]
     pub fn ellipse(&self) -> Option<&Ellipse> {
         match &self.shape {
             FootprintShape::Hertz(ellipse) => Some(ellipse),
@@ -196,14 +183,12 @@ impl Footprint {
     }
 
     /// Does the pressure jump from one sample to the next?
-    #[must_use]
     pub fn jumps(&self) -> bool {
         matches!(&self.shape, FootprintShape::Sampled(field) if field.jump().is_some())
     }
 
     /// By how much samples of a given pressure differ from what their neighbours let expect, see [`PressureField::discontinuity`]; nothing for
     /// pressures that were computed or are known in closed form.
-    #[must_use]
     pub fn discontinuity(&self) -> Option<f64> {
         match &self.shape {
             FootprintShape::Sampled(field) if self.uncertainty.is_none() => {
@@ -214,7 +199,6 @@ impl Footprint {
     }
 
     /// Segments that a strip has on average, for each patch: more than 1 where patches are hollow or bent.
-    #[must_use]
     pub fn segments_per_strip(&self) -> Vec<f64> {
         match &self.shape {
             FootprintShape::Hertz(_) => vec![1.0],
@@ -226,7 +210,6 @@ impl Footprint {
     /// patch have no chord, strips that cross it several times have several, from smaller to larger x.
     ///
     /// `strips` lists `(y, dy)` of the strips from smaller to larger y; all lengths in mm.
-    #[must_use]
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
         let mut chords = Vec::new();
         self.chords_into(patch, strips, &mut chords);
@@ -243,7 +226,6 @@ impl Footprint {
     }
 
     /// The chord of one patch along a line `y` that stands for a strip of width `dy`, if there is exactly one.
-    #[must_use]
     #[inline]
     pub fn single_chord(&self, patch: usize, line: (f64, f64)) -> Option<Chord> {
         match &self.shape {
@@ -256,7 +238,6 @@ impl Footprint {
     }
 
     /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord (not yet scaled to the patch's force).
-    #[must_use]
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         match &self.shape {
             FootprintShape::Hertz(ellipse) => ellipse.mean_pressure(chord, x0, x1),
@@ -268,7 +249,6 @@ impl Footprint {
     ///
     /// Of a pressure that was computed by the mid-points of N equal angles u, at which `x = −half · cos u` from the middle: exact for Hertz's
     /// semi-ellipse, and otherwise as exact as N points resolve the pressure.
-    #[must_use]
     pub fn mean_of_line<const N: usize>(&self, chord: &Chord, angles: &LineAngles<N>) -> f64 {
         match &self.shape {
             FootprintShape::Sampled(field) if self.uncertainty.is_some() => {
@@ -286,7 +266,6 @@ impl Footprint {
 
     /// Pressures in MPa at points of a chord (not yet scaled to the patch's force), given by the cosines and sines of rising angles u: they lie
     /// `−half · cos u` from the middle of the chord.
-    #[must_use]
     #[inline]
     pub fn pressures<const N: usize>(
         &self,
@@ -318,14 +297,12 @@ pub struct LoadAcross {
 
 impl LoadAcross {
     /// That of an elliptic patch between two y: one parabola.
-    #[must_use]
     pub fn of_ellipse([low, high]: [f64; 2]) -> LoadAcross {
         let points = vec![(low, 0.0), (0.5 * (low + high), 1.0), (high, 0.0)];
         LoadAcross { points }
     }
 
     /// That of a patch of a pressure known by samples.
-    #[must_use]
     pub fn of_samples(field: &PressureField, patch: usize) -> LoadAcross {
         let [.., low, high] = field.patches()[patch].extent;
         let count = 2 * PARABOLAS;
@@ -356,7 +333,6 @@ impl LoadAcross {
     /// before the first and behind the last. Two points at one place are a jump.
     ///
     /// Exact for a load of parabolas: its products with straight lines are cubic, which Simpson's rule integrates.
-    #[must_use]
     pub fn mean(&self, table: &[(f64, f64)]) -> f64 {
         let (first, last) = (table[0], table[table.len() - 1]);
         let (low, high) = (self.points[0].0, self.points[self.points.len() - 1].0);
@@ -401,7 +377,6 @@ pub struct SurfaceSlip {
 
 impl SurfaceSlip {
     /// Slip at a place `[x, y]` in mm; beyond the samples that of the nearest place among them.
-    #[must_use]
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (first, step, samples) = self.x;
         let last = (samples - 1) as f64;
@@ -434,7 +409,6 @@ impl SurfaceSlip {
     }
 
     /// Mean slip between two places along x, by Simpson's rule.
-    #[must_use]
     pub fn mean(&self, [from, to]: [f64; 2], y: f64) -> [f64; 2] {
         let [low, middle, high] = [from, 0.5 * (from + to), to].map(|x| self.at([x, y]));
         [0, 1].map(|k| (low[k] + 4.0 * middle[k] + high[k]) / 6.0)
@@ -458,7 +432,6 @@ pub enum NormalTask {
 
 impl NormalTask {
     /// Number of positions of the bodies: several of a wheelset only.
-    #[must_use]
     pub fn positions(&self) -> usize {
         match self {
             NormalTask::Wheelset(task) => task.poses.len(),
@@ -470,7 +443,6 @@ impl NormalTask {
     }
 
     /// The contact where it is known; nothing where it has to be found.
-    #[must_use]
     pub fn known_footprint(&self) -> Option<Footprint> {
         match self {
             NormalTask::Hertz(ellipse) => Some(Footprint::hertz(*ellipse)),
@@ -480,7 +452,6 @@ impl NormalTask {
     }
 
     /// The patches, in order of their smallest y and at least one; nothing where they have to be found.
-    #[must_use]
     pub fn known_patches(&self) -> Option<Vec<Patch>> {
         match self {
             NormalTask::Hertz(ellipse) => Some(vec![ellipse.patch()]),

@@ -40,7 +40,6 @@ impl Ellipse {
     /// `p0 l D(k)/(E* L²)`, the larger `p0 l (K(k) − D(k))/(E* L² k²)`, the approach `p0 l K(k)/E*` and the force
     /// `⅔π L l p0`; K and D are complete elliptic integrals of parameter 1 − k². All inputs are positive and
     /// finite; radii may differ by any ratio. Relative accuracy about 1e-14. Source: Johnson 1985, chapter 4.
-    #[must_use]
     pub fn of_radii(
         rolling: f64,
         lateral: f64,
@@ -62,7 +61,6 @@ impl Ellipse {
 
     /// The contact with semi-axes `a` along and `b` across rolling in mm, and contact modulus `E*` in MPa:
     /// `p0 = 3N/(2πab)`, approach `p0 l K(k)/E*` with l the smaller semi-axis and k the ratio of smaller to larger.
-    #[must_use]
     pub fn of_semi_axes(a: f64, b: f64, loading: NormalLoad, contact_modulus: f64) -> Ellipse {
         let (small, large) = (a.min(b), a.max(b));
         let (k_integral, _) = complete_integrals(small / large);
@@ -87,7 +85,6 @@ impl Ellipse {
     }
 
     /// The coefficients of x² and y² of its gap in 1/mm, with the contact modulus `E*` in MPa; see [`Ellipse::of_radii`].
-    #[must_use]
     pub fn curvatures(&self, contact_modulus: f64) -> [f64; 2] {
         let (small, large) = (self.a.min(self.b), self.a.max(self.b));
         let ratio = small / large;
@@ -105,7 +102,6 @@ impl Ellipse {
     }
 
     /// Force, area and extent.
-    #[must_use]
     pub fn patch(&self) -> Patch {
         Patch {
             normal_force: self.normal_force,
@@ -118,7 +114,6 @@ impl Ellipse {
     }
 
     /// Chords on the given strips, each `(y, dy)` with its mid-line at y; strips that miss the patch have none.
-    #[must_use]
     pub fn chords(&self, strips: &[(f64, f64)]) -> Vec<Chord> {
         let mut chords = Vec::new();
         self.add_chords(strips, &mut chords);
@@ -132,7 +127,6 @@ impl Ellipse {
     }
 
     /// The chord on one strip `(y, dy)`; nothing if it misses the patch.
-    #[must_use]
     #[inline]
     pub fn chord(&self, strip: usize, (y, dy): (f64, f64)) -> Option<Chord> {
         let half = self.half_chord(y);
@@ -148,7 +142,6 @@ impl Ellipse {
 
     /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord, in closed form; 0 outside the ellipse.
     /// For `x0 = x1` the pressure there.
-    #[must_use]
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         let half = self.half_chord(chord.y);
         if half <= 0.0 {
@@ -162,20 +155,17 @@ impl Ellipse {
     }
 
     /// Largest pressure in MPa on the line of a chord.
-    #[must_use]
     pub fn largest_on(&self, chord: &Chord) -> f64 {
         self.pressure_max * self.half_chord(chord.y) / self.a
     }
 
     /// Pressure in MPa at the angle u on a chord, where x = −half cos u; `sine` is sin u.
-    #[must_use]
     pub fn pressure(&self, chord: &Chord, sine: f64) -> f64 {
         self.pressure_max * 0.5 * (chord.right - chord.left) / self.a * sine
     }
 
     /// Mean pressures over the largest one of a line, between neighbouring places on it that run from −1 to 1: they are the same on
     /// every line.
-    #[must_use]
     pub fn profile(places: &[f64]) -> Vec<f64> {
         places
             .windows(2)
@@ -220,7 +210,6 @@ pub struct HertzShape {
 impl HertzShape {
     /// The shape of bodies with relative radii of curvature `rolling` and `lateral` in mm. The larger semi-axis lies along the larger radius, where
     /// the gap opens more slowly.
-    #[must_use]
     pub fn of_radii(rolling: f64, lateral: f64) -> HertzShape {
         let (large, small) = (rolling.max(lateral), rolling.min(lateral));
         let (ratio, d_integral) = axis_ratio(small / large);
@@ -233,7 +222,6 @@ impl HertzShape {
     }
 
     /// Semi-axes along and across rolling in mm under a normal force in N, with the contact modulus `E*` in MPa.
-    #[must_use]
     pub fn semi_axes(&self, force: f64, contact_modulus: f64) -> [f64; 2] {
         let cube = 1.5 * force * self.d_integral / (PI * contact_modulus * self.curvature);
         self.of_larger(cube.cbrt())

@@ -80,7 +80,6 @@ impl WheelTask {
     }
 
     /// This task with planes of contact in place of the curve.
-    #[must_use]
     pub(crate) fn on_planes(&self) -> WheelTask {
         WheelTask {
             surface: ReferenceSurface::Planes,
@@ -89,7 +88,6 @@ impl WheelTask {
     }
 
     /// Whether planes may answer in place of the curve.
-    #[must_use]
     pub(crate) fn may_fall_back(&self) -> bool {
         matches!(
             self.surface,
@@ -142,13 +140,11 @@ pub struct WheelPatch {
 
 impl WheelPatch {
     /// Its region and forces.
-    #[must_use]
     pub fn patch(&self) -> Patch {
         self.field.patches()[self.number]
     }
 
     /// The normal force in N.
-    #[must_use]
     pub fn normal_force(&self) -> f64 {
         self.patch().normal_force
     }
@@ -156,7 +152,6 @@ impl WheelPatch {
 
 impl WheelContact {
     /// Sum of the normal forces in N.
-    #[must_use]
     pub fn normal_force(&self) -> f64 {
         self.patches.iter().map(WheelPatch::normal_force).sum()
     }
@@ -179,7 +174,6 @@ pub struct WheelsetTask {
 
 impl WheelsetTask {
     /// The pointer to a cross-section of the right side, from what it would be for a single wheel.
-    #[must_use]
     pub fn pointer_on_right(&self, pointer: &str) -> String {
         for (own, name) in self.own_right.into_iter().zip(["rail", "wheel"]) {
             if own && let Some(rest) = pointer.strip_prefix(&format!("/contact/{name}")) {

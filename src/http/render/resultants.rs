@@ -20,7 +20,7 @@ const HISTORY: [(&str, OfHistory); 9] = [
     ("shift_y_error_mm", |at| at.shift_y_error_mm),
 ];
 
-/// Name of the patch, number of the motion, its resultants and its forces on a wheel's axes.
+/// Name of the patch, number of the motion, and the sums and forces of the line.
 type Line = (String, usize, Sum, Forces);
 
 /// One line per patch and motion, then one per motion with the sums over all patches.

@@ -23,7 +23,6 @@ pub enum Precision {
 
 impl Precision {
     /// Bytes of one number.
-    #[must_use]
     pub fn bytes(self) -> u64 {
         match self {
             Precision::Single => 4,

@@ -52,13 +52,11 @@ pub struct OperatorScratch {
 }
 
 /// Number of difference rows of a segment with `cells` cells.
-#[must_use]
 pub fn rows_of(cells: usize) -> usize {
     cells + 2
 }
 
 /// Bytes of the matrix of a mesh.
-#[must_use]
 pub fn bytes(cells: usize, segments: usize, folded: bool, precision: Precision) -> u64 {
     let rows = (cells + 2 * segments) as u64;
     let stride = |cells: usize| cells.next_multiple_of(LANES) as u64;
@@ -128,43 +126,36 @@ impl StripOperator {
     }
 
     /// Bytes of the matrix.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         self.matrix.bytes()
     }
 
     /// Number of segments whose rows are stored: all, or half of them if folded.
-    #[must_use]
     pub fn segments(&self) -> usize {
         self.first_row.len() - 1
     }
 
     /// Is only one half of a mirror-symmetric mesh stored?
-    #[must_use]
     pub fn is_folded(&self) -> bool {
         self.layout == OperatorLayout::Folded
     }
 
     /// Rows of segment `j`.
-    #[must_use]
     pub fn segment_rows(&self, j: usize) -> std::ops::Range<usize> {
         self.first_row[j]..self.first_row[j + 1]
     }
 
     /// Number of stored rows.
-    #[must_use]
     pub fn row_count(&self) -> usize {
         self.first_row[self.segments()]
     }
 
     /// Cells of segment `j`.
-    #[must_use]
     pub fn cells(&self, j: usize) -> std::ops::Range<usize> {
         self.first_cell[j]..self.first_cell[j + 1]
     }
 
     /// Number of entries that one product with the given parity touches.
-    #[must_use]
     pub fn entries(&self, parity: Option<Parity>) -> usize {
         let blocks = match (self.layout, parity) {
             (OperatorLayout::Full, _) => 3,
@@ -175,7 +166,6 @@ impl StripOperator {
     }
 
     /// Length of a vector of values per cell: the cells of the unknowns, padded with zeros.
-    #[must_use]
     pub fn padded(&self, parity: Option<Parity>) -> usize {
         match (self.layout, parity) {
             (OperatorLayout::Folded, None) => self.cells.next_multiple_of(LANES),
@@ -204,7 +194,6 @@ impl StripOperator {
 
     /// Entry of the segment's own block: the change of u_x per T_x (or u_y per T_y) in row `row` of the matrix from
     /// cell `cell`. Own blocks have no cross terms in a full matrix; in a folded one they are left out.
-    #[must_use]
     pub fn own(&self, row: usize, cell: usize, parity: Option<Parity>) -> (f64, f64) {
         if self.is_folded() && parity.is_none() {
             // In half the sum of both parities the mirrored cell cancels: what is left is the cell's own influence.
@@ -217,7 +206,6 @@ impl StripOperator {
 
     /// Any entry of the matrix that [`apply`](Self::apply) stands for, as `[xx, xy, yx, yy]`: the change of u_x per T_x
     /// and per T_y, then of u_y. Without parity, rows and cells are counted over the whole mesh.
-    #[must_use]
     pub fn entry(&self, parity: Option<Parity>, row: usize, cell: usize) -> [f64; 4] {
         if self.is_folded() && parity.is_none() {
             return self.unfolded_entry(row, cell);

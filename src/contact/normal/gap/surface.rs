@@ -49,7 +49,6 @@ pub type Window = [[f64; 2]; 2];
 
 impl GapSurface {
     /// The gap of a cross-section `(y, gap)` that rolls on a circle; at least 2 samples, y increasing.
-    #[must_use]
     pub fn profile(rolling: f64, y: &[f64], gap: &[f64]) -> GapSurface {
         GapSurface::Profile {
             rolling,
@@ -58,7 +57,6 @@ impl GapSurface {
     }
 
     /// The gap `gap[j][i]` at `(x[i], y[j])`; at least 2 samples along either axis, axes increasing.
-    #[must_use]
     pub fn grid(x: &[f64], y: &[f64], gap: &[Vec<f64>]) -> GapSurface {
         GapSurface::Grid(SampledSurface::new(x, y, gap))
     }
@@ -73,7 +71,6 @@ impl GapSurface {
     }
 
     /// The relative radius of a gap that rolls on a circle, in mm.
-    #[must_use]
     pub fn rolling_radius(&self) -> Option<f64> {
         match self {
             GapSurface::Profile { rolling, .. } => Some(*rolling),
@@ -83,7 +80,6 @@ impl GapSurface {
     }
 
     /// Where the gap is known.
-    #[must_use]
     pub fn window(&self) -> Window {
         match self {
             GapSurface::Changed { gap, .. } => gap.window(),
@@ -95,7 +91,6 @@ impl GapSurface {
     }
 
     /// Coordinates of the samples along x and y; none where a formula holds.
-    #[must_use]
     pub fn samples(&self) -> [&[f64]; 2] {
         match self {
             GapSurface::Changed { gap, .. } => gap.samples(),
@@ -105,7 +100,6 @@ impl GapSurface {
     }
 
     /// Values at all `(x[i], y[j])`, stored at `j * x.len() + i`. All points lie in the window.
-    #[must_use]
     pub fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         match self {
             GapSurface::Profile { rolling, across } => {
@@ -134,7 +128,6 @@ impl GapSurface {
     }
 
     /// The least and the largest sample; along x = 0 for a profile, without a change that was added.
-    #[must_use]
     pub fn extremes(&self) -> [f64; 2] {
         let values = match self {
             GapSurface::Profile { across, .. } => &across.values,
@@ -148,7 +141,6 @@ impl GapSurface {
     }
 
     /// Where the least sample lies, if none inside the data is as small.
-    #[must_use]
     pub fn least_at_edge(&self) -> Option<String> {
         let place = |name: &str, at: f64| format!("{name} = {at} mm");
         let least = self.extremes()[0];
@@ -180,7 +172,6 @@ impl GapSurface {
     }
 
     /// Is the gap its own mirror image about x = 0 and about y = 0, sample by sample?
-    #[must_use]
     pub fn is_mirrored(&self) -> [bool; 2] {
         let mirrored = |axis: &[f64]| axis.iter().zip(axis.iter().rev()).all(|(a, b)| *a == -b);
         let alike = |values: &[f64]| values.iter().zip(values.iter().rev()).all(|(a, b)| a == b);

@@ -53,7 +53,6 @@ const CONTACT_OVER_BOX: f64 = 0.62;
 
 impl GapTask {
     /// What the contact will be like: its size, and how many asperities touch, with valleys between them that are not pressed flat.
-    #[must_use]
     pub fn preview(&self) -> GapPreview {
         *self.seen.preview.get_or_make(|| self.look())
     }

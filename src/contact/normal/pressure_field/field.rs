@@ -56,14 +56,12 @@ impl PressureField {
     }
 
     /// The patches, in order of their smallest y: force, extent, area and largest pressure.
-    #[must_use]
     pub fn patches(&self) -> Vec<Patch> {
         let patches: Vec<Vec<Patch>> = self.grids.iter().map(GridPressure::patches).collect();
         self.places.iter().map(|[g, k]| patches[*g][*k]).collect()
     }
 
     /// The patch whose extent contains the point `[x, y]` in mm, if there is one.
-    #[must_use]
     pub fn patch_at(&self, [x, y]: [f64; 2]) -> Option<usize> {
         self.patches().iter().position(|patch| {
             let [x_min, x_max, y_min, y_max] = patch.extent;
@@ -72,27 +70,23 @@ impl PressureField {
     }
 
     /// Number of grid spacings across each patch, along the axis with fewer.
-    #[must_use]
     pub fn cells_across(&self) -> Vec<f64> {
         let cells: Vec<Vec<f64>> = self.grids.iter().map(GridPressure::cells_across).collect();
         self.places.iter().map(|[g, k]| cells[*g][*k]).collect()
     }
 
     /// The largest jump of a given pressure, if it has any.
-    #[must_use]
     pub fn jump(&self) -> Option<Jump> {
         self.grids.iter().find_map(GridPressure::jump)
     }
 
     /// How far a given pressure is from smooth, see [`GridPressure::discontinuity`].
-    #[must_use]
     pub fn discontinuity(&self) -> f64 {
         let each = self.grids.iter().map(GridPressure::discontinuity);
         each.fold(0.0, f64::max)
     }
 
     /// Average number of segments per strip, for each patch.
-    #[must_use]
     pub fn segments_per_strip(&self) -> Vec<f64> {
         let segments: Vec<Vec<f64>> = self
             .grids
@@ -104,7 +98,6 @@ impl PressureField {
 
     /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y. A strip that misses the patch has none; one
     /// that crosses a hollow or curved patch may have several, in order of x.
-    #[must_use]
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
         let mut chords = Vec::new();
         self.add_chords(patch, strips, &mut chords);
@@ -119,21 +112,18 @@ impl PressureField {
 
     /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
     /// `x0 = x1` the pressure there. See [`GridPressure::mean_pressure`].
-    #[must_use]
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         let [grid, _] = self.places[chord.patch];
         self.grids[grid].mean_pressure(chord, x0, x1)
     }
 
     /// The pressures in MPa at points of the line of a chord, given by x in rising order; 0 outside the chord.
-    #[must_use]
     pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
         let [grid, _] = self.places[chord.patch];
         self.grids[grid].pressures(chord, places)
     }
 
     /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
-    #[must_use]
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
         if let Some(patch) = patch {
             let [grid, label] = self.places[patch];
@@ -152,7 +142,6 @@ impl PressureField {
     }
 
     /// Mean square distances `[along, across]` in mm² from the load centre of one patch, weighted with the pressure.
-    #[must_use]
     pub fn load_spread(&self, patch: usize) -> [f64; 2] {
         let [grid, label] = self.places[patch];
         self.grids[grid].load_spread(label)

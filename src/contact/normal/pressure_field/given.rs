@@ -152,13 +152,11 @@ impl GridPressure {
     ///
     /// `normal_force` is the sum of the samples' pressures times the areas they represent, which extend half-way to the
     /// neighbouring samples; `area` is that of the interpolated region, `pressure_max` the largest sample.
-    #[must_use]
     pub fn patches(&self) -> Vec<Patch> {
         self.shapes.iter().map(|shape| shape.patch).collect()
     }
 
     /// Average number of segments per strip, for each patch.
-    #[must_use]
     pub fn segments_per_strip(&self) -> Vec<f64> {
         self.shapes
             .iter()
@@ -222,7 +220,6 @@ impl GridPressure {
     /// Gauss–Legendre quadrature of order 10 per grid interval (6 where there are many intervals), with the square root of the
     /// distance from the nearer end of the chord as variable, in which the pressure is smooth; accurate to about 1e-9 for Hertz's
     /// pressure.
-    #[must_use]
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         let (low, high) = (x0.max(chord.left), x1.min(chord.right));
         if low > high {
@@ -270,7 +267,6 @@ impl GridPressure {
     }
 
     /// Pressures at points of the line of a chord, given by x in rising order; 0 outside the chord.
-    #[must_use]
     pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
         let x = &self.grid.x;
         let rows = self.rows_about(chord);

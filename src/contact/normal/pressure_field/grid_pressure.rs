@@ -86,7 +86,6 @@ const JUMP: f64 = 0.35;
 
 impl GridPressure {
     /// Number of grid spacings across each patch, along the axis with fewer.
-    #[must_use]
     pub fn cells_across(&self) -> Vec<f64> {
         let axes = [&self.grid.x, &self.grid.y];
         let spacing = axes.map(|axis| (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64);
@@ -132,14 +131,12 @@ impl GridPressure {
     }
 
     /// The largest jump of the pressure, if it has any.
-    #[must_use]
     pub fn jump(&self) -> Option<Jump> {
         self.jump
     }
 
     /// The largest fall of the squared pressure over one interval beyond that extrapolated from the interval before, relative to the
     /// largest squared pressure: up to 0.2 for smooth pressures.
-    #[must_use]
     pub fn discontinuity(&self) -> f64 {
         self.discontinuity
     }
@@ -192,7 +189,6 @@ pub(crate) fn label_cells(grid: &SampleGrid, samples: &[u8]) -> Vec<u8> {
 
 impl GridPressure {
     /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
-    #[must_use]
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
         if let Some(patch) = patch {
             return self.shapes[patch].load.centre;
@@ -229,7 +225,6 @@ impl GridPressure {
     }
 
     /// Mean square distances `[along, across]` in mm² from the load centre of one patch, weighted with the pressure.
-    #[must_use]
     pub fn load_spread(&self, patch: usize) -> [f64; 2] {
         let [x0, y0] = self.load_centre(Some(patch));
         let (mut weight, mut sum) = (0.0, [0.0; 2]);
