@@ -19,7 +19,7 @@ pub trait Monitor {
     /// Time since the solve began.
     fn elapsed(&self) -> Duration;
 
-    /// The same as [`tick`](Monitor::tick), with an error as the end.
+    /// Calls [`tick`](Monitor::tick) and returns a stop as an error.
     ///
     /// # Errors
     /// Why the solve is to end.

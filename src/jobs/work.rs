@@ -552,7 +552,7 @@ impl Follower {
     }
 }
 
-/// The identity of a state of a job, batch or run in events. Two states that clients can tell apart have different identities.
+/// Identifies a state of a job, batch or run in events. States that differ in the answers to clients have different identities.
 fn tag(work: &Work) -> String {
     match work {
         Work::Job(job) => format!("{} {:.2}", job.version, job.progress),

@@ -27,7 +27,7 @@ pub fn small(name: &str) -> Value {
     case
 }
 
-/// The same with this normal force.
+/// Returns the case of `small` with this normal force.
 pub fn small_loaded(name: &str, newtons: usize) -> Value {
     let mut case = small(name);
     case["load"]["normal_force_n"] = json!(newtons);

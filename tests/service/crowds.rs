@@ -19,7 +19,7 @@ pub async fn send(address: SocketAddr, request: &str) -> TcpStream {
     stream
 }
 
-/// Sends a GET on a new connection and reads nothing of the answer.
+/// Opens a connection, sends a GET, and leaves the answer unread.
 pub async fn silent(address: SocketAddr, path: &str) -> TcpStream {
     let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
     send(address, &request).await

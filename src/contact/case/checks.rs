@@ -264,7 +264,7 @@ fn motion_faults(
     faults
 }
 
-/// Faults of what a case asks for beside its contact, with its motions.
+/// Finds the faults of the tasks that follow the contact, such as subsurface stresses, damage and temperatures.
 fn after_faults(
     given: &PartialCase,
     motion: &Motions,

@@ -41,7 +41,7 @@ impl CoefficientTable {
         self.points.iter().fold(0.0, |most, (_, mu)| most.max(*mu))
     }
 
-    /// The same with its origin moved to `x`.
+    /// Returns this table in coordinates whose origin lies at `x`.
     #[must_use]
     pub fn about(&self, x: f64) -> CoefficientTable {
         let points = self.points.iter().map(|(at, mu)| (at - x, *mu));

@@ -153,7 +153,7 @@ impl CurveTask<'_> {
         share * rail + (1.0 - share) * wheel
     }
 
-    /// The same task at the tolerance of a grid that only finds the contact or estimates friction.
+    /// Returns this task with the looser tolerance of grids that only find the contact or estimate friction.
     pub(crate) fn roughly(mut self) -> Self {
         self.fineness.tolerance = FIRST_TOLERANCE;
         self
