@@ -15,7 +15,7 @@ use crate::contact::solution::words::answer::{
 };
 use crate::contact::solution::words::damage::ProfileUncertainty;
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, Fault, ProblemBody};
+use crate::http::problem::{ApiError, Fault, ProblemBody, Result};
 use crate::jobs::codec::table::TableKind;
 use crate::jobs::model::{Batch, Job, Kind, Priority, QueuePlace, State as JobState};
 use crate::jobs::run::model::{Run, RunColumn};
@@ -463,7 +463,7 @@ impl JobResult {
     ///
     /// # Errors
     /// It cannot be written as JSON.
-    pub(crate) fn tail(id: Uuid, cached: bool, outputs: &[Output]) -> Result<String, ApiError> {
+    pub(crate) fn tail(id: Uuid, cached: bool, outputs: &[Output]) -> Result<String> {
         let outputs: Vec<&str> = outputs.iter().copied().map(Output::name).collect();
         let links = serde_json::to_string(&JobResult::links(id, &outputs));
         let links = links.map_err(|error| ApiError::internal(&error))?;

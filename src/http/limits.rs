@@ -15,7 +15,7 @@ use tokio::time::timeout;
 use tokio_util::sync::{CancellationToken, DropGuard};
 
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::jobs::sync::{blocking, lock};
 
 /// Units of memory, requests or turns, in all and for each tenant. Clones share the semaphore.
@@ -132,7 +132,7 @@ impl Turns {
     ///
     /// # Errors
     /// `overloaded`: it does not come in time.
-    pub(crate) async fn take_in_time(&self, tenant: &str) -> Result<Turn, ApiError> {
+    pub(crate) async fn take_in_time(&self, tenant: &str) -> Result<Turn> {
         let turn = timeout(WITHIN, self.take(tenant)).await;
         turn.map_err(|_| overloaded("other requests of this kind take all turns"))
     }
@@ -170,8 +170,8 @@ impl Computation {
     /// `overloaded`: the first turn does not come in time; or the error of the work or of its steps.
     pub async fn run<T: Send + 'static>(
         &mut self,
-        work: impl FnOnce(&mut Pace) -> Result<T, ApiError> + Send + 'static,
-    ) -> Result<T, ApiError> {
+        work: impl FnOnce(&mut Pace) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
         let mut pace = Pace {
             turn: Some(self.turns.take_in_time(&self.tenant).await?),
             turns: self.turns.clone(),
@@ -210,7 +210,7 @@ impl Pace {
     ///
     /// # Errors
     /// The client has left, or `body-too-large`: the computation has taken longer than it may.
-    pub fn step(&mut self) -> Result<(), ApiError> {
+    pub fn step(&mut self) -> Result<()> {
         if self.left.is_cancelled() {
             return Err(client_left());
         }
@@ -272,7 +272,7 @@ impl ConcurrencyLimits {
     ///
     /// # Errors
     /// `too-many-requests`: there are as many as there may be.
-    pub fn request(&self, tenant: &str) -> Result<Permit, ApiError> {
+    pub fn request(&self, tenant: &str) -> Result<Permit> {
         self.requests.try_take(tenant, 1).ok_or_else(|| {
             too_many(
                 "the tenant has as many requests under way as it may (`--tenant-requests-max`)",
@@ -284,7 +284,7 @@ impl ConcurrencyLimits {
     ///
     /// # Errors
     /// As [`ConcurrencyLimits::request`].
-    pub fn stream(&self, tenant: &str) -> Result<Permit, ApiError> {
+    pub fn stream(&self, tenant: &str) -> Result<Permit> {
         self.streams.try_take(tenant, 1).ok_or_else(|| {
             too_many("as many streams of events are open as there may be (`--tenant-streams-max`, `--streams-max`)")
         })
@@ -300,7 +300,7 @@ impl ConcurrencyLimits {
     ///
     /// # Errors
     /// As [`ConcurrencyLimits::request`].
-    pub fn require_wait(&self, tenant: &str) -> Result<Permit, ApiError> {
+    pub fn require_wait(&self, tenant: &str) -> Result<Permit> {
         self.wait(tenant).ok_or_else(|| {
             too_many("as many requests wait as there may be (`--tenant-waits-max`, `--waits-max`)")
         })
@@ -427,7 +427,7 @@ impl Memory {
     ///
     /// # Errors
     /// `overloaded`: it is not free in time.
-    pub async fn body(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
+    pub async fn body(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>> {
         take(&self.bodies, tenant, bytes, "the bodies of requests").await
     }
 
@@ -435,7 +435,7 @@ impl Memory {
     ///
     /// # Errors
     /// As [`Memory::body`].
-    pub async fn parsed(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
+    pub async fn parsed(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>> {
         take(&self.parsed, tenant, bytes, "cases that are read").await
     }
 
@@ -443,7 +443,7 @@ impl Memory {
     ///
     /// # Errors
     /// As [`Memory::body`].
-    pub async fn rows(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
+    pub async fn rows(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>> {
         take(&self.answers, tenant, bytes, ANSWERS).await
     }
 
@@ -451,7 +451,7 @@ impl Memory {
     ///
     /// # Errors
     /// `overloaded`: it does not come in time.
-    pub async fn turn(&self, tenant: &str, bytes: usize) -> Result<Turn, ApiError> {
+    pub async fn turn(&self, tenant: &str, bytes: usize) -> Result<Turn> {
         let turns = if bytes > SMALL_BYTES {
             &self.large
         } else {
@@ -476,7 +476,7 @@ impl Memory {
     ///
     /// # Errors
     /// `overloaded`: it is not free.
-    pub fn ready_answer(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>, ApiError> {
+    pub fn ready_answer(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>> {
         if bytes <= SMALL_BYTES {
             return Ok(None);
         }
@@ -494,7 +494,7 @@ impl Memory {
     ///
     /// # Errors
     /// `overloaded`: too many wait already, or too long.
-    pub async fn rendering(&self, tenant: &str, bytes: usize) -> Result<Rendering, ApiError> {
+    pub async fn rendering(&self, tenant: &str, bytes: usize) -> Result<Rendering> {
         let waiting = self.waiting.try_take(tenant, 1).ok_or_else(|| {
             overloaded("as many requests wait for pictures, grids and tables as there may be (`--renderings-waiting-max`)")
         })?;
@@ -522,9 +522,9 @@ impl Rendering {
     /// What `work` fails with, or `overloaded` if the answer is larger than was thought and there is no memory for it.
     pub async fn run<T: Send + 'static>(
         self,
-        work: impl FnOnce() -> Result<T, ApiError> + Send + 'static,
+        work: impl FnOnce() -> Result<T> + Send + 'static,
         size: impl Fn(&T) -> usize,
-    ) -> Result<(T, Option<Permit>), ApiError> {
+    ) -> Result<(T, Option<Permit>)> {
         let turn = self.turn;
         let work = blocking(move || {
             // The turn is held until the work ends, even if the client has gone away.
@@ -549,7 +549,7 @@ async fn take(
     tenant: &str,
     bytes: usize,
     what: &str,
-) -> Result<Option<Permit>, ApiError> {
+) -> Result<Option<Permit>> {
     if bytes <= SMALL_BYTES {
         return Ok(None);
     }
@@ -650,7 +650,7 @@ mod tests {
         let counted = steps.clone();
         let mut endless = Computation::new(turns.clone(), "a", minutes);
         let endless = tokio::spawn(async move {
-            let work = move |pace: &mut Pace| -> Result<(), ApiError> {
+            let work = move |pace: &mut Pace| -> Result<()> {
                 loop {
                     counted.fetch_add(1, Ordering::Relaxed);
                     pace.step()?;

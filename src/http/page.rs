@@ -12,7 +12,7 @@ use axum::routing::get;
 use rust_embed::Embed;
 
 use crate::http::layers::etag;
-use crate::http::problem::{ApiError, unknown_route};
+use crate::http::problem::{Result, unknown_route};
 
 /// The files of the page, as they are in the program.
 #[derive(Embed)]
@@ -57,7 +57,7 @@ pub(crate) fn routes<S: Clone + Send + Sync + 'static>(folder: Folder) -> Router
         .with_state(folder)
 }
 
-async fn index(State(folder): State<Folder>, uri: Uri) -> Result<Response, ApiError> {
+async fn index(State(folder): State<Folder>, uri: Uri) -> Result<Response> {
     let body = load(folder.as_deref(), INDEX).await;
     let body = body.ok_or_else(|| unknown_route(uri.path()))?;
     let own = match folder {
@@ -72,7 +72,7 @@ async fn file(
     State(folder): State<Folder>,
     Segments((digest, path)): Segments<(String, String)>,
     uri: Uri,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let body = load(folder.as_deref(), &path).await;
     let body = body.ok_or_else(|| unknown_route(uri.path()))?;
     let lifetime = match folder {

@@ -6,7 +6,7 @@ use std::os::unix::fs::DirBuilderExt;
 use std::path::Path;
 
 use crate::jobs::disk_reserve::make_private_folder;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::open_store::table_file;
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::sync::blocking;
@@ -18,7 +18,7 @@ use crate::jobs::sync::blocking;
 ///
 /// # Errors
 /// The folder `to` exists already, or something cannot be read or written.
-pub async fn backup(data_dir: &Path, to: &Path) -> Result<(), JobsError> {
+pub async fn backup(data_dir: &Path, to: &Path) -> Result<()> {
     let failed = |path: &Path, source| JobsError::DataDir {
         path: path.to_owned(),
         source,

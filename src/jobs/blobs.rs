@@ -20,7 +20,7 @@ use uuid::Uuid;
 use crate::contact::solution::words::answer::PatchFields;
 use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::store::Claim;
 use crate::jobs::sync::blocking;
 
@@ -55,7 +55,7 @@ impl Blobs {
     ///
     /// # Errors
     /// The folder cannot be created or read.
-    pub fn open(root: &FilePath) -> Result<Blobs, JobsError> {
+    pub fn open(root: &FilePath) -> Result<Blobs> {
         std::fs::create_dir_all(root).map_err(|source| JobsError::DataDir {
             path: root.to_owned(),
             source,
@@ -83,7 +83,7 @@ impl Blobs {
         claim: &Claim,
         slice: Option<u32>,
         result: EncodedResult,
-    ) -> Result<String, JobsError> {
+    ) -> Result<String> {
         let slice = slice.map_or_else(String::new, |number| format!("-{number}"));
         let folder = job_folder(claim.id).join(format!("{}{slice}", claim.lease_token));
         let name = if result.is_rows() { ROWS } else { FIELDS };
@@ -106,7 +106,7 @@ impl Blobs {
     ///
     /// # Errors
     /// It cannot be read.
-    pub async fn solution(&self, folder: &str) -> Result<Bytes, JobsError> {
+    pub async fn solution(&self, folder: &str) -> Result<Bytes> {
         let path = Path::from(folder).join(SOLUTION);
         Ok(self.objects.get(&path).await?.bytes().await?)
     }
@@ -115,7 +115,7 @@ impl Blobs {
     ///
     /// # Errors
     /// They cannot be read.
-    pub async fn chunk_answers(&self, folder: &str) -> Result<Bytes, JobsError> {
+    pub async fn chunk_answers(&self, folder: &str) -> Result<Bytes> {
         let path = Path::from(folder).join(ROWS);
         Ok(self.objects.get(&path).await?.bytes().await?)
     }
@@ -127,7 +127,7 @@ impl Blobs {
     pub async fn open_solution(
         &self,
         folder: &str,
-    ) -> Result<(usize, BoxStream<'static, Result<Bytes, JobsError>>), JobsError> {
+    ) -> Result<(usize, BoxStream<'static, Result<Bytes>>)> {
         let path = Path::from(folder).join(SOLUTION);
         // One request brings all of a solution that is not large, and the size of one that is.
         let first = GetOptions {
@@ -168,7 +168,7 @@ impl Blobs {
     ///
     /// # Errors
     /// It cannot be read.
-    pub async fn solution_bytes(&self, folder: &str) -> Result<usize, JobsError> {
+    pub async fn solution_bytes(&self, folder: &str) -> Result<usize> {
         let path = Path::from(folder).join(SOLUTION);
         let about = self.objects.head(&path).await?;
         Ok(usize::try_from(about.size).unwrap_or(usize::MAX))
@@ -178,7 +178,7 @@ impl Blobs {
     ///
     /// # Errors
     /// It cannot be read.
-    pub async fn whole(&self, folder: &str) -> Result<EncodedResult, JobsError> {
+    pub async fn whole(&self, folder: &str) -> Result<EncodedResult> {
         let solution = self.solution(folder).await?;
         let path = Path::from(folder).join(FIELDS);
         let fields = match self.objects.get(&path).await {
@@ -198,7 +198,7 @@ impl Blobs {
         folder: &str,
         patch: usize,
         point: Option<usize>,
-    ) -> Result<PatchFields, JobsError> {
+    ) -> Result<PatchFields> {
         let path = Path::from(folder).join(FIELDS);
         let damaged = |error: String| JobsError::Damaged(format!("{path}: {error}"));
         let start = self.objects.get_range(&path, 0..FIELDS_AT_ONCE).await?;
@@ -232,7 +232,7 @@ impl Blobs {
     ///
     /// # Errors
     /// They could not be written.
-    pub(crate) async fn try_write(&self, bytes: usize) -> Result<(), JobsError> {
+    pub(crate) async fn try_write(&self, bytes: usize) -> Result<()> {
         let path = Path::from(ROOT).join(format!("probe-{}", Uuid::now_v7()));
         let written = self.objects.put(&path, vec![0; bytes].into()).await;
         written?;
@@ -243,7 +243,7 @@ impl Blobs {
     ///
     /// # Errors
     /// It cannot be read or written.
-    pub async fn copy(&self, key: &str, to: &Blobs) -> Result<Option<u64>, JobsError> {
+    pub async fn copy(&self, key: &str, to: &Blobs) -> Result<Option<u64>> {
         let folder = Path::from(key);
         let mut bytes = 0;
         // The solution last, as it is written.
@@ -266,7 +266,7 @@ impl Blobs {
     ///
     /// # Errors
     /// Something could not be removed.
-    pub async fn remove(&self, key: &str) -> Result<(), JobsError> {
+    pub async fn remove(&self, key: &str) -> Result<()> {
         let folder = Path::from(key);
         for name in [SOLUTION, FIELDS, ROWS] {
             match self.objects.delete(&folder.clone().join(name)).await {
@@ -279,7 +279,7 @@ impl Blobs {
 
     /// Removes an emptied local folder with what a killed process may have left half-written in it, which the blob
     /// store does not show, and the folder of its job once that is empty.
-    async fn scrub(&self, folder: &Path) -> Result<(), JobsError> {
+    async fn scrub(&self, folder: &Path) -> Result<()> {
         let Some(root) = &self.root else {
             return Ok(());
         };
@@ -298,7 +298,7 @@ impl Blobs {
     }
 
     /// Keeps what was just written from everybody else on this machine.
-    async fn make_private(&self, folder: &Path) -> Result<(), JobsError> {
+    async fn make_private(&self, folder: &Path) -> Result<()> {
         let Some(root) = &self.root else {
             return Ok(());
         };
@@ -339,7 +339,7 @@ fn job_folder(id: Uuid) -> Path {
 
 impl Blobs {
     /// Everything that is stored, in the order of the keys: the job, the key, and when it was written, in epoch milliseconds.
-    pub fn listed(&self) -> BoxStream<'static, Result<(Uuid, String, i64), JobsError>> {
+    pub fn listed(&self) -> BoxStream<'static, Result<(Uuid, String, i64)>> {
         let listed = self.objects.list(Some(&Path::from(ROOT)));
         let read = listed
             .map_err(JobsError::from)
@@ -359,7 +359,7 @@ impl Blobs {
     ///
     /// # Errors
     /// The store cannot be listed.
-    pub async fn keys(&self, month: &Path) -> Result<Vec<(Uuid, String)>, JobsError> {
+    pub async fn keys(&self, month: &Path) -> Result<Vec<(Uuid, String)>> {
         let mut keys = Vec::new();
         for job in self.below(month).await? {
             let Some(id) = job.filename().and_then(|id| Uuid::try_parse(id).ok()) else {
@@ -375,7 +375,7 @@ impl Blobs {
     ///
     /// # Errors
     /// The store cannot be listed.
-    pub async fn months(&self) -> Result<Vec<Path>, JobsError> {
+    pub async fn months(&self) -> Result<Vec<Path>> {
         let mut months = Vec::new();
         for year in self.below(&Path::from(ROOT)).await? {
             months.extend(self.below(&year).await?);
@@ -383,7 +383,7 @@ impl Blobs {
         Ok(months)
     }
 
-    async fn below(&self, folder: &Path) -> Result<Vec<Path>, JobsError> {
+    async fn below(&self, folder: &Path) -> Result<Vec<Path>> {
         let listed = self.objects.list_with_delimiter(Some(folder)).await?;
         Ok(listed.common_prefixes)
     }

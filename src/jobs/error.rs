@@ -21,6 +21,9 @@ pub enum StorageFault {
     Unreachable,
 }
 
+/// What a call on jobs gives, or why it fails.
+pub type Result<T, E = JobsError> = std::result::Result<T, E>;
+
 /// A call of a store failed and changed nothing. Clones share the cause.
 #[derive(Debug, Clone, Error)]
 pub enum StoreError {

@@ -2,7 +2,7 @@
 
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::Job;
 
@@ -14,7 +14,7 @@ impl Jobs {
     }
 
     /// The job with that time, unless it is over, or belongs to a batch that was never acknowledged.
-    pub(crate) fn unexpired(&self, job: Job) -> Result<Job, JobsError> {
+    pub(crate) fn unexpired(&self, job: Job) -> Result<Job> {
         let job = self.dated(job);
         if let Some(batch) = &job.batch_id
             && self.shared.unfinished_batches().abandoned.contains(batch)

@@ -8,7 +8,7 @@ use tokio::time::timeout;
 use crate::contact::case::solver::KnownPair;
 use crate::contact::error::{CaseError, Fault, FaultCode};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::model::{Kind, Labels};
 use crate::jobs::options::Options;
 use crate::jobs::runtime_probe::{ProbedTime, probe};
@@ -108,7 +108,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn usage(&self) -> Result<Usage, JobsError> {
+    pub async fn usage(&self) -> Result<Usage> {
         let usage = self.shared.store.usage(&self.tenant).await?;
         Ok(Usage {
             staged_bytes: self.shared.staged.of(&self.tenant),
@@ -120,7 +120,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::Draining`], or a database that fails or does not answer in time.
-    pub async fn ready(&self) -> Result<(), JobsError> {
+    pub async fn ready(&self) -> Result<()> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
@@ -157,7 +157,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::BoundKey`].
-    pub(crate) fn require_unbound(&self, action: &'static str) -> Result<(), JobsError> {
+    pub(crate) fn require_unbound(&self, action: &'static str) -> Result<()> {
         if self.bound.is_empty() {
             return Ok(());
         }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::jobs::clock::Clock;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::{Key, Labels, MARK, is_tenant};
 use crate::jobs::open_store::{open_beside, open_shared, table_file};
@@ -22,7 +22,7 @@ impl Keyring {
     ///
     /// # Errors
     /// There is no such folder, or it cannot be used.
-    pub async fn open(data_dir: &Path) -> Result<Keyring, JobsError> {
+    pub async fn open(data_dir: &Path) -> Result<Keyring> {
         std::fs::read_dir(data_dir).map_err(|source| JobsError::DataDir {
             path: data_dir.to_owned(),
             source,
@@ -35,7 +35,7 @@ impl Keyring {
     ///
     /// # Errors
     /// It cannot be reached, has no job table, or one of another version.
-    pub async fn open_shared(url: &str) -> Result<Keyring, JobsError> {
+    pub async fn open_shared(url: &str) -> Result<Keyring> {
         let store = open_shared(url).await?;
         Ok(Keyring { store })
     }
@@ -56,7 +56,7 @@ impl Keyring {
         name: Option<String>,
         read_only: bool,
         labels: Labels,
-    ) -> Result<(Key, String), JobsError> {
+    ) -> Result<(Key, String)> {
         if !is_tenant(tenant) {
             return Err(JobsError::BadTenant);
         }
@@ -85,7 +85,7 @@ impl Keyring {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn list(&self) -> Result<Vec<Key>, JobsError> {
+    pub async fn list(&self) -> Result<Vec<Key>> {
         Ok(self.store.keys().await?)
     }
 
@@ -93,7 +93,7 @@ impl Keyring {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn revoke(&self, id: &str) -> Result<Option<Key>, JobsError> {
+    pub async fn revoke(&self, id: &str) -> Result<Option<Key>> {
         Ok(self.store.revoke_key(id, Clock::system().now_ms()).await?)
     }
 
@@ -133,7 +133,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn key(&self, text: &str) -> Result<Option<Key>, JobsError> {
+    pub async fn key(&self, text: &str) -> Result<Option<Key>> {
         let Some(id) = id_of(text) else {
             return Ok(None);
         };
@@ -166,7 +166,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn any_key(&self) -> Result<bool, JobsError> {
+    pub async fn any_key(&self) -> Result<bool> {
         let keys = self.shared.store.keys().await?;
         Ok(keys.iter().any(|key| key.revoked_at.is_none()))
     }

@@ -21,7 +21,7 @@ use crate::jobs::blobs::Blobs;
 use crate::jobs::clock::ClockSteps;
 use crate::jobs::disk_reserve::{self, make_private_folder};
 use crate::jobs::engine::Engine;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::maintenance::{self, nodes};
 use crate::jobs::metrics::Metrics;
@@ -48,7 +48,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The folder is in use by another process, or cannot be used.
-    pub async fn open(options: Options) -> Result<Jobs, JobsError> {
+    pub async fn open(options: Options) -> Result<Jobs> {
         Jobs::open_with(options, Engine::contact()).await
     }
 
@@ -56,7 +56,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::open`].
-    pub async fn open_with(options: Options, engine: Engine) -> Result<Jobs, JobsError> {
+    pub async fn open_with(options: Options, engine: Engine) -> Result<Jobs> {
         let lock = lock_folder(&options.data_dir)?;
         let store = open_for_service(&options.data_dir, options.database.as_ref()).await?;
         let (metrics, registry) = Metrics::new();
@@ -136,7 +136,7 @@ impl Jobs {
     ///
     /// # Errors
     /// A solver thread could not be started.
-    pub fn start(&self) -> Result<(), JobsError> {
+    pub fn start(&self) -> Result<()> {
         let workers = self.shared.options.workers;
         // A process without workers has no spare one either.
         let threads = if workers == 0 { 0 } else { workers + 1 };
@@ -165,7 +165,7 @@ impl Jobs {
     ///
     /// # Errors
     /// Its thread could not be started.
-    pub fn worker(&self, name: &str) -> Result<Worker, JobsError> {
+    pub fn worker(&self, name: &str) -> Result<Worker> {
         Worker::new(self.shared.clone(), name)
     }
 
@@ -208,11 +208,7 @@ impl Jobs {
 }
 
 /// The place of large results: a folder of the data folder, or what all nodes of a database have in common.
-async fn open_blobs(
-    store: &dyn Store,
-    options: &Options,
-    metrics: &Metrics,
-) -> Result<Blobs, JobsError> {
+async fn open_blobs(store: &dyn Store, options: &Options, metrics: &Metrics) -> Result<Blobs> {
     match (store.cluster(), &options.results) {
         (Some(cluster), place) => {
             settle(cluster, place.as_ref(), metrics.store_requests.clone()).await
@@ -227,7 +223,7 @@ async fn open_blobs(
 
 /// Creates the data folder if needed and takes it for this process alone. The system frees the lock when the process
 /// ends, however it ends.
-pub(crate) fn lock_folder(data_dir: &Path) -> Result<File, JobsError> {
+pub(crate) fn lock_folder(data_dir: &Path) -> Result<File> {
     let failed = |path: &Path, source| JobsError::DataDir {
         path: path.to_owned(),
         source,

@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use prometheus_client::registry::Registry;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::metrics::state_label;
 use crate::jobs::model::State;
@@ -21,7 +21,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn refresh_metrics(&self) -> Result<(), JobsError> {
+    pub async fn refresh_metrics(&self) -> Result<()> {
         let metrics = &self.shared.metrics;
         metrics.workers.set(count(self.shared.options.workers));
         let abandoned = self.shared.abandoned.load(Ordering::Acquire);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::Result;
 
 /// Makes spans; no value of it exists in this build.
 #[derive(Debug, Clone)]
@@ -27,9 +27,9 @@ impl SubmitSpan {
 
     pub(crate) fn end<T>(
         self,
-        submitted: Result<T, JobsError>,
+        submitted: Result<T>,
         _: impl FnOnce(&T) -> Vec<KeyValue>,
-    ) -> Result<T, JobsError> {
+    ) -> Result<T> {
         submitted
     }
 }

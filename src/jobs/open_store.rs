@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::jobs::disk_reserve;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::options::{Database, NotifyMode};
 use crate::jobs::store::Store;
 #[cfg(feature = "cluster")]
@@ -30,7 +30,7 @@ pub fn table_file(data_dir: &Path) -> PathBuf {
 pub async fn open_for_service(
     data_dir: &Path,
     database: Option<&Database>,
-) -> Result<Arc<dyn Store>, JobsError> {
+) -> Result<Arc<dyn Store>> {
     let Some(database) = database else {
         return open_embedded(data_dir).await;
     };
@@ -42,20 +42,20 @@ pub async fn open_for_service(
 }
 
 #[cfg(feature = "cluster")]
-async fn open_database(database: &Database) -> Result<Arc<dyn Store>, JobsError> {
+async fn open_database(database: &Database) -> Result<Arc<dyn Store>> {
     let store = PostgresStore::open(&database.url, database.connections).await?;
     Ok(Arc::new(store.with_notify_mode(&database.notify_mode)?))
 }
 
 #[cfg(not(feature = "cluster"))]
-async fn open_database(_: &Database) -> Result<Arc<dyn Store>, JobsError> {
+async fn open_database(_: &Database) -> Result<Arc<dyn Store>> {
     Err(JobsError::NotBuilt {
         what: "PostgreSQL",
         feature: "cluster",
     })
 }
 
-async fn open_embedded(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
+async fn open_embedded(data_dir: &Path) -> Result<Arc<dyn Store>> {
     let table = table_file(data_dir);
     // After an end that closed the table there is nothing to be checked.
     let closed = std::fs::remove_file(data_dir.join(CLOSED)).is_ok();
@@ -77,7 +77,7 @@ async fn open_embedded(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
 ///
 /// # Errors
 /// It cannot be opened, or is of another version.
-pub async fn open_beside(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
+pub async fn open_beside(data_dir: &Path) -> Result<Arc<dyn Store>> {
     Ok(Arc::new(SqliteStore::open(&table_file(data_dir)).await?))
 }
 
@@ -85,7 +85,7 @@ pub async fn open_beside(data_dir: &Path) -> Result<Arc<dyn Store>, JobsError> {
 ///
 /// # Errors
 /// It cannot be reached, has no job table, or one of another version.
-pub async fn open_shared(url: &str) -> Result<Arc<dyn Store>, JobsError> {
+pub async fn open_shared(url: &str) -> Result<Arc<dyn Store>> {
     open_database(&Database {
         connections: 1,
         notify_mode: NotifyMode::Database,

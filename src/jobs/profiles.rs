@@ -17,7 +17,7 @@ use crate::contact::evaluate::varied::{
 };
 use crate::contact::monitor::Monitor;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::{Jobs, PAGE_MAX};
 use crate::jobs::idempotency;
 use crate::jobs::store::{Page, ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
@@ -34,7 +34,7 @@ impl Jobs {
     pub async fn keep_profile(
         &self,
         section: Value,
-    ) -> Result<(StoredProfile, SectionReport, bool), JobsError> {
+    ) -> Result<(StoredProfile, SectionReport, bool)> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }
@@ -63,7 +63,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::ProfileNotFound`], or a failed database.
-    pub async fn profile(&self, digest: &str) -> Result<StoredProfile, JobsError> {
+    pub async fn profile(&self, digest: &str) -> Result<StoredProfile> {
         let found = self.shared.store.profile(&self.tenant, digest).await?;
         found.ok_or(JobsError::ProfileNotFound)
     }
@@ -72,11 +72,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::BoundKey`], [`JobsError::BadCursor`], or a failed database.
-    pub async fn profiles(
-        &self,
-        cursor: Option<&str>,
-        limit: u32,
-    ) -> Result<Page<ProfileEntry>, JobsError> {
+    pub async fn profiles(&self, cursor: Option<&str>, limit: u32) -> Result<Page<ProfileEntry>> {
         self.require_unbound("list the profiles of the tenant")?;
         let after = match cursor {
             Some(cursor) => Some(ProfileCursor::read(cursor).ok_or(JobsError::BadCursor)?),
@@ -91,7 +87,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::BoundKey`], [`JobsError::ProfileNotFound`], or a failed database.
-    pub async fn delete_profile(&self, digest: &str) -> Result<(), JobsError> {
+    pub async fn delete_profile(&self, digest: &str) -> Result<()> {
         self.require_unbound("delete profiles of the tenant")?;
         let store = &self.shared.store;
         match store.delete_profile(&self.tenant, digest).await? {
@@ -104,7 +100,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::Case`]: the tenant keeps no such cross-section, or one is named and given; or a failed database.
-    pub async fn with_profiles(&self, case: Value) -> Result<Value, JobsError> {
+    pub async fn with_profiles(&self, case: Value) -> Result<Value> {
         self.with_known_profiles(case, &mut KnownSections::new())
             .await
     }
@@ -114,7 +110,7 @@ impl Jobs {
         &self,
         case: Value,
         known: &mut KnownSections,
-    ) -> Result<Value, JobsError> {
+    ) -> Result<Value> {
         if named_sections(&case).is_empty() {
             return Ok(case);
         }
@@ -125,7 +121,7 @@ impl Jobs {
         &self,
         mut case: Value,
         known: &mut KnownSections,
-    ) -> Result<Value, JobsError> {
+    ) -> Result<Value> {
         if let Some(place) = named_and_given(&case) {
             let detail = "given together with points; a stored profile stands in place of points_mm or of text and format";
             return Err(CaseError(vec![Fault::new(format!("{place}/profile"), detail)]).into());
@@ -145,7 +141,7 @@ impl Jobs {
         &self,
         digest: &str,
         known: &mut KnownSections,
-    ) -> Result<Option<Value>, JobsError> {
+    ) -> Result<Option<Value>> {
         if let Some(section) = known.get(digest) {
             return Ok(Some(section.clone()));
         }
@@ -171,10 +167,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The tenant has no such profile, or a failed database.
-    pub fn profiles_of(
-        &self,
-        columns: &[VariedColumn],
-    ) -> Result<BTreeMap<String, Value>, JobsError> {
+    pub fn profiles_of(&self, columns: &[VariedColumn]) -> Result<BTreeMap<String, Value>> {
         let mut known = KnownSections::new();
         let named = columns.iter();
         let named = named.map(|column| (&*column.pointer, &*column.pointer, &column.values));
@@ -196,7 +189,7 @@ impl Jobs {
         first: u64,
         (known, bytes): (&mut KnownSections, &mut usize),
         bytes_max: usize,
-    ) -> Result<Vec<Fault>, JobsError> {
+    ) -> Result<Vec<Fault>> {
         for (name, _, values) in columns.filter(|(_, place, _)| place.ends_with("/profile")) {
             let Values::Texts(digests) = values else {
                 continue;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::jobs::blobs::Blobs;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::lifecycle::lock_folder;
 use crate::jobs::metrics::StoreRequests;
 use crate::jobs::open_store::table_file;
@@ -38,11 +38,7 @@ pub struct Moved {
 ///
 /// # Errors
 /// The folder is in use or has no job table, the database has jobs or no tables, or something cannot be read or written.
-pub async fn relocate(
-    data_dir: &Path,
-    url: &str,
-    place: Option<&ResultsPlace>,
-) -> Result<Moved, JobsError> {
+pub async fn relocate(data_dir: &Path, url: &str, place: Option<&ResultsPlace>) -> Result<Moved> {
     let table = table_file(data_dir);
     let failed = |source| JobsError::DataDir {
         path: table.clone(),

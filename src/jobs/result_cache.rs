@@ -2,7 +2,7 @@
 
 use uuid::Uuid;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::Result;
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::State;
 use crate::jobs::shared::Shared;
@@ -25,10 +25,7 @@ impl Jobs {
     }
 
     /// Gives each of the jobs about to be queued its source, if there is one.
-    pub(crate) async fn find_sources(
-        &self,
-        jobs: impl Iterator<Item = &mut NewJob>,
-    ) -> Result<(), JobsError> {
+    pub(crate) async fn find_sources(&self, jobs: impl Iterator<Item = &mut NewJob>) -> Result<()> {
         let jobs: Vec<_> = jobs.collect();
         let keys: Vec<_> = jobs.iter().filter_map(|job| job.cache_key).collect();
         if keys.is_empty() {

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::{PatchFields, Solution};
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::Job;
 use crate::jobs::store::{ResultRef, StoredResult};
@@ -19,7 +19,7 @@ const LARGE_BYTES: usize = 64 << 10;
 /// The answer of a succeeded job, read from where it is stored while it is taken.
 pub struct ResultStream {
     /// What was computed, as JSON text without the closing brace.
-    pub open_solution: BoxStream<'static, Result<Bytes, JobsError>>,
+    pub open_solution: BoxStream<'static, Result<Bytes>>,
     /// Size of the whole text.
     pub bytes: usize,
     /// How much of it is in memory already.
@@ -35,7 +35,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
-    pub async fn case(&self, id: Uuid) -> Result<Bytes, JobsError> {
+    pub async fn case(&self, id: Uuid) -> Result<Bytes> {
         self.get(id).await?;
         let case = self.shared.store.case(&self.tenant, id).await?;
         // It was there a moment ago.
@@ -51,7 +51,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
-    pub async fn solution(&self, id: Uuid) -> Result<Solution, JobsError> {
+    pub async fn solution(&self, id: Uuid) -> Result<Solution> {
         let text = self.answer(id).await?;
         let damaged = |error| JobsError::Damaged(format!("solution of job {id}: {error}"));
         let large = text.len() >= LARGE_BYTES;
@@ -67,7 +67,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::solution`].
-    pub async fn answer_bytes(&self, id: Uuid) -> Result<usize, JobsError> {
+    pub async fn answer_bytes(&self, id: Uuid) -> Result<usize> {
         let (_, stored) = self.stored(id).await?;
         match &stored.result {
             StoredResult::Blob(key, _) => {
@@ -82,7 +82,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::solution`].
-    pub async fn answer(&self, id: Uuid) -> Result<Bytes, JobsError> {
+    pub async fn answer(&self, id: Uuid) -> Result<Bytes> {
         let (_, stored) = self.stored(id).await?;
         match stored.result {
             StoredResult::Blob(key, _) => {
@@ -97,7 +97,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::solution`].
-    pub async fn open_answer(&self, id: Uuid) -> Result<ResultStream, JobsError> {
+    pub async fn open_answer(&self, id: Uuid) -> Result<ResultStream> {
         let (job, stored) = self.stored(id).await?;
         let outputs = outputs_of(id, &stored)?;
         let (bytes, held_bytes, open_solution) = match &stored.result {
@@ -130,7 +130,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::solution`].
-    pub async fn outputs(&self, id: Uuid) -> Result<Vec<Output>, JobsError> {
+    pub async fn outputs(&self, id: Uuid) -> Result<Vec<Output>> {
         let (_, stored) = self.stored(id).await?;
         outputs_of(id, &stored)
     }
@@ -139,7 +139,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::NoSuchPatch`], else as [`Jobs::solution`].
-    pub async fn patch_fields(&self, id: Uuid, patch: usize) -> Result<PatchFields, JobsError> {
+    pub async fn patch_fields(&self, id: Uuid, patch: usize) -> Result<PatchFields> {
         self.fields_of(id, patch, None).await
     }
 
@@ -147,21 +147,11 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::NoSuchPatch`], [`JobsError::NoSuchPoint`], else as [`Jobs::solution`].
-    pub async fn point_fields(
-        &self,
-        id: Uuid,
-        patch: usize,
-        point: usize,
-    ) -> Result<PatchFields, JobsError> {
+    pub async fn point_fields(&self, id: Uuid, patch: usize, point: usize) -> Result<PatchFields> {
         self.fields_of(id, patch, Some(point)).await
     }
 
-    async fn fields_of(
-        &self,
-        id: Uuid,
-        patch: usize,
-        point: Option<usize>,
-    ) -> Result<PatchFields, JobsError> {
+    async fn fields_of(&self, id: Uuid, patch: usize, point: Option<usize>) -> Result<PatchFields> {
         let (_, stored) = self.stored(id).await?;
         if patch >= stored.field_patches {
             return Err(JobsError::NoSuchPatch(stored.field_patches));
@@ -176,7 +166,7 @@ impl Jobs {
     }
 
     /// Returns a result that was read from storage. If it could not be read because its job was deleted in the meantime, the error says so.
-    async fn unless_gone<T>(&self, id: Uuid, read: Result<T, JobsError>) -> Result<T, JobsError> {
+    async fn unless_gone<T>(&self, id: Uuid, read: Result<T>) -> Result<T> {
         match read {
             Err(error) => Err(self.gone_meanwhile(id, error).await),
             read => read,
@@ -199,7 +189,7 @@ impl Jobs {
     }
 
     /// Where the result of a job lies.
-    async fn stored(&self, id: Uuid) -> Result<(Job, ResultRef), JobsError> {
+    async fn stored(&self, id: Uuid) -> Result<(Job, ResultRef)> {
         let found = self.shared.store.result(&self.tenant, id).await?;
         let Some((job, stored)) = found else {
             return Err(self.missing(id).await);
@@ -216,7 +206,7 @@ impl Jobs {
     }
 }
 
-fn outputs_of(id: Uuid, stored: &ResultRef) -> Result<Vec<Output>, JobsError> {
+fn outputs_of(id: Uuid, stored: &ResultRef) -> Result<Vec<Output>> {
     serde_json::from_str(&stored.outputs)
         .map_err(|error| JobsError::Damaged(format!("outputs of job {id}: {error}")))
 }

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::options::StagingBounds;
 use crate::jobs::sync::lock;
 
@@ -14,12 +14,7 @@ pub(crate) struct StagedBytes(Mutex<HashMap<Arc<str>, u64>>);
 
 impl StagedBytes {
     /// Counts more bytes of a tenant, or says which bound they would pass.
-    pub(crate) fn add(
-        &self,
-        tenant: &str,
-        bytes: u64,
-        bounds: StagingBounds,
-    ) -> Result<(), JobsError> {
+    pub(crate) fn add(&self, tenant: &str, bytes: u64, bounds: StagingBounds) -> Result<()> {
         let mut staged = lock(&self.0);
         let of_tenant = staged.get(tenant).copied().unwrap_or(0);
         if of_tenant + bytes > bounds.tenant {

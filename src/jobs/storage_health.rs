@@ -9,7 +9,7 @@ use std::future::Future;
 use std::time::Duration;
 
 use crate::jobs::disk_reserve;
-use crate::jobs::error::{JobsError, StorageFault, StoreError};
+use crate::jobs::error::{JobsError, Result, StorageFault, StoreError};
 use crate::jobs::handle::Jobs;
 use crate::jobs::shared::Shared;
 use crate::jobs::storage_fault::{FaultChange, StoragePlace};
@@ -25,10 +25,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 impl Jobs {
     /// Passes the outcome of a write to the job table on. After a fault of the storage the service is not ready until a write succeeds.
-    pub(crate) fn observe_write<T, E: Into<JobsError>>(
-        &self,
-        written: Result<T, E>,
-    ) -> Result<T, JobsError> {
+    pub(crate) fn observe_write<T, E: Into<JobsError>>(&self, written: Result<T, E>) -> Result<T> {
         let written = written.map_err(Into::into);
         self.shared.observe_storage(StoragePlace::Table, &written);
         written
@@ -47,7 +44,7 @@ impl Jobs {
 
 impl Shared {
     /// Notes whether a place takes what is written.
-    pub(crate) fn observe_storage<T>(&self, place: StoragePlace, written: &Result<T, JobsError>) {
+    pub(crate) fn observe_storage<T>(&self, place: StoragePlace, written: &Result<T>) {
         match written {
             Ok(_) => self.note_fault(place, None),
             // Filling a batch reads its file too, whose faults are noted where they arise.
@@ -86,7 +83,7 @@ impl Shared {
         &self,
         place: StoragePlace,
         mut write: impl FnMut() -> F,
-    ) -> Result<T, JobsError>
+    ) -> Result<T>
     where
         F: Future<Output = Result<T, E>>,
         E: Into<JobsError>,
@@ -129,7 +126,7 @@ impl Shared {
     }
 
     /// Do all places take data? Writes only to those that did not the last time.
-    pub(crate) async fn require_storage(&self) -> Result<(), JobsError> {
+    pub(crate) async fn require_storage(&self) -> Result<()> {
         for place in StoragePlace::ALL {
             let Some((fault, waited_for)) = self.storage.fault(place) else {
                 continue;
@@ -148,7 +145,7 @@ impl Shared {
     }
 
     /// Writes to a place and leaves nothing there.
-    async fn try_write(&self, place: StoragePlace) -> Result<(), JobsError> {
+    async fn try_write(&self, place: StoragePlace) -> Result<()> {
         match place {
             StoragePlace::Table => Ok(self.store.ready(true).await?),
             StoragePlace::Results => {

@@ -10,7 +10,7 @@ use crate::contact::error::CaseError;
 use crate::contact::evaluate::varied::in_template;
 use crate::contact::evolution::task::Evolution;
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
 use crate::jobs::model::{Job, Kind, WorkOptions, created_at};
@@ -28,11 +28,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::Case`], [`JobsError::QueueFull`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`], or a
     /// failed database.
-    pub async fn submit(
-        &self,
-        case: Value,
-        idempotency_key: Option<String>,
-    ) -> Result<Job, JobsError> {
+    pub async fn submit(&self, case: Value, idempotency_key: Option<String>) -> Result<Job> {
         let options = WorkOptions {
             idempotency_key,
             ..WorkOptions::default()
@@ -46,11 +42,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::submit`].
-    pub async fn submit_with(
-        &self,
-        case: Value,
-        options: WorkOptions,
-    ) -> Result<(Job, bool), JobsError> {
+    pub async fn submit_with(&self, case: Value, options: WorkOptions) -> Result<(Job, bool)> {
         let check = |jobs: &Jobs, case: &Value| {
             let mut checked = jobs.check(case)?;
             jobs.bind(&mut checked.label.labels).map_err(CaseError)?;
@@ -69,7 +61,7 @@ impl Jobs {
         &self,
         mut request: Value,
         mut options: WorkOptions,
-    ) -> Result<(Job, bool), JobsError> {
+    ) -> Result<(Job, bool)> {
         let name = options.name.take();
         let labels = std::mem::take(&mut options.labels);
         if let Some(template) = request.get_mut("template") {
@@ -101,9 +93,9 @@ impl Jobs {
         &self,
         request: Value,
         small: bool,
-        check: impl FnOnce(&Jobs, &Value) -> Result<NewJob, JobsError> + Send + 'static,
+        check: impl FnOnce(&Jobs, &Value) -> Result<NewJob> + Send + 'static,
         options: WorkOptions,
-    ) -> Result<(Job, bool), JobsError> {
+    ) -> Result<(Job, bool)> {
         let span = self.submit_span();
         let traceparent = span.traceparent();
         let submitted = self.store_work(request, small, check, (options, traceparent));
@@ -119,9 +111,9 @@ impl Jobs {
         &self,
         request: Value,
         small: bool,
-        check: impl FnOnce(&Jobs, &Value) -> Result<NewJob, JobsError> + Send + 'static,
+        check: impl FnOnce(&Jobs, &Value) -> Result<NewJob> + Send + 'static,
         (options, traceparent): (WorkOptions, Option<Arc<str>>),
-    ) -> Result<(Job, bool), JobsError> {
+    ) -> Result<(Job, bool)> {
         let (key, options) = (options.idempotency_key, options.submit);
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
@@ -233,7 +225,7 @@ impl Jobs {
     }
 
     /// The job that was made, or that the idempotency key stands for, and whether it is the latter.
-    fn of_enqueued(&self, enqueued: Enqueued) -> Result<(Job, bool), JobsError> {
+    fn of_enqueued(&self, enqueued: Enqueued) -> Result<(Job, bool)> {
         match enqueued {
             Enqueued::Created(job) => Ok((self.dated(job), false)),
             Enqueued::Existing(job) => Ok((self.unexpired(job)?, true)),

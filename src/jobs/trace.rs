@@ -15,7 +15,7 @@ use opentelemetry::propagation::TextMapPropagator;
 use opentelemetry::trace::{Span, SpanKind, Status, TraceContextExt, Tracer as _};
 use opentelemetry_sdk::propagation::TraceContextPropagator;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::Result;
 
 pub(crate) const TRACEPARENT: &str = "traceparent";
 
@@ -90,9 +90,9 @@ impl SubmitSpan {
     /// Ends the span with what became of it.
     pub(crate) fn end<T>(
         self,
-        submitted: Result<T, JobsError>,
+        submitted: Result<T>,
         tell: impl FnOnce(&T) -> Vec<KeyValue>,
-    ) -> Result<T, JobsError> {
+    ) -> Result<T> {
         if let Some(context) = self.0 {
             let span = context.span();
             match &submitted {

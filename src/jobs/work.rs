@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use crate::jobs::attempts::attempt::StopReason;
 use crate::jobs::batch::control::DELETED_AT_ONCE;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
 use crate::jobs::model::{Batch, Job, Kind, Labels, QueuePlace, State};
 use crate::jobs::run::model::{Run, RunHead};
@@ -106,7 +106,7 @@ impl Work {
     ///
     /// # Errors
     /// [`JobsError::NotFound`]: it is neither.
-    pub fn job(self) -> Result<Job, JobsError> {
+    pub fn job(self) -> Result<Job> {
         match self {
             Work::Job(job) => Ok(*job),
             _ => Err(JobsError::NotFound(Kind::Case)),
@@ -116,7 +116,7 @@ impl Work {
 
 impl Jobs {
     /// Work as it is stored, or was not longer than `age` ago: one read serves all who follow it. A run is a batch here.
-    async fn read(&self, id: Uuid, age: Duration) -> Result<Work, JobsError> {
+    async fn read(&self, id: Uuid, age: Duration) -> Result<Work> {
         let (shared, tenant) = (&self.shared, &self.tenant);
         let found = match self.kind {
             Kind::Case | Kind::Evolution => {
@@ -141,7 +141,7 @@ impl Jobs {
     }
 
     /// Work as clients see it: a job that has not expired, a batch, or a run with its head.
-    async fn shown(&self, work: Work) -> Result<Work, JobsError> {
+    async fn shown(&self, work: Work) -> Result<Work> {
         let batch = match work {
             Work::Job(job) => return Ok(self.unexpired(*job)?.into()),
             Work::Batch(batch) if batch.kind == Kind::Rows => *batch,
@@ -162,7 +162,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::work`].
-    pub async fn get(&self, id: Uuid) -> Result<Job, JobsError> {
+    pub async fn get(&self, id: Uuid) -> Result<Job> {
         self.read(id, Duration::ZERO).await?.job()
     }
 
@@ -170,7 +170,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::work`].
-    pub async fn run(&self, id: Uuid) -> Result<Run, JobsError> {
+    pub async fn run(&self, id: Uuid) -> Result<Run> {
         match self.of_kind(Kind::Rows).work(id).await? {
             Work::Run(run) => Ok(*run),
             _ => Err(JobsError::NotFound(Kind::Rows)),
@@ -181,7 +181,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
-    pub async fn work(&self, id: Uuid) -> Result<Work, JobsError> {
+    pub async fn work(&self, id: Uuid) -> Result<Work> {
         let mut work = self.read(id, Duration::ZERO).await?;
         if let Work::Job(job) = &mut work
             && job.state == State::Queued
@@ -191,7 +191,7 @@ impl Jobs {
         self.shown(work).await
     }
 
-    async fn queue_place(&self, job: &Job) -> Result<Option<QueuePlace>, JobsError> {
+    async fn queue_place(&self, job: &Job) -> Result<Option<QueuePlace>> {
         let store = &self.shared.store;
         let ahead = store.queued_before(job, PLACES_COUNTED).await?;
         let position = u32::try_from(ahead.jobs).ok();
@@ -216,7 +216,7 @@ impl Jobs {
         filter: &Filter,
         cursor: Option<&str>,
         limit: u32,
-    ) -> Result<Page<Work>, JobsError> {
+    ) -> Result<Page<Work>> {
         // The store makes cursors for the narrowed filter.
         let filter = Filter {
             kind: self.kind,
@@ -256,7 +256,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::work`].
-    pub async fn wait_for(&self, id: Uuid, at_most: Duration) -> Result<Work, JobsError> {
+    pub async fn wait_for(&self, id: Uuid, at_most: Duration) -> Result<Work> {
         let until = Instant::now() + at_most;
         let mut seen = None;
         while let Ok(changed) = timeout_at(until, self.changed_since(id, seen.as_deref())).await {
@@ -275,7 +275,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::get`].
-    pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job, JobsError> {
+    pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job> {
         self.wait_for(id, at_most).await?.job()
     }
 
@@ -284,11 +284,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::work`].
-    pub async fn changed_since(
-        &self,
-        id: Uuid,
-        seen: Option<&str>,
-    ) -> Result<Option<Work>, JobsError> {
+    pub async fn changed_since(&self, id: Uuid, seen: Option<&str>) -> Result<Option<Work>> {
         // Subscribe first, then read: the end of a job in between is announced. Nothing announces changes of batches.
         let mut ended = self.shared.ended.subscribe();
         let mut age = match (self.kind, seen) {
@@ -330,7 +326,7 @@ impl Jobs {
     ///
     /// # Errors
     /// As [`Jobs::work`].
-    pub async fn cancel(&self, id: Uuid) -> Result<Work, JobsError> {
+    pub async fn cancel(&self, id: Uuid) -> Result<Work> {
         let (store, tenant) = (&self.shared.store, &self.tenant);
         let now = self.shared.now_ms();
         if let Work::Job(_) = self.read(id, Duration::ZERO).await? {
@@ -374,7 +370,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::NotEnded`], else as [`Jobs::work`].
-    pub async fn delete(&self, id: Uuid) -> Result<(), JobsError> {
+    pub async fn delete(&self, id: Uuid) -> Result<()> {
         let (shared, tenant) = (&self.shared, &self.tenant);
         let work = self.read(id, Duration::ZERO).await?;
         if !work.ended() {
@@ -446,7 +442,7 @@ impl Follower {
     ///
     /// # Errors
     /// The database failed.
-    pub async fn next(&mut self) -> Result<Option<(Work, i64)>, JobsError> {
+    pub async fn next(&mut self) -> Result<Option<(Work, i64)>> {
         let shared = self.jobs.shared.clone();
         loop {
             if let Some(next) = self.told.pop_front() {
@@ -462,7 +458,7 @@ impl Follower {
         }
     }
 
-    async fn poll(&mut self) -> Result<(), JobsError> {
+    async fn poll(&mut self) -> Result<()> {
         let from = self.since.saturating_sub(REACH_MS);
         self.poll_changes(from).await?;
         self.tell_progress().await?;
@@ -471,7 +467,7 @@ impl Follower {
         Ok(())
     }
 
-    async fn poll_changes(&mut self, mut from: i64) -> Result<(), JobsError> {
+    async fn poll_changes(&mut self, mut from: i64) -> Result<()> {
         let mut after = None;
         let mut changed: HashMap<(Kind, Uuid), i64> = HashMap::new();
         loop {
@@ -508,11 +504,7 @@ impl Follower {
     }
 
     /// What changed, with its tag; only the tag if the change was announced before.
-    async fn read_changed(
-        &self,
-        kind: Kind,
-        id: Uuid,
-    ) -> Result<(String, Option<Work>), JobsError> {
+    async fn read_changed(&self, kind: Kind, id: Uuid) -> Result<(String, Option<Work>)> {
         let jobs = self.jobs.of_kind(kind);
         let work = jobs.read(id, POLL_PAUSE).await?;
         let tag = tag(&work);
@@ -523,7 +515,7 @@ impl Follower {
         }
     }
 
-    async fn tell_progress(&mut self) -> Result<(), JobsError> {
+    async fn tell_progress(&mut self) -> Result<()> {
         let filter = Filter {
             states: vec![State::Running],
             member: Some(Membership::Alone),

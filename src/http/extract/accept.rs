@@ -6,7 +6,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::http::extract::query::{Reader, reader};
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::http::render::format::Format;
 
 /// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.
@@ -46,11 +46,7 @@ pub fn one_of(offered: &'static [Format]) -> Reader<Format> {
 ///
 /// # Errors
 /// `not-acceptable`: `Accept` excludes all that are offered.
-pub fn choose(
-    headers: &HeaderMap,
-    named: Option<Format>,
-    offered: &[Format],
-) -> Result<Format, ApiError> {
+pub fn choose(headers: &HeaderMap, named: Option<Format>, offered: &[Format]) -> Result<Format> {
     if let Some(format) = named {
         return Ok(format);
     }

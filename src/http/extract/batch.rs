@@ -16,7 +16,7 @@ use crate::http::extract::tables::{Chunk, CsvRows, TableForm, TableRows, TableSo
 use crate::http::extract::titles::{Place, faulty, is_text, number, place, question, short_names};
 use crate::http::limits::{Computation, Memory, Pace, SMALL_BYTES};
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::jobs::Jobs;
 use crate::jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use crate::jobs::model::{CaseOptions, Kind, Priority};
@@ -90,7 +90,7 @@ impl Splitter {
     ///
     /// # Errors
     /// A case is too large, or the body is no array.
-    pub fn feed(&mut self, piece: &[u8], out: &mut Vec<Element>) -> Result<(), ApiError> {
+    pub fn feed(&mut self, piece: &[u8], out: &mut Vec<Element>) -> Result<()> {
         match self.layout {
             Layout::Lines => self.feed_lines(piece, out),
             Layout::Array => piece.iter().try_for_each(|byte| self.feed_byte(*byte, out)),
@@ -101,7 +101,7 @@ impl Splitter {
     ///
     /// # Errors
     /// The array is not closed.
-    pub fn end(mut self, out: &mut Vec<Element>) -> Result<(), ApiError> {
+    pub fn end(mut self, out: &mut Vec<Element>) -> Result<()> {
         match self.layout {
             Layout::Lines => self.complete_line(out),
             Layout::Array if self.place == SplitterState::After => {}
@@ -118,7 +118,7 @@ impl Splitter {
         Ok(())
     }
 
-    fn feed_lines(&mut self, piece: &[u8], out: &mut Vec<Element>) -> Result<(), ApiError> {
+    fn feed_lines(&mut self, piece: &[u8], out: &mut Vec<Element>) -> Result<()> {
         let mut parts = piece.split(|byte| *byte == b'\n').peekable();
         while let Some(part) = parts.next() {
             self.require_room(part.len())?;
@@ -141,7 +141,7 @@ impl Splitter {
         self.line += 1;
     }
 
-    fn feed_byte(&mut self, byte: u8, out: &mut Vec<Element>) -> Result<(), ApiError> {
+    fn feed_byte(&mut self, byte: u8, out: &mut Vec<Element>) -> Result<()> {
         match self.place {
             _ if self.place != SplitterState::Inside && byte.is_ascii_whitespace() => {}
             SplitterState::Before if byte == b'[' => self.place = SplitterState::Inside,
@@ -182,7 +182,7 @@ impl Splitter {
         Ok(())
     }
 
-    fn complete_element(&mut self, out: &mut Vec<Element>) -> Result<(), ApiError> {
+    fn complete_element(&mut self, out: &mut Vec<Element>) -> Result<()> {
         if blank(&self.held) {
             return Err(malformed(&format!(
                 "element {} of the array (counted from 0) is empty",
@@ -197,13 +197,13 @@ impl Splitter {
         Ok(())
     }
 
-    fn hold(&mut self, byte: u8) -> Result<(), ApiError> {
+    fn hold(&mut self, byte: u8) -> Result<()> {
         self.require_room(1)?;
         self.held.push(byte);
         Ok(())
     }
 
-    fn require_room(&self, bytes: usize) -> Result<(), ApiError> {
+    fn require_room(&self, bytes: usize) -> Result<()> {
         if self.held.len() + bytes <= self.max_bytes {
             return Ok(());
         }
@@ -331,7 +331,7 @@ pub struct TemplateColumn {
 ///
 /// # Errors
 /// `faulty-table`: a title names no column, or two the same.
-pub fn columns_of(titles: &[Title]) -> Result<Vec<TemplateColumn>, ApiError> {
+pub fn columns_of(titles: &[Title]) -> Result<Vec<TemplateColumn>> {
     let mut seen = HashSet::new();
     let mut columns = Vec::new();
     for Title { name, unit, .. } in titles {
@@ -471,7 +471,7 @@ pub async fn read_draft(
     (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
     table: Option<Table>,
     request: Request<Body>,
-) -> Result<BatchUpload, ApiError> {
+) -> Result<BatchUpload> {
     let limits = (options.body_timeout, options.batch_max_bytes, "one batch");
     let mut draft = jobs.draft(Kind::Cases)?;
     if let Some(table) = table {
@@ -530,7 +530,7 @@ fn read_rows(
     (form, file): (TableForm, File),
     options: &HttpOptions,
     pace: &mut Pace,
-) -> Result<BatchUpload, ApiError> {
+) -> Result<BatchUpload> {
     let told = |detail| vec![Fault::new("", detail)];
     if form == TableForm::Csv {
         let mut rows = CsvRows::new(BufReader::new(file), options.body_max_bytes)?;
@@ -556,7 +556,7 @@ fn read_rows(
     Ok(draft)
 }
 
-fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<(), ApiError> {
+fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<()> {
     if draft.cases <= options.batch_max_cases {
         return Ok(());
     }
@@ -582,7 +582,7 @@ impl Checking {
         mut draft: BatchUpload,
         layout: Layout,
         portion: Vec<Element>,
-    ) -> Result<BatchUpload, ApiError> {
+    ) -> Result<BatchUpload> {
         if portion.is_empty() {
             return Ok(draft);
         }
@@ -604,7 +604,7 @@ fn add(
     layout: Layout,
     element: &Element,
     parsed_max_bytes: usize,
-) -> Result<(), ApiError> {
+) -> Result<()> {
     weigh_case(&element.text, parsed_max_bytes)?;
     match layout {
         Layout::Array => {
@@ -631,11 +631,7 @@ mod tests {
     use crate::jobs::batch::upload::fill;
     use crate::jobs::codec::table::COLUMNS_MAX;
 
-    fn cut(
-        layout: Layout,
-        text: &str,
-        piece: usize,
-    ) -> Result<Vec<(Option<u64>, String)>, ApiError> {
+    fn cut(layout: Layout, text: &str, piece: usize) -> Result<Vec<(Option<u64>, String)>> {
         let mut splitter = Splitter::new(layout, 40);
         let mut out = Vec::new();
         for piece in text.as_bytes().chunks(piece) {
@@ -709,7 +705,7 @@ mod tests {
         assert_eq!(pointers, ["/a~1b", "/deadline_s", "/priority"]);
     }
 
-    fn taken(lines: &[&str]) -> Result<Vec<Row>, ApiError> {
+    fn taken(lines: &[&str]) -> Result<Vec<Row>> {
         let text = lines.join("\n");
         let mut table = CsvRows::new(text.as_bytes(), 1 << 20)?;
         let columns = columns_of(&table.titles)?;

@@ -12,7 +12,7 @@ use uuid::Uuid;
 
 use crate::http::layers::auth::{Access, bearer, unauthorized};
 use crate::http::limits::{ConcurrencyLimits, HeldPermits};
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::jobs::Jobs;
 use crate::jobs::model::{ANONYMOUS, Kind, OPERATOR};
 
@@ -83,7 +83,7 @@ where
 {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
         let access = Access::from_ref(state);
         let (tenant, labels) = match access.key(parts).await? {
             Some(key) => (key.tenant, key.labels),
@@ -108,7 +108,7 @@ where
 {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
         let access = Access::from_ref(state);
         match access.key(parts).await? {
             Some(key) if *key.tenant != *OPERATOR => Err(ApiError::new(
@@ -130,7 +130,7 @@ macro_rules! id {
         impl<S: Send + Sync> FromRequestParts<S> for $name {
             type Rejection = ApiError;
 
-            async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+            async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
                 read_id(parts, state, Kind::$kind).await.map($name)
             }
         }
@@ -157,7 +157,7 @@ pub struct RunRowId(pub Uuid, pub u64);
 impl<S: Send + Sync> FromRequestParts<S> for RunRowId {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
         let path = Path::<(String, String)>::from_request_parts(parts, state).await;
         let Path((id, row)) = path
             .map_err(|rejection| ApiError::new(ProblemKind::RunNotFound, rejection.body_text()))?;
@@ -170,11 +170,7 @@ impl<S: Send + Sync> FromRequestParts<S> for RunRowId {
     }
 }
 
-async fn read_id<S: Send + Sync>(
-    parts: &mut Parts,
-    state: &S,
-    kind: Kind,
-) -> Result<Uuid, ApiError> {
+async fn read_id<S: Send + Sync>(parts: &mut Parts, state: &S, kind: Kind) -> Result<Uuid> {
     let path = Path::<String>::from_request_parts(parts, state).await;
     let Path(text) = path
         .map_err(|rejection| ApiError::new(ProblemKind::not_found(kind), rejection.body_text()))?;
@@ -185,7 +181,7 @@ async fn read_id<S: Send + Sync>(
 ///
 /// # Errors
 /// The text is not an id.
-pub(crate) fn work_id(kind: Kind, text: &str) -> Result<Uuid, ApiError> {
+pub(crate) fn work_id(kind: Kind, text: &str) -> Result<Uuid> {
     let id = Uuid::try_parse(text).map_err(|_| {
         let detail = format!("`{text}` is no {} id; ids are UUIDs", kind.noun());
         ApiError::new(ProblemKind::not_found(kind), detail)

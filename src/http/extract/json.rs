@@ -14,7 +14,7 @@ use crate::http::extract::caller::Tenant;
 use crate::http::layers::admission::{PackedLength, too_long};
 use crate::http::limits::{Memory, MemoryPermit, Permit, SMALL_BYTES};
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::jobs::sync::blocking;
 
 /// The JSON body of a request. What it means is for others to judge.
@@ -34,7 +34,7 @@ where
 {
     type Rejection = ApiError;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
+    async fn from_request(request: Request, state: &S) -> Result<Self> {
         let options = HttpOptions::from_ref(state);
         let memory = Memory::from_ref(state);
         require_json(request.headers())?;
@@ -72,7 +72,7 @@ async fn weigh_in_turn(
     tenant: &str,
     text: &Bytes,
     max_bytes: usize,
-) -> Result<usize, ApiError> {
+) -> Result<usize> {
     if text.len() <= SMALL_BYTES {
         return weigh_case(text, max_bytes);
     }
@@ -88,7 +88,7 @@ async fn weigh_in_turn(
 ///
 /// # Errors
 /// `body-too-large`: more than one case may take.
-pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize, ApiError> {
+pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize> {
     let weight = weigh(text);
     if weight.bytes > max_bytes {
         return Err(ApiError::new(
@@ -116,7 +116,7 @@ pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize, ApiError> {
 ///
 /// # Errors
 /// `malformed-json` with its position.
-pub fn read_json(text: &[u8]) -> Result<Value, ApiError> {
+pub fn read_json(text: &[u8]) -> Result<Value> {
     read_strict(text).map_err(|error| {
         let refusal = ApiError::malformed(&error);
         match unlike_json(text) {
@@ -154,7 +154,7 @@ pub fn essence(headers: &HeaderMap) -> String {
     essence.trim().to_ascii_lowercase()
 }
 
-fn require_json(headers: &HeaderMap) -> Result<(), ApiError> {
+fn require_json(headers: &HeaderMap) -> Result<()> {
     let given = headers
         .get(header::CONTENT_TYPE)
         .map(|value| value.to_str().unwrap_or("?"));
@@ -180,7 +180,7 @@ async fn read_whole(
     memory: &Memory,
     tenant: &str,
     options: &HttpOptions,
-) -> Result<(Bytes, Option<Permit>), ApiError> {
+) -> Result<(Bytes, Option<Permit>)> {
     let (max_bytes, within) = (options.body_max_bytes, options.body_timeout);
     let exact = request.body().size_hint().exact();
     let exact = exact.map_or(0, |bytes| usize::try_from(bytes).unwrap_or(max_bytes));
@@ -361,7 +361,7 @@ impl BodyReader {
         max_bytes: u64,
         what: &'static str,
         request: Request<Body>,
-    ) -> Result<BodyReader, ApiError> {
+    ) -> Result<BodyReader> {
         let declared = request.headers().get(header::CONTENT_LENGTH);
         let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
         let packed = request.extensions().get::<PackedLength>().cloned();
@@ -384,7 +384,7 @@ impl BodyReader {
     ///
     /// # Errors
     /// It is too large, too slow, or breaks off.
-    pub async fn next(&mut self) -> Result<Option<Bytes>, ApiError> {
+    pub async fn next(&mut self) -> Result<Option<Bytes>> {
         #[expect(clippy::cast_precision_loss, reason = "far fewer bytes than 2^53")]
         let owed = Duration::from_secs_f64(self.total as f64 / LOWEST_RATE);
         let latest = self.begun + self.timeout + owed;

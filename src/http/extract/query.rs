@@ -9,7 +9,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
-use crate::http::problem::{ApiError, Fault};
+use crate::http::problem::{ApiError, Fault, Result};
 use crate::jobs::model::{Priority, SubmitOptions};
 
 /// Parameters that belong together; [`query`] makes such types.
@@ -27,7 +27,7 @@ pub trait Parameters: Sized {
     ///
     /// # Errors
     /// `bad-query` with every fault.
-    fn read(uri: &Uri, limits: &Self::Limits) -> Result<Self, ApiError> {
+    fn read(uri: &Uri, limits: &Self::Limits) -> Result<Self> {
         let mut query = Query::read(uri, &Self::names());
         let parameters = Self::take(&mut query, limits);
         query.finish()?;
@@ -313,7 +313,7 @@ impl Query {
     ///
     /// # Errors
     /// `bad-query` with every fault found.
-    pub fn finish(mut self) -> Result<(), ApiError> {
+    pub fn finish(mut self) -> Result<()> {
         for (place, (name, _)) in self.pairs.iter().enumerate() {
             let before = self.pairs[..place]
                 .iter()
@@ -351,7 +351,7 @@ pub fn whole(text: &str, low: u32, high: u32) -> Option<u32> {
 ///
 /// # Errors
 /// `bad-query` naming the parameter, its value and the largest number allowed.
-pub fn require_index(name: &str, index: Option<usize>, count: usize) -> Result<(), ApiError> {
+pub fn require_index(name: &str, index: Option<usize>, count: usize) -> Result<()> {
     match index {
         Some(index) if index >= count => Err(ApiError::bad_parameter(
             name,

@@ -24,7 +24,7 @@ use crate::http::extract::tables::{TableForm, TableRows, TableSource, unsupporte
 use crate::http::extract::titles::{NamedColumns, faulty, require_few};
 use crate::http::limits::{Memory, Pace, Permit};
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::jobs::Jobs;
 use crate::jobs::codec::table::COLUMNS_MAX;
 use crate::jobs::run::draft::RunDraft;
@@ -45,7 +45,7 @@ pub fn declared_bytes(request: &Request, options: &HttpOptions) -> usize {
 ///
 /// # Errors
 /// It is too large, too slow, or breaks off.
-pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes, ApiError> {
+pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes> {
     let max_bytes = options.evaluate_max_bytes;
     let declared = declared_bytes(&request, options);
     let mut reader = BodyReader::new(
@@ -70,7 +70,7 @@ pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes,
 pub fn read_json_columns(
     text: &[u8],
     named: &NamedColumns,
-) -> Result<(Value, Vec<RunColumn>, Vec<Values>), ApiError> {
+) -> Result<(Value, Vec<RunColumn>, Vec<Values>)> {
     let read: RowsBody =
         serde_json::from_slice(text).map_err(|error| ApiError::malformed(&error))?;
     require_few(read.columns.count)?;
@@ -222,7 +222,7 @@ pub async fn separate_table(
     job: Option<Uuid>,
     (json, lines): (&str, bool),
     request: Request,
-) -> Result<(Request, Option<Table>), ApiError> {
+) -> Result<(Request, Option<Table>)> {
     let (request, part) = match essence(request.headers()) == "multipart/form-data" {
         true if job.is_some() => {
             return Err(ApiError::bad_parameter(
@@ -279,7 +279,7 @@ async fn separate_parts(
     memory: &Memory,
     options: &HttpOptions,
     request: Request,
-) -> Result<(Request, Option<Held>), ApiError> {
+) -> Result<(Request, Option<Held>)> {
     let content_type = request.headers().get(header::CONTENT_TYPE);
     let content_type = content_type.and_then(|value| value.to_str().ok());
     let boundary = multer::parse_boundary(content_type.unwrap_or_default()).map_err(|error| {
@@ -319,7 +319,7 @@ async fn next_part(
     parts: &mut Multipart<'static>,
     options: &HttpOptions,
     name: &str,
-) -> Result<Field<'static>, ApiError> {
+) -> Result<Field<'static>> {
     let part = timeout(options.body_timeout, parts.next_field()).await;
     let part = part.map_err(|_| {
         let detail = format!("the part `{name}` did not arrive in time");
@@ -386,7 +386,7 @@ pub async fn read_run(
     (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
     (table, named): (Option<Table>, NamedColumns),
     request: Request<Body>,
-) -> Result<RunDraft, ApiError> {
+) -> Result<RunDraft> {
     let (rows_max, bytes_max) = (options.run_max_rows, options.evaluate_max_bytes);
     let drafts = jobs.clone();
     let Some(table) = table else {
@@ -435,8 +435,8 @@ pub async fn read_spooled<T: Send + 'static>(
     (timeout, most, what): (Duration, u64, &'static str),
     bytes: usize,
     request: Request<Body>,
-    read: impl FnOnce(File, &mut Pace) -> Result<T, ApiError> + Send + 'static,
-) -> Result<T, ApiError> {
+    read: impl FnOnce(File, &mut Pace) -> Result<T> + Send + 'static,
+) -> Result<T> {
     let mut reader = BodyReader::new(timeout, most, what, request)?;
     let file = jobs.spool_file()?;
     let mut file = tokio::fs::File::from_std(file);

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 
 use crate::contact::evaluate::varied::column_pointer;
-use crate::http::problem::{ApiError, Fault, ProblemKind};
+use crate::http::problem::{ApiError, Fault, ProblemKind, Result};
 use crate::jobs::codec::table::COLUMNS_MAX;
 use crate::jobs::run::model::RunColumn;
 
@@ -26,7 +26,7 @@ pub fn faulty(detail: impl Into<String>) -> ApiError {
 ///
 /// # Errors
 /// `faulty-table`
-pub fn require_few(columns: usize) -> Result<(), ApiError> {
+pub fn require_few(columns: usize) -> Result<()> {
     match columns > COLUMNS_MAX {
         false => Ok(()),
         true => Err(faulty(format!(
@@ -451,10 +451,7 @@ impl NamedColumns {
     /// # Errors
     /// `faulty-table` with every column at fault: a title is not known, or it names a quantity with a unit that it does not have, or without
     /// one; or there are too many columns; or the client named a column twice, or one that is not there.
-    pub fn columns<'a>(
-        &self,
-        titles: impl Iterator<Item = Titled<'a>>,
-    ) -> Result<Vec<RunColumn>, ApiError> {
+    pub fn columns<'a>(&self, titles: impl Iterator<Item = Titled<'a>>) -> Result<Vec<RunColumn>> {
         let titles: Vec<Titled<'_>> = titles.take(COLUMNS_MAX + 1).collect();
         if titles.len() > COLUMNS_MAX {
             return Err(faulty(format!(

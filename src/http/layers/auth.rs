@@ -19,7 +19,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tracing::field::display;
 
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::http::server::connections::{Peer, ProbesOnly, network};
 use crate::jobs::Jobs;
 use crate::jobs::model::Key;
@@ -54,7 +54,7 @@ impl Access {
     ///
     /// # Errors
     /// `unauthorized`, `too-many-requests`, or what [`Guard::require_direct`] says.
-    pub async fn key(&self, parts: &Parts) -> Result<Option<Key>, ApiError> {
+    pub async fn key(&self, parts: &Parts) -> Result<Option<Key>> {
         let mut given = parts.headers.get_all(header::AUTHORIZATION).iter();
         let peer = parts.extensions.get::<Peer>().copied();
         let left = parts.extensions.get::<RateLeft>();
@@ -162,7 +162,7 @@ impl Guard {
     ///
     /// # Errors
     /// `host-not-allowed`, `cross-site` or `unauthorized`, with what to do.
-    pub(crate) fn require_direct(&self, parts: &Parts) -> Result<(), ApiError> {
+    pub(crate) fn require_direct(&self, parts: &Parts) -> Result<()> {
         self.require_host(parts)?;
         self.require_own_page(parts)?;
         let told = FORWARDED
@@ -182,7 +182,7 @@ impl Guard {
     }
 
     /// Is the service asked by a name that is its own? An address cannot be made to lead elsewhere, a name can.
-    fn require_host(&self, parts: &Parts) -> Result<(), ApiError> {
+    fn require_host(&self, parts: &Parts) -> Result<()> {
         let Some(host) = host(parts) else {
             return Ok(());
         };
@@ -202,7 +202,7 @@ impl Guard {
     }
 
     /// Does a request that changes something come from a page of this service, or from no page at all?
-    fn require_own_page(&self, parts: &Parts) -> Result<(), ApiError> {
+    fn require_own_page(&self, parts: &Parts) -> Result<()> {
         if matches!(parts.method, Method::GET | Method::HEAD | Method::OPTIONS) {
             return Ok(());
         }
@@ -394,7 +394,7 @@ impl RateLimit {
         sender: RateKey,
         who: &str,
         left: Option<&RateLeft>,
-    ) -> Result<(), ApiError> {
+    ) -> Result<()> {
         let Some(limiter) = &self.limiter else {
             return Ok(());
         };
@@ -457,7 +457,7 @@ impl RateLimit {
     ///
     /// # Errors
     /// `too-many-requests`, with the seconds after which to try again: the address has sent too many of them.
-    pub(crate) fn count_failure(&self, address: Option<IpAddr>) -> Result<(), ApiError> {
+    pub(crate) fn count_failure(&self, address: Option<IpAddr>) -> Result<()> {
         let Some(address) = address else {
             return Ok(());
         };

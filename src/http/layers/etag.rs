@@ -17,7 +17,7 @@ use http_body_util::BodyExt;
 use tokio::sync::OnceCell;
 use uuid::Uuid;
 
-use crate::http::problem::ApiError;
+use crate::http::problem::{ApiError, Result};
 use crate::http::render::format::Format;
 use crate::jobs::Jobs;
 use crate::jobs::model::State;
@@ -86,7 +86,7 @@ impl Precondition {
         uri: &Uri,
         headers: &HeaderMap,
         format: Format,
-    ) -> Result<Precondition, ApiError> {
+    ) -> Result<Precondition> {
         let job = jobs.get(id).await?;
         let query = Pairs::<Vec<(String, String)>>::try_from_uri(uri);
         let mut query = query.map_or_else(|_| Vec::new(), |Pairs(pairs)| pairs);

@@ -23,7 +23,7 @@ use crate::http::extract::rows::{TableUpload, separate_table};
 use crate::http::layers::response::StreamedUnbuffered;
 use crate::http::limits::{Memory, Permit, hold_while_sent};
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, Fault, ProblemBody, ProblemKind, problems};
+use crate::http::problem::{ApiError, Fault, ProblemBody, ProblemKind, Result, problems};
 use crate::http::render::batch_table::Columns;
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::Piece;
@@ -90,7 +90,7 @@ pub(crate) async fn submit(
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
     request: Request,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     named.read_into(&mut work, &jobs)?;
     let state = (&jobs, &memory, &options);
     let json = "an array with `application/json`, one case per line with `application/x-ndjson`";
@@ -481,7 +481,7 @@ pub(crate) async fn results(
     State(memory): State<Memory>,
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let (query, _) = <(BatchResultsQuery, WaitQuery)>::read(&uri, &())?;
     let format = choose(&headers, query.format, RESULT_FORMATS)?;
     let is_table = format != Format::Ndjson;

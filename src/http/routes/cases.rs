@@ -15,7 +15,7 @@ use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
 use crate::http::limits::{Memory, MemoryPermit};
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, problems};
+use crate::http::problem::{ApiError, Result, problems};
 use crate::jobs::sync::blocking;
 
 /// A case that can be solved, and its expected cost.
@@ -76,7 +76,7 @@ pub(crate) async fn check(
     State(memory): State<Memory>,
     State(options): State<HttpOptions>,
     JsonBody { value, mut room }: JsonBody,
-) -> Result<Json<CheckReport>, ApiError> {
+) -> Result<Json<CheckReport>> {
     if room.turn.is_none() {
         room.turn = Some(memory.turn(jobs.tenant(), 0).await?);
     }

@@ -31,7 +31,7 @@ use crate::http::extract::tables::{TableForm, TableRows, TableSource, too_large}
 use crate::http::extract::titles::{NamedColumns, faulty};
 use crate::http::limits::{Memory, Pace, hold_while_sent};
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, problems};
+use crate::http::problem::{ApiError, ProblemKind, Result, problems};
 use crate::http::render::format::Format;
 use crate::http::render::npz;
 use crate::http::render::row_tables::{json_body, table_body};
@@ -182,7 +182,7 @@ pub(crate) async fn evaluate(
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
     request: Request,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let EvaluateQuery { template, format } = EvaluateQuery::read(request.uri(), &())?;
     let format = choose(request.headers(), format, FORMATS)?;
     let state = (&jobs, &memory, &options);
@@ -251,7 +251,7 @@ fn read_rows(
     text: &Bytes,
     (rows_max, bytes_max): (usize, usize),
     pace: &mut Pace,
-) -> Result<ReceivedRows, ApiError> {
+) -> Result<ReceivedRows> {
     let source = TableSource::Memory(text.clone());
     let table = TableRows::new(form, source, bytes_max)?;
     let columns = table.titles.len();
@@ -270,7 +270,7 @@ fn read_rows(
 }
 
 /// No rows of these columns, all of which stand for something in the case.
-fn varied_alone(columns: Vec<RunColumn>) -> Result<ReceivedRows, ApiError> {
+fn varied_alone(columns: Vec<RunColumn>) -> Result<ReceivedRows> {
     let carried = columns.iter().find(|column| column.pointer.is_none());
     match carried {
         None => Ok(ReceivedRows::new(columns)?),
@@ -294,12 +294,7 @@ struct Evaluation {
 }
 
 impl Evaluation {
-    fn answer(
-        &self,
-        template: Value,
-        rows: ReceivedRows,
-        pace: &mut Pace,
-    ) -> Result<RowsAnswer, ApiError> {
+    fn answer(&self, template: Value, rows: ReceivedRows, pace: &mut Pace) -> Result<RowsAnswer> {
         let (rows_max, held) = (self.rows_max, rows.held());
         let (names, columns): (Vec<String>, Vec<VariedColumn>) = rows.into_varied().unzip();
         let (rows, columns) = (held, &columns);

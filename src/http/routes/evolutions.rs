@@ -16,7 +16,7 @@ use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::{Parameters, count, query, word};
 use crate::http::extract::titles::{Place, place, question};
 use crate::http::limits::{Memory, hold_while_sent};
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::RowWriter;
 use crate::http::routes::jobs::{self, GetProblems, SubmitProblems};
@@ -52,7 +52,7 @@ pub(crate) async fn submit(
     }: Submission<NamedQuery>,
     State(memory): State<Memory>,
     JsonBody { mut value, room }: JsonBody,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let jobs = jobs.of_kind(Kind::Evolution);
     named.read_into(&mut options, &jobs)?;
     let titles = name_columns(&mut value)?;
@@ -68,7 +68,7 @@ pub(crate) async fn submit(
 type Title = [String; 2];
 
 /// Names the columns of the traffic by JSON pointers, in the units of the case. What is no table is left to the check.
-fn name_columns(request: &mut Value) -> Result<Vec<Title>, ApiError> {
+fn name_columns(request: &mut Value) -> Result<Vec<Title>> {
     let columns = request.pointer_mut("/traffic/columns");
     let (mut titles, mut named, mut faults) = (Vec::new(), Map::new(), Vec::new());
     let Some(Value::Object(columns)) = columns else {
@@ -135,7 +135,7 @@ fn scale(values: &mut Value, factor: f64) {
     params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
     responses((status = 200, description = "Case, traffic and plan", body = EvolutionWords), GetProblems)
 )]
-pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
+pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response> {
     jobs::case(Caller(jobs.of_kind(Kind::Evolution)), JobId(id)).await
 }
 
@@ -152,7 +152,7 @@ pub(crate) async fn result(
     Caller(jobs): Caller,
     JobId(id): JobId,
     State(memory): State<Memory>,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let jobs = jobs.of_kind(Kind::Evolution);
     let share = memory.ready_answer(jobs.tenant(), jobs.answer_bytes(id).await?)?;
     let text = jobs.answer(id).await?;
@@ -197,7 +197,7 @@ pub(crate) async fn table(
     uri: Uri,
     State(memory): State<Memory>,
     headers: HeaderMap,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let query = EvolutionTableQuery::read(&uri, &())?;
     let format = choose(&headers, query.format, TABLES)?;
     let made = read(jobs, &memory, id, move |evolution| {
@@ -253,7 +253,7 @@ pub(crate) async fn section(
     Path((id, body)): Path<(String, String)>,
     uri: Uri,
     State(memory): State<Memory>,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let query = SectionQuery::read(&uri, &())?;
     let id = work_id(Kind::Evolution, &id)?;
     let Some(k) = BODIES.iter().position(|(name, _)| *name == body) else {
@@ -283,8 +283,8 @@ async fn read(
     jobs: Jobs,
     memory: &Memory,
     id: Uuid,
-    make: impl FnOnce(&EvolutionAnswer) -> Result<Response, ApiError> + Send + 'static,
-) -> Result<Response, ApiError> {
+    make: impl FnOnce(&EvolutionAnswer) -> Result<Response> + Send + 'static,
+) -> Result<Response> {
     let jobs = jobs.of_kind(Kind::Evolution);
     // Once as text, and about as much as numbers.
     let share = memory.ready_answer(jobs.tenant(), 2 * jobs.answer_bytes(id).await?)?;

@@ -13,7 +13,7 @@ use crate::http::dto::{Cells, GriddedField, Outlines};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole, word};
 use crate::http::limits::{Rendering, hold_while_sent};
-use crate::http::problem::ApiError;
+use crate::http::problem::{ApiError, Result};
 use crate::http::render::csv::Precision;
 use crate::http::render::format::Format;
 use crate::http::render::pieces::{csv_body, json_body};
@@ -101,7 +101,7 @@ impl Selection {
     ///
     /// # Errors
     /// `bad-query` with every fault, or `not-acceptable`.
-    pub(crate) fn read(request: &PartRequest) -> Result<Self, ApiError> {
+    pub(crate) fn read(request: &PartRequest) -> Result<Self> {
         let samples_max = request.shared.options.grid_max_samples;
         let query = FieldQuery::read(&request.uri, &samples_max)?;
         Ok(Selection {
@@ -121,7 +121,7 @@ impl Selection {
         &self,
         request: &PartRequest,
         shown: Output,
-    ) -> Result<Option<Response>, ApiError> {
+    ) -> Result<Option<Response>> {
         if !matches!(self.format, Format::Svg | Format::Png) {
             return Ok(None);
         }
@@ -193,7 +193,7 @@ macro_rules! field_routes {
                 (File = "image/png")
             )), FieldProblems)
         )]
-        pub(crate) async fn $name(request: PartRequest) -> Result<Response, ApiError> {
+        pub(crate) async fn $name(request: PartRequest) -> Result<Response> {
             answer(&request, Output::$output).await
         }
     )*};
@@ -212,7 +212,7 @@ field_routes! {
     zones("/v1/jobs/{id}/zones", "get_zones", Zones, Zones, "Areas, outlines and the zone of every cell, or zones on a regular grid; only cells or grid in forms other than JSON");
 }
 
-async fn answer(request: &PartRequest, output: Output) -> Result<Response, ApiError> {
+async fn answer(request: &PartRequest, output: Output) -> Result<Response> {
     let selection = Selection::read(request)?;
     let answer = async {
         if let Some(picture) = selection.picture(request, output).await? {
@@ -236,7 +236,7 @@ async fn write_parts(
     selection: Selection,
     wanted: Vec<Output>,
     (members, name): (String, &'static str),
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let place = [selection.patch, selection.point];
     let (cells, values) = stored(&request.jobs, request.id, place, &wanted).await?;
     let outputs = match wanted.is_empty() {
@@ -282,7 +282,7 @@ impl FieldValues {
         rendering: Rendering,
         selection: Selection,
         name: &'static str,
-    ) -> Result<Response, ApiError> {
+    ) -> Result<Response> {
         let size = |written: &Written| match written {
             Written::Json(table, _) | Written::Csv(table) => table.bytes(),
             Written::File(bytes) => bytes.len(),
@@ -301,7 +301,7 @@ impl FieldValues {
         Ok(hold_while_sent(response, share))
     }
 
-    fn written(self, selection: Selection, name: &str) -> Result<Written, ApiError> {
+    fn written(self, selection: Selection, name: &str) -> Result<Written> {
         let (patch, point) = (selection.patch, selection.point);
         let with_zones = self.outputs.contains(&Output::Zones);
         let outlines = Outlines::of(&self.cells, &self.values, with_zones);
@@ -390,7 +390,7 @@ fn parts() -> Reader<Vec<Output>> {
         (File = "application/x-vtk")
     )), FieldProblems)
 )]
-pub(crate) async fn fields(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn fields(request: PartRequest) -> Result<Response> {
     let query = FieldsQuery::read(&request.uri, &request.shared.options.grid_max_samples)?;
     let selection = Selection {
         patch: query.patch.unwrap_or(0),
@@ -442,7 +442,7 @@ pub(crate) struct ZoneCells {
 }
 
 /// The areas and numbers of cells of the zones as members of JSON; `None` if the case did not ask for zones.
-async fn sizes_of_zones(jobs: &Jobs, id: Uuid, selection: Selection) -> Result<String, ApiError> {
+async fn sizes_of_zones(jobs: &Jobs, id: Uuid, selection: Selection) -> Result<String> {
     let solution = jobs.solution(id).await?;
     let (_, point) = motion_of(&solution, [selection.patch, selection.point])?;
     let sizes = || {

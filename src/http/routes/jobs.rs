@@ -8,7 +8,7 @@ use crate::contact::case::words::solver::Case;
 use crate::http::extract::caller::{Caller, JobId};
 use crate::http::extract::json::JsonBody;
 use crate::http::limits::Memory;
-use crate::http::problem::{ApiError, problems};
+use crate::http::problem::{Result, problems};
 use crate::http::routes::submission::{JobAccepted, Submission, SubmitParameters};
 
 problems! {
@@ -40,7 +40,7 @@ pub(crate) async fn submit(
     }: Submission<()>,
     State(memory): State<Memory>,
     JsonBody { value, room }: JsonBody,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let (job, replayed) = jobs.submit_with(value, options).await?;
     drop(room);
     reply
@@ -62,7 +62,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The case", body = Case), GetProblems)
 )]
-pub(crate) async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response, ApiError> {
+pub(crate) async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response> {
     let text = jobs.case(id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }

@@ -20,7 +20,7 @@ use crate::http::extract::caller::Caller;
 use crate::http::extract::query::{
     Parameters, Query, Reader, Repeated, count, label, name, query, reader, time,
 };
-use crate::http::problem::{ApiError, ProblemKind, describe};
+use crate::http::problem::{ApiError, ProblemKind, Result, describe};
 use crate::http::render::format::Format;
 use crate::http::routes::work::{WorkAnswer, answer_name, route, text_header};
 use crate::http::state::AppState;
@@ -177,7 +177,7 @@ fn groups(kind: Kind) -> (Vec<&'static str>, Vec<utoipa::openapi::path::Paramete
     all
 }
 
-async fn list_work(kind: Kind, Caller(jobs): Caller, uri: &Uri) -> Result<Response, ApiError> {
+async fn list_work(kind: Kind, Caller(jobs): Caller, uri: &Uri) -> Result<Response> {
     let mut query = Query::read(uri, &groups(kind).0);
     let PageQuery { limit, cursor } = PageQuery::take(&mut query, &());
     let common = FilterQuery::take(&mut query, &());

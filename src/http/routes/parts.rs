@@ -13,7 +13,7 @@ use crate::http::extract::caller::{Caller, JobId};
 use crate::http::extract::query::require_index;
 use crate::http::layers::etag::{Precondition, tagged};
 use crate::http::limits::Rendering;
-use crate::http::problem::{ApiError, ProblemKind, problems};
+use crate::http::problem::{ApiError, ProblemKind, Result, problems};
 use crate::http::render::format::Format;
 use crate::http::state::AppState;
 use crate::jobs::Jobs;
@@ -36,7 +36,7 @@ pub(crate) struct PartRequest {
 impl FromRequestParts<AppState> for PartRequest {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, shared: &AppState) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, shared: &AppState) -> Result<Self> {
         let Caller(jobs) = Caller::from_request_parts(parts, shared).await?;
         let JobId(id) = JobId::from_request_parts(parts, shared).await?;
         Ok(PartRequest {
@@ -57,8 +57,8 @@ impl PartRequest {
     pub(crate) async fn unless_known(
         &self,
         format: Format,
-        answer: impl Future<Output = Result<Response, ApiError>> + Send,
-    ) -> Result<Response, ApiError> {
+        answer: impl Future<Output = Result<Response>> + Send,
+    ) -> Result<Response> {
         match Precondition::of(&self.jobs, self.id, &self.uri, &self.headers, format).await? {
             Precondition::NotModified(unchanged) => Ok(unchanged),
             Precondition::Proceed(tag) => Ok(tagged(&tag, answer.await?)),
@@ -69,7 +69,7 @@ impl PartRequest {
     ///
     /// # Errors
     /// As [`Memory::rendering`](crate::http::limits::Memory::rendering).
-    pub(crate) async fn rendering(&self, bytes: usize) -> Result<Rendering, ApiError> {
+    pub(crate) async fn rendering(&self, bytes: usize) -> Result<Rendering> {
         self.shared
             .memory
             .rendering(self.jobs.tenant(), bytes)
@@ -100,7 +100,7 @@ pub(crate) async fn stored(
     id: Uuid,
     [patch, point]: [usize; 2],
     wanted: &[Output],
-) -> Result<(PatchCells, PointFields), ApiError> {
+) -> Result<(PatchCells, PointFields)> {
     let mut fields = match jobs.point_fields(id, patch, point).await {
         // Nothing is stored per cell when the case asked for no field at all.
         Err(JobsError::NoSuchPatch(0)) => {
@@ -131,7 +131,7 @@ pub(crate) async fn stored(
 pub(crate) fn motion_of(
     solution: &Solution,
     [patch, point]: [usize; 2],
-) -> Result<(&PatchSolution, &PointSolution), ApiError> {
+) -> Result<(&PatchSolution, &PointSolution)> {
     require_index("patch", Some(patch), solution.patches.len())?;
     let patch = &solution.patches[patch];
     require_index("point", Some(point), patch.points.len())?;
@@ -156,7 +156,7 @@ pub(crate) fn has(cells: &PatchCells, values: &PointFields, output: Output) -> b
 ///
 /// # Errors
 /// Always: `output-not-asked`, or what went wrong while finding out.
-pub(crate) async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T, ApiError> {
+pub(crate) async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T> {
     let asked: Vec<String> = jobs
         .outputs(id)
         .await?

@@ -11,7 +11,7 @@ use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
 use crate::http::extract::query::{Parameters, count, index, query, reader, word};
 use crate::http::limits::hold_while_sent;
-use crate::http::problem::ApiError;
+use crate::http::problem::{ApiError, Result};
 use crate::http::render::format::Format;
 use crate::http::render::picture::curve::{self, Curve, CurveLine};
 use crate::http::render::picture::draw::draw;
@@ -122,7 +122,7 @@ pub(crate) fn short(value: f64) -> String {
 }
 
 /// Draws when its turn has come.
-pub(crate) type Drawing = Box<dyn FnOnce(u32) -> Result<String, ApiError> + Send>;
+pub(crate) type Drawing = Box<dyn FnOnce(u32) -> Result<String> + Send>;
 
 /// What draws this view.
 ///
@@ -132,7 +132,7 @@ pub(crate) async fn drawing(
     request: &PartRequest,
     title: String,
     wish: PlotOptions,
-) -> Result<Drawing, ApiError> {
+) -> Result<Drawing> {
     let (jobs, id) = (&request.jobs, request.id);
     let solution = jobs.solution(id).await?;
     match wish.view {
@@ -169,7 +169,7 @@ pub(crate) async fn drawing(
     Ok(Box::new(move |width| Ok(section::draw(&sections, width))))
 }
 
-fn of_curve(title: String, solution: &Solution) -> Result<Drawing, ApiError> {
+fn of_curve(title: String, solution: &Solution) -> Result<Drawing> {
     let points = solution
         .patches
         .first()
@@ -251,12 +251,7 @@ fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
     (name, points.iter().map(of).collect())
 }
 
-async fn of_profiles(
-    jobs: &Jobs,
-    id: Uuid,
-    title: String,
-    solution: Solution,
-) -> Result<Drawing, ApiError> {
+async fn of_profiles(jobs: &Jobs, id: Uuid, title: String, solution: Solution) -> Result<Drawing> {
     let mut patches = Vec::new();
     for (number, patch) in solution.patches.iter().enumerate() {
         // The wheelset has two wheels in every position.
@@ -375,7 +370,7 @@ fn range(text: &str) -> Option<[f64; 2]> {
 }
 
 impl PlotOptions {
-    fn read(uri: &Uri) -> Result<PlotOptions, ApiError> {
+    fn read(uri: &Uri) -> Result<PlotOptions> {
         let query = PlotQuery::read(uri, &())?;
         let shown = query.field.unwrap_or(Output::Tractions);
         if shown == Output::Zones && query.range.is_some() {
@@ -422,7 +417,7 @@ impl PlotOptions {
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((String = "image/svg+xml"))), FieldProblems)
 )]
-pub(crate) async fn svg(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn svg(request: PartRequest) -> Result<Response> {
     plot(&request, Format::Svg).await
 }
 
@@ -435,11 +430,11 @@ pub(crate) async fn svg(request: PartRequest) -> Result<Response, ApiError> {
     params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
     responses((status = 200, description = "The picture", content((File = "image/png"))), FieldProblems)
 )]
-pub(crate) async fn png(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn png(request: PartRequest) -> Result<Response> {
     plot(&request, Format::Png).await
 }
 
-async fn plot(request: &PartRequest, format: Format) -> Result<Response, ApiError> {
+async fn plot(request: &PartRequest, format: Format) -> Result<Response> {
     let wish = PlotOptions::read(&request.uri)?;
     let drawn = picture(request, wish, format);
     request.unless_known(format, drawn).await
@@ -453,7 +448,7 @@ pub(crate) async fn picture(
     request: &PartRequest,
     wish: PlotOptions,
     format: Format,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     // Its pixels are there during its turn only; what is sent is small.
     let rendering = request.rendering(0).await?;
     let (jobs, id) = (&request.jobs, request.id);

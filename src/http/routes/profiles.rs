@@ -16,7 +16,7 @@ use crate::http::dto::rfc3339;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::json::JsonBody;
 use crate::http::extract::query::Parameters;
-use crate::http::problem::{ApiError, ProblemKind, problems};
+use crate::http::problem::{ApiError, ProblemKind, Result, problems};
 use crate::http::routes::lists::{LIMIT_DEFAULT, PageQuery, answer};
 
 /// The digest in the path.
@@ -26,7 +26,7 @@ pub(crate) struct Digest(String);
 impl<S: Send + Sync> FromRequestParts<S> for Digest {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
         let Path(text) = Path::<String>::from_request_parts(parts, state)
             .await
             .map_err(|rejection| {
@@ -77,7 +77,7 @@ problems! {
 pub(crate) async fn keep(
     Caller(jobs): Caller,
     JsonBody { value, room }: JsonBody,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let (kept, report, before) = jobs.keep_profile(value).await?;
     drop(room);
     let location = [(header::LOCATION, format!("/v1/profiles/{}", kept.digest))];
@@ -137,7 +137,7 @@ problems! {
         ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
     )), ListProfilesProblems)
 )]
-pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response, ApiError> {
+pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response> {
     let PageQuery { limit, cursor } = PageQuery::read(&uri, &())?;
     let limit = limit.unwrap_or(LIMIT_DEFAULT);
     let page = jobs.profiles(cursor.as_deref(), limit).await?;
@@ -168,10 +168,7 @@ problems! {
     params(("digest" = String, Path, description = "Digest of the profile")),
     responses((status = 200, description = "The cross-section", body = CrossSection), ProfileProblems)
 )]
-pub(crate) async fn get(
-    Caller(jobs): Caller,
-    Digest(digest): Digest,
-) -> Result<Json<Value>, ApiError> {
+pub(crate) async fn get(Caller(jobs): Caller, Digest(digest): Digest) -> Result<Json<Value>> {
     let kept = jobs.profile(&digest).await?;
     let value = serde_json::from_slice(&kept.body);
     Ok(Json(value.map_err(|error| ApiError::internal(&error))?))
@@ -188,10 +185,7 @@ pub(crate) async fn get(
     params(("digest" = String, Path, description = "Digest of the profile")),
     responses((status = 204, description = "It is gone"), ProfileProblems)
 )]
-pub(crate) async fn delete(
-    Caller(jobs): Caller,
-    Digest(digest): Digest,
-) -> Result<StatusCode, ApiError> {
+pub(crate) async fn delete(Caller(jobs): Caller, Digest(digest): Digest) -> Result<StatusCode> {
     jobs.delete_profile(&digest).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -22,7 +22,7 @@ use crate::http::extract::caller::{Caller, JobId};
 use crate::http::extract::query::{Parameters, index, query, require_index};
 use crate::http::layers::etag::{Precondition, tagged};
 use crate::http::limits::{Memory, Permit, SMALL_BYTES, hold_while_sent};
-use crate::http::problem::{ApiError, problems};
+use crate::http::problem::{ApiError, Result, problems};
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::RowWriter;
 use crate::http::render::{resultants, stresses};
@@ -59,7 +59,7 @@ pub(crate) async fn result(
     State(memory): State<Memory>,
     uri: Uri,
     headers: HeaderMap,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     await_end(&jobs, id, &wait).await?;
     let tag = match Precondition::of(&jobs, id, &uri, &headers, Format::Json).await? {
         Precondition::NotModified(answer) => return Ok(answer),
@@ -81,7 +81,7 @@ pub(crate) async fn result_text(
     memory: &Memory,
     id: Uuid,
     around: [&str; 2],
-) -> Result<(Body, Option<Permit>), ApiError> {
+) -> Result<(Body, Option<Permit>)> {
     let answer = jobs.open_answer(id).await?;
     let share = memory.ready_answer(jobs.tenant(), answer.held_bytes)?;
     let tail = JobResult::tail(id, answer.cached, &answer.outputs)?;
@@ -133,7 +133,7 @@ query! {
     ),
     responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` as its patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
 )]
-pub(crate) async fn resultants(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn resultants(request: PartRequest) -> Result<Response> {
     let query = ResultantsQuery::read(&request.uri, &())?;
     let format = choose(&request.headers, query.format, FORMS)?;
     let answer = write_resultants(&request, query.point, query.patch, format);
@@ -145,7 +145,7 @@ async fn write_resultants(
     point: Option<usize>,
     patch: Option<usize>,
     format: Format,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let (jobs, id) = (&request.jobs, request.id);
     // The stored text is read whole and cut to what was asked for.
     let turn = request.rendering(2 * jobs.answer_bytes(id).await?).await?;
@@ -168,7 +168,7 @@ async fn write_resultants(
     Ok(hold_while_sent(response, share))
 }
 
-fn csv(table: RowTable) -> Result<Vec<u8>, ApiError> {
+fn csv(table: RowTable) -> Result<Vec<u8>> {
     RowWriter::whole(Format::Csv, table).map_err(|error| ApiError::internal(&error))
 }
 
@@ -223,7 +223,7 @@ pub(crate) struct SubsurfaceAnswer {
     ),
     responses((status = 200, description = "Stresses at the requested points in the order of the case, and the worst point. CSV: one line per requested point", content((SubsurfaceAnswer = "application/json"), (String = "text/csv"))), FieldProblems)
 )]
-pub(crate) async fn subsurface(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn subsurface(request: PartRequest) -> Result<Response> {
     let query = SubsurfaceQuery::read(&request.uri, &())?;
     let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
     let format = choose(&request.headers, query.format, FORMS)?;
@@ -236,7 +236,7 @@ async fn write_stresses(
     patch: usize,
     point: usize,
     format: Format,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let (jobs, id) = (&request.jobs, request.id);
     let output = Output::Subsurface;
     let (_, values) = stored(jobs, id, [patch, point], &[output]).await?;
@@ -304,18 +304,14 @@ pub(crate) struct PatchDamage {
     ),
     responses((status = 200, description = "The models that the case asked for", body = PatchDamage), FieldProblems)
 )]
-pub(crate) async fn damage(request: PartRequest) -> Result<Response, ApiError> {
+pub(crate) async fn damage(request: PartRequest) -> Result<Response> {
     let query = DamageQuery::read(&request.uri, &())?;
     let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
     let answer = write_damage(&request, patch, point);
     request.unless_known(Format::Json, answer).await
 }
 
-async fn write_damage(
-    request: &PartRequest,
-    patch: usize,
-    point: usize,
-) -> Result<Response, ApiError> {
+async fn write_damage(request: &PartRequest, patch: usize, point: usize) -> Result<Response> {
     let (jobs, id) = (&request.jobs, request.id);
     let solution = jobs.solution(id).await?;
     let (_, motion) = motion_of(&solution, [patch, point])?;

@@ -21,7 +21,7 @@ use crate::http::extract::rows::{JSON, TableUpload, read_run, separate_table};
 use crate::http::extract::titles::{NamedColumns, named_column};
 use crate::http::limits::{Memory, hold_while_sent};
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, problems};
+use crate::http::problem::{ApiError, ProblemKind, Result, problems};
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::{Piece, RowWriter, WriteError};
 use crate::http::routes::submission::{NamedQuery, RunAccepted, Submission, SubmitParameters};
@@ -89,7 +89,7 @@ pub(crate) async fn submit(
     State(options): State<HttpOptions>,
     State(memory): State<Memory>,
     request: Request,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     named.read_into(&mut work, &jobs)?;
     let state = (&jobs, &memory, &options);
     let (request, table) = separate_table(state, run.template, JSON, request).await?;
@@ -190,7 +190,7 @@ pub(crate) async fn results(
     State(memory): State<Memory>,
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let (query, _) = <(RunResultsQuery, WaitQuery)>::read(&uri, &())?;
     let format = choose(&headers, query.format, RESULT_FORMATS)?;
     await_end(&jobs.of_kind(Kind::Rows), id, &wait).await?;
@@ -214,7 +214,7 @@ pub(crate) async fn results(
 }
 
 /// A run has answers once it has ended.
-fn require_ended(run: &Run) -> Result<(), ApiError> {
+fn require_ended(run: &Run) -> Result<()> {
     match run.state() {
         state if state.ended() => Ok(()),
         state => Err(ApiError::new(
@@ -230,7 +230,7 @@ fn require_ended(run: &Run) -> Result<(), ApiError> {
 }
 
 /// The columns that are wanted, in the order of the answers.
-fn selected(run: &Run, wanted: Option<Vec<String>>) -> Result<Vec<(String, TableKind)>, ApiError> {
+fn selected(run: &Run, wanted: Option<Vec<String>>) -> Result<Vec<(String, TableKind)>> {
     let mut columns = run.head.answers();
     let Some(wanted) = wanted else {
         return Ok(columns);
@@ -313,10 +313,7 @@ pub(crate) struct RunFile {
     params(("id" = String, Path, description = "Id of the run", format = "uuid")),
     responses((status = 200, description = "The files", body = RunManifest), RunResultProblems)
 )]
-pub(crate) async fn manifest(
-    Caller(jobs): Caller,
-    RunId(id): RunId,
-) -> Result<Json<RunManifest>, ApiError> {
+pub(crate) async fn manifest(Caller(jobs): Caller, RunId(id): RunId) -> Result<Json<RunManifest>> {
     let run = jobs.run(id).await?;
     require_ended(&run)?;
     let (rows, columns) = (run.head.rows, answer_columns(&run));
@@ -376,7 +373,7 @@ pub(crate) struct RunRowAlone {
 pub(crate) async fn row(
     Caller(jobs): Caller,
     RunRowId(id, row): RunRowId,
-) -> Result<Json<RunRowAlone>, ApiError> {
+) -> Result<Json<RunRowAlone>> {
     let run = jobs.run(id).await?;
     if row >= run.head.rows {
         return Err(ApiError::new(
@@ -390,7 +387,7 @@ pub(crate) async fn row(
 }
 
 /// The only row of a table as the lines of the results have it.
-fn members(table: RowTable) -> Result<Map<String, Value>, ApiError> {
+fn members(table: RowTable) -> Result<Map<String, Value>> {
     let line = RowWriter::Ndjson.write(table);
     let line = line.map_err(|error| ApiError::internal(&error))?;
     serde_json::from_slice(&line).map_err(|error| ApiError::internal(&error))
@@ -503,7 +500,7 @@ pub(crate) async fn totals(
     RunId(id): RunId,
     uri: Uri,
     State(memory): State<Memory>,
-) -> Result<Json<RunTotals>, ApiError> {
+) -> Result<Json<RunTotals>> {
     let query = RunTotalsQuery::read(&uri, &())?;
     let run = jobs.run(id).await?;
     require_ended(&run)?;
@@ -553,7 +550,7 @@ fn section_of(
     columns: &[(String, TableKind)],
     by: Option<String>,
     width: Option<f64>,
-) -> Result<Option<RowSection>, ApiError> {
+) -> Result<Option<RowSection>> {
     let Some(name) = by else {
         return match width {
             None => Ok(None),
@@ -603,7 +600,7 @@ struct Numbers {
 }
 
 impl Gathered {
-    fn add(&mut self, table: &RowTable) -> Result<(), ApiError> {
+    fn add(&mut self, table: &RowTable) -> Result<()> {
         let Some(TableColumn::Texts(statuses)) = table.column("status") else {
             return Err(ApiError::internal(&"answers without a status"));
         };

@@ -17,7 +17,9 @@ use crate::http::dto::TenantLimits;
 use crate::http::extract::caller::{AnyTenant, Caller, Operator};
 use crate::http::layers::metrics::Metrics;
 use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, PlainProblems, ProblemKind, ProblemMeaning, problems};
+use crate::http::problem::{
+    ApiError, PlainProblems, ProblemKind, ProblemMeaning, Result, problems,
+};
 use crate::http::routes::wait::WAIT_MAX_SECONDS;
 use crate::jobs::PAGE_MAX;
 use crate::jobs::error::JobsError;
@@ -240,7 +242,7 @@ pub(crate) struct ExampleCase {
     operation_id = "list_examples",
     responses((status = 200, description = "All examples", body = Vec<ExampleCase>), PlainProblems)
 )]
-pub(crate) async fn examples() -> Result<Json<Vec<ExampleCase>>, ApiError> {
+pub(crate) async fn examples() -> Result<Json<Vec<ExampleCase>>> {
     let read = |(name, summary, text): (&'static str, &'static str, &str)| {
         let case = serde_json::from_str(text);
         let case = case.map_err(|error| ApiError::internal(&error))?;
@@ -302,9 +304,7 @@ problems! {
     operation_id = "readyz",
     responses((status = 200, description = "The service takes jobs", body = Health), ReadyProblems)
 )]
-pub(crate) async fn ready(
-    State(AnyTenant(jobs)): State<AnyTenant>,
-) -> Result<Json<Health>, ApiError> {
+pub(crate) async fn ready(State(AnyTenant(jobs)): State<AnyTenant>) -> Result<Json<Health>> {
     match jobs.ready().await {
         Ok(()) => Ok(Health::new("ready")),
         Err(reason)
@@ -347,7 +347,7 @@ pub(crate) async fn metrics(
     Operator(jobs): Operator,
     State(metrics): State<Metrics>,
     headers: HeaderMap,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     jobs.refresh_metrics().await?;
     let mut text = String::new();
     metrics
@@ -430,7 +430,7 @@ pub(crate) async fn list_problems() -> Json<Vec<ProblemMeaning>> {
     params(("name" = String, Path, description = "The last part of a problem's `type`", example = "faulty-case")),
     responses((status = 200, description = "What this kind of problem means", body = ProblemMeaning), ExplainProblems)
 )]
-pub(crate) async fn explain(Path(name): Path<String>) -> Result<Json<ProblemMeaning>, ApiError> {
+pub(crate) async fn explain(Path(name): Path<String>) -> Result<Json<ProblemMeaning>> {
     let known = ProblemKind::ALL
         .iter()
         .copied()
@@ -494,7 +494,7 @@ pub(crate) struct Used {
 pub(crate) async fn me(
     Caller(jobs): Caller,
     State(options): State<HttpOptions>,
-) -> Result<Json<Me>, ApiError> {
+) -> Result<Json<Me>> {
     let own = jobs.options();
     let usage = jobs.usage().await?;
     let number = |state| usage.jobs.get(&state).copied().unwrap_or(0);

@@ -19,7 +19,7 @@ use crate::http::extract::query::{
 };
 use crate::http::layers::auth::Access;
 use crate::http::limits::{ConcurrencyLimits, Memory, Permit, hold_while_sent};
-use crate::http::problem::{ApiError, Fault};
+use crate::http::problem::{ApiError, Fault, Result};
 use crate::http::render::format::Format;
 use crate::http::routes::results::result_text;
 use crate::http::routes::wait::{Wait, WaitQuery};
@@ -51,7 +51,7 @@ impl NamedQuery {
     ///
     /// # Errors
     /// There are too many labels, two have the same key, or one contradicts the key of the request.
-    pub(crate) fn read_into(self, options: &mut WorkOptions, jobs: &Jobs) -> Result<(), ApiError> {
+    pub(crate) fn read_into(self, options: &mut WorkOptions, jobs: &Jobs) -> Result<()> {
         let given = self.label.unwrap_or_default();
         let number = given.len();
         let mut labels: Labels = given.into_iter().collect();
@@ -86,7 +86,7 @@ where
 {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
         let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
         let wait = Wait::from_request_parts(parts, state).await?;
         let idempotency_key = idempotency_key(&parts.headers)?;
@@ -124,7 +124,7 @@ impl Reply {
         memory: &Memory,
         (mut work, replayed): (Work, bool),
         errors: Option<Vec<Fault>>,
-    ) -> Result<Response, ApiError> {
+    ) -> Result<Response> {
         let Reply(wait) = self;
         let jobs = jobs.of_kind(work.kind());
         let (id, ended) = (work.id(), work.ended());
@@ -170,7 +170,7 @@ async fn text(
     work: Work,
     errors: Option<Vec<Fault>>,
     in_time: bool,
-) -> Result<(Body, Option<Permit>), ApiError> {
+) -> Result<(Body, Option<Permit>)> {
     let solved = match &work {
         Work::Job(job) => in_time && job.kind == Kind::Case && job.state == JobState::Succeeded,
         _ => false,
@@ -190,7 +190,7 @@ async fn text(
 }
 
 /// The idempotency key of a request, if it has one.
-fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>, ApiError> {
+fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>> {
     let Some(value) = headers.get(&IDEMPOTENCY_KEY) else {
         return Ok(None);
     };

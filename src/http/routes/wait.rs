@@ -15,7 +15,7 @@ use crate::http::extract::caller::{Caller, Credential, Tenant, revoked, revoked_
 use crate::http::extract::query::{Parameters, Query, query, seconds};
 use crate::http::layers::auth::Access;
 use crate::http::limits::{ConcurrencyLimits, HeldPermits, Permit, hold_while_sent};
-use crate::http::problem::ApiError;
+use crate::http::problem::{ApiError, Result};
 use crate::http::render::format::Format;
 use crate::jobs::Jobs;
 
@@ -66,7 +66,7 @@ impl Wait {
         &self,
         jobs: &Jobs,
         waiting: impl AsyncFnOnce(Duration) -> T,
-    ) -> Result<Option<T>, ApiError> {
+    ) -> Result<Option<T>> {
         let Some(at_most) = self.at_most() else {
             return Ok(None);
         };
@@ -98,7 +98,7 @@ where
 {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
         let concurrency = ConcurrencyLimits::from_ref(state);
         let tenant = parts.extensions.get::<Tenant>().cloned();
         let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
@@ -126,7 +126,7 @@ where
 }
 
 /// The parameter `wait` of an address; others are for the route to read.
-fn wait_of(uri: &Uri) -> Result<Option<u32>, ApiError> {
+fn wait_of(uri: &Uri) -> Result<Option<u32>> {
     let mut query = Query::part_of(uri, &WaitQuery::names());
     let WaitQuery { wait } = WaitQuery::take(&mut query, &());
     query.finish()?;
@@ -176,7 +176,7 @@ where
 {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
         let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
         choose(&parts.headers, None, &[Format::Events])?;
         Ok(EventRequest {
@@ -197,7 +197,7 @@ impl EventRequest {
     pub(crate) fn answer(
         self,
         events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static,
-    ) -> Result<Response, ApiError> {
+    ) -> Result<Response> {
         let place = self.concurrency.stream(self.jobs.tenant())?;
         self.held.release();
         let events = events.take_until(revoked(self.jobs, self.key));

@@ -24,7 +24,7 @@ use uuid::Uuid;
 
 use crate::http::dto::{BatchAnswer, BatchReceipt, JobAnswer, RunAnswer};
 use crate::http::extract::caller::{Caller, Credential, revoked, until_revoked, work_id};
-use crate::http::problem::{ApiError, PlainProblems, ProblemKind, describe};
+use crate::http::problem::{ApiError, PlainProblems, ProblemKind, Result, describe};
 use crate::http::render::format::Format;
 use crate::http::render::row_tables::{Piece, RowWriter, WriteError};
 use crate::http::routes::wait::{EventRequest, Wait, WaitQuery, changed, event};
@@ -113,7 +113,7 @@ pub(crate) fn one(kind: Kind) -> OpenApiRouter<AppState> {
 ///
 /// # Errors
 /// There is none with this id, or the key of the request is revoked meanwhile.
-pub(crate) async fn await_end(jobs: &Jobs, id: Uuid, wait: &Wait) -> Result<(), ApiError> {
+pub(crate) async fn await_end(jobs: &Jobs, id: Uuid, wait: &Wait) -> Result<()> {
     let waited = wait.hold(jobs, async |at_most| jobs.wait_for(id, at_most).await);
     if let Some(ended) = waited.await? {
         ended?;
@@ -134,7 +134,7 @@ pub(crate) fn table_answer(
     (format, name): (Format, &str),
     columns: &[(String, TableKind)],
     pieces: impl Stream<Item = Result<Piece, WriteError>> + Send + 'static,
-) -> Result<Response, ApiError> {
+) -> Result<Response> {
     let text = RowWriter::stream(format, columns, pieces);
     let text = text.map_err(|error| ApiError::internal(&error))?;
     let revoked = revoked(jobs, key.map(|Extension(key)| key));
@@ -213,7 +213,7 @@ pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
     ))
 }
 
-async fn follow(request: EventRequest, kind: Kind, id: Uuid) -> Result<Response, ApiError> {
+async fn follow(request: EventRequest, kind: Kind, id: Uuid) -> Result<Response> {
     let jobs = request.jobs.of_kind(kind);
     let work = jobs.work(id).await?;
     let seen = request.seen.clone();
@@ -415,7 +415,7 @@ impl ToSchema for TenantEventSent {
     params(("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen: the stream goes on from there")),
     responses((status = 200, description = "One event per change", content((TenantEventSent = "text/event-stream"))), PlainProblems)
 )]
-pub(crate) async fn follow_all(request: EventRequest) -> Result<Response, ApiError> {
+pub(crate) async fn follow_all(request: EventRequest) -> Result<Response> {
     let seen = request.seen.as_ref().and_then(|text| text.parse().ok());
     let follower = request.jobs.follow(seen);
     let start = event("start", &follower.since().to_string(), &json!({}));

@@ -11,7 +11,7 @@ use uuid::Uuid;
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::jobs::attempts::slices::{Outcome, SlicedWork};
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::model::Queue;
 use crate::jobs::store::{Claim, ClaimedCase};
 use crate::jobs::sync::lock;
@@ -100,7 +100,7 @@ impl Drop for Counted {
 
 impl SolverThread {
     /// Starts a thread of this name.
-    pub(crate) fn start(name: &str) -> Result<SolverThread, JobsError> {
+    pub(crate) fn start(name: &str) -> Result<SolverThread> {
         let (tasks, todo) = mpsc::channel::<Task>();
         let left = Arc::new(OnceLock::new());
         let until_the_end = left.clone();

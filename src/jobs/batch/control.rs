@@ -9,7 +9,7 @@ use tokio::time::Instant;
 use uuid::Uuid;
 
 use crate::jobs::batch::upload::BatchUpload;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::{BatchItem, ItemFault, Kind, State, SubmitOptions, WorkOptions};
 use crate::jobs::shared::Shared;
@@ -53,7 +53,7 @@ impl Shared {
         self.collect_blobs().await;
     }
 
-    async fn drop_batch(&self, id: Uuid) -> Result<(), JobsError> {
+    async fn drop_batch(&self, id: Uuid) -> Result<()> {
         while !self.store.drop_batch(id, DELETED_AT_ONCE).await? {}
         Ok(())
     }
@@ -80,7 +80,7 @@ impl Jobs {
         &self,
         draft: BatchUpload,
         options: WorkOptions,
-    ) -> Result<(Uuid, bool), JobsError> {
+    ) -> Result<(Uuid, bool)> {
         let span = self.submit_span();
         let jobs = draft.cases - draft.rejected;
         let submitted = self.store_batch(draft, options, span.traceparent());
@@ -97,7 +97,7 @@ impl Jobs {
         mut draft: BatchUpload,
         options: WorkOptions,
         traceparent: Option<Arc<str>>,
-    ) -> Result<(Uuid, bool), JobsError> {
+    ) -> Result<(Uuid, bool)> {
         let (id, submit) = (draft.id, options.submit);
         let new = draft.as_new(options);
         let filled_here = |id| self.shared.unfinished_batches().living.contains(&id);
@@ -156,7 +156,7 @@ impl Jobs {
         new: &NewBatch,
         draft: &mut BatchUpload,
         (options, traceparent): (SubmitOptions, Option<Arc<str>>),
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         let Some(staging) = draft.staging.take() else {
             return Ok(());
         };
@@ -228,7 +228,7 @@ const PAGE_JOBS: u32 = 500;
 const REREAD_PAUSE: Duration = Duration::from_millis(10);
 
 /// Size of a solution, and its text without the closing brace.
-pub type OpenedItem = (usize, BoxStream<'static, Result<Bytes, JobsError>>);
+pub type OpenedItem = (usize, BoxStream<'static, Result<Bytes>>);
 
 /// The jobs of a batch or the chunks of a run in the order in which they were sent, read page by page.
 #[derive(Debug)]
@@ -251,7 +251,7 @@ impl Items {
     ///
     /// # Errors
     /// A failed database.
-    pub async fn next(&mut self) -> Result<Option<BatchItem>, JobsError> {
+    pub async fn next(&mut self) -> Result<Option<BatchItem>> {
         self.fill().await?;
         Ok(self.read.pop_front())
     }
@@ -262,7 +262,7 @@ impl Items {
     ///
     /// # Errors
     /// A failed database.
-    pub async fn fill(&mut self) -> Result<bool, JobsError> {
+    pub async fn fill(&mut self) -> Result<bool> {
         let shared = &self.jobs.shared;
         while self.read.is_empty() {
             let items = shared.store.batch_items(
@@ -322,7 +322,7 @@ impl Jobs {
     ///
     /// # Errors
     /// A failed database.
-    pub async fn batch_label_keys(&self, id: Uuid, limit: u32) -> Result<Vec<String>, JobsError> {
+    pub async fn batch_label_keys(&self, id: Uuid, limit: u32) -> Result<Vec<String>> {
         let store = &self.shared.store;
         Ok(store.batch_label_keys(&self.tenant, id, limit).await?)
     }

@@ -14,7 +14,7 @@ use crate::contact::error::{CaseError, Fault};
 use crate::contact::evaluate::varied::{self, Replaced, named_sections, put};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::disk_reserve::nameless;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::idempotency;
 use crate::jobs::model::{CaseOptions, Kind, SubmitOptions, WorkOptions, created_at};
@@ -147,7 +147,7 @@ impl StoredCase {
     ///
     /// # Errors
     /// What is stored cannot be read.
-    pub fn value(&self) -> Result<Value, JobsError> {
+    pub fn value(&self) -> Result<Value> {
         let damaged = |reason: String| JobsError::Damaged(format!("a stored case: {reason}"));
         let Some(template) = &self.template else {
             return serde_json::from_slice(&self.body).map_err(|error| damaged(error.to_string()));
@@ -270,7 +270,7 @@ impl BatchUpload {
         line: Option<u64>,
         text: &[u8],
         case: Result<BatchCase, Vec<Fault>>,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         self.count(text.len())?;
         let Some(BatchCase { case, wrapped, own }) = self.good(line, text, case) else {
             return Ok(());
@@ -298,7 +298,7 @@ impl BatchUpload {
         line: Option<u64>,
         text: &[u8],
         row: Result<BatchRow, Vec<Fault>>,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         // Checked and solved as a case of this size, however little is kept of it.
         self.count(text.len() + self.template.as_ref().map_or(0, Bytes::len))?;
         let Some(row) = self.good(line, text, row) else {
@@ -319,7 +319,7 @@ impl BatchUpload {
         line: Option<u64>,
         template: &mut RowTemplate,
         BatchRow { cells, own }: BatchRow,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         self.digest.update(&digest(&cells));
         let RowTemplate { case, known } = template;
         let filled = match fill_in_place(case, &cells) {
@@ -350,7 +350,7 @@ impl BatchUpload {
         line: Option<u64>,
         case: Value,
         own: CaseOptions,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         let Some(case) = self.with_profiles(line, case, "")? else {
             return Ok(());
         };
@@ -365,7 +365,7 @@ impl BatchUpload {
         line: Option<u64>,
         case: Value,
         prefix: &str,
-    ) -> Result<Option<Value>, JobsError> {
+    ) -> Result<Option<Value>> {
         match self.jobs.with_profiles_here(case, &mut self.profiles) {
             Ok(case) => Ok(Some(case)),
             Err(JobsError::Case(CaseError(faults))) => {
@@ -380,12 +380,7 @@ impl BatchUpload {
     ///
     /// # Errors
     /// As [`BatchUpload::add`].
-    pub(crate) fn add_chunk(
-        &mut self,
-        method: &str,
-        cost_us: u32,
-        body: &[u8],
-    ) -> Result<(), JobsError> {
+    pub(crate) fn add_chunk(&mut self, method: &str, cost_us: u32, body: &[u8]) -> Result<()> {
         self.count(body.len())?;
         self.digest.update(body);
         let job = NewJob {
@@ -400,7 +395,7 @@ impl BatchUpload {
     }
 
     /// Counts the next case as a good one and stages what is kept of it.
-    fn stage(&mut self, own: CaseOptions, job: NewJob, kept: &[u8]) -> Result<(), JobsError> {
+    fn stage(&mut self, own: CaseOptions, job: NewJob, kept: &[u8]) -> Result<()> {
         let staged = (self.cases, own, job);
         self.cases += 1;
         self.require_place()?;
@@ -459,7 +454,7 @@ impl BatchUpload {
         prefix: &str,
         (row, own): (bool, CaseOptions),
         kept: &[u8],
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         if own != CaseOptions::default() {
             let own = SubmitOptions::default().of_case(own);
             self.digest.update(&own.digest(&[0; 32]));
@@ -482,7 +477,7 @@ impl BatchUpload {
         self.stage(own, job, kept)
     }
 
-    fn count(&mut self, bytes: usize) -> Result<(), JobsError> {
+    fn count(&mut self, bytes: usize) -> Result<()> {
         let (shared, bytes) = (&self.jobs.shared, bytes as u64);
         let bounds = shared.options.staging;
         shared.staged.add(&self.jobs.tenant, bytes, bounds)?;
@@ -491,7 +486,7 @@ impl BatchUpload {
     }
 
     /// Reserves more places as the batch grows, twice as many each time, so that few writes reserve many.
-    fn require_place(&mut self) -> Result<(), JobsError> {
+    fn require_place(&mut self) -> Result<()> {
         let good = self.cases - self.rejected;
         if good <= UNRESERVED_MAX || good <= self.reserved {
             return Ok(());
@@ -566,7 +561,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobsError::Draining`], or the data folder cannot be written.
-    pub fn draft(&self, kind: Kind) -> Result<BatchUpload, JobsError> {
+    pub fn draft(&self, kind: Kind) -> Result<BatchUpload> {
         if self.shared.draining.is_cancelled() {
             return Err(JobsError::Draining);
         }

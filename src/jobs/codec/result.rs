@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::contact::solution::words::answer::PatchFields;
 use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
 use crate::jobs::codec::parquet;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 
 /// A result in its stored form.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,11 +49,7 @@ impl EncodedResult {
     ///
     /// # Errors
     /// There is no such motion, or the fields cannot be read.
-    pub fn patch_fields(
-        &self,
-        patch: usize,
-        point: Option<usize>,
-    ) -> Result<PatchFields, JobsError> {
+    pub fn patch_fields(&self, patch: usize, point: Option<usize>) -> Result<PatchFields> {
         let file = self.fields.as_deref().unwrap_or_default();
         let damaged = |error: String| JobsError::Damaged(format!("stored fields: {error}"));
         let prefix = file.get(..PREFIX_BYTES).unwrap_or_default();

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use crate::jobs::attempts::attempt::StopReason;
 use crate::jobs::disk_reserve;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::{FailureKind, Job, State, too_late};
 use crate::jobs::shared::{Shared, heartbeat};
@@ -69,7 +69,7 @@ pub(crate) async fn sweep_orphans(shared: Arc<Shared>) {
     }
 }
 
-async fn sweep_results(shared: &Shared) -> Result<usize, JobsError> {
+async fn sweep_results(shared: &Shared) -> Result<usize> {
     shared.collect_blobs().await;
     let (mut removed, mut undecided) = (0, Vec::new());
     for month in shared.blobs.months().await? {
@@ -89,7 +89,7 @@ async fn sweep_results(shared: &Shared) -> Result<usize, JobsError> {
     Ok(removed)
 }
 
-async fn remove(shared: &Shared, keys: &[String]) -> Result<usize, JobsError> {
+async fn remove(shared: &Shared, keys: &[String]) -> Result<usize> {
     for key in keys {
         shared.blobs.remove(key).await?;
     }
@@ -105,7 +105,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The database or the place of the results failed; the next sweep will go on.
-    pub async fn sweep_old_results(&self) -> Result<u64, JobsError> {
+    pub async fn sweep_old_results(&self) -> Result<u64> {
         self.shared.sweep_old_results().await
     }
 }
@@ -113,7 +113,7 @@ impl Jobs {
 impl Shared {
     /// Removes results outside the database that no job refers to and that were written more than a day ago; returns their number.
     /// Several nodes may do so at once.
-    pub(crate) async fn sweep_old_results(&self) -> Result<u64, JobsError> {
+    pub(crate) async fn sweep_old_results(&self) -> Result<u64> {
         let before = self.now_ms() - YOUNG;
         let mut listed = self.blobs.listed();
         let (mut some, mut removed) = (Vec::new(), 0);
@@ -156,7 +156,7 @@ pub(crate) async fn watch_deadlines(shared: Arc<Shared>) {
     }
 }
 
-async fn enforce_deadlines(shared: &Shared) -> Result<(), JobsError> {
+async fn enforce_deadlines(shared: &Shared) -> Result<()> {
     let (now, leap) = (shared.now_ms(), shared.clock_step());
     let moment = Moment {
         now,
@@ -283,7 +283,7 @@ pub(crate) async fn recover(shared: Arc<Shared>) {
 
 impl Shared {
     /// Takes back the jobs that a dead process was running.
-    pub(crate) async fn recover(&self) -> Result<(), JobsError> {
+    pub(crate) async fn recover(&self) -> Result<()> {
         if self.recovered.get().is_some() {
             return Ok(());
         }
@@ -336,7 +336,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The database failed; the next sweep will go on.
-    pub async fn sweep_expired(&self) -> Result<u64, JobsError> {
+    pub async fn sweep_expired(&self) -> Result<u64> {
         self.shared.sweep_expired().await
     }
 }
@@ -347,7 +347,7 @@ impl Shared {
         job.ended_at.map(|ended| ended.saturating_add(kept))
     }
 
-    async fn sweep_expired(&self) -> Result<u64, JobsError> {
+    async fn sweep_expired(&self) -> Result<u64> {
         let now = self.now_ms();
         let mut removed = 0;
         let clock_leapt = self.clock_step().ms > 0;

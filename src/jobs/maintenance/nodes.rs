@@ -9,9 +9,9 @@ use tokio::time::{MissedTickBehavior, interval, sleep};
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt::StopReason;
-use crate::jobs::error::{JobsError, StoreError};
+use crate::jobs::error::JobsError;
 use crate::jobs::shared::Shared;
-use crate::jobs::store::{Cluster, ClusterView, Notification};
+use crate::jobs::store::{Cluster, ClusterView, Notification, Result};
 
 /// Time between two signs of life; the store counts a node as dead after four.
 const BEAT_EVERY: Duration = Duration::from_secs(5);
@@ -52,7 +52,7 @@ pub(crate) fn start(shared: &Arc<Shared>) {
 
 impl Shared {
     /// Shows this node to the others and sets its clock by that of the store.
-    pub(crate) async fn show_node(&self, cluster: &dyn Cluster) -> Result<ClusterView, StoreError> {
+    pub(crate) async fn show_node(&self, cluster: &dyn Cluster) -> Result<ClusterView> {
         self.set_clock(cluster).await?;
         let view = cluster.beat(&self.node).await?;
         self.cluster_workers.store(view.workers, Ordering::Relaxed);
@@ -61,7 +61,7 @@ impl Shared {
 
     /// How far the clock of the store is ahead. An answer that took long says little, and a small difference is one of the
     /// measurement.
-    async fn set_clock(&self, cluster: &dyn Cluster) -> Result<(), StoreError> {
+    async fn set_clock(&self, cluster: &dyn Cluster) -> Result<()> {
         let asked = self.steady_ms();
         let there = cluster.now().await?;
         let taken = self.steady_ms() - asked;
@@ -118,7 +118,7 @@ async fn beat(shared: Arc<Shared>) {
 }
 
 /// Keeps the batches that this node fills, and takes up those that nobody fills any more, to remove them.
-async fn keep_batches(shared: &Shared, cluster: &dyn Cluster) -> Result<(), StoreError> {
+async fn keep_batches(shared: &Shared, cluster: &dyn Cluster) -> Result<()> {
     let living: Vec<Uuid> = {
         let batches = shared.unfinished_batches();
         batches.living.iter().copied().collect()

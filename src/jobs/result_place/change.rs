@@ -4,7 +4,7 @@ use futures_util::{StreamExt, TryStreamExt, stream};
 use object_store::ObjectStore;
 
 use crate::jobs::blobs::Blobs;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::metrics::StoreRequests;
 use crate::jobs::result_place::settle::{IN_DATABASE, decide, mark, marker, on_this_machine_alone};
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
@@ -34,17 +34,14 @@ pub struct MovedResults {
 /// # Errors
 /// A node uses the database, no node has ever been started, the place is that of another database or the same as before, or something
 /// cannot be read or written.
-pub async fn move_results(url: &str, place: &ResultsPlace) -> Result<MovedResults, JobsError> {
+pub async fn move_results(url: &str, place: &ResultsPlace) -> Result<MovedResults> {
     let database = PostgresStore::open(url, 4).await?;
     let moved = move_within(&database, place).await;
     database.close().await;
     moved
 }
 
-async fn move_within(
-    database: &PostgresStore,
-    place: &ResultsPlace,
-) -> Result<MovedResults, JobsError> {
+async fn move_within(database: &PostgresStore, place: &ResultsPlace) -> Result<MovedResults> {
     let refused = |why: String| Err(JobsError::ResultPlace(why));
     on_this_machine_alone(place)?;
     let before = without_nodes(database).await?;
@@ -103,7 +100,7 @@ async fn move_within(
 }
 
 /// What the database knows, if no node uses it.
-async fn without_nodes(database: &PostgresStore) -> Result<Deployment, JobsError> {
+async fn without_nodes(database: &PostgresStore) -> Result<Deployment> {
     let deployment = database.deployment().await?;
     match deployment.nodes {
         0 => Ok(deployment),
@@ -113,11 +110,7 @@ async fn without_nodes(database: &PostgresStore) -> Result<Deployment, JobsError
     }
 }
 
-async fn open_old(
-    database: &PostgresStore,
-    deployment: &Deployment,
-    from: &str,
-) -> Result<Blobs, JobsError> {
+async fn open_old(database: &PostgresStore, deployment: &Deployment, from: &str) -> Result<Blobs> {
     if from == IN_DATABASE {
         return Ok(Blobs::at(database.objects(), None));
     }

@@ -16,7 +16,7 @@ use object_store::client::{
 };
 use tokio::time::timeout;
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::metrics::{StoreRequests, count_request};
 
 /// How long a connection may take.
@@ -42,7 +42,7 @@ pub(crate) struct Client {
 impl Client {
     /// # Errors
     /// No authority is trusted on this machine.
-    pub(crate) fn new(requests: StoreRequests) -> Result<Client, JobsError> {
+    pub(crate) fn new(requests: StoreRequests) -> Result<Client> {
         let mut tcp = TcpConnector::new();
         tcp.enforce_http(false);
         tcp.set_nodelay(true);

@@ -15,7 +15,7 @@ pub(crate) mod settle;
 pub mod url;
 
 #[cfg(feature = "cluster")]
-use crate::jobs::error::JobsError;
+use crate::jobs::error::Result;
 #[cfg(feature = "cluster")]
 use crate::jobs::result_place::url::ResultsPlace;
 #[cfg(feature = "cluster")]
@@ -26,10 +26,7 @@ use crate::jobs::store::postgres::{database::PostgresStore, doctor::Finding};
 /// # Errors
 /// The database cannot be reached, or has no job table.
 #[cfg(feature = "cluster")]
-pub async fn examine_results(
-    url: &str,
-    place: Option<&ResultsPlace>,
-) -> Result<Finding, JobsError> {
+pub async fn examine_results(url: &str, place: Option<&ResultsPlace>) -> Result<Finding> {
     let store = PostgresStore::open(url, 1).await?;
     let examined = settle::examine(&store, place).await;
     store.close().await;

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use tokio::time::timeout;
 
 use crate::jobs::blobs::Blobs;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::metrics::StoreRequests;
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
 use crate::jobs::store::{Cluster, Deployment};
@@ -38,7 +38,7 @@ pub(crate) async fn settle(
     cluster: &dyn Cluster,
     place: Option<&ResultsPlace>,
     requests: StoreRequests,
-) -> Result<Blobs, JobsError> {
+) -> Result<Blobs> {
     let settled = async {
         let Some(place) = place else {
             return settle_inside(cluster).await;
@@ -53,7 +53,7 @@ pub(crate) async fn settle(
 }
 
 /// Refuses a folder that is not said to be the same on every node.
-pub(super) fn on_this_machine_alone(place: &ResultsPlace) -> Result<(), JobsError> {
+pub(super) fn on_this_machine_alone(place: &ResultsPlace) -> Result<()> {
     match (&place.url, place.shared) {
         (ResultsUrl::Folder(path), false) => Err(JobsError::ResultPlace(format!(
             "{} is a folder of this machine, and the nodes of a database have their results in common; say --results-shared if \
@@ -64,7 +64,7 @@ pub(super) fn on_this_machine_alone(place: &ResultsPlace) -> Result<(), JobsErro
     }
 }
 
-async fn settle_inside(cluster: &dyn Cluster) -> Result<Blobs, JobsError> {
+async fn settle_inside(cluster: &dyn Cluster) -> Result<Blobs> {
     let deployment = cluster.deployment().await?;
     match deployment.results_place.as_deref() {
         Some(IN_DATABASE) => {}
@@ -82,7 +82,7 @@ async fn settle_outside(
     cluster: &dyn Cluster,
     url: &ResultsUrl,
     objects: &dyn ObjectStore,
-) -> Result<(), JobsError> {
+) -> Result<()> {
     let deployment = cluster.deployment().await?;
     let place = url.to_string();
     let refused = |why: String| Err(JobsError::ResultPlace(why));
@@ -136,7 +136,7 @@ async fn is_another(
     objects: &dyn ObjectStore,
     known: &str,
     deployment: &Deployment,
-) -> Result<bool, JobsError> {
+) -> Result<bool> {
     let url: ResultsUrl = known.parse().map_err(JobsError::ResultPlace)?;
     if url.folder().is_some_and(|folder| !folder.exists()) {
         return Ok(false);
@@ -164,11 +164,7 @@ async fn is_another(
     }
 }
 
-pub(super) async fn decide(
-    cluster: &dyn Cluster,
-    before: &Deployment,
-    place: &str,
-) -> Result<(), JobsError> {
+pub(super) async fn decide(cluster: &dyn Cluster, before: &Deployment, place: &str) -> Result<()> {
     let known = before.results_place.as_deref();
     if cluster.place_results(known, place).await? {
         tracing::info!(place, "the place of the results was decided");
@@ -182,7 +178,7 @@ pub(super) async fn decide(
     }
 }
 
-pub(super) async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>, JobsError> {
+pub(super) async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>> {
     let found = match objects.get(&Path::from(MARKER)).await {
         Ok(found) => found.bytes().await?,
         Err(Error::NotFound { .. }) => return Ok(None),
@@ -198,7 +194,7 @@ pub(super) async fn mark(
     objects: &dyn ObjectStore,
     deployment: &Deployment,
     place: &str,
-) -> Result<(), JobsError> {
+) -> Result<()> {
     let text = serde_json::json!(Marker {
         deployment: deployment.id.clone()
     });
@@ -226,7 +222,7 @@ fn unusable(error: &Error) -> JobsError {
 pub(crate) async fn examine(
     cluster: &dyn Cluster,
     place: Option<&ResultsPlace>,
-) -> Result<(String, bool), JobsError> {
+) -> Result<(String, bool)> {
     let deployment = cluster.deployment().await?;
     let Some(place) = place else {
         return Ok(match deployment.results_place.as_deref() {
@@ -251,7 +247,7 @@ pub(crate) async fn examine(
 
 #[cfg(feature = "cluster")]
 /// Checks whose results are there, and writes, reads and removes an object.
-async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<(), JobsError> {
+async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<()> {
     let wrong = |why: String| Err(JobsError::ResultPlace(why));
     match &deployment.results_place {
         Some(known) if known != &url.to_string() => {

@@ -15,7 +15,7 @@ use object_store::prefix::PrefixStore;
 #[cfg(feature = "cluster")]
 use object_store::{BackoffConfig, RetryConfig};
 
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::metrics::StoreRequests;
 #[cfg(feature = "cluster")]
 use crate::jobs::result_place::client::Client;
@@ -124,7 +124,7 @@ impl ResultsUrl {
     ///
     /// # Errors
     /// The folder cannot be made, or a variable is wrong.
-    pub(crate) fn open(&self, requests: StoreRequests) -> Result<Arc<dyn ObjectStore>, JobsError> {
+    pub(crate) fn open(&self, requests: StoreRequests) -> Result<Arc<dyn ObjectStore>> {
         match self {
             ResultsUrl::Folder(path) => {
                 std::fs::create_dir_all(path).map_err(|source| JobsError::DataDir {
@@ -159,7 +159,7 @@ impl ResultsUrl {
 }
 
 #[cfg(not(feature = "cluster"))]
-fn bucket_store(_: &str, _: &str, _: StoreRequests) -> Result<Arc<dyn ObjectStore>, JobsError> {
+fn bucket_store(_: &str, _: &str, _: StoreRequests) -> Result<Arc<dyn ObjectStore>> {
     Err(JobsError::NotBuilt {
         what: "object stores",
         feature: "cluster",
@@ -171,7 +171,7 @@ fn bucket_store(
     scheme: &str,
     bucket: &str,
     requests: StoreRequests,
-) -> Result<Arc<dyn ObjectStore>, JobsError> {
+) -> Result<Arc<dyn ObjectStore>> {
     let client = Client::new(requests)?;
     let retry = RetryConfig {
         backoff: BackoffConfig {

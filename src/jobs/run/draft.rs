@@ -15,7 +15,7 @@ use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::batch::upload::BatchUpload;
 use crate::jobs::codec::table::COLUMNS_MAX;
 use crate::jobs::disk_reserve::nameless;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::{Kind, WorkOptions};
 use crate::jobs::profiles::KnownSections;
@@ -69,7 +69,7 @@ impl Jobs {
         template: Value,
         columns: Vec<RunColumn>,
         rows_max: u64,
-    ) -> Result<RunDraft, JobsError> {
+    ) -> Result<RunDraft> {
         let rows = ReceivedRows::new(columns)?;
         let mut profiles = KnownSections::new();
         let template = self.with_profiles_here(template, &mut profiles)?;
@@ -89,7 +89,7 @@ impl Jobs {
     ///
     /// # Errors
     /// The data folder cannot be written.
-    pub fn spool_file(&self) -> Result<File, JobsError> {
+    pub fn spool_file(&self) -> Result<File> {
         let file = nameless(&self.options().data_dir);
         file.map_err(|source| self.spool_failed(source))
     }
@@ -109,7 +109,7 @@ impl Jobs {
         &self,
         draft: RunDraft,
         mut options: WorkOptions,
-    ) -> Result<(Uuid, bool), JobsError> {
+    ) -> Result<(Uuid, bool)> {
         let upload = blocking(move || draft.finish()).await??;
         // Results of rows cannot be found again by a digest.
         options.submit.bypass_cache = true;
@@ -123,7 +123,7 @@ impl RunDraft {
     /// # Errors
     /// [`JobsError::Case`]: the columns differ in length or kind, or hold what no case may have; more rows than are allowed; or as
     /// [`BatchUpload::add`].
-    pub fn push(&mut self, columns: Vec<Values>) -> Result<(), JobsError> {
+    pub fn push(&mut self, columns: Vec<Values>) -> Result<()> {
         let faults = self.find_profiles(&columns)?;
         if !faults.is_empty() {
             return Err(CaseError(faults).into());
@@ -142,7 +142,7 @@ impl RunDraft {
     ///
     /// # Errors
     /// [`JobsError::Case`]: there are no rows, or the case of the first one is faulty; or as [`BatchUpload::add`].
-    pub fn cut_all(&mut self) -> Result<(), JobsError> {
+    pub fn cut_all(&mut self) -> Result<()> {
         if self.rows.received == 0 {
             let fault = Fault::new("/columns", "0 rows given; at least one is needed");
             return Err(CaseError(vec![fault]).into());
@@ -151,7 +151,7 @@ impl RunDraft {
     }
 
     /// Everything is there.
-    fn finish(mut self) -> Result<BatchUpload, JobsError> {
+    fn finish(mut self) -> Result<BatchUpload> {
         self.cut_all()?;
         if let Some(Begun {
             mut head,
@@ -169,7 +169,7 @@ impl RunDraft {
     }
 
     /// Stages whole chunks of what is held, at the end all of it.
-    fn cut(&mut self, last: bool) -> Result<(), JobsError> {
+    fn cut(&mut self, last: bool) -> Result<()> {
         if self.begun.is_none() {
             self.begun = Some(self.begin()?);
         }
@@ -198,7 +198,7 @@ impl RunDraft {
     }
 
     /// What the first rows decide: is the case good, and how many rows are a chunk?
-    fn begin(&self) -> Result<Begun, JobsError> {
+    fn begin(&self) -> Result<Begun> {
         let varied = self.rows.varied(CHUNK_ROWS_MAX);
         let profiles: BTreeMap<String, Value> = self.profiles.clone().into_iter().collect();
         let names = self.rows.names();
@@ -242,7 +242,7 @@ impl RunDraft {
     }
 
     /// Reads the kept profiles that rows name.
-    fn find_profiles(&mut self, columns: &[Values]) -> Result<Vec<Fault>, JobsError> {
+    fn find_profiles(&mut self, columns: &[Values]) -> Result<Vec<Fault>> {
         let named = self.rows.columns.iter().zip(columns);
         let named = named.filter_map(|(column, values)| {
             Some((&*column.name, column.pointer.as_deref()?, values))

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use crate::jobs::codec::table::{TableColumn, TableKind};
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::model::{Batch, RunRecord, State};
 
 /// The form of heads and chunks that is written.
@@ -160,7 +160,7 @@ impl RunHead {
     ///
     /// # Errors
     /// It is damaged, or of another form.
-    pub fn read(common: &[u8], own: Option<&[u8]>) -> Result<RunHead, JobsError> {
+    pub fn read(common: &[u8], own: Option<&[u8]>) -> Result<RunHead> {
         let damaged = |reason: String| JobsError::Damaged(format!("the head of a run: {reason}"));
         let text = own.unwrap_or(common);
         let mut head: RunHead =
@@ -271,7 +271,7 @@ impl RunChunk {
     ///
     /// # Errors
     /// It is damaged.
-    pub fn read(body: &[u8], columns: &[RunColumn]) -> Result<RunChunk, JobsError> {
+    pub fn read(body: &[u8], columns: &[RunColumn]) -> Result<RunChunk> {
         let damaged = |what: String| JobsError::Damaged(format!("rows of a run: {what}"));
         let packed = body.strip_prefix(MAGIC);
         let packed = packed.ok_or_else(|| damaged("not the body of a chunk".to_owned()))?;

@@ -6,7 +6,7 @@ use uuid::Uuid;
 use crate::contact::evaluate::varied::case_of_row;
 use crate::jobs::codec::parquet::TableReader;
 use crate::jobs::codec::table::{RowTable, TableColumn};
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::handle::Jobs;
 use crate::jobs::model::{BatchItem, State};
 use crate::jobs::run::model::{Run, RunChunk, RunHead, parted, table_column};
@@ -17,11 +17,7 @@ impl Jobs {
     ///
     /// # Errors
     /// A failed store, or the run has gone.
-    pub async fn run_row(
-        &self,
-        run: &Run,
-        row: u64,
-    ) -> Result<(Value, Option<RowTable>), JobsError> {
+    pub async fn run_row(&self, run: &Run, row: u64) -> Result<(Value, Option<RowTable>)> {
         let head = &run.head;
         let mut chunks = self.items(run.chunks.id);
         let (chunk, place) = loop {
@@ -54,7 +50,7 @@ impl Jobs {
         head: &RunHead,
         chunk: &BatchItem,
         wanted: Option<Vec<String>>,
-    ) -> Result<RowTable, JobsError> {
+    ) -> Result<RowTable> {
         let Some(key) = chunk.key() else {
             return self.without_answers(head, chunk, wanted.as_deref()).await;
         };
@@ -67,7 +63,7 @@ impl Jobs {
         head: &RunHead,
         chunk: &BatchItem,
         wanted: Option<&[String]>,
-    ) -> Result<RowTable, JobsError> {
+    ) -> Result<RowTable> {
         let rows = head.rows_of(chunk.index);
         let sent = self.chunk_rows(head, chunk.job.id).await?;
         let count = usize::try_from(rows.end - rows.start).unwrap_or(0);
@@ -99,13 +95,13 @@ impl Jobs {
     ///
     /// # Errors
     /// A failed database, or the run has gone.
-    pub async fn chunk_rows(&self, head: &RunHead, job: Uuid) -> Result<RunChunk, JobsError> {
+    pub async fn chunk_rows(&self, head: &RunHead, job: Uuid) -> Result<RunChunk> {
         let case = self.shared.store.case(&self.tenant, job).await?;
         RunChunk::read(&case.ok_or(JobsError::Expired)?.body, &head.columns)
     }
 }
 
-fn read_answers(file: Bytes, wanted: Option<&[String]>) -> Result<RowTable, JobsError> {
+fn read_answers(file: Bytes, wanted: Option<&[String]>) -> Result<RowTable> {
     let damaged = |error: &dyn std::fmt::Display| JobsError::Damaged(format!("answers: {error}"));
     let reader = TableReader::new(file).map_err(|error| damaged(&error))?;
     let wanted = |name: &str| wanted.is_none_or(|wanted| wanted.iter().any(|known| known == name));

@@ -40,6 +40,9 @@ pub mod postgres;
 mod sql_errors;
 pub mod sqlite;
 
+/// What a call of a store gives, or why it failed and changed nothing.
+pub type Result<T, E = StoreError> = std::result::Result<T, E>;
+
 /// A job table, which also keeps API keys.
 #[async_trait]
 pub trait Store:
@@ -55,7 +58,7 @@ pub trait Store:
     + Debug
 {
     /// Makes a round trip; with `write` the round trip writes, although it changes nothing.
-    async fn ready(&self, write: bool) -> Result<(), StoreError>;
+    async fn ready(&self, write: bool) -> Result<()>;
 
     /// What the store can do beside, if several processes may use it at once.
     fn cluster(&self) -> Option<&dyn Cluster>;
@@ -64,7 +67,7 @@ pub trait Store:
     async fn close(&self);
 
     /// Gives up to `step` free pages back to the file system if there are more than `spare`; says whether it did.
-    async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError>;
+    async fn compact(&self, spare: i64, step: u32) -> Result<bool>;
 }
 
 /// Submission of single jobs.
@@ -73,10 +76,10 @@ pub trait SubmitJobs: Send + Sync {
     /// Inserts a job if the bounds leave it a place, or finds the job for which its idempotency key stands. A job with a
     /// cached result ends at once and needs no place; if its source has gone meanwhile, the job is queued. A caller that
     /// stops waiting does not stop the call.
-    async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, StoreError>;
+    async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued>;
 
     /// Frees an idempotency key of a tenant.
-    async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError>;
+    async fn forget_key(&self, tenant: &str, key: &str) -> Result<()>;
 
     /// The job for which an idempotency key of a tenant stands, or the conflict if it stands for another digest.
     async fn job_by_key(
@@ -84,7 +87,7 @@ pub trait SubmitJobs: Send + Sync {
         tenant: &str,
         key: &str,
         digest: &[u8; 32],
-    ) -> Result<Option<Enqueued>, StoreError>;
+    ) -> Result<Option<Enqueued>>;
 }
 
 /// Batches and runs: filled piece by piece, acknowledged once they are complete, read and removed as a whole.
@@ -97,14 +100,14 @@ pub trait Batches: Send + Sync {
         tenant: &str,
         most: u32,
         bounds: QueueBounds,
-    ) -> Result<Result<u32, Refusal>, StoreError>;
+    ) -> Result<Result<u32, Refusal>>;
 
     /// What [`Batches::begin_batch`] would answer because of the idempotency key; `None` if the key is free.
     async fn batch_by_key(
         &self,
         new: &NewBatch,
         filled_here: FilledHere<'_>,
-    ) -> Result<Option<BatchBegun>, StoreError>;
+    ) -> Result<Option<BatchBegun>>;
 
     /// Begins to fill a batch, or finds the one for which its idempotency key stands. Afterwards exactly the places of its
     /// jobs are reserved. A key of an unfinished batch that no process fills is free.
@@ -113,25 +116,21 @@ pub trait Batches: Send + Sync {
         new: &NewBatch,
         filled_here: FilledHere<'_>,
         bounds: QueueBounds,
-    ) -> Result<BatchBegun, StoreError>;
+    ) -> Result<BatchBegun>;
 
     /// Inserts jobs of a batch, with their indices in it, on its reserved places. Returns those that ended at once with a
     /// cached result.
-    async fn fill_batch(
-        &self,
-        batch: Uuid,
-        jobs: &[(u32, NewJob)],
-    ) -> Result<Vec<Uuid>, StoreError>;
+    async fn fill_batch(&self, batch: Uuid, jobs: &[(u32, NewJob)]) -> Result<Vec<Uuid>>;
 
     /// Acknowledges a batch: from now on it is found, and survives the process.
-    async fn complete_batch(&self, batch: Uuid) -> Result<(), StoreError>;
+    async fn complete_batch(&self, batch: Uuid) -> Result<()>;
 
     /// Removes up to `limit` jobs of a batch that was never acknowledged, and the batch after the last of them; `true` once
     /// nothing is left. The first call frees its places and its key.
-    async fn drop_batch(&self, batch: Uuid, limit: u32) -> Result<bool, StoreError>;
+    async fn drop_batch(&self, batch: Uuid, limit: u32) -> Result<bool>;
 
     /// The batches that are not acknowledged.
-    async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError>;
+    async fn unfinished_batches(&self) -> Result<Vec<Uuid>>;
 
     /// Cancels up to `limit` jobs of a batch; returns those that changed.
     async fn cancel_batch(
@@ -140,10 +139,10 @@ pub trait Batches: Send + Sync {
         id: Uuid,
         limit: u32,
         now: i64,
-    ) -> Result<Vec<(Uuid, State)>, StoreError>;
+    ) -> Result<Vec<(Uuid, State)>>;
 
     /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
-    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError>;
+    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool>;
 
     /// The jobs of a batch after the job `after`, in the order in which they were sent, at most `limit`; small solutions are read with
     /// them, and none after those of `bytes` together.
@@ -154,15 +153,10 @@ pub trait Batches: Send + Sync {
         after: Option<Uuid>,
         limit: u32,
         bytes: usize,
-    ) -> Result<Vec<BatchItem>, StoreError>;
+    ) -> Result<Vec<BatchItem>>;
 
     /// The keys of the labels of the jobs of a batch, sorted, the first `limit`.
-    async fn batch_label_keys(
-        &self,
-        tenant: &str,
-        id: Uuid,
-        limit: u32,
-    ) -> Result<Vec<String>, StoreError>;
+    async fn batch_label_keys(&self, tenant: &str, id: Uuid, limit: u32) -> Result<Vec<String>>;
 
     /// One page of the acknowledged batches of a tenant with their counts, newest first, from the first one older than `after`.
     async fn batches(
@@ -171,13 +165,13 @@ pub trait Batches: Send + Sync {
         filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Page<Batch>, StoreError>;
+    ) -> Result<Page<Batch>>;
 
     /// An acknowledged batch or run with its counts.
-    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError>;
+    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>>;
 
     /// The template of an acknowledged batch that is a run, and how far its chunks are.
-    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError>;
+    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>>;
 }
 
 /// Reads, lists and cancels jobs for clients.
@@ -185,23 +179,19 @@ pub trait Batches: Send + Sync {
 pub trait ClientJobs: Send + Sync {
     /// Cancels a queued job at once, and marks a running one as to be cancelled; an ended one stays as it is. Returns the
     /// job as it then is.
-    async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>, StoreError>;
+    async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>>;
 
     /// Removes an ended job with all that hangs on it; its blob goes with the last reference to it.
-    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted, StoreError>;
+    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted>;
 
     /// A job.
-    async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>, StoreError>;
+    async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>>;
 
     /// A job with its result: a small one itself, a large one by the key of its blob.
-    async fn result(
-        &self,
-        tenant: &str,
-        id: Uuid,
-    ) -> Result<Option<(Job, Option<ResultRef>)>, StoreError>;
+    async fn result(&self, tenant: &str, id: Uuid) -> Result<Option<(Job, Option<ResultRef>)>>;
 
     /// The case of a job as it was submitted.
-    async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError>;
+    async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>>;
 
     /// One page of the jobs of a tenant, newest first, from the first job older than `after`. It reads no more rows than it
     /// returns, up to a constant.
@@ -211,7 +201,7 @@ pub trait ClientJobs: Send + Sync {
         filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Page<Job>, StoreError>;
+    ) -> Result<Page<Job>>;
 
     /// Jobs of a tenant that changed, progress aside, in the order of the time of their last change and of their ids: those
     /// that changed later than `since`, and of those that changed at that time the ones after the job `after`, or all of them.
@@ -221,7 +211,7 @@ pub trait ClientJobs: Send + Sync {
         since: i64,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Vec<Change>, StoreError>;
+    ) -> Result<Vec<Change>>;
 }
 
 /// Cross-sections that tenants keep.
@@ -233,14 +223,10 @@ pub trait Profiles: Send + Sync {
         tenant: &str,
         new: &StoredProfile,
         max_bytes: u64,
-    ) -> Result<ProfileKept, StoreError>;
+    ) -> Result<ProfileKept>;
 
     /// A cross-section of a tenant by its digest.
-    async fn profile(
-        &self,
-        tenant: &str,
-        digest: &str,
-    ) -> Result<Option<StoredProfile>, StoreError>;
+    async fn profile(&self, tenant: &str, digest: &str) -> Result<Option<StoredProfile>>;
 
     /// One page of the cross-sections of a tenant, newest first.
     async fn profiles(
@@ -248,31 +234,27 @@ pub trait Profiles: Send + Sync {
         tenant: &str,
         after: Option<&ProfileCursor>,
         limit: u32,
-    ) -> Result<Page<ProfileEntry>, StoreError>;
+    ) -> Result<Page<ProfileEntry>>;
 
     /// Removes a cross-section of a tenant; `false` if there was none.
-    async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError>;
+    async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool>;
 }
 
 /// Claims of queued jobs, and what workers do while they hold a lease.
 #[async_trait]
 pub trait Claims: Send + Sync {
     /// Queues with jobs in them, and how many.
-    async fn queues(&self) -> Result<Vec<(Queue, u64)>, StoreError>;
+    async fn queues(&self) -> Result<Vec<(Queue, u64)>>;
 
     /// Claims the first job of a queue, by priority and then by age, together with those behind it that are small
     /// enough, in their order. A suspect comes alone, and no job of a batch that is not acknowledged.
-    async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError>;
+    async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>>;
 
     /// The cases of claimed jobs, with what has happened to them meanwhile.
-    async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>, StoreError>;
+    async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>>;
 
     /// Extends leases and stores progress; the answers are in the order of the claims.
-    async fn renew(
-        &self,
-        claims: &[(&Claim, f64)],
-        lease: Lease,
-    ) -> Result<Vec<Renewal>, StoreError>;
+    async fn renew(&self, claims: &[(&Claim, f64)], lease: Lease) -> Result<Vec<Renewal>>;
 
     /// Gives claimed jobs back to the queue without counting their attempts; those that the client has cancelled end.
     /// Returns those that were still held, with their new states.
@@ -281,17 +263,17 @@ pub trait Claims: Send + Sync {
         claims: &[Claim],
         why: ReleaseReason,
         now: i64,
-    ) -> Result<Vec<(Uuid, State)>, StoreError>;
+    ) -> Result<Vec<(Uuid, State)>>;
 
     /// Stores a solved slice in place of what there was from its number on; `false` if the lease is lost. Attempts are
     /// counted from the last slice. The same call again changes nothing.
-    async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, StoreError>;
+    async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool>;
 
     /// The stored slices of a job in their order. Whatever ends a job removes its slices.
-    async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError>;
+    async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>>;
 
     /// The parts of the answer that the slices of a job are, in their order.
-    async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError>;
+    async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>>;
 }
 
 /// Ends of claimed jobs.
@@ -299,11 +281,10 @@ pub trait Claims: Send + Sync {
 pub trait Ends: Send + Sync {
     /// Ends claimed jobs, all in one transaction; returns those that ended. Of the others the lease is lost, or the source
     /// of their cached result has gone.
-    async fn finish(&self, ends: &[(Claim, Ending)], now: i64)
-    -> Result<HashSet<Uuid>, StoreError>;
+    async fn finish(&self, ends: &[(Claim, Ending)], now: i64) -> Result<HashSet<Uuid>>;
 
     /// For each of these keys that a succeeded job carries, one such job.
-    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError>;
+    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>>;
 }
 
 /// Takes jobs from workers that no longer answer, removes what has expired, and counts what there is.
@@ -312,65 +293,56 @@ pub trait Upkeep: Send + Sync {
     /// Takes running jobs from their workers: to `cancelled` if the client asked for that, to `failed` if `attempts_max` are
     /// used up, else back to the queue. An attempt counts only for a job that was solved alone; the others come alone
     /// next time. Returns them with their new states.
-    async fn reap(
-        &self,
-        which: Reap,
-        now: i64,
-        attempts_max: u32,
-    ) -> Result<Vec<(Uuid, State)>, StoreError>;
+    async fn reap(&self, which: Reap, now: i64, attempts_max: u32) -> Result<Vec<(Uuid, State)>>;
 
     /// Ends some of the queued jobs whose deadline has passed with this failure, and names the running ones. To be called
     /// again until it ends none.
-    async fn pass_deadlines(
-        &self,
-        failure: &Failure,
-        moment: Moment,
-    ) -> Result<Overdue, StoreError>;
+    async fn pass_deadlines(&self, failure: &Failure, moment: Moment) -> Result<Overdue>;
 
     /// Removes expired jobs and leaves tombstones, removes empty batches of that age, and old tombstones. Returns the number
     /// of jobs removed.
-    async fn expire(&self, rule: RetentionRule) -> Result<u64, StoreError>;
+    async fn expire(&self, rule: RetentionRule) -> Result<u64>;
 
     /// Was there a job or a batch of this tenant that has expired?
-    async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError>;
+    async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool>;
 
     /// What a tenant has; the bytes that its unfinished batches stand for are not known here.
-    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError>;
+    async fn usage(&self, tenant: &str) -> Result<Usage>;
 
     /// Counts and sizes, read from indices alone.
-    async fn stats(&self) -> Result<Stats, StoreError>;
+    async fn stats(&self) -> Result<Stats>;
 
     /// Counts the jobs of the same tenant that come before a queued job, at most `limit` of them.
-    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError>;
+    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead>;
 }
 
 /// Keys of large results.
 #[async_trait]
 pub trait ResultKeys: Send + Sync {
     /// Keys of large results that nobody refers to any more, at most `limit`; those in `done` are forgotten first.
-    async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>, StoreError>;
+    async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>>;
 
     /// Leaves a large result that was written and that no job will refer to, to be removed.
-    async fn abandon_blob(&self, key: &str) -> Result<(), StoreError>;
+    async fn abandon_blob(&self, key: &str) -> Result<()>;
 
     /// Which of these large results no job refers to.
-    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError>;
+    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans>;
 }
 
 /// API keys.
 #[async_trait]
 pub trait KeyStore: Send + Sync {
     /// Stores a key. It fails if there is one with the same id.
-    async fn add_key(&self, key: &Key) -> Result<(), StoreError>;
+    async fn add_key(&self, key: &Key) -> Result<()>;
 
     /// A key by its id.
-    async fn key(&self, id: &str) -> Result<Option<Key>, StoreError>;
+    async fn key(&self, id: &str) -> Result<Option<Key>>;
 
     /// All keys, oldest first, with the revoked ones.
-    async fn keys(&self) -> Result<Vec<Key>, StoreError>;
+    async fn keys(&self) -> Result<Vec<Key>>;
 
     /// Revokes a key; `None` if there is none. A key that was revoked before keeps its time.
-    async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError>;
+    async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>>;
 }
 
 /// Large results that no job refers to.
@@ -565,36 +537,36 @@ impl Deployment {
 #[async_trait]
 pub trait Cluster: Send + Sync + Debug {
     /// The clock of the store, epoch milliseconds.
-    async fn now(&self) -> Result<i64, StoreError>;
+    async fn now(&self) -> Result<i64>;
 
     /// Records that a node is alive and returns its view of the cluster.
-    async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError>;
+    async fn beat(&self, node: &Node) -> Result<ClusterView>;
 
     /// The node is no more.
-    async fn leave(&self, node: Uuid) -> Result<(), StoreError>;
+    async fn leave(&self, node: Uuid) -> Result<()>;
 
     /// Those of these running jobs that are to be cancelled.
-    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError>;
+    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>>;
 
     /// Shows that these batches are still received or filled. A batch of which nobody has shown that for a minute is
     /// [unfinished](crate::jobs::store::Batches::unfinished_batches).
-    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError>;
+    async fn keep_batches(&self, batches: &[Uuid]) -> Result<()>;
 
     /// Removes large results that were written long ago and that no job refers to: what a node left that was killed between the
     /// two. Returns their number.
-    async fn sweep_objects(&self) -> Result<u64, StoreError>;
+    async fn sweep_objects(&self) -> Result<u64>;
 
     /// Brings what the database counts into a short form.
-    async fn fold_counts(&self) -> Result<(), StoreError>;
+    async fn fold_counts(&self) -> Result<()>;
 
     /// Identity of the database, location of its large results, and number of its live nodes.
-    async fn deployment(&self) -> Result<Deployment, StoreError>;
+    async fn deployment(&self) -> Result<Deployment>;
 
     /// Replaces the recorded location of the results if it is still the expected one; returns whether it was.
-    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError>;
+    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool>;
 
     /// Claims the daily sweep of results outside the database; returns whether the claim succeeded.
-    async fn take_sweep(&self) -> Result<bool, StoreError>;
+    async fn take_sweep(&self) -> Result<bool>;
 
     /// Where large results are kept that are in the database.
     fn objects(&self) -> Arc<dyn ObjectStore>;
@@ -603,7 +575,7 @@ pub trait Cluster: Send + Sync + Debug {
     fn publish(&self, notification: Notification);
 
     /// Listens to the notifications of all nodes until the connection fails; for ever with [`NotifyMode::Off`].
-    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<(), StoreError>;
+    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<()>;
 }
 
 /// A solved slice about to be stored.

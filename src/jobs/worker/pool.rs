@@ -6,7 +6,7 @@ use tokio::time::sleep;
 use uuid::Uuid;
 
 use crate::jobs::attempts::attempt::{Attempt, SolverThread};
-use crate::jobs::error::JobsError;
+use crate::jobs::error::Result;
 use crate::jobs::model::{Queue, State};
 use crate::jobs::shared::Shared;
 use crate::jobs::store::{ClaimKind, ClaimRequest};
@@ -40,7 +40,7 @@ pub struct StepReport {
 }
 
 impl Worker {
-    pub(crate) fn new(shared: Arc<Shared>, name: &str) -> Result<Worker, JobsError> {
+    pub(crate) fn new(shared: Arc<Shared>, name: &str) -> Result<Worker> {
         Ok(Worker {
             thread: Some(SolverThread::start(name)?),
             shared,
@@ -76,7 +76,7 @@ impl Worker {
     ///
     /// # Errors
     /// The database failed; claimed jobs are given back if that is possible, or taken back when their leases run out.
-    pub async fn step(&mut self) -> Result<StepReport, JobsError> {
+    pub async fn step(&mut self) -> Result<StepReport> {
         let Some(mut attempt) = self.next_turn().await? else {
             return Ok(StepReport::default());
         };
@@ -97,7 +97,7 @@ const GROUP_COST_US: u64 = 200_000;
 
 impl Worker {
     /// What to work on next, by the turns of the tenants. Within a queue, new jobs and begun sweeps take turns.
-    pub(crate) async fn next_turn(&self) -> Result<Option<Attempt>, JobsError> {
+    pub(crate) async fn next_turn(&self) -> Result<Option<Attempt>> {
         let shared = &self.shared;
         if shared.draining.is_cancelled() || (self.spare && !shared.all_workers_are_long()) {
             return Ok(None);
@@ -124,7 +124,7 @@ impl Worker {
         &self,
         (queue, waiting): (&Queue, u64),
         kind: ClaimKind,
-    ) -> Result<Option<Attempt>, JobsError> {
+    ) -> Result<Option<Attempt>> {
         let shared = &self.shared;
         let options = &shared.options;
         let slice_us = u64::try_from(options.slice.as_micros()).unwrap_or(u64::MAX);

@@ -10,7 +10,7 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::jobs::attempts::attempt::{Attempt, Phase, StopReason};
 use crate::jobs::attempts::slices::{INTERNAL, Outcome, SlicedWork, Work};
 use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::model::{Failure, FailureKind, State, too_late};
 use crate::jobs::storage_fault::StoragePlace;
 use crate::jobs::store::{Claim, Ending, NewSlice, ReleaseReason, SliceRecord, StoredResult};
@@ -106,7 +106,7 @@ impl Worker {
         place: usize,
         mut sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
-    ) -> Result<bool, JobsError> {
+    ) -> Result<bool> {
         let shared = &self.shared;
         let member = &mut attempt.members[place];
         if let Some((note, part)) = part {
@@ -139,11 +139,7 @@ impl Worker {
     }
 
     /// What is to be done next for a sweep.
-    pub(crate) async fn next_of(
-        &self,
-        id: Uuid,
-        mut sliced: Box<SlicedWork>,
-    ) -> Result<Work, JobsError> {
+    pub(crate) async fn next_of(&self, id: Uuid, mut sliced: Box<SlicedWork>) -> Result<Work> {
         if !sliced.waits_for_parts() {
             return Ok(Work::Next(sliced));
         }
@@ -159,7 +155,7 @@ impl Worker {
     }
 
     /// The stored parts of the answer of a sweep.
-    async fn parts(&self, id: Uuid) -> Result<Vec<EncodedResult>, JobsError> {
+    async fn parts(&self, id: Uuid) -> Result<Vec<EncodedResult>> {
         let shared = &self.shared;
         let placed = shared.store.slice_results(id).await?;
         let mut parts = Vec::with_capacity(placed.len());
@@ -180,7 +176,7 @@ impl Worker {
         &self,
         attempt: &mut Attempt,
         step: &mut StepReport,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         let claims = attempt.claims(|phase| matches!(phase, Phase::Solving));
         let ids: Vec<_> = claims.iter().map(|claim| claim.id).collect();
         let mut cases = self.shared.store.claimed_cases(&ids).await?;
@@ -201,7 +197,7 @@ impl Worker {
         attempt: &mut Attempt,
         pairs: Vec<(Claim, Uuid)>,
         step: &mut StepReport,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         if pairs.is_empty() {
             return Ok(());
         }
@@ -238,11 +234,7 @@ impl Worker {
     }
 
     /// Writes down what became of the members that are over.
-    pub(crate) async fn record(
-        &self,
-        attempt: &mut Attempt,
-        step: &mut StepReport,
-    ) -> Result<(), JobsError> {
+    pub(crate) async fn record(&self, attempt: &mut Attempt, step: &mut StepReport) -> Result<()> {
         let shared = &self.shared;
         let from = shared.options.tracer.is_some().then(SystemTime::now);
         let mut pending = PendingWrites::default();
@@ -335,7 +327,7 @@ impl Worker {
         ends: Vec<(Claim, Ending)>,
         from: Option<SystemTime>,
         step: &mut StepReport,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         if ends.is_empty() {
             return Ok(());
         }
@@ -381,11 +373,7 @@ impl Worker {
     }
 
     /// Ends members that waited for an equal one with its answer; without an answer they go back to the queue.
-    async fn settle_duplicates(
-        &self,
-        attempt: &mut Attempt,
-        step: &mut StepReport,
-    ) -> Result<(), JobsError> {
+    async fn settle_duplicates(&self, attempt: &mut Attempt, step: &mut StepReport) -> Result<()> {
         let still: HashSet<Uuid> = attempt
             .claims(|phase| matches!(phase, Phase::Solving))
             .iter()
@@ -415,7 +403,7 @@ impl Worker {
         claim: &Claim,
         slice: Option<u32>,
         result: EncodedResult,
-    ) -> Result<StoredResult, JobsError> {
+    ) -> Result<StoredResult> {
         let shared = &self.shared;
         // Other programs read the answers of rows where they lie.
         if !result.is_rows() && result.bytes() <= shared.options.small_result_max_bytes {
@@ -436,7 +424,7 @@ impl Worker {
         claims: &[Claim],
         why: ReleaseReason,
         step: &mut StepReport,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         if claims.is_empty() {
             return Ok(());
         }

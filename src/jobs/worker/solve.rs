@@ -23,7 +23,7 @@ use crate::jobs::codec::encode::encode;
 use crate::jobs::codec::parquet;
 use crate::jobs::codec::result::EncodedResult;
 use crate::jobs::codec::table::{RowTable, TableColumn};
-use crate::jobs::error::JobsError;
+use crate::jobs::error::{JobsError, Result};
 use crate::jobs::job_trace::JobTrace;
 use crate::jobs::model::{Failure, FailureKind, Kind, Queue};
 use crate::jobs::run::model::{REASON, RunChunk, RunHead, parted};
@@ -150,10 +150,7 @@ fn encoded(solution: &Solution, fields: &Fields) -> Result<EncodedResult, String
 ///
 /// # Errors
 /// A part cannot be read, or does not fit to the others. `None` if `go_on` said no.
-fn join(
-    parts: &[EncodedResult],
-    go_on: impl Fn() -> bool,
-) -> Result<Option<(Solution, Fields)>, JobsError> {
+fn join(parts: &[EncodedResult], go_on: impl Fn() -> bool) -> Result<Option<(Solution, Fields)>> {
     let mut whole: Option<(Solution, Fields)> = None;
     for part in parts {
         if !go_on() {
@@ -178,14 +175,14 @@ fn join(
     whole.ok_or_else(none).map(Some)
 }
 
-fn read(part: &EncodedResult) -> Result<(Solution, Fields), JobsError> {
+fn read(part: &EncodedResult) -> Result<(Solution, Fields)> {
     let damaged = |error: serde_json::Error| JobsError::Damaged(format!("a slice: {error}"));
     let solution: Solution = serde_json::from_slice(&part.solution).map_err(damaged)?;
     let patches = match &part.fields {
         None => Vec::new(),
         Some(_) => (0..solution.patches.len())
             .map(|patch| part.patch_fields(patch, None))
-            .collect::<Result<Vec<PatchFields>, JobsError>>()?,
+            .collect::<Result<Vec<PatchFields>>>()?,
     };
     Ok((solution, Fields { patches }))
 }
@@ -233,7 +230,7 @@ pub(crate) fn solve_chunk(shared: &Shared, control: &AttemptControl, stored: &St
     })
 }
 
-fn read_rows(stored: &StoredCase) -> Result<(RunHead, RunChunk), JobsError> {
+fn read_rows(stored: &StoredCase) -> Result<(RunHead, RunChunk)> {
     let head = RunHead::read(
         stored.template.as_deref().unwrap_or_default(),
         stored.head.as_deref(),

@@ -13,7 +13,7 @@ use tokio::time::{MissedTickBehavior, interval};
 
 use crate::jobs::attempts::attempt::{Attempt, Counted, Phase, SolverThread, StopReason};
 use crate::jobs::attempts::slices::Work;
-use crate::jobs::error::JobsError;
+use crate::jobs::error::Result;
 use crate::jobs::shared::Shared;
 use crate::jobs::store::{ClaimedCase, ReleaseReason};
 use crate::jobs::worker::pool::{StepReport, Worker};
@@ -30,7 +30,7 @@ impl Worker {
         &mut self,
         attempt: &mut Attempt,
         step: &mut StepReport,
-    ) -> Result<(), JobsError> {
+    ) -> Result<()> {
         let start = Instant::now();
         self.read_cases(attempt, step).await?;
         attempt.set_aside_duplicates();
@@ -63,7 +63,7 @@ impl Worker {
         Ok(())
     }
 
-    async fn begin(&mut self, attempt: &mut Attempt) -> Result<(), JobsError> {
+    async fn begin(&mut self, attempt: &mut Attempt) -> Result<()> {
         let places = attempt.to_solve();
         let mut work = Vec::with_capacity(places.len());
         for place in places {
@@ -99,11 +99,7 @@ impl Worker {
     }
 
     /// Waits until the solver is done, and stops it when its time is up. What a group has not begun within a slice goes back to the queue.
-    async fn until_over(
-        &self,
-        attempt: &mut Attempt,
-        step: &mut StepReport,
-    ) -> Result<(), JobsError> {
+    async fn until_over(&self, attempt: &mut Attempt, step: &mut StepReport) -> Result<()> {
         let shared = &self.shared;
         let (start, mut charged) = (Instant::now(), Instant::now());
         let slice = shared.options.slice;

@@ -12,7 +12,7 @@ use self::npz::read_arrays;
 use self::text::JsonRows;
 use crate::contact::evaluate::varied::Values;
 use crate::http::extract::titles::{NamedColumns, Titled, faulty, require_few};
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::jobs::codec::arrow;
 use crate::jobs::codec::parquet::TableReader;
 use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
@@ -123,11 +123,11 @@ pub type Chunk = Vec<Values>;
 pub struct TableRows {
     /// The titles of the columns.
     pub titles: Vec<Title>,
-    chunks: Box<dyn Iterator<Item = Result<Chunk, ApiError>>>,
+    chunks: Box<dyn Iterator<Item = Result<Chunk>>>,
 }
 
 impl Iterator for TableRows {
-    type Item = Result<Chunk, ApiError>;
+    type Item = Result<Chunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.chunks.next()
@@ -139,11 +139,7 @@ impl TableRows {
     ///
     /// # Errors
     /// `faulty-table`: it is not of its form, or has too many columns; `body-too-large`: an archive has more bytes.
-    pub fn new(
-        form: TableForm,
-        source: TableSource,
-        unpacked_max: usize,
-    ) -> Result<TableRows, ApiError> {
+    pub fn new(form: TableForm, source: TableSource, unpacked_max: usize) -> Result<TableRows> {
         match form {
             TableForm::Csv => {
                 let rows = CsvRows::new(source.reader(), ROW_BYTES_MAX)?;
@@ -181,7 +177,7 @@ impl TableRows {
     ///
     /// # Errors
     /// See [`NamedColumns::columns`].
-    pub fn named(&self, named: &NamedColumns) -> Result<Vec<RunColumn>, ApiError> {
+    pub fn named(&self, named: &NamedColumns) -> Result<Vec<RunColumn>> {
         let titles = self.titles.iter();
         named.columns(
             titles.map(|title| -> Titled<'_> { (&title.name, title.unit.as_deref(), title.text) }),
@@ -190,8 +186,8 @@ impl TableRows {
 
     /// The rows of tables that all have the columns of the first.
     fn of_tables(
-        mut tables: impl Iterator<Item = Result<RowTable, ApiError>> + 'static,
-    ) -> Result<TableRows, ApiError> {
+        mut tables: impl Iterator<Item = Result<RowTable>> + 'static,
+    ) -> Result<TableRows> {
         let first = tables
             .next()
             .ok_or_else(|| faulty("the table has no rows"))??;
@@ -213,7 +209,7 @@ impl TableRows {
 }
 
 /// The arrays of an NPZ archive.
-fn npz_table(source: impl Read, bytes_max: usize) -> Result<RowTable, ApiError> {
+fn npz_table(source: impl Read, bytes_max: usize) -> Result<RowTable> {
     let mut archive = Vec::new();
     source
         .take(bytes_max as u64 + 1)
@@ -232,7 +228,7 @@ fn npz_table(source: impl Read, bytes_max: usize) -> Result<RowTable, ApiError> 
 /// The groups of rows of a Parquet file.
 fn groups<R: parquet::file::reader::ChunkReader + 'static>(
     reader: parquet::errors::Result<TableReader<R>>,
-) -> Result<impl Iterator<Item = Result<RowTable, ApiError>>, ApiError> {
+) -> Result<impl Iterator<Item = Result<RowTable>>> {
     let damaged = |error| faulty(format!("the Parquet file cannot be read: {error}"));
     let reader = reader.map_err(damaged)?;
     require_few(reader.names().len())?;

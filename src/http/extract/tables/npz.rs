@@ -8,7 +8,7 @@ use axum::body::Bytes;
 use zip::ZipArchive;
 
 use crate::http::extract::titles::{faulty, require_few};
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::http::problem::{ApiError, ProblemKind, Result};
 
 /// What an array may hold.
 const KINDS: &str = "float32, float64, or integers";
@@ -17,10 +17,7 @@ const KINDS: &str = "float32, float64, or integers";
 ///
 /// # Errors
 /// `faulty-table` with the array; `body-too-large`: unpacked they have more than `max_bytes`.
-pub(super) fn read_arrays(
-    data: Bytes,
-    max_bytes: usize,
-) -> Result<Vec<(String, Vec<f64>)>, ApiError> {
+pub(super) fn read_arrays(data: Bytes, max_bytes: usize) -> Result<Vec<(String, Vec<f64>)>> {
     let unread =
         |error: &dyn std::fmt::Display| faulty(format!("the NPZ archive cannot be read: {error}"));
     let mut archive = ZipArchive::new(Cursor::new(data)).map_err(|error| unread(&error))?;

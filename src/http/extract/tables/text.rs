@@ -9,7 +9,7 @@ use crate::http::extract::tables::{Chunk, Title};
 use crate::http::extract::titles::{
     delimiter, faulty, is_line_of_units, is_text, number, require_few,
 };
-use crate::http::problem::ApiError;
+use crate::http::problem::{ApiError, Result};
 
 /// Rows that are read at once.
 const ROWS: usize = 8192;
@@ -55,7 +55,7 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub fn new(mut source: R, record_max: usize) -> Result<CsvRows<R>, ApiError> {
+    pub fn new(mut source: R, record_max: usize) -> Result<CsvRows<R>> {
         let mut first = Vec::new();
         let read = (&mut source).take(LINE_BYTES_MAX);
         let read = { read }.read_until(b'\n', &mut first);
@@ -117,7 +117,7 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// Some more rows, none at the end.
-    fn read(&mut self) -> Result<Chunk, ApiError> {
+    fn read(&mut self) -> Result<Chunk> {
         let mut values = empty(&self.titles);
         for _ in 0..ROWS {
             let Some(record) = &self.record else { break };
@@ -156,7 +156,7 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub fn record(&mut self) -> Result<Option<(u64, csv::StringRecord)>, ApiError> {
+    pub fn record(&mut self) -> Result<Option<(u64, csv::StringRecord)>> {
         let Some(record) = self.record.clone() else {
             return Ok(None);
         };
@@ -166,7 +166,7 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// Reads the next record that is no blank line.
-    fn advance(&mut self) -> Result<(), ApiError> {
+    fn advance(&mut self) -> Result<()> {
         while let Some(record) = &mut self.record {
             let source = self.reader.get_mut();
             source.left = source.max;
@@ -202,7 +202,7 @@ impl<R: BufRead> JsonRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub(super) fn new(source: R) -> Result<JsonRows<R>, ApiError> {
+    pub(super) fn new(source: R) -> Result<JsonRows<R>> {
         let mut rows = JsonRows {
             source,
             line: 0,
@@ -222,7 +222,7 @@ impl<R: BufRead> JsonRows<R> {
     }
 
     /// Some more rows, none at the end.
-    fn read(&mut self) -> Result<Chunk, ApiError> {
+    fn read(&mut self) -> Result<Chunk> {
         let mut values = empty(&self.titles);
         for _ in 0..ROWS {
             let Some(mut row) = self.row.take() else {
@@ -257,7 +257,7 @@ impl<R: BufRead> JsonRows<R> {
     }
 
     /// Reads the next line that is not blank.
-    fn advance(&mut self) -> Result<(), ApiError> {
+    fn advance(&mut self) -> Result<()> {
         loop {
             let mut text = Vec::new();
             let mut line = (&mut self.source).take(LINE_BYTES_MAX);
@@ -283,7 +283,7 @@ impl<R: BufRead> JsonRows<R> {
 }
 
 impl<R: BufRead> Iterator for CsvRows<R> {
-    type Item = Result<Chunk, ApiError>;
+    type Item = Result<Chunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.read().map(there).transpose()
@@ -291,7 +291,7 @@ impl<R: BufRead> Iterator for CsvRows<R> {
 }
 
 impl<R: BufRead> Iterator for JsonRows<R> {
-    type Item = Result<Chunk, ApiError>;
+    type Item = Result<Chunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
         self.read().map(there).transpose()
@@ -322,7 +322,7 @@ mod tests {
     use crate::http::extract::tables::{TableForm, TableRows, TableSource};
     use crate::http::extract::titles::NamedColumns;
 
-    fn rows(form: TableForm, text: &'static str) -> Result<TableRows, ApiError> {
+    fn rows(form: TableForm, text: &'static str) -> Result<TableRows> {
         let source = TableSource::Memory(Bytes::from_static(text.as_bytes()));
         TableRows::new(form, source, text.len())
     }

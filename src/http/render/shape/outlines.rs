@@ -5,7 +5,11 @@
 //!
 //! Recovers strips and their segments from stored cells, and finds the neighbours that continue a segment.
 
-use std::collections::{BTreeMap, BTreeSet};
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay::IntOverlayOptions;
+use i_overlay::core::simplify::Simplify;
+use i_overlay::i_float::int::point::IntPoint;
+use i_overlay::i_shape::int::shape::IntContour;
 
 use crate::contact::numerics::interpolation;
 use crate::contact::solution::words::answer::{PatchCells, Zone};
@@ -34,23 +38,27 @@ pub(crate) fn outlines(
 
     let x = CellBorders::new(&fields.x_mm, &fields.dx_mm, &cells);
     let y = CellBorders::new(&fields.y_mm, &fields.dy_mm, &cells);
-    let mut rows: BTreeMap<(usize, usize), Vec<(usize, usize)>> = BTreeMap::new();
-    for (&from_to_x, &from_to_y) in x.of_cell.iter().zip(&y.of_cell) {
-        rows.entry(from_to_y).or_default().push(from_to_x);
+    let cells = x.of_cell.iter().zip(&y.of_cell).map(|(x, y)| {
+        let corners = [(x.0, y.0), (x.1, y.0), (x.1, y.1), (x.0, y.1)];
+        corners.map(|(i, j)| IntPoint::new(i, j)).to_vec()
+    });
+    let cells: Vec<IntContour<i32>> = cells.collect();
+    let union = cells.simplify(FillRule::NonZero, IntOverlayOptions::ogc());
+    let mut loops: Vec<IntContour<i32>> = union.into_iter().flatten().collect();
+    for corners in &mut loops {
+        let lowest = (0..corners.len()).min_by_key(|&k| (corners[k].y, corners[k].x));
+        corners.rotate_left(lowest.unwrap_or(0));
     }
-    let mut loops: Vec<Vec<Corner>> = chain(boundary(&rows))
-        .iter()
-        .map(|l| straighten(l))
-        .collect();
-    loops.sort_by_key(|corners| (corners[0].1, corners[0].0));
+    loops.sort_by_key(|corners| (corners[0].y, corners[0].x));
+    let place = |corner: &IntPoint<i32>| {
+        [
+            x.values[corner.x as usize],
+            y.values[corner.y as usize],
+        ]
+    };
     loops
         .iter()
-        .map(|corners| {
-            corners
-                .iter()
-                .map(|&(i, j)| [x.values[i], y.values[j]])
-                .collect()
-        })
+        .map(|corners| corners.iter().map(place).collect())
         .collect()
 }
 
@@ -88,7 +96,7 @@ pub(crate) fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
 /// Distinct edges along one axis; every cell knows its two by rank.
 struct CellBorders {
     values: Vec<f64>,
-    of_cell: Vec<(usize, usize)>,
+    of_cell: Vec<(i32, i32)>,
 }
 
 impl CellBorders {
@@ -113,7 +121,7 @@ impl CellBorders {
                 values.push(value);
                 last_tolerance = tolerance;
             }
-            ranks[side] = values.len() - 1;
+            ranks[side] = values.len() as i32 - 1;
         }
         let of_cell = ranks
             .chunks_exact(2)
@@ -121,135 +129,6 @@ impl CellBorders {
             .collect();
         CellBorders { values, of_cell }
     }
-}
-
-/// Directed boundary edges, the cells on their left, from rows `(bottom, top) → cells (left, right)`.
-fn boundary(rows: &BTreeMap<(usize, usize), Vec<(usize, usize)>>) -> Vec<(Corner, Corner)> {
-    let mut edges = Vec::new();
-    // Along every horizontal line: runs that end on it from below count −1, runs that begin on it count +1.
-    let mut lines: BTreeMap<usize, BTreeMap<usize, i32>> = BTreeMap::new();
-    for (&(bottom, top), cells) in rows {
-        for (left, right) in runs(cells) {
-            edges.push(((left, top), (left, bottom)));
-            edges.push(((right, bottom), (right, top)));
-            for (line, step) in [(bottom, 1), (top, -1)] {
-                let line = lines.entry(line).or_default();
-                *line.entry(left).or_default() += step;
-                *line.entry(right).or_default() -= step;
-            }
-        }
-    }
-    for (y, steps) in lines {
-        let (mut side, mut from) = (0, 0);
-        for (x, step) in steps.into_iter().filter(|&(_, step)| step != 0) {
-            match side {
-                1 => edges.push(((from, y), (x, y))),
-                -1 => edges.push(((x, y), (from, y))),
-                _ => {}
-            }
-            (side, from) = (side + step, x);
-        }
-    }
-    edges
-}
-
-/// Unbroken runs of the cells of one row.
-fn runs(cells: &[(usize, usize)]) -> Vec<(usize, usize)> {
-    let mut sorted = cells.to_vec();
-    sorted.sort_unstable();
-    let mut runs: Vec<(usize, usize)> = Vec::new();
-    for (left, right) in sorted {
-        match runs.last_mut() {
-            Some(run) if run.1 >= left => run.1 = run.1.max(right),
-            _ => runs.push((left, right)),
-        }
-    }
-    runs
-}
-
-/// A corner as the ranks of its x and y among the distinct cell edges.
-pub(crate) type Corner = (usize, usize);
-
-/// Joins directed edges to loops that visit every corner at most once.
-///
-/// At a corner where two cells meet diagonally the walk turns left, which keeps the two apart; if it comes back to a
-/// corner it has already passed, the part in between is a loop of its own (a hole that touches the outside).
-pub(crate) fn chain(edges: Vec<(Corner, Corner)>) -> Vec<Vec<Corner>> {
-    let mut leaving: BTreeMap<Corner, BTreeSet<Corner>> = BTreeMap::new();
-    for (from, to) in edges {
-        leaving.entry(from).or_default().insert(to);
-    }
-    let mut loops = Vec::new();
-    while let Some((&start, _)) = leaving.first_key_value() {
-        let mut path: Vec<Corner> = vec![start];
-        let mut place: BTreeMap<Corner, usize> = BTreeMap::from([(start, 0)]);
-        while let Some(&here) = path.last() {
-            let before = path.len().checked_sub(2).map(|k| path[k]);
-            let Some(next) = take_next(&mut leaving, before, here) else {
-                break;
-            };
-            if let Some(&first) = place.get(&next) {
-                for corner in &path[first + 1..] {
-                    place.remove(corner);
-                }
-                loops.push(path.split_off(first));
-                path.push(next);
-                if path.len() == 1 {
-                    break;
-                }
-            } else {
-                place.insert(next, path.len());
-                path.push(next);
-            }
-        }
-    }
-    loops
-}
-
-/// Takes the edge that leaves `here`, the leftmost turn seen from `before` if there are two.
-fn take_next(
-    leaving: &mut BTreeMap<Corner, BTreeSet<Corner>>,
-    before: Option<Corner>,
-    here: Corner,
-) -> Option<Corner> {
-    let ways = leaving.get_mut(&here)?;
-    let turns_left = |to: &Corner| before.is_some_and(|before| turn(before, here, *to) > 0);
-    let next = ways
-        .iter()
-        .copied()
-        .find(turns_left)
-        .or_else(|| ways.first().copied())?;
-    ways.remove(&next);
-    if ways.is_empty() {
-        leaving.remove(&here);
-    }
-    Some(next)
-}
-
-/// Sign of the turn from `a` over `b` to `c`: 1 left, −1 right, 0 straight.
-fn turn(a: Corner, b: Corner, c: Corner) -> i64 {
-    let step = |from: Corner, to: Corner| {
-        (
-            i64::from(to.0 > from.0) - i64::from(to.0 < from.0),
-            i64::from(to.1 > from.1) - i64::from(to.1 < from.1),
-        )
-    };
-    let (p, q) = (step(a, b), step(b, c));
-    p.0 * q.1 - p.1 * q.0
-}
-
-/// Drops corners that are passed straight on, and starts at the lowest, then leftmost corner.
-pub(crate) fn straighten(corners: &[Corner]) -> Vec<Corner> {
-    let n = corners.len();
-    let mut kept: Vec<Corner> = (0..n)
-        .filter(|&k| turn(corners[(k + n - 1) % n], corners[k], corners[(k + 1) % n]) != 0)
-        .map(|k| corners[k])
-        .collect();
-    let lowest = (0..kept.len())
-        .min_by_key(|&k| (kept[k].1, kept[k].0))
-        .unwrap_or(0);
-    kept.rotate_left(lowest);
-    kept
 }
 
 /// Distance between cells, as a fraction of a cell's width, below which they count as adjacent.
@@ -666,30 +545,6 @@ mod tests {
             let [all, stick, slip] = [None, Some(Zone::Stick), Some(Zone::Slip)].map(|w| total(&outlines(&fields, Some(&zones), w)));
             prop_assert!((stick + slip - all).abs() < 1e-9);
         }
-    }
-
-    fn square(x: usize, y: usize) -> [(Corner, Corner); 4] {
-        let c = [(x, y), (x + 1, y), (x + 1, y + 1), (x, y + 1)];
-        [0, 1, 2, 3].map(|k| (c[k], c[(k + 1) % 4]))
-    }
-
-    #[test]
-    fn squares_that_meet_in_a_corner_stay_two_loops() {
-        let edges = [square(0, 0), square(1, 1)].concat();
-        let loops = chain(edges);
-        assert_eq!(
-            loops,
-            vec![
-                vec![(0, 0), (1, 0), (1, 1), (0, 1)],
-                vec![(1, 1), (2, 1), (2, 2), (1, 2)]
-            ]
-        );
-    }
-
-    #[test]
-    fn corners_passed_straight_on_are_dropped_and_the_lowest_comes_first() {
-        let corners = [(4, 3), (2, 3), (1, 3), (1, 0), (4, 0)];
-        assert_eq!(straighten(&corners), vec![(1, 0), (4, 0), (4, 3), (1, 3)]);
     }
 }
 

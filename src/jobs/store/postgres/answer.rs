@@ -5,14 +5,13 @@ use std::time::Duration;
 use tokio::time::timeout;
 
 use crate::jobs::error::{StorageFault, StoreError};
+use crate::jobs::store::Result;
 
 /// How long a call may take; the server ends its statements before.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(15);
 
 /// Makes a call that ends in any case, also if nothing comes back.
-pub(crate) async fn in_time<T>(
-    call: impl Future<Output = Result<T, StoreError>>,
-) -> Result<T, StoreError> {
+pub(crate) async fn in_time<T>(call: impl Future<Output = Result<T>>) -> Result<T> {
     let answer = timeout(ANSWERED_WITHIN, call).await;
     answer
         .unwrap_or_else(|_| Err(StoreError::timed_out()))

@@ -11,11 +11,10 @@ use std::time::{Duration, Instant};
 use sqlx::Row;
 use sqlx::postgres::{PgConnection, PgRow};
 
-use crate::jobs::error::StoreError;
 use crate::jobs::model::Queue;
-use crate::jobs::store::ClaimRequest;
 use crate::jobs::store::postgres::sql::claim::peek;
 use crate::jobs::store::postgres::sql::rows::count;
+use crate::jobs::store::{ClaimRequest, Result};
 use crate::jobs::sync::lock;
 
 /// Queues that are shorter are counted and walked from their start at every claim.
@@ -92,7 +91,7 @@ impl ClaimMemory {
         &self,
         connection: &mut PgConnection,
         request: &ClaimRequest<'_>,
-    ) -> Result<Vec<PgRow>, StoreError> {
+    ) -> Result<Vec<PgRow>> {
         let places = self.known().places.get(request.queue).cloned();
         if let Some((since, [high, normal, low])) = places
             && since.elapsed() < PLACE_KEPT
@@ -120,12 +119,7 @@ impl ClaimMemory {
     }
 
     /// Remembers where a full group of a long queue began; without one the next claim begins at the start.
-    fn remember(
-        &self,
-        request: &ClaimRequest<'_>,
-        found: &[PgRow],
-        since: Instant,
-    ) -> Result<(), StoreError> {
+    fn remember(&self, request: &ClaimRequest<'_>, found: &[PgRow], since: Instant) -> Result<()> {
         let mut known = self.known();
         let Some((_, mut places)) = known.places.remove(request.queue).or_else(|| {
             let begin = (since, Default::default());
@@ -168,7 +162,7 @@ pub(crate) async fn first_queued(
     peek: &'static str,
     request: &ClaimRequest<'_>,
     most: i64,
-) -> Result<Vec<PgRow>, StoreError> {
+) -> Result<Vec<PgRow>> {
     let rows = sqlx::query(peek)
         .bind(&*request.queue.tenant)
         .bind(most)

@@ -8,13 +8,12 @@ use railhead_macros::repeat_conflicts;
 use sqlx::Row;
 use uuid::Uuid;
 
-use crate::jobs::error::StoreError;
 use crate::jobs::store::postgres::connection::{FOLD, LOCKS};
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::objects::PgObjects;
 use crate::jobs::store::postgres::sql::rows::{count, read_id, read_small};
 use crate::jobs::store::postgres::{engine, notifier};
-use crate::jobs::store::{Cluster, ClusterView, Deployment, Node, Notification};
+use crate::jobs::store::{Cluster, ClusterView, Deployment, Node, Notification, Result};
 
 const NOW: &str = "SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)";
 
@@ -37,11 +36,11 @@ const SWEEP: &str = "DELETE FROM objects WHERE made_at < CAST(extract(epoch FROM
 #[repeat_conflicts]
 #[async_trait]
 impl Cluster for PostgresStore {
-    async fn now(&self) -> Result<i64, StoreError> {
+    async fn now(&self) -> Result<i64> {
         Ok(sqlx::query_scalar(NOW).fetch_one(&self.writer).await?)
     }
 
-    async fn beat(&self, node: &Node) -> Result<ClusterView, StoreError> {
+    async fn beat(&self, node: &Node) -> Result<ClusterView> {
         let now = self.now().await?;
         sqlx::query(
             "INSERT INTO nodes (id, version, workers, seen_at) VALUES ($1, $2, $3, $4) \
@@ -69,7 +68,7 @@ impl Cluster for PostgresStore {
         })
     }
 
-    async fn leave(&self, node: Uuid) -> Result<(), StoreError> {
+    async fn leave(&self, node: Uuid) -> Result<()> {
         sqlx::query("DELETE FROM nodes WHERE id = $1")
             .bind(node.to_string())
             .execute(&self.writer)
@@ -77,7 +76,7 @@ impl Cluster for PostgresStore {
         Ok(())
     }
 
-    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>, StoreError> {
+    async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>> {
         let ids: Vec<String> = running.iter().map(Uuid::to_string).collect();
         let rows = sqlx::query(
             "SELECT id FROM jobs WHERE id = ANY($1) AND state = 'running' AND cancel_requested = 1",
@@ -88,7 +87,7 @@ impl Cluster for PostgresStore {
         rows.iter().map(read_id).collect()
     }
 
-    async fn keep_batches(&self, batches: &[Uuid]) -> Result<(), StoreError> {
+    async fn keep_batches(&self, batches: &[Uuid]) -> Result<()> {
         let ids: Vec<String> = batches.iter().map(Uuid::to_string).collect();
         sqlx::query(
             "UPDATE batches SET filled_until = CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) + $2 \
@@ -101,13 +100,13 @@ impl Cluster for PostgresStore {
         Ok(())
     }
 
-    async fn sweep_objects(&self) -> Result<u64, StoreError> {
+    async fn sweep_objects(&self) -> Result<u64> {
         let swept = sqlx::query(SWEEP).bind(SWEPT_AFTER).execute(&self.writer);
         Ok(swept.await?.rows_affected())
     }
 
     // Somebody else may be at it.
-    async fn fold_counts(&self) -> Result<(), StoreError> {
+    async fn fold_counts(&self) -> Result<()> {
         let mut transaction = self.writer.begin().await?;
         let free: bool = sqlx::query_scalar("SELECT pg_try_advisory_xact_lock($1, $2)")
             .bind(LOCKS)
@@ -134,7 +133,7 @@ impl Cluster for PostgresStore {
         Ok(())
     }
 
-    async fn deployment(&self) -> Result<Deployment, StoreError> {
+    async fn deployment(&self) -> Result<Deployment> {
         let row = sqlx::query(
             "SELECT id, results_place, EXISTS (SELECT 1 FROM blobs WHERE key IS NOT NULL) AS has_results, \
              (SELECT COUNT(*) FROM nodes WHERE seen_at > CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - $1) AS nodes \
@@ -151,7 +150,7 @@ impl Cluster for PostgresStore {
         })
     }
 
-    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool, StoreError> {
+    async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool> {
         let written = sqlx::query(
             "UPDATE deployment SET results_place = $2 WHERE results_place IS NOT DISTINCT FROM $1",
         )
@@ -162,7 +161,7 @@ impl Cluster for PostgresStore {
         Ok(written.rows_affected() > 0)
     }
 
-    async fn take_sweep(&self) -> Result<bool, StoreError> {
+    async fn take_sweep(&self) -> Result<bool> {
         let taken = sqlx::query(
             "WITH clock AS (SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) AS now) \
              UPDATE deployment SET swept_at = clock.now FROM clock WHERE swept_at <= clock.now - $1",
@@ -184,7 +183,7 @@ impl Cluster for PostgresStore {
     }
 
     #[once]
-    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<(), StoreError> {
+    async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<()> {
         match &self.listens_at {
             Some(options) => notifier::listen(options.clone(), heard).await,
             None => std::future::pending().await,
@@ -194,7 +193,7 @@ impl Cluster for PostgresStore {
 
 impl PostgresStore {
     /// The keys of all results outside the table, each once, in order.
-    pub(crate) async fn result_keys(&self) -> Result<Vec<String>, StoreError> {
+    pub(crate) async fn result_keys(&self) -> Result<Vec<String>> {
         let keys = "SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL ORDER BY key";
         let mut connection = self.writer.acquire().await?;
         // For a command of the operator, which may take its time.
@@ -205,7 +204,7 @@ impl PostgresStore {
     }
 
     /// Removes all large results that are in the database.
-    pub(crate) async fn remove_objects(&self) -> Result<(), StoreError> {
+    pub(crate) async fn remove_objects(&self) -> Result<()> {
         sqlx::raw_sql("TRUNCATE objects")
             .execute(&self.writer)
             .await?;

@@ -8,6 +8,7 @@ use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
 use tokio::time::timeout;
 
 use crate::jobs::error::{JobsError, StoreError};
+use crate::jobs::store::Result;
 use crate::jobs::store::postgres::url;
 
 /// How long a call waits for a connection.
@@ -110,7 +111,7 @@ fn tls_failed(error: sqlx::Error) -> JobsError {
 }
 
 /// From here to the end of the transaction nobody else has this lock.
-pub(crate) async fn lock(connection: &mut PgConnection, what: i32) -> Result<(), StoreError> {
+pub(crate) async fn lock(connection: &mut PgConnection, what: i32) -> Result<()> {
     sqlx::query("SELECT pg_advisory_xact_lock($1, $2)")
         .bind(LOCKS)
         .bind(what)

@@ -4,13 +4,13 @@ use std::fmt;
 
 use sqlx::postgres::{PgConnectOptions, PgPool};
 
-use crate::jobs::error::{JobsError, StoreError};
-use crate::jobs::store::NotifyMode;
+use crate::jobs::error::JobsError;
 use crate::jobs::store::postgres::claim_memory::ClaimMemory;
 use crate::jobs::store::postgres::connection::{connect, session};
 use crate::jobs::store::postgres::notifier::Notifier;
 use crate::jobs::store::postgres::schema::require;
 use crate::jobs::store::postgres::sql::submit::GroupCommit;
+use crate::jobs::store::{NotifyMode, Result};
 
 /// The job table that several processes share.
 #[derive(Clone)]
@@ -81,7 +81,7 @@ impl PostgresStore {
     }
 
     /// A round trip; with `write` it writes a value that nobody reads.
-    pub(crate) async fn ready(&self, write: bool) -> Result<(), StoreError> {
+    pub(crate) async fn ready(&self, write: bool) -> Result<()> {
         let statement = match write {
             true => "UPDATE deployment SET touched = touched + 1",
             false => "SELECT 1 FROM deployment",

@@ -14,7 +14,7 @@ use crate::jobs::store::postgres::connection::{ADMISSION, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
 use crate::jobs::store::postgres::sql::claim::{claimed, push_lease_until};
 use crate::jobs::store::postgres::sql::rows::{count, push_list, read_count, read_flag, read_id};
-use crate::jobs::store::{ClaimKind, ClaimRequest, Cluster};
+use crate::jobs::store::{ClaimKind, ClaimRequest, Cluster, Result};
 
 pub(crate) use sqlx::{Row, query, query_scalar};
 
@@ -35,7 +35,7 @@ pub(crate) const LEASE_NOW: (&str, &str) = (
 const REPEATED: u32 = 4;
 
 /// Begins a transaction.
-pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, StoreError> {
+pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>> {
     Ok(pool.begin().await?)
 }
 
@@ -43,8 +43,8 @@ pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>, Sto
 pub(crate) async fn for_each(
     rows: Query<'_, Db, PgArguments>,
     readers: &DbPool,
-    mut row: impl FnMut(&DbRow) -> Result<bool, StoreError> + Send,
-) -> Result<(), StoreError> {
+    mut row: impl FnMut(&DbRow) -> Result<bool> + Send,
+) -> Result<()> {
     let mut rows = rows.fetch(readers);
     while let Some(next) = rows.try_next().await? {
         if !row(&next)? {
@@ -56,15 +56,12 @@ pub(crate) async fn for_each(
 
 /// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key. What the one
 /// before did is seen by the next statement.
-pub(crate) async fn lock_admission(connection: &mut DbConnection) -> Result<(), StoreError> {
+pub(crate) async fn lock_admission(connection: &mut DbConnection) -> Result<()> {
     lock(connection, ADMISSION).await
 }
 
 /// Keeps jobs from being removed until the end of the transaction: another job is about to refer to their results.
-pub(crate) async fn lock_jobs_for_share(
-    connection: &mut DbConnection,
-    ids: &[Uuid],
-) -> Result<(), StoreError> {
+pub(crate) async fn lock_jobs_for_share(connection: &mut DbConnection, ids: &[Uuid]) -> Result<()> {
     let ids: Vec<String> = ids.iter().map(Uuid::to_string).collect();
     sqlx::query("SELECT id FROM jobs WHERE id = ANY($1) ORDER BY id FOR KEY SHARE")
         .bind(ids)
@@ -75,10 +72,7 @@ pub(crate) async fn lock_jobs_for_share(
 
 /// Keeps others from counting the references to blobs until the end of the transaction. Of two who drop the last two
 /// references at the same time, the later sees that the other one is gone.
-pub(crate) async fn lock_blobs(
-    connection: &mut DbConnection,
-    ids: &[i64],
-) -> Result<(), StoreError> {
+pub(crate) async fn lock_blobs(connection: &mut DbConnection, ids: &[i64]) -> Result<()> {
     sqlx::query("SELECT id FROM blobs WHERE id = ANY($1) ORDER BY id FOR UPDATE")
         .bind(ids)
         .fetch_all(connection)
@@ -92,7 +86,7 @@ impl PostgresStore {
         &self,
         connection: &mut DbConnection,
         number: usize,
-    ) -> Result<Vec<i64>, StoreError> {
+    ) -> Result<Vec<i64>> {
         let ids = sqlx::query_scalar(
             "SELECT nextval('blob_ids') FROM generate_series(1, CAST($1 AS bigint))",
         )
@@ -107,7 +101,7 @@ impl PostgresStore {
         &self,
         request: &ClaimRequest<'_>,
         token: i64,
-    ) -> Result<Vec<DbRow>, StoreError> {
+    ) -> Result<Vec<DbRow>> {
         let mut transaction = begin(&self.writer).await?;
         let queued = match request.kind {
             ClaimKind::New => self.claim_memory.peek(&mut transaction, request).await?,
@@ -160,7 +154,7 @@ impl PostgresStore {
     }
 
     /// Size of the database.
-    pub(crate) async fn database_bytes(&self) -> Result<u64, StoreError> {
+    pub(crate) async fn database_bytes(&self) -> Result<u64> {
         let bytes: i64 = sqlx::query_scalar("SELECT pg_database_size(current_database())")
             .fetch_one(&self.readers)
             .await?;
@@ -168,16 +162,14 @@ impl PostgresStore {
     }
 
     /// The server gives space back by itself.
-    pub(crate) async fn compact(&self, _: i64, _: u32) -> Result<bool, StoreError> {
+    pub(crate) async fn compact(&self, _: i64, _: u32) -> Result<bool> {
         Ok(false)
     }
 }
 
 /// Makes a call, and makes it again if it was the one that had to give way to another transaction, or if a row that it was about
 /// to remove was referred to meanwhile: in both cases nothing of it was done.
-pub(crate) async fn again<T, F: Future<Output = Result<T, StoreError>>>(
-    call: impl Fn() -> F,
-) -> Result<T, StoreError> {
+pub(crate) async fn again<T, F: Future<Output = Result<T>>>(call: impl Fn() -> F) -> Result<T> {
     for _ in 0..REPEATED {
         match in_time(call()).await {
             Err(error) if gave_way(&error) => tracing::debug!(%error, "made again"),
@@ -200,7 +192,7 @@ fn gave_way(error: &StoreError) -> bool {
 }
 
 /// The ids of the next group: the first of the queued jobs together with those behind it that are small enough.
-fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>, StoreError> {
+fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>> {
     let mut ids = Vec::with_capacity(queued.len());
     let mut cost_us = 0;
     for row in queued {

@@ -3,7 +3,8 @@
 use sqlx::postgres::PgConnection;
 use sqlx::{AssertSqlSafe, Connection};
 
-use crate::jobs::error::{JobsError, StoreError};
+use crate::jobs::error::JobsError;
+use crate::jobs::store::Result;
 use crate::jobs::store::portion::{Portion, TABLES, Values};
 use crate::jobs::store::postgres::connection::{ADMISSION, lock};
 use crate::jobs::store::postgres::database::PostgresStore;
@@ -65,11 +66,7 @@ async fn require_empty(connection: &mut PgConnection) -> Result<(), JobsError> {
     }
 }
 
-async fn insert(
-    connection: &mut PgConnection,
-    table: &str,
-    portion: Portion,
-) -> Result<(), StoreError> {
+async fn insert(connection: &mut PgConnection, table: &str, portion: Portion) -> Result<()> {
     let (mut names, mut arrays) = (Vec::new(), Vec::new());
     for (place, (name, values)) in portion.columns.iter().enumerate() {
         let kind = match values {

@@ -8,9 +8,8 @@ use tokio::sync::mpsc;
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use crate::jobs::error::StoreError;
-use crate::jobs::store::Notification;
 use crate::jobs::store::postgres::answer::in_time;
+use crate::jobs::store::{Notification, Result};
 
 /// The channel of all nodes.
 const CHANNEL: &str = "railhead";
@@ -96,7 +95,7 @@ fn read(word: &str) -> Option<Notification> {
 pub(crate) async fn listen(
     options: PgConnectOptions,
     heard: &(dyn Fn(Notification) + Send + Sync),
-) -> Result<(), StoreError> {
+) -> Result<()> {
     let mut listener = in_time(async {
         let pool = sqlx::postgres::PgPoolOptions::new()
             .max_connections(1)

@@ -20,8 +20,8 @@ use super::submit::{Places, insert_jobs};
 use crate::jobs::error::StoreError;
 use crate::jobs::model::{Batch, BatchItem, ItemResult, Kind, RunRecord, State, created_at};
 use crate::jobs::store::{
-    BatchBegun, Batches, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Refusal, Total,
-    first_id_at,
+    BatchBegun, Batches, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Refusal, Result,
+    Total, first_id_at,
 };
 
 const CANCEL: &str = concat!(
@@ -45,7 +45,7 @@ impl Batches for SqlStore {
         tenant: &str,
         most: u32,
         bounds: QueueBounds,
-    ) -> Result<Result<u32, Refusal>, StoreError> {
+    ) -> Result<Result<u32, Refusal>> {
         let mut transaction = engine::begin(&self.writer).await?;
         engine::lock_admission(&mut transaction).await?;
         let mut places = Places::of(&mut transaction, [tenant], bounds).await?;
@@ -74,7 +74,7 @@ impl Batches for SqlStore {
         &self,
         new: &NewBatch,
         filled_here: FilledHere<'_>,
-    ) -> Result<Option<BatchBegun>, StoreError> {
+    ) -> Result<Option<BatchBegun>> {
         let mut connection = self.readers.acquire().await?;
         by_key(&mut connection, new, filled_here).await
     }
@@ -84,7 +84,7 @@ impl Batches for SqlStore {
         new: &NewBatch,
         filled_here: FilledHere<'_>,
         bounds: QueueBounds,
-    ) -> Result<BatchBegun, StoreError> {
+    ) -> Result<BatchBegun> {
         let mut transaction = engine::begin(&self.writer).await?;
         engine::lock_admission(&mut transaction).await?;
         if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
@@ -148,11 +148,7 @@ impl Batches for SqlStore {
         Ok(BatchBegun::Created)
     }
 
-    async fn fill_batch(
-        &self,
-        batch: Uuid,
-        jobs: &[(u32, NewJob)],
-    ) -> Result<Vec<Uuid>, StoreError> {
+    async fn fill_batch(&self, batch: Uuid, jobs: &[(u32, NewJob)]) -> Result<Vec<Uuid>> {
         let jobs: Vec<_> = jobs
             .iter()
             .map(|(index, job)| (Some(*index), job))
@@ -173,7 +169,7 @@ impl Batches for SqlStore {
         Ok(ended)
     }
 
-    async fn complete_batch(&self, id: Uuid) -> Result<(), StoreError> {
+    async fn complete_batch(&self, id: Uuid) -> Result<()> {
         let complete =
             query("UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0")
                 .bind(id.to_string())
@@ -182,7 +178,7 @@ impl Batches for SqlStore {
         require_batch(id, complete.rows_affected())
     }
 
-    async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool, StoreError> {
+    async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool> {
         let mut transaction = engine::begin(&self.writer).await?;
         for statement in [
             "UPDATE batches SET reserved = 0, dropped = 1 WHERE id = $1 AND complete = 0 AND dropped = 0",
@@ -214,7 +210,7 @@ impl Batches for SqlStore {
         Ok(last)
     }
 
-    async fn unfinished_batches(&self) -> Result<Vec<Uuid>, StoreError> {
+    async fn unfinished_batches(&self) -> Result<Vec<Uuid>> {
         let rows = query(concat!(
             "SELECT id FROM batches WHERE complete = 0 AND ",
             being_filled!(),
@@ -231,7 +227,7 @@ impl Batches for SqlStore {
         id: Uuid,
         limit: u32,
         now: i64,
-    ) -> Result<Vec<(Uuid, State)>, StoreError> {
+    ) -> Result<Vec<(Uuid, State)>> {
         let mut transaction = engine::begin(&self.writer).await?;
         let rows = query(CANCEL)
             .bind(now)
@@ -247,7 +243,7 @@ impl Batches for SqlStore {
             .collect()
     }
 
-    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool, StoreError> {
+    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool> {
         let mut transaction = engine::begin(&self.writer).await?;
         let gone = query(
             "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
@@ -282,7 +278,7 @@ impl Batches for SqlStore {
         after: Option<Uuid>,
         limit: u32,
         bytes: usize,
-    ) -> Result<Vec<BatchItem>, StoreError> {
+    ) -> Result<Vec<BatchItem>> {
         let rows = query(concat!(
             "SELECT ",
             job_columns!(),
@@ -313,12 +309,7 @@ impl Batches for SqlStore {
         Ok(items)
     }
 
-    async fn batch_label_keys(
-        &self,
-        tenant: &str,
-        id: Uuid,
-        limit: u32,
-    ) -> Result<Vec<String>, StoreError> {
+    async fn batch_label_keys(&self, tenant: &str, id: Uuid, limit: u32) -> Result<Vec<String>> {
         let rows = query(concat!(
             "SELECT DISTINCT label.key AS key FROM jobs, ",
             pairs_of_labels!(),
@@ -342,7 +333,7 @@ impl Batches for SqlStore {
         filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Page<Batch>, StoreError> {
+    ) -> Result<Page<Batch>> {
         let mut query = page_query(tenant, filter, after);
         query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
         let mut rows = query.build().fetch_all(&self.readers).await?;
@@ -358,7 +349,7 @@ impl Batches for SqlStore {
         })
     }
 
-    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>, StoreError> {
+    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>> {
         let mut query = QueryBuilder::new("SELECT ");
         query
             .push(COLUMNS)
@@ -373,7 +364,7 @@ impl Batches for SqlStore {
         Ok(self.with_counts(&rows).await?.pop())
     }
 
-    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>, StoreError> {
+    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>> {
         let row = query(GET_RUN)
             .bind(id.to_string())
             .bind(tenant)
@@ -392,7 +383,7 @@ impl Batches for SqlStore {
 }
 
 /// Stores the idempotency key of a batch. A key that is still there belongs to the rest of a batch that failed.
-async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<(), StoreError> {
+async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<()> {
     let Some((key, digest)) = &new.idempotency else {
         return Ok(());
     };
@@ -410,11 +401,7 @@ async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<(), S
     Ok(())
 }
 
-async fn has_template(
-    connection: &mut DbConnection,
-    tenant: &str,
-    digest: &[u8],
-) -> Result<bool, StoreError> {
+async fn has_template(connection: &mut DbConnection, tenant: &str, digest: &[u8]) -> Result<bool> {
     let found = query("SELECT 1 FROM templates WHERE tenant = $1 AND digest = $2")
         .bind(tenant)
         .bind(digest)
@@ -424,7 +411,7 @@ async fn has_template(
 }
 
 /// What was given up is not filled any more.
-fn require_batch(id: Uuid, found: u64) -> Result<(), StoreError> {
+fn require_batch(id: Uuid, found: u64) -> Result<()> {
     match found {
         0 => Err(StoreError::Failed(Arc::new(std::io::Error::other(
             format!("batch {id} was given up"),
@@ -437,7 +424,7 @@ async fn by_key(
     connection: &mut DbConnection,
     new: &NewBatch,
     filled_here: FilledHere<'_>,
-) -> Result<Option<BatchBegun>, StoreError> {
+) -> Result<Option<BatchBegun>> {
     let Some((key, digest)) = &new.idempotency else {
         return Ok(None);
     };
@@ -472,7 +459,7 @@ const EXAMINED_MAX: i64 = 10_000;
 const COLUMNS: &str = "id, tenant, kind, created_at, count, rejected, name, labels, ended_at";
 
 impl SqlStore {
-    async fn count_batches(&self, tenant: &str, filter: &Filter) -> Result<Total, StoreError> {
+    async fn count_batches(&self, tenant: &str, filter: &Filter) -> Result<Total> {
         let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
         push_page(&mut query, "id", tenant, filter, None);
         query.push(" LIMIT ").push_bind(EXAMINED_MAX);
@@ -485,7 +472,7 @@ impl SqlStore {
         })
     }
 
-    async fn with_counts(&self, rows: &[DbRow]) -> Result<Vec<Batch>, StoreError> {
+    async fn with_counts(&self, rows: &[DbRow]) -> Result<Vec<Batch>> {
         if rows.is_empty() {
             return Ok(Vec::new());
         }

@@ -10,8 +10,7 @@ use uuid::Uuid;
 
 use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query_scalar};
 use super::rows::{count, fence, push_list, read_blob_ids, read_id, read_small, read_state};
-use crate::jobs::error::StoreError;
-use crate::jobs::store::{Claim, Orphans, ResultKeys, StoredResult};
+use crate::jobs::store::{Claim, Orphans, Result, ResultKeys, StoredResult};
 
 /// Values bound in one statement; far below the bound of SQLite.
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;
@@ -23,7 +22,7 @@ impl SqlStore {
         &self,
         connection: &mut DbConnection,
         results: &[(&Claim, &StoredResult)],
-    ) -> Result<Vec<i64>, StoreError> {
+    ) -> Result<Vec<i64>> {
         if results.is_empty() {
             return Ok(Vec::new());
         }
@@ -60,10 +59,7 @@ impl SqlStore {
 }
 
 /// Removes those of these blobs that nothing refers to any more; the keys of the large ones enter the outbox.
-pub(crate) async fn release_blobs(
-    connection: &mut DbConnection,
-    mut ids: Vec<i64>,
-) -> Result<(), StoreError> {
+pub(crate) async fn release_blobs(connection: &mut DbConnection, mut ids: Vec<i64>) -> Result<()> {
     ids.sort_unstable();
     ids.dedup();
     for some in ids.chunks(VALUES_PER_STATEMENT) {
@@ -93,7 +89,7 @@ pub(crate) async fn release_blobs(
 pub(crate) async fn drop_slices_of_ended(
     connection: &mut DbConnection,
     rows: &[DbRow],
-) -> Result<(), StoreError> {
+) -> Result<()> {
     let mut ids = Vec::new();
     for row in rows {
         let slices: u32 = read_small(row, "slices")?;
@@ -116,7 +112,7 @@ pub(crate) async fn drop_slices_of_ended(
 pub(crate) async fn leave_to_collector(
     connection: &mut DbConnection,
     keys: &[String],
-) -> Result<(), StoreError> {
+) -> Result<()> {
     for some in keys.chunks(VALUES_PER_STATEMENT) {
         let mut leave = QueryBuilder::new("WITH gone (key) AS (");
         leave.push_values(some, |mut row, key| {
@@ -142,7 +138,7 @@ pub(crate) fn push_keys(query: &mut QueryBuilder, keys: &[String]) {
 #[repeat_conflicts]
 #[async_trait]
 impl ResultKeys for SqlStore {
-    async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>, StoreError> {
+    async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>> {
         for some in done.chunks(VALUES_PER_STATEMENT) {
             let mut forget = QueryBuilder::new("DELETE FROM blob_outbox WHERE key IN (");
             push_keys(&mut forget, some);
@@ -155,12 +151,12 @@ impl ResultKeys for SqlStore {
         Ok(keys)
     }
 
-    async fn abandon_blob(&self, key: &str) -> Result<(), StoreError> {
+    async fn abandon_blob(&self, key: &str) -> Result<()> {
         let mut connection = self.writer.acquire().await?;
         leave_to_collector(&mut connection, &[key.to_owned()]).await
     }
 
-    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans, StoreError> {
+    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans> {
         let mut orphans = Orphans::default();
         for some in results.chunks(VALUES_PER_STATEMENT) {
             // In this order: what a running job has written is known by its key before the job no longer runs.
@@ -184,7 +180,7 @@ impl ResultKeys for SqlStore {
 }
 
 impl SqlStore {
-    async fn running(&self, results: &[(Uuid, String)]) -> Result<HashSet<Uuid>, StoreError> {
+    async fn running(&self, results: &[(Uuid, String)]) -> Result<HashSet<Uuid>> {
         let mut query =
             QueryBuilder::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");
         let ids: Vec<Uuid> = results.iter().map(|(id, _)| *id).collect();

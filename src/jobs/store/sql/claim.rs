@@ -17,8 +17,8 @@ use super::rows::{
 use crate::jobs::error::StoreError;
 use crate::jobs::model::{Queue, State};
 use crate::jobs::store::{
-    Claim, ClaimRequest, ClaimedCase, Claims, Lease, NewSlice, ReleaseReason, Renewal, SliceRecord,
-    StoredCase, StoredResult,
+    Claim, ClaimRequest, ClaimedCase, Claims, Lease, NewSlice, ReleaseReason, Renewal, Result,
+    SliceRecord, StoredCase, StoredResult,
 };
 
 /// Selects the first jobs of the queue $1 and $5, at most `$most`; suspects if `$suspects` is 1.
@@ -53,7 +53,7 @@ pub(crate) const QUEUES: &str = "SELECT tenant, kind, CAST(SUM(number) AS bigint
 #[repeat_conflicts]
 #[async_trait]
 impl Claims for SqlStore {
-    async fn queues(&self) -> Result<Vec<(Queue, u64)>, StoreError> {
+    async fn queues(&self) -> Result<Vec<(Queue, u64)>> {
         if let Some(known) = self.known_queues() {
             return Ok(known);
         }
@@ -67,15 +67,12 @@ impl Claims for SqlStore {
             };
             Ok((queue, read_count(row, "waiting")?))
         };
-        let queues = rows
-            .iter()
-            .map(read)
-            .collect::<Result<Vec<_>, StoreError>>()?;
+        let queues = rows.iter().map(read).collect::<Result<Vec<_>>>()?;
         self.remember_queues(&queues);
         Ok(queues)
     }
 
-    async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>, StoreError> {
+    async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>> {
         let mut claims = Vec::with_capacity(request.jobs);
         for row in &self.claim_next(request, new_token()?).await? {
             let rank: i64 = row.try_get("rank")?;
@@ -85,7 +82,7 @@ impl Claims for SqlStore {
         Ok(claims.into_iter().map(|(_, claim)| claim).collect())
     }
 
-    async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>, StoreError> {
+    async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>> {
         if ids.is_empty() {
             return Ok(HashMap::new());
         }
@@ -134,11 +131,7 @@ impl Claims for SqlStore {
         Ok(cases)
     }
 
-    async fn renew(
-        &self,
-        claims: &[(&Claim, f64)],
-        lease: Lease,
-    ) -> Result<Vec<Renewal>, StoreError> {
+    async fn renew(&self, claims: &[(&Claim, f64)], lease: Lease) -> Result<Vec<Renewal>> {
         if claims.is_empty() {
             return Ok(Vec::new());
         }
@@ -178,7 +171,7 @@ impl Claims for SqlStore {
         claims: &[Claim],
         why: ReleaseReason,
         now: i64,
-    ) -> Result<Vec<(Uuid, State)>, StoreError> {
+    ) -> Result<Vec<(Uuid, State)>> {
         if claims.is_empty() {
             return Ok(Vec::new());
         }
@@ -220,7 +213,7 @@ impl Claims for SqlStore {
             .collect()
     }
 
-    async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool, StoreError> {
+    async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool> {
         let id = claim.id.to_string();
         let note = &slice.note;
         let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
@@ -278,7 +271,7 @@ impl Claims for SqlStore {
         Ok(true)
     }
 
-    async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>, StoreError> {
+    async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>> {
         let rows = query(NOTES)
             .bind(id.to_string())
             .fetch_all(&self.readers)
@@ -295,7 +288,7 @@ impl Claims for SqlStore {
             .collect()
     }
 
-    async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>, StoreError> {
+    async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>> {
         let rows = query(RESULTS)
             .bind(id.to_string())
             .fetch_all(&self.readers)
@@ -315,7 +308,7 @@ impl Claims for SqlStore {
 }
 
 /// A token that no other claim has, not even after the database was restored from a backup.
-fn new_token() -> Result<i64, StoreError> {
+fn new_token() -> Result<i64> {
     let random = getrandom::u64().map_err(|error| StoreError::Failed(Arc::new(error)))?;
     Ok(count(random >> 1))
 }
@@ -328,7 +321,7 @@ pub(crate) fn push_lease_until(query: &mut QueryBuilder, store: &SqlStore, lease
     query.push_bind(lease.ms);
 }
 
-fn read_claim(row: &DbRow) -> Result<Claim, StoreError> {
+fn read_claim(row: &DbRow) -> Result<Claim> {
     Ok(Claim {
         id: read_id(row)?,
         attempt: read_small(row, "attempt")?,
@@ -343,7 +336,7 @@ fn read_claim(row: &DbRow) -> Result<Claim, StoreError> {
 
 impl SqlStore {
     /// The template of a batch, and the head of a run.
-    async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>, StoreError> {
+    async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>> {
         let row = query(
             "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
              WHERE batches.id = $1",

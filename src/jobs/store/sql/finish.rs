@@ -9,9 +9,8 @@ use uuid::Uuid;
 use super::blobs::{drop_slices_of_ended, leave_to_collector, release_blobs};
 use super::engine::{self, DbConnection, DbRow, QueryBuilder, SqlStore};
 use super::rows::{fence, read_cache_key, read_id, read_move, read_optional_id, to_json};
-use crate::jobs::error::StoreError;
 use crate::jobs::model::State;
-use crate::jobs::store::{CacheKey, Claim, Ending, Ends, NewJob, StoredResult};
+use crate::jobs::store::{CacheKey, Claim, Ending, Ends, NewJob, Result, StoredResult};
 
 /// One seek in the index, however many jobs have the same key.
 pub(crate) const SOURCE: &str =
@@ -22,7 +21,7 @@ pub(crate) const SOURCE: &str =
 pub(crate) async fn end_with_sources(
     connection: &mut DbConnection,
     jobs: impl Iterator<Item = &NewJob>,
-) -> Result<Vec<Uuid>, StoreError> {
+) -> Result<Vec<Uuid>> {
     let pairs: Vec<_> = jobs
         .filter_map(|job| {
             let (source, at) = job.source?;
@@ -47,10 +46,7 @@ pub(crate) struct Pair {
 }
 
 /// Ends jobs that are queued, or running under the given lease; returns them.
-pub(crate) async fn end_pairs(
-    connection: &mut DbConnection,
-    pairs: &[Pair],
-) -> Result<Vec<Uuid>, StoreError> {
+pub(crate) async fn end_pairs(connection: &mut DbConnection, pairs: &[Pair]) -> Result<Vec<Uuid>> {
     if pairs.is_empty() {
         return Ok(Vec::new());
     }
@@ -91,7 +87,7 @@ impl SqlStore {
         connection: &mut DbConnection,
         rows: &[(&Claim, EndRow<'_>)],
         now: i64,
-    ) -> Result<(Vec<i64>, Vec<DbRow>), StoreError> {
+    ) -> Result<(Vec<i64>, Vec<DbRow>)> {
         if rows.is_empty() {
             return Ok((Vec::new(), Vec::new()));
         }
@@ -133,7 +129,7 @@ impl SqlStore {
 }
 
 /// The jobs that ended.
-fn read_ended(rows: &[DbRow]) -> Result<HashSet<Uuid>, StoreError> {
+fn read_ended(rows: &[DbRow]) -> Result<HashSet<Uuid>> {
     rows.iter()
         .map(|row| Ok(read_move(row, State::Running)?.0))
         .collect()
@@ -142,11 +138,7 @@ fn read_ended(rows: &[DbRow]) -> Result<HashSet<Uuid>, StoreError> {
 #[repeat_conflicts]
 #[async_trait]
 impl Ends for SqlStore {
-    async fn finish(
-        &self,
-        ends: &[(Claim, Ending)],
-        now: i64,
-    ) -> Result<HashSet<Uuid>, StoreError> {
+    async fn finish(&self, ends: &[(Claim, Ending)], now: i64) -> Result<HashSet<Uuid>> {
         if ends.is_empty() {
             return Ok(HashSet::new());
         }
@@ -166,7 +158,7 @@ impl Ends for SqlStore {
             .iter()
             .filter(|(_, ending)| !matches!(ending, Ending::Cached { .. }))
             .map(|(claim, ending)| Ok((claim, EndRow::of(ending)?)))
-            .collect::<Result<Vec<_>, StoreError>>()?;
+            .collect::<Result<Vec<_>>>()?;
         let mut transaction = engine::begin(&self.writer).await?;
         let (made, rows_ended) = self.end_solved(&mut transaction, &rows, now).await?;
         drop_slices_of_ended(&mut transaction, &rows_ended).await?;
@@ -186,7 +178,7 @@ impl Ends for SqlStore {
         Ok(ended)
     }
 
-    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>, StoreError> {
+    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>> {
         if keys.is_empty() {
             return Ok(HashMap::new());
         }
@@ -217,7 +209,7 @@ pub(crate) struct EndRow<'a> {
 }
 
 impl EndRow<'_> {
-    pub(crate) fn of(ending: &Ending) -> Result<EndRow<'_>, StoreError> {
+    pub(crate) fn of(ending: &Ending) -> Result<EndRow<'_>> {
         let mut row = EndRow {
             state: State::Cancelled,
             remarks: "[]".to_owned(),

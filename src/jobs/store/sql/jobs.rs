@@ -12,16 +12,15 @@ use super::rows::{
     GET, job_columns, read_blob_id, read_count, read_flag, read_id, read_job, read_kind,
     read_optional_id, read_small,
 };
-use crate::jobs::error::StoreError;
 use crate::jobs::model::{Job, State};
 use crate::jobs::store::{
-    Change, ClientJobs, Deleted, Filter, Page, ResultRef, StoredCase, StoredResult, Total,
+    Change, ClientJobs, Deleted, Filter, Page, Result, ResultRef, StoredCase, StoredResult, Total,
 };
 
 #[repeat_conflicts]
 #[async_trait]
 impl ClientJobs for SqlStore {
-    async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>, StoreError> {
+    async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>> {
         let mut transaction = engine::begin(&self.writer).await?;
         let row = query(concat!(
             "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
@@ -44,7 +43,7 @@ impl ClientJobs for SqlStore {
         }
     }
 
-    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted, StoreError> {
+    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted> {
         let mut transaction = engine::begin(&self.writer).await?;
         let gone = query(
             "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND kind <> 'rows' AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
@@ -63,7 +62,7 @@ impl ClientJobs for SqlStore {
         Ok(job.map_or(Deleted::NotFound, |job| Deleted::NotEnded(job.state)))
     }
 
-    async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>, StoreError> {
+    async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>> {
         let row = query(GET)
             .bind(id.to_string())
             .bind(tenant)
@@ -72,11 +71,7 @@ impl ClientJobs for SqlStore {
         row.as_ref().map(read_job).transpose()
     }
 
-    async fn result(
-        &self,
-        tenant: &str,
-        id: Uuid,
-    ) -> Result<Option<(Job, Option<ResultRef>)>, StoreError> {
+    async fn result(&self, tenant: &str, id: Uuid) -> Result<Option<(Job, Option<ResultRef>)>> {
         let row = query(concat!(
             "SELECT ",
             job_columns!(),
@@ -106,7 +101,7 @@ impl ClientJobs for SqlStore {
         Ok(Some((job, Some(stored))))
     }
 
-    async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>, StoreError> {
+    async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>> {
         let row = query(
             "SELECT jobs.kind, cases.row, cases.body, head, templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
              LEFT JOIN batches ON batches.id = jobs.batch_id \
@@ -138,7 +133,7 @@ impl ClientJobs for SqlStore {
         filter: &Filter,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Page<Job>, StoreError> {
+    ) -> Result<Page<Job>> {
         let (mut jobs, mut looked_to) = (Vec::new(), None);
         for state in walked(filter) {
             let mut query = page_query(tenant, filter, state, after, limit);
@@ -178,7 +173,7 @@ impl ClientJobs for SqlStore {
         since: i64,
         after: Option<Uuid>,
         limit: u32,
-    ) -> Result<Vec<Change>, StoreError> {
+    ) -> Result<Vec<Change>> {
         let rows = query(CHANGES)
             .bind(tenant)
             .bind(since)
@@ -204,7 +199,7 @@ const EXAMINED_MAX: i64 = 20_000;
 const COUNTED: i64 = 1_000;
 
 impl SqlStore {
-    async fn count(&self, tenant: &str, filter: &Filter) -> Result<Total, StoreError> {
+    async fn count(&self, tenant: &str, filter: &Filter) -> Result<Total> {
         let restricted = filter.member.is_some()
             || !filter.labels.is_empty()
             || filter.created_after.or(filter.created_before).is_some();

@@ -9,7 +9,8 @@ use super::rows::{read_count, read_flag, read_json, to_json};
 use crate::jobs::error::StoreError;
 use crate::jobs::model::Key;
 use crate::jobs::store::{
-    KeyStore, Page, ProfileCursor, ProfileEntry, ProfileKept, Profiles, StoredProfile, Total,
+    KeyStore, Page, ProfileCursor, ProfileEntry, ProfileKept, Profiles, Result, StoredProfile,
+    Total,
 };
 
 const ALL: &str =
@@ -20,7 +21,7 @@ const ONE: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_o
 #[repeat_conflicts]
 #[async_trait]
 impl KeyStore for SqlStore {
-    async fn add_key(&self, key: &Key) -> Result<(), StoreError> {
+    async fn add_key(&self, key: &Key) -> Result<()> {
         query(
             "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
         )
@@ -37,19 +38,19 @@ impl KeyStore for SqlStore {
         Ok(())
     }
 
-    async fn key(&self, id: &str) -> Result<Option<Key>, StoreError> {
+    async fn key(&self, id: &str) -> Result<Option<Key>> {
         let row = query(ONE).bind(id).fetch_optional(&self.readers).await?;
         row.as_ref().map(read_key).transpose()
     }
 
-    async fn keys(&self) -> Result<Vec<Key>, StoreError> {
+    async fn keys(&self) -> Result<Vec<Key>> {
         let rows = query(ALL).fetch_all(&self.readers).await?;
         let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
         keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
         Ok(keys)
     }
 
-    async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>, StoreError> {
+    async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>> {
         query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
             .bind(now)
             .bind(id)
@@ -59,7 +60,7 @@ impl KeyStore for SqlStore {
     }
 }
 
-fn read_key(row: &DbRow) -> Result<Key, StoreError> {
+fn read_key(row: &DbRow) -> Result<Key> {
     let hash: Vec<u8> = row.try_get("hash")?;
     let tenant: String = row.try_get("tenant")?;
     Ok(Key {
@@ -83,7 +84,7 @@ impl Profiles for SqlStore {
         tenant: &str,
         new: &StoredProfile,
         max_bytes: u64,
-    ) -> Result<ProfileKept, StoreError> {
+    ) -> Result<ProfileKept> {
         let mut transaction = engine::begin(&self.writer).await?;
         engine::lock_admission(&mut transaction).await?;
         let known = query(
@@ -120,11 +121,7 @@ impl Profiles for SqlStore {
         Ok(ProfileKept::Added)
     }
 
-    async fn profile(
-        &self,
-        tenant: &str,
-        digest: &str,
-    ) -> Result<Option<StoredProfile>, StoreError> {
+    async fn profile(&self, tenant: &str, digest: &str) -> Result<Option<StoredProfile>> {
         let row = query(
             "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
         )
@@ -140,7 +137,7 @@ impl Profiles for SqlStore {
         tenant: &str,
         after: Option<&ProfileCursor>,
         limit: u32,
-    ) -> Result<Page<ProfileEntry>, StoreError> {
+    ) -> Result<Page<ProfileEntry>> {
         let mut query =
             QueryBuilder::new("SELECT digest, bytes, created_at FROM profiles WHERE tenant = ");
         query.push_bind(tenant.to_owned());
@@ -160,7 +157,7 @@ impl Profiles for SqlStore {
                 created_at: row.try_get("created_at")?,
             })
         };
-        let entries: Result<Vec<_>, StoreError> = rows.iter().map(read).collect();
+        let entries: Result<Vec<_>> = rows.iter().map(read).collect();
         let mut entries = entries?;
         let more = entries.len() > limit as usize;
         entries.truncate(limit as usize);
@@ -173,7 +170,7 @@ impl Profiles for SqlStore {
         })
     }
 
-    async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool, StoreError> {
+    async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool> {
         let gone = query("DELETE FROM profiles WHERE tenant = $1 AND digest = $2")
             .bind(tenant)
             .bind(digest)
@@ -183,7 +180,7 @@ impl Profiles for SqlStore {
     }
 }
 
-fn read_profile(row: &DbRow) -> Result<StoredProfile, StoreError> {
+fn read_profile(row: &DbRow) -> Result<StoredProfile> {
     let body: Vec<u8> = row.try_get("body")?;
     Ok(StoredProfile {
         digest: row.try_get("digest")?,

@@ -7,7 +7,7 @@ use uuid::Uuid;
 use super::engine::{DbRow, QueryBuilder, Row};
 use crate::jobs::error::StoreError;
 use crate::jobs::model::{Job, Kind, Priority, State};
-use crate::jobs::store::{CacheKey, Claim};
+use crate::jobs::store::{CacheKey, Claim, Result};
 
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {
@@ -18,7 +18,7 @@ macro_rules! job_columns {
 pub(crate) use job_columns;
 
 /// Reads a row that has the columns of `job_columns`.
-pub(crate) fn read_job(row: &DbRow) -> Result<Job, StoreError> {
+pub(crate) fn read_job(row: &DbRow) -> Result<Job> {
     Ok(Job {
         id: read_id(row)?,
         tenant: row.try_get("tenant")?,
@@ -48,20 +48,20 @@ pub(crate) fn read_job(row: &DbRow) -> Result<Job, StoreError> {
     })
 }
 
-pub(crate) fn read_id(row: &DbRow) -> Result<Uuid, StoreError> {
+pub(crate) fn read_id(row: &DbRow) -> Result<Uuid> {
     let id = read_optional_id(row, "id")?;
     id.ok_or_else(|| StoreError::Corrupt("a row without an id".to_owned()))
 }
 
 /// An id, if the row has one.
-pub(crate) fn read_optional_id(row: &DbRow, column: &str) -> Result<Option<Uuid>, StoreError> {
+pub(crate) fn read_optional_id(row: &DbRow, column: &str) -> Result<Option<Uuid>> {
     let text: Option<String> = row.try_get(column)?;
     let id = text.as_deref().map(Uuid::try_parse).transpose();
     id.map_err(|error| StoreError::Corrupt(format!("{column} {text:?}: {error}")))
 }
 
 /// The key of identical cases, if the row has one.
-pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>, StoreError> {
+pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>> {
     let key: Option<Vec<u8>> = row.try_get("cache_key")?;
     key.map(CacheKey::try_from)
         .transpose()
@@ -69,13 +69,13 @@ pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>, StoreError
 }
 
 /// The blob a row refers to.
-pub(crate) fn read_blob_id(row: &DbRow) -> Result<Option<i64>, StoreError> {
+pub(crate) fn read_blob_id(row: &DbRow) -> Result<Option<i64>> {
     let id = row.try_get("blob_id")?;
     Ok(id)
 }
 
 /// The blobs that rows refer to.
-pub(crate) fn read_blob_ids(rows: &[DbRow]) -> Result<Vec<i64>, StoreError> {
+pub(crate) fn read_blob_ids(rows: &[DbRow]) -> Result<Vec<i64>> {
     let ids = rows
         .iter()
         .map(read_blob_id)
@@ -84,44 +84,44 @@ pub(crate) fn read_blob_ids(rows: &[DbRow]) -> Result<Vec<i64>, StoreError> {
 }
 
 /// The kind of the work in a row.
-pub(crate) fn read_kind(row: &DbRow) -> Result<Kind, StoreError> {
+pub(crate) fn read_kind(row: &DbRow) -> Result<Kind> {
     let name: String = row.try_get("kind")?;
     Kind::from_name(&name).ok_or_else(|| StoreError::Corrupt(format!("kind {name:?}")))
 }
 
-pub(crate) fn read_state(row: &DbRow) -> Result<State, StoreError> {
+pub(crate) fn read_state(row: &DbRow) -> Result<State> {
     let name: String = row.try_get("state")?;
     State::from_name(&name).ok_or_else(|| StoreError::Corrupt(format!("job state {name:?}")))
 }
 
 /// The id of a row and its state, into which a job that was in `from` has moved.
-pub(crate) fn read_move(row: &DbRow, from: State) -> Result<(Uuid, State), StoreError> {
+pub(crate) fn read_move(row: &DbRow, from: State) -> Result<(Uuid, State)> {
     let to = read_state(row)?;
     debug_assert!(from.may_become(to), "{from:?} became {to:?}");
     Ok((read_id(row)?, to))
 }
 
-pub(crate) fn read_count(row: &DbRow, column: &str) -> Result<u64, StoreError> {
+pub(crate) fn read_count(row: &DbRow, column: &str) -> Result<u64> {
     let count: i64 = row.try_get(column)?;
     u64::try_from(count).map_err(|_| StoreError::Corrupt(format!("{column} is {count}")))
 }
 
 /// A number that is never large.
-pub(crate) fn read_small<T: TryFrom<i64>>(row: &DbRow, column: &str) -> Result<T, StoreError> {
+pub(crate) fn read_small<T: TryFrom<i64>>(row: &DbRow, column: &str) -> Result<T> {
     let count: i64 = row.try_get(column)?;
     T::try_from(count).map_err(|_| StoreError::Corrupt(format!("{column} is {count}")))
 }
 
 /// A column that is 0 or 1.
-pub(crate) fn read_flag(row: &DbRow, column: &str) -> Result<bool, StoreError> {
+pub(crate) fn read_flag(row: &DbRow, column: &str) -> Result<bool> {
     Ok(row.try_get::<i64, _>(column)? != 0)
 }
 
-pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String, StoreError> {
+pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String> {
     serde_json::to_string(value).map_err(|error| StoreError::Corrupt(error.to_string()))
 }
 
-pub(crate) fn read_json<T: DeserializeOwned>(row: &DbRow, column: &str) -> Result<T, StoreError> {
+pub(crate) fn read_json<T: DeserializeOwned>(row: &DbRow, column: &str) -> Result<T> {
     let text: String = row.try_get(column)?;
     serde_json::from_str(&text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
 }

@@ -12,7 +12,7 @@ use super::finish::end_with_sources;
 use super::rows::{GET, count, job_columns, push_list, read_count, read_id, read_job, to_json};
 use crate::jobs::error::StoreError;
 use crate::jobs::model::{Job, State};
-use crate::jobs::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, SubmitJobs};
+use crate::jobs::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result, SubmitJobs};
 
 /// Places still free, as one transaction has read them and takes them.
 pub(crate) struct Places {
@@ -29,7 +29,7 @@ impl Places {
         connection: &mut DbConnection,
         tenants: impl IntoIterator<Item = &'a str>,
         bounds: QueueBounds,
-    ) -> Result<Places, StoreError> {
+    ) -> Result<Places> {
         let mut query = QueryBuilder::new("WITH asked (tenant) AS (");
         query.push_values(tenants, |mut row, tenant| {
             row.push_bind(tenant);
@@ -96,7 +96,7 @@ impl Places {
 }
 
 /// Bytes of cases, templates and results that a tenant has stored.
-pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Result<u64, StoreError> {
+pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Result<u64> {
     let row = query(
         "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM stored_bytes WHERE tenant = $1",
     )
@@ -110,7 +110,7 @@ pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Resul
 pub(crate) async fn succeeded(
     connection: &mut DbConnection,
     ids: &[Uuid],
-) -> Result<HashSet<Uuid>, StoreError> {
+) -> Result<HashSet<Uuid>> {
     if ids.is_empty() {
         return Ok(HashSet::new());
     }
@@ -134,7 +134,7 @@ pub(crate) async fn insert_jobs(
     connection: &mut DbConnection,
     batch: Option<Uuid>,
     jobs: &[(Option<u32>, &NewJob)],
-) -> Result<Vec<Uuid>, StoreError> {
+) -> Result<Vec<Uuid>> {
     let mut ended = Vec::new();
     let batch = batch.map(|id| id.to_string());
     for some in jobs.chunks(ROWS_PER_STATEMENT) {
@@ -216,7 +216,7 @@ pub(crate) const BY_KEY: &str = concat!(
 pub(crate) struct Submission {
     pub(crate) new: NewJob,
     pub(crate) bounds: QueueBounds,
-    pub(crate) reply: oneshot::Sender<Result<Enqueued, StoreError>>,
+    pub(crate) reply: oneshot::Sender<Result<Enqueued>>,
 }
 
 /// The way to the task that stores jobs; it ends with the last of these.
@@ -292,7 +292,7 @@ async fn store_together(
     writer: &DbPool,
     jobs: &[&NewJob],
     bounds: QueueBounds,
-) -> Result<Vec<Enqueued>, StoreError> {
+) -> Result<Vec<Enqueued>> {
     let mut transaction = engine::begin(writer).await?;
     engine::lock_admission(&mut transaction).await?;
     let tenants: HashSet<&str> = jobs.iter().map(|job| &*job.tenant).collect();
@@ -354,10 +354,7 @@ async fn store_together(
 }
 
 /// The answers in the order of the jobs.
-fn answers(
-    jobs: &[&NewJob],
-    mut known: HashMap<Uuid, Enqueued>,
-) -> Result<Vec<Enqueued>, StoreError> {
+fn answers(jobs: &[&NewJob], mut known: HashMap<Uuid, Enqueued>) -> Result<Vec<Enqueued>> {
     jobs.iter()
         .map(|job| known.remove(&job.id).ok_or_else(lost))
         .collect()
@@ -373,7 +370,7 @@ pub(crate) async fn by_key(
     tenant: &str,
     key: &str,
     digest: &[u8; 32],
-) -> Result<Option<Enqueued>, StoreError> {
+) -> Result<Option<Enqueued>> {
     let row = query(BY_KEY)
         .bind(tenant)
         .bind(key)
@@ -388,7 +385,7 @@ pub(crate) async fn by_key(
     }))
 }
 
-async fn read_back(connection: &mut DbConnection, job: &NewJob) -> Result<Job, StoreError> {
+async fn read_back(connection: &mut DbConnection, job: &NewJob) -> Result<Job> {
     let row = query(GET)
         .bind(job.id.to_string())
         .bind(&*job.tenant)
@@ -428,7 +425,7 @@ fn queued(new: &NewJob) -> Job {
 #[async_trait]
 impl SubmitJobs for SqlStore {
     #[once]
-    async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued, StoreError> {
+    async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued> {
         let gone = || {
             StoreError::Failed(Arc::new(std::io::Error::other(
                 "the task that stores jobs has ended",
@@ -448,7 +445,7 @@ impl SubmitJobs for SqlStore {
         answer.await.map_err(|_| gone())?
     }
 
-    async fn forget_key(&self, tenant: &str, key: &str) -> Result<(), StoreError> {
+    async fn forget_key(&self, tenant: &str, key: &str) -> Result<()> {
         query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
             .bind(tenant)
             .bind(key)
@@ -462,7 +459,7 @@ impl SubmitJobs for SqlStore {
         tenant: &str,
         key: &str,
         digest: &[u8; 32],
-    ) -> Result<Option<Enqueued>, StoreError> {
+    ) -> Result<Option<Enqueued>> {
         let mut connection = self.readers.acquire().await?;
         by_key(&mut connection, tenant, key, digest).await
     }

@@ -9,11 +9,10 @@ use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, QueryBuilder, SqlStore, query, query_scalar};
 use super::rows::{push_list, read_blob_ids, read_count, read_id, read_move, read_state, to_json};
 use super::submit::stored;
-use crate::jobs::error::StoreError;
 use crate::jobs::model::{Failure, Job, State};
 use crate::jobs::store::{
-    Claims, Cluster, Moment, Overdue, QueueAhead, Reap, RetentionRule, Stats, Store, Upkeep, Usage,
-    first_id_at,
+    Claims, Cluster, Moment, Overdue, QueueAhead, Reap, Result, RetentionRule, Stats, Store,
+    Upkeep, Usage, first_id_at,
 };
 
 /// Those whose lease has run out: a job that was claimed alone counts the attempt; those of a group do not, and come alone next
@@ -48,12 +47,7 @@ pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
 #[repeat_conflicts]
 #[async_trait]
 impl Upkeep for SqlStore {
-    async fn reap(
-        &self,
-        which: Reap,
-        now: i64,
-        attempts_max: u32,
-    ) -> Result<Vec<(Uuid, State)>, StoreError> {
+    async fn reap(&self, which: Reap, now: i64, attempts_max: u32) -> Result<Vec<(Uuid, State)>> {
         let mut transaction = engine::begin(&self.writer).await?;
         let mut rows = Vec::new();
         let late = match which {
@@ -80,11 +74,7 @@ impl Upkeep for SqlStore {
             .collect()
     }
 
-    async fn pass_deadlines(
-        &self,
-        failure: &Failure,
-        moment: Moment,
-    ) -> Result<Overdue, StoreError> {
+    async fn pass_deadlines(&self, failure: &Failure, moment: Moment) -> Result<Overdue> {
         // Late jobs are rare, and a read holds no writer up.
         let rows = query(LATE)
             .bind(moment.now)
@@ -105,7 +95,7 @@ impl Upkeep for SqlStore {
         Ok(overdue)
     }
 
-    async fn expire(&self, expiry: RetentionRule) -> Result<u64, StoreError> {
+    async fn expire(&self, expiry: RetentionRule) -> Result<u64> {
         let mut transaction = engine::begin(&self.writer).await?;
         let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
         let rows = query(EXPIRED)
@@ -157,7 +147,7 @@ impl Upkeep for SqlStore {
         Ok(rows.len() as u64)
     }
 
-    async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool, StoreError> {
+    async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool> {
         let found = query("SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2")
             .bind(id.to_string())
             .bind(tenant)
@@ -166,7 +156,7 @@ impl Upkeep for SqlStore {
         Ok(found.is_some())
     }
 
-    async fn usage(&self, tenant: &str) -> Result<Usage, StoreError> {
+    async fn usage(&self, tenant: &str) -> Result<Usage> {
         let rows = query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
             .bind(tenant)
             .fetch_all(&self.readers)
@@ -187,7 +177,7 @@ impl Upkeep for SqlStore {
         Ok(usage)
     }
 
-    async fn stats(&self) -> Result<Stats, StoreError> {
+    async fn stats(&self) -> Result<Stats> {
         let rows = query(COUNT).fetch_all(&self.readers).await?;
         let mut jobs: BTreeMap<State, u64> =
             State::ALL.into_iter().map(|state| (state, 0)).collect();
@@ -206,7 +196,7 @@ impl Upkeep for SqlStore {
         })
     }
 
-    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead, StoreError> {
+    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead> {
         let row = query(BEFORE)
             .bind(&job.tenant)
             .bind(job.priority.rank())
@@ -243,7 +233,7 @@ pub(crate) const FAIL_LATE: &str = concat!(
 const AT_ONCE: i64 = 1000;
 
 impl SqlStore {
-    async fn fail_late(&self, failure: &Failure, moment: Moment) -> Result<Vec<Uuid>, StoreError> {
+    async fn fail_late(&self, failure: &Failure, moment: Moment) -> Result<Vec<Uuid>> {
         let mut transaction = engine::begin(&self.writer).await?;
         let rows = query(FAIL_LATE)
             .bind(moment.now)
@@ -297,7 +287,7 @@ pub(crate) const BEFORE: &str = "SELECT COUNT(*) AS jobs, CAST(COALESCE(SUM(cost
 
 #[async_trait]
 impl Store for SqlStore {
-    async fn ready(&self, write: bool) -> Result<(), StoreError> {
+    async fn ready(&self, write: bool) -> Result<()> {
         engine::again(|| self.ready(write)).await
     }
 
@@ -309,7 +299,7 @@ impl Store for SqlStore {
         self.close().await;
     }
 
-    async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError> {
+    async fn compact(&self, spare: i64, step: u32) -> Result<bool> {
         engine::again(|| self.compact(spare, step)).await
     }
 }

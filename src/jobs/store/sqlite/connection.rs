@@ -14,6 +14,7 @@ use tokio::runtime::{Handle, RuntimeFlavor};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::jobs::error::{StorageFault, StoreError};
+use crate::jobs::store::Result;
 use crate::jobs::sync::lock;
 
 /// How long a statement waits for a lock that another process holds.
@@ -56,7 +57,7 @@ impl std::fmt::Debug for Pool {
 
 impl Pool {
     /// Opens the first of up to `size` connections; the others are opened when they are needed.
-    pub(crate) fn open(size: u32, open: Open) -> Result<Pool, StoreError> {
+    pub(crate) fn open(size: u32, open: Open) -> Result<Pool> {
         let pool = Shared {
             free: Arc::new(Semaphore::new(size as usize)),
             connections: Mutex::default(),
@@ -69,7 +70,7 @@ impl Pool {
     }
 
     /// Takes a connection once one is free.
-    pub(crate) async fn acquire(&self) -> Result<Pooled, StoreError> {
+    pub(crate) async fn acquire(&self) -> Result<Pooled> {
         let permit = self.0.free.clone().acquire_owned().await;
         let permit = permit.map_err(|_| closed())?;
         let kept = lock(&self.0.connections).pop();
@@ -86,7 +87,7 @@ impl Pool {
     }
 
     /// Begins a transaction that writes. One that reads first and then turns into a writer would fail at once beside another.
-    pub(crate) async fn begin(&self) -> Result<Transaction, StoreError> {
+    pub(crate) async fn begin(&self) -> Result<Transaction> {
         let mut connection = self.acquire().await?;
         unlocked(&mut connection, |connection| {
             connection.execute_batch("BEGIN IMMEDIATE")
@@ -96,7 +97,7 @@ impl Pool {
     }
 
     /// As [`Pool::begin`], for what may be lost in a power cut, though not with the process: the commit does not wait for the disk.
-    pub(crate) async fn begin_relaxed(&self) -> Result<Transaction, StoreError> {
+    pub(crate) async fn begin_relaxed(&self) -> Result<Transaction> {
         let mut connection = self.acquire().await?;
         connection.batch(RELAX)?;
         connection.relaxed = true;
@@ -117,7 +118,7 @@ impl Pool {
 }
 
 impl Shared {
-    fn connect(&self) -> Result<rusqlite::Connection, StoreError> {
+    fn connect(&self) -> Result<rusqlite::Connection> {
         let connection = blocking(|| (self.open)())?;
         connection.set_prepared_statement_cache_capacity(PREPARED);
         Ok(connection)
@@ -175,7 +176,7 @@ impl Drop for Pooled {
 pub(crate) struct Transaction(Pooled);
 
 impl Transaction {
-    pub(crate) async fn commit(mut self) -> Result<(), StoreError> {
+    pub(crate) async fn commit(mut self) -> Result<()> {
         let relaxed = self.0.relaxed;
         self.0.with(|connection| match relaxed {
             true => connection.execute_batch("COMMIT"),
@@ -205,12 +206,12 @@ impl Connection {
     fn with<T>(
         &mut self,
         call: impl FnOnce(&rusqlite::Connection) -> rusqlite::Result<T>,
-    ) -> Result<T, StoreError> {
+    ) -> Result<T> {
         Ok(call(self.0.as_ref().ok_or_else(closed)?)?)
     }
 
     /// Runs several statements that have no parameters.
-    pub(crate) fn batch(&mut self, statements: &str) -> Result<(), StoreError> {
+    pub(crate) fn batch(&mut self, statements: &str) -> Result<()> {
         self.with(|connection| connection.execute_batch(statements))
     }
 }
@@ -222,7 +223,7 @@ pub(crate) trait Executor: Send {
         self,
         long: bool,
         call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
-    ) -> impl Future<Output = Result<T, StoreError>> + Send;
+    ) -> impl Future<Output = Result<T>> + Send;
 }
 
 impl Executor for &mut Connection {
@@ -230,7 +231,7 @@ impl Executor for &mut Connection {
         self,
         _: bool,
         call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
-    ) -> Result<T, StoreError> {
+    ) -> Result<T> {
         self.with(call)
     }
 }
@@ -240,7 +241,7 @@ impl Executor for &Pool {
         self,
         long: bool,
         mut call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
-    ) -> Result<T, StoreError> {
+    ) -> Result<T> {
         let mut connection = self.acquire().await?;
         unlocked(&mut connection, |connection| match long {
             true => blocking(|| call(connection)),
@@ -254,7 +255,7 @@ impl Executor for &Pool {
 async fn unlocked<T: Send>(
     connection: &mut Connection,
     mut call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
-) -> Result<T, StoreError> {
+) -> Result<T> {
     let start = Instant::now();
     loop {
         let done = connection.with(|connection| match call(connection) {
@@ -315,7 +316,7 @@ impl Query {
     }
 
     /// Runs the statement; how many rows it changed.
-    pub(crate) async fn execute(self, executor: impl Executor) -> Result<Done, StoreError> {
+    pub(crate) async fn execute(self, executor: impl Executor) -> Result<Done> {
         let mut none = |_| true;
         let changed = executor.run(true, |connection| {
             self.step(connection, &mut none)?;
@@ -324,10 +325,7 @@ impl Query {
         Ok(Done(changed.await?))
     }
 
-    pub(crate) async fn fetch_all(
-        self,
-        executor: impl Executor,
-    ) -> Result<Vec<SqliteRow>, StoreError> {
+    pub(crate) async fn fetch_all(self, executor: impl Executor) -> Result<Vec<SqliteRow>> {
         executor
             .run(true, |connection| {
                 let mut rows = Vec::new();
@@ -341,10 +339,7 @@ impl Query {
     }
 
     /// The first row of a statement that has few. It runs to its end.
-    pub(crate) async fn fetch_optional(
-        self,
-        executor: impl Executor,
-    ) -> Result<Option<SqliteRow>, StoreError> {
+    pub(crate) async fn fetch_optional(self, executor: impl Executor) -> Result<Option<SqliteRow>> {
         executor
             .run(false, |connection| {
                 let mut first = None;
@@ -357,7 +352,7 @@ impl Query {
             .await
     }
 
-    pub(crate) async fn fetch_one(self, executor: impl Executor) -> Result<SqliteRow, StoreError> {
+    pub(crate) async fn fetch_one(self, executor: impl Executor) -> Result<SqliteRow> {
         let none = || StoreError::Corrupt("a statement has no row".to_owned());
         let rows = self.fetch_all(executor).await?;
         rows.into_iter().next().ok_or_else(none)
@@ -367,8 +362,8 @@ impl Query {
     pub(crate) async fn for_each(
         self,
         executor: impl Executor,
-        mut row: impl FnMut(&SqliteRow) -> Result<bool, StoreError> + Send,
-    ) -> Result<(), StoreError> {
+        mut row: impl FnMut(&SqliteRow) -> Result<bool> + Send,
+    ) -> Result<()> {
         executor
             .run(true, |connection| self.walk(connection, &mut row))
             .await?
@@ -379,16 +374,16 @@ impl Query {
     pub(crate) fn for_each_now(
         self,
         connection: &mut Connection,
-        mut row: impl FnMut(&SqliteRow) -> Result<bool, StoreError>,
-    ) -> Result<(), StoreError> {
+        mut row: impl FnMut(&SqliteRow) -> Result<bool>,
+    ) -> Result<()> {
         connection.with(|connection| self.walk(connection, &mut row))?
     }
 
     fn walk(
         &self,
         connection: &rusqlite::Connection,
-        row: &mut dyn FnMut(&SqliteRow) -> Result<bool, StoreError>,
-    ) -> rusqlite::Result<Result<(), StoreError>> {
+        row: &mut dyn FnMut(&SqliteRow) -> Result<bool>,
+    ) -> rusqlite::Result<Result<()>> {
         let mut done = Ok(());
         self.step(connection, &mut |next| {
             row(&next).unwrap_or_else(|error| {
@@ -455,17 +450,11 @@ impl ScalarQuery {
         ScalarQuery(self.0.bind(parameter))
     }
 
-    pub(crate) async fn fetch_one<T: FromSql>(
-        self,
-        executor: impl Executor,
-    ) -> Result<T, StoreError> {
+    pub(crate) async fn fetch_one<T: FromSql>(self, executor: impl Executor) -> Result<T> {
         self.0.fetch_one(executor).await?.try_get(0)
     }
 
-    pub(crate) async fn fetch_all<T: FromSql>(
-        self,
-        executor: impl Executor,
-    ) -> Result<Vec<T>, StoreError> {
+    pub(crate) async fn fetch_all<T: FromSql>(self, executor: impl Executor) -> Result<Vec<T>> {
         let rows = self.0.fetch_all(executor).await?;
         rows.iter().map(|row| row.try_get(0)).collect()
     }
@@ -481,11 +470,11 @@ pub(crate) struct SqliteRow {
 /// Access to the columns of a row.
 pub(crate) trait Row {
     /// The value of a column, given by its name or its place.
-    fn try_get<T: FromSql, C: Column>(&self, column: C) -> Result<T, StoreError>;
+    fn try_get<T: FromSql, C: Column>(&self, column: C) -> Result<T>;
 }
 
 impl Row for SqliteRow {
-    fn try_get<T: FromSql, C: Column>(&self, column: C) -> Result<T, StoreError> {
+    fn try_get<T: FromSql, C: Column>(&self, column: C) -> Result<T> {
         let place = column.place(&self.names);
         let value = place.and_then(|place| self.values.get(place));
         let read = value.and_then(|value| T::column_result(value.into()).ok());
@@ -611,7 +600,7 @@ mod tests {
     use super::*;
     use crate::jobs::store::sqlite::database::SqliteStore;
 
-    async fn bury(transaction: &mut Transaction, id: &str) -> Result<Done, StoreError> {
+    async fn bury(transaction: &mut Transaction, id: &str) -> Result<Done> {
         let insert = query("INSERT INTO tombstones (id, tenant, gone_at) VALUES ($2, $1, 0)");
         insert.bind("t").bind(id).execute(&mut **transaction).await
     }

@@ -11,7 +11,8 @@ use std::time::Duration;
 
 use rusqlite::OpenFlags;
 
-use crate::jobs::error::{JobsError, StoreError};
+use crate::jobs::error::JobsError;
+use crate::jobs::store::Result;
 use crate::jobs::store::sqlite::connection::{Pool, query, query_scalar};
 use crate::jobs::store::sqlite::schema::{mark, migrate, require};
 use crate::jobs::store::sqlite::sql::submit::GroupCommit;
@@ -59,7 +60,7 @@ impl SqliteStore {
         Ok(store)
     }
 
-    fn connect(file: &Path) -> Result<SqliteStore, StoreError> {
+    fn connect(file: &Path) -> Result<SqliteStore> {
         let path = file.to_owned();
         let writer = Pool::open(1, Box::new(move || open_writer(&path)))?;
         let path = file.to_owned();
@@ -106,7 +107,7 @@ impl SqliteStore {
     }
 
     /// A round trip; with `write` it writes a page that stays as it was.
-    pub(crate) async fn ready(&self, write: bool) -> Result<(), StoreError> {
+    pub(crate) async fn ready(&self, write: bool) -> Result<()> {
         if write {
             return mark(&self.writer).await;
         }

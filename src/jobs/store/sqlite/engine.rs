@@ -5,13 +5,12 @@ use std::path::Path;
 
 use uuid::Uuid;
 
-use crate::jobs::error::StoreError;
 use crate::jobs::model::Queue;
 use crate::jobs::store::sqlite::connection::{Query, Transaction};
 use crate::jobs::store::sqlite::database::SqliteStore;
 use crate::jobs::store::sqlite::sql::claim::{claimed, peek};
 use crate::jobs::store::sqlite::sql::rows::count;
-use crate::jobs::store::{ClaimKind, ClaimRequest, Cluster};
+use crate::jobs::store::{ClaimKind, ClaimRequest, Cluster, Result};
 
 pub(crate) use crate::jobs::store::sqlite::connection::{
     Connection as DbConnection, Pool as DbPool, QueryBuilder, Row, SqliteRow as DbRow, query,
@@ -47,7 +46,7 @@ pub(crate) const CLAIM_NEW: &str = claim!("slices = 0", "$2");
 pub(crate) const CLAIM_BEGUN: &str = claim!("slices > 0", "1");
 
 /// Begins a transaction that writes.
-pub(crate) async fn begin(writer: &DbPool) -> Result<Transaction, StoreError> {
+pub(crate) async fn begin(writer: &DbPool) -> Result<Transaction> {
     writer.begin().await
 }
 
@@ -55,34 +54,29 @@ pub(crate) async fn begin(writer: &DbPool) -> Result<Transaction, StoreError> {
 pub(crate) async fn for_each(
     rows: Query,
     readers: &DbPool,
-    row: impl FnMut(&DbRow) -> Result<bool, StoreError> + Send,
-) -> Result<(), StoreError> {
+    row: impl FnMut(&DbRow) -> Result<bool> + Send,
+) -> Result<()> {
     rows.for_each(readers, row).await
 }
 
 /// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key: there is one
 /// writer.
-pub(crate) async fn lock_admission(_: &mut DbConnection) -> Result<(), StoreError> {
+pub(crate) async fn lock_admission(_: &mut DbConnection) -> Result<()> {
     Ok(())
 }
 
 /// Keeps jobs from being removed until the end of the transaction: there is one writer.
-pub(crate) async fn lock_jobs_for_share(
-    _: &mut DbConnection,
-    _: &[Uuid],
-) -> Result<(), StoreError> {
+pub(crate) async fn lock_jobs_for_share(_: &mut DbConnection, _: &[Uuid]) -> Result<()> {
     Ok(())
 }
 
 /// Keeps others from counting the references to blobs until the end of the transaction: there is one writer.
-pub(crate) async fn lock_blobs(_: &mut DbConnection, _: &[i64]) -> Result<(), StoreError> {
+pub(crate) async fn lock_blobs(_: &mut DbConnection, _: &[i64]) -> Result<()> {
     Ok(())
 }
 
 /// Makes a call; with one writer none has to give way to another.
-pub(crate) async fn again<T, F: Future<Output = Result<T, StoreError>>>(
-    call: impl Fn() -> F,
-) -> Result<T, StoreError> {
+pub(crate) async fn again<T, F: Future<Output = Result<T>>>(call: impl Fn() -> F) -> Result<T> {
     call().await
 }
 
@@ -92,7 +86,7 @@ impl SqliteStore {
         &self,
         connection: &mut DbConnection,
         number: usize,
-    ) -> Result<Vec<i64>, StoreError> {
+    ) -> Result<Vec<i64>> {
         let last = query("SELECT seq FROM sqlite_sequence WHERE name = 'blobs'");
         let last = last.fetch_optional(connection).await?;
         let last: i64 = last.map_or(Ok(0), |row| row.try_get("seq"))?;
@@ -104,7 +98,7 @@ impl SqliteStore {
         &self,
         request: &ClaimRequest<'_>,
         token: i64,
-    ) -> Result<Vec<DbRow>, StoreError> {
+    ) -> Result<Vec<DbRow>> {
         let claim = match request.kind {
             ClaimKind::New => CLAIM_NEW,
             ClaimKind::Begun => CLAIM_BEGUN,
@@ -150,7 +144,7 @@ impl SqliteStore {
     }
 
     /// Size of the file and its write-ahead log.
-    pub(crate) async fn database_bytes(&self) -> Result<u64, StoreError> {
+    pub(crate) async fn database_bytes(&self) -> Result<u64> {
         let mut log = OsString::from(self.file.as_os_str());
         log.push("-wal");
         Ok(size(&self.file).await + size(Path::new(&log)).await)
@@ -160,7 +154,7 @@ impl SqliteStore {
     ///
     /// # Errors
     /// The database failed.
-    pub(crate) async fn compact(&self, spare: i64, step: u32) -> Result<bool, StoreError> {
+    pub(crate) async fn compact(&self, spare: i64, step: u32) -> Result<bool> {
         let free: i64 = query_scalar("PRAGMA freelist_count")
             .fetch_one(&self.readers)
             .await?;

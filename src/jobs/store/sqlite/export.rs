@@ -5,6 +5,7 @@ use std::sync::Arc;
 use tokio::sync::mpsc;
 
 use crate::jobs::error::StoreError;
+use crate::jobs::store::Result;
 use crate::jobs::store::portion::{Portion, Values};
 use crate::jobs::store::sqlite::connection::{Row, SqliteRow, query, query_scalar};
 use crate::jobs::store::sqlite::database::SqliteStore;
@@ -15,10 +16,7 @@ const BYTES_MAX: usize = 4 << 20;
 
 impl SqliteStore {
     /// The rows of a table, some at a time.
-    pub(crate) fn portions(
-        &self,
-        table: &'static str,
-    ) -> mpsc::Receiver<Result<Portion, StoreError>> {
+    pub(crate) fn portions(&self, table: &'static str) -> mpsc::Receiver<Result<Portion>> {
         let (sender, portions) = mpsc::channel(1);
         let store = self.clone();
         tokio::spawn(async move {
@@ -33,14 +31,14 @@ impl SqliteStore {
     async fn send(
         &self,
         table: &'static str,
-        sender: &mpsc::Sender<Result<Portion, StoreError>>,
-    ) -> Result<(), StoreError> {
+        sender: &mpsc::Sender<Result<Portion>>,
+    ) -> Result<()> {
         let columns = query("SELECT name, type FROM pragma_table_info($1) ORDER BY cid");
         let columns = columns.bind(table).fetch_all(&self.readers).await?;
         let columns = columns
             .iter()
             .map(|row| Ok((row.try_get("name")?, row.try_get("type")?)))
-            .collect::<Result<Vec<(String, String)>, StoreError>>()?;
+            .collect::<Result<Vec<(String, String)>>>()?;
         let mut connection = self.readers.acquire().await?;
         let sender = sender.clone();
         let reading = tokio::task::spawn_blocking(move || {
@@ -86,7 +84,7 @@ fn empty(columns: &[(String, String)]) -> Portion {
 }
 
 /// Adds a row; its bytes, as far as they count.
-fn add(portion: &mut Portion, row: &SqliteRow) -> Result<usize, StoreError> {
+fn add(portion: &mut Portion, row: &SqliteRow) -> Result<usize> {
     let mut bytes = 0;
     for (place, (_, values)) in portion.columns.iter_mut().enumerate() {
         match values {
@@ -110,7 +108,7 @@ fn add(portion: &mut Portion, row: &SqliteRow) -> Result<usize, StoreError> {
 
 impl SqliteStore {
     /// The keys of the large results that something refers to.
-    pub(crate) async fn large_results(&self) -> Result<Vec<String>, StoreError> {
+    pub(crate) async fn large_results(&self) -> Result<Vec<String>> {
         let keys = query_scalar("SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL");
         keys.fetch_all(&self.readers).await
     }

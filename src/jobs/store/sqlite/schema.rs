@@ -4,7 +4,8 @@
 //! `schema.sql` is its first form that later ones go on with. Every later one is a step, which is one transaction: a process that dies
 //! between two steps leaves a table that the next start brings forward.
 
-use crate::jobs::error::{JobsError, StoreError};
+use crate::jobs::error::JobsError;
+use crate::jobs::store::Result;
 use crate::jobs::store::sqlite::connection::{Connection, Pool, query, query_scalar};
 
 /// The statements that make an empty file a job table of the first form.
@@ -79,7 +80,7 @@ async fn form(connection: &mut Connection) -> Result<i64, JobsError> {
 }
 
 /// Writes the number of the version again: a page that stays as it was.
-pub(crate) async fn mark(writer: &Pool) -> Result<(), StoreError> {
+pub(crate) async fn mark(writer: &Pool) -> Result<()> {
     query(format!("PRAGMA user_version = {SCHEMA_VERSION}"))
         .execute(writer)
         .await?;
