@@ -5,7 +5,7 @@ use railhead::contact;
 use railhead::contact::case::solver::Limits;
 use railhead::contact::geometry::formats::{self, Format};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::http::extract::batch::{Element, Layout, Splitter, columns_of, row_of};
+use railhead::http::extract::batch::{Add, columns_of, read_elements, read_lines, row_of};
 use railhead::http::extract::json::read_strict;
 use railhead::http::extract::tables::CsvRows;
 use railhead::jobs::batch::upload::{fill_in_place, restore};
@@ -92,25 +92,6 @@ pub fn profile(data: &[u8]) {
     }
 }
 
-/// A body cut into cases, whole and in pieces of some size; both must say the same.
-fn cut(layout: Layout, data: &[u8], piece: usize) -> Option<Vec<Element>> {
-    const CASE_MAX: usize = 1 << 16;
-    let cut = |piece: usize| {
-        let mut splitter = Splitter::new(layout, CASE_MAX);
-        let mut out = Vec::new();
-        for piece in data.chunks(piece.max(1)) {
-            splitter.feed(piece, &mut out).ok()?;
-        }
-        splitter.end(&mut out).ok()?;
-        Some(out)
-    };
-    let whole = cut(data.len());
-    if data.len() < CASE_MAX {
-        assert_eq!(whole, cut(piece));
-    }
-    whole
-}
-
 /// A table of cases; the first byte belongs to none of them.
 pub fn table(data: &[u8]) {
     let text = data.get(1..).unwrap_or_default();
@@ -135,30 +116,35 @@ pub fn table(data: &[u8]) {
     }
 }
 
-/// The body of a batch: the first byte chooses its form, the second is the size of the pieces in which the others arrive.
+/// The body of a batch: the first byte chooses its form, the second belongs to none of its cases.
 pub fn batch(data: &[u8]) {
-    let [form, piece, text @ ..] = data else {
+    const CASE_MAX: usize = 1 << 16;
+    let [form, _, text @ ..] = data else {
         return;
     };
-    if form % 2 == 0 {
-        for line in cut(Layout::Lines, text, usize::from(*piece)).unwrap_or_default() {
-            case(&line.text);
-        }
-        return;
-    }
-    let elements = cut(Layout::Array, text, usize::from(*piece));
+    let mut texts = Vec::new();
+    let add: Add<'_> = &mut |_, text| {
+        texts.push(text.to_owned());
+        Ok(())
+    };
+    let array = form % 2 == 1;
+    let read = match array {
+        true => read_elements(text, CASE_MAX, add),
+        false => read_lines(text, CASE_MAX, add),
+    };
     // Whatever is an array is cut at its commas.
-    if let Ok(Value::Array(items)) = read_strict(text)
-        && text.len() < 1 << 16
+    if array
+        && let Ok(Value::Array(items)) = read_strict(text)
+        && text.len() < CASE_MAX
     {
-        let elements = elements.as_ref().expect("an array can be cut");
-        let read: Vec<Value> = elements
+        assert!(read.is_ok(), "an array can be cut");
+        let parsed = texts
             .iter()
-            .map(|element| serde_json::from_slice(&element.text).expect("an element is JSON"))
+            .map(|text| serde_json::from_slice::<Value>(text));
+        let parsed: Vec<Value> = parsed
+            .map(|item| item.expect("an element is JSON"))
             .collect();
-        assert_eq!(read, items);
+        assert_eq!(parsed, items);
     }
-    for element in elements.unwrap_or_default() {
-        case(&element.text);
-    }
+    texts.iter().for_each(|text| case(text));
 }

@@ -12,7 +12,7 @@ use http_body_util::BodyExt;
 use tokio::runtime::Handle;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
-use tokio_util::sync::{CancellationToken, DropGuard};
+use tokio_util::sync::CancellationToken;
 
 use crate::http::options::HttpOptions;
 use crate::http::problem::{ApiError, ProblemKind, Result};
@@ -138,56 +138,30 @@ impl Turns {
     }
 }
 
-/// The computing of one request, done in turns. Its work ends soon after this is dropped, as it is when the client leaves.
-#[derive(Debug)]
-pub struct Computation {
-    turns: Turns,
-    tenant: Arc<str>,
-    limit: Duration,
-    spent: Duration,
-    left: CancellationToken,
-    _leaves: DropGuard,
-}
-
-impl Computation {
-    /// A computation of a tenant that may take this much time, waiting aside.
-    #[must_use]
-    pub(crate) fn new(turns: Turns, tenant: &str, limit: Duration) -> Computation {
-        let left = CancellationToken::new();
-        Computation {
-            turns,
-            tenant: tenant.into(),
-            limit,
-            spent: Duration::ZERO,
-            _leaves: left.clone().drop_guard(),
-            left,
-        }
-    }
-
-    /// Does a part of the work on the pool of blocking threads. The work calls [`Pace::step`] between its steps.
+impl Turns {
+    /// Does work of a tenant on the pool of blocking threads, in turns, which may take `limit` of computing time. The work calls
+    /// [`Pace::step`] between its steps, which fails once the client has left.
     ///
     /// # Errors
     /// `overloaded`: the first turn does not come in time; or the error of the work or of its steps.
-    pub async fn run<T: Send + 'static>(
-        &mut self,
+    pub(crate) async fn compute<T: Send + 'static>(
+        &self,
+        tenant: &str,
+        limit: Duration,
         work: impl FnOnce(&mut Pace) -> Result<T> + Send + 'static,
     ) -> Result<T> {
+        let left = CancellationToken::new();
+        let _leaves = left.clone().drop_guard();
         let mut pace = Pace {
-            turn: Some(self.turns.take_in_time(&self.tenant).await?),
-            turns: self.turns.clone(),
-            tenant: self.tenant.clone(),
-            limit: self.limit,
-            spent: self.spent,
+            turn: Some(self.take_in_time(tenant).await?),
+            turns: self.clone(),
+            tenant: tenant.into(),
+            limit,
+            spent: Duration::ZERO,
             begun: Instant::now(),
-            left: self.left.clone(),
+            left,
         };
-        let work = blocking(move || {
-            let done = work(&mut pace);
-            (done, pace.spent + pace.begun.elapsed())
-        });
-        let (done, spent) = work.await?;
-        self.spent = spent;
-        done
+        blocking(move || work(&mut pace)).await?
     }
 }
 
@@ -460,10 +434,16 @@ impl Memory {
         turns.take_in_time(tenant).await
     }
 
-    /// The reading of a table or the evaluation of rows, in turns for large cases.
-    #[must_use]
-    pub fn computation(&self, tenant: &str) -> Computation {
-        Computation::new(self.large.clone(), tenant, self.table_time)
+    /// Reads a table or evaluates rows, in turns for large cases.
+    ///
+    /// # Errors
+    /// As [`Turns::compute`].
+    pub async fn compute<T: Send + 'static>(
+        &self,
+        tenant: &str,
+        work: impl FnOnce(&mut Pace) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        self.large.compute(tenant, self.table_time, work).await
     }
 
     /// A turn to solve a case for a moment; none if it does not come within that time.
@@ -648,7 +628,7 @@ mod tests {
         let minutes = Duration::from_secs(600);
         let steps = Arc::new(AtomicUsize::new(0));
         let counted = steps.clone();
-        let mut endless = Computation::new(turns.clone(), "a", minutes);
+        let own = turns.clone();
         let endless = tokio::spawn(async move {
             let work = move |pace: &mut Pace| -> Result<()> {
                 loop {
@@ -656,14 +636,14 @@ mod tests {
                     pace.step()?;
                 }
             };
-            endless.run(work).await
+            own.compute("a", minutes, work).await
         });
         while steps.load(Ordering::Relaxed) == 0 {
             tokio::task::yield_now().await;
         }
         for tenant in ["b", "a"] {
-            let mut short = Computation::new(turns.clone(), tenant, minutes);
-            assert_eq!(short.run(|_| Ok(7)).await.unwrap(), 7);
+            let short = turns.compute(tenant, minutes, |_| Ok(7)).await;
+            assert_eq!(short.unwrap(), 7);
         }
         endless.abort();
         // Its turn comes back, and it stays.
@@ -674,17 +654,18 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn the_time_of_all_parts_of_a_computation_is_bounded() {
+    async fn the_time_of_all_steps_of_a_computation_is_bounded() {
         let limit = Duration::from_millis(20);
-        let mut computation = Computation::new(Turns::new(1), "a", limit);
-        let part = |pace: &mut Pace| {
-            std::thread::sleep(Duration::from_millis(15));
-            pace.step()
+        let steps = |pace: &mut Pace| {
+            for number in 0.. {
+                std::thread::sleep(Duration::from_millis(15));
+                if pace.step().is_err() {
+                    return Ok(number);
+                }
+            }
+            Ok(usize::MAX)
         };
-        let mut parts = 0;
-        while computation.run(part).await.is_ok() {
-            parts += 1;
-        }
-        assert!(parts <= 1, "{parts}");
+        let steps = Turns::new(1).compute("a", limit, steps).await.unwrap();
+        assert!(steps <= 1, "{steps}");
     }
 }

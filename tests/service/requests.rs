@@ -123,7 +123,7 @@ async fn a_refusal_in_the_middle_of_a_body_leaves_the_connection_usable_or_says_
     let server = Server::idle().await;
     let head = |length: usize| {
         format!(
-            "POST /v1/batches HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: {length}\r\n\r\n{{"
+            "POST /v1/batches HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/plain\r\nContent-Length: {length}\r\n\r\n{{"
         )
     };
     let mut stream = send(server.address, &head(100_000)).await;
@@ -135,16 +135,15 @@ async fn a_refusal_in_the_middle_of_a_body_leaves_the_connection_usable_or_says_
     }
     stream.read_to_end(&mut answer).await.expect("two answers");
     let answer = String::from_utf8_lossy(&answer);
-    assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
+    assert!(answer.starts_with("HTTP/1.1 415"), "{answer}");
     assert!(answer.contains("HTTP/1.1 200"), "{answer}");
 
     // More than is read away: the rest never comes.
     let answer = raw(&server, &head(100_000_000)).await;
-    assert!(answer.starts_with("HTTP/1.1 422"), "{answer}");
+    assert!(answer.starts_with("HTTP/1.1 415"), "{answer}");
     assert!(answer.contains("connection: close"), "{answer}");
     // A client that asks first is not told to send.
     let asking = head(100).replace("\r\n\r\n{", "\r\nExpect: 100-continue\r\n\r\n");
-    let asking = asking.replace("application/json", "text/plain");
     let answer = raw(&server, &asking).await;
     assert!(answer.starts_with("HTTP/1.1 415"), "{answer}");
     assert!(answer.contains("connection: close"), "{answer}");

@@ -1,20 +1,26 @@
-//! Reads the body of a batch: an array, lines or a table, cut into cases while it arrives and checked portion by portion.
+//! Reads the body of a batch: an array, lines or a table, which is spooled while it arrives and then cut into cases.
+use std::cell::Cell as Shared;
 use std::collections::HashSet;
+use std::fmt::{self, Display};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{self, BufRead, BufReader, Read};
 
 use axum::body::Body;
 use axum::extract::Request;
-use serde_json::Value;
+use serde::Deserializer as _;
+use serde::de::{Error, SeqAccess, Visitor};
+use serde_json::error::Category;
+use serde_json::value::RawValue;
+use serde_json::{Deserializer, Value};
 
 use crate::contact::error::Fault;
 use crate::contact::evaluate::varied::{Values, members};
-use crate::http::extract::json::{BodyReader, essence, read_strict, weigh_case};
+use crate::http::extract::json::{essence, read_strict, weigh_case};
 use crate::http::extract::query::DEADLINE_MAX_SECONDS;
 use crate::http::extract::rows::{Table, read_spooled};
 use crate::http::extract::tables::{Chunk, CsvRows, TableForm, TableRows, TableSource, Title};
 use crate::http::extract::titles::{Place, faulty, is_text, number, place, question, short_names};
-use crate::http::limits::{Computation, Memory, Pace, SMALL_BYTES};
+use crate::http::limits::{Memory, Pace};
 use crate::http::options::HttpOptions;
 use crate::http::problem::{ApiError, ProblemKind, Result};
 use crate::jobs::Jobs;
@@ -22,214 +28,126 @@ use crate::jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use crate::jobs::model::{CaseOptions, Kind, Priority};
 use crate::jobs::run::model::converted;
 
-/// How cases stand in a body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Layout {
-    /// One per line; empty lines count as lines and hold no case.
-    Lines,
-    /// As elements of one JSON array.
-    Array,
-}
+/// Takes a case with the number of its line, if it has one.
+pub type Add<'a> = &'a mut dyn FnMut(Option<u64>, &[u8]) -> Result<()>;
 
-/// The text of one case.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Element {
-    /// The line it begins on, counted from 1; not of an array.
-    pub line: Option<u64>,
-    /// The text.
-    pub text: Vec<u8>,
-}
-
-/// Where in an array the cutting stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum SplitterState {
-    Before,
-    /// In an element, or before it.
-    Inside,
-    After,
-}
-
-/// Cuts a body piece by piece.
-#[derive(Debug)]
-pub struct Splitter {
-    layout: Layout,
-    max_bytes: usize,
-    held: Vec<u8>,
-    line: u64,
-    place: SplitterState,
-    depth: usize,
-    in_string: bool,
-    escaped: bool,
-    elements: u64,
-}
-
-impl Splitter {
-    /// Ready for the first piece; no case may be larger than `max_bytes`.
-    #[must_use]
-    pub fn new(layout: Layout, max_bytes: usize) -> Self {
-        Splitter {
-            layout,
-            max_bytes,
-            held: Vec::new(),
-            line: 1,
-            place: SplitterState::Before,
-            depth: 0,
-            in_string: false,
-            escaped: false,
-            elements: 0,
+/// Reads cases that stand in a line each, of at most `most` bytes; blank lines are counted and left out.
+///
+/// # Errors
+/// `body-too-large`: a line is longer; what `add` refuses.
+pub fn read_lines(mut source: impl BufRead, most: usize, add: Add<'_>) -> Result<()> {
+    let mut text = Vec::new();
+    for line in 1.. {
+        text.clear();
+        let mut rest = (&mut source).take(most as u64 + 1);
+        let read = rest.read_until(b'\n', &mut text);
+        if read.map_err(|error| ApiError::internal(&error))? == 0 {
+            break;
+        }
+        text.pop_if(|byte| *byte == b'\n');
+        require_fitting(format_args!("line {line}"), text.len(), most)?;
+        if !text.iter().all(u8::is_ascii_whitespace) {
+            add(Some(line), &text)?;
         }
     }
+    Ok(())
+}
 
-    /// Bytes of the case under way.
-    #[must_use]
-    pub fn held(&self) -> usize {
-        self.held.len()
+/// Reads cases that are the elements of an array, each of at most `most` bytes.
+///
+/// # Errors
+/// `malformed-json`, `faulty-batch`: it is no array; `body-too-large`: an element is longer; what `add` refuses.
+pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()> {
+    let left = Shared::new(most + BETWEEN);
+    let mut json = Deserializer::from_reader(Bounded {
+        source,
+        left: &left,
+    });
+    let mut elements = Elements {
+        most,
+        left: &left,
+        number: 0,
+        add,
+        refusal: None,
+    };
+    let read = json.deserialize_seq(&mut elements);
+    let read = read.and_then(|()| json.end());
+    match (read, elements.refusal.take()) {
+        (_, Some(refusal)) => Err(refusal),
+        (Ok(()), None) => Ok(()),
+        (Err(_), None) if left.get() == 0 => require_fitting(elements.place(), usize::MAX, most),
+        (Err(error), None) => Err(match error.classify() {
+            Category::Data => no_array(),
+            Category::Io => ApiError::internal(&error),
+            Category::Syntax | Category::Eof => ApiError::malformed(&error),
+        }),
     }
+}
 
-    /// Takes a piece of the body and appends the cases that it completes.
-    ///
-    /// # Errors
-    /// A case is too large, or the body is no array.
-    pub fn feed(&mut self, piece: &[u8], out: &mut Vec<Element>) -> Result<()> {
-        match self.layout {
-            Layout::Lines => self.feed_lines(piece, out),
-            Layout::Array => piece.iter().try_for_each(|byte| self.feed_byte(*byte, out)),
+/// Bytes that may stand between two elements.
+const BETWEEN: usize = 1 << 10;
+
+/// A source that ends in an error where nothing is left of the bytes that an element may take.
+struct Bounded<'a, R> {
+    source: R,
+    left: &'a Shared<usize>,
+}
+
+impl<R: Read> Read for Bounded<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let most = buffer.len().min(self.left.get());
+        if most == 0 {
+            return Err(io::Error::other("an element is too long"));
         }
+        let read = self.source.read(&mut buffer[..most])?;
+        self.left.set(self.left.get() - read);
+        Ok(read)
+    }
+}
+
+/// Reads the elements of an array one by one.
+struct Elements<'a> {
+    most: usize,
+    left: &'a Shared<usize>,
+    number: u64,
+    add: Add<'a>,
+    refusal: Option<ApiError>,
+}
+
+impl Elements<'_> {
+    fn place(&self) -> String {
+        format!("element {} (counted from 0)", self.number)
+    }
+}
+
+impl<'de> Visitor<'de> for &mut Elements<'_> {
+    type Value = ();
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str("an array of cases")
     }
 
-    /// Ends the body.
-    ///
-    /// # Errors
-    /// The array is not closed.
-    pub fn end(mut self, out: &mut Vec<Element>) -> Result<()> {
-        match self.layout {
-            Layout::Lines => self.complete_line(out),
-            Layout::Array if self.place == SplitterState::After => {}
-            Layout::Array if self.place == SplitterState::Before => {
-                return Err(malformed("the body is empty; send an array of cases"));
+    fn visit_seq<A: SeqAccess<'de>>(self, mut elements: A) -> Result<(), A::Error> {
+        while let Some(text) = elements.next_element::<Box<RawValue>>()? {
+            let text = text.get().as_bytes();
+            let fits = require_fitting(self.place(), text.len(), self.most);
+            if let Err(refusal) = fits.and_then(|()| (self.add)(None, text)) {
+                self.refusal = Some(refusal);
+                return Err(A::Error::custom("refused"));
             }
-            Layout::Array => {
-                return Err(malformed(&format!(
-                    "the array is not closed; the body ends in element {} (counted from 0)",
-                    self.elements
-                )));
-            }
+            self.number += 1;
+            self.left.set(self.most + BETWEEN);
         }
         Ok(())
     }
-
-    fn feed_lines(&mut self, piece: &[u8], out: &mut Vec<Element>) -> Result<()> {
-        let mut parts = piece.split(|byte| *byte == b'\n').peekable();
-        while let Some(part) = parts.next() {
-            self.require_room(part.len())?;
-            self.held.extend_from_slice(part);
-            if parts.peek().is_some() {
-                self.complete_line(out);
-            }
-        }
-        Ok(())
-    }
-
-    fn complete_line(&mut self, out: &mut Vec<Element>) {
-        if !blank(&self.held) {
-            out.push(Element {
-                line: Some(self.line),
-                text: std::mem::take(&mut self.held),
-            });
-        }
-        self.held.clear();
-        self.line += 1;
-    }
-
-    fn feed_byte(&mut self, byte: u8, out: &mut Vec<Element>) -> Result<()> {
-        match self.place {
-            _ if self.place != SplitterState::Inside && byte.is_ascii_whitespace() => {}
-            SplitterState::Before if byte == b'[' => self.place = SplitterState::Inside,
-            SplitterState::Before => return Err(no_array()),
-            SplitterState::After => {
-                return Err(malformed("something follows the end of the array"));
-            }
-            SplitterState::Inside if self.in_string => {
-                self.hold(byte)?;
-                match byte {
-                    _ if self.escaped => self.escaped = false,
-                    b'\\' => self.escaped = true,
-                    b'"' => self.in_string = false,
-                    _ => {}
-                }
-            }
-            SplitterState::Inside => match byte {
-                b',' if self.depth == 0 => self.complete_element(out)?,
-                b']' if self.depth == 0 => {
-                    if self.elements > 0 || !blank(&self.held) {
-                        self.complete_element(out)?;
-                    }
-                    self.place = SplitterState::After;
-                }
-                _ => {
-                    match byte {
-                        b'"' => self.in_string = true,
-                        b'[' | b'{' => self.depth += 1,
-                        b']' | b'}' => self.depth = self.depth.saturating_sub(1),
-                        _ => {}
-                    }
-                    if !(self.held.is_empty() && byte.is_ascii_whitespace()) {
-                        self.hold(byte)?;
-                    }
-                }
-            },
-        }
-        Ok(())
-    }
-
-    fn complete_element(&mut self, out: &mut Vec<Element>) -> Result<()> {
-        if blank(&self.held) {
-            return Err(malformed(&format!(
-                "element {} of the array (counted from 0) is empty",
-                self.elements
-            )));
-        }
-        self.elements += 1;
-        out.push(Element {
-            line: None,
-            text: std::mem::take(&mut self.held),
-        });
-        Ok(())
-    }
-
-    fn hold(&mut self, byte: u8) -> Result<()> {
-        self.require_room(1)?;
-        self.held.push(byte);
-        Ok(())
-    }
-
-    fn require_room(&self, bytes: usize) -> Result<()> {
-        if self.held.len() + bytes <= self.max_bytes {
-            return Ok(());
-        }
-        let place = match self.layout {
-            Layout::Lines => format!("line {}", self.line),
-            Layout::Array => format!("element {} (counted from 0)", self.elements),
-        };
-        Err(ApiError::new(
-            ProblemKind::BodyTooLarge,
-            format!(
-                "{place} is larger than the {} bytes that are allowed for one case",
-                self.max_bytes
-            ),
-        ))
-    }
 }
 
-fn blank(text: &[u8]) -> bool {
-    text.iter().all(u8::is_ascii_whitespace)
-}
-
-fn malformed(detail: &str) -> ApiError {
-    ApiError::new(
-        ProblemKind::MalformedJson,
-        format!("the body is not JSON: {detail}"),
-    )
+fn require_fitting(place: impl Display, bytes: usize, most: usize) -> Result<()> {
+    if bytes <= most {
+        return Ok(());
+    }
+    let detail = format!("{place} is larger than the {most} bytes that are allowed for one case");
+    Err(ApiError::new(ProblemKind::BodyTooLarge, detail))
 }
 
 fn no_array() -> ApiError {
@@ -460,10 +378,7 @@ fn read_value(field: &str, factor: f64, decimal_comma: bool) -> Value {
     }
 }
 
-/// Cases are checked in portions of about this many bytes.
-const PORTION_BYTES: usize = 256 << 10;
-
-/// Reads and checks the body as it arrives: a table, or cases one after the other.
+/// Reads and checks the body once it has arrived: a table, or cases one after the other.
 ///
 /// # Errors
 /// The body is too large, too slow, broken, or not of its form; faults of single cases are kept in the draft.
@@ -474,54 +389,36 @@ pub async fn read_draft(
 ) -> Result<BatchUpload> {
     let limits = (options.body_timeout, options.batch_max_bytes, "one batch");
     let mut draft = jobs.draft(Kind::Cases)?;
+    let array = essence(request.headers()) == "application/json";
+    let form = table.as_ref().map_or(TableForm::Csv, |table| table.form);
+    let (one, archive) = (options.body_max_bytes, 2 * options.evaluate_max_bytes);
+    let bytes = move |length: usize| match form {
+        TableForm::Csv => length.min(one),
+        // It is read as a whole, once packed and once as numbers.
+        _ => archive,
+    };
+    let mut held = None;
     if let Some(table) = table {
         draft.set_row_template(jobs.with_profiles(table.template).await?);
-        // An archive is read as a whole, once packed and once as numbers.
-        let bytes = match table.form {
-            TableForm::Csv => options.body_max_bytes,
-            _ => 2 * options.evaluate_max_bytes,
-        };
-        let options = options.clone();
-        let read = move |file, pace: &mut Pace| {
-            let _held = table.share;
-            read_rows(draft, (table.form, file), &options, pace)
-        };
-        return read_spooled((jobs, memory), limits, bytes, request, read).await;
+        held = Some(table.share);
     }
-    let layout = match essence(request.headers()).as_str() {
-        "application/json" => Layout::Array,
-        _ => Layout::Lines,
-    };
-    let (timeout, most, what) = limits;
-    let mut reader = BodyReader::new(timeout, most, what, request)?;
-    let mut splitter = Splitter::new(layout, options.body_max_bytes);
-    let mut portion = Vec::new();
-    let mut held = 0;
-    let mut share = None;
-    let mut checking = Checking {
-        computation: memory.computation(jobs.tenant()),
-        parsed_max_bytes: options.parsed_max_bytes,
-    };
-    while let Some(piece) = reader.next().await? {
-        held += piece.len();
-        // Most cases are small; a large one is held until its end has come.
-        if share.is_none() && splitter.held() + piece.len() > SMALL_BYTES.max(PORTION_BYTES) {
-            share = memory.body(jobs.tenant(), options.body_max_bytes).await?;
+    let options = options.clone();
+    let read = move |file, pace: &mut Pace| match held {
+        Some(_held) => read_rows(draft, (form, file), &options, pace),
+        None => {
+            let (source, most) = (BufReader::new(file), options.body_max_bytes);
+            let add: Add<'_> = &mut |line, text| {
+                pace.step()?;
+                add(&mut draft, line, text, &options)
+            };
+            match array {
+                true => read_elements(source, most, add),
+                false => read_lines(source, most, add),
+            }?;
+            Ok(draft)
         }
-        splitter.feed(&piece, &mut portion)?;
-        if held >= PORTION_BYTES {
-            held = 0;
-            draft = checking
-                .check(draft, layout, std::mem::take(&mut portion))
-                .await?;
-            require_count(&draft, options)?;
-        }
-    }
-    splitter.end(&mut portion)?;
-    draft = checking.check(draft, layout, portion).await?;
-    drop(share);
-    require_count(&draft, options)?;
-    Ok(draft)
+    };
+    read_spooled((jobs, memory), limits, bytes, request, read).await
 }
 
 /// Adds the rows of a table that has arrived.
@@ -569,57 +466,24 @@ fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<()> {
     ))
 }
 
-/// Checks cases off the threads that answer requests.
-struct Checking {
-    computation: Computation,
-    parsed_max_bytes: usize,
-}
-
-impl Checking {
-    /// Checks some cases, in turns.
-    async fn check(
-        &mut self,
-        mut draft: BatchUpload,
-        layout: Layout,
-        portion: Vec<Element>,
-    ) -> Result<BatchUpload> {
-        if portion.is_empty() {
-            return Ok(draft);
-        }
-        let max_bytes = self.parsed_max_bytes;
-        let checked = self.computation.run(move |pace| {
-            for element in portion {
-                pace.step()?;
-                add(&mut draft, layout, &element, max_bytes)?;
-            }
-            Ok(draft)
-        });
-        checked.await
-    }
-}
-
-/// Adds one case to a draft, with its faults if it has any.
+/// Adds one case to a draft, with its faults if it has any. One in a line of its own need not be JSON.
 fn add(
     draft: &mut BatchUpload,
-    layout: Layout,
-    element: &Element,
-    parsed_max_bytes: usize,
+    line: Option<u64>,
+    text: &[u8],
+    options: &HttpOptions,
 ) -> Result<()> {
-    weigh_case(&element.text, parsed_max_bytes)?;
-    match layout {
-        Layout::Array => {
-            let case = read_strict(&element.text)
-                .map_err(|error| ApiError::malformed_element(draft.cases, &error))?;
-            draft.add(element.line, &element.text, read_options(case))?;
+    weigh_case(text, options.parsed_max_bytes)?;
+    let case = match (read_strict(text), line) {
+        (Ok(case), _) => read_options(case),
+        (Err(error), None) => return Err(ApiError::malformed_element(draft.cases, &error)),
+        (Err(error), Some(_)) => {
+            let detail = format!("the line is not JSON: {error}");
+            Err(vec![Fault::new("", detail)])
         }
-        Layout::Lines => {
-            let case = read_strict(&element.text)
-                .map_err(|error| vec![Fault::new("", format!("the line is not JSON: {error}"))])
-                .and_then(read_options);
-            draft.add(element.line, &element.text, case)?;
-        }
-    }
-    Ok(())
+    };
+    draft.add(line, text, case)?;
+    require_count(draft, options)
 }
 
 #[cfg(test)]
@@ -631,54 +495,53 @@ mod tests {
     use crate::jobs::batch::upload::fill;
     use crate::jobs::codec::table::COLUMNS_MAX;
 
-    fn cut(layout: Layout, text: &str, piece: usize) -> Result<Vec<(Option<u64>, String)>> {
-        let mut splitter = Splitter::new(layout, 40);
+    fn cut(array: bool, text: &str) -> Result<Vec<(Option<u64>, String)>> {
         let mut out = Vec::new();
-        for piece in text.as_bytes().chunks(piece) {
-            splitter.feed(piece, &mut out)?;
-        }
-        splitter.end(&mut out)?;
-        let text = |element: Element| {
-            let text = String::from_utf8(element.text).unwrap();
-            (element.line, text.trim().to_owned())
+        let add: Add<'_> = &mut |line, text| {
+            let text = String::from_utf8_lossy(text);
+            out.push((line, text.trim().to_owned()));
+            Ok(())
         };
-        Ok(out.into_iter().map(text).collect())
+        match array {
+            true => read_elements(text.as_bytes(), 40, add)?,
+            false => read_lines(text.as_bytes(), 40, add)?,
+        }
+        Ok(out)
     }
 
     #[test]
     fn lines_keep_their_numbers_however_the_body_is_cut() {
-        for piece in 1..30 {
-            let cases = cut(Layout::Lines, "{\"a\":1}\n\n  \r\n{\"b\":2}\r\nx", piece).unwrap();
-            let expected = [(1, "{\"a\":1}"), (4, "{\"b\":2}"), (5, "x")];
-            let expected = expected.map(|(line, text)| (Some(line), text.to_owned()));
-            assert_eq!(cases, expected);
-        }
+        let cases = cut(false, "{\"a\":1}\n\n  \r\n{\"b\":2}\r\nx").unwrap();
+        let expected = [(1, "{\"a\":1}"), (4, "{\"b\":2}"), (5, "x")];
+        let expected = expected.map(|(line, text)| (Some(line), text.to_owned()));
+        assert_eq!(cases, expected);
     }
 
     #[test]
     fn elements_end_at_their_own_commas_only() {
-        let text = r#" [ {"a":[1,2],"s":"],\",{"} , [3] ,7 ] "#;
-        for piece in 1..text.len() {
-            let cases = cut(Layout::Array, text, piece).unwrap();
-            let texts: Vec<_> = cases.iter().map(|(_, text)| text.as_str()).collect();
-            assert_eq!(texts, [r#"{"a":[1,2],"s":"],\",{"}"#, "[3]", "7"]);
-        }
-        assert_eq!(cut(Layout::Array, "[]", 1).unwrap(), []);
+        let cases = cut(true, r#" [ {"a":[1,2],"s":"],\",{"} , [3] ,7 ] "#).unwrap();
+        let texts: Vec<_> = cases.iter().map(|(_, text)| text.as_str()).collect();
+        assert_eq!(texts, [r#"{"a":[1,2],"s":"],\",{"}"#, "[3]", "7"]);
+        assert_eq!(cut(true, "[]").unwrap(), []);
     }
 
     #[test]
     fn broken_arrays_and_large_cases_are_refused() {
         for text in ["", "[1", "[1,]", "[,1]", "[1] 2", "{\"a\":1}", "[\"]"] {
-            assert!(
-                cut(Layout::Array, text, 2).is_err(),
-                "{text:?} was accepted"
-            );
+            assert!(cut(true, text).is_err(), "{text:?} was accepted");
         }
         let just = format!("\"{}\"", "a".repeat(38));
-        assert!(cut(Layout::Array, &format!("[{just},{just}]"), 3).is_ok());
-        assert!(cut(Layout::Array, &format!("[{just}0]"), 3).is_err());
-        assert!(cut(Layout::Lines, &format!("{just}\n{just}"), 3).is_ok());
-        assert!(cut(Layout::Lines, &format!("{just}0\n"), 50).is_err());
+        assert!(cut(true, &format!("[{just},{just}]")).is_ok());
+        let endless = "1".repeat(1 << 20);
+        for text in [
+            format!("[{just},\"{}\"]", "a".repeat(60)),
+            format!("[{just},{endless}"),
+        ] {
+            let refusal = format!("{:?}", cut(true, &text).unwrap_err());
+            assert!(refusal.contains("element 1"), "{refusal}");
+        }
+        assert!(cut(false, &format!("{just}\n{just}")).is_ok());
+        assert!(cut(false, &format!("{just}0\n")).is_err());
     }
 
     #[test]

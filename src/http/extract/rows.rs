@@ -2,7 +2,7 @@
 use std::collections::HashSet;
 use std::fmt;
 use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom};
 use std::time::Duration;
 
 use axum::body::{Body, Bytes};
@@ -393,8 +393,7 @@ pub async fn read_run(
         let bytes = 2 * declared_bytes(&request, options).min(bytes_max);
         let share = memory.rows(jobs.tenant(), bytes).await?;
         let text = read_body(request, options).await?;
-        let mut computation = memory.computation(jobs.tenant());
-        let read = computation.run(move |_| {
+        let read = memory.compute(jobs.tenant(), move |_| {
             let _held = share;
             let (template, columns, values) = read_json_columns(&text, &named)?;
             drop(text);
@@ -411,6 +410,7 @@ pub async fn read_run(
         TableForm::Npz => 2 * bytes_max,
         _ => PIECE_BYTES,
     };
+    let bytes = move |_| bytes;
     read_spooled((jobs, memory), limits, bytes, request, move |file, pace| {
         let _held = table.share;
         let rows = TableRows::new(table.form, TableSource::File(file), bytes_max)?;
@@ -425,31 +425,34 @@ pub async fn read_run(
     .await
 }
 
-/// Reads a table from a nameless file into which it is spooled while it arrives, so that a large one takes little memory. `limits` are the time
-/// that a piece of it may take, its largest size, and what it is; the reader takes `bytes` of memory.
+/// Reads a body from a nameless file into which it is spooled while it arrives, so that a large one takes little memory. `limits` are the time
+/// that a piece of it may take, its largest size, and what it is; `bytes` tells the memory that the reader takes for a body of some length.
 ///
 /// # Errors
 /// The body is too large, too slow or broken; the file cannot be written; or the error of `read`.
 pub async fn read_spooled<T: Send + 'static>(
     (jobs, memory): (&Jobs, &Memory),
     (timeout, most, what): (Duration, u64, &'static str),
-    bytes: usize,
+    bytes: impl FnOnce(usize) -> usize,
     request: Request<Body>,
     read: impl FnOnce(File, &mut Pace) -> Result<T> + Send + 'static,
 ) -> Result<T> {
     let mut reader = BodyReader::new(timeout, most, what, request)?;
     let file = jobs.spool_file()?;
     let mut file = tokio::fs::File::from_std(file);
+    let mut length = 0;
     while let Some(piece) = reader.next().await? {
+        length += piece.len();
         let written = file.write_all(&piece).await;
         written.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
     }
+    // Tells whether the last piece was written too.
+    let written = file.flush().await;
     let mut file = file.into_std().await;
-    let ready = file.flush().and_then(|()| file.seek(SeekFrom::Start(0)));
+    let ready = written.and_then(|()| file.seek(SeekFrom::Start(0)));
     ready.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
-    let share = memory.rows(jobs.tenant(), bytes).await?;
-    let mut computation = memory.computation(jobs.tenant());
-    let read = computation.run(move |pace| {
+    let share = memory.rows(jobs.tenant(), bytes(length)).await?;
+    let read = memory.compute(jobs.tenant(), move |pace| {
         let _held = share;
         read(file, pace)
     });

@@ -198,7 +198,7 @@ pub(crate) async fn evaluate(
     if !packed && let Some(share) = &mut share {
         share.shrink_to(2 * text.len());
     }
-    let mut computation = memory.computation(jobs.tenant());
+    let (limits, tenant) = (memory.clone(), jobs.tenant().to_owned());
     let bytes_max = options.evaluate_max_bytes;
     let evaluation = Evaluation {
         jobs,
@@ -206,7 +206,7 @@ pub(crate) async fn evaluate(
         rows_max: options.evaluate_max_rows,
         time: options.evaluate_time,
     };
-    let work = computation.run(move |pace| {
+    let work = limits.compute(&tenant, move |pace| {
         let (template, rows, _held) = match table {
             Some(table) => {
                 let limits = (evaluation.rows_max, bytes_max);

@@ -50,12 +50,7 @@ pub(crate) fn outlines(
         corners.rotate_left(lowest.unwrap_or(0));
     }
     loops.sort_by_key(|corners| (corners[0].y, corners[0].x));
-    let place = |corner: &IntPoint<i32>| {
-        [
-            x.values[corner.x as usize],
-            y.values[corner.y as usize],
-        ]
-    };
+    let place = |corner: &IntPoint<i32>| [x.values[corner.x as usize], y.values[corner.y as usize]];
     loops
         .iter()
         .map(|corners| corners.iter().map(place).collect())
