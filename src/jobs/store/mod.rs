@@ -33,6 +33,24 @@ use crate::jobs::model::{
     Batch, BatchItem, Failure, Job, Key, Kind, Queue, RunRecord, State, SubmitOptions,
 };
 
+/// Runs a statement on a connection with a value for each of its parameters, and takes its rows as `execute`, `fetch_all` or the like do;
+/// `scalar` takes those of one column.
+macro_rules! sql {
+    ($take:ident, $connection:expr, $text:expr $(; $($value:expr),+)?) => {
+        query($text)$($(.bind($value))+)?.$take($connection).await
+    };
+    (scalar $take:ident, $connection:expr, $text:expr $(; $($value:expr),+)?) => {
+        query_scalar($text)$($(.bind($value))+)?.$take($connection).await
+    };
+}
+
+/// Binds the values of a row of `VALUES`.
+macro_rules! values {
+    ($row:ident; $($value:expr),+) => {
+        $row$(.push_bind($value))+
+    };
+}
+
 #[cfg(feature = "cluster")]
 pub(crate) mod portion;
 #[cfg(feature = "cluster")]

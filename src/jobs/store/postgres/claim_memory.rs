@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use sqlx::Row;
 use sqlx::postgres::{PgConnection, PgRow};
+use sqlx::query;
 
 use crate::jobs::model::Queue;
 use crate::jobs::store::postgres::sql::claim::peek;
@@ -96,18 +97,12 @@ impl ClaimMemory {
         if let Some((since, [high, normal, low])) = places
             && since.elapsed() < PLACE_KEPT
         {
-            let found = sqlx::query(PEEK_FROM)
-                .bind(&*request.queue.tenant)
-                .bind(count(request.jobs))
-                .bind(request.late_before)
-                .bind(request.each_slice_us.map_or(i64::MAX, count))
-                .bind(high)
-                .bind(normal)
-                .bind(low)
-                .bind(request.queue.kind.name())
-                .bind(i64::from(request.suspects))
-                .fetch_all(&mut *connection)
-                .await?;
+            let found = sql!(fetch_all, &mut *connection,
+                PEEK_FROM;
+                &*request.queue.tenant, count(request.jobs), request.late_before,
+                request.each_slice_us.map_or(i64::MAX, count), high, normal, low,
+                request.queue.kind.name(), i64::from(request.suspects)
+            )?;
             self.remember(request, &found, since)?;
             if !found.is_empty() {
                 return Ok(found);
@@ -163,14 +158,11 @@ pub(crate) async fn first_queued(
     request: &ClaimRequest<'_>,
     most: i64,
 ) -> Result<Vec<PgRow>> {
-    let rows = sqlx::query(peek)
-        .bind(&*request.queue.tenant)
-        .bind(most)
-        .bind(request.late_before)
-        .bind(request.each_slice_us.map_or(i64::MAX, count))
-        .bind(request.queue.kind.name())
-        .bind(i64::from(request.suspects))
-        .fetch_all(connection)
-        .await?;
+    let rows = sql!(fetch_all, connection,
+        peek;
+        &*request.queue.tenant, most, request.late_before,
+        request.each_slice_us.map_or(i64::MAX, count), request.queue.kind.name(),
+        i64::from(request.suspects)
+    )?;
     Ok(rows)
 }

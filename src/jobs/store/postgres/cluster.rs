@@ -6,6 +6,7 @@ use async_trait::async_trait;
 use object_store::ObjectStore;
 use railhead_macros::repeat_conflicts;
 use sqlx::Row;
+use sqlx::{query, query_scalar};
 use uuid::Uuid;
 
 use crate::jobs::store::postgres::connection::{FOLD, LOCKS};
@@ -37,31 +38,21 @@ const SWEEP: &str = "DELETE FROM objects WHERE made_at < CAST(extract(epoch FROM
 #[async_trait]
 impl Cluster for PostgresStore {
     async fn now(&self) -> Result<i64> {
-        Ok(sqlx::query_scalar(NOW).fetch_one(&self.writer).await?)
+        Ok(sql!(scalar fetch_one, &self.writer, NOW)?)
     }
 
     async fn beat(&self, node: &Node) -> Result<ClusterView> {
         let now = self.now().await?;
-        sqlx::query(
+        sql!(execute, &self.writer,
             "INSERT INTO nodes (id, version, workers, seen_at) VALUES ($1, $2, $3, $4) \
-             ON CONFLICT (id) DO UPDATE SET workers = $3, seen_at = $4",
-        )
-        .bind(node.id.to_string())
-        .bind(env!("CARGO_PKG_VERSION"))
-        .bind(count(node.workers))
-        .bind(now)
-        .execute(&self.writer)
-        .await?;
-        sqlx::query("DELETE FROM nodes WHERE seen_at < $1")
-            .bind(now - FORGOTTEN_AFTER)
-            .execute(&self.writer)
-            .await?;
-        let living = sqlx::query(
-            "SELECT COUNT(*) AS nodes, CAST(COALESCE(SUM(workers), 0) AS bigint) AS workers FROM nodes WHERE seen_at > $1",
-        )
-        .bind(now - DEAD_AFTER)
-        .fetch_one(&self.writer)
-        .await?;
+             ON CONFLICT (id) DO UPDATE SET workers = $3, seen_at = $4";
+            node.id.to_string(), env!("CARGO_PKG_VERSION"), count(node.workers), now
+        )?;
+        sql!(execute, &self.writer, "DELETE FROM nodes WHERE seen_at < $1"; now - FORGOTTEN_AFTER)?;
+        let living = sql!(fetch_one, &self.writer,
+            "SELECT COUNT(*) AS nodes, CAST(COALESCE(SUM(workers), 0) AS bigint) AS workers FROM nodes WHERE seen_at > $1";
+            now - DEAD_AFTER
+        )?;
         Ok(ClusterView {
             nodes: read_small(&living, "nodes")?,
             workers: read_small(&living, "workers")?,
@@ -69,34 +60,26 @@ impl Cluster for PostgresStore {
     }
 
     async fn leave(&self, node: Uuid) -> Result<()> {
-        sqlx::query("DELETE FROM nodes WHERE id = $1")
-            .bind(node.to_string())
-            .execute(&self.writer)
-            .await?;
+        sql!(execute, &self.writer, "DELETE FROM nodes WHERE id = $1"; node.to_string())?;
         Ok(())
     }
 
     async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>> {
         let ids: Vec<String> = running.iter().map(Uuid::to_string).collect();
-        let rows = sqlx::query(
-            "SELECT id FROM jobs WHERE id = ANY($1) AND state = 'running' AND cancel_requested = 1",
-        )
-        .bind(ids)
-        .fetch_all(&self.readers)
-        .await?;
+        let rows = sql!(fetch_all, &self.readers,
+            "SELECT id FROM jobs WHERE id = ANY($1) AND state = 'running' AND cancel_requested = 1";
+            ids
+        )?;
         rows.iter().map(read_id).collect()
     }
 
     async fn keep_batches(&self, batches: &[Uuid]) -> Result<()> {
         let ids: Vec<String> = batches.iter().map(Uuid::to_string).collect();
-        sqlx::query(
+        sql!(execute, &self.writer,
             "UPDATE batches SET filled_until = CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) + $2 \
-             WHERE id = ANY($1) AND complete = 0 AND dropped = 0",
-        )
-        .bind(ids)
-        .bind(FILLED_WITHIN)
-        .execute(&self.writer)
-        .await?;
+             WHERE id = ANY($1) AND complete = 0 AND dropped = 0";
+            ids, FILLED_WITHIN
+        )?;
         Ok(())
     }
 
@@ -108,40 +91,37 @@ impl Cluster for PostgresStore {
     // Somebody else may be at it.
     async fn fold_counts(&self) -> Result<()> {
         let mut transaction = self.writer.begin().await?;
-        let free: bool = sqlx::query_scalar("SELECT pg_try_advisory_xact_lock($1, $2)")
-            .bind(LOCKS)
-            .bind(FOLD)
-            .fetch_one(&mut *transaction)
-            .await?;
+        let free: bool = sql!(scalar fetch_one, &mut *transaction,
+            "SELECT pg_try_advisory_xact_lock($1, $2)";
+            LOCKS, FOLD
+        )?;
         if free {
-            sqlx::query(
+            sql!(
+                execute,
+                &mut *transaction,
                 "WITH gone AS (DELETE FROM job_counts RETURNING state, tenant, kind, number) \
                  INSERT INTO job_counts (state, tenant, kind, number) \
-                 SELECT state, tenant, kind, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant, kind HAVING SUM(number) <> 0",
-            )
-            .execute(&mut *transaction)
-            .await?;
-            sqlx::query(
+                 SELECT state, tenant, kind, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant, kind HAVING SUM(number) <> 0"
+            )?;
+            sql!(
+                execute,
+                &mut *transaction,
                 "WITH gone AS (DELETE FROM stored_bytes RETURNING tenant, bytes) \
                  INSERT INTO stored_bytes (tenant, bytes) \
-                 SELECT tenant, CAST(SUM(bytes) AS bigint) FROM gone GROUP BY tenant HAVING SUM(bytes) <> 0",
-            )
-            .execute(&mut *transaction)
-            .await?;
+                 SELECT tenant, CAST(SUM(bytes) AS bigint) FROM gone GROUP BY tenant HAVING SUM(bytes) <> 0"
+            )?;
         }
         transaction.commit().await?;
         Ok(())
     }
 
     async fn deployment(&self) -> Result<Deployment> {
-        let row = sqlx::query(
+        let row = sql!(fetch_one, &self.writer,
             "SELECT id, results_place, EXISTS (SELECT 1 FROM blobs WHERE key IS NOT NULL) AS has_results, \
              (SELECT COUNT(*) FROM nodes WHERE seen_at > CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - $1) AS nodes \
-             FROM deployment",
-        )
-        .bind(DEAD_AFTER)
-        .fetch_one(&self.writer)
-        .await?;
+             FROM deployment";
+            DEAD_AFTER
+        )?;
         Ok(Deployment {
             id: row.try_get("id")?,
             results_place: row.try_get("results_place")?,
@@ -151,24 +131,19 @@ impl Cluster for PostgresStore {
     }
 
     async fn place_results(&self, before: Option<&str>, place: &str) -> Result<bool> {
-        let written = sqlx::query(
-            "UPDATE deployment SET results_place = $2 WHERE results_place IS NOT DISTINCT FROM $1",
-        )
-        .bind(before)
-        .bind(place)
-        .execute(&self.writer)
-        .await?;
+        let written = sql!(execute, &self.writer,
+            "UPDATE deployment SET results_place = $2 WHERE results_place IS NOT DISTINCT FROM $1";
+            before, place
+        )?;
         Ok(written.rows_affected() > 0)
     }
 
     async fn take_sweep(&self) -> Result<bool> {
-        let taken = sqlx::query(
+        let taken = sql!(execute, &self.writer,
             "WITH clock AS (SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) AS now) \
-             UPDATE deployment SET swept_at = clock.now FROM clock WHERE swept_at <= clock.now - $1",
-        )
-        .bind(SWEPT_AFTER)
-        .execute(&self.writer)
-        .await?;
+             UPDATE deployment SET swept_at = clock.now FROM clock WHERE swept_at <= clock.now - $1";
+            SWEPT_AFTER
+        )?;
         Ok(taken.rows_affected() > 0)
     }
 
@@ -200,7 +175,7 @@ impl PostgresStore {
         sqlx::raw_sql("SET statement_timeout = 0")
             .execute(&mut *connection)
             .await?;
-        Ok(sqlx::query_scalar(keys).fetch_all(&mut *connection).await?)
+        Ok(sql!(scalar fetch_all, &mut *connection, keys)?)
     }
 
     /// Removes all large results that are in the database.

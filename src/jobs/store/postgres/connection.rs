@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use sqlx::Connection;
 use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
+use sqlx::query;
 use tokio::time::timeout;
 
 use crate::jobs::error::{JobsError, StoreError};
@@ -112,10 +113,6 @@ fn tls_failed(error: sqlx::Error) -> JobsError {
 
 /// From here to the end of the transaction nobody else has this lock.
 pub(crate) async fn lock(connection: &mut PgConnection, what: i32) -> Result<()> {
-    sqlx::query("SELECT pg_advisory_xact_lock($1, $2)")
-        .bind(LOCKS)
-        .bind(what)
-        .execute(connection)
-        .await?;
+    sql!(execute, connection, "SELECT pg_advisory_xact_lock($1, $2)"; LOCKS, what)?;
     Ok(())
 }

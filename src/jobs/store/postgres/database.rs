@@ -3,6 +3,7 @@
 use std::fmt;
 
 use sqlx::postgres::{PgConnectOptions, PgPool};
+use sqlx::query;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::postgres::claim_memory::ClaimMemory;
@@ -86,7 +87,7 @@ impl PostgresStore {
             true => "UPDATE deployment SET touched = touched + 1",
             false => "SELECT 1 FROM deployment",
         };
-        sqlx::query(statement).execute(&self.writer).await?;
+        sql!(execute, &self.writer, statement)?;
         Ok(())
     }
 }

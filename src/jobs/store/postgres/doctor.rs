@@ -1,6 +1,7 @@
 //! How is the database? What an operator wants to know before and while nodes use it.
 
 use sqlx::postgres::PgPool;
+use sqlx::query_scalar;
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::postgres::connection::connect;
@@ -87,7 +88,7 @@ async fn ask(pool: &PgPool) -> Result<Vec<Finding>, JobsError> {
     require(pool).await?;
     let mut findings = vec![clock(pool).await?];
     for (about, statement, wrong) in NUMBERS {
-        let number: i64 = sqlx::query_scalar(statement).fetch_one(pool).await?;
+        let number: i64 = sql!(scalar fetch_one, pool, statement)?;
         findings.push(Finding {
             about,
             says: number.to_string(),
@@ -100,10 +101,9 @@ async fn ask(pool: &PgPool) -> Result<Vec<Finding>, JobsError> {
 async fn clock(pool: &PgPool) -> Result<Finding, JobsError> {
     let here = || jiff::Timestamp::now().as_millisecond();
     let asked = here();
-    let there: i64 =
-        sqlx::query_scalar("SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)")
-            .fetch_one(pool)
-            .await?;
+    let there: i64 = sql!(scalar fetch_one, pool,
+        "SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)"
+    )?;
     let offset = there - i64::midpoint(asked, here());
     Ok(Finding {
         about: "ms by which the clock of the database is ahead of that of this machine",

@@ -63,20 +63,20 @@ pub(crate) async fn lock_admission(connection: &mut DbConnection) -> Result<()> 
 /// Keeps jobs from being removed until the end of the transaction: another job is about to refer to their results.
 pub(crate) async fn lock_jobs_for_share(connection: &mut DbConnection, ids: &[Uuid]) -> Result<()> {
     let ids: Vec<String> = ids.iter().map(Uuid::to_string).collect();
-    sqlx::query("SELECT id FROM jobs WHERE id = ANY($1) ORDER BY id FOR KEY SHARE")
-        .bind(ids)
-        .fetch_all(connection)
-        .await?;
+    sql!(fetch_all, connection,
+        "SELECT id FROM jobs WHERE id = ANY($1) ORDER BY id FOR KEY SHARE";
+        ids
+    )?;
     Ok(())
 }
 
 /// Keeps others from counting the references to blobs until the end of the transaction. Of two who drop the last two
 /// references at the same time, the later sees that the other one is gone.
 pub(crate) async fn lock_blobs(connection: &mut DbConnection, ids: &[i64]) -> Result<()> {
-    sqlx::query("SELECT id FROM blobs WHERE id = ANY($1) ORDER BY id FOR UPDATE")
-        .bind(ids)
-        .fetch_all(connection)
-        .await?;
+    sql!(fetch_all, connection,
+        "SELECT id FROM blobs WHERE id = ANY($1) ORDER BY id FOR UPDATE";
+        ids
+    )?;
     Ok(())
 }
 
@@ -87,12 +87,10 @@ impl PostgresStore {
         connection: &mut DbConnection,
         number: usize,
     ) -> Result<Vec<i64>> {
-        let ids = sqlx::query_scalar(
-            "SELECT nextval('blob_ids') FROM generate_series(1, CAST($1 AS bigint))",
-        )
-        .bind(i64::try_from(number).unwrap_or(i64::MAX))
-        .fetch_all(connection)
-        .await?;
+        let ids = sql!(scalar fetch_all, connection,
+            "SELECT nextval('blob_ids') FROM generate_series(1, CAST($1 AS bigint))";
+            i64::try_from(number).unwrap_or(i64::MAX)
+        )?;
         Ok(ids)
     }
 
@@ -155,9 +153,9 @@ impl PostgresStore {
 
     /// Size of the database.
     pub(crate) async fn database_bytes(&self) -> Result<u64> {
-        let bytes: i64 = sqlx::query_scalar("SELECT pg_database_size(current_database())")
-            .fetch_one(&self.readers)
-            .await?;
+        let bytes: i64 = sql!(scalar fetch_one, &self.readers,
+            "SELECT pg_database_size(current_database())"
+        )?;
         Ok(u64::try_from(bytes).unwrap_or(0))
     }
 

@@ -1,6 +1,7 @@
 //! Takes the rows of an embedded job table into an empty database, all of them or none.
 
 use sqlx::postgres::PgConnection;
+use sqlx::query_scalar;
 use sqlx::{AssertSqlSafe, Connection};
 
 use crate::jobs::error::JobsError;
@@ -60,7 +61,7 @@ impl PostgresStore {
 
 async fn require_empty(connection: &mut PgConnection) -> Result<(), JobsError> {
     let filled = "SELECT EXISTS (SELECT 1 FROM jobs) OR EXISTS (SELECT 1 FROM batches)";
-    match sqlx::query_scalar(filled).fetch_one(connection).await? {
+    match sql!(scalar fetch_one, connection, filled)? {
         true => Err(JobsError::DatabaseNotEmpty),
         false => Ok(()),
     }

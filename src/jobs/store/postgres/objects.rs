@@ -14,6 +14,7 @@ use object_store::{
     PutResult, Result,
 };
 use sqlx::postgres::PgPool;
+use sqlx::{query, query_scalar};
 
 /// Bytes of a piece.
 const PIECE: u64 = 1 << 20;
@@ -34,12 +35,11 @@ impl PgObjects {
     }
 
     async fn meta(&self, location: &Path) -> Result<ObjectMeta> {
-        let size: Option<i64> =
-            sqlx::query_scalar("SELECT size FROM objects WHERE path = $1 AND number = 0")
-                .bind(location.as_ref())
-                .fetch_optional(&self.pool)
-                .await
-                .map_err(failed)?;
+        let size: Option<i64> = sql!(scalar fetch_optional, &self.pool,
+            "SELECT size FROM objects WHERE path = $1 AND number = 0";
+            location.as_ref()
+        )
+        .map_err(failed)?;
         match size {
             Some(size) => Ok(meta(location.clone(), size)),
             None => Err(missing(location)),
@@ -49,13 +49,11 @@ impl PgObjects {
     /// The part of a range that one piece has.
     async fn piece(&self, location: &Path, number: u64, range: &Range<u64>) -> Result<Bytes> {
         let start = number * PIECE;
-        let body: Option<Vec<u8>> =
-            sqlx::query_scalar("SELECT body FROM objects WHERE path = $1 AND number = $2")
-                .bind(location.as_ref())
-                .bind(number.cast_signed())
-                .fetch_optional(&self.pool)
-                .await
-                .map_err(failed)?;
+        let body: Option<Vec<u8>> = sql!(scalar fetch_optional, &self.pool,
+            "SELECT body FROM objects WHERE path = $1 AND number = $2";
+            location.as_ref(), number.cast_signed()
+        )
+        .map_err(failed)?;
         // Somebody may have removed it meanwhile.
         let body = Bytes::from(body.ok_or_else(|| missing(location))?);
         let place = |at: u64| usize::try_from(at.saturating_sub(start)).unwrap_or(usize::MAX);
@@ -85,20 +83,14 @@ impl ObjectStore for PgObjects {
             pieces.push(&[]);
         }
         let mut transaction = self.pool.begin().await.map_err(failed)?;
-        sqlx::query("DELETE FROM objects WHERE path = $1")
-            .bind(location.as_ref())
-            .execute(&mut *transaction)
-            .await
+        sql!(execute, &mut *transaction, "DELETE FROM objects WHERE path = $1"; location.as_ref())
             .map_err(failed)?;
         for (number, piece) in (0_i64..).zip(pieces) {
-            sqlx::query("INSERT INTO objects (path, number, size, body) VALUES ($1, $2, $3, $4)")
-                .bind(location.as_ref())
-                .bind(number)
-                .bind(size)
-                .bind(piece)
-                .execute(&mut *transaction)
-                .await
-                .map_err(failed)?;
+            sql!(execute, &mut *transaction,
+                "INSERT INTO objects (path, number, size, body) VALUES ($1, $2, $3, $4)";
+                location.as_ref(), number, size, piece
+            )
+            .map_err(failed)?;
         }
         transaction.commit().await.map_err(failed)?;
         Ok(PutResult {
@@ -151,11 +143,11 @@ impl ObjectStore for PgObjects {
             .and_then(move |location| {
                 let pool = pool.clone();
                 async move {
-                    let gone = sqlx::query("DELETE FROM objects WHERE path = $1")
-                        .bind(location.as_ref())
-                        .execute(&pool)
-                        .await
-                        .map_err(failed)?;
+                    let gone = sql!(execute, &pool,
+                        "DELETE FROM objects WHERE path = $1";
+                        location.as_ref()
+                    )
+                    .map_err(failed)?;
                     match gone.rows_affected() {
                         0 => Err(missing(&location)),
                         _ => Ok(location),
@@ -187,14 +179,11 @@ impl ObjectStore for PgObjects {
     /// Only the folders are told, which is what results are looked for by.
     async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
         let (from, to) = bounds(prefix);
-        let names: Vec<String> = sqlx::query_scalar(
+        let names: Vec<String> = sql!(scalar fetch_all, &self.pool,
             "SELECT DISTINCT split_part(substr(path, length($1) + 1), '/', 1) FROM objects \
-             WHERE path >= $1 AND path < $2 AND number = 0 AND strpos(substr(path, length($1) + 1), '/') > 0 ORDER BY 1",
+             WHERE path >= $1 AND path < $2 AND number = 0 AND strpos(substr(path, length($1) + 1), '/') > 0 ORDER BY 1";
+            &from, to
         )
-        .bind(&from)
-        .bind(to)
-        .fetch_all(&self.pool)
-        .await
         .map_err(failed)?;
         let folders = names.iter().map(|name| Path::from(format!("{from}{name}")));
         Ok(ListResult {

@@ -6,6 +6,7 @@
 
 use sqlx::PgConnection;
 use sqlx::postgres::PgPool;
+use sqlx::{query, query_scalar};
 
 use crate::jobs::error::JobsError;
 use crate::jobs::store::postgres::connection::{self, connect, lock};
@@ -75,21 +76,20 @@ async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
     }
     if before.is_none() {
         sqlx::raw_sql(SCHEMA).execute(&mut *transaction).await?;
-        sqlx::query("INSERT INTO deployment (one, form) VALUES (1, $1)")
-            .bind(FIRST_SCHEMA_VERSION)
-            .execute(&mut *transaction)
-            .await?;
+        sql!(execute, &mut *transaction,
+            "INSERT INTO deployment (one, form) VALUES (1, $1)";
+            FIRST_SCHEMA_VERSION
+        )?;
     }
     let reached = before.unwrap_or(FIRST_SCHEMA_VERSION);
     for (form, statements, readable_from) in STEPS.iter().filter(|step| step.0 > reached) {
         sqlx::raw_sql(*statements)
             .execute(&mut *transaction)
             .await?;
-        sqlx::query("UPDATE deployment SET form = $1, readable_from = $2")
-            .bind(form)
-            .bind(readable_from)
-            .execute(&mut *transaction)
-            .await?;
+        sql!(execute, &mut *transaction,
+            "UPDATE deployment SET form = $1, readable_from = $2";
+            form, readable_from
+        )?;
     }
     transaction.commit().await?;
     Ok(match before {
@@ -114,9 +114,9 @@ async fn require_within(connection: &mut PgConnection) -> Result<(), JobsError> 
     if form < SCHEMA_VERSION {
         return Err(JobsError::OldTables);
     }
-    let readable_from: i64 = sqlx::query_scalar("SELECT readable_from FROM deployment")
-        .fetch_one(connection)
-        .await?;
+    let readable_from: i64 = sql!(scalar fetch_one, connection,
+        "SELECT readable_from FROM deployment"
+    )?;
     match readable_from <= SCHEMA_VERSION {
         true => Ok(()),
         false => Err(JobsError::UnsupportedSchema),
@@ -125,9 +125,9 @@ async fn require_within(connection: &mut PgConnection) -> Result<(), JobsError> 
 
 /// The form of the tables, if there are any.
 async fn form(connection: &mut PgConnection) -> Result<Option<i64>, JobsError> {
-    let there: bool = sqlx::query_scalar("SELECT to_regclass('deployment') IS NOT NULL")
-        .fetch_one(&mut *connection)
-        .await?;
+    let there: bool = sql!(scalar fetch_one, &mut *connection,
+        "SELECT to_regclass('deployment') IS NOT NULL"
+    )?;
     if !there {
         return Ok(None);
     }

@@ -56,16 +56,11 @@ impl Batches for SqlStore {
             Ok(places) => u32::try_from(places).unwrap_or(most),
             Err(refusal) => return Ok(Err(refusal)),
         };
-        query(
+        sql!(execute, &mut *transaction,
             "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
-         ON CONFLICT (id) DO UPDATE SET reserved = batches.reserved + $4",
-        )
-        .bind(id.to_string())
-        .bind(tenant)
-        .bind(created_at(id))
-        .bind(i64::from(places))
-        .execute(&mut *transaction)
-        .await?;
+             ON CONFLICT (id) DO UPDATE SET reserved = batches.reserved + $4";
+            id.to_string(), tenant, created_at(id), i64::from(places)
+        )?;
         transaction.commit().await?;
         Ok(Ok(places))
     }
@@ -90,10 +85,10 @@ impl Batches for SqlStore {
         if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
             return Ok(begun);
         }
-        let reserved = query("SELECT reserved FROM batches WHERE id = $1")
-            .bind(new.id.to_string())
-            .fetch_optional(&mut *transaction)
-            .await?;
+        let reserved = sql!(fetch_optional, &mut *transaction,
+            "SELECT reserved FROM batches WHERE id = $1";
+            new.id.to_string()
+        )?;
         let reserved = match &reserved {
             Some(row) => read_count(row, "reserved")?,
             None => 0,
@@ -117,32 +112,19 @@ impl Batches for SqlStore {
             return Ok(BatchBegun::Refused(refusal));
         }
         if let Some((digest, body)) = of_template {
-            query(
-                "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
-            )
-            .bind(&*new.tenant)
-            .bind(digest)
-            .bind(body.as_ref())
-            .execute(&mut *transaction)
-            .await?;
+            sql!(execute, &mut *transaction,
+                "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING";
+                &*new.tenant, digest, body.as_ref()
+            )?;
         }
-        query(
+        sql!(execute, &mut *transaction,
             "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
              VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10) \
-             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10",
-        )
-        .bind(new.id.to_string())
-        .bind(&*new.tenant)
-        .bind(new.created_at)
-        .bind(i64::from(new.count))
-        .bind(i64::from(new.rejected))
-        .bind(&new.name)
-        .bind(to_json(&new.labels)?)
-        .bind(template.as_ref().map(|(digest, _)| digest))
-        .bind(new.head.as_deref())
-        .bind(new.kind.name())
-        .execute(&mut *transaction)
-        .await?;
+             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10";
+            new.id.to_string(), &*new.tenant, new.created_at, i64::from(new.count),
+            i64::from(new.rejected), &new.name, to_json(&new.labels)?,
+            template.as_ref().map(|(digest, _)| digest), new.head.as_deref(), new.kind.name()
+        )?;
         keep_key(&mut transaction, new).await?;
         transaction.commit().await?;
         Ok(BatchBegun::Created)
@@ -154,15 +136,14 @@ impl Batches for SqlStore {
             .map(|(index, job)| (Some(*index), job))
             .collect();
         let mut transaction = engine::begin(&self.writer).await?;
-        let filled = query(concat!(
-            "UPDATE batches SET reserved = ",
-            greatest!(),
-            "(reserved - $1, 0) WHERE id = $2 AND dropped = 0"
-        ))
-        .bind(count(jobs.len()))
-        .bind(batch.to_string())
-        .execute(&mut *transaction)
-        .await?;
+        let filled = sql!(execute, &mut *transaction,
+            concat!(
+                "UPDATE batches SET reserved = ",
+                greatest!(),
+                "(reserved - $1, 0) WHERE id = $2 AND dropped = 0"
+            );
+            count(jobs.len()), batch.to_string()
+        )?;
         require_batch(batch, filled.rows_affected())?;
         let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
         transaction.commit().await?;
@@ -170,11 +151,10 @@ impl Batches for SqlStore {
     }
 
     async fn complete_batch(&self, id: Uuid) -> Result<()> {
-        let complete =
-            query("UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0")
-                .bind(id.to_string())
-                .execute(&self.writer)
-                .await?;
+        let complete = sql!(execute, &self.writer,
+            "UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0";
+            id.to_string()
+        )?;
         require_batch(id, complete.rows_affected())
     }
 
@@ -185,39 +165,35 @@ impl Batches for SqlStore {
             "DELETE FROM batch_keys WHERE batch_id = $1 \
              AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0)",
         ] {
-            query(statement)
-                .bind(id.to_string())
-                .execute(&mut *transaction)
-                .await?;
+            sql!(execute, &mut *transaction, statement; id.to_string())?;
         }
-        let gone = query(
+        let gone = sql!(fetch_all, &mut *transaction,
             "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs WHERE batch_id = $1 ORDER BY id LIMIT $2) \
-             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id",
-        )
-        .bind(id.to_string())
-        .bind(i64::from(limit))
-        .fetch_all(&mut *transaction)
-        .await?;
+             AND EXISTS (SELECT 1 FROM batches WHERE id = $1 AND complete = 0) RETURNING blob_id";
+            id.to_string(), i64::from(limit)
+        )?;
         release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
         let last = gone.len() < limit as usize;
         if last {
-            query("DELETE FROM batches WHERE id = $1 AND complete = 0")
-                .bind(id.to_string())
-                .execute(&mut *transaction)
-                .await?;
+            sql!(execute, &mut *transaction,
+                "DELETE FROM batches WHERE id = $1 AND complete = 0";
+                id.to_string()
+            )?;
         }
         transaction.commit().await?;
         Ok(last)
     }
 
     async fn unfinished_batches(&self) -> Result<Vec<Uuid>> {
-        let rows = query(concat!(
-            "SELECT id FROM batches WHERE complete = 0 AND ",
-            being_filled!(),
-            " = 0"
-        ))
-        .fetch_all(&self.readers)
-        .await?;
+        let rows = sql!(
+            fetch_all,
+            &self.readers,
+            concat!(
+                "SELECT id FROM batches WHERE complete = 0 AND ",
+                being_filled!(),
+                " = 0"
+            )
+        )?;
         rows.iter().map(read_id).collect()
     }
 
@@ -229,13 +205,10 @@ impl Batches for SqlStore {
         now: i64,
     ) -> Result<Vec<(Uuid, State)>> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let rows = query(CANCEL)
-            .bind(now)
-            .bind(id.to_string())
-            .bind(i64::from(limit))
-            .bind(tenant)
-            .fetch_all(&mut *transaction)
-            .await?;
+        let rows = sql!(fetch_all, &mut *transaction,
+            CANCEL;
+            now, id.to_string(), i64::from(limit), tenant
+        )?;
         drop_slices_of_ended(&mut transaction, &rows).await?;
         transaction.commit().await?;
         rows.iter()
@@ -245,27 +218,20 @@ impl Batches for SqlStore {
 
     async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let gone = query(
+        let gone = sql!(fetch_all, &mut *transaction,
             "DELETE FROM jobs WHERE id IN (SELECT id FROM jobs \
-         WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
-         state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id",
-        )
-        .bind(id.to_string())
-        .bind(i64::from(limit))
-        .bind(tenant)
-        .fetch_all(&mut *transaction)
-        .await?;
+             WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $3) AND \
+             state IN ('succeeded', 'failed', 'cancelled') ORDER BY id LIMIT $2) RETURNING blob_id";
+            id.to_string(), i64::from(limit), tenant
+        )?;
         release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
         let last = gone.len() < limit as usize;
         if last {
-            query(
+            sql!(execute, &mut *transaction,
                 "DELETE FROM batches WHERE id = $1 AND tenant = $2 AND complete = 1 \
-             AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)",
-            )
-            .bind(id.to_string())
-            .bind(tenant)
-            .execute(&mut *transaction)
-            .await?;
+                 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = $1)";
+                id.to_string(), tenant
+            )?;
         }
         transaction.commit().await?;
         Ok(last)
@@ -310,16 +276,14 @@ impl Batches for SqlStore {
     }
 
     async fn batch_label_keys(&self, tenant: &str, id: Uuid, limit: u32) -> Result<Vec<String>> {
-        let rows = query(concat!(
-            "SELECT DISTINCT label.key AS key FROM jobs, ",
-            pairs_of_labels!(),
-            " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
-        ))
-        .bind(id.to_string())
-        .bind(tenant)
-        .bind(i64::from(limit))
-        .fetch_all(&self.readers)
-        .await?;
+        let rows = sql!(fetch_all, &self.readers,
+            concat!(
+                "SELECT DISTINCT label.key AS key FROM jobs, ",
+                pairs_of_labels!(),
+                " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
+            );
+            id.to_string(), tenant, i64::from(limit)
+        )?;
         let key = |row: &DbRow| {
             let key = row.try_get("key")?;
             Ok(key)
@@ -365,11 +329,7 @@ impl Batches for SqlStore {
     }
 
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>> {
-        let row = query(GET_RUN)
-            .bind(id.to_string())
-            .bind(tenant)
-            .fetch_optional(&self.readers)
-            .await?;
+        let row = sql!(fetch_optional, &self.readers, GET_RUN; id.to_string(), tenant)?;
         let Some(row) = row else { return Ok(None) };
         let template: Vec<u8> = row.try_get("body")?;
         let head: Option<Vec<u8>> = row.try_get("head")?;
@@ -387,26 +347,19 @@ async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<()> {
     let Some((key, digest)) = &new.idempotency else {
         return Ok(());
     };
-    query(
+    sql!(execute, connection,
         "INSERT INTO batch_keys (of_tenant, key, digest, batch_id, kind) VALUES ($1, $2, $3, $4, $5) \
-         ON CONFLICT (of_tenant, kind, key) DO UPDATE SET digest = $3, batch_id = $4",
-    )
-    .bind(&*new.tenant)
-    .bind(key)
-    .bind(digest.as_slice())
-    .bind(new.id.to_string())
-    .bind(new.kind.name())
-    .execute(connection)
-    .await?;
+         ON CONFLICT (of_tenant, kind, key) DO UPDATE SET digest = $3, batch_id = $4";
+        &*new.tenant, key, digest.as_slice(), new.id.to_string(), new.kind.name()
+    )?;
     Ok(())
 }
 
 async fn has_template(connection: &mut DbConnection, tenant: &str, digest: &[u8]) -> Result<bool> {
-    let found = query("SELECT 1 FROM templates WHERE tenant = $1 AND digest = $2")
-        .bind(tenant)
-        .bind(digest)
-        .fetch_optional(connection)
-        .await?;
+    let found = sql!(fetch_optional, connection,
+        "SELECT 1 FROM templates WHERE tenant = $1 AND digest = $2";
+        tenant, digest
+    )?;
     Ok(found.is_some())
 }
 
@@ -428,17 +381,15 @@ async fn by_key(
     let Some((key, digest)) = &new.idempotency else {
         return Ok(None);
     };
-    let row = query(concat!(
-        "SELECT digest, id, complete, ",
-        being_filled!(),
-        " AS filled FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \
-         WHERE of_tenant = $1 AND key = $2 AND batch_keys.kind = $3"
-    ))
-    .bind(&*new.tenant)
-    .bind(key)
-    .bind(new.kind.name())
-    .fetch_optional(connection)
-    .await?;
+    let row = sql!(fetch_optional, connection,
+        concat!(
+            "SELECT digest, id, complete, ",
+            being_filled!(),
+            " AS filled FROM batch_keys JOIN batches ON batches.id = batch_keys.batch_id \
+             WHERE of_tenant = $1 AND key = $2 AND batch_keys.kind = $3"
+        );
+        &*new.tenant, key, new.kind.name()
+    )?;
     let Some(row) = row else { return Ok(None) };
     let stored: Vec<u8> = row.try_get("digest")?;
     let (id, complete) = (read_id(&row)?, read_flag(&row, "complete")?);

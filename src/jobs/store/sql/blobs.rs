@@ -37,13 +37,11 @@ impl SqlStore {
                     StoredResult::Blob(key, _) => (Some(key.as_str()), None),
                     StoredResult::Inline(result) => (None, Some(result)),
                 };
-                row.push_bind(next.next().copied())
-                    .push_bind(claim.id.to_string())
-                    .push_bind(fence(claim))
-                    .push_bind(key)
-                    .push_bind(count(result.bytes()))
-                    .push_bind(inside.map(|result| result.solution.as_ref()))
-                    .push_bind(inside.and_then(|result| result.fields.as_deref()));
+                values!(row;
+                    next.next().copied(), claim.id.to_string(), fence(claim), key,
+                    count(result.bytes()), inside.map(|result| result.solution.as_ref()),
+                    inside.and_then(|result| result.fields.as_deref())
+                );
             });
             insert.push(concat!(
                 ") INSERT INTO blobs (id, key, bytes, solution, fields, tenant) \
@@ -144,10 +142,10 @@ impl ResultKeys for SqlStore {
             push_keys(&mut forget, some);
             forget.build().execute(&self.writer).await?;
         }
-        let keys = query_scalar("SELECT key FROM blob_outbox ORDER BY key LIMIT $1")
-            .bind(i64::from(limit))
-            .fetch_all(&self.readers)
-            .await?;
+        let keys = sql!(scalar fetch_all, &self.readers,
+            "SELECT key FROM blob_outbox ORDER BY key LIMIT $1";
+            i64::from(limit)
+        )?;
         Ok(keys)
     }
 

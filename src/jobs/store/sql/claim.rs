@@ -58,7 +58,7 @@ impl Claims for SqlStore {
             return Ok(known);
         }
         let mut connection = self.readers.acquire().await?;
-        let rows = query(QUEUES).fetch_all(&mut *connection).await?;
+        let rows = sql!(fetch_all, &mut *connection, QUEUES)?;
         drop(connection);
         let read = |row: &DbRow| {
             let queue = Queue {
@@ -137,9 +137,7 @@ impl Claims for SqlStore {
         }
         let mut query = QueryBuilder::new("WITH held (id, lease_token, now_at) AS (");
         query.push_values(claims, |mut row, (claim, progress)| {
-            row.push_bind(claim.id.to_string())
-                .push_bind(fence(claim))
-                .push_bind(*progress);
+            values!(row; claim.id.to_string(), fence(claim), *progress);
         });
         query.push(") UPDATE jobs SET lease_until = ");
         push_lease_until(&mut query, self, lease);
@@ -219,63 +217,40 @@ impl Claims for SqlStore {
         let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
         let mut transaction = engine::begin(&self.writer).await?;
         // Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
-        let added = query(
+        let added = sql!(execute, &mut *transaction,
             "UPDATE jobs SET attempt = 1, version = version + 1, slices = $1, done = $2, progress = $2, cost_us = $3 \
-             WHERE id = $4 AND lease_token = $5 AND state = 'running'",
-        )
-        .bind(i64::from(note.number) + 1)
-        .bind(slice.done)
-        .bind(count(slice.rest_us))
-        .bind(&id)
-        .bind(fence(claim))
-        .execute(&mut *transaction)
-        .await?;
+             WHERE id = $4 AND lease_token = $5 AND state = 'running'";
+            i64::from(note.number) + 1, slice.done, count(slice.rest_us), &id, fence(claim)
+        )?;
         if added.rows_affected() == 0 {
             return Ok(false);
         }
-        let there = query(
-            "SELECT 1 FROM job_slices WHERE job_id = $1 AND number = $2 AND digest = $3 AND spent_us = $4",
-        )
-        .bind(&id)
-        .bind(i64::from(note.number))
-        .bind(&note.digest)
-        .bind(spent_us)
-        .fetch_optional(&mut *transaction)
-        .await?;
+        let there = sql!(fetch_optional, &mut *transaction,
+            "SELECT 1 FROM job_slices WHERE job_id = $1 AND number = $2 AND digest = $3 AND spent_us = $4";
+            &id, i64::from(note.number), &note.digest, spent_us
+        )?;
         if there.is_none() {
-            let replaced = query(
-                "DELETE FROM job_slices WHERE job_id = $1 AND number >= $2 RETURNING blob_id",
-            )
-            .bind(&id)
-            .bind(i64::from(note.number))
-            .fetch_all(&mut *transaction)
-            .await?;
+            let replaced = sql!(fetch_all, &mut *transaction,
+                "DELETE FROM job_slices WHERE job_id = $1 AND number >= $2 RETURNING blob_id";
+                &id, i64::from(note.number)
+            )?;
             release_blobs(&mut transaction, read_blob_ids(&replaced)?).await?;
             let blobs = self
                 .insert_blobs(&mut transaction, &[(claim, &slice.result)])
                 .await?;
-            query(
+            sql!(execute, &mut *transaction,
                 "INSERT INTO job_slices (job_id, number, motions, digest, spent_us, blob_id) \
-                 VALUES ($1, $2, $3, $4, $5, $6)",
-            )
-            .bind(&id)
-            .bind(i64::from(note.number))
-            .bind(i64::from(note.motions))
-            .bind(&note.digest)
-            .bind(spent_us)
-            .bind(blobs.first())
-            .execute(&mut *transaction)
-            .await?;
+                 VALUES ($1, $2, $3, $4, $5, $6)";
+                &id, i64::from(note.number), i64::from(note.motions), &note.digest, spent_us,
+                blobs.first()
+            )?;
         }
         transaction.commit().await?;
         Ok(true)
     }
 
     async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>> {
-        let rows = query(NOTES)
-            .bind(id.to_string())
-            .fetch_all(&self.readers)
-            .await?;
+        let rows = sql!(fetch_all, &self.readers, NOTES; id.to_string())?;
         rows.iter()
             .map(|row| {
                 Ok(SliceRecord {
@@ -289,10 +264,7 @@ impl Claims for SqlStore {
     }
 
     async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>> {
-        let rows = query(RESULTS)
-            .bind(id.to_string())
-            .fetch_all(&self.readers)
-            .await?;
+        let rows = sql!(fetch_all, &self.readers, RESULTS; id.to_string())?;
         rows.iter()
             .map(|row| {
                 if let Some(key) = row.try_get::<Option<String>, _>("key")? {
@@ -337,13 +309,11 @@ fn read_claim(row: &DbRow) -> Result<Claim> {
 impl SqlStore {
     /// The template of a batch, and the head of a run.
     async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>> {
-        let row = query(
+        let row = sql!(fetch_optional, &self.readers,
             "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
-             WHERE batches.id = $1",
-        )
-        .bind(batch)
-        .fetch_optional(&self.readers)
-        .await?;
+             WHERE batches.id = $1";
+            batch
+        )?;
         // It goes with the last job of its batch.
         let Some(row) = row else { return Ok(None) };
         let (body, head): (Vec<u8>, Option<Vec<u8>>) = (row.try_get("body")?, row.try_get("head")?);

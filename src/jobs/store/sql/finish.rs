@@ -70,10 +70,7 @@ pub(crate) async fn end_pairs(connection: &mut DbConnection, pairs: &[Pair]) -> 
 fn with_pairs<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> QueryBuilder {
     let mut query = QueryBuilder::new("WITH pairs (job, at, source, lease_token) AS (");
     query.push_values(pairs, |mut row, pair| {
-        row.push_bind(pair.job.to_string())
-            .push_bind(pair.at)
-            .push_bind(pair.source.to_string())
-            .push_bind(pair.lease_token);
+        values!(row; pair.job.to_string(), pair.at, pair.source.to_string(), pair.lease_token);
     });
     query.push(")");
     query
@@ -101,13 +98,10 @@ impl SqlStore {
             "WITH done (id, lease_token, state, remarks, failure, blob, patches) AS (",
         );
         update.push_values(rows, |mut row, (claim, end)| {
-            row.push_bind(claim.id.to_string())
-                .push_bind(fence(claim))
-                .push_bind(end.state.name())
-                .push_bind(&end.remarks)
-                .push_bind(&end.failure)
-                .push_bind(end.result.and_then(|_| blobs.next().copied()))
-                .push_bind(i64::from(end.field_patches));
+            values!(row;
+                claim.id.to_string(), fence(claim), end.state.name(), &end.remarks, &end.failure,
+                end.result.and_then(|_| blobs.next().copied()), i64::from(end.field_patches)
+            );
         });
         update.push(") UPDATE jobs SET state = done.state, ended_at = ");
         update.push_bind(now);

@@ -22,19 +22,17 @@ use crate::jobs::store::{
 impl ClientJobs for SqlStore {
     async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let row = query(concat!(
-            "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
-             ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
-             cancel_requested = 1, version = version + 1, updated_at = $1 \
-             WHERE id = $2 AND tenant = $3 AND kind <> 'rows' AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
-            job_columns!(),
-            ", slices"
-        ))
-        .bind(now)
-        .bind(id.to_string())
-        .bind(tenant)
-        .fetch_all(&mut *transaction)
-        .await?;
+        let row = sql!(fetch_all, &mut *transaction,
+            concat!(
+                "UPDATE jobs SET state = CASE WHEN state = 'queued' THEN 'cancelled' ELSE state END, \
+                 ended_at = CASE WHEN state = 'queued' THEN $1 ELSE NULL END, \
+                 cancel_requested = 1, version = version + 1, updated_at = $1 \
+                 WHERE id = $2 AND tenant = $3 AND kind <> 'rows' AND cancel_requested = 0 AND state IN ('queued', 'running') RETURNING ",
+                job_columns!(),
+                ", slices"
+            );
+            now, id.to_string(), tenant
+        )?;
         drop_slices_of_ended(&mut transaction, &row).await?;
         transaction.commit().await?;
         match row.first() {
@@ -45,13 +43,10 @@ impl ClientJobs for SqlStore {
 
     async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let gone = query(
-            "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND kind <> 'rows' AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id",
-        )
-        .bind(id.to_string())
-        .bind(tenant)
-        .fetch_optional(&mut *transaction)
-        .await?;
+        let gone = sql!(fetch_optional, &mut *transaction,
+            "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND kind <> 'rows' AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id";
+            id.to_string(), tenant
+        )?;
         if let Some(row) = gone {
             release_blobs(&mut transaction, read_blob_id(&row)?.into_iter().collect()).await?;
             transaction.commit().await?;
@@ -63,26 +58,21 @@ impl ClientJobs for SqlStore {
     }
 
     async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>> {
-        let row = query(GET)
-            .bind(id.to_string())
-            .bind(tenant)
-            .fetch_optional(&self.readers)
-            .await?;
+        let row = sql!(fetch_optional, &self.readers, GET; id.to_string(), tenant)?;
         row.as_ref().map(read_job).transpose()
     }
 
     async fn result(&self, tenant: &str, id: Uuid) -> Result<Option<(Job, Option<ResultRef>)>> {
-        let row = query(concat!(
-            "SELECT ",
-            job_columns!(),
-            ", blob_id, field_patches, outputs, blob_key, blob_bytes, solution, fields FROM jobs LEFT JOIN \
-             (SELECT id AS blob, key AS blob_key, bytes AS blob_bytes, solution, fields FROM blobs) AS stored ON blob = blob_id \
-             WHERE id = $1 AND tenant = $2 AND kind <> 'rows'"
-        ))
-        .bind(id.to_string())
-        .bind(tenant)
-        .fetch_optional(&self.readers)
-        .await?;
+        let row = sql!(fetch_optional, &self.readers,
+            concat!(
+                "SELECT ",
+                job_columns!(),
+                ", blob_id, field_patches, outputs, blob_key, blob_bytes, solution, fields FROM jobs LEFT JOIN \
+                 (SELECT id AS blob, key AS blob_key, bytes AS blob_bytes, solution, fields FROM blobs) AS stored ON blob = blob_id \
+                 WHERE id = $1 AND tenant = $2 AND kind <> 'rows'"
+            );
+            id.to_string(), tenant
+        )?;
         let Some(row) = row else { return Ok(None) };
         let job = read_job(&row)?;
         if read_blob_id(&row)?.is_none() {
@@ -102,16 +92,13 @@ impl ClientJobs for SqlStore {
     }
 
     async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>> {
-        let row = query(
+        let row = sql!(fetch_optional, &self.readers,
             "SELECT jobs.kind, cases.row, cases.body, head, templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
              LEFT JOIN batches ON batches.id = jobs.batch_id \
              LEFT JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
-             WHERE jobs.id = $1 AND jobs.tenant = $2",
-        )
-        .bind(id.to_string())
-        .bind(tenant)
-        .fetch_optional(&self.readers)
-        .await?;
+             WHERE jobs.id = $1 AND jobs.tenant = $2";
+            id.to_string(), tenant
+        )?;
         let Some(row) = row else { return Ok(None) };
         let body: Vec<u8> = row.try_get("body")?;
         let template: Option<Vec<u8>> = match read_flag(&row, "row")? {
@@ -174,13 +161,10 @@ impl ClientJobs for SqlStore {
         after: Option<Uuid>,
         limit: u32,
     ) -> Result<Vec<Change>> {
-        let rows = query(CHANGES)
-            .bind(tenant)
-            .bind(since)
-            .bind(after.map_or_else(String::new, |id| id.to_string()))
-            .bind(i64::from(limit))
-            .fetch_all(&self.readers)
-            .await?;
+        let rows = sql!(fetch_all, &self.readers,
+            CHANGES;
+            tenant, since, after.map_or_else(String::new, |id| id.to_string()), i64::from(limit)
+        )?;
         let change = |row: &DbRow| {
             Ok(Change {
                 id: read_id(row)?,

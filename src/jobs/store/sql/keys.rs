@@ -22,40 +22,31 @@ const ONE: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_o
 #[async_trait]
 impl KeyStore for SqlStore {
     async fn add_key(&self, key: &Key) -> Result<()> {
-        query(
-            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
-        )
-        .bind(&key.id)
-        .bind(key.hash.as_bytes().as_slice())
-        .bind(&*key.tenant)
-        .bind(&key.name)
-        .bind(key.created_at)
-        .bind(key.revoked_at)
-        .bind(i64::from(key.read_only))
-        .bind(to_json(&*key.labels)?)
-        .execute(&self.writer)
-        .await?;
+        sql!(execute, &self.writer,
+            "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)";
+            &key.id, key.hash.as_bytes().as_slice(), &*key.tenant, &key.name, key.created_at,
+            key.revoked_at, i64::from(key.read_only), to_json(&*key.labels)?
+        )?;
         Ok(())
     }
 
     async fn key(&self, id: &str) -> Result<Option<Key>> {
-        let row = query(ONE).bind(id).fetch_optional(&self.readers).await?;
+        let row = sql!(fetch_optional, &self.readers, ONE; id)?;
         row.as_ref().map(read_key).transpose()
     }
 
     async fn keys(&self) -> Result<Vec<Key>> {
-        let rows = query(ALL).fetch_all(&self.readers).await?;
+        let rows = sql!(fetch_all, &self.readers, ALL)?;
         let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
         keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
         Ok(keys)
     }
 
     async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>> {
-        query("UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL")
-            .bind(now)
-            .bind(id)
-            .execute(&self.writer)
-            .await?;
+        sql!(execute, &self.writer,
+            "UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL";
+            now, id
+        )?;
         self.key(id).await
     }
 }
@@ -87,48 +78,35 @@ impl Profiles for SqlStore {
     ) -> Result<ProfileKept> {
         let mut transaction = engine::begin(&self.writer).await?;
         engine::lock_admission(&mut transaction).await?;
-        let known = query(
-            "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
-        )
-        .bind(tenant)
-        .bind(&new.digest)
-        .fetch_optional(&mut *transaction)
-        .await?;
+        let known = sql!(fetch_optional, &mut *transaction,
+            "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2";
+            tenant, &new.digest
+        )?;
         if let Some(row) = known {
             return Ok(ProfileKept::Existing(read_profile(&row)?));
         }
-        let row = query(
-            "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM profiles WHERE tenant = $1",
-        )
-        .bind(tenant)
-        .fetch_one(&mut *transaction)
-        .await?;
+        let row = sql!(fetch_one, &mut *transaction,
+            "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM profiles WHERE tenant = $1";
+            tenant
+        )?;
         let bytes = new.body.len() as u64;
         if read_count(&row, "bytes")? + bytes > max_bytes {
             return Ok(ProfileKept::Full);
         }
-        query(
-            "INSERT INTO profiles (tenant, digest, body, bytes, created_at) VALUES ($1, $2, $3, $4, $5)",
-        )
-        .bind(tenant)
-        .bind(&new.digest)
-        .bind(new.body.as_ref())
-        .bind(i64::try_from(bytes).unwrap_or(i64::MAX))
-        .bind(new.created_at)
-        .execute(&mut *transaction)
-        .await?;
+        sql!(execute, &mut *transaction,
+            "INSERT INTO profiles (tenant, digest, body, bytes, created_at) VALUES ($1, $2, $3, $4, $5)";
+            tenant, &new.digest, new.body.as_ref(), i64::try_from(bytes).unwrap_or(i64::MAX),
+            new.created_at
+        )?;
         transaction.commit().await?;
         Ok(ProfileKept::Added)
     }
 
     async fn profile(&self, tenant: &str, digest: &str) -> Result<Option<StoredProfile>> {
-        let row = query(
-            "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2",
-        )
-        .bind(tenant)
-        .bind(digest)
-        .fetch_optional(&self.readers)
-        .await?;
+        let row = sql!(fetch_optional, &self.readers,
+            "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2";
+            tenant, digest
+        )?;
         row.as_ref().map(read_profile).transpose()
     }
 
@@ -171,11 +149,10 @@ impl Profiles for SqlStore {
     }
 
     async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool> {
-        let gone = query("DELETE FROM profiles WHERE tenant = $1 AND digest = $2")
-            .bind(tenant)
-            .bind(digest)
-            .execute(&self.writer)
-            .await?;
+        let gone = sql!(execute, &self.writer,
+            "DELETE FROM profiles WHERE tenant = $1 AND digest = $2";
+            tenant, digest
+        )?;
         Ok(gone.rows_affected() > 0)
     }
 }

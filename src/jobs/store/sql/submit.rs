@@ -97,12 +97,10 @@ impl Places {
 
 /// Bytes of cases, templates and results that a tenant has stored.
 pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Result<u64> {
-    let row = query(
-        "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM stored_bytes WHERE tenant = $1",
-    )
-    .bind(tenant)
-    .fetch_one(connection)
-    .await?;
+    let row = sql!(fetch_one, connection,
+        "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM stored_bytes WHERE tenant = $1";
+        tenant
+    )?;
     read_count(&row, "bytes")
 }
 
@@ -149,34 +147,21 @@ pub(crate) async fn insert_jobs(
         rows.push_values(
             some.iter().zip(labels),
             |mut row, ((index, job), labels)| {
-                row.push_bind(job.id.to_string())
-                    .push("'queued'")
-                    .push_bind(&job.name)
-                    .push_bind(labels)
-                    .push_bind(&job.method)
-                    .push_bind(job.created_at)
-                    .push_bind(job.created_at)
-                    .push_bind(&batch)
-                    .push_bind(index.map(i64::from))
-                    .push_bind(i64::from(job.cost_us))
-                    .push_bind(i64::from(job.slice_us))
-                    .push_bind(&job.outputs)
-                    .push_bind(job.cache_key.as_ref().map(CacheKey::as_slice))
-                    .push_bind(&*job.tenant)
-                    .push_bind(i64::from(job.options.bypass_cache))
-                    .push_bind(job.options.priority.rank())
-                    .push_bind(job.deadline())
-                    .push_bind(job.traceparent.as_deref())
-                    .push_bind(count(job.body.len()))
-                    .push_bind(job.kind.name());
+                values!(row;
+                    job.id.to_string(), "queued", &job.name, labels, &job.method, job.created_at,
+                    job.created_at, &batch, index.map(i64::from), i64::from(job.cost_us),
+                    i64::from(job.slice_us), &job.outputs,
+                    job.cache_key.as_ref().map(CacheKey::as_slice), &*job.tenant,
+                    i64::from(job.options.bypass_cache), job.options.priority.rank(),
+                    job.deadline(), job.traceparent.as_deref(), count(job.body.len()),
+                    job.kind.name()
+                );
             },
         );
         rows.build().execute(&mut *connection).await?;
         let mut cases = QueryBuilder::new("INSERT INTO cases (job_id, row, body) ");
         cases.push_values(some, |mut row, (_, job)| {
-            row.push_bind(job.id.to_string())
-                .push_bind(i64::from(job.row))
-                .push_bind(job.body.as_ref());
+            values!(row; job.id.to_string(), i64::from(job.row), job.body.as_ref());
         });
         cases.build().execute(&mut *connection).await?;
         let labels: Vec<_> = some
@@ -187,11 +172,7 @@ pub(crate) async fn insert_jobs(
             let mut rows =
                 QueryBuilder::new("INSERT INTO job_labels (of_tenant, key, value, job_id, state) ");
             rows.push_values(some, |mut row, (job, (key, value))| {
-                row.push_bind(&*job.tenant)
-                    .push_bind(*key)
-                    .push_bind(*value)
-                    .push_bind(job.id.to_string())
-                    .push("'queued'");
+                values!(row; &*job.tenant, *key, *value, job.id.to_string(), "queued");
             });
             rows.build().execute(&mut *connection).await?;
         }
@@ -334,13 +315,10 @@ async fn store_together(
     let ended = insert_jobs(&mut transaction, None, &added).await?;
     for (_, job) in added {
         if let Some((key, digest)) = &job.idempotency {
-            query("INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4)")
-                .bind(&*job.tenant)
-                .bind(key)
-                .bind(digest.as_slice())
-                .bind(job.id.to_string())
-                .execute(&mut *transaction)
-                .await?;
+            sql!(execute, &mut *transaction,
+                "INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4)";
+                &*job.tenant, key, digest.as_slice(), job.id.to_string()
+            )?;
         }
         let as_it_is = if ended.contains(&job.id) {
             read_back(&mut transaction, job).await?
@@ -371,11 +349,7 @@ pub(crate) async fn by_key(
     key: &str,
     digest: &[u8; 32],
 ) -> Result<Option<Enqueued>> {
-    let row = query(BY_KEY)
-        .bind(tenant)
-        .bind(key)
-        .fetch_optional(connection)
-        .await?;
+    let row = sql!(fetch_optional, connection, BY_KEY; tenant, key)?;
     let Some(row) = row else { return Ok(None) };
     let stored: Vec<u8> = row.try_get("digest")?;
     Ok(Some(if stored == digest {
@@ -386,11 +360,7 @@ pub(crate) async fn by_key(
 }
 
 async fn read_back(connection: &mut DbConnection, job: &NewJob) -> Result<Job> {
-    let row = query(GET)
-        .bind(job.id.to_string())
-        .bind(&*job.tenant)
-        .fetch_one(connection)
-        .await?;
+    let row = sql!(fetch_one, connection, GET; job.id.to_string(), &*job.tenant)?;
     read_job(&row)
 }
 
@@ -446,11 +416,10 @@ impl SubmitJobs for SqlStore {
     }
 
     async fn forget_key(&self, tenant: &str, key: &str) -> Result<()> {
-        query("DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2")
-            .bind(tenant)
-            .bind(key)
-            .execute(&self.writer)
-            .await?;
+        sql!(execute, &self.writer,
+            "DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2";
+            tenant, key
+        )?;
         Ok(())
     }
 

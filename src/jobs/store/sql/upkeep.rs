@@ -58,13 +58,10 @@ impl Upkeep for SqlStore {
                 Some(i64::MAX)
             }
         };
-        let expired = query(REAP)
-            .bind(i64::from(attempts_max))
-            .bind(to_json(&Failure::worker_lost(attempts_max))?)
-            .bind(now)
-            .bind(late)
-            .fetch_all(&mut *transaction)
-            .await?;
+        let expired = sql!(fetch_all, &mut *transaction,
+            REAP;
+            i64::from(attempts_max), to_json(&Failure::worker_lost(attempts_max))?, now, late
+        )?;
         rows.extend(expired);
         drop_slices_of_ended(&mut transaction, &rows).await?;
         transaction.commit().await?;
@@ -76,12 +73,7 @@ impl Upkeep for SqlStore {
 
     async fn pass_deadlines(&self, failure: &Failure, moment: Moment) -> Result<Overdue> {
         // Late jobs are rare, and a read holds no writer up.
-        let rows = query(LATE)
-            .bind(moment.now)
-            .bind(moment.set_at)
-            .bind(moment.unset)
-            .fetch_all(&self.readers)
-            .await?;
+        let rows = sql!(fetch_all, &self.readers, LATE; moment.now, moment.set_at, moment.unset)?;
         let (mut queued, mut overdue) = (false, Overdue::default());
         for row in &rows {
             match read_state(row)? {
@@ -98,12 +90,10 @@ impl Upkeep for SqlStore {
     async fn expire(&self, expiry: RetentionRule) -> Result<u64> {
         let mut transaction = engine::begin(&self.writer).await?;
         let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
-        let rows = query(EXPIRED)
-            .bind(&young)
-            .bind(expiry.ended_before)
-            .bind(i64::from(expiry.jobs))
-            .fetch_all(&mut *transaction)
-            .await?;
+        let rows = sql!(fetch_all, &mut *transaction,
+            EXPIRED;
+            &young, expiry.ended_before, i64::from(expiry.jobs)
+        )?;
         let mut blobs = Vec::with_capacity(rows.len());
         for some in rows.chunks(250) {
             let ids = some.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
@@ -122,45 +112,38 @@ impl Upkeep for SqlStore {
             delete.build().execute(&mut *transaction).await?;
         }
         release_blobs(&mut transaction, blobs).await?;
-        query(
+        sql!(execute, &mut *transaction,
             "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, $1 FROM batches \
              WHERE id < $2 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id) \
-             ON CONFLICT (id) DO NOTHING",
-        )
-        .bind(expiry.now)
-        .bind(&young)
-        .execute(&mut *transaction)
-        .await?;
-        query(
+             ON CONFLICT (id) DO NOTHING";
+            expiry.now, &young
+        )?;
+        sql!(execute, &mut *transaction,
             "DELETE FROM batches \
-             WHERE id < $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id)",
-        )
-        .bind(&young)
-        .execute(&mut *transaction)
-        .await?;
-        query("DELETE FROM tombstones WHERE id < $1 AND gone_at <= $2")
-            .bind(first_id_at(expiry.forget_before.saturating_add(1)).to_string())
-            .bind(expiry.forget_before)
-            .execute(&mut *transaction)
-            .await?;
+             WHERE id < $1 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id)";
+            &young
+        )?;
+        sql!(execute, &mut *transaction,
+            "DELETE FROM tombstones WHERE id < $1 AND gone_at <= $2";
+            first_id_at(expiry.forget_before.saturating_add(1)).to_string(), expiry.forget_before
+        )?;
         transaction.commit().await?;
         Ok(rows.len() as u64)
     }
 
     async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool> {
-        let found = query("SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2")
-            .bind(id.to_string())
-            .bind(tenant)
-            .fetch_optional(&self.readers)
-            .await?;
+        let found = sql!(fetch_optional, &self.readers,
+            "SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2";
+            id.to_string(), tenant
+        )?;
         Ok(found.is_some())
     }
 
     async fn usage(&self, tenant: &str) -> Result<Usage> {
-        let rows = query("SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state")
-            .bind(tenant)
-            .fetch_all(&self.readers)
-            .await?;
+        let rows = sql!(fetch_all, &self.readers,
+            "SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state";
+            tenant
+        )?;
         let mut usage = Usage::default();
         for row in &rows {
             usage
@@ -178,15 +161,15 @@ impl Upkeep for SqlStore {
     }
 
     async fn stats(&self) -> Result<Stats> {
-        let rows = query(COUNT).fetch_all(&self.readers).await?;
+        let rows = sql!(fetch_all, &self.readers, COUNT)?;
         let mut jobs: BTreeMap<State, u64> =
             State::ALL.into_iter().map(|state| (state, 0)).collect();
         for row in &rows {
             jobs.insert(read_state(row)?, read_count(row, "jobs")?);
         }
-        let oldest_queued_at = query_scalar(OLDEST).fetch_one(&self.readers).await?;
-        let mean_cost_us: f64 = query_scalar(MEAN_COST).fetch_one(&self.readers).await?;
-        let result_bytes: i64 = query_scalar(RESULT_BYTES).fetch_one(&self.readers).await?;
+        let oldest_queued_at = sql!(scalar fetch_one, &self.readers, OLDEST)?;
+        let mean_cost_us: f64 = sql!(scalar fetch_one, &self.readers, MEAN_COST)?;
+        let result_bytes: i64 = sql!(scalar fetch_one, &self.readers, RESULT_BYTES)?;
         Ok(Stats {
             jobs,
             oldest_queued_at,
@@ -197,13 +180,10 @@ impl Upkeep for SqlStore {
     }
 
     async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead> {
-        let row = query(BEFORE)
-            .bind(&job.tenant)
-            .bind(job.priority.rank())
-            .bind(job.id.to_string())
-            .bind(i64::from(limit))
-            .fetch_one(&self.readers)
-            .await?;
+        let row = sql!(fetch_one, &self.readers,
+            BEFORE;
+            &job.tenant, job.priority.rank(), job.id.to_string(), i64::from(limit)
+        )?;
         let queues = self.queues().await?;
         let tenants: HashSet<&str> = queues.iter().map(|(queue, _)| &*queue.tenant).collect();
         Ok(QueueAhead {
@@ -235,14 +215,10 @@ const AT_ONCE: i64 = 1000;
 impl SqlStore {
     async fn fail_late(&self, failure: &Failure, moment: Moment) -> Result<Vec<Uuid>> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let rows = query(FAIL_LATE)
-            .bind(moment.now)
-            .bind(moment.set_at)
-            .bind(moment.unset)
-            .bind(to_json(failure)?)
-            .bind(AT_ONCE)
-            .fetch_all(&mut *transaction)
-            .await?;
+        let rows = sql!(fetch_all, &mut *transaction,
+            FAIL_LATE;
+            moment.now, moment.set_at, moment.unset, to_json(failure)?, AT_ONCE
+        )?;
         drop_slices_of_ended(&mut transaction, &rows).await?;
         transaction.commit().await?;
         rows.iter()

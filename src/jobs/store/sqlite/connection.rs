@@ -582,12 +582,6 @@ impl Separated<'_> {
         self.query
     }
 
-    /// Adds a piece of text as an entry.
-    pub(crate) fn push(&mut self, piece: &str) -> &mut Self {
-        self.next().push(piece);
-        self
-    }
-
     /// Adds a parameter as an entry.
     pub(crate) fn push_bind(&mut self, parameter: impl ToSql) -> &mut Self {
         self.next().push_bind(parameter);

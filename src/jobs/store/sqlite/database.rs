@@ -84,9 +84,7 @@ impl SqliteStore {
     /// # Errors
     /// [`JobsError::TableDamaged`], or the database failed.
     pub async fn check(&self) -> Result<(), JobsError> {
-        let found: String = query_scalar("PRAGMA quick_check(1)")
-            .fetch_one(&self.readers)
-            .await?;
+        let found: String = sql!(scalar fetch_one, &self.readers, "PRAGMA quick_check(1)")?;
         match found.as_str() {
             "ok" => Ok(()),
             _ => Err(JobsError::TableDamaged(found)),
@@ -99,10 +97,7 @@ impl SqliteStore {
     /// The file is there already or cannot be written.
     pub async fn copy_into(&self, file: &Path) -> Result<(), JobsError> {
         make_private(file)?;
-        query("VACUUM INTO $1")
-            .bind(file.to_string_lossy())
-            .execute(&self.writer)
-            .await?;
+        sql!(execute, &self.writer, "VACUUM INTO $1"; file.to_string_lossy())?;
         Ok(())
     }
 
@@ -111,9 +106,7 @@ impl SqliteStore {
         if write {
             return mark(&self.writer).await;
         }
-        query("SELECT 1 FROM jobs LIMIT 1")
-            .fetch_optional(&self.readers)
-            .await?;
+        sql!(fetch_optional, &self.readers, "SELECT 1 FROM jobs LIMIT 1")?;
         Ok(())
     }
 }

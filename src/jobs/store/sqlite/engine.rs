@@ -105,20 +105,13 @@ impl SqliteStore {
         };
         // A claim that a power cut undoes leaves its jobs in the queue.
         let mut transaction = self.writer.begin_relaxed().await?;
-        let rows = query(claim)
-            .bind(&*request.queue.tenant)
-            .bind(count(request.jobs))
-            .bind(request.late_before)
-            .bind(request.each_slice_us.map_or(i64::MAX, count))
-            .bind(request.queue.kind.name())
-            .bind(count(request.cost_us))
-            .bind(token)
-            .bind(request.lease.now.saturating_add(request.lease.ms))
-            .bind(request.worker)
-            .bind(request.now)
-            .bind(i64::from(request.suspects))
-            .fetch_all(&mut *transaction)
-            .await?;
+        let rows = sql!(fetch_all, &mut *transaction,
+            claim;
+            &*request.queue.tenant, count(request.jobs), request.late_before,
+            request.each_slice_us.map_or(i64::MAX, count), request.queue.kind.name(),
+            count(request.cost_us), token, request.lease.now.saturating_add(request.lease.ms),
+            request.worker, request.now, i64::from(request.suspects)
+        )?;
         transaction.commit().await?;
         Ok(rows)
     }
@@ -155,19 +148,17 @@ impl SqliteStore {
     /// # Errors
     /// The database failed.
     pub(crate) async fn compact(&self, spare: i64, step: u32) -> Result<bool> {
-        let free: i64 = query_scalar("PRAGMA freelist_count")
-            .fetch_one(&self.readers)
-            .await?;
+        let free: i64 = sql!(scalar fetch_one, &self.readers, "PRAGMA freelist_count")?;
         if free <= spare {
             return Ok(false);
         }
         let step = i64::from(step).min(free - spare);
-        query(format!("PRAGMA incremental_vacuum({step})"))
-            .fetch_all(&self.writer)
-            .await?;
-        let left: i64 = query_scalar("PRAGMA freelist_count")
-            .fetch_one(&self.writer)
-            .await?;
+        sql!(
+            fetch_all,
+            &self.writer,
+            format!("PRAGMA incremental_vacuum({step})")
+        )?;
+        let left: i64 = sql!(scalar fetch_one, &self.writer, "PRAGMA freelist_count")?;
         Ok(left < free)
     }
 }

@@ -35,9 +35,9 @@ const SCHEMA_VERSION: i64 = STEPS[STEPS.len() - 1].0;
 pub(crate) async fn migrate(writer: &Pool) -> Result<(), JobsError> {
     loop {
         let mut transaction = writer.begin().await?;
-        let tables: i64 = query_scalar("SELECT COUNT(*) FROM sqlite_schema")
-            .fetch_one(&mut *transaction)
-            .await?;
+        let tables: i64 = sql!(scalar fetch_one, &mut *transaction,
+            "SELECT COUNT(*) FROM sqlite_schema"
+        )?;
         let step = match tables {
             0 => Some(&(FIRST_SCHEMA_VERSION, SCHEMA)),
             _ => match form(&mut transaction).await? {
@@ -69,9 +69,7 @@ pub(crate) async fn require(pool: &Pool) -> Result<(), JobsError> {
 
 /// The form of the tables.
 async fn form(connection: &mut Connection) -> Result<i64, JobsError> {
-    let application: i64 = query_scalar("PRAGMA application_id")
-        .fetch_one(&mut *connection)
-        .await?;
+    let application: i64 = sql!(scalar fetch_one, &mut *connection, "PRAGMA application_id")?;
     if application != APPLICATION {
         return Err(JobsError::UnsupportedSchema);
     }
@@ -81,9 +79,11 @@ async fn form(connection: &mut Connection) -> Result<i64, JobsError> {
 
 /// Writes the number of the version again: a page that stays as it was.
 pub(crate) async fn mark(writer: &Pool) -> Result<()> {
-    query(format!("PRAGMA user_version = {SCHEMA_VERSION}"))
-        .execute(writer)
-        .await?;
+    sql!(
+        execute,
+        writer,
+        format!("PRAGMA user_version = {SCHEMA_VERSION}")
+    )?;
     Ok(())
 }
 
