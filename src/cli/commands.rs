@@ -8,7 +8,7 @@ use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
 
 use crate::contact::case::solver::Limits;
 use crate::contact::rolling::operator_store::{BYTES_DEFAULT, OperatorStore};
-use crate::http::extract::query::{self, ReadTexts};
+use crate::http::extract::query;
 use crate::http::{AddressRange, HttpOptions};
 use crate::jobs::Options;
 use crate::jobs::options::{Database, NotifyMode};
@@ -91,10 +91,7 @@ pub(super) fn address(text: &str) -> Result<SocketAddr, String> {
 
 /// Reads a label of a key, by the rule for labels of cases.
 pub(super) fn bound_label(text: &str) -> Result<(String, String), String> {
-    let label = query::new_label();
-    label
-        .read(&[text])
-        .map_err(|(_, allowed)| allowed.to_owned())
+    query::new_label().read(text).map_err(str::to_owned)
 }
 
 /// What one case may use.

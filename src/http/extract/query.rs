@@ -82,48 +82,37 @@ pub async fn refuse_all_but_wait(request: Request, next: Next) -> Response {
 /// How the text of a parameter is read, and what is allowed, in words.
 pub struct Reader<T> {
     allowed: Cow<'static, str>,
+    /// May the parameter be given more than once?
+    repeated: bool,
     read: Read<T>,
 }
 
-/// The value of a text; nothing if it cannot be read.
-type Read<T> = Box<dyn Fn(&str) -> Option<T>>;
+/// The value of the texts of a parameter, of which there is at least one, or the place of the one that cannot be read.
+type Read<T> = Box<dyn Fn(&[&str]) -> Result<T, usize>>;
 
-/// How the texts of a parameter are read.
-pub trait ReadTexts {
-    /// What they say.
-    type Value;
-    /// May the parameter be given more than once?
-    const REPEATED: bool;
-
-    /// The value of these texts, of which there is at least one.
+impl<T> Reader<T> {
+    /// The value of a text.
     ///
     /// # Errors
-    /// The text that cannot be read, and what is allowed.
-    fn read<'t>(&self, texts: &[&'t str]) -> Result<Self::Value, (&'t str, &str)>;
-}
-
-impl<T> ReadTexts for Reader<T> {
-    type Value = T;
-    const REPEATED: bool = false;
-
-    fn read<'t>(&self, texts: &[&'t str]) -> Result<T, (&'t str, &str)> {
-        (self.read)(texts[0]).ok_or((texts[0], &*self.allowed))
+    /// What is allowed, if it cannot be read.
+    pub fn read(&self, text: &str) -> Result<T, &str> {
+        (self.read)(&[text]).map_err(|_| &*self.allowed)
     }
 }
 
 /// Reads a parameter that may be given more than once.
-pub struct Repeated<T>(pub Reader<T>);
-
-impl<T> ReadTexts for Repeated<T> {
-    type Value = Vec<T>;
-    const REPEATED: bool = true;
-
-    fn read<'t>(&self, texts: &[&'t str]) -> Result<Vec<T>, (&'t str, &str)> {
-        let Reader { allowed, read } = &self.0;
-        let values = texts
-            .iter()
-            .map(|text| read(text).ok_or((*text, &**allowed)));
-        values.collect()
+pub fn repeated<T: 'static>(one: Reader<T>) -> Reader<Vec<T>> {
+    let read = one.read;
+    let all = move |texts: &[&str]| {
+        let texts = texts.iter().enumerate();
+        texts
+            .map(|(place, text)| read(&[text]).map_err(|_| place))
+            .collect()
+    };
+    Reader {
+        allowed: one.allowed,
+        repeated: true,
+        read: Box::new(all),
     }
 }
 
@@ -134,7 +123,8 @@ pub fn reader<T>(
 ) -> Reader<T> {
     Reader {
         allowed: allowed.into(),
-        read: Box::new(read),
+        repeated: false,
+        read: Box::new(move |texts| read(texts[0]).ok_or(0)),
     }
 }
 
@@ -284,7 +274,7 @@ impl Query {
     }
 
     /// The value of a parameter, if it is given and can be read; otherwise notes what would be allowed.
-    pub fn take<R: ReadTexts>(&mut self, name: &str, reader: &R) -> Option<R::Value> {
+    pub fn take<T>(&mut self, name: &str, reader: &Reader<T>) -> Option<T> {
         let pairs = self.pairs.iter();
         let texts: Vec<&str> = pairs
             .filter(|(other, _)| other == name)
@@ -293,12 +283,13 @@ impl Query {
         if texts.is_empty() {
             return None;
         }
-        if R::REPEATED {
+        if reader.repeated {
             self.repeatable.push(name.to_owned());
         }
-        match reader.read(&texts) {
+        match (reader.read)(&texts) {
             Ok(value) => Some(value),
-            Err((text, allowed)) => {
+            Err(place) => {
+                let (text, allowed) = (texts[place], &reader.allowed);
                 let detail = format!("`{name}` is `{text}`; allowed: {allowed}");
                 self.faults.push(Fault {
                     value: Some(text.into()),

@@ -18,7 +18,7 @@ use crate::http::dto::{Cases, JobResult};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::batch::read_draft;
 use crate::http::extract::caller::{BatchId, Caller, Credential};
-use crate::http::extract::query::{Parameters, Repeated, id, query, reader, word};
+use crate::http::extract::query::{Parameters, id, query, reader, repeated, word};
 use crate::http::extract::rows::{TableUpload, separate_table};
 use crate::http::layers::response::StreamedUnbuffered;
 use crate::http::limits::{Memory, Permit, hold_while_sent};
@@ -434,7 +434,7 @@ query! {
         #[param(format = "uuid")]
         after: Uuid as String = id("job");
         /// Only lines of jobs in this state; may be repeated for jobs in one of several
-        state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
+        state: Vec<JobState> as Vec<JobState> = repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
         /// Columns of a table, with commas between, such as `label:km,force_y_n`; with `patch` among them there is a line for each patch. See `docs/formats.md`.
         /// When left out: the usual columns, and one for each label of the jobs, at most 100
         #[param(example = "label:km,pressure_max_mpa,target_met")]

@@ -18,7 +18,7 @@ use uuid::Uuid;
 use crate::http::dto::JobAnswer;
 use crate::http::extract::caller::Caller;
 use crate::http::extract::query::{
-    Parameters, Query, Reader, Repeated, count, label, name, query, reader, time,
+    Parameters, Query, Reader, count, label, name, query, reader, repeated, time,
 };
 use crate::http::problem::{ApiError, ProblemKind, Result, describe};
 use crate::http::render::format::Format;
@@ -58,7 +58,7 @@ query! {
     FilterQuery(() => ()) {
         /// Only those with this label, written `key:value`; may be repeated for those that have all of them
         #[param(example = json!(["line:A12"]))]
-        label: Vec<(String, String)> as Vec<String> = Repeated(label());
+        label: Vec<(String, String)> as Vec<String> = repeated(label());
         /// Only those whose name contains this text; the letters A to Z match in either case
         #[param(min_length = 1, max_length = 200, example = "crown")]
         name: String as String = name();
@@ -75,7 +75,7 @@ query! {
     /// Filters of jobs and evolutions, and what is shown of them.
     StateQuery(() => ()) {
         /// Only those in this state; may be repeated for those in one of several
-        state: Vec<JobState> as Vec<JobState> = Repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
+        state: Vec<JobState> as Vec<JobState> = repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
         /// Only those that changed at or after this time (RFC 3339), progress aside
         #[param(format = "date-time")]
         updated_after: i64 as String = time();

@@ -16,7 +16,7 @@ use uuid::Uuid;
 use crate::http::dto::{AnswerColumn, RunRequest, answer_columns};
 use crate::http::extract::accept::{choose, one_of};
 use crate::http::extract::caller::{Caller, Credential, RunId, RunRowId};
-use crate::http::extract::query::{Parameters, Reader, Repeated, id, query, reader};
+use crate::http::extract::query::{Parameters, Reader, id, query, reader, repeated};
 use crate::http::extract::rows::{JSON, TableUpload, read_run, separate_table};
 use crate::http::extract::titles::{NamedColumns, named_column};
 use crate::http::limits::{Memory, hold_while_sent};
@@ -49,7 +49,7 @@ query! {
         /// unit, such as `Q:vertical_force [kN]`; a unit in the title or in a line of units may be left out. Without a name the column is carried along
         /// to the answers
         #[param(max_items = 100, example = json!(["Q:vertical_force [kN]"]))]
-        column: Vec<(String, String)> as Vec<String> = Repeated(reader("`TITLE:NAME`", named_column));
+        column: Vec<(String, String)> as Vec<String> = repeated(reader("`TITLE:NAME`", named_column));
         /// Titles of columns that are carried along to the answers, with commas between. Columns of places, times, sections and vehicles, such as `km`,
         /// `time` or `axle_no`, need no mention; any other column whose title names nothing in the case is refused
         #[param(example = "Y_left,curvature")]

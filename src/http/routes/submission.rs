@@ -15,7 +15,7 @@ use utoipa::{IntoParams, IntoResponses};
 
 use crate::http::extract::caller::Caller;
 use crate::http::extract::query::{
-    LABELS_MAX, Parameters, Repeated, SubmitQuery, name, new_label, query,
+    LABELS_MAX, Parameters, SubmitQuery, name, new_label, query, repeated,
 };
 use crate::http::layers::auth::Access;
 use crate::http::limits::{ConcurrencyLimits, Memory, Permit, hold_while_sent};
@@ -42,7 +42,7 @@ query! {
         name: String as String = name();
         /// A label, written `key:value`; may be repeated, for at most 32 labels with different keys
         #[param(max_items = 32, example = json!(["line:A12"]))]
-        label: Vec<(String, String)> as Vec<String> = Repeated(new_label());
+        label: Vec<(String, String)> as Vec<String> = repeated(new_label());
     }
 }
 

@@ -1,6 +1,6 @@
 //! Reads the rest of a body whose request has been answered already.
 //!
-//! A faulty batch is refused at its first fault, while the rest of it is still arriving. If the connection were closed at
+//! A request is refused as soon as that is known, while its body may still be arriving. If the connection were closed at
 //! once, the client would fail while it writes and never read the answer. So the rest is read and discarded. After a
 //! long rest the connection closes, which the answer announces.
 
