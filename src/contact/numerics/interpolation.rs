@@ -10,12 +10,6 @@
 
 use crate::contact::numerics::roots::interval;
 
-/// Value of the curve with these values and slopes at the nodes of an ascending axis, at least 2; beyond its ends that of the
-/// outermost cubics.
-pub(crate) fn value(axis: &[f64], values: &[f64], slopes: &[f64], at: f64) -> f64 {
-    Place::new(axis, at).value(values, slopes)
-}
-
 /// A place on an axis, found once for the curves of many rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
@@ -51,74 +45,6 @@ impl Place {
             + end * values[next]
             + (leaving * slopes[self.node] + arriving * slopes[next])
     }
-}
-
-/// Values at any places of the curve that has no extreme between its nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat.
-/// Comput. 5, 1984); beyond the first and last node their values. Nodes ascend; none of two at the same place counts twice.
-pub fn monotone(axis: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
-    let last = axis.len() - 1;
-    if last == 0 {
-        return vec![values[0]; at.len()];
-    }
-    let slopes = monotone_slopes(axis, values);
-    let value_at = |place: &f64| {
-        let place = place.clamp(axis[0], axis[last]);
-        let i = interval(axis, place);
-        if axis[i + 1] > axis[i] {
-            value(axis, values, &slopes, place)
-        } else {
-            values[i]
-        }
-    };
-    at.iter().map(value_at).collect()
-}
-
-/// Slopes after Fritsch and Butland: weighted harmonic means inside, parabolas at both ends, kept from overshooting.
-fn monotone_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
-    let last = axis.len() - 1;
-    let widths: Vec<f64> = axis.windows(2).map(|k| k[1] - k[0]).collect();
-    let secants: Vec<f64> = (0..last)
-        .map(|k| {
-            let rise = values[k + 1] - values[k];
-            if widths[k] > 0.0 {
-                rise / widths[k]
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    let end = |near: usize, next: usize| {
-        let (h, g) = (widths[near], widths[next]);
-        if h + g <= 0.0 {
-            return 0.0;
-        }
-        let slope = ((2.0 * h + g) * secants[near] - h * secants[next]) / (h + g);
-        if slope * secants[near] <= 0.0 {
-            0.0
-        } else if slope.abs() > 3.0 * secants[near].abs() {
-            3.0 * secants[near]
-        } else {
-            slope
-        }
-    };
-    let mut slopes = vec![secants[0]; last + 1];
-    if last > 1 {
-        slopes[0] = end(0, 1);
-        slopes[last] = end(last - 1, last - 2);
-    }
-    for k in 1..last {
-        let (before, after) = (secants[k - 1], secants[k]);
-        slopes[k] = if before * after > 0.0 {
-            let (w1, w2) = (
-                2.0 * widths[k] + widths[k - 1],
-                widths[k] + 2.0 * widths[k - 1],
-            );
-            (w1 + w2) / (w1 / before + w2 / after)
-        } else {
-            0.0
-        };
-    }
-    slopes
 }
 
 /// How many nodes away the last value lies that a slope of [`limited_slopes`] depends on.
@@ -454,19 +380,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_passed_without_overshoot_and_lines_are_kept() {
-        let at: Vec<f64> = (0..=50).map(|k| f64::from(k) * 0.1).collect();
-        let knots = [0.0, 1.0, 1.5, 3.0, 5.0];
-        let step = monotone(&knots, &[0.0, 0.0, 1.0, 1.0, 1.0], &at);
-        assert!(step.iter().all(|v| (0.0..=1.0).contains(v)), "{step:?}");
-        assert!(step.is_sorted_by(|a, b| a <= b));
-        let line = monotone(&knots, &knots.map(|k| 2.0 * k - 3.0), &at);
-        for (place, value) in at.iter().zip(line) {
-            assert!((value - (2.0 * place - 3.0)).abs() < 1e-12);
-        }
-    }
-
-    #[test]
     fn akima_leaves_a_line_straight_up_to_where_it_bends() {
         let axis: Vec<f64> = (0..10).map(f64::from).collect();
         let values = axis.clone().into_iter().map(|x| (x - 5.0).max(0.0));
@@ -477,7 +390,7 @@ mod tests {
             assert!(k == 5 || (slope - expected).abs() < 1e-12, "{slopes:?}");
         }
         for k in [0.3, 2.5, 3.9] {
-            assert!(value(&axis, &values, &slopes, k).abs() < 1e-12);
+            assert!(Place::new(&axis, k).value(&values, &slopes).abs() < 1e-12);
         }
     }
 
@@ -492,7 +405,7 @@ mod tests {
         let axis: Vec<f64> = (0..6).map(f64::from).collect();
         let slopes = limited_slopes(&axis, &step);
         for k in 0..50 {
-            let found = value(&axis, &step, &slopes, 0.1 * f64::from(k));
+            let found = Place::new(&axis, 0.1 * f64::from(k)).value(&step, &slopes);
             assert!((-0.1..1.1).contains(&found), "{found}");
         }
     }

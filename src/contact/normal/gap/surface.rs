@@ -1,6 +1,6 @@
 //! The gap between the undeformed bodies: samples, and a smooth surface through them.
 
-use crate::contact::numerics::interpolation::{self, LimitedSlopes, Place, SLOPE_REACH};
+use crate::contact::numerics::interpolation::{LimitedSlopes, Place, SLOPE_REACH, limited_slopes};
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
 #[derive(Debug, Clone, PartialEq)]
@@ -195,14 +195,14 @@ impl GapSurface {
 impl GapCurve {
     fn new(axis: &[f64], values: &[f64]) -> GapCurve {
         GapCurve {
-            slopes: interpolation::limited_slopes(axis, values),
+            slopes: limited_slopes(axis, values),
             axis: axis.to_vec(),
             values: values.to_vec(),
         }
     }
 
     fn at(&self, at: f64) -> f64 {
-        interpolation::value(&self.axis, &self.values, &self.slopes, at)
+        Place::new(&self.axis, at).value(&self.values, &self.slopes)
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! `benches/figures` compiles this folder too, so that it names only `crate::contact` and its own files.
 
+mod monotone;
 pub(crate) mod outlines;
 pub(crate) mod resample;
 pub(crate) mod sheet;

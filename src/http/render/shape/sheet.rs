@@ -9,8 +9,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
+use super::monotone::monotone;
 use super::outlines::Strips;
-use crate::contact::numerics::interpolation::monotone;
 use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// SheetNodes of the grid along one axis, at least and at most; between them four per cell or strip.
