@@ -3,9 +3,10 @@
 use cpu_time::ThreadTime;
 use railhead::contact;
 use railhead::contact::case::solver::Limits;
-use railhead::contact::evaluate::rows::{Column, Rows};
+use railhead::contact::evaluate::rows::Rows;
+use railhead::contact::evaluate::varied::{Values, VariedColumn};
 use railhead::contact::rolling::methods::table::file::table;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::held_out::{CONTACTS, MOTIONS, contact};
 use crate::random::Random;
@@ -48,9 +49,9 @@ pub fn print() {
 /// Time in ns of a row with load, creepages and spin of its own.
 fn ns_of_row(method: &str, radii: bool) -> f64 {
     let random = &mut Random(7);
-    let mut column = |pointer: &str, low: f64, high: f64| Column {
+    let mut column = |pointer: &str, low: f64, high: f64| VariedColumn {
         pointer: pointer.to_owned(),
-        values: (0..VALUES).map(|_| random.between(low, high)).collect(),
+        values: Values::Numbers((0..VALUES).map(|_| random.between(low, high)).collect()),
     };
     let mut columns = vec![
         column("/load/normal_force_n", 2e4, 1.2e5),
@@ -74,11 +75,11 @@ fn ns_of_row(method: &str, radii: bool) -> f64 {
     });
     for column in &columns {
         if let Some(place) = case.pointer_mut(&column.pointer) {
-            *place = Value::from(column.values[0]);
+            *place = column.values.value(0);
         }
     }
     let checked = contact::check(&case, &Limits::default()).expect("a sound case");
-    let rows = Rows::new(&case, &checked, columns).expect("sound rows");
+    let rows = Rows::new(&case, &checked, &columns).expect("sound rows");
     best(|| rows.evaluate().column("friction_power_n").iter().sum())
 }
 

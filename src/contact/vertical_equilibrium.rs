@@ -1,14 +1,12 @@
 //! Vertical equilibrium of a wheel: fixed-point iterations with secant steps between normal and tangential forces.
 
-use crate::contact::rolling::task::Resolution;
+use crate::contact::rolling::task::{NEGLIGIBLE_OF_TARGET, Resolution};
 
 /// Range of the slope of the friction found over the friction assumed that a secant step uses. Numeric safety, not tuned.
 const SLOPES: [f64; 2] = [-0.9, 0.6];
 /// The vertical force may be missed by this fraction; it bounds the change of friction's share in one round. Half of it makes a third of the rows of a pair
 /// at a target of 0.02 solve their tractions twice.
 const BALANCE: f64 = 1e-3;
-/// Upper limit of that fraction, relative to the target error. Chosen by judgement; how much it matters was not measured.
-const BALANCE_OF_TARGET: f64 = 0.1;
 
 /// The friction to count on in the next round, after a round that counted on some numbers and found others, `[counted, found]`.
 ///
@@ -39,7 +37,7 @@ pub(crate) fn next_share(
 /// By which part the vertical force may be missed.
 pub(crate) fn tolerance(resolution: Resolution) -> f64 {
     match resolution {
-        Resolution::Target(target) => BALANCE.min(BALANCE_OF_TARGET * target),
+        Resolution::Target(target) => BALANCE.min(NEGLIGIBLE_OF_TARGET * target),
         Resolution::Mesh(_) => BALANCE,
     }
 }

@@ -22,15 +22,13 @@ use crate::contact::profile_assessment::trust;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::rolling::force_control::{CubicLaw, PLACE_MAX};
 use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::task::{Motion, PrescribedForces, RelativeTo};
+use crate::contact::rolling::task::{Motion, NEGLIGIBLE_OF_TARGET, PrescribedForces, RelativeTo};
 use crate::contact::solution::words::answer::{Fields, PatchSolution, Solution};
 use crate::contact::vertical_equilibrium::tolerance;
 use crate::contact::wheel_on_rail::SolvedWheel;
 
-/// A force may be missed by this part of the target, and by this part of μN at least: what the normal problem leaves open from trial to
-/// trial is noise to the search. Chosen by judgement; how much it matters was not measured.
-const MISSED_OF_TARGET: f64 = 0.1;
-/// See [`MISSED_OF_TARGET`].
+/// A force may be missed by this part of μN at least: what the normal problem leaves open from trial to trial is noise to the search. Chosen by
+/// judgement; how much it matters was not measured.
 const MISSED_LEAST: f64 = 5e-5;
 /// Allowed error of the resultants in the first estimate, which tells patches, loads and radii.
 /// Chosen by judgement; how much it matters was not measured.
@@ -313,7 +311,7 @@ impl ForceSearch<'_> {
             RelativeTo::FrictionLimit => target,
             RelativeTo::Force => target * (wanted[0].hypot(wanted[1]) / first.limit).min(1.0),
         };
-        let along = (MISSED_OF_TARGET * target).max(MISSED_LEAST);
+        let along = (NEGLIGIBLE_OF_TARGET * target).max(MISSED_LEAST);
         let allowed = along.max(reach.open / first.limit);
         // The balance of the vertical force leaves only the lateral force open.
         let units = [along / allowed * first.limit, first.limit];

@@ -37,8 +37,7 @@ mod tractions;
 
 /// Length over width at most, of patches with more than this share of the load. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide, a
 /// contact at the root of a flange 20 times, and a single point that is off makes a ridge a hundred times as long.
-const SLENDER_MAX: f64 = 40.0;
-const SLENDER_SHARE: f64 = 0.02;
+const SLENDER: [f64; 2] = [40.0, 0.02];
 
 /// The wheel at rest with the answer for all its patches.
 pub(crate) struct SolvedWheel {
@@ -424,17 +423,18 @@ impl<'a> WheelSolve<'a> {
         self.check_ends(contact)?;
         let slender = patches.iter().map(WheelPatch::patch).find(|patch| {
             let [rear, front, low, high] = patch.extent;
-            patch.normal_force > SLENDER_SHARE * contact.normal_force()
-                && front - rear > SLENDER_MAX * (high - low)
+            patch.normal_force > SLENDER[1] * contact.normal_force()
+                && front - rear > SLENDER[0] * (high - low)
         });
         if let Some(Patch { extent, .. }) = slender.filter(|_| !self.curve.is_flat()) {
             let [rear, front, low, high] = extent;
             return Err(SolveError::NormalProblem {
                 reason: format!(
-                    "a patch on the curve of the rail is {} mm long and {} mm wide, more than {SLENDER_MAX} times as long as wide, as on a ridge; \
+                    "a patch on the curve of the rail is {} mm long and {} mm wide, more than {} times as long as wide, as on a ridge; \
                      smooth the profiles, or give reference_surface \"plane\"",
                     short(front - rear),
-                    short(high - low)
+                    short(high - low),
+                    SLENDER[0]
                 ),
             });
         }

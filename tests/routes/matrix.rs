@@ -8,7 +8,7 @@ use std::time::Duration;
 use railhead::contact;
 use railhead::contact::case::solver::{KnownPair, Limits};
 use railhead::contact::evaluate::many::{ManyTask, evaluate_at_once, solve_many};
-use railhead::contact::evaluate::rows::{Column, Rows};
+use railhead::contact::evaluate::rows::Rows;
 use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead::contact::monitor::{Monitor, Unmonitored};
 use railhead::contact::problem::checked_case::CheckedCase;
@@ -440,17 +440,15 @@ fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
     let patches = match columns.contains_key("normal_force_n") {
         true => Vec::new(),
         false => {
-            let columns = feature.varied_columns(true).into_iter();
-            let columns = columns.map(|column| Column {
-                pointer: column.pointer,
-                values: match column.values {
-                    Values::Numbers(values) => values,
-                    Values::Texts(_) => unreachable!("numbers"),
-                },
+            let columns = feature.varied_columns(true);
+            let rows = Rows::new(&case, &checked, &columns);
+            let rows = rows.ok_or("the rows are evaluated")?;
+            let mut patches = Vec::new();
+            let Ok(_) = rows.evaluate_to(|patch| {
+                patches.push(patch);
+                Ok::<_, std::convert::Infallible>(())
             });
-            let rows = Rows::new(&case, &checked, columns.collect());
-            let rows = rows.map_err(|error| error.to_string())?;
-            rows.evaluate_with_patches().1
+            patches
         }
     };
     let rows = (0..ROWS).map(|row| {

@@ -26,7 +26,6 @@ use crate::contact::problem::checked_case::{CheckedCase, Label};
 use crate::contact::problem::physics::{AfterTasks, Checked, MotionPart, Problem, Run};
 use crate::contact::remark::entry::{RemarkEntry, merged};
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::task::{Motion, PrescribedForces};
 use crate::contact::solution::words::answer::Asked;
 use crate::contact::solution::words::damage::{PairQuality, SectionQuality};
 
@@ -73,7 +72,11 @@ impl CheckedCase {
             history,
         } = motions;
         let patches = task.known_patches().unwrap_or_default();
-        let given = given_creepages(&motions, &forces);
+        // Creepages that are searched are assessed once they are found.
+        let given = match forces.iter().all(|forces| *forces == [None; 2]) {
+            true => &motions[..],
+            false => &[],
+        };
         let remarks = merged(
             of_case
                 .chain(remarks)
@@ -105,37 +108,19 @@ impl CheckedCase {
         Ok(CheckedCase {
             problem,
             run,
-            label: label(case, digest),
+            label: Label {
+                name: case.name.clone(),
+                labels: case.labels.clone(),
+                digest,
+                asked: Asked {
+                    contact: case.contact.name().to_owned(),
+                    friction_coefficient: case.friction.largest(),
+                    friction_varies: case.friction.coefficient.is_none(),
+                    load: case.load,
+                },
+            },
             remarks,
         })
-    }
-}
-
-/// The motions, if all their creepages are given; creepages that are searched are assessed once they are found.
-fn given_creepages<'a>(motions: &'a [Motion], forces: &[PrescribedForces]) -> &'a [Motion] {
-    match forces.iter().all(|forces| *forces == [None; 2]) {
-        true => motions,
-        false => &[],
-    }
-}
-
-/// What a case is called, with its digest.
-fn label(case: &Case, digest: String) -> Label {
-    Label {
-        name: case.name.clone(),
-        labels: case.labels.clone(),
-        digest,
-        asked: asked(case),
-    }
-}
-
-/// The parts of a case that its answer repeats.
-fn asked(case: &Case) -> Asked {
-    Asked {
-        contact: case.contact.name().to_owned(),
-        friction_coefficient: case.friction.largest(),
-        friction_varies: case.friction.coefficient.is_none(),
-        load: case.load,
     }
 }
 

@@ -22,7 +22,7 @@ use crate::contact::normal::wheel::ReferenceSurface;
 use crate::contact::problem::memory::{SizeInput, length_over_width, segments, spinning};
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
-use crate::contact::rolling::history::plan::HistoryTask;
+use crate::contact::rolling::history::plan::{HistoryStart, HistoryTask};
 use crate::contact::rolling::methods::table::solve as table;
 
 /// Friction coefficient above which the answer carries a remark.
@@ -114,7 +114,10 @@ impl CheckedParts {
                 spinning: motions.as_ref().map_or(0, |m| spinning(&m.motions))
                     * task.as_ref().map_or(1, |(task, _)| task.positions()),
                 history: motions.as_ref().is_some_and(|m| m.history.is_some()),
-                pressed: motions.as_ref().is_some_and(ExpandedMotions::begin_pressed),
+                pressed: motions
+                    .as_ref()
+                    .and_then(|m| m.history.as_ref())
+                    .is_some_and(|h| h.start == HistoryStart::Pressed),
                 fields: given.outputs.iter().any(|output| output.is_per_cell()),
                 stress_points: given.subsurface.map_or(0, after_tasks::count),
                 ellipse: region.and_then(length_over_width),

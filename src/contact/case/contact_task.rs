@@ -4,6 +4,8 @@
 //!
 //! Lengths of track and wheelset that would be usual in another unit than mm.
 
+use std::ops::RangeInclusive;
+
 use crate::contact::case::words::contact::{Contact, Load};
 use crate::contact::error::Fault;
 use crate::contact::geometry::profile::{LengthUnit, Profile};
@@ -16,14 +18,10 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::kind::short;
 use crate::contact::remark::list::Remark;
 
-/// Largest pressure of a patch in MPa; a larger one is a mistake rather than a contact.
-const PRESSURE_MAX: f64 = 1e12;
-/// Smallest one.
-const PRESSURE_MIN: f64 = 1e-20;
-/// Largest semi-axis in mm.
-const SEMI_AXIS_MAX: f64 = 1e6;
-/// Smallest one.
-const SEMI_AXIS_MIN: f64 = 1e-9;
+/// Largest pressures of a patch in MPa; others are a mistake rather than a contact.
+const PRESSURES: RangeInclusive<f64> = 1e-20..=1e12;
+/// Semi-axes in mm.
+const SEMI_AXES: RangeInclusive<f64> = 1e-9..=1e6;
 /// Largest ratio of the semi-axes.
 const SLENDERNESS_MAX: f64 = 1e4;
 
@@ -45,11 +43,7 @@ pub(crate) fn hertz(
         Contact::Ellipse { a_mm, b_mm } => {
             Ellipse::of_semi_axes(a_mm, b_mm, loading, contact_modulus)
         }
-        Contact::GapProfile { .. }
-        | Contact::GapGrid { .. }
-        | Contact::PressureGrid { .. }
-        | Contact::Profiles { .. }
-        | Contact::Wheelset { .. } => {
+        _ => {
             return Err(Fault::new(
                 "/contact/type",
                 "neither gaps nor profiles nor pressures on a grid make an ellipse".to_owned(),
@@ -131,14 +125,15 @@ pub(crate) fn gap(
 pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> {
     let [x_min, x_max, y_min, y_max] = patch.extent;
     let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
-    let semi_axes = SEMI_AXIS_MIN..=SEMI_AXIS_MAX;
-    if !semi_axes.contains(&a) || !semi_axes.contains(&b) {
+    if ![a, b].iter().all(|axis| SEMI_AXES.contains(axis)) {
         return Err(Fault::new(
             "/contact",
             format!(
-                "a patch of {} mm by {} mm (semi-axes) comes out; {SEMI_AXIS_MIN:e} to {SEMI_AXIS_MAX:e} mm are allowed",
+                "a patch of {} mm by {} mm (semi-axes) comes out; {:e} to {:e} mm are allowed",
                 short(a),
-                short(b)
+                short(b),
+                SEMI_AXES.start(),
+                SEMI_AXES.end()
             ),
         ));
     }
@@ -158,12 +153,14 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
             ),
         ));
     }
-    if !(PRESSURE_MIN..=PRESSURE_MAX).contains(&patch.pressure_max) {
+    if !PRESSURES.contains(&patch.pressure_max) {
         return Err(Fault::new(
             load_pointer,
             format!(
-                "the largest pressure of a patch comes out as {} MPa; {PRESSURE_MIN:e} to {PRESSURE_MAX:e} MPa are allowed",
-                short(patch.pressure_max)
+                "the largest pressure of a patch comes out as {} MPa; {:e} to {:e} MPa are allowed",
+                short(patch.pressure_max),
+                PRESSURES.start(),
+                PRESSURES.end()
             ),
         ));
     }
@@ -185,7 +182,6 @@ const AGREES: f64 = 0.5;
 const AGREES_WITH_STATED: f64 = 5.0;
 /// Largest distance in mm from the last point of a flange to a back that was not measured. Flanges are up to 35 mm thick; made-up wheels are thicker.
 const THICKNESS_MAX: f64 = 60.0;
-const MEMBER: &str = "/contact/flange_back_position_mm";
 
 /// y of the back of the flange in mm, with a remark at the pointer of the wheel.
 ///
@@ -203,10 +199,9 @@ pub(crate) fn position(
         Some(given) => check_stated(wheel, given).map(|remark| (given, remark)),
         None => find(wheel),
     };
-    match found {
-        Ok((back, remark)) => Ok((back, remark.map(|remark| remark.at_pointer(pointer)))),
-        Err(detail) => Err(Fault::new(MEMBER, detail)),
-    }
+    found
+        .map(|(back, remark)| (back, remark.map(|remark| remark.at_pointer(pointer))))
+        .map_err(|detail| Fault::new("/contact/flange_back_position_mm", detail))
 }
 
 fn check_stated(wheel: &Profile, given: f64) -> Result<Option<Remark>, String> {
@@ -265,12 +260,8 @@ fn find(wheel: &Profile) -> Result<(f64, Option<Remark>), String> {
 
 /// Usual gauge in mm: standard gauge.
 pub(crate) const GAUGE: f64 = 1435.0;
-/// Usual distance of the middle of a rail from that of the track in mm, on standard gauge.
-const RAIL_ORIGIN: f64 = 752.5;
 /// Usual distance of the backs of the flanges in mm, on standard gauge.
 pub(crate) const FLANGE_BACKS: f64 = 1360.0;
-/// Usual rolling radius in mm (UIC wheels of 920 mm diameter).
-const RADIUS: f64 = 460.0;
 
 /// Remarks on the lengths of a wheel or a wheelset on rails, each with the pointer to its member.
 pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
@@ -291,9 +282,10 @@ pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
     else {
         return Vec::new();
     };
+    // What is usual on standard gauge, for UIC wheels of 920 mm diameter.
     let lengths = [
         ("/contact/gauge_mm", *gauge_mm, GAUGE),
-        ("/contact/rail_origin_mm", *rail_origin_mm, RAIL_ORIGIN),
+        ("/contact/rail_origin_mm", *rail_origin_mm, 752.5),
         (
             "/contact/flange_back_distance_mm",
             Some(*flange_back_distance_mm),
@@ -302,7 +294,7 @@ pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
         (
             "/contact/rolling_radius_mm",
             Some(*rolling_radius_mm),
-            RADIUS,
+            460.0,
         ),
     ];
     let remark = |(pointer, length_mm, usual): (&str, Option<f64>, f64)| {

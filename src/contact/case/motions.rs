@@ -16,16 +16,6 @@ use crate::contact::rolling::history::plan::{HistoryStart, HistoryTask};
 use crate::contact::rolling::history::solve::too_long;
 use crate::contact::rolling::task::{Motion, PrescribedForces};
 
-/// No creepage.
-const STILL: AskedMotion = AskedMotion {
-    creepage_x: None,
-    creepage_y: None,
-    spin_per_mm: 0.0,
-    force_x_n: None,
-    force_y_n: None,
-    speed_mm_per_s: None,
-};
-
 /// The motions of a case in order, never empty.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ExpandedMotions {
@@ -62,12 +52,6 @@ pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<ExpandedMotio
 }
 
 impl ExpandedMotions {
-    /// Is this a history that begins with bodies pressed together?
-    pub(crate) fn begin_pressed(&self) -> bool {
-        let start = self.history.as_ref().map(|history| history.start);
-        start == Some(HistoryStart::Pressed)
-    }
-
     /// Faults of prescribed forces: more than friction can carry, where the limit μN is known, or a contact without
     /// one common frame.
     pub(crate) fn faults(
@@ -187,7 +171,7 @@ fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
 fn still_at(wheelset: &Wheelset) -> AskedMotion {
     AskedMotion {
         speed_mm_per_s: Some(wheelset.speed_mm_per_s),
-        ..STILL
+        ..AskedMotion::default()
     }
 }
 

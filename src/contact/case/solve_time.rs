@@ -11,67 +11,37 @@ use crate::contact::normal::footprint::NormalTask;
 use crate::contact::normal::wheel::WheelTask;
 use crate::contact::post::subsurface::states::StressPlaces;
 use crate::contact::problem::checked_case::{self, CheckedCase, PRESSURE_USUAL};
+use crate::contact::problem::memory::segments;
 use crate::contact::rolling::history::solve::usual_work;
 use crate::contact::rolling::task::{Resolution, TARGET_LEAST, TARGET_USUAL};
 
 /// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`], from which on the bound of the creep table usually meets the
 /// target where the table is taken.
-const MOTION_SECONDS: f64 = 3e-4;
-/// Power with which the time grows as the target falls.
-const TARGET_POWER: f64 = 1.4;
-/// Time of a motion with spin, with a prescribed force, or with friction that depends on slip, over that of one without.
+///
+/// The second number is the power with which the time grows as the target falls.
+const MOTION_SECONDS: [f64; 2] = [3e-4, 1.4];
+/// Time of a motion with spin, with a prescribed force, or with friction that depends on slip, over that of one without; of a wheel on profiles that are
+/// judged by other readings; and of a position of a wheelset, or of a wheel that is to carry prescribed forces.
 const HARD_TIMES: f64 = 3.0;
 /// A motion by the table, with its place in the answer, in s; twice what a row of a run of a million takes on an idle machine
 /// (`cargo bench --bench load -- rows`).
 pub(crate) const TABLE_SECONDS: f64 = 5e-6;
-/// Time in s to find region and pressure of a gap with one patch; it grows with the square of their number.
-const GAP_SECONDS: f64 = 1.5e-3;
+/// Time in s to find region and pressure of a gap with one patch, which grows with the square of their number; to place the rigid wheelset at one shift
+/// with two readings of its profiles; and to find the worst point below a patch (`cargo bench --bench stress -- --only after`).
+const SHORT_SECONDS: f64 = 2.5e-3;
 /// Time in s to bring a wheel to rest on its rail.
 const WHEEL_SECONDS: f64 = 9e-3;
-/// Solves of a wheel on profiles that are judged by other readings.
-const OTHER_READINGS: f64 = 3.0;
-/// Half-length and half-width in mm of a patch that is found.
-const HALF_USUAL: f64 = 5.0;
-/// Solves of a wheelset or of a wheel that is to carry prescribed forces, for each position.
-const TRIALS: f64 = 4.0;
-/// Time in s to place the rigid wheelset at one shift with two readings of its profiles.
-const RIGID_SHIFT: f64 = 3e-3;
-/// Time in s that pressure and opening of a gap take for each motion of unlike bodies (12 contacts of `tests/physics/unlike.rs`).
-const UNLIKE_SECONDS: f64 = 0.045;
-/// Time in s of a step of a history, and for every square of its cells: 33 to 97 points of `tests/data/transient.json` on 72 to 1152 cells.
-const STEP_SECONDS: f64 = 5e-5;
-const STEP_CELLS_SECONDS: f64 = 5e-9;
-/// Time in s for each stress below the surface, and for the worst point of a patch (`cargo bench --bench stress -- --only after`, medians over 18
-/// ellipses); a fine mesh takes several times as long. Other outputs of a solved motion take less than 0.1 ms.
-const STRESS_SECONDS: f64 = 4e-7;
-const WORST_SECONDS: f64 = 0.0025;
-/// For the passages below a patch, for each thing that is judged of them: the same bench.
-const PASSAGE_SECONDS: f64 = 0.03;
+/// Time in s that pressure and opening of a gap take for each motion of unlike bodies (12 contacts of `tests/physics/unlike.rs`), and that the passages
+/// below a patch take for each thing that is judged of them.
+const LONG_SECONDS: f64 = 0.04;
 
-/// Half-length and half-width in mm of the patches, as far as they are known before the normal problem is solved, and the time in s to solve it.
-fn expected_patches(task: &NormalTask) -> (Vec<[f64; 2]>, f64) {
+/// Time in s to find region and pressure of a number of patches.
+fn normal_seconds(task: &NormalTask, patches: usize) -> f64 {
     match task {
-        NormalTask::Hertz(ellipse) => (vec![[ellipse.a, ellipse.b]], 0.0),
-        NormalTask::Given(field) => {
-            let patches = field.patches();
-            let half = patches.iter().map(|patch| {
-                let [x_min, x_max, y_min, y_max] = patch.extent;
-                [0.5 * (x_max - x_min), 0.5 * (y_max - y_min)]
-            });
-            (half.collect(), 0.0)
-        }
-        NormalTask::Gap(task) => {
-            let count = task.preview().asperities;
-            (
-                vec![[HALF_USUAL; 2]; count],
-                GAP_SECONDS * (count as f64).powi(2),
-            )
-        }
-        NormalTask::Wheel(task) => (vec![[HALF_USUAL; 2]], at_rest(task)),
-        NormalTask::Wheelset(task) => (
-            vec![[HALF_USUAL; 2]; 2],
-            task.sides.iter().map(at_rest).sum(),
-        ),
+        NormalTask::Hertz(_) | NormalTask::Given(_) => 0.0,
+        NormalTask::Gap(_) => SHORT_SECONDS * (patches as f64).powi(2),
+        NormalTask::Wheel(task) => at_rest(task),
+        NormalTask::Wheelset(task) => task.sides.iter().map(at_rest).sum(),
     }
 }
 
@@ -82,35 +52,36 @@ fn at_rest(task: &WheelTask) -> f64 {
     let read_again = task.trust.auto.contains(&true)
         || profiles.iter().any(|profile| profile.smoothing() > 0.0)
         || advised_smoothing(grains, task.contact_modulus, PRESSURE_USUAL) != [0.0; 2];
-    WHEEL_SECONDS * if read_again { OTHER_READINGS } else { 1.0 }
+    WHEEL_SECONDS * if read_again { HARD_TIMES } else { 1.0 }
 }
 
 impl CheckedCase {
     /// Expected time of this case in s, on one core of the machine the figures were taken on.
     pub fn solve_seconds(&self) -> f64 {
-        let (half, normal) = expected_patches(&self.problem.task);
+        let patches = segments(&self.problem.task).len();
+        let normal = normal_seconds(&self.problem.task, patches);
         let rolling = match (self.run.method, self.run.resolution) {
-            _ if self.problem.history.is_some() => self.history_seconds(&half),
+            _ if self.problem.history.is_some() => self.history_seconds(),
             (Method::BoundaryElement, Resolution::Target(target)) => {
-                self.to_target(half.len(), target)
+                self.to_target(patches, target)
             }
             (method, _) => self.on_one_mesh(method),
         };
         let motions = self.problem.motions.len() as f64;
         let coupled = if self.problem.is_coupled(&self.run) {
-            motions * UNLIKE_SECONDS
+            motions * LONG_SECONDS
         } else {
             0.0
         };
-        let after = motions * self.after_seconds(half.len());
+        let after = motions * self.after_seconds(patches);
         let once = normal + rolling + coupled + after;
         let NormalTask::Wheelset(task) = &self.problem.task else {
-            return once * self.problem.pull().map_or(1.0, |_| TRIALS);
+            return once * self.problem.pull().map_or(1.0, |_| HARD_TIMES);
         };
         let kinematics = task.kinematics.as_ref().map_or(0.0, |asked| {
-            RIGID_SHIFT * (1.0 + 2.0 * asked.reach / asked.step)
+            SHORT_SECONDS * (1.0 + 2.0 * asked.reach / asked.step)
         });
-        once * TRIALS * task.moves.len() as f64 + kinematics
+        once * HARD_TIMES * task.moves.len() as f64 + kinematics
     }
 
     /// Time of motion `k` over that of the easiest.
@@ -129,27 +100,32 @@ impl CheckedCase {
     }
 
     /// Time of a history: its steps on the level that a target usually leads to, or on the mesh given, with the coarser one before it.
-    fn history_seconds(&self, half: &[[f64; 2]]) -> f64 {
+    fn history_seconds(&self) -> f64 {
         let Some(history) = &self.problem.history else {
             return 0.0;
         };
-        let extents: Vec<_> = half.iter().map(|[a, b]| [-a, *a, -b, *b]).collect();
+        // Patches that are found are about 10 mm long.
+        let extents = match self.problem.task.known_patches() {
+            Some(patches) => patches.iter().map(|patch| patch.extent).collect(),
+            None => vec![[-5.0, 5.0, -5.0, 5.0]],
+        };
         let along = match self.run.resolution {
             Resolution::Target(_) => None,
             Resolution::Mesh(size) => Some(f64::from(size.cells)),
         };
         let (steps, usual) = usual_work(history, &extents, along);
         let cells = along.map_or(usual, |_| self.size_input().cells());
-        steps * (STEP_SECONDS + STEP_CELLS_SECONDS * cells * cells)
+        // 33 to 97 points of `tests/data/transient.json` on 72 to 1152 cells.
+        steps * (5e-5 + 5e-9 * cells * cells)
     }
 
     fn to_target(&self, patches: usize, target: f64) -> f64 {
         let by_table = target >= TARGET_USUAL && !self.run.needs_cells();
-        let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_POWER);
+        let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(MOTION_SECONDS[1]);
         let motions = 0..self.problem.motions.len();
         let seconds = motions.map(|k| match by_table && self.may_take_table(k) {
             true => TABLE_SECONDS,
-            false => self.hardness(k) * MOTION_SECONDS * finer * patches as f64,
+            false => self.hardness(k) * MOTION_SECONDS[0] * finer * patches as f64,
         });
         seconds.sum()
     }
@@ -181,12 +157,13 @@ impl CheckedCase {
             } else {
                 0.0
             };
-            seconds += STRESS_SECONDS * count + WORST_SECONDS * searched;
+            // Each stress; a fine mesh takes several times as long. Other outputs take less than 0.1 ms.
+            seconds += 4e-7 * count + SHORT_SECONDS * searched;
             if let Some(passage) = task.passage {
                 let judged = 1 + u8::from(passage.dang_van_slope.is_some());
-                seconds += PASSAGE_SECONDS * f64::from(judged) * patches;
+                seconds += LONG_SECONDS * f64::from(judged) * patches;
                 if searched == 0.0 {
-                    seconds += WORST_SECONDS * patches;
+                    seconds += SHORT_SECONDS * patches;
                 }
             }
         }

@@ -1,6 +1,7 @@
 //! What a case is understood as: patches that are known without a solve, and wheel and rail in place.
 
 use crate::contact::geometry::contact_locus::ContactLocus;
+use crate::contact::geometry::profile::{NEEDED_BEYOND, POINT_SPACING};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::normal::footprint::{Footprint, NormalTask};
 use crate::contact::normal::hertz::Patch;
@@ -11,13 +12,6 @@ use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::answer::{
     FirstTouch, KnownPatch, PlacedProfiles, Understanding,
 };
-
-/// Spacing of the points of a drawn cross-section in mm.
-const STEP: f64 = 0.25;
-/// Digits of a coordinate in mm that are kept.
-const ROUNDED: f64 = 1e4;
-/// Length in mm of profile needed beyond a contact.
-const BEYOND: f64 = 5.0;
 
 impl CheckedCase {
     /// What can be said of the contact without solving it.
@@ -72,7 +66,7 @@ fn touch_remarks(geometry: &WheelRail) -> Vec<RemarkEntry> {
                 profile: name,
                 y_mm: [y; 2],
             }
-        } else if left_mm < BEYOND {
+        } else if left_mm < NEEDED_BEYOND {
             Remark::ContactAtProfileEnd {
                 profile: name,
                 y_mm: [y; 2],
@@ -100,7 +94,7 @@ fn known_patch(patch: &Patch) -> KnownPatch {
 fn placed(task: &WheelTask) -> Result<PlacedProfiles, String> {
     let geometry = &task.geometry;
     let locus = ContactLocus::new(geometry)?;
-    let [rail, wheel] = geometry.parameters(STEP);
+    let [rail, wheel] = geometry.parameters(POINT_SPACING);
     let rail_mm = rail.into_iter().map(|s| rounded(geometry.rail_at(s).at));
     let wheel_mm = wheel.into_iter().map(|s| {
         let [y, z] = match geometry.lowest(s) {
@@ -137,6 +131,7 @@ fn first_touch(locus: &ContactLocus<'_>, geometry: &WheelRail) -> FirstTouch {
     }
 }
 
+/// Coordinates with four decimals.
 fn rounded(at: [f64; 2]) -> [f64; 2] {
-    at.map(|value| (value * ROUNDED).round() / ROUNDED)
+    at.map(|value| (value * 1e4).round() / 1e4)
 }

@@ -19,20 +19,14 @@ const LOAD_LEAST: f64 = 1e3;
 const RADIUS_LEAST: f64 = 250.0;
 /// A wheel rolls at least with this speed in mm/s.
 const SPEED_LEAST: f64 = 500.0;
-/// Numbers of shear moduli that are GPa, and of Young's moduli.
+/// Shear moduli of metals in GPa; Young's moduli are 2.5 times as large.
 const SHEAR_GPA: [f64; 2] = [10.0, 1000.0];
-/// See [`SHEAR_GPA`].
-const YOUNG_GPA: [f64; 2] = [25.0, 2500.0];
 /// Metals have a smaller Poisson's ratio; soft plastics, whose moduli have such numbers in MPa, a larger one.
 const POISSON_METAL: f64 = 0.36;
-/// Shear modulus in MPa from which on a body is of metal.
-const SHEAR_METAL: f64 = 1e4;
 /// Creepages that are per cent.
 const CREEPAGE_PERCENT: [f64; 2] = [0.05, 5.0];
-/// Largest yaw and roll of a wheelset in rad.
+/// Largest yaw and roll of a wheelset in rad, and cant of a rail.
 const ANGLE_MOST: f64 = 0.05;
-/// Largest inclination of a rail in rad: twice the 1:20 of the steepest.
-const CANT_MOST: f64 = 0.1;
 /// Pressures of wheels on rails in MPa.
 const PRESSURES: [f64; 2] = [200.0, 3500.0];
 /// Pressure in MPa above which lengths are doubted where the patch follows from them alone: the static limit of ball bearings (ISO 76).
@@ -77,7 +71,11 @@ fn of_material(material: &Material) -> Vec<RemarkEntry> {
     for (pointer, body) in bodies(material) {
         let moduli = [
             ("shear_modulus_mpa", body.shear_modulus_mpa, SHEAR_GPA),
-            ("young_modulus_mpa", body.young_modulus_mpa, YOUNG_GPA),
+            (
+                "young_modulus_mpa",
+                body.young_modulus_mpa,
+                SHEAR_GPA.map(|g| 2.5 * g),
+            ),
         ];
         for (name, modulus, range) in moduli {
             let modulus = modulus.filter(|value| is_within(*value, range));
@@ -97,7 +95,9 @@ fn is_metal(material: &Material) -> bool {
             let own = suspect.pointer.as_deref();
             own.is_some_and(|own| own.starts_with(pointer))
         };
-        body.shear().is_some_and(|shear| shear >= SHEAR_METAL) || suspects.iter().any(at_body)
+        body.shear()
+            .is_some_and(|shear| shear >= 1e3 * SHEAR_GPA[0])
+            || suspects.iter().any(at_body)
     })
 }
 
@@ -177,8 +177,9 @@ fn of_place(contact: &Contact) -> Vec<RemarkEntry> {
         } => [*cant_rad, largest(&swept_values_of(yaw_rad)), 0.0],
         _ => return Vec::new(),
     };
+    // A rail inclined by twice its cant is suspect.
     let names = [
-        ("cant_rad", CANT_MOST),
+        ("cant_rad", 2.0 * ANGLE_MOST),
         ("yaw_rad", ANGLE_MOST),
         ("roll_rad", ANGLE_MOST),
     ];

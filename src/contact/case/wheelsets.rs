@@ -23,9 +23,6 @@ use crate::contact::normal::wheel::{
 use crate::contact::problem::checked_case;
 use crate::contact::remark::entry::{RemarkEntry, merged};
 
-/// The part of the load on the left wheel when nothing is said.
-const LEFT_SHARE: f64 = 0.5;
-
 /// The task of a wheelset with its remarks; `None` without faults where the load or the contact modulus in MPa is not known.
 ///
 /// # Errors
@@ -71,7 +68,7 @@ pub(crate) fn task(
     let (Some(force), Some(contact_modulus)) = (force, contact_modulus) else {
         return Ok(None);
     };
-    let left = load.and_then(|load| load.left_share).unwrap_or(LEFT_SHARE);
+    let left = load.and_then(|load| load.left_share).unwrap_or(0.5);
     let mut geometries = geometries.into_iter();
     let mut side = |k: usize, share: f64| {
         let geometry = geometries.next()?;

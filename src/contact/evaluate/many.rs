@@ -7,6 +7,7 @@
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -21,11 +22,11 @@ use crate::contact::error::{CaseError, Fault, SolveError};
 use crate::contact::evaluate::answer::{
     ManyAnswer, NumberColumns, RowFailure, RowNumbers, RowStatus, RowsAnswer, SolvedRow,
 };
-use crate::contact::evaluate::rows::{Column, Rows};
-use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use crate::contact::evaluate::rows::Rows;
+use crate::contact::evaluate::varied::{VariedColumn, case_of_row};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
+use crate::contact::rolling::methods::table::solve::RATIO_RANGE;
 use crate::contact::solution::words::answer::Solution;
 
 /// Solves rows: numbers of Hertz contacts by `table` and `fastsim`, or by `auto` where the table's bound meets the target, are evaluated
@@ -43,11 +44,15 @@ pub fn solve_many(
     let mut answer = ManyAnswer::new(task.rows(), columns);
     let mut open: Vec<usize> = (0..task.rows()).collect();
     if let Some((evaluable, method)) = checked.and_then(|checked| evaluable(task, &checked)) {
-        let (evaluated, patches) = evaluable.evaluate_with_patches();
+        let mut patches = Vec::with_capacity(task.rows());
+        let Ok(evaluated) = evaluable.evaluate_to(|patch| {
+            patches.push(patch);
+            Ok::<_, Infallible>(())
+        });
         open.retain(|row| !take(&mut answer, *row, method, &evaluated, patches[*row]));
     }
     open.sort_by(|a, b| near(task.columns, *a, *b));
-    RowsInWork::new(task, solve, monitor, &mut answer).solve(&open, None)?;
+    solve_each(task, &open, None, (solve, monitor), &mut answer)?;
     Ok(answer)
 }
 
@@ -62,7 +67,7 @@ fn solve_rows<E>(
     let mut answer = ManyAnswer::new(task.rows(), NumberColumns::of(checked));
     let mut rows: Vec<usize> = (0..task.rows()).collect();
     rows.sort_by(|a, b| near(task.columns, *a, *b));
-    let solved = RowsInWork::new(task, solve, monitor, &mut answer).solve(&rows, first);
+    let solved = solve_each(task, &rows, first, (solve, monitor), &mut answer);
     solved.map_err(|_| NotAtOnce::Stopped)?;
     Ok(RowsAnswer::of_solver(answer))
 }
@@ -94,7 +99,7 @@ pub fn evaluate_at_once<E>(
     checked: &CheckedCase,
     solve: &RowSolver,
     monitor: &dyn Monitor,
-    step: impl FnMut() -> Result<(), E>,
+    mut step: impl FnMut() -> Result<(), E>,
 ) -> Result<RowsAnswer, NotAtOnce<E>> {
     let first = Some(checked).filter(|checked| several_answers(checked).is_none());
     let Some((rows, method)) = evaluable(task, checked) else {
@@ -104,7 +109,8 @@ pub fn evaluate_at_once<E>(
         }
         return solve_rows(task, checked, first, solve, monitor);
     };
-    let mut answer = rows.evaluate_stepwise(step).map_err(NotAtOnce::Step)?;
+    let answered = rows.evaluate_to(|_| step());
+    let mut answer = answered.map_err(NotAtOnce::Step)?;
     let open: Vec<usize> = (0..answer.status.len())
         .filter(|row| match answer.status[*row] {
             RowStatus::NeedsSolver => true,
@@ -151,18 +157,9 @@ pub fn expected_seconds(task: &ManyTask) -> f64 {
     rows * each + left as f64 * seconds
 }
 
-/// The rows as [`Rows`], if they are of that kind, and whether the method was left to the service.
-fn evaluable(task: &ManyTask, checked: &CheckedCase) -> Option<(Rows, MethodName)> {
-    let numbers = task.columns.iter().map(|column| match &column.values {
-        Values::Numbers(values) => Some(Column {
-            pointer: column.pointer.clone(),
-            values: values.clone(),
-        }),
-        Values::Texts(_) => None,
-    });
-    let columns = numbers.collect::<Option<Vec<Column>>>()?;
-    let rows = Rows::new(task.case, checked, columns).ok();
-    let rows = rows.filter(Rows::has_method)?;
+/// The rows as [`Rows`], if they are of that kind, and the method that was asked for.
+fn evaluable<'a>(task: &ManyTask<'a>, checked: &CheckedCase) -> Option<(Rows<'a>, MethodName)> {
+    let rows = Rows::new(task.case, checked, task.columns)?;
     Some((rows, checked.run.method_asked))
 }
 
@@ -189,7 +186,9 @@ fn take(
     }
     if !status.has_answer() {
         let reason = format!(
-            "a/b of the ellipse is beyond {RATIO_MIN} to {RATIO_MAX}; \"method\": \"table\" covers no other, use boundary_element or fastsim"
+            "a/b of the ellipse is beyond {} to {}; \"method\": \"table\" covers no other, use boundary_element or fastsim",
+            RATIO_RANGE.start(),
+            RATIO_RANGE.end()
         );
         answer.set(
             row,
@@ -243,108 +242,56 @@ fn near(columns: &[VariedColumn], a: usize, b: usize) -> Ordering {
         .unwrap_or_else(|| a.cmp(&b))
 }
 
-/// Rows that are being solved.
-pub(crate) struct RowsInWork<'a> {
-    task: &'a ManyTask<'a>,
-    solve: &'a RowSolver<'a>,
-    monitor: &'a dyn Monitor,
-    /// Where their answers go.
-    answer: &'a mut ManyAnswer,
-    /// Rows that are over, and all.
-    done: usize,
-    all: usize,
-}
-
-/// Why a case has no solution.
-enum RowEnd {
-    Stopped,
-    Failed(RowFailure),
-}
-
-impl<'a> RowsInWork<'a> {
-    /// Rows of a task, before the first.
-    pub(crate) fn new(
-        task: &'a ManyTask<'a>,
-        solve: &'a RowSolver<'a>,
-        monitor: &'a dyn Monitor,
-        answer: &'a mut ManyAnswer,
-    ) -> RowsInWork<'a> {
-        RowsInWork {
-            task,
-            solve,
-            monitor,
-            answer,
-            done: 0,
-            all: 0,
+/// Solves rows one after the other. The first row of the task is not checked again if its checked case is given.
+///
+/// # Errors
+/// [`SolveError::Cancelled`]: the monitor stopped the work.
+fn solve_each(
+    task: &ManyTask,
+    rows: &[usize],
+    first: Option<&CheckedCase>,
+    (solve, monitor): (&RowSolver, &dyn Monitor),
+    answer: &mut ManyAnswer,
+) -> Result<(), SolveError> {
+    let own = 1.0 / rows.len() as f64;
+    for (done, row) in rows.iter().enumerate() {
+        let before = done as f64 * own;
+        if monitor.tick(before.min(1.0)).is_break() {
+            return Err(SolveError::Cancelled);
         }
-    }
-
-    /// Solves rows. The first row of the task is not checked again if its checked case is given.
-    ///
-    /// # Errors
-    /// [`SolveError::Cancelled`]: the monitor stopped the work.
-    pub(crate) fn solve(
-        mut self,
-        rows: &[usize],
-        first: Option<&CheckedCase>,
-    ) -> Result<(), SolveError> {
-        self.all = rows.len();
-        for row in rows {
-            if self.watch().tick(0.0).is_break() {
-                return Err(SolveError::Cancelled);
+        let checked = match first.filter(|_| *row == 0) {
+            Some(checked) => Ok(task.as_row(checked.clone())),
+            None => task.checked(*row),
+        };
+        let checked = match checked {
+            Ok(checked) => checked,
+            Err(error) => {
+                answer.set(*row, Err(RowFailure::refused(&error)));
+                continue;
             }
-            let known = first.filter(|_| *row == 0);
-            let checked = match known {
-                Some(checked) => Ok(self.task.as_row(checked.clone())),
-                None => self.task.checked(*row),
-            };
-            match checked {
-                Ok(checked) => self.alone(*row, &checked)?,
-                Err(error) => self.end(*row, RowFailure::refused(&error)),
+        };
+        let watch = RowMonitor {
+            inner: monitor,
+            begun: monitor.elapsed(),
+            before,
+            own,
+        };
+        match catch_unwind(AssertUnwindSafe(|| solve(&checked, &watch))) {
+            Ok(Ok(solution)) => answer.set_solution(*row, &solution),
+            Ok(Err(error)) => {
+                let failure = RowFailure::of(&error).ok_or(SolveError::Cancelled)?;
+                answer.set(*row, Err(failure));
+            }
+            Err(_) => {
+                let failure = RowFailure {
+                    status: RowStatus::SolverFailed,
+                    reason: "the solver stopped on a defect of its own".to_owned(),
+                };
+                answer.set(*row, Err(failure));
             }
         }
-        Ok(())
     }
-
-    fn alone(&mut self, row: usize, checked: &CheckedCase) -> Result<(), SolveError> {
-        match self.solved(checked) {
-            Ok(solution) => {
-                self.answer.set_solution(row, &solution);
-                self.done += 1;
-            }
-            Err(RowEnd::Stopped) => return Err(SolveError::Cancelled),
-            Err(RowEnd::Failed(failure)) => self.end(row, failure),
-        }
-        Ok(())
-    }
-
-    fn end(&mut self, row: usize, failure: RowFailure) {
-        self.answer.set(row, Err(failure));
-        self.done += 1;
-    }
-
-    fn solved(&self, checked: &CheckedCase) -> Result<Solution, RowEnd> {
-        let watch = self.watch();
-        let solved = catch_unwind(AssertUnwindSafe(|| (self.solve)(checked, &watch)));
-        match solved {
-            Ok(Ok(solution)) => Ok(solution),
-            Ok(Err(error)) => Err(RowFailure::of(&error).map_or(RowEnd::Stopped, RowEnd::Failed)),
-            Err(_) => Err(RowEnd::Failed(RowFailure {
-                status: RowStatus::SolverFailed,
-                reason: "the solver stopped on a defect of its own".to_owned(),
-            })),
-        }
-    }
-
-    /// The monitor of the next row.
-    fn watch(&self) -> RowMonitor<'a> {
-        RowMonitor {
-            inner: self.monitor,
-            begun: self.monitor.elapsed(),
-            before: self.done as f64 / self.all as f64,
-            own: 1.0 / self.all as f64,
-        }
-    }
+    Ok(())
 }
 
 /// The monitor of one row.

@@ -8,25 +8,24 @@ use serde_json::Value;
 use crate::contact::case::contact_task::plausible;
 use crate::contact::case::words::friction::COEFFICIENT_LEAST;
 use crate::contact::case::words::solver::{MethodName, Output};
-use crate::contact::error::{CaseError, Fault, FaultCode, SolveError};
 use crate::contact::evaluate::answer::{RowAnswer, RowStatus, RowsAnswer};
 use crate::contact::evaluate::variable::{Row, Variable};
-use crate::contact::normal::footprint::NormalTask;
+use crate::contact::evaluate::varied::{Values, VariedColumn};
 use crate::contact::normal::hertz::{Ellipse, HertzShape};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
 use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
 use crate::contact::rolling::methods::table::file::table;
-use crate::contact::rolling::methods::table::solve::{RATIO_MAX, RATIO_MIN};
+use crate::contact::rolling::methods::table::solve::RATIO_RANGE;
 use crate::contact::rolling::refinement::gradients::{STEP, slope};
 use crate::contact::rolling::task::{RelativeTo, Resolution};
 
 /// Rows that can be evaluated.
 #[derive(Debug)]
-pub struct Rows {
+pub struct Rows<'a> {
     rows: usize,
     fixed: Row,
-    varied: Vec<(Variable, Vec<f64>)>,
+    varied: Vec<(Variable, &'a [f64])>,
     /// Shear modulus and Poisson's ratio where the bodies have their own.
     pair: Option<[f64; 2]>,
     young: bool,
@@ -46,45 +45,41 @@ enum RowMethod {
         auto: bool,
     },
     Fastsim(Box<EllipseMesh>, f64),
-    /// Neither represents the case: rows are left to the solver.
-    Solver,
 }
 
-impl Rows {
-    /// The rows of a case: `case` holds the first of them, and `checked` is what it was checked to be.
-    ///
-    /// # Errors
-    /// Every fault of the case or of the columns that is of this kind of question; of single numbers the first 20. A fault of a number
-    /// points into `columns` of the request.
+impl<'a> Rows<'a> {
+    /// The rows of a case: `case` holds the first of them, and `checked` is what it was checked to be. `None` if the solver has to answer them.
     pub fn new(
         case: &Value,
         checked: &CheckedCase,
-        columns: Vec<Column>,
-    ) -> Result<Rows, CaseError> {
-        let mut faults = faults_of_case(case, checked);
+        columns: &'a [VariedColumn],
+    ) -> Option<Rows<'a>> {
+        if !is_plain(case, checked) {
+            return None;
+        }
         let rows = columns.first().map_or(1, |column| column.values.len());
-        let mut varied = Vec::new();
-        for column in columns {
-            match faults_of_column(&column, rows, case) {
-                Ok(variable) => varied.push((variable, column.values)),
-                Err(more) => faults.extend(more),
-            }
-        }
-        if !faults.is_empty() {
-            faults.truncate(FAULTS_MAX);
-            return Err(CaseError(faults));
-        }
+        let of_bodies = case.pointer("/material/lower").is_some();
+        let varied = columns.iter().map(|column| {
+            let variable = Variable::at(&column.pointer)?;
+            let Values::Numbers(numbers) = &column.values else {
+                return None;
+            };
+            let allowed = variable.allowed();
+            let good = numbers.len() == rows
+                && numbers.iter().all(|number| allowed.contains(*number))
+                && !(of_bodies && column.pointer.starts_with("/material"));
+            good.then_some((variable, &numbers[..]))
+        });
+        let varied = varied.collect::<Option<Vec<_>>>()?;
         let mut fixed = [f64::NAN; 12];
         for variable in Variable::all() {
             let number = case.pointer(variable.pointer()).and_then(Value::as_f64);
             fixed[variable as usize] = number.unwrap_or(variable.absent());
         }
-        let method = method_of(checked).map_err(|error| {
-            CaseError(vec![Fault::new("/template/solver/mesh", error.to_string())])
-        })?;
+        let method = method_of(checked)?;
         let elasticity = &checked.problem.elasticity;
         let given = |variable: Variable| case.pointer(variable.pointer()).is_some();
-        Ok(Rows {
+        Some(Rows {
             rows,
             fixed,
             varied,
@@ -103,39 +98,17 @@ impl Rows {
         })
     }
 
-    /// Is there a method that answers such rows? Otherwise all of them are left to the solver.
-    pub fn has_method(&self) -> bool {
-        !matches!(self.method, RowMethod::Solver)
-    }
-
     /// The answers.
     pub fn evaluate(&self) -> RowsAnswer {
         let Ok(answer) = self.evaluate_to(|_| Ok::<_, Infallible>(()));
         answer
     }
 
-    /// The answers; `step` is called after each row and may end the evaluation.
+    /// The answers; `note` is called with the normal force in N and √(ab) in mm of each row and may end the evaluation.
     ///
     /// # Errors
-    /// The error of `step`.
-    pub fn evaluate_stepwise<E>(
-        &self,
-        mut step: impl FnMut() -> Result<(), E>,
-    ) -> Result<RowsAnswer, E> {
-        self.evaluate_to(|_| step())
-    }
-
-    /// The answers, and of each row its normal force in N and √(ab) in mm.
-    pub fn evaluate_with_patches(&self) -> (RowsAnswer, Vec<[f64; 2]>) {
-        let mut patches = Vec::with_capacity(self.rows);
-        let Ok(answer) = self.evaluate_to(|patch| {
-            patches.push(patch);
-            Ok::<_, Infallible>(())
-        });
-        (answer, patches)
-    }
-
-    fn evaluate_to<E>(
+    /// The error of `note`.
+    pub fn evaluate_to<E>(
         &self,
         mut note: impl FnMut([f64; 2]) -> Result<(), E>,
     ) -> Result<RowsAnswer, E> {
@@ -173,9 +146,6 @@ impl Rows {
             poisson,
         };
         let place = [force, patch.c];
-        if !self.has_method() {
-            return (RowAnswer::without(RowStatus::NeedsSolver), place);
-        }
         let ellipse = Ellipse {
             a,
             b,
@@ -269,7 +239,7 @@ impl Rows {
                     ..found
                 }
             }
-            RowMethod::Table { .. } if !(RATIO_MIN..=RATIO_MAX).contains(&patch.ratio) => {
+            RowMethod::Table { .. } if !RATIO_RANGE.contains(&patch.ratio) => {
                 RowCreep::none(RowStatus::NotCovered)
             }
             RowMethod::Table { .. } => {
@@ -283,7 +253,6 @@ impl Rows {
                     ..RowCreep::ok(creep)
                 }
             }
-            RowMethod::Solver => RowCreep::none(RowStatus::NeedsSolver),
         }
     }
 }
@@ -405,11 +374,26 @@ impl Shapes {
     }
 }
 
-fn method_of(checked: &CheckedCase) -> Result<RowMethod, SolveError> {
-    if checked.problem.plain().is_none() {
-        return Ok(RowMethod::Solver);
-    }
-    Ok(match (checked.run.method_asked, checked.run.resolution) {
+/// Is it a question that table and simplified theory answer row by row: one motion by creepages on a loaded ellipse?
+fn is_plain(case: &Value, checked: &CheckedCase) -> bool {
+    let CheckedCase { problem, run, .. } = checked;
+    let asked_mesh = matches!(run.resolution, Resolution::Mesh(_));
+    problem.plain().is_some()
+        && problem.motions.len() == 1
+        && problem.history.is_none()
+        && problem.forces.iter().all(|forces| *forces == [None; 2])
+        && case.pointer(Variable::NormalForce.pointer()).is_some()
+        && match run.method_asked {
+            MethodName::Fastsim => true,
+            MethodName::Table => problem.elasticity.difference == 0.0,
+            MethodName::Auto => problem.elasticity.difference == 0.0 && !asked_mesh,
+            MethodName::BoundaryElement | MethodName::LiuHsu => false,
+        }
+}
+
+/// None where a mesh of the simplified theory cannot be made.
+fn method_of(checked: &CheckedCase) -> Option<RowMethod> {
+    Some(match (checked.run.method_asked, checked.run.resolution) {
         (MethodName::Fastsim, resolution) => {
             let size = match resolution {
                 Resolution::Mesh(size) => size,
@@ -417,124 +401,10 @@ fn method_of(checked: &CheckedCase) -> Result<RowMethod, SolveError> {
             };
             let bound = checked.run.traction_bound;
             let class = fastsim::error_class(bound, size);
-            RowMethod::Fastsim(Box::new(EllipseMesh::new(size, bound)?), class)
+            RowMethod::Fastsim(Box::new(EllipseMesh::new(size, bound).ok()?), class)
         }
         (method, _) => RowMethod::Table {
             auto: method == MethodName::Auto,
         },
     })
-}
-
-/// A column: where it stands in the case, and a number for each row.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Column {
-    /// JSON pointer into the case.
-    pub pointer: String,
-    /// The numbers.
-    pub values: Vec<f64>,
-}
-
-/// Faults of rows that are listed.
-pub(crate) const FAULTS_MAX: usize = 20;
-
-/// What rows cannot be asked about.
-pub(crate) fn faults_of_case(case: &Value, checked: &CheckedCase) -> Vec<Fault> {
-    let mut faults = Vec::new();
-    let mut refuse = |wrong: bool, pointer: &str, detail: &str| {
-        if wrong {
-            faults.push(Fault::new(format!("/template{pointer}"), detail));
-        }
-    };
-    let method = checked.run.method_asked;
-    let fast = matches!(
-        method,
-        MethodName::Auto | MethodName::Table | MethodName::Fastsim
-    );
-    if !matches!(checked.problem.task, NormalTask::Hertz(_)) {
-        refuse(
-            true,
-            "/contact/type",
-            "rows are of `radii` or `ellipse`; other contacts need a job",
-        );
-    }
-    refuse(
-        !fast,
-        "/solver/method",
-        "rows are evaluated by `table`, `fastsim` or `auto`; other methods need a job",
-    );
-    let mesh = matches!(checked.run.resolution, Resolution::Mesh(_));
-    refuse(
-        mesh && method == MethodName::Auto,
-        "/solver/mesh",
-        "given, but `auto` takes the table for rows, which has no mesh",
-    );
-    refuse(
-        checked.problem.elasticity.difference != 0.0 && method != MethodName::Fastsim,
-        "/material",
-        "bodies of unlike material (K other than 0), which the table does not cover",
-    );
-    let asked = checked
-        .problem
-        .forces
-        .iter()
-        .any(|forces| *forces != [None; 2]);
-    refuse(
-        checked.problem.motions.len() != 1 || asked || checked.problem.history.is_some(),
-        "/motion",
-        "rows have one motion each, given by creepages; sweeps, histories and prescribed forces need a job",
-    );
-    let by_force = case.pointer(Variable::NormalForce.pointer()).is_some();
-    refuse(!by_force, "/load", "rows are loaded by `normal_force_n`");
-    faults
-}
-
-/// The variable of a column, or what is wrong with it.
-pub(crate) fn faults_of_column(
-    column: &Column,
-    rows: usize,
-    case: &Value,
-) -> Result<Variable, Vec<Fault>> {
-    let escaped = column.pointer.replace('~', "~0").replace('/', "~1");
-    let here = format!("/columns/{escaped}");
-    let Some(variable) = Variable::at(&column.pointer) else {
-        let known: Vec<&str> = Variable::all().map(Variable::pointer).collect();
-        let detail = format!(
-            "`{}` cannot differ from row to row; allowed: {}",
-            column.pointer,
-            known.join(", ")
-        );
-        return Err(vec![Fault::new(here, detail)]);
-    };
-    if column.values.len() != rows {
-        let detail = format!(
-            "{} values given, the first column has {rows}; all columns need as many",
-            column.values.len()
-        );
-        return Err(vec![Fault::new(here, detail)]);
-    }
-    if case.pointer("/material/lower").is_some() && column.pointer.starts_with("/material") {
-        let detail =
-            "given, but the template names the materials of both bodies; rows vary a common one";
-        return Err(vec![Fault::new(here, detail)]);
-    }
-    let allowed = variable.allowed();
-    let wrong = column
-        .values
-        .iter()
-        .enumerate()
-        .filter(|(_, value)| !allowed.contains(**value));
-    let faults: Vec<Fault> = wrong
-        .take(FAULTS_MAX)
-        .map(|(row, value)| Fault {
-            figures: Box::new(allowed.figures(FaultCode::OutOfRange, Some(&Value::from(*value)))),
-            ..Fault::new(
-                format!("{here}/{row}"),
-                format!("{value} given; {allowed} is needed"),
-            )
-        })
-        .collect();
-    match faults.is_empty() {
-        true => Ok(variable),
-        false => Err(faults),
-    }
 }

@@ -3,14 +3,11 @@
 //! Points are `[y, z]` in mm, y to the field side and z down, in order of increasing y as a [`Profile`] has them. A point stands for the part
 //! of the section up to the middles to its neighbours.
 
-use crate::contact::geometry::profile::{Body, Profile};
+use crate::contact::geometry::profile::{Body, POINT_SPACING, Profile};
 
-/// Distance of the points of the sections in mm: a twentieth of a narrow patch, and what measured sections have at the gauge corner.
-pub(crate) const SPACING: f64 = 0.25;
-
-/// Points along the curve of a profile, at most [`SPACING`] apart.
+/// Points along the curve of a profile, at most [`POINT_SPACING`] apart.
 pub(crate) fn sampled(profile: &Profile) -> Vec<[f64; 2]> {
-    let places = profile.parameters(SPACING).into_iter();
+    let places = profile.parameters(POINT_SPACING).into_iter();
     let points = places.map(|s| profile.at(s).at);
     points.map(|[y, z]| [y, -z]).collect()
 }
@@ -103,7 +100,7 @@ pub(crate) fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> (Vec<[f64
 /// Spreads areas along the section by a kernel of this standard deviation in mm; their sum is kept.
 pub(crate) fn smoothed(areas: &[f64], deviation: f64) -> Vec<f64> {
     // One pass of ¼, ½, ¼ has half the square of the spacing as its variance; a pass with a smaller share makes up the rest.
-    let passes = 2.0 * (deviation / SPACING).powi(2);
+    let passes = 2.0 * (deviation / POINT_SPACING).powi(2);
     let mut areas = areas.to_vec();
     for k in 0..passes.ceil() as usize {
         let share = 0.25 * (passes - k as f64).min(1.0);

@@ -21,13 +21,12 @@ use crate::contact::evolution::task::{Evolution, PlannedEvent, Sections, SolveCo
 use crate::contact::evolution::traffic::condensed;
 use crate::contact::geometry::profile::Body;
 use crate::contact::monitor::{Monitor, MonitorPart};
+use crate::contact::numerics::roots::ROUNDING;
 use crate::contact::remark::kind::short;
 use crate::contact::solution::words::evolution::{
     BodyState, EvolutionRecord, EvolutionState, StateContact, WornBody,
 };
 
-/// Two shares of the extent that differ by less are one.
-const SAME: f64 = 1e-9;
 /// Shortest step as a share of the extent.
 const SHORTEST: f64 = 1e-7;
 /// Attempts at one step.
@@ -67,7 +66,7 @@ impl Evolution {
     fn due(&self, state: &EvolutionState) -> Option<&PlannedEvent> {
         let next = state.events_done as usize;
         let event = self.events.get(next);
-        event.filter(|_| self.share_of_event(next) <= state.share + SAME)
+        event.filter(|_| self.share_of_event(next) <= state.share + ROUNDING)
     }
 
     /// One step: condenses the traffic, lets an event happen, or advances the sections. Returns the record of the state before, if one is due.
@@ -188,7 +187,7 @@ impl Evolution {
             let least = if step < length { length } else { 0.0 };
             state.next = least.max(step * better);
             state.share = begin + step;
-            if (stop - state.share).abs() < SAME {
+            if (stop - state.share).abs() < ROUNDING {
                 state.share = stop;
                 state.recorded = false;
             }
@@ -200,9 +199,9 @@ impl Evolution {
     /// The next share with a record or an event.
     fn next_stop(&self, share: f64) -> f64 {
         let records = f64::from(self.plan.records);
-        let record = ((share + SAME) * records).floor() + 1.0;
+        let record = ((share + ROUNDING) * records).floor() + 1.0;
         let events = (0..self.events.len()).map(|k| self.share_of_event(k));
-        let events = events.filter(|at| *at > share + SAME);
+        let events = events.filter(|at| *at > share + ROUNDING);
         events.fold((record / records).min(1.0), f64::min)
     }
 }

@@ -7,8 +7,9 @@
 
 use crate::contact::error::SolveError;
 use crate::contact::evolution::pass::Pass;
-use crate::contact::evolution::section::{SPACING, add, smoothed};
+use crate::contact::evolution::section::{add, smoothed};
 use crate::contact::evolution::task::Evolution;
+use crate::contact::geometry::profile::POINT_SPACING;
 use crate::contact::solution::words::evolution::{CondensedTraffic, TrafficState};
 
 /// In each round the groups that change most are parted, this share of all.
@@ -196,7 +197,7 @@ fn size(areas: &[f64]) -> f64 {
 /// Variance in mm² of the place along the section at which areas lie; 0 where there are none.
 fn along_variance(areas: &[f64]) -> f64 {
     let moments = areas.iter().enumerate().fold([0.0; 3], |sums, (k, area)| {
-        let s = SPACING * k as f64;
+        let s = POINT_SPACING * k as f64;
         [sums[0] + area, sums[1] + area * s, sums[2] + area * s * s]
     });
     let [all, first, second] = moments;

@@ -16,11 +16,9 @@ use crate::contact::numerics::roots::bisect;
 const PLACES: usize = 2000;
 /// Halvings of a bracket; more change nothing.
 const HALVINGS: u32 = 60;
-/// Radii that differ by less than this in mm are equal: at an amplitude of 1 mm it is a conicity of 0.00005, a twentieth of the last digit that
-/// the standard gives.
+/// Radii that differ by less than this in mm are equal, and so small a conicity is none: at an amplitude of 1 mm the difference is a conicity of
+/// 0.00005, a twentieth of the last digit that the standard gives.
 const EQUAL: f64 = 1e-4;
-/// A conicity that counts as none, for the same reason.
-const UNNOTICEABLE: f64 = 1e-4;
 
 /// Difference of the rolling radii over the lateral shift of a wheelset, linear between samples.
 #[derive(Debug, Clone, PartialEq)]
@@ -198,7 +196,7 @@ impl RadiusDifference {
         };
         let wide = |[left, right]: [f64; 2]| right - left >= 2.0 * amplitude;
         // The cone of conicity γ has the energy γ A². Rises of the integral up to that of an unnoticeable cone are none.
-        let least = UNNOTICEABLE * amplitude.powi(2);
+        let least = EQUAL * amplitude.powi(2);
         let flat = self.turns(rest, least);
         if wide(flat) {
             let middle = shift.max(flat[0] + amplitude).min(flat[1] - amplitude);

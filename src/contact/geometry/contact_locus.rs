@@ -11,10 +11,8 @@ use crate::contact::geometry::envelope::envelope;
 use crate::contact::geometry::locus_lines::{LocusLines, LocusPoint};
 use crate::contact::geometry::wheel_rail::{WheelCircle, WheelRail};
 
-/// Spacing of the search across the track, in mm. The height of first touch is as exact as the rail is straight over half of it.
+/// Spacing of the search across the track, in mm, half of that of the points along the curves. The height of first touch is as exact as the rail is straight over half of it.
 pub(crate) const STEP: f64 = 0.04;
-/// Spacing of the points along the curves, in mm.
-const CURVE_STEP: f64 = 0.08;
 /// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
 const LOWERING_MAX: f64 = 16.0;
 /// Lowering in mm under a light load, where the estimate for others begins.
@@ -22,8 +20,7 @@ const LOWERING_FIRST: f64 = 0.032;
 /// Lowerings that are tried for an estimate at most, and part of the force to the power 2/3 that ends it: where one patch carries the force, two or
 /// three tries do. Like the one before they decide which height is tried first. Chosen by judgement: the estimate itself is some per cent off, and
 /// whether a looser end is as good was not measured.
-const LOWERINGS_TRIED: usize = 10;
-const ESTIMATED: f64 = 2e-3;
+const LOWERINGS_TRIED: (usize, f64) = (10, 2e-3);
 
 /// Rail and wheel above each other, line by line along x.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,7 +46,7 @@ pub(crate) fn rail_points(
 /// The rail's upper edge.
 fn edge_of(geometry: &WheelRail) -> &Envelope {
     geometry.rail_edge.get_or_make(|| {
-        let [rail, _] = geometry.parameters(CURVE_STEP);
+        let [rail, _] = geometry.parameters(2.0 * STEP);
         envelope(&rail_points(geometry, rail), STEP)
     })
 }
@@ -58,7 +55,7 @@ fn edge_of(geometry: &WheelRail) -> &Envelope {
 fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
     let rail = edge_of(geometry);
     let circles = geometry.circles.get_or_make(|| {
-        let [_, wheel] = geometry.parameters(CURVE_STEP);
+        let [_, wheel] = geometry.parameters(2.0 * STEP);
         wheel.into_iter().map(|s| geometry.circle(s)).collect()
     });
     // The lowest point of every circle, if it has one.
@@ -152,9 +149,9 @@ impl<'g> ContactLocus<'g> {
         // The estimate jumps where one more line overlaps: the bracket is kept.
         let (mut low, mut high) = ([0.0_f64; 2], None::<[f64; 2]>);
         let mut lowering = LOWERING_FIRST;
-        for _ in 0..LOWERINGS_TRIED {
+        for _ in 0..LOWERINGS_TRIED.0 {
             let found = power(lowering);
-            if (found / wanted - 1.0).abs() < ESTIMATED {
+            if (found / wanted - 1.0).abs() < LOWERINGS_TRIED.1 {
                 break;
             }
             if found < wanted {
@@ -243,11 +240,10 @@ struct EstimatedPatch {
 /// Force over the contact modulus of all patches. Patches press each other out of contact: one that carries the force F lets the
 /// surface at the distance r sink by `F / (π E* r)` (Boussinesq 1885), and forces grow as the power 3/2 of the depth.
 fn coupled_force(patches: &[EstimatedPatch]) -> f64 {
-    /// Rounds in which forces and what they let sink are found from each other; two leave less than 2 % (see the test). They decide
-    /// which height is tried first.
-    const ROUNDS: usize = 2;
     let mut forces: Vec<f64> = patches.iter().map(|patch| patch.force).collect();
-    let rounds = if patches.len() > 1 { ROUNDS } else { 0 };
+    // Two rounds in which forces and what they let sink are found from each other leave less than 2 % (see the test). They decide which height is tried
+    // first.
+    let rounds = if patches.len() > 1 { 2 } else { 0 };
     for _ in 0..rounds {
         for (k, patch) in patches.iter().enumerate() {
             let sunk = |(other, force): (&EstimatedPatch, &f64)| {

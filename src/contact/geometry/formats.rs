@@ -25,7 +25,7 @@ use std::f64::consts::TAU;
 
 use railhead_macros::Named;
 
-use crate::contact::geometry::profile::LengthUnit;
+use crate::contact::geometry::profile::{LengthUnit, POINTS_MIN};
 
 /// A file format that a client can name; each is read in the file of that name in this folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
@@ -649,9 +649,6 @@ pub(crate) fn unreadable(line: &Line, needed: &str, comma: Comma) -> String {
     )
 }
 
-/// Rows from which on a column that counts them is recognised.
-const COUNTED_MIN: usize = 8;
-
 /// Reads the points. A line of titles before them says which columns are y and z and may name their unit; without it they are the
 /// first two. Further columns are ignored.
 pub(crate) fn read_columns(text: &str) -> Result<ProfileFile, String> {
@@ -676,7 +673,7 @@ pub(crate) fn read_columns(text: &str) -> Result<ProfileFile, String> {
 /// Whether there are three columns or more and the first holds 0, 1, 2, … or 1, 2, 3, …
 fn counts_rows(table: &Table) -> bool {
     let first = table.rows[0].numbers[0];
-    table.rows.len() >= COUNTED_MIN
+    table.rows.len() >= POINTS_MIN
         && (first == 0.0 || first == 1.0)
         && table.rows.iter().enumerate().all(|(k, row)| {
             row.numbers.len() >= 3 && (row.numbers[0] - first - k as f64).abs() < 1e-9
@@ -747,8 +744,6 @@ fn cells<'a>(line: &'a Line<'_>) -> impl Iterator<Item = &'a str> {
 
 /// What a line of points has to be.
 const NEEDED: &str = "a row of finite numbers";
-/// Rows in one piece that may be a part of the header: fewer than the points of any profile.
-const HEADER_ROWS_MAX: usize = 7;
 /// A row of the header is this many usual chords or more from the first point, while neighbouring points are one or two apart.
 const CHORDS_APART: f64 = 10.0;
 
@@ -805,7 +800,7 @@ impl Scanned<'_> {
         let longest = stretches.iter().position(|(_, rows)| *rows == most);
         let longest = longest.unwrap_or(0);
         let (before, behind) = (&stretches[..longest], &stretches[longest..]);
-        if let Some(([_, end], _)) = before.iter().find(|(_, rows)| *rows > HEADER_ROWS_MAX) {
+        if let Some(([_, end], _)) = before.iter().find(|(_, rows)| *rows >= POINTS_MIN) {
             return Err(self.refuse(*end));
         }
         if behind[1..].iter().any(|(_, rows)| *rows > 0) {
@@ -829,7 +824,7 @@ impl Scanned<'_> {
             && length(&rows[0]) != length(&rows[1])
             && rows[2..].iter().all(|k| length(k) == length(&rows[1]));
         let chord = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-        let count = if (1..=HEADER_ROWS_MAX).contains(&attached) {
+        let count = if (1..POINTS_MIN).contains(&attached) {
             attached
         } else {
             usize::from(lone)

@@ -5,8 +5,6 @@ use crate::contact::geometry::profile::Body;
 
 /// Length in mm below which a chord is not a hole and fine enough for any patch, and over which the direction of the profile at the end of a hole is taken.
 pub(crate) const LENGTH_MIN: f64 = 1.0;
-/// Length relative to the width of the contact below which a chord is neither a hole nor coarse.
-pub(crate) const WIDTH_MIN: f64 = 1.0;
 /// Length relative to the width of the contact above which a chord may hold the whole contact, so that a job fails.
 pub(crate) const WIDE: f64 = 1.5;
 /// Distance in mm of the places at which the other body is compared with a chord.
@@ -28,7 +26,7 @@ pub struct Hole {
 impl Hole {
     /// Length in mm below which chords can be ignored beside a contact of the given width in mm.
     pub fn least(width: f64) -> f64 {
-        LENGTH_MIN.max(WIDTH_MIN * width)
+        LENGTH_MIN.max(width)
     }
 }
 

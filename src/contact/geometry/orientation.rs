@@ -166,18 +166,15 @@ const SIDE: usize = 3;
 const FLAT: f64 = 0.35;
 /// Inclination in rad of the back of a flange, of a rim and of the faces of a head (75°).
 const STEEP: f64 = 1.3;
-/// Height in mm by which a section may rise again within one descent: lips and steps of worn profiles.
-const RISE: f64 = 1.0;
 /// Depth in mm of the piece that is taken as the tip of a flange.
 const TIP_DEPTH: f64 = 2.0;
-/// Least and largest width in mm of that piece. Flanges of EN 13715 and AAR have 12 to 18 mm; the edge of a rim has less than 1 mm.
+/// Least and largest width in mm of that piece; the back of the flange is no farther from the tip than the second (15 mm in EN 13715; in a groove
+/// beside a second rail the section continues farther). Flanges of EN 13715 and AAR have 12 to 18 mm; the edge of a rim has less than 1 mm.
 const TIP_WIDTH: [f64; 2] = [4.0, 25.0];
 /// Least and largest height of a flange above its tread in mm: trams have 18 mm, worn wheels up to 40 mm.
 const FLANGE_HEIGHT: [f64; 2] = [15.0, 45.0];
 /// Least and largest distance in mm from the beginning of the flange's root to its tip. Wheels of EN 13715 have 24 mm.
 const ROOT_TO_TIP: [f64; 2] = [8.0, 45.0];
-/// Largest distance in mm from the tip of a flange to its back: 15 mm in EN 13715. In a groove beside a second rail the section continues farther.
-const TIP_TO_BACK: f64 = 25.0;
 /// Least length in mm of a tread.
 const TREAD: f64 = 20.0;
 /// Least height in mm of a flange that ends before its tip.
@@ -186,14 +183,14 @@ const PART_HEIGHT: f64 = 12.0;
 const PART_SLOPE: [f64; 2] = [0.87, 1.38];
 /// Least length in mm of the crown of a head: the nose of a crossing has 15 mm where wheels reach it.
 const CROWN: f64 = 15.0;
-/// Least fall in mm at one side of a head, and at its other side.
+/// Least fall in mm at one side of a head, and at its other side. By the second a section may rise again within one descent: lips and steps of worn
+/// profiles.
 const FALL: [f64; 2] = [6.0, 1.0];
-/// Inclination in rad toward a cut end that a crown may have (6°): rails are canted by up to 0.05, feet of rails slope by 0.25.
+/// Inclination in rad toward a cut end that a crown may have, and from the vertical that the back of a flange may have (6°): rails are canted by up
+/// to 0.05, feet of rails slope by 0.25; of a rounding of 20.5 mm, 2 mm lie within this angle.
 const CUT_SLOPE: f64 = 0.1;
 /// Least turn in rad of a crown that is measured without either side: 35 mm of a radius of 300 mm turn by 0.12.
 const CROWN_TURN: f64 = 0.05;
-/// Factor by which the crowns of one sense must exceed those of the other in length.
-const CLEARLY_LONGER: f64 = 2.0;
 /// Least length in mm of the crown, least fall in mm of both faces, and range of the width in mm of a section that can only be a rail. Heads
 /// of EN 13674 are 65 to 75 mm wide.
 const SURE_CROWN: f64 = 30.0;
@@ -203,13 +200,8 @@ const SURE_FALL: f64 = 10.0;
 const SURE_CORNER: f64 = 0.3;
 /// Width of such a section over its faces in mm.
 const SURE_WIDTH: [f64; 2] = [50.0, 90.0];
-/// Angle in rad from the vertical within which a stretch is the back of a flange (6°), and its least length in mm. Of a rounding of 20.5 mm,
-/// 2 mm lie within this angle.
-const VERTICAL: f64 = 0.1;
-/// Least length of the back of a flange in mm.
+/// Least length in mm of the back of a flange, and distance between the three points at a steep end that the rounding of the back is continued from.
 const BACK: f64 = 3.0;
-/// Distance in mm between the three points at a steep end that the rounding of the back is continued from.
-const ROUNDING_STEP: f64 = 3.0;
 /// Largest radius in mm of that rounding; it is 20.5 mm in EN 13715.
 const ROUNDING_MAX: f64 = 50.0;
 /// Least inclination in rad at such an end (72°): the rounding of 20.5 mm is continued by at most 1.0 mm.
@@ -271,10 +263,8 @@ pub fn rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
         heads.iter().map(|head| head.crown).sum()
     };
     let [down, up] = [false, true].map(crowns);
-    if up > CLEARLY_LONGER * down {
-        return Some(true);
-    }
-    (down > CLEARLY_LONGER * up).then_some(false)
+    // The crowns of one sense must be more than twice as long as those of the other.
+    (up > 2.0 * down || down > 2.0 * up).then_some(up > down)
 }
 
 /// Whether z of points is positive up, if they can only be those of a rail with at least one of its faces.
@@ -435,7 +425,7 @@ impl Section<'_> {
                     turn,
                     y: self.points[at][0],
                 };
-            } else if depth < found.depth - RISE {
+            } else if depth < found.depth - FALL[1] {
                 return found;
             }
         }
@@ -461,7 +451,7 @@ impl Section<'_> {
         let whole = within(TIP_WIDTH, tip[1] - tip[0])
             && within(FLANGE_HEIGHT, height)
             && within(ROOT_TO_TIP, to_tip)
-            && 0.5 * (tip[0] + tip[1]) - end <= TIP_TO_BACK;
+            && 0.5 * (tip[0] + tip[1]) - end <= TIP_WIDTH[1];
         if whole {
             return Some(Flange {
                 tip: Some(tip),
@@ -496,12 +486,11 @@ impl Section<'_> {
 
     /// y of the back of a flange with its lowest place at this sample.
     fn back(&self, lowest: usize) -> Option<f64> {
-        let steep = (0..lowest).filter(|k| (self.angles[*k] + FRAC_PI_2).abs() <= VERTICAL);
+        let steep = (0..lowest).filter(|k| (self.angles[*k] + FRAC_PI_2).abs() <= CUT_SLOPE);
         let mut places: Vec<f64> = steep.map(|k| self.points[k][0]).collect();
         if places.len() as f64 * STEP >= BACK {
             places.sort_by(f64::total_cmp);
-            let vertical = places[places.len() / 2];
-            return Some(vertical);
+            return Some(places[places.len() / 2]);
         }
         self.rounding_end(lowest)
     }
@@ -513,7 +502,7 @@ impl Section<'_> {
             let far = |at: &&[f64; 2]| (at[0] - end[0]).hypot(at[1] - end[1]) >= distance;
             self.given.iter().find(far).copied()
         };
-        let (middle, inner) = (beyond(ROUNDING_STEP)?, beyond(2.0 * ROUNDING_STEP)?);
+        let (middle, inner) = (beyond(BACK)?, beyond(2.0 * BACK)?);
         if inner[0] > self.points[lowest][0] {
             return None;
         }

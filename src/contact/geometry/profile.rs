@@ -24,12 +24,13 @@ pub const ARC_LENGTH: [f64; 2] = [5.0, 500.0];
 pub const POINTS_MIN: usize = 8;
 /// Most points of one profile.
 pub const POINTS_MAX: usize = 20_000;
-/// Width in mm of the head of a usual rail (60E1).
-const RAIL_WIDTH: f64 = 72.0;
-/// Width in mm of a usual wheel (EN 13715).
-const WHEEL_WIDTH: f64 = 135.0;
+/// Distance in mm of the points of a section that is drawn or wears: a twentieth of a narrow patch, and what measured sections have at the gauge
+/// corner.
+pub(crate) const POINT_SPACING: f64 = 0.25;
+/// Length in mm of profile needed beyond a contact; with less there is a remark.
+pub(crate) const NEEDED_BEYOND: f64 = 5.0;
 /// Points nearer to each other than this are one, in mm.
-const NEAR: f64 = 1e-3;
+pub(crate) const NEAR: f64 = 1e-3;
 /// Cosine of the turn from which on a point runs back against its neighbours: 102°, which no corner of a measured profile has, while points
 /// at a joint of two measurements turn by up to 180°. Chosen by judgement; how much it matters was not measured.
 const FLANGE_BACK_TURN: f64 = -0.2;
@@ -369,8 +370,9 @@ fn orient(
 /// The width of a section, and the unit in which it would be that of a usual rail head or wheel, if that is not mm.
 fn likely_unit(body: Body, points: &[[f64; 2]]) -> Option<(f64, LengthUnit)> {
     let usual = match body {
-        Body::Rail => RAIL_WIDTH,
-        Body::Wheel => WHEEL_WIDTH,
+        // The head of a usual rail (60E1), and a usual wheel (EN 13715).
+        Body::Rail => 72.0,
+        Body::Wheel => 135.0,
     };
     let y = || points.iter().map(|point| point[0]);
     let width = y().fold(f64::NEG_INFINITY, f64::max) - y().fold(f64::INFINITY, f64::min);

@@ -18,12 +18,11 @@ use crate::contact::numerics::quadrature::{GaussPoints, integral};
 
 pub use crate::contact::geometry::curve_place::CurvePlace;
 
-/// Largest spacing in mm of the places of the rail where overlaps are looked for.
+/// Largest spacing in mm of the places of the rail where overlaps are looked for, and of the wheel's circles among which the one over a place is looked
+/// for.
 pub const SPACING: f64 = 0.25;
 /// A place between two that are nearer to the wheel than this, in mm, may be overlapped although both are not.
 const BETWEEN: f64 = 3e-3;
-/// Spacing of the wheel's circles among which the one over a place is looked for, in mm.
-const WHEEL_STEP: f64 = 0.25;
 /// Intervals between neighbouring circles, or places of the rail, that are looked at together.
 const BLOCK: usize = 16;
 /// Where the wheel's polygon comes nearer to the rail than this, in mm, the distance is computed exactly.
@@ -32,23 +31,19 @@ const LOOKED_AT: f64 = 0.02;
 const DEEPEST: f64 = 2.0;
 /// A wheel farther from the rail than this along the normal, in mm, does not touch it.
 const FAR: f64 = 8.0;
-/// Largest cosine between the outward normals of two bodies that face each other.
-const FACING: f64 = -0.1;
+/// Least cosine between directions that follow each other: between the outward normal of a body and the inward one of another that faces it, and between the
+/// tangent of the rail and a plane of contact, which ends where it is smaller.
+const FOLLOWS: f64 = 0.1;
 /// Intervals between the points along x at which the gap is computed, for a wheel without yaw, and at most; and the distance in mm across the
 /// wheel's profile for which there is one more.
-const INTERVALS: usize = 4;
-const INTERVALS_MAX: usize = 15;
+const INTERVALS: [usize; 2] = [4, 15];
 const NODE_DISTANCE: f64 = 0.1;
 /// Sections in which the least gap between two places is looked for.
 const SECTIONS: usize = 16;
 /// Circles searched from the last result on, before all are searched.
 const NEIGHBOURS: usize = 8;
 /// Newton's method for the wheel's surface: steps at most, the last step in mm, and the longest one allowed in mm.
-const STEPS_MAX: usize = 25;
-const STEP_LAST: f64 = 1e-10;
-const STEP_LONGEST: f64 = 1.0;
-/// A plane of contact ends where the tangent of the rail has a smaller part along it than this.
-const ALONG_PLANE: f64 = 0.1;
+const STEPS: (usize, f64, f64) = (25, 1e-10, 1.0);
 
 /// A plane of contact across the track.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -162,7 +157,7 @@ pub struct WheelOver {
 impl<'g> ReferenceCurve<'g> {
     /// The curve of a rail, with the wheel in its pose.
     pub fn new(geometry: &'g WheelRail) -> ReferenceCurve<'g> {
-        let [_, wheel] = geometry.parameters(WHEEL_STEP);
+        let [_, wheel] = geometry.parameters(SPACING);
         let circles: Vec<LowestPoint> = wheel
             .into_iter()
             .map(|wheel| {
@@ -196,7 +191,7 @@ impl<'g> ReferenceCurve<'g> {
     pub fn on_planes(&self, planes: Vec<ContactPlane>) -> ReferenceCurve<'g> {
         let mut rail = Vec::new();
         for plane in &planes {
-            let facing = |place: &CurvePlace| plane.follows(place.angle) > ALONG_PLANE;
+            let facing = |place: &CurvePlace| plane.follows(place.angle) > FOLLOWS;
             let inside = |place: &CurvePlace| {
                 (plane.range[0]..plane.range[1]).contains(&place.s) && facing(place)
             };
@@ -478,7 +473,8 @@ impl<'g> ReferenceCurve<'g> {
         let WheelOver {
             mut gap, mut wheel, ..
         } = *start;
-        for _ in 0..STEPS_MAX {
+        let (steps, last_step, longest) = STEPS;
+        for _ in 0..steps {
             let arm = [
                 from[0],
                 from[1] + gap * normal[0],
@@ -496,18 +492,18 @@ impl<'g> ReferenceCurve<'g> {
                 (r * missed[0] - a * missed[1]) / determinant,
                 (widening * missed[0] - normal_along * missed[1]) / determinant,
             ];
-            let [across, along_wheel] = step.map(|step| step.clamp(-STEP_LONGEST, STEP_LONGEST));
+            let [across, along_wheel] = step.map(|step| step.clamp(-longest, longest));
             if !(across.is_finite() && along_wheel.is_finite()) {
                 return None;
             }
             gap += across;
             wheel = (wheel + along_wheel).clamp(first, last);
-            if step[0].abs().max(step[1].abs()) < STEP_LAST {
+            if step[0].abs().max(step[1].abs()) < last_step {
                 let size = self.sign() * a.hypot(r);
                 let outward = [0, 1, 2].map(|k| (a * radial[k] / radius - r * axle[k]) / size);
                 let facing = outward[1] * normal[0] + outward[2] * normal[1];
                 let inside = wheel > first && wheel < last;
-                return (facing < FACING && inside).then(|| WheelOver {
+                return (facing < -FOLLOWS && inside).then(|| WheelOver {
                     gap,
                     wheel,
                     lift: outward[2] / facing,
@@ -522,7 +518,7 @@ impl<'g> ReferenceCurve<'g> {
     /// moves the contact across the wheel's profile.
     pub fn nodes(&self, [first, last]: [f64; 2]) -> Vec<f64> {
         let across = self.geometry.axle()[0].abs() * (last - first);
-        let intervals = (INTERVALS + (across / NODE_DISTANCE) as usize).min(INTERVALS_MAX);
+        let intervals = (INTERVALS[0] + (across / NODE_DISTANCE) as usize).min(INTERVALS[1]);
         let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
         let angle = |k: usize| std::f64::consts::PI * k as f64 / intervals as f64;
         (0..=intervals)

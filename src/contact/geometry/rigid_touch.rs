@@ -4,18 +4,11 @@ use crate::contact::geometry::contact_locus::rail_points;
 use crate::contact::geometry::envelope::{Envelope, envelope};
 use crate::contact::geometry::wheel_rail::WheelRail;
 
-/// Spacing of the lines on which the rail's upper edge is kept, and of its points, in mm.
+/// Spacing in mm of the lines on which the rail's upper edge is kept, half of that of its points.
 const LINE_STEP: f64 = 0.01;
-const CURVE_STEP: f64 = 0.02;
 /// Spacing of the points of the wheel among which the touching one is looked for, in mm. Two places of contact whose clearances
 /// differ by less than some 3e-5 mm may be taken for each other.
 const WHEEL_STEP: f64 = 0.05;
-/// The place of contact is then refined by parabolas through points so far apart, in mm.
-const REFINED: [f64; 2] = [0.05, 0.01];
-/// Steps of Newton's method for the rail under a point of the wheel, from a place on the line between two points of the rail [`CURVE_STEP`]
-/// apart. Each squares the error, so that none is tested; bounds of the root, as the common root finders need, are not known on a face.
-const NEWTON_STEPS: u32 = 4;
-
 /// The upper edge of a rail, and the points of the wheel above it.
 #[derive(Debug, Clone)]
 pub(crate) struct RailTop {
@@ -42,7 +35,7 @@ pub struct RigidTouch {
 
 impl RailTop {
     pub(crate) fn new(geometry: &WheelRail) -> RailTop {
-        let [rail, _] = geometry.parameters(CURVE_STEP);
+        let [rail, _] = geometry.parameters(2.0 * LINE_STEP);
         let rail = rail_points(geometry, rail);
         let [_, wheel] = geometry.parameters(WHEEL_STEP);
         RailTop {
@@ -74,7 +67,8 @@ impl RailTop {
         let (_, mut wheel) = highest.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let [first, last] = geometry.ranges()[1];
         let value = |s: f64| self.exactly(geometry, s.clamp(first, last)).map(|at| at[0]);
-        for step in REFINED {
+        // Refined by parabolas through points so far apart.
+        for step in [WHEEL_STEP, LINE_STEP] {
             let around = [-step, 0.0, step].map(|by| value(wheel + by));
             let [Some(before), Some(here), Some(after)] = around else {
                 break;
@@ -103,11 +97,13 @@ impl RailTop {
         let [_, y, z] = geometry.lowest(wheel)?;
         let [_, start] = self.over(y)?;
         let mut rail = start;
-        for _ in 0..NEWTON_STEPS {
+        // From a place on the line between two points of the rail each step of Newton's method squares the error, so that none is tested; bounds of the root,
+        // as the common root finders need, are not known on a face.
+        for _ in 0..4 {
             let point = geometry.rail_at(rail);
             let step = (y - point.at[0]) / point.slope[0];
             // On a face that is all but upright the place found from the lines is kept.
-            if !step.is_finite() || (rail + step - start).abs() > 2.0 * CURVE_STEP {
+            if !step.is_finite() || (rail + step - start).abs() > 2.0 * 2.0 * LINE_STEP {
                 break;
             }
             rail += step;

@@ -10,15 +10,13 @@
 
 use std::f64::consts::FRAC_PI_2;
 
+use crate::contact::geometry::profile::NEAR;
 use crate::contact::geometry::rigid_touch::{RailTop, RigidTouch};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::numerics::equilibrium::{Search, Trial};
 
 /// The wheels' heights may differ by so much in mm, 1e-10 rad of roll.
 const LEVEL: f64 = 1e-7;
-
-/// A contact within this distance of the end of a cross-section in mm is at its end.
-const AT_END: f64 = 1e-3;
 
 /// Both wheels over both rails, to be placed again and again.
 #[derive(Debug, Clone)]
@@ -118,7 +116,7 @@ impl PairOfRails {
             let ranges = self.sides[k].ranges();
             let bodies = [("rail", touch.rail), ("wheel", touch.wheel)];
             for ((body, at), [first, last]) in bodies.into_iter().zip(ranges) {
-                if at <= first + AT_END || at >= last - AT_END {
+                if at <= first + NEAR || at >= last - NEAR {
                     let side = ["left", "right"][k];
                     return Err(format!(
                         "at a lateral shift of {:.2} mm the {side} wheel touches at the end of the {body}'s points; send the points beyond",

@@ -23,10 +23,7 @@ use rustfft::num_complex::Complex;
 use crate::contact::half_space::grid_operator::{FftPlanners, FftPlans, coefficients, lines};
 use crate::contact::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
 use crate::contact::lazy_field::LazyField;
-use crate::contact::numerics::simd;
-
-/// Waves that are summed side by side.
-const WAVES: usize = 16;
+use crate::contact::numerics::simd::{self, LANES};
 
 /// How strips of a bent surface act on each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,9 +81,9 @@ pub struct BentOperator {
 #[derive(Debug, Clone, PartialEq)]
 pub struct StripFactors(Vec<f32>);
 
-/// Transforms of an influence by the distance of two strips: for each group of [`WAVES`] waves, and there for each distance from the largest negative to
+/// Transforms of an influence by the distance of two strips: for each group of [`LANES`] waves, and there for each distance from the largest negative to
 /// the largest positive one, real numbers. An odd influence has `i` times these.
-type Spectrum = Vec<[f32; WAVES]>;
+type Spectrum = Vec<[f32; LANES]>;
 
 impl BentOperator {
     /// The operator of `nx` cells along x of sizes `step` in mm on some strips.
@@ -189,7 +186,7 @@ impl BentOperator {
         self.transform(&*self.plans.forward, lines, &mut workspace.scratch);
         let last = used.len() - 1;
         let distances = 2 * last + 1;
-        let mut spectrum = vec![[0.0; WAVES]; distances * self.groups()];
+        let mut spectrum = vec![[0.0; LANES]; distances * self.groups()];
         for (pair, line) in needed.chunks(2).zip(lines.chunks_exact(width)) {
             for (wave, value) in line[..=width / 2].iter().enumerate() {
                 // The spectrum of an even line is real, that of an odd one imaginary.
@@ -197,10 +194,10 @@ impl BentOperator {
                     true => [value.re, value.im],
                     false => [value.im, -value.re],
                 };
-                let group = wave / WAVES * distances;
+                let group = wave / LANES * distances;
                 for (j, part) in pair.iter().zip(parts) {
                     for distance in [last - j, last + j] {
-                        spectrum[group + distance][wave % WAVES] = part;
+                        spectrum[group + distance][wave % LANES] = part;
                     }
                 }
             }
@@ -209,7 +206,7 @@ impl BentOperator {
     }
 
     fn groups(&self) -> usize {
-        (self.width / 2 + 1).div_ceil(WAVES)
+        (self.width / 2 + 1).div_ceil(LANES)
     }
 
     fn transform(
@@ -435,9 +432,9 @@ impl BentOperator {
         self.transform(&*self.plans.forward, &mut lines[..transformed], scratch);
         from.resize(
             acting.len().next_multiple_of(2) * self.groups(),
-            [[0.0; WAVES]; 2],
+            [[0.0; LANES]; 2],
         );
-        to.resize(count.next_multiple_of(2) * self.groups(), [[0.0; WAVES]; 2]);
+        to.resize(count.next_multiple_of(2) * self.groups(), [[0.0; LANES]; 2]);
         simd::dispatch(StripSums {
             spectrum,
             factors: &factors.0,
@@ -498,8 +495,8 @@ pub struct BentWorkspace {
     /// Strips with values other than 0.
     acting: Vec<usize>,
     /// Transforms of acting strips, and of all: for each group of waves, and there for each strip, the real and the imaginary parts.
-    from: Vec<[[f32; WAVES]; 2]>,
-    to: Vec<[[f32; WAVES]; 2]>,
+    from: Vec<[[f32; LANES]; 2]>,
+    to: Vec<[[f32; LANES]; 2]>,
 }
 
 /// Takes the transforms of acting strips, two in a line, and leaves those of all strips, two in a line; compiled for the instruction set of this
@@ -512,14 +509,14 @@ struct StripSums<'a> {
     width: usize,
     odd: bool,
     lines: &'a mut [Complex<f32>],
-    from: &'a mut [[[f32; WAVES]; 2]],
-    to: &'a mut [[[f32; WAVES]; 2]],
+    from: &'a mut [[[f32; LANES]; 2]],
+    to: &'a mut [[[f32; LANES]; 2]],
 }
 
 /// The sums of a group of waves.
 struct GroupSums<'a> {
-    kernel: &'a [[f32; WAVES]],
-    from: &'a [[[f32; WAVES]; 2]],
+    kernel: &'a [[f32; LANES]],
+    from: &'a [[[f32; LANES]; 2]],
     factors: &'a [f32],
     number: &'a [usize],
     acting: &'a [usize],
@@ -533,11 +530,11 @@ impl GroupSums<'_> {
         &self,
         simd: S,
         first: usize,
-    ) -> [[[f32; WAVES]; 2]; STRIPS] {
+    ) -> [[[f32; LANES]; 2]; STRIPS] {
         let count = self.number.len();
         let from_zero = self.number[first] + self.kernel.len() / 2;
-        let mut found = [[[0.0; WAVES]; 2]; STRIPS];
-        for lanes in 0..WAVES / S::F32_LANES {
+        let mut found = [[[0.0; LANES]; 2]; STRIPS];
+        for lanes in 0..LANES / S::F32_LANES {
             let mut sums = [[simd.splat_f32s(0.0); 2]; STRIPS];
             for ([re, im], strip) in self.from.iter().zip(self.acting) {
                 let [re, im] = [re, im].map(|part| S::as_simd_f32s(part).0[lanes]);
@@ -566,7 +563,7 @@ impl GroupSums<'_> {
         &self,
         simd: S,
         first: usize,
-        to: &mut [[[f32; WAVES]; 2]],
+        to: &mut [[[f32; LANES]; 2]],
     ) -> usize {
         let numbers = self.number[first..].get(..STRIPS);
         if numbers.is_none_or(|numbers| numbers[STRIPS - 1] - numbers[0] >= STRIPS) {
@@ -595,7 +592,7 @@ impl WithSimd for StripSums<'_> {
             to,
         } = self;
         let (count, waves) = (number.len(), width / 2 + 1);
-        let groups = waves.div_ceil(WAVES);
+        let groups = waves.div_ceil(LANES);
         let distances = spectrum.len() / groups;
         let (from_all, to_all) = (from.len() / groups, to.len() / groups);
         for (pair, line) in lines
@@ -607,8 +604,8 @@ impl WithSimd for StripSums<'_> {
                 let [one, other] = &mut from[group * from_all + 2 * pair..][..2] else {
                     unreachable!("two were taken")
                 };
-                let first = group * WAVES;
-                for (k, here) in line[first..waves].iter().take(WAVES).enumerate() {
+                let first = group * LANES;
+                for (k, here) in line[first..waves].iter().take(LANES).enumerate() {
                     let wave = first + k;
                     let there = line[if wave == 0 { 0 } else { width - wave }];
                     // The even part belongs to the real line, the odd one to the imaginary line.
@@ -630,7 +627,7 @@ impl WithSimd for StripSums<'_> {
             while first < count {
                 // The sums of eight strips fit into the registers where these hold all waves of a group.
                 let mut done = 0;
-                if S::F32_LANES == WAVES {
+                if S::F32_LANES == LANES {
                     done = sums.leave::<S, 8>(simd, first, to);
                 }
                 if done == 0 {
@@ -647,12 +644,12 @@ impl WithSimd for StripSums<'_> {
                 let [one, other] = &to[group * to_all + 2 * pair..][..2] else {
                     unreachable!("two were taken")
                 };
-                let of = |strip: &[[f32; WAVES]; 2], k: usize| match odd {
+                let of = |strip: &[[f32; LANES]; 2], k: usize| match odd {
                     true => [-strip[1][k], strip[0][k]],
                     false => [strip[0][k], strip[1][k]],
                 };
-                let first = group * WAVES;
-                for k in 0..WAVES.min(waves - first) {
+                let first = group * LANES;
+                for k in 0..LANES.min(waves - first) {
                     let ([a, b], [c, d]) = (of(one, k), of(other, k));
                     line[first + k] = Complex::new(a - d, b + c);
                     if first + k > 0 {

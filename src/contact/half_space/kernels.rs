@@ -12,7 +12,7 @@ use std::ops::Range;
 use pulp::NullaryFnOnce;
 
 use crate::contact::numerics::quadrature::FOUR_POINTS;
-use crate::contact::numerics::simd;
+use crate::contact::numerics::simd::{self, LANES};
 
 /// A rectangle `x0 < x < x1`, `y0 < y < y1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -394,9 +394,6 @@ pub mod rectangle_stress {
 
 /// Stresses `xx, yy, zz, xy, xz, yz`.
 pub type Stress = [f64; 6];
-
-/// Loads that are taken side by side.
-pub const LANES: usize = 16;
 
 /// One number per lane.
 pub type Lanes = [f32; LANES];

@@ -3,6 +3,7 @@
 //! Each residual must grow with its own unknown, as a force does with its creepage. A step was then too long if the residuals after it point back along
 //! it. Unless it has shortened the residuals it is rejected, and the next one, from the same place, is shorter.
 
+use crate::contact::numerics::roots::ROUNDING;
 use crate::contact::remark::list::Remark;
 
 /// Most trials of one search.
@@ -12,10 +13,6 @@ const TRIALS_MAX: u32 = 40;
 const STRIDE: f64 = 0.5;
 /// An update multiplies the inverse of the derivatives along a step by at most the reciprocal of this, however little the residuals change there.
 const FLAT: f64 = 0.1;
-/// Number of successive rejected steps after which the derivatives are reset to the scale.
-const REJECTED_MAX: u32 = 2;
-/// An unknown is at its limit if only this part of a step is left to it.
-const AT_LIMIT: f64 = 1e-9;
 /// The residuals jump where steps shorter than this part of the tolerance no longer bring them within it.
 const JUMP: f64 = 0.01;
 
@@ -141,11 +138,12 @@ impl<const N: usize> Search<N> {
             // As far as all unknowns stay within their limits.
             let room = |k: usize| (self.limit[k] - place[k] * wanted[k].signum()) / wanted[k].abs();
             factor = (0..N).fold(factor, |factor, k| factor.min(room(k)));
-            if factor <= AT_LIMIT {
+            // An unknown is at its limit if next to nothing of the step is left to it.
+            if factor <= ROUNDING {
                 // An unknown at its limit, whose own residual asks for more.
                 let beyond =
                     |k: usize| -self.scale[k].unwrap_or(0.0) * residual[k] * place[k] > 0.0;
-                if (0..N).any(|k| room(k) <= AT_LIMIT && beyond(k)) {
+                if (0..N).any(|k| room(k) <= ROUNDING && beyond(k)) {
                     best.end = Termination::AtLimit;
                     return Ok(best);
                 }
@@ -168,7 +166,8 @@ impl<const N: usize> Search<N> {
             } else {
                 stride = 0.5 * length(step);
                 rejected += 1;
-                if rejected % REJECTED_MAX == 0 {
+                // Derivatives that mislead twice in a row are reset to the scale.
+                if rejected % 2 == 0 {
                     self.inverse = identity();
                 }
             }

@@ -7,6 +7,9 @@
 //! Tangents at the nodes are those of the parabola through the node and its two neighbours, so the curve has a
 //! continuous derivative and reproduces parabolas exactly (Catmull and Rom 1974, for unequal spacing).
 
+/// Relative differences below this are rounding, of values that took many operations.
+pub(crate) const ROUNDING: f64 = 1e-9;
+
 /// Bisects the interval between `low` and `high` (in either order) and returns the bracket after the given number of halvings, `2^-halvings` times as
 /// long. `is_low` is true on the side of `low` and false on that of `high`.
 pub(crate) fn bisect(
@@ -29,14 +32,13 @@ pub(crate) fn bisect(
 /// found to 1e-4 of the interval, so that the relative error of a smooth maximum is about the square of this. A function with several
 /// maxima gives one of them. At most forty evaluations.
 pub(crate) fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
-    const STEPS: usize = 40;
     const SHORT: f64 = 0.381_966_011_250_105_1;
     let close = 1e-4 * (high - low);
     let best = low + SHORT * (high - low);
     // The best argument, the second best and the previous second best, each with its value.
     let mut places = [(best, f(best)); 3];
     let (mut step, mut before) = (0.0_f64, 0.0_f64);
-    for _ in 0..STEPS {
+    for _ in 0..40 {
         let [(x, fx), (w, fw), (v, fv)] = places;
         let middle = 0.5 * (low + high);
         if (x - middle).abs() <= 2.0 * close - 0.5 * (high - low) {

@@ -10,6 +10,9 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use pulp::{Arch, WithSimd};
 
+/// Numbers that are taken side by side; lists of values per cell are padded to a multiple of it, so that products need no remainder loop.
+pub const LANES: usize = 16;
+
 thread_local! {
     /// Level that [`SimdLevel::during`] has set on this thread.
     static CHOSEN: Cell<Option<Arch>> = const { Cell::new(None) };

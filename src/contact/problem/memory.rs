@@ -15,24 +15,17 @@ use crate::contact::rolling::refinement::mesh_family::{
 };
 use crate::contact::rolling::task::{Motion, Resolution, precision_of};
 
-/// Cells of the finest mesh for a target of 0.02, on average.
-const TARGET_CELLS: f64 = 128.0;
-/// Power by which they grow as the target falls.
-const TARGET_GROWTH: f64 = 0.65;
-/// Dense square matrices the method of Liu and Hsu holds at once.
-const LIU_HSU_MATRICES: f64 = 4.0;
-/// Doubles per cell of the finest mesh that an iteration holds: the Krylov space, iterates and buffers.
-const VECTORS_PER_CELL: f64 = 64.0;
-/// Bytes per cell of a level that is kept: two meshes, pressure, area and bound, and what two motions left on it.
-const LEVEL_BYTES_PER_CELL: f64 = 200.0;
+/// Cells of the finest mesh for a target of 0.02, on average, and the power by which they grow as the target falls.
+const TARGET_CELLS: [f64; 2] = [128.0, 0.65];
+/// Bytes per cell of the finest mesh that an iteration holds (the Krylov space, iterates and buffers), and of a level that is kept (two meshes, pressure,
+/// area and bound, and what two motions left on it).
+const BYTES_PER_CELL: [f64; 2] = [512.0, 200.0];
 /// Meshes that one motion is solved on, usually.
 const LEVELS_PER_MOTION: f64 = 4.0;
 /// Bytes of a motion in the answer, for each patch, and of its text.
 const MOTION_BYTES: f64 = 2000.0;
-/// Bytes of a stress in the answer and in its stored form.
-const STRESS_BYTES: f64 = 150.0;
-/// Bytes per cell and motion of fields, in the answer and in their stored form.
-const FIELDS_BYTES_PER_CELL: f64 = 160.0;
+/// Bytes of a stress, and of the fields of a cell in a motion, in the answer and in its stored form.
+const PLACE_BYTES: f64 = 160.0;
 
 /// Bytes per cell and point of a history on a level: tractions, slips, and which slip.
 const HISTORY_BYTES_PER_CELL: f64 = 33.0;
@@ -110,22 +103,23 @@ impl SizeInput {
         let solve = match self.method {
             // Own blocks of the strips, and factored blocks of two unknowns per cell (see `StripFactors`).
             Method::BoundaryElement => 48.0 * cells * cells / segments.max(1.0),
-            Method::LiuHsu => (2.0 * cells).powi(2) * 8.0 * LIU_HSU_MATRICES,
+            // Four dense square matrices at once.
+            Method::LiuHsu => 4.0 * (2.0 * cells).powi(2) * 8.0,
             Method::Fastsim | Method::Table => 0.0,
         };
         let levels = (LEVELS_PER_MOTION * motions).min(LEVELS_KEPT as f64);
         let patches = self.segments.len() as f64;
         let fields = if self.fields {
             // Many motions need twice the average at most.
-            motions * cells.min(2.0 * self.usual_cells(cells)) * FIELDS_BYTES_PER_CELL
+            motions * cells.min(2.0 * self.usual_cells(cells)) * PLACE_BYTES
         } else {
             0.0
         };
         operators
             + solve
-            + cells * (8.0 * VECTORS_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
+            + cells * (BYTES_PER_CELL[0] + levels * BYTES_PER_CELL[1])
             + self.kept_of_history(cells)
-            + motions * patches * (MOTION_BYTES + STRESS_BYTES * self.stress_points as f64)
+            + motions * patches * (MOTION_BYTES + PLACE_BYTES * self.stress_points as f64)
             + fields
     }
 
@@ -215,7 +209,7 @@ impl SizeInput {
     fn usual_cells(&self, finest: f64) -> f64 {
         match (self.resolution, self.method) {
             (Resolution::Target(target), Method::BoundaryElement) => {
-                finest.min(TARGET_CELLS * (0.02 / target).powf(TARGET_GROWTH))
+                finest.min(TARGET_CELLS[0] * (0.02 / target).powf(TARGET_CELLS[1]))
             }
             _ => finest,
         }

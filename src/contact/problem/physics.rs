@@ -26,7 +26,7 @@ use crate::contact::rolling::answer::MotionAnswer;
 use crate::contact::rolling::history::plan::HistoryTask;
 use crate::contact::rolling::methods::table::solve::{outside, unlike};
 use crate::contact::rolling::task::{
-    Motion, PrescribedForces, RelativeTo, Resolution, TARGET_LEAST,
+    Motion, NEGLIGIBLE_OF_TARGET, PrescribedForces, RelativeTo, Resolution, TARGET_LEAST,
 };
 
 /// What is asked: the physics.
@@ -312,8 +312,6 @@ impl AfterTasks {
 /// Error of forces relative to μN over |K| μ, where tractions feel the pressure but the pressure does not feel them: 0.09 to 0.55 in nine
 /// contacts with |K| from 0.05 to 0.25 and μ of 0.3 and 0.6, on 10 × 20 cells against CONTACT.
 const FIRST_ORDER: f64 = 0.6;
-/// An error below this part of the target is not worth a second look at the pressure.
-const PART_OF_TARGET: f64 = 0.1;
 
 impl Problem {
     /// Error of forces, relative to μN, that is left if only tractions feel the other: 0 where the bodies are alike or without friction, and
@@ -366,5 +364,5 @@ impl Problem {
 
 /// The error of forces below which the pressure need not feel the tractions.
 pub(crate) fn negligible(run: &Run) -> f64 {
-    PART_OF_TARGET * run.resolution.target_or_usual()
+    NEGLIGIBLE_OF_TARGET * run.resolution.target_or_usual()
 }

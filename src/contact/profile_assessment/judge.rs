@@ -2,8 +2,8 @@
 //!
 //! Defects of a profile, described so that whoever measured it can correct them.
 
-use crate::contact::geometry::holes::{LENGTH_MIN, WIDE, WIDTH_MIN};
-use crate::contact::geometry::profile::{Body, Profile};
+use crate::contact::geometry::holes::{LENGTH_MIN, WIDE};
+use crate::contact::geometry::profile::{Body, NEEDED_BEYOND, Profile};
 use crate::contact::geometry::profile_quality::{
     Grain, Oddity, UnderContact, advised_smoothing, noise_pressure, under_contact,
 };
@@ -13,19 +13,13 @@ use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::solution::words::damage::{PatchQuality, ProfileQuality};
 
-/// Length in mm of profile needed beyond a contact; with less there is a remark.
-const BEYOND: f64 = 5.0;
 /// Share of the roughness of both bodies from which that of one body is reported.
 const BLAMED: f64 = 0.6;
-/// Ambiguity, relative to the pressure, below which the distance of points does not matter, as on a straight stretch.
-const AMBIGUOUS_LEAST: f64 = 0.02;
 /// Length in mm up to which a chord is judged by its ambiguity alone, however narrow the patch. The arcs of heads and treads are 10 to
 /// 50 mm long, so that a longer chord may hide an arc that neither of the two curves through the points shows.
 /// Population: holes and coarse points at 384 places on the pairs of the thresholds, seeds 1001 to 1004 and 2001 to 2012 of the class *damaged
 /// profile*: with this bound 38 of 487 correct and 165 of 174 wrong answers get the remark, with 0 mm 43 and 166.
 const CHORD_HIDES_ARC: f64 = 10.0;
-/// Ambiguity relative to the largest pressure that makes a job fail.
-const AMBIGUOUS_MAX: f64 = 0.5;
 /// Pressure in MPa below which errors do no harm and no job fails because of them.
 const PRESSURE_LIGHT: f64 = 200.0;
 /// What the assessment needs to know of a patch.
@@ -217,7 +211,7 @@ fn roughness(
         everywhere: found.roughness.everywhere / patch.pressure,
         advised: more,
         refused: patch.load_share > LIGHT
-            && found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure.max(PRESSURE_LIGHT),
+            && found.roughness.ambiguity > AMBIGUOUS[2] * patch.pressure.max(PRESSURE_LIGHT),
         ..own.finding(patch, own.cause(advised > 0.0))
     }
 }
@@ -228,14 +222,14 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
     let length = found.chord[1] - found.chord[0];
     let hides_arc = length > CHORD_HIDES_ARC;
     let least = if hides_arc {
-        AMBIGUOUS_LEAST
+        AMBIGUOUS[0]
     } else {
-        AMBIGUOUS
+        AMBIGUOUS[1]
     };
     let open = found.roughness.ambiguity > least * patch.pressure;
     // Only a lightly loaded flange, which touches over some tenths of a mm, has patches that shorter chords are too long for.
     let wide = length > LENGTH_MIN
-        && (found.over_width > WIDTH_MIN && open || found.over_width > WIDE && hides_arc);
+        && (found.over_width > 1.0 && open || found.over_width > WIDE && hides_arc);
     wide.then(|| Finding {
         share: own.rough() / patch.pressure,
         refused: patch.load_share > LIGHT && found.over_width > WIDE,
@@ -255,7 +249,7 @@ fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
     let on_tip = tip.is_some_and(|[from, to]| (from..=to).contains(&middle));
     let cause = if on_tip {
         Cause::FlangeTip
-    } else if low - first < BEYOND || last - high < BEYOND {
+    } else if low - first < NEEDED_BEYOND || last - high < NEEDED_BEYOND {
         Cause::End {
             left: (low - first).min(last - high),
         }
@@ -273,12 +267,14 @@ fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
 ///
 /// Population: as for `CHORD_HIDES_ARC` of `judge.rs`. At 0.08, 47 of 487 correct and 166 of 174 wrong answers get the remark, at 0.09 38 and
 /// 165, at 0.10 34 and 163.
-pub const AMBIGUOUS: f64 = 0.09;
+///
+/// The three: below the first the distance of points does not matter, as on a straight stretch; above the last a job fails.
+const AMBIGUOUS: [f64; 3] = [0.02, 0.09, 0.5];
 /// Waviness, relative to the largest pressure, above which it is a defect even without noise, outlier or step. Two arcs that meet have
 /// some too: an unworn 60E1 reaches 0.12 at its gauge corner.
 const WAVES_BEYOND_SHAPE: f64 = 0.3;
-/// Median waviness, relative to the largest pressure, above which it extends beyond the contact and indicates waves.
-const WAVES_EVERYWHERE: f64 = 0.03;
+/// Waves and noise below this share of the largest pressure are harmless; a larger median waviness extends beyond the contact and indicates waves.
+pub(crate) const HARMLESS: f64 = 0.03;
 /// Share of the load below which a patch may lie entirely where two arcs meet: its pressure then says nothing of the profiles, and the forces do not depend
 /// on it.
 pub const LIGHT: f64 = 0.02;
@@ -398,10 +394,10 @@ impl Finding {
             | Cause::Noise { .. } => true,
             Cause::Waves => {
                 self.smoothing > 0.0
-                    || self.everywhere > WAVES_EVERYWHERE
+                    || self.everywhere > HARMLESS
                     || self.share > WAVES_BEYOND_SHAPE && self.load_share > LIGHT
             }
-            Cause::Coarse => self.smoothing > 0.0 || self.share > AMBIGUOUS,
+            Cause::Coarse => self.smoothing > 0.0 || self.share > AMBIGUOUS[1],
             Cause::Spacing | Cause::Hole | Cause::FlangeTip | Cause::End { .. } => true,
         }
     }

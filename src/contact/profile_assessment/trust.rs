@@ -5,13 +5,13 @@ use std::sync::Arc;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::contact_locus::ContactLocus;
 use crate::contact::geometry::holes::{Hole, holes};
-use crate::contact::geometry::profile::{Body, Profile};
+use crate::contact::geometry::profile::{Body, NEEDED_BEYOND, Profile};
 use crate::contact::geometry::profile_quality::{Grain, advised_smoothing, under_contact};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel::{ReferenceSurface, WheelContact, WheelPatch, WheelTask};
 use crate::contact::problem::checked_case;
 use crate::contact::problem::checked_case::{CheckedCase, PRESSURE_USUAL};
-use crate::contact::profile_assessment::judge::{Cause, Finding, FoundPatch, judge};
+use crate::contact::profile_assessment::judge::{Cause, Finding, FoundPatch, HARMLESS, judge};
 use crate::contact::profile_assessment::uncertainty;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
@@ -101,7 +101,7 @@ fn assessed(
         patch.quality = Some(quality);
     }
     let rough = findings.iter().any(|finding| {
-        finding.of_roughness() && finding.has_evidence() && finding.share > uncertainty::HARMLESS
+        finding.of_roughness() && finding.has_evidence() && finding.share > HARMLESS
     });
     let suspicious = rough || undecided(contact);
     let changes = uncertainty::add(operators, case, contact, suspicious, solution, monitor)?;
@@ -320,12 +320,10 @@ impl<'a> Judgement<'a> {
     }
 }
 
-/// Half of the length in mm about the first touch that counts as contact, about half the width of a usual patch.
-const NEAR: f64 = 5.0;
-
 /// Noise and spacing of a profile near a place in mm along it. A few displaced points are no noise: smoothing only spreads their error.
 fn grain_near(profile: &Profile, place: f64, modulus: f64) -> Grain {
-    let contact = [place - NEAR, place + NEAR];
+    // About the width of a usual patch.
+    let contact = [place - NEEDED_BEYOND, place + NEEDED_BEYOND];
     let found = under_contact(&profile.read(), contact, modulus);
     let noise = found.noise.filter(|_| found.oddity.is_none());
     Grain {

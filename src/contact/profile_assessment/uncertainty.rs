@@ -4,16 +4,15 @@
 //! the shape is lost. The uncertainty is the largest difference, plus 1 % of the pressure and 0.3 % of μN respectively. Population: noise
 //! of 1 to 20 µm with L = 5 mm; the errors of 97 % of the pressures and 93 % of the forces are within it.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::time::Duration;
 
 use crate::contact::error::SolveError;
 use crate::contact::geometry::profile::Profile;
-use crate::contact::geometry::profile_quality::{SMOOTHING_ADVISED, noise_pressure};
-use crate::contact::monitor::{Monitor, Stop};
+use crate::contact::geometry::profile_quality::{CHORDS, SMOOTHING_ADVISED, noise_pressure};
+use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::wheel::WheelTask;
 use crate::contact::problem::checked_case::CheckedCase;
+use crate::contact::profile_assessment::judge::HARMLESS;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
@@ -24,40 +23,17 @@ use crate::contact::wheel_on_rail;
 
 /// The companion solves use the smoothing multiplied by these factors.
 pub(crate) const COMPANIONS: [f64; 2] = [0.4, 2.0];
-/// Smoothing of a companion to a solve without smoothing, in mm, and in lengths of chords for coarse points, which a shorter smoothing
-/// would not change.
-const COMPANION_LEAST: f64 = 2.0;
-pub(crate) const COMPANION_CHORDS: f64 = 2.0;
-/// Waves and noise below this share of the pressure need no companion.
-pub(crate) const HARMLESS: f64 = 0.03;
-/// Added to the differences, relative to the largest pressure and to μN.
-const PRESSURE_FLOOR: f64 = 0.01;
-const FORCE_FLOOR: f64 = 0.003;
+/// Added to the differences of pressures and of forces, relative to the largest pressure and to μN.
+const FLOORS: [f64; 2] = [0.01, 0.003];
 /// Uncertainty without companions: of the pressure, as a multiple of the roughness; of the force relative to μN, as a multiple of the
 /// roughness relative to the pressure.
-const BY_ROUGHNESS: f64 = 2.0;
-const FORCE_BY_PRESSURE: f64 = 0.1;
+const BY_ROUGHNESS: [f64; 2] = [2.0, 0.1];
 /// Smallest target of companions, relative to μN, and most motions that they are solved for.
-const TARGET: f64 = 0.01;
-const MOTIONS_MAX: usize = 5;
-/// Uncertainty, relative to the largest pressure and to μN, from which there is a remark.
-const PRESSURE_OPEN: f64 = 0.06;
-const FORCE_OPEN: f64 = 0.02;
+const COMPANION_WORK: (f64, usize) = (0.01, 5);
+/// Uncertainty of pressures and of forces, relative to the largest pressure and to μN, from which there is a remark.
+const OPEN: [f64; 2] = [0.06, 0.02];
 /// Largest distance across the track, in mm, between corresponding patches of a solve and its companion.
 const SAME_PLACE: f64 = 6.0;
-
-/// Monitor of the companions: it can stop them, but reports no progress, because that of the solve is complete.
-struct Afterwards<'a>(&'a dyn Monitor);
-
-impl Monitor for Afterwards<'_> {
-    fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
-        self.0.tick(1.0)
-    }
-
-    fn elapsed(&self) -> Duration {
-        self.0.elapsed()
-    }
-}
 
 /// Writes the uncertainty into every point and total, and returns which patches another reading changes so much that a remark is due.
 ///
@@ -73,12 +49,11 @@ pub(crate) fn add(
 ) -> Result<Vec<bool>, SolveError> {
     let motions = case.problem.motions.len();
     // The points of a history follow from each other.
-    let chosen: Vec<usize> = if motions <= MOTIONS_MAX || case.problem.history.is_some() {
+    let (_, most) = COMPANION_WORK;
+    let chosen: Vec<usize> = if motions <= most || case.problem.history.is_some() {
         (0..motions).collect()
     } else {
-        (0..MOTIONS_MAX)
-            .map(|k| k * (motions - 1) / (MOTIONS_MAX - 1))
-            .collect()
+        (0..most).map(|k| k * (motions - 1) / (most - 1)).collect()
     };
     let mut companions = Vec::new();
     let noisy = |patch: &PatchSolution| noisy(patch, contact.contact_modulus);
@@ -91,7 +66,12 @@ pub(crate) fn add(
                 &other,
                 // Companions are solved without an assessment of their profiles.
                 &mut |_| Ok(()),
-                &Afterwards(monitor),
+                // They can be stopped, but report no progress, because that of the solve is complete.
+                &MonitorPart {
+                    inner: monitor,
+                    before: 1.0,
+                    own: 0.0,
+                },
             ) {
                 Ok(found) => companions.push(found.solution),
                 Err(stop @ (SolveError::Cancelled | SolveError::OutOfTime { .. })) => {
@@ -128,7 +108,7 @@ pub(crate) fn target_below(case: &CheckedCase, solution: &Solution) -> Option<Re
         .map(|open| open.force_x_n.max(open.force_y_n))
         .reduce(f64::max)?;
     let uncertainty = largest / limit;
-    (limit > 0.0 && uncertainty > target.max(2.0 * FORCE_FLOOR)).then(|| {
+    (limit > 0.0 && uncertainty > target.max(2.0 * FLOORS[1])).then(|| {
         Remark::TargetBelowProfileUncertainty {
             target,
             uncertainty,
@@ -183,10 +163,8 @@ fn readings(contact: &WheelTask, solution: &Solution) -> Vec<[f64; 2]> {
     }
     if used == [0.0; 2] {
         let chords = contact.geometry.profiles().map(Profile::usual_chord);
-        let least = chords.map(|chord| {
-            let [_, most] = SMOOTHING_ADVISED;
-            (COMPANION_CHORDS * chord).clamp(COMPANION_LEAST, most)
-        });
+        let [least, most] = SMOOTHING_ADVISED;
+        let least = chords.map(|chord| (CHORDS * chord).clamp(least, most));
         return vec![[0, 1].map(|k| advised[k].max(least[k]))];
     }
     let with = |factor: f64| {
@@ -204,7 +182,7 @@ fn readings(contact: &WheelTask, solution: &Solution) -> Vec<[f64; 2]> {
 fn companion(case: &CheckedCase, chosen: &[usize]) -> CheckedCase {
     CheckedCase {
         problem: case.problem.with_motions(chosen),
-        run: case.run.for_resultants(TARGET),
+        run: case.run.for_resultants(COMPANION_WORK.0),
         label: case.label.clone(),
         remarks: Vec::new(),
     }
@@ -232,9 +210,9 @@ impl Open {
     /// The uncertainty with its lower bounds added, for a given μN and largest pressure.
     fn report(self, limit: f64, pressure: f64) -> ProfileUncertainty {
         ProfileUncertainty {
-            force_x_n: self.force[0] + FORCE_FLOOR * limit,
-            force_y_n: self.force[1] + FORCE_FLOOR * limit,
-            pressure_max_mpa: self.pressure + PRESSURE_FLOOR * pressure,
+            force_x_n: self.force[0] + FLOORS[1] * limit,
+            force_y_n: self.force[1] + FLOORS[1] * limit,
+            pressure_max_mpa: self.pressure + FLOORS[0] * pressure,
         }
     }
 }
@@ -288,9 +266,9 @@ fn write(
     }
     let mut changes = Vec::with_capacity(of_patches.len());
     for (patch, open) in solution.patches.iter_mut().zip(of_patches) {
-        let limit = FORCE_OPEN * friction * patch.normal_force_n;
+        let limit = OPEN[1] * friction * patch.normal_force_n;
         changes.push(
-            open.between.pressure > PRESSURE_OPEN * patch.pressure_max_mpa
+            open.between.pressure > OPEN[0] * patch.pressure_max_mpa
                 || open
                     .between
                     .force
@@ -319,8 +297,8 @@ fn of_patch(
     limit: f64,
     rough: bool,
 ) -> OfPatch {
-    let by_points = BY_ROUGHNESS * open_by_points(patch, rough);
-    let force = FORCE_BY_PRESSURE * limit * by_points / patch.pressure_max_mpa;
+    let by_points = BY_ROUGHNESS[0] * open_by_points(patch, rough);
+    let force = BY_ROUGHNESS[1] * limit * by_points / patch.pressure_max_mpa;
     let mut open = Open::default();
     let across = |patch: &PatchSolution| patch.position.map_or(0.0, |place| place.track_mm[1]);
     let far = |other: &PatchSolution| (across(other) - across(patch)).abs();

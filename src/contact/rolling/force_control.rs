@@ -23,7 +23,9 @@ use crate::contact::rolling::refinement::adapt;
 use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::refinement::mesh_family::MeshFamily;
 use crate::contact::rolling::refinement::on_mesh::MotionTask;
-use crate::contact::rolling::task::{MeshPlan, Motion, PrescribedForces, Resolution, RollingTask};
+use crate::contact::rolling::task::{
+    MeshPlan, Motion, PrescribedForces, Resolution, RollingTask, TOLERANCE_LEAST,
+};
 
 /// Largest place: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement; how much it matters was not
 /// measured.
@@ -33,13 +35,9 @@ pub(crate) const PLACE_MAX: f64 = 65.0;
 const TABLE_MISSED: f64 = 1e-3;
 /// A prescribed force may be missed by this part of the target error. Chosen by judgement; how much it matters was not measured.
 const SHARE_OF_TARGET: f64 = 0.02;
-/// Smallest tolerance of a force with a target, relative to μN: ten times the least residual to which tractions are solved.
-const MISSED_FOR_TARGET: f64 = 1e-5;
-/// The same of the first search, on the coarsest mesh. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of `cargo bench --bench
+/// Tolerance of a force, relative to μN, of the first search, on the coarsest mesh. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of `cargo bench --bench
 /// stress -- --only times`, and no such search five times as much, most of it in a few slender ellipses.
 const MISSED_ON_COARSEST: f64 = 0.01;
-/// Tolerance of a force on an explicit mesh and for the simplified theory, relative to μN.
-const MISSED: f64 = 1e-6;
 /// Near μN the creepage depends on the small remainder `1 − force/μN`; the tolerance is at most this multiple of the remainder. Chosen by
 /// judgement; how much it matters was not measured.
 const NEAR_LIMIT: f64 = 10.0;
@@ -221,9 +219,9 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
     fn tolerance(&self, roughly: bool) -> f64 {
         let most = match self.task.resolution {
             Resolution::Target(target) if self.task.method != Method::Fastsim => {
-                (SHARE_OF_TARGET * target).max(MISSED_FOR_TARGET)
+                (SHARE_OF_TARGET * target).max(10.0 * TOLERANCE_LEAST)
             }
-            _ => MISSED,
+            _ => TOLERANCE_LEAST,
         };
         let wanted = length(self.wanted());
         // Where pressure alone pulls, the forces of the first motion tried say nothing of the size of those to be sought.

@@ -13,7 +13,6 @@ use crate::contact::normal::pressure_field::field::PressureField;
 use crate::contact::numerics::quadrature::FOUR_POINTS;
 
 /// Strips over a patch, and parts of each chord: moments and load_mismatch load change by less than 0.002 with twice as many.
-const STRIPS: usize = 48;
 const PARTS: usize = 48;
 
 /// The ellipse that stands for a patch.
@@ -93,8 +92,8 @@ impl LoadEllipse {
 /// The parts of a patch with their loads, in any unit.
 fn parts(footprint: &Footprint, patch: usize) -> Vec<EllipsePart> {
     let [_, _, low, high] = footprint.patches()[patch].extent;
-    let dy = (high - low) / STRIPS as f64;
-    let strips: Vec<(f64, f64)> = (0..STRIPS)
+    let dy = (high - low) / PARTS as f64;
+    let strips: Vec<(f64, f64)> = (0..PARTS)
         .map(|k| (low + dy * (k as f64 + 0.5), dy))
         .collect();
     let mut parts = Vec::new();

@@ -18,16 +18,11 @@ use crate::contact::monitor::{Monitor, Stop};
 /// mirror symmetry), or for some hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and
 /// 256 MiB (`cargo bench --bench stress -- --only creep-map`); what is kept pays for batches of one shape (`cargo bench --bench report`).
 pub const BYTES_DEFAULT: u64 = 128 << 20;
-/// An operator larger than this fraction of the bound is not kept, because it would push out all others.
-const LARGEST_PART: u64 = 2;
 
 /// Bytes that a store of `bytes_max` keeps of an operator of so many: all or nothing.
 pub(crate) fn kept_bytes(bytes: u64, bytes_max: u64) -> u64 {
-    if bytes <= bytes_max / LARGEST_PART {
-        bytes
-    } else {
-        0
-    }
+    // One larger than half of the bound would push out all others.
+    if bytes <= bytes_max / 2 { bytes } else { 0 }
 }
 
 /// What an operator depends on beside its mesh.

@@ -131,6 +131,8 @@ pub fn precision_of(resolution: Resolution) -> Precision {
 /// Error of the resultants relative to μN that is allowed when nothing else is asked for, and that stands for an explicit mesh where a search needs a
 /// target.
 pub const TARGET_USUAL: f64 = 0.005;
+/// An error below this part of the target is not worth another iteration.
+pub(crate) const NEGLIGIBLE_OF_TARGET: f64 = 0.1;
 /// Part of a target that another error may take up while the rest of it is still sought.
 const ERROR_MAX: f64 = 0.95;
 

@@ -9,6 +9,7 @@ use crate::contact::normal::wheel::{WheelContact, WheelPatch};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::contact::problem::physics::Run;
 use crate::contact::remark::list::Remark;
+use crate::contact::rolling::task::NEGLIGIBLE_OF_TARGET;
 use crate::contact::solution::words::answer::Total;
 use crate::contact::traction_estimate::{can_estimate, patch_forces};
 use crate::contact::unlike_bodies::LEFT_BY_PRESSURE;
@@ -20,17 +21,12 @@ use crate::contact::wheel_on_rail::{BeforeMotions, WheelSolve, minus};
 const TARGET_ROUGH: f64 = 0.2;
 /// Rounds at most; 3 to 6 suffice.
 const ROUNDS_MAX: u32 = 16;
-/// Change of the forces relative to μN over the target that ends the rounds.
-const CHANGE: f64 = 0.1;
 /// Part by which the gap that tractions open is off if they are taken to be proportional to the pressure.
 const FORECAST_OFF: f64 = 0.3;
-/// The gap opened by tractions is neglected if the table estimates that it changes the forces by less than this part of the target. The estimate may be
-/// ten times too small.
-const OPENS: f64 = 0.01;
 /// Change of the forces relative to μN that ends the rounds with coarse tractions. The step after it leaves about a fiftieth of that.
-const CHANGE_ROUGH: f64 = 0.05;
-/// Change of the vertical force, relative to it, that ends the rounds with the table.
-const CHANGE_TABLE: f64 = 0.02;
+///
+/// The second is the change of the vertical force, relative to it, that ends the rounds with the table.
+const CHANGE_ROUGH: [f64; 2] = [0.05, 0.02];
 /// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark, and is part of the error estimate. Where a strip at
 /// the edge of a patch comes and goes with the tractions, these jump by the error of their mesh, and rounds do not end.
 const CHANGE_POOR: f64 = 0.03;
@@ -75,6 +71,7 @@ impl WheelSolve<'_> {
         before(&first)?;
         let exact = with_tractions(run, &run.outputs);
         let target = run.resolution.target_or_usual();
+        let negligible = NEGLIGIBLE_OF_TARGET * target;
         let balance = tolerance(run.resolution);
         let open = match with_friction && !self.curve.is_flat() {
             true => LEFT_BY_PRESSURE * problem.elasticity.difference.abs(),
@@ -95,10 +92,10 @@ impl WheelSolve<'_> {
                 };
                 let [by_lift, by_gap] = contact.change_by(&friction, &next, self.shared());
                 let by_gap = by_gap * contact.normal_force() / limit(&parts);
-                change = (by_lift / balance).max(by_gap / (CHANGE * target));
+                change = (by_lift / balance).max(by_gap / negligible);
             }
             if change <= 1.0 || round == ROUNDS_MAX {
-                let residual = change * CHANGE * target;
+                let residual = change * NEGLIGIBLE_OF_TARGET * target;
                 if change > 1.0 && residual > CHANGE_POOR {
                     return Err(SolveError::NormalProblem {
                         reason: format!(
@@ -112,7 +109,7 @@ impl WheelSolve<'_> {
                     iteration: "pressures and tractions on the curve of the rail",
                     reason: "the rounds were used up",
                     residual,
-                    tolerance: CHANGE * target,
+                    tolerance: negligible,
                 };
                 let mut wheel = match round {
                     1 => first,
@@ -220,7 +217,7 @@ impl WheelSolve<'_> {
             coarse = between;
         }
         let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
-        let target = run.resolution.target_or_usual();
+        let negligible = NEGLIGIBLE_OF_TARGET * run.resolution.target_or_usual();
         let limit = problem.friction.largest();
         let mut by_table = problem.history.is_none() && can_estimate(problem);
         let mut earlier = None;
@@ -230,8 +227,9 @@ impl WheelSolve<'_> {
                 let mut next = self.estimate(&coarse, workspace)?;
                 let [_, opened] = coarse.change_by(&Friction::default(), &next, self.shared());
                 // Where the table is not accurate enough, rounds with tractions begin from its first estimate.
-                by_table = opened <= CHANGE * target / FORECAST_OFF * limit;
-                if opened <= OPENS * target * limit {
+                by_table = opened <= negligible / FORECAST_OFF * limit;
+                // The estimate may be ten times too small.
+                if 10.0 * opened <= negligible * limit {
                     next.opened = None;
                 }
                 next
@@ -241,12 +239,12 @@ impl WheelSolve<'_> {
             };
             let [by_lift, by_gap] = coarse.change_by(&friction, &next, self.shared());
             friction = accelerated(&friction, next, &mut earlier);
-            if by_table && by_lift <= CHANGE_TABLE {
+            if by_table && by_lift <= CHANGE_ROUGH[1] {
                 break;
             }
             coarse = task.again(coarse, &friction, workspace, self.watch)?;
             friction.opened.clone_from(&coarse.opened);
-            if !of_table && by_lift.max(by_gap / limit) <= CHANGE_ROUGH {
+            if !of_table && by_lift.max(by_gap / limit) <= CHANGE_ROUGH[0] {
                 break;
             }
         }

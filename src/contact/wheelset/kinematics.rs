@@ -8,20 +8,19 @@ use std::f64::consts::PI;
 use crate::contact::error::SolveError;
 use crate::contact::geometry::conicity::{Conicity, NoConicity, RadiusDifference};
 use crate::contact::geometry::profile::Profile;
-use crate::contact::geometry::profile_quality::{SMOOTHING_ADVISED, advised_smoothing};
+use crate::contact::geometry::profile_quality::{CHORDS, SMOOTHING_ADVISED, advised_smoothing};
 use crate::contact::geometry::wheel_rail::WheelRail;
 use crate::contact::geometry::wheelset_pose::{PairOfRails, RigidPose};
 use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel::{KinematicsTask, WheelTask};
 use crate::contact::problem::checked_case;
 use crate::contact::problem::checked_case::PRESSURE_USUAL;
-use crate::contact::profile_assessment::uncertainty::{COMPANION_CHORDS, COMPANIONS};
+use crate::contact::profile_assessment::uncertainty::COMPANIONS;
 use crate::contact::solution::words::answer::{EquivalentConicity, Kinematics, TouchLine};
 
-/// Between two shifts the radius difference is known to this in mm, a fifth of the rounding of the standard's tables ...
-const RESOLVED: f64 = 2e-3;
-/// ... or its jump to the distance of the shifts halved this many times, 0.0001 mm for 0.1 mm.
-const HALVINGS: u32 = 10;
+/// Between two shifts the radius difference is known to this in mm, a fifth of the rounding of the standard's tables, or its jump to the distance of the
+/// shifts halved this many times, 0.0001 mm for 0.1 mm.
+const RESOLVED: (f64, u32) = (2e-3, 10);
 
 /// A radius difference as sampled, and with twice the distance of the shifts.
 struct Sampled {
@@ -155,12 +154,17 @@ fn sampled(poses: &[RigidPose], mut pose: impl FnMut(f64) -> Result<RigidPose, S
     let bends = |k: usize| {
         k > 0
             && k + 1 < known.len()
-            && (known[k - 1][1] - 2.0 * known[k][1] + known[k + 1][1]).abs() > 8.0 * RESOLVED
+            && (known[k - 1][1] - 2.0 * known[k][1] + known[k + 1][1]).abs() > 8.0 * RESOLVED.0
     };
     let mut between = Vec::new();
     for k in 1..known.len() {
         if bends(k - 1) || bends(k) {
-            halve([known[k - 1], known[k]], HALVINGS, &mut pose, &mut between);
+            halve(
+                [known[k - 1], known[k]],
+                RESOLVED.1,
+                &mut pose,
+                &mut between,
+            );
         }
     }
     let curve = |every: usize| {
@@ -193,7 +197,7 @@ fn halve(
     };
     found.push(middle);
     let off = (middle[1] - 0.5 * (from[1] + to[1])).abs();
-    if times > 1 && off > RESOLVED {
+    if times > 1 && off > RESOLVED.0 {
         halve([from, middle], times - 1, pose, found);
         halve([middle, to], times - 1, pose, found);
     }
@@ -205,7 +209,7 @@ fn other_reading(side: &WheelTask) -> WheelRail {
     let grains = profiles.map(checked_case::grain);
     let advised = advised_smoothing(grains, side.contact_modulus, PRESSURE_USUAL);
     let other = |k: usize, profile: &Profile| {
-        let chords = COMPANION_CHORDS * profile.usual_chord();
+        let chords = CHORDS * profile.usual_chord();
         let least = (COMPANIONS[1] * profile.smoothing()).max(chords.min(SMOOTHING_ADVISED[1]));
         least.max(advised[k])
     };

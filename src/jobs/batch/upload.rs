@@ -11,7 +11,7 @@ use uuid::Uuid;
 
 use crate::contact::case::solver::KnownPair;
 use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::varied::{self, Replaced, named_sections, put};
+use crate::contact::evaluate::varied::{named_sections, put};
 use crate::contact::problem::checked_case::CheckedCase;
 use crate::jobs::disk_reserve::nameless;
 use crate::jobs::error::{JobsError, Result};
@@ -103,31 +103,6 @@ impl Cell {
 pub fn digest(cells: &[Cell]) -> [u8; 32] {
     let places = cells.iter().map(|cell| (cell.pointer(), cell.1.clone()));
     idempotency::digest(&Value::Object(places.collect()))
-}
-
-/// As [`fill`], in the template itself; [`restore`] takes the values of the row away again.
-///
-/// # Errors
-/// As [`fill`]; the template is then unchanged.
-pub fn fill_in_place(template: &mut Value, row: &[Cell]) -> Result<Vec<Replaced>, (usize, String)> {
-    let mut filled = Vec::with_capacity(row.len());
-    for (number, Cell(path, value)) in row.iter().enumerate() {
-        match varied::replace(template, path, value.clone()) {
-            Ok(replaced) => filled.push(replaced),
-            Err(reason) => {
-                restore(template, row, filled);
-                return Err((number, reason));
-            }
-        }
-    }
-    Ok(filled)
-}
-
-/// Undoes [`fill_in_place`].
-pub fn restore(template: &mut Value, row: &[Cell], filled: Vec<Replaced>) {
-    for (Cell(path, _), replaced) in row.iter().zip(filled).rev() {
-        varied::restore(template, path, replaced);
-    }
 }
 
 /// The template with the values of a row in their places.
@@ -304,44 +279,42 @@ impl BatchUpload {
         let Some(row) = self.good(line, text, row) else {
             return Ok(());
         };
-        let Some(mut template) = self.rows.take() else {
+        let Some(template) = self.rows.take() else {
             let detail = "a row of a table without a template";
             return Err(JobsError::Damaged(detail.to_owned()));
         };
-        let added = self.add_filled(line, &mut template, row);
+        let added = self.add_filled(line, &template, row);
         self.rows = Some(template);
         added
     }
 
-    /// Adds the case that a row makes of the template, which is afterwards as before.
+    /// Adds the case that a row makes of the template.
     fn add_filled(
         &mut self,
         line: Option<u64>,
-        template: &mut RowTemplate,
+        template: &RowTemplate,
         BatchRow { cells, own }: BatchRow,
     ) -> Result<()> {
         self.digest.update(&digest(&cells));
         let RowTemplate { case, known } = template;
-        let filled = match fill_in_place(case, &cells) {
-            Ok(filled) => filled,
+        let case = match fill(case, &cells) {
+            Ok(case) => case,
             Err((number, reason)) => {
                 let detail = format!("the column `{}` {reason}", cells[number].pointer());
                 self.reject(line, vec![Fault::new("", detail)]);
                 return Ok(());
             }
         };
-        let added = match named_sections(case).is_empty() {
+        match named_sections(&case).is_empty() {
             true => {
-                let checked = self.jobs.check_next(known, case);
+                let checked = self.jobs.check_next(known, &case);
                 let kept = serde_json::to_vec(&cells);
                 kept.map_err(|error| JobsError::Damaged(error.to_string()))
                     .and_then(|kept| self.keep(line, checked, "", (true, own), &kept))
             }
             // A profile that the row names is kept with it.
-            false => self.add_with_profiles(line, case.clone(), own),
-        };
-        restore(case, &cells, filled);
-        added
+            false => self.add_with_profiles(line, case, own),
+        }
     }
 
     /// Adds the case of a row that names profiles.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::contact::case::words::object::{AllowedRange, Object, join};
+use crate::contact::case::words::samples::AXIS_POINTS;
 
 /// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across`, `along` and `by_temperature`. `layer` and
 /// `reduction` make the contact softer to tractions and may stand beside each of them.
@@ -173,8 +174,6 @@ impl Friction {
 
 /// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
 pub(crate) const COEFFICIENT_LEAST: f64 = 1e-12;
-/// Points of a coefficient across, along or by temperature.
-const POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// The ways to give a coefficient.
 const WAYS: [&str; 5] = ["coefficient", "law", "across", "along", "by_temperature"];
 /// The words of a fault for what `terms` has to be.
@@ -323,9 +322,13 @@ pub(crate) fn faults_of_temperatures(
 
 /// The numbers of a table.
 pub(crate) fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
-    let what = format!("an array of {} to {} numbers", POINTS.start(), POINTS.end());
+    let what = format!(
+        "an array of {} to {} numbers",
+        AXIS_POINTS.start(),
+        AXIS_POINTS.end()
+    );
     block.required(name, &what)?;
-    let elements = block.array(name, POINTS, &what)?;
+    let elements = block.array(name, AXIS_POINTS, &what)?;
     block.numbers(name, elements, allowed)
 }
 

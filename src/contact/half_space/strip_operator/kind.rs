@@ -1,8 +1,5 @@
 //! Which half of the unknowns an operator serves, and how wide its numbers are.
 
-/// Values per cell are padded to a multiple of this, so that products need no remainder loop.
-pub(crate) const LANES: usize = 16;
-
 /// Which part of a mirror-symmetric problem the unknowns belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parity {

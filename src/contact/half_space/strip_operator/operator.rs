@@ -10,11 +10,12 @@
 use pulp::WithSimd;
 
 use crate::contact::half_space::strip_operator::assembly::OperatorAssembly;
-use crate::contact::half_space::strip_operator::kind::{LANES, Parity, Precision};
+use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
 use crate::contact::half_space::strip_operator::product::{Product, RowLayout};
 use crate::contact::mesh::Mesh;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::simd;
+use crate::contact::numerics::simd::LANES;
 
 /// How the matrix is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

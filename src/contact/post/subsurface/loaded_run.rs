@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-use crate::contact::half_space::kernels::{LANES, LoadPack};
+use crate::contact::half_space::kernels::LoadPack;
 use crate::contact::mesh::{Chord, Segment};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::numerics::quadrature::RULES;
+use crate::contact::numerics::simd::LANES;
 use crate::contact::post::subsurface::load_parts::{LoadPart, ORDERS, PartBox};
 use crate::contact::rolling::answer::LevelAnswer;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -17,10 +18,10 @@ const POINTS_MAX: usize = RULES[ORDERS - 1].len();
 /// How often cells are halved along and across under a smooth pressure, see [`halvings`]. With no halvings across, errors on ellipses with a pole of spin
 /// grow from 0.0015 of the largest pressure to 0.0055, where friction jumps from 0.4 to 0.1 across from 0.0009 to 0.0055, and on a gap of two radii from
 /// 0.001 to 0.004.
-const SMOOTH: [u32; 2] = [0, 4];
-/// How often they are halved in patches with a rough pressure or with hollows. Without it, errors where the pressure jumps grow from 0.007 of the largest
-/// pressure to 0.02.
-const ROUGH: [u32; 2] = [4, 4];
+///
+/// The second pair is for patches with a rough pressure or with hollows. Without it, errors where the pressure jumps grow from 0.007 of the largest pressure
+/// to 0.02.
+const HALVINGS: [[u32; 2]; 2] = [[0, 4], [4, 4]];
 /// See [`steepest`]: it is 0.30 at most on ellipses and gaps, where the last cells differ by their width alone, and 0.54 and more where the pressure jumps,
 /// at hollows, and where a gap opens so steeply that the pressure rises towards the edge.
 const STEEP: f64 = 0.4;
@@ -294,8 +295,8 @@ fn halvings(level: &StripMesh, footprint: &Footprint, segments: &[Segment]) -> [
     let all = level.mesh.segments.iter();
     let hollow = all.filter(|segment| segment.chord.patch == patch).count() > segments.len();
     match footprint.jumps() || hollow || steepest(level, segments) > STEEP {
-        true => ROUGH,
-        false => SMOOTH,
+        true => HALVINGS[1],
+        false => HALVINGS[0],
     }
 }
 

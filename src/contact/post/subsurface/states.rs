@@ -67,9 +67,6 @@ pub fn point(at: [f64; 3], stress: Stress) -> StressPoint {
     }
 }
 
-/// Sweeps of rotations; a symmetric 3 × 3 matrix is diagonal to rounding after five.
-const SWEEPS_MAX: usize = 12;
-
 /// Principal stresses from the largest to the smallest, and their directions as unit vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Principal {
@@ -84,7 +81,8 @@ pub fn principal([xx, yy, zz, xy, xz, yz]: Stress) -> Principal {
     let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let size = a.iter().flatten().map(|x| x.abs()).fold(0.0, f64::max);
-    for _ in 0..SWEEPS_MAX {
+    // It is diagonal to rounding after five sweeps.
+    for _ in 0..12 {
         let off = a[0][1].abs().max(a[0][2].abs()).max(a[1][2].abs());
         if off <= f64::EPSILON * 1e-3 * size {
             break;

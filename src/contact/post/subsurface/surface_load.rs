@@ -9,10 +9,11 @@
 
 use std::ops::Range;
 
-use crate::contact::half_space::kernels::{LANES, LoadPack, Stress, stress};
+use crate::contact::half_space::kernels::{LoadPack, Stress, stress};
 use crate::contact::mesh::{Chord, Segment};
 use crate::contact::normal::footprint::Footprint;
 use crate::contact::numerics::quadrature::RULES;
+use crate::contact::numerics::simd::LANES;
 use crate::contact::post::subsurface::load_parts::{
     LoadPart, LoadParts, LoadResolution, ORDERS, PartBox,
 };

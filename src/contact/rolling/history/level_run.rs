@@ -25,8 +25,6 @@ use crate::contact::rolling::task::{Motion, PrescribedForces, RollingTask};
 /// Tangential stiffness of a circular patch over shear modulus and radius, for the first trial of a force: 4/(2 − ν) of both bodies together
 /// (Mindlin 1949). Later trials take what was found.
 const STIFFNESS: f64 = 2.5;
-/// Distance over the half-length after which creepage has brought its force, for the first trial of steady rolling.
-const RELAXATION: f64 = 1.0;
 
 /// What is solved on one level.
 pub struct LevelRun<'a> {
@@ -195,7 +193,8 @@ impl<'a> LevelRun<'a> {
             StepKind::Roll { distance, growth } => {
                 distance / (self.level.scale.length * weights(growth)[0])
             }
-            StepKind::Steady => RELAXATION * 0.5 * (patch[1] - patch[0]) / self.level.scale.length,
+            // Creepage has about brought its force after half of the length.
+            StepKind::Steady => 0.5 * (patch[1] - patch[0]) / self.level.scale.length,
         };
         let scale = self.task.forces[0].map(|force| force.map(|_| 1.0 / (stiffness * reach)));
         Search::new(scale, [f64::INFINITY; 2])
@@ -323,7 +322,7 @@ impl<'a> LevelRun<'a> {
             .newton
             .solve(&law, &mut tractions, self.workspace, self.monitor)?;
         let mut work = of.newton.work(&report);
-        if !report.exit.converged() {
+        if !report.converged {
             // Try again without a start, which may be why the iteration did not converge.
             tractions.fill(0.0);
             report = of
@@ -332,7 +331,7 @@ impl<'a> LevelRun<'a> {
             work.add(of.newton.work(&report));
         }
         self.state.work.add(work);
-        if !report.exit.converged() {
+        if !report.converged {
             return Err(LevelFailure::NotConverged {
                 work: self.state.work,
                 tolerance: self.tolerance[0],

@@ -236,15 +236,11 @@ fn outside(mesh: &Mesh, pair: &PressedPair, [x, y]: [f64; 2]) -> ScaledPlace {
 
 /// Growth of the patch in a step.
 const GROWTH: f64 = 1.05;
-/// Steps at most; 100 shrink what a step began with by 130.
-const STEPS_MAX: usize = 300;
+/// Steps at most (100 shrink what a step began with by 130), and the step from which on the mean of two states is taken for the past, since single cells at
+/// the edge of what sticks may come and go for ever where nearly all sticks.
+const STEPS: [usize; 2] = [300, 60];
 /// Mean change of the tractions in a step, relative to the friction limit, from which on they count as copies. 1e-6 gives the same forces and areas.
 const CHANGE: f64 = 2e-5;
-/// From this step on the mean of two states is taken for the past, since single cells at the edge of what sticks may come and go for ever
-/// where nearly all sticks.
-const STEPS_FREE: usize = 60;
-/// Energies grow with this power of the size.
-const ENERGY_POWER: f64 = 5.0;
 
 impl LevelRun<'_> {
     /// Tractions of bodies that were pressed together.
@@ -275,7 +271,7 @@ impl LevelRun<'_> {
         // From nothing at once to begin with.
         let mut past: Option<[PressedState; 2]> = None;
         let mut change = f64::INFINITY;
-        for step in 0..STEPS_MAX {
+        for step in 0..STEPS[0] {
             self.monitor.go_on(0.0)?;
             let mut source =
                 [0, 1].map(|k| given.iter().map(|u| -PRESS_WEIGHTS[0] * u[k]).collect());
@@ -290,7 +286,7 @@ impl LevelRun<'_> {
             let state = self.pressed(of, &tractions, &given);
             past = Some(match past {
                 None => [state.clone(), state],
-                Some([last, _]) if step < STEPS_FREE => [state, last],
+                Some([last, _]) if step < STEPS[1] => [state, last],
                 // What comes and goes from step to step is taken out.
                 Some([last, _]) => {
                     let mean = state.mean(&last);
@@ -356,7 +352,8 @@ impl LevelRun<'_> {
         state.motion = Motion::default();
         for patch in 0..over.len() {
             let per_growth = length * over[patch] / GROWTH.ln();
-            state.dissipated[patch] = (per_growth / ENERGY_POWER).max(0.0);
+            // Energies grow with the fifth power of the size.
+            state.dissipated[patch] = (per_growth / 5.0).max(0.0);
             state.stored[patch] = [0.5 * length * stored[patch]; 2];
         }
         state.earlier.clone_from(&displacement);

@@ -13,7 +13,7 @@ use crate::contact::rolling::history::plan::{HistoryStart, HistoryTask, PointRec
 use crate::contact::rolling::history::self_similar::SelfSimilarState;
 use crate::contact::rolling::refinement::interpolate::RefinementState;
 use crate::contact::rolling::refinement::on_mesh::named;
-use crate::contact::rolling::task::{Motion, Resolution, RollingTask};
+use crate::contact::rolling::task::{Motion, Resolution, RollingTask, TOLERANCE_LEAST};
 
 // The numbers below are from the four histories of CONTACT in `tests/data/transient.json`, on meshes from 6 × 12 to 24 × 48 with steps of
 // a/5 to a/32, a half the length (`cargo test --test physics -- histories_agree --nocapture` prints what comes of them).
@@ -26,9 +26,8 @@ const FINER: f64 = 1.5;
 const LEVELS_MAX: i32 = 4;
 /// Cells along x per strip on a patch as long as wide. What travels through the contact is rounded over two cells, so that cells count for
 /// more than strips: with 3 creepages are as exact, moments under spin half as.
-const SHAPE: f64 = 2.0;
-/// The same where pressing is all that is asked for, whose tractions change as much across as along.
-const SHAPE_PRESSED: f64 = 1.0;
+/// The second where pressing is all that is asked for, whose tractions change as much across as along.
+const SHAPES: [f64; 2] = [2.0, 1.0];
 /// Steps in which a pressing usually settles.
 const STEPS_PRESSED: f64 = 100.0;
 /// Steps per half-length of the patch and cell along x. With twice as many the creepages are off by up to twice as much, since shorter
@@ -39,9 +38,7 @@ const STEPS_PER_CELL: f64 = 1.0 / 3.0;
 const EXTRAPOLATED: f64 = 0.5;
 /// Error of resultants, and of creepages and shifts that are found, over the change from the level before. Chosen so that the estimates
 /// cover the points of CONTACT's four histories (`cargo test --test physics histories`), which therefore are no check of them.
-const ERROR_OVER_CHANGE: f64 = 0.8;
-/// See [`ERROR_OVER_CHANGE`].
-const CREEPAGE_ERROR_OVER_CHANGE: f64 = 1.4;
+const ERROR_OVER_CHANGE: [f64; 2] = [0.8, 1.4];
 /// Least change of a shift that is found, in cells along x and relative to the shift: the changes of single shifts from level to level cross zero by
 /// chance. Chosen so that the errors cover 57 shifts, alone and within histories, of which 31 were covered by the changes alone; the closed form of
 /// Cattaneo (1938) is among them.
@@ -50,9 +47,6 @@ const SHIFT_CHANGE_LEAST: f64 = 0.18;
 const REMEMBERED: f64 = 0.7;
 /// By how much prescribed forces may be missed, relative to the friction limit, with some room.
 const MISSED: f64 = 2e-5;
-/// Residual of the tractions of a step of rolling. A step changes little, so that the tractions before it leave a small residual by themselves: at
-/// 1e-4 they were kept, and under small creepages forces stayed up to 0.012 of the limit from steady rolling, with estimates of 0.002.
-const STEP_RESIDUAL: f64 = 1e-6;
 /// The error of creepages and shifts that are found is to be below this many times the target, relative to the largest creepage.
 const CREEPAGE_SHARE: f64 = 10.0;
 
@@ -113,12 +107,12 @@ pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64
         HistoryStart::Rest | HistoryStart::Steady => 0.0,
     };
     let steps = plan::count(history, half / (STEPS_PER_CELL * cells));
-    (steps + pressing, cells * cells / SHAPE)
+    (steps + pressing, cells * cells / SHAPES[0])
 }
 
 /// Most cells that a target leads to where pressing is all that is asked for.
 pub fn pressed_cells_max() -> f64 {
-    (CELLS_FIRST * FINER.powi(LEVELS_MAX - 1)).powi(2) / SHAPE_PRESSED
+    (CELLS_FIRST * FINER.powi(LEVELS_MAX - 1)).powi(2) / SHAPES[1]
 }
 
 /// Bytes that a pressing keeps on a mesh of so many cells.
@@ -155,7 +149,7 @@ pub fn solve(
     monitor: &dyn Monitor,
 ) -> Result<Vec<MotionAnswer>, SolveError> {
     let presses = history.only_presses() && !task.has_prescribed_forces();
-    let plans = level_plans(task, if presses { SHAPE_PRESSED } else { SHAPE });
+    let plans = level_plans(task, SHAPES[usize::from(presses)]);
     let mut before: Option<SolvedHistory> = None;
     let mut seconds = 0.0;
     let mut work = Work::default();
@@ -244,7 +238,9 @@ fn on_level(
     let number = state.levels.level(plan.size.into())?;
     let level = state.levels.get(number);
     // What the iteration leaves of a force is a change of the creepage in one step.
-    let tolerance = [STEP_RESIDUAL, 1e-5];
+    // A step of rolling changes little, so that the tractions before it leave a small residual by themselves: at 1e-4 they were kept, and under small
+    // creepages forces stayed up to 0.012 of the limit from steady rolling, with estimates of 0.002.
+    let tolerance = [TOLERANCE_LEAST, 1e-5];
     let workspace = &mut state.workspace;
     let run = LevelRun::new(task, history, &level, tolerance, workspace, monitor)?;
     let points = run
@@ -320,7 +316,7 @@ fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> boo
     };
     let forces = changes.iter().filter_map(|change| change.resultants.last());
     let worst = forces.fold(0.0_f64, |worst, change| worst.max(*change));
-    if ERROR_OVER_CHANGE * worst > target {
+    if ERROR_OVER_CHANGE[0] * worst > target {
         return false;
     }
     let small = |of: fn(&Motion) -> [f64; 2],
@@ -329,7 +325,7 @@ fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> boo
         (0..2).all(|k| {
             let peak = points.iter().map(|point| of(motion(point))[k].abs());
             let worst = changes.iter().map(|own| change(own)[k]);
-            CREEPAGE_ERROR_OVER_CHANGE * worst.fold(0.0, f64::max)
+            ERROR_OVER_CHANGE[1] * worst.fold(0.0, f64::max)
                 <= CREEPAGE_SHARE * target * peak.fold(0.0, f64::max)
         })
     };
@@ -363,10 +359,10 @@ fn answers(
                 work.residual = residual;
             }
             let error =
-                |change: &f64| Some(ERROR_OVER_CHANGE * change + task.tolerance(k).max(MISSED));
+                |change: &f64| Some(ERROR_OVER_CHANGE[0] * change + task.tolerance(k).max(MISSED));
             let forces = task.forces[k];
             let found = |changes: [f64; 2]| {
-                [0, 1].map(|k| forces[k].map(|_| CREEPAGE_ERROR_OVER_CHANGE * changes[k]))
+                [0, 1].map(|k| forces[k].map(|_| ERROR_OVER_CHANGE[1] * changes[k]))
             };
             let resultants = point.resultants.iter().zip(&change.coarser).enumerate();
             let extrapolated = resultants.map(|(patch, (fine, coarse))| {

@@ -10,7 +10,7 @@ use crate::contact::rolling::task::Motion;
 const ELASTIC_SLIP_MAX: f64 = 10.0;
 /// Rigid slip must be this many times larger for the elastic slip to be left out: the direction of the traction then
 /// changes by less than the inverse.
-const NEGLIGIBLE: f64 = 1e6;
+pub(crate) const NEGLIGIBLE: f64 = 1e6;
 
 fn rigid_slip(level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
     let normalised = &level.normalised;

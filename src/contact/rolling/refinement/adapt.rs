@@ -3,6 +3,7 @@
 use crate::contact::error::SolveError;
 use crate::contact::method::Method;
 use crate::contact::monitor::Monitor;
+use crate::contact::numerics::roots::ROUNDING;
 use crate::contact::rolling::answer::{MotionAnswer, SolvedFields, Work};
 use crate::contact::rolling::methods::table::solve as table;
 use crate::contact::rolling::refinement::error_estimate::{Estimate, coarser};
@@ -13,16 +14,9 @@ use crate::contact::rolling::refinement::on_mesh::{
 };
 use crate::contact::rolling::task::{MeshPlan, RollingTask};
 
-/// Next mesh over the last one.
-const DOUBLING: f64 = 2.0;
-/// Estimates up to this many times the target are followed by half a doubling.
-const HALF_DOUBLING_TO: f64 = 1.5;
-/// Where the estimate of the mesh before exceeds the target by no more than this part of it, the answer is a mean of both meshes, so that answers
-/// of near motions do not jump where the number of meshes changes.
+/// Where the estimate of a mesh exceeds the target by no more than this part of it, half a doubling follows, and the answer is a mean of both meshes,
+/// so that answers of near motions do not jump where the number of meshes changes.
 const BLENDED: f64 = 0.5;
-
-/// Estimate over the target of a mean of two meshes of which the finer meets it: just below 1, to leave room for rounding.
-const MET: f64 = 1.0 - 1e-9;
 
 /// Solves a motion by the method of the task.
 ///
@@ -145,7 +139,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
             let is_finest = cells > 0.999 * most;
             let is_needed = is_finest && self.solved.is_empty();
             self.add(family.mesh(cells), is_needed)?;
-            let mut times = DOUBLING;
+            let mut times = 2.0_f64;
             let estimate = Estimate::of(self.task, self.asked.index, &self.solved, true);
             let is_judged = self.compared().len() > 2;
             if let Some(mut found) = estimate.filter(|_| is_judged || is_finest) {
@@ -159,8 +153,8 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
                     }
                     return Ok(found);
                 }
-                if error < HALF_DOUBLING_TO * target {
-                    times = DOUBLING.sqrt();
+                if error < (1.0 + BLENDED) * target {
+                    times = times.sqrt();
                 }
                 before = Some(found);
             }
@@ -261,7 +255,13 @@ impl Estimate {
             if let (Some(error), Some(other)) = (error, other) {
                 let mixed = weight * *error + (1.0 - weight) * other;
                 let met = *error <= target;
-                *error = error.max(if met { mixed.min(MET * target) } else { mixed });
+                // A mean of two meshes of which the finer meets the target meets it, with room for rounding.
+                let most = if met {
+                    (1.0 - ROUNDING) * target
+                } else {
+                    mixed
+                };
+                *error = error.max(mixed.min(most));
             }
         }
     }

@@ -14,22 +14,17 @@ const CELLS_FIRST: f64 = 32.0;
 pub const CELLS_MAX: u32 = 2048;
 /// Fewest cells per patch that the finest mesh may have, however many patches there are.
 pub const PATCH_CELLS_MAX_LEAST: f64 = 64.0;
-/// Meshes of one motion at least: the estimate needs two changes.
-const LEVELS_LEAST: i32 = 3;
-/// Fewest strips, and fewest cells in a strip, of an adaptive mesh.
+/// Fewest strips, and fewest cells in a strip, of an adaptive mesh; the meshes below an explicit one may have half as many.
 const SIDE_MIN: f64 = 4.0;
-/// Fewest strips, and fewest cells in a strip, of the meshes below an explicit one.
-const SIDE_MIN_EXPLICIT: f64 = 2.0;
 /// Dimensionless spin `φ c G/(μ p_max)` from which meshes gather about the pole of the rigid slip. 1 to 4 change the work by 20 %.
 const SPIN_GRADED: f64 = 2.0;
 /// Distance from the middle of the patch, in half axes, beyond which a pole counts as outside.
 const POLE_INSIDE: f64 = 0.9;
-/// Length over width of a patch beyond which the cells of a motion with spin and no pole inside become longer. With 4 in place of 8 and a power of
-/// 0.75, 1.5 % of the errors of random ellipses exceed twice their estimate; with 8 it is 0.5 %.
-const SLENDER_SPINNING: f64 = 8.0;
-/// Power with which their number along a strip over the number of strips then grows. With 0.75 the patch of a flange takes twice as many products as
-/// with 1.5; with 2, 5 % of the errors of wheels on the curve exceed twice their estimate.
-const SLENDER_POWER: f64 = 1.5;
+/// Length over width of a patch beyond which the cells of a motion with spin and no pole inside become longer, and the power with which their number
+/// along a strip over the number of strips then grows. With 4 in place of 8 and a power of 0.75, 1.5 % of the errors of random ellipses exceed twice
+/// their estimate; with 8 it is 0.5 %. With 0.75 the patch of a flange takes twice as many products as with 1.5; with 2, 5 % of the errors of wheels on
+/// the curve exceed twice their estimate.
+const SLENDER: [f64; 2] = [8.0, 1.5];
 /// Poles are rounded to multiples of this, in half axes, so that near motions share meshes. 0.02 and 0.1 change the work by 1 to 6 %.
 const POLE_GRID: f64 = 0.05;
 
@@ -60,7 +55,7 @@ impl MeshFamily {
         let shape = if pole.is_some() {
             0.85 * a_over_b.powf(0.4)
         } else if motion.spin_per_mm != 0.0 && a_over_b > 1.0 {
-            1.3 * (a_over_b / SLENDER_SPINNING).max(1.0).powf(SLENDER_POWER)
+            1.3 * (a_over_b / SLENDER[0]).max(1.0).powf(SLENDER[1])
         } else {
             1.3 * a_over_b.powf(0.3)
         };
@@ -86,7 +81,8 @@ impl MeshFamily {
 
     /// Cells per patch of the coarsest mesh.
     pub fn cells_first(&self) -> f64 {
-        CELLS_FIRST.min(self.cells_max() / 2.0_f64.powi(LEVELS_LEAST - 1))
+        // The estimate needs two changes, from twice and four times as many.
+        CELLS_FIRST.min(self.cells_max() / 4.0)
     }
 
     /// Cells per patch of the finest mesh.
@@ -146,9 +142,10 @@ fn coarser(size: MeshSize, times: f64) -> MeshSize {
     let side = times.sqrt();
     let [strips, cells] = [size.strips, size.cells].map(f64::from);
     let even = 2.0 * (0.5 * strips / side).round();
+    let least = 0.5 * SIDE_MIN;
     MeshSize {
-        strips: even.max(SIDE_MIN_EXPLICIT).min(strips) as u32,
-        cells: (cells / side).round().max(SIDE_MIN_EXPLICIT).min(cells) as u32,
+        strips: even.max(least).min(strips) as u32,
+        cells: (cells / side).round().max(least).min(cells) as u32,
     }
 }
 

@@ -3,12 +3,8 @@
 use crate::contact::numerics::simd::length;
 use crate::contact::rolling::task::Motion;
 
-/// Distance from the line through the last two motions, relative to the step, up to which a motion lies on it. Numeric safety, not tuned.
-const STRAIGHT: f64 = 1e-6;
 /// Longest step that is extrapolated, in steps between the last two motions. 1.1 and 2.5 are alike on sweeps of equal steps.
 const STEP_MAX: f64 = 1.5;
-/// Motions remembered on every mesh. Starts from three, by a parabola, take 8 to 15 % more products on creep curves and maps.
-const STEPS: usize = 2;
 /// Longest step, relative to the motion, over which the last tractions serve unchanged. On 12 sweeps of 9 motions on random ellipses 0.12 takes
 /// 6 % more products and 0.5 takes 6 % fewer.
 const NEAR: f64 = 0.25;
@@ -34,7 +30,8 @@ impl Predictor {
     pub fn remember(&mut self, mesh: usize, motion: Motion, traction: &[Vec<f64>; 2]) {
         self.steps
             .retain(|step| step.mesh != mesh || step.motion != motion);
-        if self.steps.iter().filter(|step| step.mesh == mesh).count() == STEPS
+        // Starts from three motions, by a parabola, take 8 to 15 % more products on creep curves and maps.
+        if self.steps.iter().filter(|step| step.mesh == mesh).count() == 2
             && let Some(oldest) = self.steps.iter().position(|step| step.mesh == mesh)
         {
             self.steps.remove(oldest);
@@ -82,7 +79,8 @@ impl Predictor {
 fn on_line(to: [f64; 3], step: [f64; 3]) -> Option<f64> {
     let along = dot(to, step) / dot(step, step);
     let aside = [0, 1, 2].map(|k| to[k] - along * step[k]);
-    (dot(aside, aside).sqrt() <= STRAIGHT * dot(to, to).sqrt()).then_some(along)
+    // Parallel but for rounding.
+    (dot(aside, aside).sqrt() <= 1e-6 * dot(to, to).sqrt()).then_some(along)
 }
 
 /// The ratio of a motion to the last one, if they are parallel and of similar size: tractions that stick grow in proportion.

@@ -16,7 +16,7 @@ use crate::contact::rolling::methods::boundary_element::linearisation::{
 };
 use crate::contact::rolling::methods::boundary_element::preconditioner::{OwnBlocks, StripFactors};
 use crate::contact::rolling::methods::boundary_element::task::{
-    Convergence, NewtonTask, NewtonTermination, STEPS_MAX,
+    Convergence, NewtonTask, STEPS_MAX,
 };
 use crate::contact::rolling::methods::boundary_element::workspace::{
     NewtonWorkspace, StepVectors, zeroed,
@@ -160,7 +160,7 @@ impl<'a> Newton<'a> {
             }
             let is_answer = law.accepts_start || report.iterations > 0;
             if is_answer && report.residual <= law.tolerance {
-                report.exit = NewtonTermination::Converged;
+                report.converged = true;
                 break;
             }
             if report.iterations == law.steps_max {
@@ -187,7 +187,7 @@ impl<'a> Newton<'a> {
             self.halve(law, [before, candidate], allowed, t, workspace, &mut report);
             report.iterations += 1;
         }
-        if !report.exit.converged() {
+        if !report.converged {
             report.residual = least;
             t.copy_from_slice(best);
         }
@@ -422,7 +422,7 @@ impl<'a> Newton<'a> {
         };
         let report_of_step = gmres.solve(&mut system, rhs, tolerance, step)?;
         report.products += report_of_step.products;
-        report.inexact_steps += u32::from(!report_of_step.exit.converged());
+        report.inexact_steps += u32::from(!report_of_step.converged);
         Ok(())
     }
 

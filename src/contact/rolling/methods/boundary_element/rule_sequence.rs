@@ -24,9 +24,6 @@ const SAME_SOLUTION: f64 = 4e-3;
 /// From this stability number on (see [`Newton::stability`]) a second solution is looked for. None was seen below 1.5 in 360 random
 /// motions of the prototype.
 const SECOND_START_FROM: f64 = 0.5;
-/// Rounds of bounds that follow from slips, and slips from bounds. On 200 random motions with friction that
-/// falls with temperature none took as many. Keeps the numbers safe; not tuned.
-const PASSAGE_ROUNDS: u32 = 60;
 /// A round that leaves more than this part of the change before it halves the steps of the next ones. Chosen by judgement; how much it matters was
 /// not measured.
 const PASSAGE_FALL: f64 = 0.7;
@@ -179,13 +176,13 @@ impl<'a> RuleSequence<'a> {
         let newton = self.newton(&equations);
         let mut report = self.rule(&newton, &rigid, t)?;
         // The start may be what hinders the iteration.
-        if !report.exit.converged() {
+        if !report.converged {
             t.fill(0.0);
             // The upwind rule is of first order, but monotone; its solution serves as a start only.
             self.upwind(t)?;
             report = self.rule(&newton, &rigid, t)?;
         }
-        if !report.exit.converged() {
+        if !report.converged {
             return Err(LevelFailure::NotConverged {
                 work: self.work,
                 tolerance: self.tolerance,
@@ -222,7 +219,8 @@ impl<'a> RuleSequence<'a> {
     ) -> Result<(), LevelFailure> {
         let (cells, rest) = (newton.cells(), self.bound.clone());
         let (mut change, mut weight) = (f64::INFINITY, 1.0);
-        for _ in 0..PASSAGE_ROUNDS {
+        // On 200 random motions with friction that falls with temperature none took as many.
+        for _ in 0..STEPS_MAX {
             let slips = self.control.workspace.slip();
             let padded = slips.len() / 2;
             let sizes = (0..cells).map(|i| match newton.slips(&self.bound, t, slips, i) {
@@ -248,7 +246,7 @@ impl<'a> RuleSequence<'a> {
             for (bound, found) in self.bound.iter_mut().zip(found) {
                 *bound += weight * (found - *bound);
             }
-            if !self.rule(newton, rigid, t)?.exit.converged() {
+            if !self.rule(newton, rigid, t)?.converged {
                 break;
             }
         }
@@ -278,7 +276,7 @@ impl<'a> RuleSequence<'a> {
         slide_along(rigid, bound, Some(&fall), &mut other);
         let limit: f64 = area.iter().zip(bound).map(|(a, g)| a * g).sum();
         let report = self.rule(newton, rigid, &mut other)?;
-        if !report.exit.converged() {
+        if !report.converged {
             return Ok(None);
         }
         let change = force_change(&self.area[..cells], t, &other) / limit;
@@ -289,7 +287,7 @@ impl<'a> RuleSequence<'a> {
         let equations = self.equations(Rule::Upwind);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        Ok(self.rule(&newton, &rigid, t)?.exit.converged())
+        Ok(self.rule(&newton, &rigid, t)?.converged)
     }
 
     /// Which cells slip by the trapezoid rule, solved from `t` in at most `steps_max` Newton steps; `t` and its residual stay as they were if they do not
@@ -306,7 +304,7 @@ impl<'a> RuleSequence<'a> {
         self.steps_max = steps_max;
         let report = self.rule(&newton, &rigid, &mut found)?;
         self.steps_max = STEPS_MAX;
-        if !report.exit.converged() {
+        if !report.converged {
             self.work.residual = residual;
             return Ok(None);
         }

@@ -2,7 +2,6 @@
 
 use crate::contact::friction::path_dependent::PathDependentFriction;
 use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::numerics::gmres::GmresTermination;
 use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome};
 use crate::contact::rolling::methods::full_slip;
 use crate::contact::rolling::strip_mesh::StripMesh;
@@ -65,27 +64,11 @@ pub(super) const FEW_STEPS: u32 = 16;
 /// levels, rules and companions.
 pub const STEPS_MAX: u32 = 60;
 
-/// How an iteration for the tractions ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NewtonTermination {
-    /// The residual reached the tolerance.
-    Converged,
-    /// The steps were used up before.
-    StepsUsedUp,
-}
-
-impl NewtonTermination {
-    /// Was the tolerance met?
-    pub fn converged(self) -> bool {
-        self == NewtonTermination::Converged
-    }
-}
-
 /// How a solve went.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Convergence {
-    /// How it ended.
-    pub exit: NewtonTermination,
+    /// Did the residual reach the tolerance, before the steps were used up?
+    pub converged: bool,
     /// Newton steps.
     pub iterations: u32,
     /// Products of the influence with a vector.
@@ -102,8 +85,7 @@ impl Convergence {
         let linear = match self.inexact_steps {
             0 => String::new(),
             steps => {
-                let reason = GmresTermination::RestartsUsedUp.reason();
-                format!("in {steps} steps {reason}; ")
+                format!("in {steps} steps the restarts of the linear solver were used up; ")
             }
         };
         format!("{linear}try another mesh, with cells and strips of similar width")
@@ -114,7 +96,7 @@ impl Default for Convergence {
     /// Before the first step.
     fn default() -> Self {
         Convergence {
-            exit: NewtonTermination::StepsUsedUp,
+            converged: false,
             iterations: 0,
             products: 0,
             residual: f64::INFINITY,

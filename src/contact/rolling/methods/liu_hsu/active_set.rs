@@ -6,16 +6,14 @@ use faer::{Mat, MatMut};
 
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::numerics::lu;
+use crate::contact::numerics::roots::ROUNDING;
+use crate::contact::rolling::methods::boundary_element::task::STEPS_MAX;
 use crate::contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, SlipSystem, both_components,
 };
 use crate::contact::rolling::slip_rules::Rule;
 use crate::contact::rolling::task::Motion;
 
-/// Divisions into stick and slip after which the run ends without convergence.
-const DIVISIONS_MAX: u32 = 60;
-/// A stick cell slips when its traction exceeds its bound by this share, so that rounding does not decide.
-const STICK_MARGIN: f64 = 1e-9;
 /// In given tractions, a cell counts as slipping if its traction is less than its bound by at most this share.
 const START_MARGIN: f64 = 1e-6;
 
@@ -98,7 +96,7 @@ pub fn run(
     };
     let mut division = first_division(task, start);
     let mut seen: Vec<Vec<bool>> = Vec::new();
-    while attempt.outer_iterations < DIVISIONS_MAX {
+    while attempt.outer_iterations < STEPS_MAX {
         attempt.outer_iterations += 1;
         seen.push(division.slips.clone());
         // Stick tractions are eliminated, and which these are depends on the division: each has a system of its own.
@@ -188,9 +186,9 @@ struct RootChoice<'a> {
 impl RootChoice<'_> {
     /// The root that Newton–Raphson finds from a start, if any.
     fn find(&mut self, mut t: Vec<f64>, steps: StepRule) -> Result<Option<Vec<f64>>, Stop> {
-        let end = solve(self.system, &self.bound, steps, &mut t, self.monitor)?;
-        self.iterations += end.iterations;
-        Ok((end.exit == NewtonRaphsonTermination::Converged).then_some(t))
+        let (converged, steps) = solve(self.system, &self.bound, steps, &mut t, self.monitor)?;
+        self.iterations += steps;
+        Ok(converged.then_some(t))
     }
 
     /// A root with as few tractions as possible that oppose their slip. Eq. 9 has a root for every choice of such
@@ -261,7 +259,7 @@ fn load_mismatch(task: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usi
         .stick_cells
         .iter()
         .copied()
-        .filter(|i| t[*i].hypot(t[n + i]) >= task.bound[*i] * (1.0 + STICK_MARGIN))
+        .filter(|i| t[*i].hypot(t[n + i]) >= task.bound[*i] * (1.0 + ROUNDING))
         .collect();
     let t_slip: Vec<f64> = both_components(&system.slip_cells, n)
         .into_iter()
@@ -316,13 +314,13 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
     (length > 0.0 && length.is_finite()).then(|| [v[0] / length, v[1] / length])
 }
 
-/// Steps after which the iteration ends without convergence.
+/// Steps of Newton's method after which it ends without convergence.
 const ITERATIONS_MAX: u32 = 40;
+/// A step on the circles is halved at most this often.
+const HALVINGS_MAX: u32 = 6;
 /// The iteration has converged when no traction changes by more than this share of its bound; the remaining error is about the
 /// square of this.
 const STEP_SMALL: f64 = 1e-8;
-/// A step on the circles is halved at most this often.
-const HALVINGS_MAX: u32 = 6;
 
 /// How a step is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -334,30 +332,11 @@ pub enum StepRule {
     OnCircles,
 }
 
-/// How an iteration ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NewtonRaphsonTermination {
-    /// The last step was small.
-    Converged,
-    /// A step was not finite.
-    Diverged,
-    /// The steps were used up.
-    StepsUsedUp,
-}
-
-/// Result of an iteration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct NewtonEnd {
-    /// How it ended.
-    pub exit: NewtonRaphsonTermination,
-    /// Steps taken.
-    pub iterations: u32,
-}
-
 /// Solves `|T|² = g²` (eq. 8) and `s_x T_y − s_y T_x = 0` (eq. 9), `s = q' + K T` (eq. 13), on the slip cells.
 ///
 /// `t` holds the initial guess and receives the answer, x of all slip cells before y; no traction in it may be 0. `bound`
-/// is g of the slip cells, more than 0. The guess determines which root is found (traction along or against the slip).
+/// is g of the slip cells, more than 0. The guess determines which root is found (traction along or against the slip). Returns whether the last step
+/// was small, and the number of steps; the iteration ends with a step that is not finite.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -367,19 +346,13 @@ pub fn solve(
     steps: StepRule,
     t: &mut [f64],
     monitor: &dyn Monitor,
-) -> Result<NewtonEnd, Stop> {
-    let mut end = NewtonEnd {
-        exit: NewtonRaphsonTermination::StepsUsedUp,
-        iterations: 0,
-    };
+) -> Result<(bool, u32), Stop> {
     if bound.is_empty() {
-        end.exit = NewtonRaphsonTermination::Converged;
-        return Ok(end);
+        return Ok((true, 0));
     }
-    while end.iterations < ITERATIONS_MAX {
+    for taken in 1..=ITERATIONS_MAX {
         monitor.go_on(0.0)?;
         let step = newton_step(system, bound, t, monitor)?;
-        end.iterations += 1;
         let n = bound.len();
         let largest =
             (0..n)
@@ -389,8 +362,7 @@ pub fn solve(
                     |a: f64, b| if b.is_nan() { f64::NAN } else { a.max(b) },
                 );
         if !largest.is_finite() {
-            end.exit = NewtonRaphsonTermination::Diverged;
-            break;
+            return Ok((false, taken));
         }
         match steps {
             StepRule::Full => {
@@ -401,11 +373,10 @@ pub fn solve(
             StepRule::OnCircles => search_on_circles(system, bound, &step, t),
         }
         if largest <= STEP_SMALL {
-            end.exit = NewtonRaphsonTermination::Converged;
-            break;
+            return Ok((true, taken));
         }
     }
-    Ok(end)
+    Ok((false, ITERATIONS_MAX))
 }
 
 /// One step of Newton's method on all equations (8) and (9).

@@ -1,5 +1,7 @@
 //! The table as a method: resultants of the patches of a footprint for one motion.
 
+use std::ops::RangeInclusive;
+
 use crate::contact::error::SolveError;
 use crate::contact::friction::law::FrictionLaw;
 use crate::contact::friction::path_dependent::Interface;
@@ -14,15 +16,11 @@ use crate::contact::rolling::methods::table::file::table;
 use crate::contact::rolling::task::{Motion, RollingTask};
 
 /// a/b that the table covers.
-pub const RATIO_MIN: f64 = 0.1;
-/// The largest one.
-pub const RATIO_MAX: f64 = 10.0;
+pub const RATIO_RANGE: RangeInclusive<f64> = 0.1..=10.0;
 /// Largest share of load_mismatch load of a patch that an ellipse may stand for: above it errors reach 0.08 μN.
 const MISPLACED_MAX: f64 = 0.1;
 /// Error of the ellipse that stands for another shape, relative to μN: `0.3 D + 0.006` holds for 27 patches with D up to 0.9.
-const PER_MISPLACED: f64 = 0.3;
-/// Its part that does not depend on D.
-const ANY_SHAPE: f64 = 0.006;
+const BY_SHAPE: [f64; 2] = [0.3, 0.006];
 /// What is added where patches turn each other's tractions elastically, which the table leaves out.
 const NEIGHBOURS: f64 = 0.01;
 
@@ -48,7 +46,7 @@ pub fn solve(
         let answer = on_ellipse(task, ellipse, limit, motion);
         let mut error = answer.error;
         if ellipse.load_mismatch > 0.0 {
-            error += PER_MISPLACED * ellipse.load_mismatch + ANY_SHAPE;
+            error += BY_SHAPE[0] * ellipse.load_mismatch + BY_SHAPE[1];
         }
         if patches.len() > 1 {
             error += NEIGHBOURS;
@@ -87,10 +85,12 @@ pub fn unlike(elasticity: &Elasticity) -> Option<String> {
 
 /// Why the table has no answer for an ellipse with this ratio of semi-axes, if it has none.
 pub fn outside(ratio: f64) -> Option<String> {
-    (!(RATIO_MIN..=RATIO_MAX).contains(&ratio)).then(|| {
+    (!RATIO_RANGE.contains(&ratio)).then(|| {
         format!(
-            "an ellipse with a/b = {}; \"method\": \"table\" covers {RATIO_MIN} to {RATIO_MAX}, use boundary_element or fastsim",
-            Rounded(ratio, 6)
+            "an ellipse with a/b = {}; \"method\": \"table\" covers {} to {}, use boundary_element or fastsim",
+            Rounded(ratio, 6),
+            RATIO_RANGE.start(),
+            RATIO_RANGE.end()
         )
     })
 }
@@ -127,7 +127,9 @@ pub(crate) fn forces(
         return [0.0; 2];
     }
     let creepage = dimensionless(shear_modulus, ellipse, limit, motion);
-    let ratio = ellipse.ratio().clamp(RATIO_MIN, RATIO_MAX);
+    let ratio = ellipse
+        .ratio()
+        .clamp(*RATIO_RANGE.start(), *RATIO_RANGE.end());
     let at_ratio = table().ellipse(ratio, poisson_ratio);
     let Creep { force, .. } = at_ratio.interpolated(creepage);
     [limit * force[0], limit * force[1]]
