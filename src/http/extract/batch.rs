@@ -59,10 +59,11 @@ pub fn read_lines(mut source: impl BufRead, most: usize, add: Add<'_>) -> Result
 /// `malformed-json`, `faulty-batch`: it is no array; `body-too-large`: an element is longer; what `add` refuses.
 pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()> {
     let left = Shared::new(most + BETWEEN);
-    let mut json = Deserializer::from_reader(Bounded {
+    let source = Bounded {
         source,
         left: &left,
-    });
+    };
+    let mut json = Deserializer::from_reader(BufReader::new(source));
     let mut elements = Elements {
         most,
         left: &left,
@@ -84,10 +85,10 @@ pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()>
     }
 }
 
-/// Bytes that may stand between two elements.
-const BETWEEN: usize = 1 << 10;
+/// Bytes that are read ahead, or stand between two elements.
+const BETWEEN: usize = 16 << 10;
 
-/// A source that ends in an error where nothing is left of the bytes that an element may take.
+/// A source that ends in an error where nothing is left of the bytes that an element may take. Below a buffer, whose bytes are read fast.
 struct Bounded<'a, R> {
     source: R,
     left: &'a Shared<usize>,
@@ -406,14 +407,14 @@ pub async fn read_draft(
     let read = move |file, pace: &mut Pace| match held {
         Some(_held) => read_rows(draft, (form, file), &options, pace),
         None => {
-            let (source, most) = (BufReader::new(file), options.body_max_bytes);
+            let most = options.body_max_bytes;
             let add: Add<'_> = &mut |line, text| {
                 pace.step()?;
                 add(&mut draft, line, text, &options)
             };
             match array {
-                true => read_elements(source, most, add),
-                false => read_lines(source, most, add),
+                true => read_elements(file, most, add),
+                false => read_lines(BufReader::new(file), most, add),
             }?;
             Ok(draft)
         }
