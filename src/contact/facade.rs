@@ -357,6 +357,7 @@ impl CrossSection {
     fn empty() -> CrossSection {
         CrossSection {
             points_mm: None,
+            guard_rail_points_mm: None,
             profile: None,
             format: None,
             text: None,

@@ -16,7 +16,7 @@ use crate::contact::half_space::bent_surface::{Influence, TURN_MAX};
 use crate::contact::monitor::{Monitor, MonitorPart};
 use crate::contact::normal::gap::grid::GridFineness;
 use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::on_curve::{CurveContact, CurveTask, Friction, Workspace};
+use crate::contact::normal::on_curve::{CurveContact, CurveTask, Friction, STEEP, Workspace};
 use crate::contact::normal::wheel::{
     ReferenceSurface, WheelContact, WheelLoad, WheelPatch, WheelTask,
 };
@@ -37,7 +37,10 @@ mod tractions;
 
 /// Length over width at most, of patches with more than this share of the load. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide, a
 /// contact at the root of a flange 20 times, and a single point that is off makes a ridge a hundred times as long.
-const SLENDER: [f64; 2] = [40.0, 0.02];
+const SLENDER_MAX: f64 = 40.0;
+const SLENDER_SHARE: f64 = 0.02;
+/// Least cosine of the angle of a steep face, whose patches may be longer.
+const COSINE_LEAST: f64 = 0.01;
 
 /// The wheel at rest with the answer for all its patches.
 pub(crate) struct SolvedWheel {
@@ -421,20 +424,29 @@ impl<'a> WheelSolve<'a> {
     fn wheel(&self, contact: &CurveContact) -> Result<WheelContact, SolveError> {
         let patches = self.patches(contact, true)?;
         self.check_ends(contact)?;
-        let slender = patches.iter().map(WheelPatch::patch).find(|patch| {
-            let [rear, front, low, high] = patch.extent;
-            patch.normal_force > SLENDER[1] * contact.normal_force()
-                && front - rear > SLENDER[0] * (high - low)
+        // On a steep face, the wheel's curvature along x falls with the cosine of the angle.
+        let slender_max = |angle: f64| {
+            let steep = STEEP / angle.cos().clamp(COSINE_LEAST, STEEP);
+            SLENDER_MAX * steep.powf(2.0 / 3.0)
+        };
+        let slender = patches.iter().find_map(|on_rail| {
+            let Patch {
+                extent: [rear, front, low, high],
+                normal_force,
+                ..
+            } = on_rail.patch();
+            let (length, width, most) =
+                (front - rear, high - low, slender_max(on_rail.place.angle));
+            let counts = normal_force > SLENDER_SHARE * contact.normal_force();
+            (counts && length > most * width).then_some([length, width, most])
         });
-        if let Some(Patch { extent, .. }) = slender.filter(|_| !self.curve.is_flat()) {
-            let [rear, front, low, high] = extent;
+        if let Some([length, width, most]) = slender.filter(|_| !self.curve.is_flat()) {
             return Err(SolveError::NormalProblem {
                 reason: format!(
-                    "a patch on the curve of the rail is {} mm long and {} mm wide, more than {} times as long as wide, as on a ridge; \
+                    "a patch on the curve of the rail is {} mm long and {} mm wide, more than {most:.0} times as long as wide, as on a ridge; \
                      smooth the profiles, or give reference_surface \"plane\"",
-                    short(front - rear),
-                    short(high - low),
-                    SLENDER[0]
+                    short(length),
+                    short(width)
                 ),
             });
         }

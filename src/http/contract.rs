@@ -286,8 +286,9 @@ const MEMBERS: [(&str, usize, Option<usize>); 3] = [
 ];
 
 /// Members that are lists of so many numbers, or lists of those.
-const TUPLES: [(&str, &str, usize); 37] = [
+const TUPLES: [(&str, &str, usize); 38] = [
     ("ArchardFigures", "speeds_mm_per_s", 2),
+    ("CrossSection", "guard_rail_points_mm", 2),
     ("CrossSection", "points_mm", 2),
     ("EquivalentConicity", "turns_mm", 2),
     ("FirstTouch", "rail_mm", 2),

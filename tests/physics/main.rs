@@ -35,6 +35,7 @@ mod gap_samples;
 mod gap_two_patches;
 mod golden;
 mod gradients;
+mod guard_rail;
 mod held_out;
 mod hertz;
 mod histories;

@@ -326,6 +326,24 @@ pub(crate) fn profile_at(
     body: Body,
     section: &CrossSection,
 ) -> Result<Profile, Fault> {
+    let profile = own_profile(pointer, body, section)?;
+    let Some(points) = &section.guard_rail_points_mm else {
+        return Ok(profile);
+    };
+    let fault = |detail| Fault::new(format!("{pointer}/guard_rail_points_mm"), detail);
+    if body == Body::Wheel {
+        return Err(fault(
+            "given for a wheel; only a rail has a guard rail beside it".to_owned(),
+        ));
+    }
+    let unit_mm = section.unit.map_or(1.0, |unit| LengthUnit::from(unit).mm());
+    profile
+        .with_guard_rail(&scaled(points, unit_mm))
+        .map_err(fault)
+}
+
+/// The profile of a rail without a guard rail, or of a wheel.
+fn own_profile(pointer: &str, body: Body, section: &CrossSection) -> Result<Profile, Fault> {
     let name = body.name();
     let reading = Reading {
         mirror_y: section.mirror_y,
@@ -336,10 +354,6 @@ pub(crate) fn profile_at(
         },
     };
     let stated_mm = section.unit.map(|unit| LengthUnit::from(unit).mm());
-    let scaled = |points: &[[f64; 2]], scale: f64| -> Vec<[f64; 2]> {
-        let scaled = points.iter().map(|point| point.map(|part| part * scale));
-        scaled.collect()
-    };
     let (Some(format), Some(text)) = (section.format, &section.text) else {
         let points = section.points_mm.as_deref().unwrap_or_default();
         let profile = match stated_mm {
@@ -387,6 +401,11 @@ pub(crate) fn profile_at(
         });
     }
     Ok(profile)
+}
+
+fn scaled(points: &[[f64; 2]], scale: f64) -> Vec<[f64; 2]> {
+    let scaled = points.iter().map(|point| point.map(|part| part * scale));
+    scaled.collect()
 }
 
 /// What the format of a file specifies about the senses of its points.

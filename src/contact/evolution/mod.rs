@@ -506,6 +506,12 @@ mod tests {
                 "50000",
             ),
             (
+                "/template/contact/rail/guard_rail_points_mm",
+                json!([[-80.0, 0.0]]),
+                "/template/contact/rail/guard_rail_points_mm",
+                "running rail",
+            ),
+            (
                 "/template/contact/type",
                 json!("radii"),
                 "/template/contact/type",

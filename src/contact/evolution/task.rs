@@ -258,6 +258,12 @@ fn not_profiles() -> CaseError {
     Fault::new("/template/contact/type", detail).into()
 }
 
+/// Guard rails do not wear.
+fn guard_rail(section: &str) -> Fault {
+    let detail = "given for an evolution; only a running rail and a wheel wear, leave it out";
+    Fault::new(format!("{section}/guard_rail_points_mm"), detail)
+}
+
 /// The template with the outputs that wear needs.
 fn template(plan: &EvolutionWords) -> Result<Value, CaseError> {
     let mut template = plan.template.clone();
@@ -269,6 +275,9 @@ fn template(plan: &EvolutionWords) -> Result<Value, CaseError> {
             let pointer = format!("/template/contact/{body}/smoothing_mm");
             let detail = "\"auto\" given; a length in mm is needed, since the sections change";
             return Err(Fault::new(pointer, detail).into());
+        }
+        if !template["contact"][body]["guard_rail_points_mm"].is_null() {
+            return Err(guard_rail(&format!("/template/contact/{body}")).into());
         }
     }
     if template["solver"]["method"] == "table" {
@@ -336,7 +345,11 @@ fn events(plan: &mut EvolutionWords) -> Result<Vec<PlannedEvent>, CaseError> {
             (Body::Wheel, &event.reprofile, "reprofile"),
         ];
         let sections = bodies.map(|(body, section, name)| {
-            let found = profile_at(&format!("/events/{k}/{name}"), body, section.as_ref()?);
+            let (section, pointer) = (section.as_ref()?, format!("/events/{k}/{name}"));
+            if section.guard_rail_points_mm.is_some() {
+                faults.push(guard_rail(&pointer));
+            }
+            let found = profile_at(&pointer, body, section);
             let found = found.map_err(|fault| faults.push(fault)).ok()?;
             Some(sampled(&found))
         });

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use railhead_macros::Named;
 
 use crate::contact::geometry::orientation::{
-    self, Flange, FormatSenses, FoundSenses, StatedSenses, SureBody,
+    self, Flange, FormatSenses, FoundSenses, Senses, StatedSenses, SureBody,
 };
 use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::contact::geometry::profile_quality::{Points, PointsRead};
@@ -29,6 +29,10 @@ pub const POINTS_MAX: usize = 20_000;
 pub(crate) const POINT_SPACING: f64 = 0.25;
 /// Length in mm of profile needed beyond a contact; with less there is a remark.
 pub(crate) const NEEDED_BEYOND: f64 = 5.0;
+/// Least depth in mm of the groove beside a guard rail below the highest point of the running rail: twice the height of a flange.
+const GROOVE_DEPTH: f64 = 60.0;
+/// Least depth in mm of the groove below the points at its sides.
+const GROOVE_WALL: f64 = 5.0;
 /// Points nearer to each other than this are one, in mm.
 pub(crate) const NEAR: f64 = 1e-3;
 /// Cosine of the turn from which on a point runs back against its neighbours: 102°, which no corner of a measured profile has, while points
@@ -80,6 +84,10 @@ struct MeasuredCurve {
     rounding: Option<f64>,
     /// Step of which all given coordinates are multiples, in mm.
     digits: f64,
+    /// The senses of the given points.
+    senses: Senses,
+    /// Points of a guard rail and of the groove, before those of the running rail.
+    beside: usize,
     flange: Option<Flange>,
     sure_body: LazyField<Option<SureBody>>,
 }
@@ -136,7 +144,7 @@ impl Profile {
                 unit: unit.name(),
             });
         }
-        let flange = orient(body, &mut points, reading, format, &mut remarks)?;
+        let (senses, flange) = orient(body, &mut points, reading, format, &mut remarks)?;
         straighten(body, &mut points, &mut remarks)?;
         cut_stray_ends(body, &mut points, &mut remarks);
         let given = points.len();
@@ -154,26 +162,61 @@ impl Profile {
                 points.len()
             ));
         }
-        if let Some([first, second]) = plane_curve::first(&points) {
-            return Err(format!(
-                "the profile runs through itself near [{:.3}, {:.3}] and [{:.3}, {:.3}]; loops are refused",
-                first[0], -first[1], second[0], -second[1]
-            ));
-        }
-        let mut along = vec![0.0];
-        for pair in points.windows(2) {
-            along.push(along[along.len() - 1] + distance(pair[0], pair[1]));
-        }
         let measured = MeasuredCurve {
+            along: lengths(&points)?,
             points,
-            along,
             smoothing: reading.smoothing,
             rounding,
             digits,
+            senses,
+            beside: 0,
             flange,
             sure_body: LazyField::default(),
         };
         Ok(Profile::of(measured, remarks))
+    }
+
+    /// The profile of a rail together with a guard rail at the side of the track centre, whose points are given in the same senses. A groove joins the two,
+    /// so deep that no wheel reaches its bottom.
+    ///
+    /// # Errors
+    /// A sentence: numbers that are not finite, an arc length outside 5 to 500 mm, loops, or a guard rail that is not beside the rail.
+    pub fn with_guard_rail(&self, points: &[[f64; 2]]) -> Result<Profile, String> {
+        let own = &self.measured;
+        let mut joined = orientation::in_senses(&checked(points)?, own.senses);
+        let length = arc_length(&joined);
+        let [shortest, longest] = ARC_LENGTH;
+        if !(shortest..=longest).contains(&length) {
+            return Err(format!(
+                "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed"
+            ));
+        }
+        joined.dedup_by(|after, before| distance(*after, *before) < NEAR);
+        let [end, _] = self.width();
+        let reach = joined
+            .iter()
+            .map(|at| at[0])
+            .fold(f64::NEG_INFINITY, f64::max);
+        if reach >= end {
+            return Err(format!(
+                "the guard rail reaches y = {reach:.2} mm (positive to the field side), and the running rail begins at {end:.2} mm; a guard rail lies at the side \
+                 of the track centre, beside the running rail"
+            ));
+        }
+        let heights = own.points.iter().map(|at| at[1]);
+        let top = heights.fold(f64::NEG_INFINITY, f64::max);
+        let [from, to] = [joined[joined.len() - 1], own.points[0]];
+        let bottom = from[1].min(to[1]).min(top - GROOVE_DEPTH) - GROOVE_WALL;
+        joined.extend([[from[0], bottom], [to[0], bottom]]);
+        let beside = joined.len();
+        joined.extend(&own.points);
+        let measured = MeasuredCurve {
+            along: lengths(&joined)?,
+            points: joined,
+            beside,
+            ..(**own).clone()
+        };
+        Ok(Profile::of(measured, self.remarks.clone()))
     }
 
     fn of(measured: MeasuredCurve, remarks: Vec<Remark>) -> Profile {
@@ -196,7 +239,7 @@ impl Profile {
 
     /// The body that its points show without doubt.
     pub(crate) fn sure_body(&self) -> Option<SureBody> {
-        let points = &self.measured.points;
+        let points = &self.measured.points[self.measured.beside..];
         *self
             .measured
             .sure_body
@@ -208,9 +251,15 @@ impl Profile {
         self.measured.flange
     }
 
-    /// Least and largest y of the points in mm.
+    /// First parameter of a wheel or of a running rail: behind a guard rail and the groove.
+    pub(crate) fn first(&self) -> f64 {
+        self.measured.along[self.measured.beside]
+    }
+
+    /// Least and largest y of the points in mm, without a guard rail.
     pub(crate) fn width(&self) -> [f64; 2] {
-        let y = || self.measured.points.iter().map(|at| at[0]);
+        let points = &self.measured.points[self.measured.beside..];
+        let y = || points.iter().map(|at| at[0]);
         [
             y().fold(f64::INFINITY, f64::min),
             y().fold(f64::NEG_INFINITY, f64::max),
@@ -309,14 +358,15 @@ fn arc_length(points: &[[f64; 2]]) -> f64 {
         .sum()
 }
 
-/// Brings the points to y toward the field side, z up, and increasing y from the first to the last. Returns the flange of a wheel.
+/// Brings the points to y toward the field side, z up, and increasing y from the first to the last. Returns the senses and the flange of a
+/// wheel.
 fn orient(
     body: Body,
     points: &mut Vec<[f64; 2]>,
     reading: Reading,
     format: FormatSenses,
     remarks: &mut Vec<Remark>,
-) -> Result<Option<Flange>, String> {
+) -> Result<(Senses, Option<Flange>), String> {
     let stated = StatedSenses {
         mirror_y: reading.mirror_y,
         mirror_z: reading.mirror_z,
@@ -364,7 +414,7 @@ fn orient(
         Body::Wheel => None,
     };
     *points = orientation::in_senses(points, senses);
-    Ok(flange)
+    Ok((senses, flange))
 }
 
 /// The width of a section, and the unit in which it would be that of a usual rail head or wheel, if that is not mm.
@@ -423,6 +473,21 @@ fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Rema
         distance_mm,
     };
     remarks.extend([last, first].into_iter().flatten().map(dropped));
+}
+
+/// Lengths of the chords up to each point.
+fn lengths(points: &[[f64; 2]]) -> Result<Vec<f64>, String> {
+    if let Some([first, second]) = plane_curve::first(points) {
+        return Err(format!(
+            "the profile runs through itself near [{:.3}, {:.3}] and [{:.3}, {:.3}]; loops are refused",
+            first[0], -first[1], second[0], -second[1]
+        ));
+    }
+    let mut along = vec![0.0];
+    for pair in points.windows(2) {
+        along.push(along[along.len() - 1] + distance(pair[0], pair[1]));
+    }
+    Ok(along)
 }
 
 fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {

@@ -442,12 +442,13 @@ impl WheelRail {
 /// The end of the points may lie above the height of the gauge by this much in mm: rounding of a rail measured down to it.
 const GAUGE_ROUNDING: f64 = 1e-6;
 
-/// Where the origin of a rail's profile lies, `[y, z]` in mm, y from the middle of the track to the field side.
+/// Where the origin of a running rail's profile lies, `[y, z]` in mm, y from the middle of the track to the field side.
 fn origin(rail: &Profile, placement: &Placement) -> Result<[f64; 2], NotPlaced> {
     let canted = rail.curve().placed(placement.cant, [0.0; 2], 1.0);
     let places: Vec<[f64; 2]> = canted
         .parameters(0.05)
         .into_iter()
+        .filter(|s| *s >= rail.first())
         .map(|s| canted.at(s).at)
         .collect();
     let top = places

@@ -5,6 +5,7 @@
 //! between the patches.
 
 use std::borrow::Cow;
+use std::f64::consts::PI;
 
 use crate::contact::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve, SPACING};
 use crate::contact::half_space::bent_surface::{
@@ -48,8 +49,16 @@ const FORCE: f64 = 2e-5;
 const FORCE_POOR: f64 = 5e-3;
 /// Least lowering of the wheel in mm that is tried.
 const LOWERING_LEAST: f64 = 1e-4;
+/// Largest lowering in mm of a wheel that rests where it touches first.
+const LOWERING_USUAL: f64 = 1.0;
 /// The gap is computed again where the height has changed by more than this part of the deepest overlap; up to there it is linear in the height.
 const LINEAR: f64 = 0.05;
+/// Faces are steep where the cosine of their angle is less than this.
+pub(crate) const STEEP: f64 = 0.26;
+/// Steps in mm in which a wheel slides down along steep faces, their number, and how exact its place is.
+const SLIDE_STEP: f64 = 0.5;
+const SLIDE_STEPS: u32 = 120;
+const SLIDE_EXACT: f64 = 2e-3;
 /// Steeper strips count in the search for the height as if their angle had this cosine.
 const COSINE_LEAST: f64 = 0.1;
 
@@ -172,11 +181,15 @@ impl CurveTask<'_> {
             WheelLoad::Lowering(lowering) => lowering,
             _ => self.expected.max(LOWERING_LEAST),
         };
+        // A little more than the lowering still fits.
+        let deepest = |lowering: f64| self.touch - lowering - 0.1 * lowering.min(LOWERING_USUAL);
+        let mut overlaps = self.curve.overlaps(deepest(lowering));
+        if let Some(lower) = self.below_steep_faces(lowering, &overlaps)? {
+            lowering = lower;
+            overlaps = self.curve.overlaps(deepest(lowering));
+        }
         let mut last = None;
         for _ in 0..GRIDS_MAX {
-            // So that a little more than the lowering still fits.
-            let deepest = self.touch - 1.1 * lowering;
-            let overlaps = self.curve.overlaps(deepest);
             let grid = self.over_overlaps(lowering, &overlaps)?;
             let centre = self.touch - lowering;
             let over = grid.over(self.curve, centre);
@@ -201,20 +214,56 @@ impl CurveTask<'_> {
             let found = self.roughly().settled(start, &none, workspace, monitor)?;
             let next = self.touch - found.centre;
             let close = (next / lowering - 1.0).abs() < 0.1;
-            lowering = next.max(LOWERING_LEAST);
             let found = last.insert(found);
-            found.overlaps = (
-                deepest,
-                overlaps.iter().map(|overlap| ends(overlap)).collect(),
-            );
+            let ends = overlaps.iter().map(|overlap| ends(overlap)).collect();
+            found.overlaps = (deepest(lowering), ends);
+            lowering = next.max(LOWERING_LEAST);
             if self.influence == Influence::HalfSpace {
                 found.runs = found.grid.joined(found.grid.runs(&found.pressure));
             }
             if close {
                 break;
             }
+            overlaps = self.curve.overlaps(deepest(lowering));
         }
         last.ok_or_else(|| NormalError::NoAnswer("no grid of the contact was found".to_owned()))
+    }
+
+    /// A lowering in mm to begin with in place of the expected one where the bodies overlap on steep faces only, if there is one: along those the wheel
+    /// slides down to where other places carry it.
+    fn below_steep_faces(
+        &self,
+        expected: f64,
+        overlaps: &[Vec<Nearest>],
+    ) -> Result<Option<f64>, NormalError> {
+        let wanted = self.wanted_force(&Friction::default())?;
+        let Some(wanted) = wanted.filter(|_| overlaps.iter().flatten().all(is_steep)) else {
+            return Ok(None);
+        };
+        let overlaps = |lowering: f64| self.curve.overlaps(self.touch - lowering);
+        let carries = |lowering: f64| self.carried_apart_from_steep(&overlaps(lowering)) >= wanted;
+        let lowerings = (1..SLIDE_STEPS).map(|k| expected + SLIDE_STEP * f64::from(k));
+        let Some(carrying) = lowerings.into_iter().find(|lowering| carries(*lowering)) else {
+            return Ok(None);
+        };
+        let (mut low, mut width) = (carrying - SLIDE_STEP, SLIDE_STEP);
+        while width > SLIDE_EXACT {
+            width *= 0.5;
+            low += if carries(low + width) { 0.0 } else { width };
+        }
+        Ok(Some(low + width))
+    }
+
+    /// About the force in N that overlaps carry apart from steep faces: each as a circle of half of its area, pressed by a sphere.
+    fn carried_apart_from_steep(&self, overlaps: &[Vec<Nearest>]) -> f64 {
+        let of_overlap = |overlap: &Vec<Nearest>| {
+            let flat = || overlap.iter().filter(|at| !is_steep(at));
+            let lengths = flat().map(|at| 2.0 * self.curve.half_length(&at.wheel));
+            let area = 0.5 * SPACING * lengths.sum::<f64>();
+            let depth = flat().map(|at| -at.wheel.gap).fold(0.0, f64::max);
+            4.0 / 3.0 * self.elasticity.contact_modulus() * depth * (area / PI).sqrt()
+        };
+        overlaps.iter().map(of_overlap).sum()
     }
 
     /// Brings the wheel to rest on a grid as fine as the answer needs.
@@ -571,13 +620,21 @@ impl CurveTask<'_> {
                     over,
                 });
             }
-            sum = sum.map(|sum| sum / (1.0 + missed));
+            sum = sum.map(|sum| match self.loading {
+                WheelLoad::Normal(_) => sum / (1.0 + missed),
+                _ => sum - missed * wanted.unwrap_or(0.0),
+            });
             if !is_linear {
                 over = grid.over(self.curve, centre);
             }
         }
         unreachable!("the last height ends the search")
     }
+}
+
+/// Whether a place is too steep to carry a wheel.
+fn is_steep(at: &Nearest) -> bool {
+    at.place.angle.cos() < STEEP
 }
 
 /// The ends of an overlap along the arc length in mm.
@@ -631,8 +688,8 @@ fn first_pressure(gap: &[f64], depth: f64, cell: f64, elasticity: &Elasticity) -
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
     let part = |gap: &f64| (1.0 - 2.0 * (gap - least) / depth).max(0.0);
     let inside = gap.iter().filter(|gap| part(gap) > 0.0).count();
-    let radius = (inside as f64 * cell / std::f64::consts::PI).sqrt();
-    let largest = elasticity.contact_modulus() * depth / (std::f64::consts::PI * radius);
+    let radius = (inside as f64 * cell / PI).sqrt();
+    let largest = elasticity.contact_modulus() * depth / (PI * radius);
     gap.iter().map(|gap| largest * part(gap).sqrt()).collect()
 }
 
