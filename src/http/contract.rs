@@ -223,7 +223,7 @@ macro_rules! examples {
 }
 
 /// Name, summary and text of each.
-pub(super) const EXAMPLES: [(&str, &str, &str); 17] = examples! {
+pub(super) const EXAMPLES: [(&str, &str, &str); 18] = examples! {
     "hertz-steel": "A wheel on a rail by its radii, with both creepages and spin";
     "spin": "An ellipse with lateral creepage and spin";
     "uic60-crown": "A wheel on a UIC60-like crown of arcs, as a measured gap: region and pressure are found";
@@ -231,6 +231,7 @@ pub(super) const EXAMPLES: [(&str, &str, &str); 17] = examples! {
     "two-patches": "A gap on a grid with two contact patches";
     "wheel-rail": "A wheel on a rail by their cross-sections, under a vertical force, with the motion of the wheelset";
     "wheel-rail-flange": "A wheel on a rail by their cross-sections, touching at the gauge corner and at the flange";
+    "guard-rail": "A wheel on a rail with a guard rail beside it, which the back of the flange touches";
     "wheelset": "A wheelset on both rails at three shifts, rolling freely, with its equivalent conicity";
     "maintenance": "What one wheel does to a rail: stresses below the worst point, wear and fatigue, temperatures";
     "friction": "A creep curve of a wet rail: friction that falls with slip, and a layer between the bodies";

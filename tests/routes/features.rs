@@ -265,6 +265,18 @@ fn profiles_with_wheelset() -> Feature {
     feature
 }
 
+/// The back of the flange on a guard rail beside the rail, in two of its rows.
+fn guard_rail() -> Feature {
+    let text = include_str!("../../api/examples/guard-rail.case.json");
+    let example: Value = serde_json::from_str(text).expect("an example");
+    let mut feature = profiles_with_wheelset()
+        .named("profiles with a guard rail")
+        .with("/contact", example["contact"].clone())
+        .with("/solver", json!({ "target_error": 0.02 }));
+    feature.columns = vec![("/contact/lateral_shift_mm", [4.25, 3.0, 4.24])];
+    feature
+}
+
 fn wheelset() -> Feature {
     let mut contact = wheel_on_rail();
     let members = contact.as_object_mut().expect("a contact");
@@ -333,7 +345,7 @@ fn questions() -> Vec<Feature> {
         json!(["tractions", "pressure", "slip"]),
         json!(["resultants", "zones", "tractions"]),
     ];
-    let mut features = vec![approached];
+    let mut features = vec![approached, guard_rail()];
     features.extend(of_outputs.map(|outputs| {
         radii()
             .named(&format!("outputs {outputs}"))

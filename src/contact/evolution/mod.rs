@@ -506,8 +506,8 @@ mod tests {
                 "50000",
             ),
             (
-                "/template/contact/rail/guard_rail_points_mm",
-                json!([[-80.0, 0.0]]),
+                "/template/contact/rail",
+                json!({ "guard_rail_points_mm": [[-80.0, 0.0]] }),
                 "/template/contact/rail/guard_rail_points_mm",
                 "running rail",
             ),
