@@ -11,9 +11,9 @@ use crate::contact::rolling::task::Resolution;
 use crate::contact::solution::words::answer::{Fields, Solution};
 
 /// Most motions of a slice. Few motions keep the time short that other jobs wait; each slice finds region and pressure again. Chosen by judgement.
-///
-/// The second where a motion takes long: unlike bodies, whose motions each have a pressure of their own, and fine meshes.
-const MOTIONS_MAX: [usize; 2] = [100, 10];
+const MOTIONS_MAX: usize = 100;
+/// The same where a motion takes long: unlike bodies, whose motions each have a pressure of their own, and fine meshes.
+const MOTIONS_MAX_LONG: usize = 10;
 /// Targets below this one need fine meshes.
 const TARGET_FINE: f64 = 0.002;
 /// An explicit mesh is fine from this number of cells on.
@@ -33,8 +33,8 @@ pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
         Resolution::Mesh(size) => size.strips * size.cells >= CELLS_FINE,
     };
     let most = match is_fine || case.problem.is_coupled(&case.run) {
-        true => MOTIONS_MAX[1],
-        false => MOTIONS_MAX[0],
+        true => MOTIONS_MAX_LONG,
+        false => MOTIONS_MAX,
     };
     let parts = motions.div_ceil(most).max(1);
     let start = |part: usize| part * motions / parts;

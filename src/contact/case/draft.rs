@@ -24,8 +24,10 @@ use crate::contact::method::Method;
 const NAME_LENGTH_MAX: usize = 200;
 /// Most labels of a case.
 const LABELS_MAX: usize = 32;
-/// Most characters of the key of a label, and of its value.
-const LABEL_LENGTHS_MAX: [usize; 2] = [64, 256];
+/// Most characters of the key of a label.
+const LABEL_KEY_LENGTH_MAX: usize = 64;
+/// Most characters of its value.
+const LABEL_VALUE_LENGTH_MAX: usize = 256;
 
 /// What could be read of a case: the parts without a fault.
 ///
@@ -189,13 +191,14 @@ fn labels(case: &mut Object) -> BTreeMap<String, String> {
         );
         return labels;
     }
-    let [key_max, value_max] = LABEL_LENGTHS_MAX;
     for (key, value) in members {
         let length = key.chars().count();
-        if length == 0 || length > key_max {
+        if length == 0 || length > LABEL_KEY_LENGTH_MAX {
             case.faults().add(
                 join(&pointer, key),
-                format!("a key of {length} characters given; 1 to {key_max} are allowed"),
+                format!(
+                    "a key of {length} characters given; 1 to {LABEL_KEY_LENGTH_MAX} are allowed"
+                ),
             );
         } else if has_controls(key) || key.contains(':') {
             case.faults().add(
@@ -207,14 +210,14 @@ fn labels(case: &mut Object) -> BTreeMap<String, String> {
         }
         match value.as_str() {
             Some(text)
-                if text.chars().count() <= value_max && !has_controls(text) =>
+                if text.chars().count() <= LABEL_VALUE_LENGTH_MAX && !has_controls(text) =>
             {
                 labels.insert(key.clone(), text.to_owned());
             }
             _ => case.faults().add(
                 join(&pointer, key),
                 format!(
-                    "{} given; a text of at most {value_max} characters without control characters is needed",
+                    "{} given; a text of at most {LABEL_VALUE_LENGTH_MAX} characters without control characters is needed",
                     shown(value)
                 ),
             ),

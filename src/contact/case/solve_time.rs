@@ -17,9 +17,9 @@ use crate::contact::rolling::task::{Resolution, TARGET_LEAST, TARGET_USUAL};
 
 /// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`], from which on the bound of the creep table usually meets the
 /// target where the table is taken.
-///
-/// The second number is the power with which the time grows as the target falls.
-const MOTION_SECONDS: [f64; 2] = [3e-4, 1.4];
+const MOTION_SECONDS: f64 = 3e-4;
+/// Power with which the time grows as the target falls.
+const TARGET_POWER: f64 = 1.4;
 /// Time of a motion with spin, with a prescribed force, or with friction that depends on slip, over that of one without; of a wheel on profiles that are
 /// judged by other readings; and of a position of a wheelset, or of a wheel that is to carry prescribed forces.
 const HARD_TIMES: f64 = 3.0;
@@ -121,11 +121,11 @@ impl CheckedCase {
 
     fn to_target(&self, patches: usize, target: f64) -> f64 {
         let by_table = target >= TARGET_USUAL && !self.run.needs_cells();
-        let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(MOTION_SECONDS[1]);
+        let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_POWER);
         let motions = 0..self.problem.motions.len();
         let seconds = motions.map(|k| match by_table && self.may_take_table(k) {
             true => TABLE_SECONDS,
-            false => self.hardness(k) * MOTION_SECONDS[0] * finer * patches as f64,
+            false => self.hardness(k) * MOTION_SECONDS * finer * patches as f64,
         });
         seconds.sum()
     }

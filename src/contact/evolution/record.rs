@@ -18,10 +18,14 @@ use crate::contact::solution::words::evolution::{
     StateContact, WearUncertainty, WornBody,
 };
 
-/// Depth in mm of W2 below the top of the rail, and of the flange's thickness below the tread.
-const DEPTHS: [f64; 2] = [14.0, 10.0];
-/// Amplitude of the conicity in mm, as EN 15302 has it, and the reach and the step of the shifts that are sampled.
-const CONICITY: [f64; 3] = [3.0, 8.0, 0.25];
+/// Depth of W2 below the top of the rail in mm.
+const GAUGE_DEPTH: f64 = 14.0;
+/// Depth of the flange's thickness below the tread in mm.
+const FLANGE_DEPTH: f64 = 10.0;
+/// Amplitude of the conicity in mm, as EN 15302 has it.
+const AMPLITUDE: f64 = 3.0;
+/// Reach and step in mm of the shifts that are sampled for it.
+const SHIFTS: [f64; 2] = [8.0, 0.25];
 /// Samples of the wear coefficients.
 const SAMPLES: u32 = 2000;
 
@@ -93,7 +97,7 @@ fn losses(bodies: &[BodyState; 2]) -> WearLosses {
     };
     let heights = rail.start_mm.iter().map(|at| at[1]);
     let top = heights.fold(f64::INFINITY, f64::min);
-    let gauge = [-1e3, top + DEPTHS[0]];
+    let gauge = [-1e3, top + GAUGE_DEPTH];
     let face = distance(&rail.start_mm, gauge, [1.0, 0.0]);
     let below = [0.0, 1e3];
     let tread = distance(&wheel.start_mm, below, [0.0, -1.0]);
@@ -102,7 +106,7 @@ fn losses(bodies: &[BodyState; 2]) -> WearLosses {
         gauge_face_mm: loss(rail, gauge, [1.0, 0.0]),
         gauge_corner_mm: face.and_then(|y| loss(rail, [y - 1e3, top], [FRAC_1_SQRT_2; 2])),
         tread_mm: loss(wheel, below, [0.0, -1.0]),
-        flange_mm: tread.and_then(|off| loss(wheel, [0.0, 1e3 - off + DEPTHS[1]], [-1.0, 0.0])),
+        flange_mm: tread.and_then(|off| loss(wheel, [0.0, 1e3 - off + FLANGE_DEPTH], [-1.0, 0.0])),
     }
 }
 
@@ -126,7 +130,7 @@ fn conicity(task: &Evolution, bodies: &[BodyState; 2]) -> Option<f64> {
         WheelRail::new(rail.clone(), wheel.clone(), placement).ok()
     };
     let mut pair = PairOfRails::new([on(Side::Left)?, on(Side::Right)?]);
-    let [amplitude, reach, step] = CONICITY;
+    let [reach, step] = SHIFTS;
     let count = (reach / step) as i32;
     let shifts = (-count..=count).map(|k| step * f64::from(k));
     let poses = shifts.filter_map(|shift| {
@@ -138,7 +142,7 @@ fn conicity(task: &Evolution, bodies: &[BodyState; 2]) -> Option<f64> {
     if shifts.len() < 2 {
         return None;
     }
-    let found = RadiusDifference::new(shifts, differences).conicity(amplitude);
+    let found = RadiusDifference::new(shifts, differences).conicity(AMPLITUDE);
     found.ok().map(|found| found.conicity)
 }
 

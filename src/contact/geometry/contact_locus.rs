@@ -20,7 +20,8 @@ const LOWERING_FIRST: f64 = 0.032;
 /// Lowerings that are tried for an estimate at most, and part of the force to the power 2/3 that ends it: where one patch carries the force, two or
 /// three tries do. Like the one before they decide which height is tried first. Chosen by judgement: the estimate itself is some per cent off, and
 /// whether a looser end is as good was not measured.
-const LOWERINGS_TRIED: (usize, f64) = (10, 2e-3);
+const LOWERINGS_TRIED: usize = 10;
+const ESTIMATED: f64 = 2e-3;
 
 /// Rail and wheel above each other, line by line along x.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,9 +150,9 @@ impl<'g> ContactLocus<'g> {
         // The estimate jumps where one more line overlaps: the bracket is kept.
         let (mut low, mut high) = ([0.0_f64; 2], None::<[f64; 2]>);
         let mut lowering = LOWERING_FIRST;
-        for _ in 0..LOWERINGS_TRIED.0 {
+        for _ in 0..LOWERINGS_TRIED {
             let found = power(lowering);
-            if (found / wanted - 1.0).abs() < LOWERINGS_TRIED.1 {
+            if (found / wanted - 1.0).abs() < ESTIMATED {
                 break;
             }
             if found < wanted {

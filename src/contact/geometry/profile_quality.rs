@@ -16,10 +16,14 @@ use crate::contact::numerics::lu::first_coefficient;
 
 /// Chords in one window of the noise estimate.
 const NOISE_CHORDS: usize = 4;
-/// Largest length of a window in mm, of fine and of coarse points: over longer ones the shape itself differs from a cubic.
-const SPAN_MAX: [f64; 2] = [3.0, 12.0];
-/// Fewest windows for the median of fine points and for the quartile of coarse ones.
-const WINDOWS_MIN: [usize; 2] = [12, 30];
+/// Largest length of a window in mm: over longer ones the shape itself differs from a cubic.
+const NOISE_SPAN_MAX: f64 = 3.0;
+/// Largest length of a window of coarse points in mm.
+const COARSE_SPAN_MAX: f64 = 12.0;
+/// Fewest windows for a median.
+const WINDOWS_MIN: usize = 12;
+/// Fewest windows of coarse points for a quartile.
+const COARSE_WINDOWS_MIN: usize = 30;
 /// Noise in mm that the quartile finds in the shape alone, for points 1 mm apart; it grows with the fourth power of their distance.
 ///
 /// Population: sound rails and wheels of the class *damaged profile* with true points 0.8 to 4 mm apart: 0.002 to 0.1 µm at 1 mm, each of them
@@ -27,8 +31,10 @@ const WINDOWS_MIN: [usize; 2] = [12, 30];
 const COARSE_SHAPE: f64 = 6e-5;
 /// Distance of the points in mm up to which the shape of sound profiles contributes less than 0.2 µm, or 1 % of a usual pressure.
 const COARSE_TELLS: f64 = 1.8;
-/// Lower quartile and median of the absolute value of a normal variable of deviation 1.
-const OF_NORMAL: [f64; 2] = [0.3186, 0.6745];
+/// Lower quartile of the absolute value of a normal variable of deviation 1.
+const QUARTILE_OF_NORMAL: f64 = 0.3186;
+/// Median of the absolute value of a normal variable of deviation 1.
+const MEDIAN_OF_NORMAL: f64 = 0.6745;
 /// Deviation, in local medians, from which a point is an outlier. Population: seeded damage of the stress bench (class *damaged profile*);
 /// an outlier of 2 µm may cause half of the largest pressure.
 const ODD_MEDIANS: f64 = 12.0;
@@ -54,7 +60,8 @@ const KINKS_MIN: usize = 4;
 /// Least ratio of the sum of the turns at kinks to the sum of their magnitudes: a rail or a wheel bends to one side over many chords.
 const KINKS_ONE_WAY: f64 = 0.8;
 /// Most decimals that are looked for; with more the arithmetic of readers leaves none, and coordinates count as exact to the step after it.
-const DIGITS: (i32, f64) = (7, 1e-9);
+const DIGITS_MAX: i32 = 7;
+const DIGITS_LEAST: f64 = 1e-9;
 /// Share of neighbouring fourth differences with opposite signs above which they are those of white noise, for which it is 0.8: their
 /// correlation is −56/70. Of waves longer than four points it is 0.5 and less.
 const WHITE: f64 = 0.65;
@@ -109,22 +116,22 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
         let Some((span, difference)) = found else {
             continue;
         };
-        if span <= SPAN_MAX[0] {
+        if span <= NOISE_SPAN_MAX {
             fine.push(difference.abs());
-        } else if span <= SPAN_MAX[1] {
+        } else if span <= COARSE_SPAN_MAX {
             coarse.push(difference.abs());
             length += span;
         }
     }
-    if fine.len() >= WINDOWS_MIN[0] {
-        return Some(median(&mut fine) / OF_NORMAL[1]);
+    if fine.len() >= WINDOWS_MIN {
+        return Some(median(&mut fine) / MEDIAN_OF_NORMAL);
     }
-    if coarse.len() < WINDOWS_MIN[1] {
+    if coarse.len() < COARSE_WINDOWS_MIN {
         return None;
     }
     let spacing = length / (NOISE_CHORDS * coarse.len()) as f64;
     coarse.sort_by(f64::total_cmp);
-    let found = coarse[coarse.len() / 4] / OF_NORMAL[0];
+    let found = coarse[coarse.len() / 4] / QUARTILE_OF_NORMAL;
     // For points close enough together, the contribution of the shape is negligible.
     (spacing <= COARSE_TELLS || found > COARSE_SHAPE * spacing.powi(4)).then_some(found)
 }
@@ -291,7 +298,7 @@ fn off_neighbours(points: Points, k: usize) -> Option<f64> {
         .map(|k| points.chord(k))
         .fold(0.0, f64::max);
     let uneven = span > ODD_SPAN_MAX && longest > ODD_CHORD_MAX * span / 6.0;
-    if span > SPAN_MAX[1] || uneven || (first + 1..first + 6).any(|k| is_corner(points.at, k)) {
+    if span > COARSE_SPAN_MAX || uneven || (first + 1..first + 6).any(|k| is_corner(points.at, k)) {
         return None;
     }
     let others = [0, 1, 2, 4, 5, 6].map(|j| local[j]);
@@ -347,7 +354,7 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
 
 /// The digits that points were given with: the coarser of the steps in mm of which all y and all z are multiples, and at least 1e-9 mm.
 pub fn digits(given: &[[f64; 2]]) -> f64 {
-    let of = |part| step_of(given, part, DIGITS.0, 1e-4).unwrap_or(DIGITS.1);
+    let of = |part| step_of(given, part, DIGITS_MAX, 1e-4).unwrap_or(DIGITS_LEAST);
     of(0).max(of(1))
 }
 
@@ -417,8 +424,10 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Least length of a stray chord at an end of a profile, in mm and relative to the median chord.
-const STRAY: [f64; 2] = [10.0, 8.0];
+/// Least length in mm of a stray chord at an end of a profile.
+const STRAY: f64 = 10.0;
+/// Least length of a stray chord relative to the median chord.
+const STRAY_MEDIANS: f64 = 8.0;
 /// Most points beyond a stray chord.
 const STRAY_POINTS_MAX: usize = 2;
 
@@ -432,7 +441,7 @@ pub fn stray_ends(points: &[[f64; 2]]) -> [Option<(usize, f64)>; 2] {
     let usual = median(&mut chords.clone());
     let farthest = |from_end: &mut dyn Iterator<Item = &f64>| {
         let near = (1..).zip(from_end.copied()).take(STRAY_POINTS_MAX);
-        near.filter(|(_, chord)| *chord > STRAY[0].max(STRAY[1] * usual))
+        near.filter(|(_, chord)| *chord > STRAY.max(STRAY_MEDIANS * usual))
             .last()
     };
     [
@@ -583,7 +592,7 @@ impl ProfileStretch {
             step,
             waves,
             ambiguity,
-            everywhere: median(&mut sizes) / OF_NORMAL[1],
+            everywhere: median(&mut sizes) / MEDIAN_OF_NORMAL,
         }
     }
 
@@ -669,9 +678,10 @@ pub fn noise_pressure(modulus: f64, noise: f64, spacing: f64, cut: f64) -> f64 {
 /// gauge corners and flange roots (radii of 13 to 20 mm; 5 mm changes the largest pressure by 2 %, 10 mm by 27 % in one of ten cases).
 pub const SMOOTHING_ADVISED: [f64; 2] = [2.0, 8.0];
 /// Noise, as a share of the largest pressure, that remains after the advised smoothing. Between 0.05 and 0.1 neither pressures nor forces
-/// change by more than their scatter; population: 18 places on three pairs with noise of 1 to 20 µm. Where noise without smoothing is below the second
-/// share, none is advised.
-const NOISE_LEFT: [f64; 2] = [0.07, 0.01];
+/// change by more than their scatter; population: 18 places on three pairs with noise of 1 to 20 µm.
+const NOISE_LEFT: f64 = 0.07;
+/// Noise without smoothing, as a share of the largest pressure, below which no smoothing is advised.
+const NOISE_HARMLESS: f64 = 0.01;
 /// Smoothing length, in chords, that turns a polygon into a smooth curve; a shorter one changes no coarse points.
 pub(crate) const CHORDS: f64 = 2.0;
 /// Noise in steps of rounding: the deviation of an even distribution of width 1 is 1/√12. Up to twice this it is due to the rounding.
@@ -775,10 +785,10 @@ pub fn advised_smoothing(bodies: [Grain; 2], modulus: f64, pressure: f64) -> [f6
     let share = |body: &Grain| body.noise * body.spacing.sqrt();
     let both = share(&bodies[0]).hypot(share(&bodies[1]));
     let [least, most] = SMOOTHING_ADVISED;
-    let length = (2.34 * modulus * both / (NOISE_LEFT[0] * pressure)).powf(2.0 / 3.0);
+    let length = (2.34 * modulus * both / (NOISE_LEFT * pressure)).powf(2.0 / 3.0);
     bodies.map(|body| {
         let raw = noise_pressure(modulus, body.noise, body.spacing, 2.0 * body.spacing);
-        let of_noise = if raw < NOISE_LEFT[1] * pressure {
+        let of_noise = if raw < NOISE_HARMLESS * pressure {
             0.0
         } else {
             length.clamp(least, most)
@@ -991,7 +1001,7 @@ mod tests {
         assert_eq!(digits(&[[0.1, 1.0], [-1.0, 3.0]]), 0.1);
         let third = 1.0 / 3.0;
         assert_eq!(digits(&[[0.1, third], [0.2, 1.0]]), 0.1);
-        assert_eq!(digits(&[[third, third], [third, 1.0]]), DIGITS.1);
+        assert_eq!(digits(&[[third, third], [third, 1.0]]), DIGITS_LEAST);
     }
 
     #[test]

@@ -36,14 +36,17 @@ const FAR: f64 = 8.0;
 const FOLLOWS: f64 = 0.1;
 /// Intervals between the points along x at which the gap is computed, for a wheel without yaw, and at most; and the distance in mm across the
 /// wheel's profile for which there is one more.
-const INTERVALS: [usize; 2] = [4, 15];
+const INTERVALS: usize = 4;
+const INTERVALS_MAX: usize = 15;
 const NODE_DISTANCE: f64 = 0.1;
 /// Sections in which the least gap between two places is looked for.
 const SECTIONS: usize = 16;
 /// Circles searched from the last result on, before all are searched.
 const NEIGHBOURS: usize = 8;
 /// Newton's method for the wheel's surface: steps at most, the last step in mm, and the longest one allowed in mm.
-const STEPS: (usize, f64, f64) = (25, 1e-10, 1.0);
+const STEPS_MAX: usize = 25;
+const STEP_LAST: f64 = 1e-10;
+const STEP_LONGEST: f64 = 1.0;
 
 /// A plane of contact across the track.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -473,8 +476,7 @@ impl<'g> ReferenceCurve<'g> {
         let WheelOver {
             mut gap, mut wheel, ..
         } = *start;
-        let (steps, last_step, longest) = STEPS;
-        for _ in 0..steps {
+        for _ in 0..STEPS_MAX {
             let arm = [
                 from[0],
                 from[1] + gap * normal[0],
@@ -492,13 +494,13 @@ impl<'g> ReferenceCurve<'g> {
                 (r * missed[0] - a * missed[1]) / determinant,
                 (widening * missed[0] - normal_along * missed[1]) / determinant,
             ];
-            let [across, along_wheel] = step.map(|step| step.clamp(-longest, longest));
+            let [across, along_wheel] = step.map(|step| step.clamp(-STEP_LONGEST, STEP_LONGEST));
             if !(across.is_finite() && along_wheel.is_finite()) {
                 return None;
             }
             gap += across;
             wheel = (wheel + along_wheel).clamp(first, last);
-            if step[0].abs().max(step[1].abs()) < last_step {
+            if step[0].abs().max(step[1].abs()) < STEP_LAST {
                 let size = self.sign() * a.hypot(r);
                 let outward = [0, 1, 2].map(|k| (a * radial[k] / radius - r * axle[k]) / size);
                 let facing = outward[1] * normal[0] + outward[2] * normal[1];
@@ -518,7 +520,7 @@ impl<'g> ReferenceCurve<'g> {
     /// moves the contact across the wheel's profile.
     pub fn nodes(&self, [first, last]: [f64; 2]) -> Vec<f64> {
         let across = self.geometry.axle()[0].abs() * (last - first);
-        let intervals = (INTERVALS[0] + (across / NODE_DISTANCE) as usize).min(INTERVALS[1]);
+        let intervals = (INTERVALS + (across / NODE_DISTANCE) as usize).min(INTERVALS_MAX);
         let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
         let angle = |k: usize| std::f64::consts::PI * k as f64 / intervals as f64;
         (0..=intervals)

@@ -15,11 +15,14 @@ use crate::contact::rolling::refinement::mesh_family::{
 };
 use crate::contact::rolling::task::{Motion, Resolution, precision_of};
 
-/// Cells of the finest mesh for a target of 0.02, on average, and the power by which they grow as the target falls.
-const TARGET_CELLS: [f64; 2] = [128.0, 0.65];
-/// Bytes per cell of the finest mesh that an iteration holds (the Krylov space, iterates and buffers), and of a level that is kept (two meshes, pressure,
-/// area and bound, and what two motions left on it).
-const BYTES_PER_CELL: [f64; 2] = [512.0, 200.0];
+/// Cells of the finest mesh for a target of 0.02, on average.
+const TARGET_CELLS: f64 = 128.0;
+/// Power by which they grow as the target falls.
+const TARGET_GROWTH: f64 = 0.65;
+/// Bytes per cell of the finest mesh that an iteration holds: the Krylov space, iterates and buffers.
+const WORK_BYTES_PER_CELL: f64 = 512.0;
+/// Bytes per cell of a level that is kept: two meshes, pressure, area and bound, and what two motions left on it.
+const LEVEL_BYTES_PER_CELL: f64 = 200.0;
 /// Meshes that one motion is solved on, usually.
 const LEVELS_PER_MOTION: f64 = 4.0;
 /// Bytes of a motion in the answer, for each patch, and of its text.
@@ -117,7 +120,7 @@ impl SizeInput {
         };
         operators
             + solve
-            + cells * (BYTES_PER_CELL[0] + levels * BYTES_PER_CELL[1])
+            + cells * (WORK_BYTES_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
             + self.kept_of_history(cells)
             + motions * patches * (MOTION_BYTES + PLACE_BYTES * self.stress_points as f64)
             + fields
@@ -209,7 +212,7 @@ impl SizeInput {
     fn usual_cells(&self, finest: f64) -> f64 {
         match (self.resolution, self.method) {
             (Resolution::Target(target), Method::BoundaryElement) => {
-                finest.min(TARGET_CELLS[0] * (0.02 / target).powf(TARGET_CELLS[1]))
+                finest.min(TARGET_CELLS * (0.02 / target).powf(TARGET_GROWTH))
             }
             _ => finest,
         }

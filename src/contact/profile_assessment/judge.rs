@@ -211,7 +211,7 @@ fn roughness(
         everywhere: found.roughness.everywhere / patch.pressure,
         advised: more,
         refused: patch.load_share > LIGHT
-            && found.roughness.ambiguity > AMBIGUOUS[2] * patch.pressure.max(PRESSURE_LIGHT),
+            && found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure.max(PRESSURE_LIGHT),
         ..own.finding(patch, own.cause(advised > 0.0))
     }
 }
@@ -222,9 +222,9 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
     let length = found.chord[1] - found.chord[0];
     let hides_arc = length > CHORD_HIDES_ARC;
     let least = if hides_arc {
-        AMBIGUOUS[0]
+        AMBIGUOUS_LEAST
     } else {
-        AMBIGUOUS[1]
+        AMBIGUOUS
     };
     let open = found.roughness.ambiguity > least * patch.pressure;
     // Only a lightly loaded flange, which touches over some tenths of a mm, has patches that shorter chords are too long for.
@@ -263,13 +263,15 @@ fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
     })
 }
 
+/// Ambiguity, relative to the pressure, below which the distance of points does not matter, as on a straight stretch.
+const AMBIGUOUS_LEAST: f64 = 0.02;
 /// Ambiguity of both bodies together, relative to the largest pressure, from which coarse points get a remark.
 ///
 /// Population: as for `CHORD_HIDES_ARC` of `judge.rs`. At 0.08, 47 of 487 correct and 166 of 174 wrong answers get the remark, at 0.09 38 and
 /// 165, at 0.10 34 and 163.
-///
-/// The three: below the first the distance of points does not matter, as on a straight stretch; above the last a job fails.
-const AMBIGUOUS: [f64; 3] = [0.02, 0.09, 0.5];
+const AMBIGUOUS: f64 = 0.09;
+/// Ambiguity relative to the largest pressure that makes a job fail.
+const AMBIGUOUS_MAX: f64 = 0.5;
 /// Waviness, relative to the largest pressure, above which it is a defect even without noise, outlier or step. Two arcs that meet have
 /// some too: an unworn 60E1 reaches 0.12 at its gauge corner.
 const WAVES_BEYOND_SHAPE: f64 = 0.3;
@@ -397,7 +399,7 @@ impl Finding {
                     || self.everywhere > HARMLESS
                     || self.share > WAVES_BEYOND_SHAPE && self.load_share > LIGHT
             }
-            Cause::Coarse => self.smoothing > 0.0 || self.share > AMBIGUOUS[1],
+            Cause::Coarse => self.smoothing > 0.0 || self.share > AMBIGUOUS,
             Cause::Spacing | Cause::Hole | Cause::FlangeTip | Cause::End { .. } => true,
         }
     }

@@ -23,15 +23,19 @@ use crate::contact::wheel_on_rail;
 
 /// The companion solves use the smoothing multiplied by these factors.
 pub(crate) const COMPANIONS: [f64; 2] = [0.4, 2.0];
-/// Added to the differences of pressures and of forces, relative to the largest pressure and to μN.
-const FLOORS: [f64; 2] = [0.01, 0.003];
+/// Added to the differences, relative to the largest pressure and to μN.
+const PRESSURE_FLOOR: f64 = 0.01;
+const FORCE_FLOOR: f64 = 0.003;
 /// Uncertainty without companions: of the pressure, as a multiple of the roughness; of the force relative to μN, as a multiple of the
 /// roughness relative to the pressure.
-const BY_ROUGHNESS: [f64; 2] = [2.0, 0.1];
+const BY_ROUGHNESS: f64 = 2.0;
+const FORCE_BY_PRESSURE: f64 = 0.1;
 /// Smallest target of companions, relative to μN, and most motions that they are solved for.
-const COMPANION_WORK: (f64, usize) = (0.01, 5);
-/// Uncertainty of pressures and of forces, relative to the largest pressure and to μN, from which there is a remark.
-const OPEN: [f64; 2] = [0.06, 0.02];
+const TARGET: f64 = 0.01;
+const MOTIONS_MAX: usize = 5;
+/// Uncertainty, relative to the largest pressure and to μN, from which there is a remark.
+const PRESSURE_OPEN: f64 = 0.06;
+const FORCE_OPEN: f64 = 0.02;
 /// Largest distance across the track, in mm, between corresponding patches of a solve and its companion.
 const SAME_PLACE: f64 = 6.0;
 
@@ -49,11 +53,12 @@ pub(crate) fn add(
 ) -> Result<Vec<bool>, SolveError> {
     let motions = case.problem.motions.len();
     // The points of a history follow from each other.
-    let (_, most) = COMPANION_WORK;
-    let chosen: Vec<usize> = if motions <= most || case.problem.history.is_some() {
+    let chosen: Vec<usize> = if motions <= MOTIONS_MAX || case.problem.history.is_some() {
         (0..motions).collect()
     } else {
-        (0..most).map(|k| k * (motions - 1) / (most - 1)).collect()
+        (0..MOTIONS_MAX)
+            .map(|k| k * (motions - 1) / (MOTIONS_MAX - 1))
+            .collect()
     };
     let mut companions = Vec::new();
     let noisy = |patch: &PatchSolution| noisy(patch, contact.contact_modulus);
@@ -108,7 +113,7 @@ pub(crate) fn target_below(case: &CheckedCase, solution: &Solution) -> Option<Re
         .map(|open| open.force_x_n.max(open.force_y_n))
         .reduce(f64::max)?;
     let uncertainty = largest / limit;
-    (limit > 0.0 && uncertainty > target.max(2.0 * FLOORS[1])).then(|| {
+    (limit > 0.0 && uncertainty > target.max(2.0 * FORCE_FLOOR)).then(|| {
         Remark::TargetBelowProfileUncertainty {
             target,
             uncertainty,
@@ -182,7 +187,7 @@ fn readings(contact: &WheelTask, solution: &Solution) -> Vec<[f64; 2]> {
 fn companion(case: &CheckedCase, chosen: &[usize]) -> CheckedCase {
     CheckedCase {
         problem: case.problem.with_motions(chosen),
-        run: case.run.for_resultants(COMPANION_WORK.0),
+        run: case.run.for_resultants(TARGET),
         label: case.label.clone(),
         remarks: Vec::new(),
     }
@@ -210,9 +215,9 @@ impl Open {
     /// The uncertainty with its lower bounds added, for a given μN and largest pressure.
     fn report(self, limit: f64, pressure: f64) -> ProfileUncertainty {
         ProfileUncertainty {
-            force_x_n: self.force[0] + FLOORS[1] * limit,
-            force_y_n: self.force[1] + FLOORS[1] * limit,
-            pressure_max_mpa: self.pressure + FLOORS[0] * pressure,
+            force_x_n: self.force[0] + FORCE_FLOOR * limit,
+            force_y_n: self.force[1] + FORCE_FLOOR * limit,
+            pressure_max_mpa: self.pressure + PRESSURE_FLOOR * pressure,
         }
     }
 }
@@ -266,9 +271,9 @@ fn write(
     }
     let mut changes = Vec::with_capacity(of_patches.len());
     for (patch, open) in solution.patches.iter_mut().zip(of_patches) {
-        let limit = OPEN[1] * friction * patch.normal_force_n;
+        let limit = FORCE_OPEN * friction * patch.normal_force_n;
         changes.push(
-            open.between.pressure > OPEN[0] * patch.pressure_max_mpa
+            open.between.pressure > PRESSURE_OPEN * patch.pressure_max_mpa
                 || open
                     .between
                     .force
@@ -297,8 +302,8 @@ fn of_patch(
     limit: f64,
     rough: bool,
 ) -> OfPatch {
-    let by_points = BY_ROUGHNESS[0] * open_by_points(patch, rough);
-    let force = BY_ROUGHNESS[1] * limit * by_points / patch.pressure_max_mpa;
+    let by_points = BY_ROUGHNESS * open_by_points(patch, rough);
+    let force = FORCE_BY_PRESSURE * limit * by_points / patch.pressure_max_mpa;
     let mut open = Open::default();
     let across = |patch: &PatchSolution| patch.position.map_or(0.0, |place| place.track_mm[1]);
     let far = |other: &PatchSolution| (across(other) - across(patch)).abs();

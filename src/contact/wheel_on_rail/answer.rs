@@ -21,7 +21,8 @@ use crate::contact::wheel_on_rail::{WheelSolve, minus};
 /// Errors of the factors for the turn relative to μN: this times the standard deviation of the angle over the load, in rad, and at most that. Against
 /// boundary elements of seven wheels on rails with μ of 0.3 they are 0.2 to 1.5 % where the angle deviates by 0.07 to 0.5 rad; half of these the factors were
 /// fitted to.
-const OPEN_BY_TURN: [f64; 2] = [0.2, 0.035];
+const OPEN_BY_TURN: f64 = 0.2;
+const OPEN_MAX: f64 = 0.035;
 /// The errors by the turn grow with the difference of the two bodies' shares of the displacement, times this. On a bent surface the stiffness of a convex and
 /// of a concave body changes in opposite directions, by boundary elements of each body alone; the factors hold for their mean. The value was derived from these
 /// single-body results (about 2 in lateral forces); it was not compared with boundary elements of unequal pairs.
@@ -66,7 +67,7 @@ impl WheelSolve<'_> {
         }
         let [_, deviation] = contact.angles();
         let unequal = (2.0 * self.case.problem.elasticity.lower_share - 1.0).abs();
-        (1.0 + OPEN_BY_UNEQUAL * unequal) * (OPEN_BY_TURN[0] * deviation).min(OPEN_BY_TURN[1])
+        (1.0 + OPEN_BY_UNEQUAL * unequal) * (OPEN_BY_TURN * deviation).min(OPEN_MAX)
     }
 
     /// The answer of all parts.

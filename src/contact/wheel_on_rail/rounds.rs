@@ -24,9 +24,9 @@ const ROUNDS_MAX: u32 = 16;
 /// Part by which the gap that tractions open is off if they are taken to be proportional to the pressure.
 const FORECAST_OFF: f64 = 0.3;
 /// Change of the forces relative to μN that ends the rounds with coarse tractions. The step after it leaves about a fiftieth of that.
-///
-/// The second is the change of the vertical force, relative to it, that ends the rounds with the table.
-const CHANGE_ROUGH: [f64; 2] = [0.05, 0.02];
+const CHANGE_ROUGH: f64 = 0.05;
+/// Change of the vertical force, relative to it, that ends the rounds with the table.
+const CHANGE_TABLE: f64 = 0.02;
 /// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark, and is part of the error estimate. Where a strip at
 /// the edge of a patch comes and goes with the tractions, these jump by the error of their mesh, and rounds do not end.
 const CHANGE_POOR: f64 = 0.03;
@@ -239,12 +239,12 @@ impl WheelSolve<'_> {
             };
             let [by_lift, by_gap] = coarse.change_by(&friction, &next, self.shared());
             friction = accelerated(&friction, next, &mut earlier);
-            if by_table && by_lift <= CHANGE_ROUGH[1] {
+            if by_table && by_lift <= CHANGE_TABLE {
                 break;
             }
             coarse = task.again(coarse, &friction, workspace, self.watch)?;
             friction.opened.clone_from(&coarse.opened);
-            if !of_table && by_lift.max(by_gap / limit) <= CHANGE_ROUGH[0] {
+            if !of_table && by_lift.max(by_gap / limit) <= CHANGE_ROUGH {
                 break;
             }
         }

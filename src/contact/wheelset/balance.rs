@@ -30,11 +30,13 @@ use crate::contact::wheel_force_control::limit_and_law;
 use crate::contact::wheel_on_rail::SolvedWheel;
 use crate::contact::wheelset::kinematics;
 
-/// The heights of the centre by both wheels may differ by so much in mm; if nothing better is found, by the second with a remark. The first leaves a roll
-/// of 2e-7 rad, which moves a contact by 1e-4 mm, the second moves it by 5e-3 mm.
-const LEVEL: [f64; 2] = [3e-4, 1e-2];
+/// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
+const LEVEL: f64 = 3e-4;
+/// If nothing better is found, so much is answered with a remark: it moves a contact by 5e-3 mm.
+const LEVEL_POOR: f64 = 1e-2;
 /// A torque is balanced to this part of the target of forces, and at least to this part of the friction limit.
-const TORQUE: [f64; 2] = [0.2, 1e-4];
+const TORQUE_OF_TARGET: f64 = 0.2;
+const TORQUE_LEAST: f64 = 1e-4;
 
 /// A wheelset that is to be solved in one position.
 pub(crate) struct WheelsetSolve<'a> {
@@ -157,8 +159,8 @@ impl WheelsetSolve<'_> {
     ) -> Result<Both, SolveError> {
         let radius = 0.5 * (rigid.touches[0].radius + rigid.touches[1].radius);
         let target = self.case.run.resolution.target_or_usual();
-        let tolerance = (TORQUE[0] * target).max(TORQUE[1]);
-        let per_mm = tolerance / LEVEL[0];
+        let tolerance = (TORQUE_OF_TARGET * target).max(TORQUE_LEAST);
+        let per_mm = tolerance / LEVEL;
         // What the search calls 1: the slip at which linear theory reaches the limit of friction.
         let mut unit = None;
         let scale = [
@@ -198,7 +200,7 @@ impl WheelsetSolve<'_> {
             Some(torque) => format!(
                 "no angular velocity was found at which the rails balance a drive torque of {torque} N mm: {reason}; friction may not carry it"
             ),
-            None if above.abs() > LEVEL[1] => format!(
+            None if above.abs() > LEVEL_POOR => format!(
                 "no roll was found at which both wheels carry their loads: their heights still differ by {above:.4} mm, {reason}"
             ),
             None => {

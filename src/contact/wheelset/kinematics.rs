@@ -18,9 +18,10 @@ use crate::contact::problem::checked_case::PRESSURE_USUAL;
 use crate::contact::profile_assessment::uncertainty::COMPANIONS;
 use crate::contact::solution::words::answer::{EquivalentConicity, Kinematics, TouchLine};
 
-/// Between two shifts the radius difference is known to this in mm, a fifth of the rounding of the standard's tables, or its jump to the distance of the
-/// shifts halved this many times, 0.0001 mm for 0.1 mm.
-const RESOLVED: (f64, u32) = (2e-3, 10);
+/// Between two shifts the radius difference is known to this in mm, a fifth of the rounding of the standard's tables ...
+const RESOLVED: f64 = 2e-3;
+/// ... or its jump to the distance of the shifts halved this many times, 0.0001 mm for 0.1 mm.
+const HALVINGS: u32 = 10;
 
 /// A radius difference as sampled, and with twice the distance of the shifts.
 struct Sampled {
@@ -154,17 +155,12 @@ fn sampled(poses: &[RigidPose], mut pose: impl FnMut(f64) -> Result<RigidPose, S
     let bends = |k: usize| {
         k > 0
             && k + 1 < known.len()
-            && (known[k - 1][1] - 2.0 * known[k][1] + known[k + 1][1]).abs() > 8.0 * RESOLVED.0
+            && (known[k - 1][1] - 2.0 * known[k][1] + known[k + 1][1]).abs() > 8.0 * RESOLVED
     };
     let mut between = Vec::new();
     for k in 1..known.len() {
         if bends(k - 1) || bends(k) {
-            halve(
-                [known[k - 1], known[k]],
-                RESOLVED.1,
-                &mut pose,
-                &mut between,
-            );
+            halve([known[k - 1], known[k]], HALVINGS, &mut pose, &mut between);
         }
     }
     let curve = |every: usize| {
@@ -197,7 +193,7 @@ fn halve(
     };
     found.push(middle);
     let off = (middle[1] - 0.5 * (from[1] + to[1])).abs();
-    if times > 1 && off > RESOLVED.0 {
+    if times > 1 && off > RESOLVED {
         halve([from, middle], times - 1, pose, found);
         halve([middle, to], times - 1, pose, found);
     }

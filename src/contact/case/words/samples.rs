@@ -8,8 +8,10 @@ const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Points of one axis of a grid, and of a coefficient of friction across, along or by temperature.
 pub(crate) const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// Least distance of neighbouring coordinates of an axis, relative to the length of the axis: closer ones cannot be told apart in the
-/// arithmetic. The second is relative to the largest coordinate.
-const SPACING_MIN: [f64; 2] = [1e-9, 1e-12];
+/// arithmetic.
+const SPACING_MIN: f64 = 1e-9;
+/// The same relative to the largest coordinate.
+const SPACING_TO_COORDINATE_MIN: f64 = 1e-12;
 /// Neighbouring spacings differ by at most this factor; the edge of the contact cannot be told from more uneven samples.
 const SPACING_RATIO_MAX: f64 = 1000.0;
 
@@ -23,7 +25,7 @@ pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
     let pointer = block.pointer_to(name);
     let (first, last) = (axis[0], axis[axis.len() - 1]);
     let largest = first.abs().max(last.abs());
-    let least = (SPACING_MIN[0] * (last - first).abs()).max(SPACING_MIN[1] * largest);
+    let least = (SPACING_MIN * (last - first).abs()).max(SPACING_TO_COORDINATE_MIN * largest);
     let late = (1..axis.len()).find(|&i| axis[i] - axis[i - 1] <= least);
     if let Some(i) = late {
         block.faults().add(

@@ -24,7 +24,8 @@ const COLUMNS: [(usize, f64); 2] = [(13, 1.02), (7, 0.9)];
 /// Depths over the half-width of the patch.
 pub(crate) const DEPTHS: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0];
 /// Points from which a search starts, and how far apart they lie at least.
-const STARTS: (usize, f64) = (3, 0.4);
+const STARTS: usize = 3;
+const APART: f64 = 0.4;
 /// First steps in `x/a`, `y/b` and `ln depth`, and evaluations of a search.
 pub(crate) const STEPS: [f64; 3] = [0.12, 0.15, 0.2];
 const EVALUATIONS: usize = 120;
@@ -90,11 +91,11 @@ pub fn worst_place(
     scanned.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut starts: Vec<[f64; 3]> = Vec::new();
     for (_, at) in scanned {
-        let far = |other: &[f64; 3]| (0..3).any(|k| (at[k] - other[k]).abs() > STARTS.1);
+        let far = |other: &[f64; 3]| (0..3).any(|k| (at[k] - other[k]).abs() > APART);
         if starts.iter().all(far) {
             starts.push(at);
         }
-        if starts.len() == STARTS.0 {
+        if starts.len() == STARTS {
             break;
         }
     }

@@ -30,7 +30,8 @@ use crate::contact::solution::words::evolution::{PassagePlace, PassageSummary};
 /// Places across, relative to the half width.
 const ACROSS: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
 /// States: so many on each side of the middle up to 1.5 half-lengths, and these further out.
-const NEAR: (usize, f64) = (16, 1.5);
+const NEAR: usize = 16;
+const NEAR_REACH: f64 = 1.5;
 const FAR: [f64; 4] = [1.8, 2.3, 3.2, 5.0];
 /// How often the spaces beside states that decide are halved.
 const HALVINGS: usize = 4;
@@ -130,8 +131,7 @@ impl<'a> Lines<'a> {
             [first.min(extent[0]), last.max(extent[1])]
         });
         let (centre, reach) = (0.5 * (first + last), 0.5 * (last - first));
-        let (count, far) = NEAR;
-        let inner = (1..=count).map(|k| far * k as f64 / count as f64);
+        let inner = (1..=NEAR).map(|k| NEAR_REACH * k as f64 / NEAR as f64);
         let one_side: Vec<f64> = inner.chain(FAR).collect();
         let behind = one_side.iter().rev().map(|s| -s);
         let all = behind.chain([0.0]).chain(one_side.iter().copied());

@@ -236,9 +236,11 @@ fn outside(mesh: &Mesh, pair: &PressedPair, [x, y]: [f64; 2]) -> ScaledPlace {
 
 /// Growth of the patch in a step.
 const GROWTH: f64 = 1.05;
-/// Steps at most (100 shrink what a step began with by 130), and the step from which on the mean of two states is taken for the past, since single cells at
-/// the edge of what sticks may come and go for ever where nearly all sticks.
-const STEPS: [usize; 2] = [300, 60];
+/// Steps at most; 100 shrink what a step began with by 130.
+const STEPS_MAX: usize = 300;
+/// From this step on the mean of two states is taken for the past, since single cells at the edge of what sticks may come and go for ever
+/// where nearly all sticks.
+const STEPS_FREE: usize = 60;
 /// Mean change of the tractions in a step, relative to the friction limit, from which on they count as copies. 1e-6 gives the same forces and areas.
 const CHANGE: f64 = 2e-5;
 
@@ -271,7 +273,7 @@ impl LevelRun<'_> {
         // From nothing at once to begin with.
         let mut past: Option<[PressedState; 2]> = None;
         let mut change = f64::INFINITY;
-        for step in 0..STEPS[0] {
+        for step in 0..STEPS_MAX {
             self.monitor.go_on(0.0)?;
             let mut source =
                 [0, 1].map(|k| given.iter().map(|u| -PRESS_WEIGHTS[0] * u[k]).collect());
@@ -286,7 +288,7 @@ impl LevelRun<'_> {
             let state = self.pressed(of, &tractions, &given);
             past = Some(match past {
                 None => [state.clone(), state],
-                Some([last, _]) if step < STEPS[1] => [state, last],
+                Some([last, _]) if step < STEPS_FREE => [state, last],
                 // What comes and goes from step to step is taken out.
                 Some([last, _]) => {
                     let mean = state.mean(&last);

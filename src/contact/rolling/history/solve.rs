@@ -38,7 +38,9 @@ const STEPS_PER_CELL: f64 = 1.0 / 3.0;
 const EXTRAPOLATED: f64 = 0.5;
 /// Error of resultants, and of creepages and shifts that are found, over the change from the level before. Chosen so that the estimates
 /// cover the points of CONTACT's four histories (`cargo test --test physics histories`), which therefore are no check of them.
-const ERROR_OVER_CHANGE: [f64; 2] = [0.8, 1.4];
+const ERROR_OVER_CHANGE: f64 = 0.8;
+/// See [`ERROR_OVER_CHANGE`].
+const CREEPAGE_ERROR_OVER_CHANGE: f64 = 1.4;
 /// Least change of a shift that is found, in cells along x and relative to the shift: the changes of single shifts from level to level cross zero by
 /// chance. Chosen so that the errors cover 57 shifts, alone and within histories, of which 31 were covered by the changes alone; the closed form of
 /// Cattaneo (1938) is among them.
@@ -316,7 +318,7 @@ fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> boo
     };
     let forces = changes.iter().filter_map(|change| change.resultants.last());
     let worst = forces.fold(0.0_f64, |worst, change| worst.max(*change));
-    if ERROR_OVER_CHANGE[0] * worst > target {
+    if ERROR_OVER_CHANGE * worst > target {
         return false;
     }
     let small = |of: fn(&Motion) -> [f64; 2],
@@ -325,7 +327,7 @@ fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> boo
         (0..2).all(|k| {
             let peak = points.iter().map(|point| of(motion(point))[k].abs());
             let worst = changes.iter().map(|own| change(own)[k]);
-            ERROR_OVER_CHANGE[1] * worst.fold(0.0, f64::max)
+            CREEPAGE_ERROR_OVER_CHANGE * worst.fold(0.0, f64::max)
                 <= CREEPAGE_SHARE * target * peak.fold(0.0, f64::max)
         })
     };
@@ -359,10 +361,10 @@ fn answers(
                 work.residual = residual;
             }
             let error =
-                |change: &f64| Some(ERROR_OVER_CHANGE[0] * change + task.tolerance(k).max(MISSED));
+                |change: &f64| Some(ERROR_OVER_CHANGE * change + task.tolerance(k).max(MISSED));
             let forces = task.forces[k];
             let found = |changes: [f64; 2]| {
-                [0, 1].map(|k| forces[k].map(|_| ERROR_OVER_CHANGE[1] * changes[k]))
+                [0, 1].map(|k| forces[k].map(|_| CREEPAGE_ERROR_OVER_CHANGE * changes[k]))
             };
             let resultants = point.resultants.iter().zip(&change.coarser).enumerate();
             let extrapolated = resultants.map(|(patch, (fine, coarse))| {

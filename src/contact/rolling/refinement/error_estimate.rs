@@ -10,10 +10,11 @@ use crate::contact::rolling::methods::full_slip::NEGLIGIBLE;
 use crate::contact::rolling::refinement::on_mesh::DiscreteSolution;
 use crate::contact::rolling::task::RollingTask;
 
-/// Factors on the root of the squares of both changes: under smooth pressures, and where the pressure jumps (80 grids). The first was chosen on 230 of
-/// the 920 ellipses, smooth grids and gaps of `benches/calibrate`: 0.9 covers .89 to 1.0 of the classes, 1.3 covers .95 to 1.0 for up to 1.4 times the
-/// work.
-const SAFETY: [f64; 2] = [1.1, 1.5];
+/// Factor on the root of the squares of both changes. Chosen on 230 of the 920 ellipses, smooth grids and gaps of `benches/calibrate`: 0.9 covers .89
+/// to 1.0 of the classes, 1.3 covers .95 to 1.0 for up to 1.4 times the work.
+const SAFETY: f64 = 1.1;
+/// The factor where the pressure jumps (80 grids of the same bench).
+const SAFETY_JUMPING: f64 = 1.5;
 /// Surprises (see `GridPressure::discontinuity`) up to which a pressure counts as smooth and from which it jumps; the factor is linear between.
 const SURPRISES: [f64; 2] = [0.06, 0.31];
 /// Share of the error of the finest mesh that extrapolation takes off. 0 leaves errors 1.3 times as large, ½ is alike.
@@ -21,14 +22,18 @@ const EXTRAPOLATED: f64 = 1.0 / 3.0;
 /// Part of the cells of a mesh that a coarser one may have to be compared with it.
 const COARSER: f64 = 0.6;
 /// Meshes with fewer cells, all of them given by clients, may agree by chance; the meshes of a family that are judged have more.
-/// The second number is the least relative error on so few cells, times their number: errors of an ellipse 6 mm × 5 mm on 3 × 3 to 8 × 8 cells, 10
-/// creepages each.
-const CELLS_FEW: [f64; 2] = [64.0, 0.6];
+const CELLS_FEW: f64 = 64.0;
+/// Least relative error on so few cells, times their number: errors of an ellipse 6 mm × 5 mm on 3 × 3 to 8 × 8 cells, 10 creepages each.
+const ERROR_FEW: f64 = 0.6;
 /// Meshes with fewer cells or strips have no coarser one along that axis to be compared with; the least relative error is 1 over the square of their number.
 const SIDE_FEW: u32 = 3;
-/// Error of the resultants from region and pressure of a gap with 44 cells of the normal problem across a patch (100 gaps and 96 patches of wheels on
-/// rails), these cells, and the power of them that the error falls with.
-const REGION: [f64; 3] = [6e-4, 44.0, 1.75];
+/// Error of the resultants from region and pressure of a gap with [`REGION_CELLS`] cells of the normal problem across a patch (100 gaps and 96 patches
+/// of wheels on rails).
+const REGION: f64 = 6e-4;
+/// Cells of the normal problem across a patch that [`REGION`] belongs to.
+const REGION_CELLS: f64 = 44.0;
+/// Power of these cells that the error falls with.
+const REGION_POWER: f64 = 1.75;
 /// On so few cells the error is twice what the power says. Chosen on one patch with a few ten-thousandths of the load.
 const REGION_CELLS_FEW: f64 = 3.0;
 
@@ -119,7 +124,7 @@ impl Estimate {
         let least = match tangential.exit {
             LevelOutcome::RigidSlip => 1.0 / NEGLIGIBLE,
             _ if side < SIDE_FEW => f64::from(side).powi(-2),
-            _ if cells < CELLS_FEW[0] => CELLS_FEW[1] / cells,
+            _ if cells < CELLS_FEW => ERROR_FEW / cells,
             _ => task.tolerance(index),
         };
         let normal = normal_errors(task, patches);
@@ -149,11 +154,11 @@ pub(crate) fn coarser(solved: &[DiscreteSolution], fine: usize) -> Option<usize>
 
 fn safety(task: &RollingTask) -> f64 {
     let Some(discontinuity) = task.footprint.discontinuity() else {
-        return SAFETY[0];
+        return SAFETY;
     };
     let [smooth, jumping] = SURPRISES;
     let share = ((discontinuity - smooth) / (jumping - smooth)).clamp(0.0, 1.0);
-    SAFETY[0] + share * (SAFETY[1] - SAFETY[0])
+    SAFETY + share * (SAFETY_JUMPING - SAFETY)
 }
 
 /// Distances of two sets of resultants by their largest components: every patch relative to its own μN with moments about its middle, then
@@ -197,8 +202,7 @@ fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
     };
     let of = |cells: &f64| {
         let cells = cells.max(1.0);
-        let [error, usual, power] = REGION;
-        let region = error * (usual / cells).powf(power);
+        let region = REGION * (REGION_CELLS / cells).powf(REGION_POWER);
         region * (1.0 + (REGION_CELLS_FEW / cells).powi(2))
     };
     let mut errors: Vec<f64> = uncertainty.cells_across.iter().map(of).collect();

@@ -20,11 +20,12 @@ const SIDE_MIN: f64 = 4.0;
 const SPIN_GRADED: f64 = 2.0;
 /// Distance from the middle of the patch, in half axes, beyond which a pole counts as outside.
 const POLE_INSIDE: f64 = 0.9;
-/// Length over width of a patch beyond which the cells of a motion with spin and no pole inside become longer, and the power with which their number
-/// along a strip over the number of strips then grows. With 4 in place of 8 and a power of 0.75, 1.5 % of the errors of random ellipses exceed twice
-/// their estimate; with 8 it is 0.5 %. With 0.75 the patch of a flange takes twice as many products as with 1.5; with 2, 5 % of the errors of wheels on
-/// the curve exceed twice their estimate.
-const SLENDER: [f64; 2] = [8.0, 1.5];
+/// Length over width of a patch beyond which the cells of a motion with spin and no pole inside become longer. With 4 in place of 8 and a power of
+/// 0.75, 1.5 % of the errors of random ellipses exceed twice their estimate; with 8 it is 0.5 %.
+const SLENDER_SPINNING: f64 = 8.0;
+/// Power with which their number along a strip over the number of strips then grows. With 0.75 the patch of a flange takes twice as many products as
+/// with 1.5; with 2, 5 % of the errors of wheels on the curve exceed twice their estimate.
+const SLENDER_POWER: f64 = 1.5;
 /// Poles are rounded to multiples of this, in half axes, so that near motions share meshes. 0.02 and 0.1 change the work by 1 to 6 %.
 const POLE_GRID: f64 = 0.05;
 
@@ -55,7 +56,7 @@ impl MeshFamily {
         let shape = if pole.is_some() {
             0.85 * a_over_b.powf(0.4)
         } else if motion.spin_per_mm != 0.0 && a_over_b > 1.0 {
-            1.3 * (a_over_b / SLENDER[0]).max(1.0).powf(SLENDER[1])
+            1.3 * (a_over_b / SLENDER_SPINNING).max(1.0).powf(SLENDER_POWER)
         } else {
             1.3 * a_over_b.powf(0.3)
         };

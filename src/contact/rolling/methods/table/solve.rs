@@ -20,7 +20,9 @@ pub const RATIO_RANGE: RangeInclusive<f64> = 0.1..=10.0;
 /// Largest share of load_mismatch load of a patch that an ellipse may stand for: above it errors reach 0.08 μN.
 const MISPLACED_MAX: f64 = 0.1;
 /// Error of the ellipse that stands for another shape, relative to μN: `0.3 D + 0.006` holds for 27 patches with D up to 0.9.
-const BY_SHAPE: [f64; 2] = [0.3, 0.006];
+const PER_MISPLACED: f64 = 0.3;
+/// Its part that does not depend on D.
+const ANY_SHAPE: f64 = 0.006;
 /// What is added where patches turn each other's tractions elastically, which the table leaves out.
 const NEIGHBOURS: f64 = 0.01;
 
@@ -46,7 +48,7 @@ pub fn solve(
         let answer = on_ellipse(task, ellipse, limit, motion);
         let mut error = answer.error;
         if ellipse.load_mismatch > 0.0 {
-            error += BY_SHAPE[0] * ellipse.load_mismatch + BY_SHAPE[1];
+            error += PER_MISPLACED * ellipse.load_mismatch + ANY_SHAPE;
         }
         if patches.len() > 1 {
             error += NEIGHBOURS;
