@@ -110,6 +110,7 @@ fn a_guard_rail_is_part_of_the_section_and_moves_nothing_else() {
     let own = rail["points_mm"].as_array().unwrap().clone();
     let points = guard_rail().into_iter().chain(groove).chain(own);
     rail.insert("points_mm".to_owned(), points.collect());
+    rail.insert("mirror_z".to_owned(), json!(false));
     two["contact"]["rail_origin_mm"] = json!(753.5);
     let loads = [one, two].map(|case| {
         let patches = solve(&case).patches;

@@ -20,8 +20,8 @@ pub struct CrossSection {
     /// Points `[y, z]` in order along the cross-section, in mm or in `unit`.
     #[member(with = points)]
     pub points_mm: Option<Vec<[f64; 2]>>,
-    /// Points `[y, z]` of a guard rail at the side of the track centre, if the section of a rail has two bodies: in order along its surface, with the unit, the
-    /// origin and the senses of the rail's own points. The gauge and the highest point are those of the running rail, and nothing touches between the two.
+    /// Points `[y, z]` of a guard rail beside a rail, toward the track centre, in order along its surface; unit, origin and senses are those of the rail's own points.
+    /// The gauge and the highest point are those of the running rail.
     #[member(with = points)]
     pub guard_rail_points_mm: Option<Vec<[f64; 2]>>,
     /// Digest of a cross-section that was kept with `POST /v1/profiles`, in place of points or text.
