@@ -1,5 +1,6 @@
 //! Contact of the back of a flange with a guard rail that is part of the rail's section.
 
+use railhead::contact::case::check::check_section;
 use railhead::contact::case::solver::Limits;
 use railhead::contact::check;
 use railhead::contact::monitor::Unmonitored;
@@ -100,6 +101,15 @@ fn a_guard_rail_is_part_of_the_section_and_moves_nothing_else() {
     let [a, b] = [&with, &without].map(|solution| solution.total[0]);
     let moved = (a.force_x_n - b.force_x_n).hypot(a.force_y_n - b.force_y_n);
     assert!(moved < 2e-3 * limit, "{moved}");
+    // The groove is no hole in the points.
+    let rail = &beside_guard_rail(0.0)["contact"]["rail"];
+    let report = check_section(rail).unwrap();
+    let given = ["points_mm", "guard_rail_points_mm"].map(|name| rail[name].as_array().unwrap());
+    assert_eq!(
+        report.quality.points as usize,
+        given[0].len() + given[1].len()
+    );
+    assert!(report.quality.hole_mm < 15.0, "{}", report.quality.hole_mm);
     // As one list with points of the groove, placed by the origin.
     let mut one = beside_guard_rail(3.8);
     one["contact"]["rail_origin_mm"] = json!(753.5);

@@ -258,7 +258,7 @@ fn not_profiles() -> CaseError {
     Fault::new("/template/contact/type", detail).into()
 }
 
-/// Guard rails do not wear.
+/// The fault of a section with a guard rail, whose wear is not computed.
 fn guard_rail(section: &str) -> Fault {
     let detail = "given for an evolution; only a running rail and a wheel wear, leave it out";
     Fault::new(format!("{section}/guard_rail_points_mm"), detail)

@@ -5,6 +5,7 @@
 //!
 //! Units of length in which cross-sections are given.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use railhead_macros::Named;
@@ -254,6 +255,11 @@ impl Profile {
     /// First parameter of a wheel or of a running rail: behind a guard rail and the groove.
     pub(crate) fn first(&self) -> f64 {
         self.measured.along[self.measured.beside]
+    }
+
+    /// The chords of the groove between a guard rail and its running rail, which nobody gave; none without a guard rail.
+    pub(crate) fn groove(&self) -> Range<usize> {
+        self.measured.beside.saturating_sub(3)..self.measured.beside
     }
 
     /// Least and largest y of the points in mm, without a guard rail.

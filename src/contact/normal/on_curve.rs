@@ -49,13 +49,13 @@ const FORCE: f64 = 2e-5;
 const FORCE_POOR: f64 = 5e-3;
 /// Least lowering of the wheel in mm that is tried.
 const LOWERING_LEAST: f64 = 1e-4;
-/// Largest lowering in mm of a wheel that rests where it touches first.
+/// A wheel that rests where it touches first is lowered by no more than this, in mm.
 const LOWERING_USUAL: f64 = 1.0;
 /// The gap is computed again where the height has changed by more than this part of the deepest overlap; up to there it is linear in the height.
 const LINEAR: f64 = 0.05;
 /// Faces are steep where the cosine of their angle is less than this.
 pub(crate) const STEEP: f64 = 0.26;
-/// Steps in mm in which a wheel slides down along steep faces, their number, and how exact its place is.
+/// The search below steep faces: its steps in mm, their number at most, and the tolerance in mm of the lowering.
 const SLIDE_STEP: f64 = 0.5;
 const SLIDE_STEPS: u32 = 120;
 const SLIDE_EXACT: f64 = 2e-3;
@@ -181,7 +181,7 @@ impl CurveTask<'_> {
             WheelLoad::Lowering(lowering) => lowering,
             _ => self.expected.max(LOWERING_LEAST),
         };
-        // A little more than the lowering still fits.
+        // Grids reach a little deeper than the lowering.
         let deepest = |lowering: f64| self.touch - lowering - 0.1 * lowering.min(LOWERING_USUAL);
         let mut overlaps = self.curve.overlaps(deepest(lowering));
         if let Some(lower) = self.below_steep_faces(lowering, &overlaps)? {
@@ -229,8 +229,8 @@ impl CurveTask<'_> {
         last.ok_or_else(|| NormalError::NoAnswer("no grid of the contact was found".to_owned()))
     }
 
-    /// A lowering in mm to begin with in place of the expected one where the bodies overlap on steep faces only, if there is one: along those the wheel
-    /// slides down to where other places carry it.
+    /// Returns the lowering in mm at which places outside steep faces carry the load. Returns `None` if the bodies overlap at such places at the expected
+    /// lowering already, or if no lowering was found.
     fn below_steep_faces(
         &self,
         expected: f64,
@@ -254,7 +254,7 @@ impl CurveTask<'_> {
         Ok(Some(low + width))
     }
 
-    /// About the force in N that overlaps carry apart from steep faces: each as a circle of half of its area, pressed by a sphere.
+    /// Estimates the force in N that the overlaps carry outside steep faces. Each counts as a circle with half of its area, pressed by a sphere.
     fn carried_apart_from_steep(&self, overlaps: &[Vec<Nearest>]) -> f64 {
         let of_overlap = |overlap: &Vec<Nearest>| {
             let flat = || overlap.iter().filter(|at| !is_steep(at));
@@ -632,7 +632,7 @@ impl CurveTask<'_> {
     }
 }
 
-/// Whether a place is too steep to carry a wheel.
+/// Whether the rail is steep at a place.
 fn is_steep(at: &Nearest) -> bool {
     at.place.angle.cos() < STEEP
 }

@@ -130,13 +130,15 @@ pub fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {
 
 /// The quality of one profile, with the smoothing that suits it in mm.
 pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
-    let points = profile.points();
+    let (points, groove) = (profile.points(), profile.groove());
     let chords = points.along.windows(2).enumerate();
     let longest = chords
+        .filter(|(k, _)| !groove.contains(k))
         .max_by(|(_, a), (_, b)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
         .map_or(0, |(k, _)| k);
     SectionQuality {
-        points: u32::try_from(points.at.len()).unwrap_or(u32::MAX),
+        // A groove has two points of its own.
+        points: u32::try_from(points.at.len() - groove.len().min(2)).unwrap_or(u32::MAX),
         spacing_mm: profile.usual_chord(),
         hole_mm: points.along[longest + 1] - points.along[longest],
         y_mm: [points.at[longest][0], points.at[longest + 1][0]],
