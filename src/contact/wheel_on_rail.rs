@@ -39,7 +39,7 @@ mod tractions;
 /// contact at the root of a flange 20 times, and a single point that is off makes a ridge a hundred times as long.
 const SLENDER_MAX: f64 = 40.0;
 const SLENDER_SHARE: f64 = 0.02;
-/// Least cosine of the angle of a steep face, whose patches may be longer.
+/// The length allowed on a steep face no longer grows where the cosine of its angle is less than this.
 const COSINE_LEAST: f64 = 0.01;
 
 /// The wheel at rest with the answer for all its patches.

@@ -399,7 +399,7 @@ const DISK_RETRY_SECONDS: u32 = 10;
 /// Faults of one case that are listed.
 const FAULTS_LISTED: usize = 1000;
 
-/// What a request gives, or why it fails.
+/// The result of a request.
 pub(crate) type Result<T, E = ApiError> = std::result::Result<T, E>;
 
 /// A failure on its way to the client.

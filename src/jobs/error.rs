@@ -21,7 +21,7 @@ pub enum StorageFault {
     Unreachable,
 }
 
-/// What a call on jobs gives, or why it fails.
+/// The result of a call on jobs.
 pub type Result<T, E = JobsError> = std::result::Result<T, E>;
 
 /// A call of a store failed and changed nothing. Clones share the cause.

@@ -75,7 +75,7 @@ fn the_face_of_a_guard_rail_takes_the_back_of_a_flange_and_the_tread_carries_the
         assert!(tread.position.as_ref().unwrap().rail_mm[0].abs() < 10.0);
         assert!(guard.normal_force_n > 1.5 * before, "{shift}");
         before = guard.normal_force_n;
-        // The same bodies as a gap, under the force that the guard rail carries.
+        // Compare with the gap of the two surfaces, solved alone under the force on the guard rail.
         let mut alone = case.clone();
         alone["contact"] = torus_on_plane();
         alone["load"] = json!({ "normal_force_n": guard.normal_force_n });
@@ -91,7 +91,7 @@ fn the_face_of_a_guard_rail_takes_the_back_of_a_flange_and_the_tread_carries_the
 
 #[test]
 fn a_guard_rail_is_part_of_the_section_and_moves_nothing_else() {
-    // Without contact on it, and placed by the gauge of the running rail.
+    // Without contact on the guard rail, the answer is that of the rail alone: the gauge is measured on the running rail.
     let with = beside_guard_rail(1.0);
     let mut without = with.clone();
     let rail = without["contact"]["rail"].as_object_mut().unwrap();
@@ -101,7 +101,7 @@ fn a_guard_rail_is_part_of_the_section_and_moves_nothing_else() {
     let [a, b] = [&with, &without].map(|solution| solution.total[0]);
     let moved = (a.force_x_n - b.force_x_n).hypot(a.force_y_n - b.force_y_n);
     assert!(moved < 2e-3 * limit, "{moved}");
-    // The groove is no hole in the points.
+    // The groove does not count as a hole in the points.
     let rail = &beside_guard_rail(0.0)["contact"]["rail"];
     let report = check_section(rail).unwrap();
     let given = ["points_mm", "guard_rail_points_mm"].map(|name| rail[name].as_array().unwrap());
@@ -110,7 +110,7 @@ fn a_guard_rail_is_part_of_the_section_and_moves_nothing_else() {
         given[0].len() + given[1].len()
     );
     assert!(report.quality.hole_mm < 15.0, "{}", report.quality.hole_mm);
-    // As one list with points of the groove, placed by the origin.
+    // One list with points of the groove, placed by the origin, gives the same loads.
     let mut one = beside_guard_rail(3.8);
     one["contact"]["rail_origin_mm"] = json!(753.5);
     let mut two = one.clone();

@@ -265,7 +265,7 @@ fn profiles_with_wheelset() -> Feature {
     feature
 }
 
-/// The back of the flange on a guard rail beside the rail, in two of its rows.
+/// A wheel on a rail with a guard rail. The back of the flange touches the guard rail in two of the three rows.
 fn guard_rail() -> Feature {
     let text = include_str!("../../api/examples/guard-rail.case.json");
     let example: Value = serde_json::from_str(text).expect("an example");

@@ -282,7 +282,7 @@ pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
     else {
         return Vec::new();
     };
-    // What is usual on standard gauge, for UIC wheels of 920 mm diameter.
+    // Usual values on standard gauge, for UIC wheels of 920 mm diameter.
     let lengths = [
         ("/contact/gauge_mm", *gauge_mm, GAUGE),
         ("/contact/rail_origin_mm", *rail_origin_mm, 752.5),

@@ -342,7 +342,7 @@ pub(crate) fn profile_at(
         .map_err(fault)
 }
 
-/// The profile of a rail without a guard rail, or of a wheel.
+/// Reads a section without its guard rail.
 fn own_profile(pointer: &str, body: Body, section: &CrossSection) -> Result<Profile, Fault> {
     let name = body.name();
     let reading = Reading {

@@ -107,7 +107,7 @@ impl<'a> Rows<'a> {
     /// The answers; `note` is called with the normal force in N and √(ab) in mm of each row and may end the evaluation.
     ///
     /// # Errors
-    /// The error of `note`.
+    /// Returns the error that `note` returned.
     pub fn evaluate_to<E>(
         &self,
         mut note: impl FnMut([f64; 2]) -> Result<(), E>,

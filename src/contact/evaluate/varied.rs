@@ -220,7 +220,7 @@ pub fn members(pointer: &str) -> Vec<String> {
 /// Puts a value where the members lead; objects on the way are made.
 ///
 /// # Errors
-/// Why they lead nowhere; the case is then unchanged.
+/// Returns the reason if a pointer leads nowhere; the case is then unchanged.
 pub fn put(case: &mut Value, path: &[String], value: Value) -> Result<(), String> {
     if path.is_empty() {
         return Ok(());

@@ -87,7 +87,7 @@ struct MeasuredCurve {
     digits: f64,
     /// The senses of the given points.
     senses: Senses,
-    /// Points of a guard rail and of the groove, before those of the running rail.
+    /// Number of points of the guard rail and the groove, which come before those of the running rail.
     beside: usize,
     flange: Option<Flange>,
     sure_body: LazyField<Option<SureBody>>,
@@ -181,7 +181,7 @@ impl Profile {
     /// so deep that no wheel reaches its bottom.
     ///
     /// # Errors
-    /// A sentence: numbers that are not finite, an arc length outside 5 to 500 mm, loops, or a guard rail that is not beside the rail.
+    /// Returns a sentence if a number is not finite, the arc length is outside 5 to 500 mm, the points form a loop, or the guard rail is not beside the rail.
     pub fn with_guard_rail(&self, points: &[[f64; 2]]) -> Result<Profile, String> {
         let own = &self.measured;
         let mut joined = orientation::in_senses(&checked(points)?, own.senses);
@@ -252,17 +252,17 @@ impl Profile {
         self.measured.flange
     }
 
-    /// First parameter of a wheel or of a running rail: behind a guard rail and the groove.
+    /// The parameter at which the running rail begins, after the guard rail and the groove; 0 without a guard rail.
     pub(crate) fn first(&self) -> f64 {
         self.measured.along[self.measured.beside]
     }
 
-    /// The chords of the groove between a guard rail and its running rail, which nobody gave; none without a guard rail.
+    /// The chords of the groove that joins a guard rail and its running rail; empty without a guard rail.
     pub(crate) fn groove(&self) -> Range<usize> {
         self.measured.beside.saturating_sub(3)..self.measured.beside
     }
 
-    /// Least and largest y of the points in mm, without a guard rail.
+    /// Least and largest y in mm of the points, those of a guard rail excluded.
     pub(crate) fn width(&self) -> [f64; 2] {
         let points = &self.measured.points[self.measured.beside..];
         let y = || points.iter().map(|at| at[0]);

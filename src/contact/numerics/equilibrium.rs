@@ -138,7 +138,7 @@ impl<const N: usize> Search<N> {
             // As far as all unknowns stay within their limits.
             let room = |k: usize| (self.limit[k] - place[k] * wanted[k].signum()) / wanted[k].abs();
             factor = (0..N).fold(factor, |factor, k| factor.min(room(k)));
-            // An unknown is at its limit if next to nothing of the step is left to it.
+            // An unknown is at its limit if the limit leaves almost none of its step.
             if factor <= ROUNDING {
                 // An unknown at its limit, whose own residual asks for more.
                 let beyond =

@@ -94,7 +94,7 @@ impl Gmres {
         }
         self.residual = residual;
         report.residual = beta / norm_b;
-        // False of a residual that is not a number.
+        // False if the residual is not a number.
         report.converged = beta <= tolerance * norm_b;
         Ok(report)
     }

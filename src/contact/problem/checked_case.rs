@@ -137,7 +137,7 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
         .max_by(|(_, a), (_, b)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
         .map_or(0, |(k, _)| k);
     SectionQuality {
-        // A groove has two points of its own.
+        // The two points at the bottom of a groove were not given.
         points: u32::try_from(points.at.len() - groove.len().min(2)).unwrap_or(u32::MAX),
         spacing_mm: profile.usual_chord(),
         hole_mm: points.along[longest + 1] - points.along[longest],

@@ -94,7 +94,7 @@ impl<T> Reader<T> {
     /// The value of a text.
     ///
     /// # Errors
-    /// What is allowed, if it cannot be read.
+    /// The allowed values, for the error if a text cannot be read.
     pub fn read(&self, text: &str) -> Result<T, &str> {
         (self.read)(&[text]).map_err(|_| &*self.allowed)
     }

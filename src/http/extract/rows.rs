@@ -426,7 +426,7 @@ pub async fn read_run(
 }
 
 /// Reads a body from a nameless file into which it is spooled while it arrives, so that a large one takes little memory. `limits` are the time
-/// that a piece of it may take, its largest size, and what it is; `bytes` tells the memory that the reader takes for a body of some length.
+/// allowed for a piece of the body, its largest size, and its name in errors; `bytes` returns the memory in bytes that the reader needs for a body of a given length.
 ///
 /// # Errors
 /// The body is too large, too slow or broken; the file cannot be written; or the error of `read`.

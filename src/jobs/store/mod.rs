@@ -58,7 +58,7 @@ pub mod postgres;
 mod sql_errors;
 pub mod sqlite;
 
-/// What a call of a store gives, or why it failed and changed nothing.
+/// The result of a call of a store; a failed call changes nothing.
 pub type Result<T, E = StoreError> = std::result::Result<T, E>;
 
 /// A job table, which also keeps API keys.

@@ -79,7 +79,7 @@ impl Predictor {
 fn on_line(to: [f64; 3], step: [f64; 3]) -> Option<f64> {
     let along = dot(to, step) / dot(step, step);
     let aside = [0, 1, 2].map(|k| to[k] - along * step[k]);
-    // Parallel but for rounding.
+    // Parallel up to rounding.
     (dot(aside, aside).sqrt() <= 1e-6 * dot(to, to).sqrt()).then_some(along)
 }
 

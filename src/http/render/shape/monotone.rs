@@ -1,7 +1,7 @@
 //! Curves through samples that have no extreme between their nodes.
 
 /// Values at any places of the curve that has no extreme between its nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat.
-/// Comput. 5, 1984); beyond the first and last node their values. Nodes ascend; none of two at the same place counts twice.
+/// Comput. 5, 1984); beyond the first and the last node, the values there. Nodes must ascend; of two at the same place one counts.
 pub(super) fn monotone(axis: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
     let last = axis.len() - 1;
     if last == 0 {

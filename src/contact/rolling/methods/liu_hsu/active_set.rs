@@ -316,7 +316,7 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
 
 /// Steps of Newton's method after which it ends without convergence.
 const ITERATIONS_MAX: u32 = 40;
-/// A step on the circles is halved at most this often.
+/// Largest number of halvings of a step on the circles.
 const HALVINGS_MAX: u32 = 6;
 /// The iteration has converged when no traction changes by more than this share of its bound; the remaining error is about the
 /// square of this.
