@@ -89,8 +89,10 @@ export class Service {
  */
 export function setUp(more = []) {
   const service = new Service();
-  /** @type {{ browser: import('playwright-core').Browser | null }} */
-  const held = { browser: null };
+  /** @type {{ browser: import('playwright-core').Browser | null, page: import('playwright-core').Page | null }} */
+  const held = { browser: null, page: null };
+  /** @type {string[]} */
+  const complaints = [];
   before(async () => {
     mkdirSync(OUTPUT, { recursive: true });
     [held.browser] = await Promise.all([
@@ -102,18 +104,11 @@ export function setUp(more = []) {
     await held.browser?.close();
     await service.stop();
   });
-  /**
-   * Opens the page and runs a test on it. Afterwards nothing may have gone wrong.
-   * @param {string} hash
-   * @param {(page: import('playwright-core').Page) => Promise<void>} test
-   * @param {import('playwright-core').BrowserContextOptions & { quiet?: boolean }} [look] `quiet`: the service is away for a while.
-   */
-  const onPage = async (hash, test, look = {}) => {
+  /** A page of its own that notes what goes wrong. @param {import('playwright-core').BrowserContextOptions} look */
+  const opened = async (look) => {
     assert.ok(held.browser);
     const context = await held.browser.newContext({ viewport: { width: 1440, height: 900 }, acceptDownloads: true, ...look });
     const page = await context.newPage();
-    /** @type {string[]} */
-    const complaints = [];
     page.on('pageerror', (error) => complaints.push(error.stack ?? error.message));
     page.on('console', (message) => {
       // A refusal is logged by the browser though the page deals with it.
@@ -124,12 +119,30 @@ export function setUp(more = []) {
       if (protocol.startsWith('http') && origin !== service.base) complaints.push(`asked ${request.url()}`);
     });
     page.setDefaultTimeout(60_000);
+    return page;
+  };
+  /**
+   * Opens the page and runs a test on it. Afterwards nothing may have gone wrong. A browser takes most of its time to make a page, so that tests of
+   * the usual look use one after the other, without what it has stored.
+   * @param {string} hash
+   * @param {(page: import('playwright-core').Page) => Promise<void>} test
+   * @param {import('playwright-core').BrowserContextOptions | null} [look] Of a page of its own.
+   */
+  const onPage = async (hash, test, look = null) => {
+    const page = look ? await opened(look) : (held.page ?? await opened({}));
+    held.page = null;
+    complaints.length = 0;
     try {
       await page.goto(`${service.base}/${hash}`);
       await test(page);
       assert.deepEqual(complaints, []);
+      if (!look) {
+        await page.evaluate(() => [localStorage, sessionStorage].forEach((storage) => storage.clear()));
+        await page.goto('about:blank');
+        held.page = page;
+      }
     } finally {
-      await context.close();
+      if (held.page !== page) await page.context().close();
     }
   };
   return { service, onPage };

@@ -78,7 +78,7 @@ test('every view is sound for axe, has one heading and names, fits small windows
       await page.evaluate(() => document.documentElement.style.removeProperty('font-size'));
       await page.setViewportSize({ width: 1440, height: 900 });
     }
-  });
+  }, {});
 });
 
 test('every view is sound for axe and fits on a phone', async () => {
@@ -211,7 +211,7 @@ test('first load, solving and drawing are measured, and the page is small', () =
   console.log(JSON.stringify({ loaded, kilobytes: sizes / 1000, solveToPicture: waits, redraw, crosshair }));
   assert.ok(sizes < 300_000, `${sizes} bytes`);
   assert.ok(waits.every((wait) => wait > 0) && redraw.took > 0 && crosshair > 0, 'something was not measured');
-}));
+}, {}));
 
 test('every view is drawn in Firefox, where a case is written, solved, and its map has a crosshair', SKIPPED, async () => {
   const firefox = new Firefox();
