@@ -11,6 +11,9 @@ use crate::population::{Class, case, on_planes};
 use crate::reference::median;
 use crate::truth::{self, Judged};
 
+/// At targets below this one, which take most of the time, one of three cases is solved, but all gaps and wheels on the curve of the rail.
+const FINE: f64 = 0.002;
+
 /// Fewer errors that are clear of the uncertainty of the truth have no median to speak of.
 const CLEAR_MIN: usize = 8;
 
@@ -56,6 +59,8 @@ fn tally(method: &str, class: Class, target: f64) -> Tally {
     let held_out = known
         .iter()
         .filter(|(number, _)| class.is_wheel() || 2 * **number >= class.count());
+    let few = target < FINE && !matches!(class, Class::Gap | Class::Curve);
+    let held_out = held_out.step_by(if few { 3 } else { 1 });
     for (number, truth) in held_out {
         let mut question = case(class, *number);
         assert_eq!(

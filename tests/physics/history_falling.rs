@@ -77,11 +77,7 @@ fn long_rolling_ends_in_the_steady_state_and_remains_in_it() {
 /// A creepage that grows, stays and falls, far into sliding; forces by the number of cells, and what is told at default settings.
 #[test]
 fn finer_meshes_approach_one_history_within_what_is_told() {
-    for friction in [
-        law("exponential", 0.2, 300.0),
-        law("exponential", 0.2, 120.0),
-        law("linear", 0.15, 400.0),
-    ] {
+    for friction in [law("exponential", 0.2, 120.0), law("linear", 0.15, 400.0)] {
         let rolled = |mesh: Option<[u32; 2]>| {
             let mut case = history(friction.clone(), &[0.0, 2.0, 4.0, 6.0, 8.0, 12.0], [0.0; 3]);
             case["motion"]["history"]["creepage_x"] = json!([0.0, 0.008, 0.02, 0.02, 0.002, 0.002]);

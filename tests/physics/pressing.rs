@@ -1,6 +1,6 @@
 //! Bodies that differ, pressed together under friction: Spence's contact, and rolling that begins there.
 
-use railhead::contact::solution::words::answer::{PointSolution, Solution};
+use railhead::contact::solution::words::answer::{Fields, PointSolution, Solution};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -90,7 +90,10 @@ fn bodies_pressed_together_agree_with_contact() {
 
 /// Values of one field of the answer.
 fn tractions(case: &Value) -> [Vec<f64>; 2] {
-    let (_, fields) = solve(case);
+    tractions_of(&solve(case).1)
+}
+
+fn tractions_of(fields: &Fields) -> [Vec<f64>; 2] {
     let values = fields.patches[0].points[0].clone();
     [values.traction_x_mpa, values.traction_y_mpa].map(|values| values.expect("asked for"))
 }
@@ -123,9 +126,10 @@ fn a_pressing_is_a_scaled_copy_of_any_smaller_one() {
     let case = with_mesh(&references()[2].case());
     let force = 8.0 * references()[2].normal_force_n;
     let more = with(&case, "/load/normal_force_n", Some(json!(force)));
-    let [small, large] = [&case, &more].map(|case| dissipated(&solve(case).0));
-    assert!((large / small / 32.0 - 1.0).abs() < 1e-2, "{small} {large}");
-    let [small, large] = [&case, &more].map(tractions);
+    let [(small, small_fields), (large, large_fields)] = [&case, &more].map(solve);
+    let [less, much] = [&small, &large].map(dissipated);
+    assert!((much / less / 32.0 - 1.0).abs() < 1e-2, "{less} {much}");
+    let [small, large] = [&small_fields, &large_fields].map(tractions_of);
     let largest = small[0].iter().fold(0.0_f64, |most, t| most.max(t.abs()));
     for (small, large) in small[0].iter().zip(&large[0]) {
         assert!(
