@@ -41,11 +41,11 @@ pub(super) fn retention(text: &str) -> Result<Retention, String> {
 /// When requests without an API key are answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(super) enum Anonymous {
-    /// While the service listens on a loopback address.
+    /// Only if the service listens on a loopback address.
     Loopback,
-    /// On every address: whoever reaches the port may use the service.
+    /// On every address: everyone who can reach the port can use the service.
     Always,
-    /// Not at all.
+    /// Never.
     Never,
 }
 
@@ -96,12 +96,13 @@ pub(super) fn bound_label(text: &str) -> Result<(String, String), String> {
 
 /// What one case may use.
 #[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "Solver")]
 pub(super) struct CaseArgs {
-    /// Estimated memory beyond which a case is refused, in MiB.
+    /// Maximum estimated memory of a case in MiB; a larger case is refused.
     #[arg(long, env = "RAILHEAD_MEMORY_LIMIT_MB", default_value_t = 2048, value_name = "MIB",
           value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     pub memory_limit_mb: u64,
-    /// Memory for operators of meshes, in MiB, kept for the next cases of the same shape and shared by all workers; 0: none are kept.
+    /// Memory in MiB for mesh operators, which all workers share and later cases of the same shape reuse; 0: none are stored.
     #[arg(long, env = "RAILHEAD_OPERATOR_STORE_MB", default_value_t = BYTES_DEFAULT >> 20, value_name = "MIB",
           value_parser = clap::value_parser!(u64).range(..=1 << 30))]
     pub operator_store_mb: u64,
@@ -145,9 +146,11 @@ pub(super) struct DataFolderArgs {
 
 /// The database of several nodes.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Shared database")]
 pub(super) struct DatabaseArgs {
-    /// PostgreSQL 15 or later, in which jobs and results are kept and which any number of nodes share, such as
-    /// `postgres://user:password@host/database`; without it they are kept in the data folder. Needs a build with the feature `cluster`.
+    /// PostgreSQL database (15 or later) that stores jobs and results and that any number of nodes share, such as
+    /// `postgres://user:password@host/database`. Without it, they are stored in the data folder. Requires a build with the feature
+    /// `cluster`.
     #[arg(
         long,
         env = "RAILHEAD_DATABASE_URL",
@@ -155,12 +158,13 @@ pub(super) struct DatabaseArgs {
         value_name = "URL"
     )]
     pub database_url: Option<String>,
-    /// Most connections of this process to the database, one more aside on which it listens.
+    /// Maximum number of database connections of this process, in addition to one that receives notifications.
     #[arg(long, env = "RAILHEAD_DATABASE_CONNECTIONS", default_value_t = 10, value_name = "N",
           value_parser = clap::value_parser!(u32).range(2..))]
     pub database_connections: u32,
-    /// The same database past a pooler that gives each transaction another session (PgBouncer in transaction mode), where nodes hear
-    /// each other; `none`: they do not, and notice what others did up to a second later. Without it at `--database-url`.
+    /// URL for notifications between nodes, if `--database-url` points to a pooler in transaction mode (such as PgBouncer): the same
+    /// database without the pooler. `none`: no notifications; nodes poll and see changes up to a second later. Default: the value of
+    /// `--database-url`.
     #[arg(
         long,
         env = "RAILHEAD_DATABASE_DIRECT_URL",
@@ -174,12 +178,14 @@ pub(super) struct DatabaseArgs {
 
 /// The place of large results beside a database.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Shared database")]
 pub(super) struct ResultsArgs {
-    /// Where results above 32 KiB are kept beside a database: `s3://bucket/prefix` (keys, region and address by the usual `AWS_…`
-    /// variables) or `file:///folder`; without it in the database. Buckets need the feature `cluster`. Every node of a database names the same place.
+    /// Location of results larger than 32 KiB if there is a database: `s3://bucket/prefix` (keys, region and address from the usual
+    /// `AWS_…` variables) or `file:///folder`. Without it, they are stored in the database. Buckets require the feature `cluster`. All
+    /// nodes of a database must use the same location.
     #[arg(long, env = "RAILHEAD_RESULTS_URL", value_name = "URL")]
     pub results_url: Option<ResultsUrl>,
-    /// The folder that `--results-url` names is the same one on every node (a network file system).
+    /// Confirms that the folder in `--results-url` is the same one on every node (a network file system).
     #[arg(
         long,
         env = "RAILHEAD_RESULTS_SHARED",
@@ -221,6 +227,7 @@ impl DatabaseArgs {
 
 /// The database that a command is about.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Shared database")]
 pub(super) struct DatabaseUrlArgs {
     /// PostgreSQL 15 or later, such as `postgres://user:password@host/database`.
     #[arg(
@@ -244,100 +251,116 @@ pub(super) struct DoctorArgs {
 /// Settings of `serve`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct ServeArgs {
-    /// Address and port to listen on; port 0 takes a free one, which the log event `listening` names.
+    /// IP address and port to listen on. Port 0 selects a free port; the log event `listening` contains it.
     #[arg(
         long,
-        env = "RAILHEAD_LISTEN",
+        env = "RAILHEAD_LISTEN", help_heading = "Service",
         default_value = "127.0.0.1:8080",
         value_name = "ADDRESS:PORT",
         value_parser = address
     )]
     pub listen: SocketAddr,
-    /// Folder of the job table and the results; with a database only of batches that are being received. Created if it is
-    /// not there. One process at a time.
+    /// Folder of the job table and the results; with a database, only of batches that are being received. It is created if it does not
+    /// exist. Only one process can use it at a time.
     #[arg(
         long,
-        env = DATA_DIR_VARIABLE,
+        env = DATA_DIR_VARIABLE, help_heading = "Service",
         default_value = DATA_DIR_DEFAULT,
         value_name = "FOLDER"
     )]
     pub data_dir: PathBuf,
     #[command(flatten)]
     pub database: DatabaseArgs,
-    /// Number of jobs solved at the same time, each on a thread of its own; 0, with a database: other nodes solve
+    /// Number of jobs solved at the same time, each on its own thread. 0: other nodes solve the jobs, which requires a database
     /// [default: cores − 1, at least 1].
-    #[arg(long, env = "RAILHEAD_WORKERS", value_name = "N")]
+    #[arg(
+        long,
+        env = "RAILHEAD_WORKERS",
+        help_heading = "Jobs",
+        value_name = "N"
+    )]
     pub workers: Option<u16>,
     #[command(flatten)]
     pub case: CaseArgs,
-    /// How long ended jobs and their results are kept, such as `30d`, `30days` or `12h`; `forever`: until they are deleted.
-    #[arg(long, env = "RAILHEAD_RETENTION", default_value = "forever", value_name = "TIME", value_parser = retention)]
+    /// Time for which ended jobs and their results are kept, such as `30d`, `30days` or `12h`; `forever`: until they are deleted.
+    #[arg(long, env = "RAILHEAD_RETENTION", help_heading = "Jobs", default_value = "forever", value_name = "TIME", value_parser = retention)]
     pub retention: Retention,
-    /// Seconds a running job may go on after the service was told to stop; then it goes back to the queue.
+    /// Seconds for which running jobs may continue after a stop signal; after that they return to the queue.
     #[arg(
         long,
         env = "RAILHEAD_SHUTDOWN_GRACE_S",
+        help_heading = "Service",
         default_value_t = 10,
         value_name = "SECONDS"
     )]
     pub shutdown_grace_s: u32,
-    /// Seconds between SIGTERM, when `/readyz` turns 503, and the closing of the port; connections are accepted
-    /// meanwhile. None after SIGINT.
+    /// Seconds between SIGTERM, when `/readyz` changes to 503, and the closing of the port; connections are still accepted during this
+    /// time. After SIGINT the port closes at once.
     #[arg(
         long,
         env = "RAILHEAD_DRAIN_DELAY_S",
+        help_heading = "Service",
         default_value_t = 2,
         value_name = "SECONDS"
     )]
     pub drain_delay_s: u32,
-    /// Whether requests without an API key are answered. Without keys and without anonymous use the service does not
-    /// start.
+    /// When requests without an API key are answered. The service does not start if there are no keys and anonymous requests are not
+    /// answered.
     #[arg(
         long,
         env = "RAILHEAD_ANONYMOUS",
+        help_heading = "Access",
         value_enum,
         default_value = "loopback"
     )]
     pub anonymous: Anonymous,
-    /// Requests per second of one API key, twice as many at once; 0: any number. Requests without a key are counted by
-    /// address, those from this machine itself not at all.
+    /// Maximum number of requests per second of one API key, with bursts of twice this number; 0: no limit. Requests without a key are
+    /// counted by client address; those from this machine are not counted.
     #[arg(
         long,
         env = "RAILHEAD_RATE_LIMIT",
+        help_heading = "Access",
         default_value_t = 200,
         value_name = "N"
     )]
     pub rate_limit: u32,
-    /// Origins of web pages that may read answers, such as `https://dashboard.example`, separated by commas.
-    #[arg(long, env = "RAILHEAD_CORS_ORIGIN", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
+    /// Comma-separated origins of web pages that may read responses, such as `https://dashboard.example`.
+    #[arg(long, env = "RAILHEAD_CORS_ORIGIN", help_heading = "Access", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
     pub cors_origin: Vec<String>,
-    /// Collector that gets the spans of requests and jobs by OTLP over HTTP, such as `http://127.0.0.1:4318`; without it
-    /// none are made. Needs a build with the feature `otlp`.
-    #[arg(long, env = "RAILHEAD_OTLP_ENDPOINT", value_name = "URL")]
+    /// Collector that receives spans of requests and jobs by OTLP over HTTP, such as `http://127.0.0.1:4318`. Without it, no spans are
+    /// recorded. Requires a build with the feature `otlp`.
+    #[arg(
+        long,
+        env = "RAILHEAD_OTLP_ENDPOINT",
+        help_heading = "Log and traces",
+        value_name = "URL"
+    )]
     pub otlp_endpoint: Option<Endpoint>,
     #[command(flatten)]
     pub jobs: Options,
-    /// Address and port of a second listener that answers `/healthz`, `/readyz` and `/metrics` only; without it they are
-    /// answered on the first one alone, where a few places are kept for them.
-    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
+    /// IP address and port of a second listener that serves only `/healthz`, `/readyz` and `/metrics`. Without it, only the first
+    /// listener serves them, with a few connections reserved for them.
+    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", help_heading = "Service", value_name = "ADDRESS:PORT", value_parser = address)]
     pub probe_listen: Option<SocketAddr>,
     #[command(flatten)]
     pub http: HttpOptions,
-    /// Addresses of proxies, separated by commas, such as `10.0.0.0/8`, that are believed when they name the addresses of their clients
-    /// in `Forwarded` or `X-Forwarded-For`. Wrong keys and requests without a key are then counted by these addresses, and
-    /// `--address-connections-max` does not hold for the proxies.
+    /// Comma-separated addresses of trusted proxies, such as `10.0.0.0/8`. The service takes client addresses from their headers
+    /// `Forwarded` or `X-Forwarded-For`, counts wrong keys and requests without a key by these client addresses, and does not apply
+    /// `--address-connections-max` to the proxies.
     #[arg(
         long,
         env = "RAILHEAD_TRUSTED_PROXIES",
+        help_heading = "Access",
         value_delimiter = ',',
         value_name = "ADDRESSES"
     )]
     pub trusted_proxies: Vec<AddressRange>,
-    /// Names of the service, separated by commas, by which it may be asked without a key; addresses and `localhost` always
-    /// may. Others are refused, as a web page could make its own name lead here.
+    /// Comma-separated host names that requests without a key may have in `Host`, in addition to IP addresses and `localhost`. Other
+    /// names are refused, because a web page could point its own name to this service (DNS rebinding).
     #[arg(
         long,
         env = "RAILHEAD_ALLOWED_HOST",
+        help_heading = "Access",
         value_delimiter = ',',
         value_name = "NAME"
     )]
@@ -348,11 +371,12 @@ pub(super) struct ServeArgs {
 
 /// How to log.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Log and traces")]
 pub(super) struct LogArgs {
-    /// How a log line looks.
+    /// Format of log lines.
     #[arg(long, env = "RAILHEAD_LOG_FORMAT", value_enum, default_value = "text")]
     pub log_format: LogFormat,
-    /// What is logged, for example `info,railhead::jobs=debug`.
+    /// Log filter, such as `info,railhead::jobs=debug`.
     #[arg(
         long,
         env = "RAILHEAD_LOG",
@@ -389,9 +413,9 @@ impl ServeArgs {
     }
 }
 
-/// Rolling-contact stress service: tractions, stick and slip zones and forces between wheel and rail.
+/// Rolling-contact stress service: computes tractions, stick and slip zones and forces of bodies in rolling contact.
 #[derive(Debug, Parser)]
-#[command(name = "railhead", version, about)]
+#[command(name = "railhead", version)]
 pub(super) struct Cli {
     #[command(subcommand)]
     pub command: Command,
@@ -400,38 +424,38 @@ pub(super) struct Cli {
 /// What can be started.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Serve the HTTP API and solve what is submitted.
+    /// Serve the HTTP API and solve the submitted jobs.
     Serve(ServeArgs),
-    /// Solve what is submitted to other nodes of the same database; takes the flags of `serve` and answers probes only.
+    /// Solve jobs that other nodes of the same database accept; has the flags of `serve` and serves only probes.
     Worker(ServeArgs),
-    /// Make the job table in a database that several nodes share, or bring it forward to this version.
+    /// Create the job table in a shared database, or upgrade it to this version.
     Migrate(DatabaseUrlArgs),
-    /// Tell how the database is that several nodes share; exit code 1 if something is wrong.
+    /// Check a shared database; exit code 1 if there is a problem.
     Doctor(DoctorArgs),
-    /// Solve one case without a server; the result goes to standard output.
+    /// Solve one case without a server and print the result to standard output.
     ///
-    /// Exit code 0: solved; 1: no answer; 2: the case is faulty.
+    /// Exit code 0: solved; 1: no solution; 2: the case has faults.
     Solve(SolveArgs),
-    /// Make, list and revoke API keys; also while the service runs.
+    /// Create, list and revoke API keys; also possible while the service runs.
     Keys(KeysArgs),
-    /// Copy the data folder, also while the service runs; a service can be started on the copy.
+    /// Copy the data folder; also possible while the service runs. A service can be started on the copy.
     Backup(BackupArgs),
-    /// Move what is in a data folder, which no service uses, into a database that several nodes share.
+    /// Move the contents of a data folder into a shared database; no service may use the folder.
     Move(MoveArgs),
-    /// Move the large results of a database, which no node uses, to another place.
+    /// Move the large results of a database to another location; no node may use the database.
     MoveResults(MoveResultsArgs),
-    /// Print the settings that `serve` would run with and where each comes from, as JSON; takes the flags of `serve`.
+    /// Print the settings of `serve` and the source of each as JSON; has the flags of `serve`.
     Config(ServeArgs),
-    /// Ask a running service whether it is ready; exit code 0 if it is, 1 if not.
+    /// Check whether a running service is ready; exit code 0 if it is, 1 if not.
     Healthcheck(HealthcheckArgs),
-    /// Print the contract of the HTTP API (OpenAPI 3.1, JSON).
+    /// Print the OpenAPI 3.1 description of the HTTP API as JSON.
     Openapi,
 }
 
 /// Settings of `backup`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct BackupArgs {
-    /// Folder to make; it must not be there yet.
+    /// Folder to create; it must not exist.
     #[arg(long, value_name = "FOLDER")]
     pub to: PathBuf,
     #[command(flatten)]
@@ -474,18 +498,18 @@ pub(super) struct KeysArgs {
 /// What can be done with API keys.
 #[derive(Debug, Clone, Subcommand)]
 pub(super) enum KeysAction {
-    /// Make a key and print it, this one time.
+    /// Create a key and print it; it is not shown again.
     Create {
-        /// Whose jobs the key opens; keys of the tenant `operator` may also read `/metrics`.
+        /// Tenant whose jobs the key gives access to. Keys of the tenant `operator` may also read `/metrics`.
         #[arg(long, value_name = "TENANT")]
         tenant: String,
-        /// What the key is for.
+        /// Purpose of the key.
         #[arg(long, value_name = "TEXT")]
         name: Option<String>,
-        /// The key reads what is the tenant's, checks cases and evaluates rows, but makes, cancels and deletes nothing.
+        /// Make the key read-only: it reads the tenant's data, checks cases and evaluates rows, but cannot submit, cancel or delete.
         #[arg(long)]
         read_only: bool,
-        /// The key opens only jobs and batches with this label, and what it makes gets it; may be given up to 8 times.
+        /// Restrict the key to jobs and batches with this label, and add the label to its submissions; may be repeated up to 8 times.
         #[arg(long = "label", value_name = "KEY:VALUE", value_parser = bound_label)]
         labels: Vec<(String, String)>,
         #[command(flatten)]
@@ -493,7 +517,7 @@ pub(super) enum KeysAction {
         #[command(flatten)]
         database: DatabaseArgs,
     },
-    /// List all keys without their secrets.
+    /// List all keys, without their secrets.
     List {
         #[command(flatten)]
         folder: DataFolderArgs,
@@ -502,7 +526,7 @@ pub(super) enum KeysAction {
     },
     /// Revoke a key; a running service refuses it within seconds.
     Revoke {
-        /// Id of the key, as `list` shows it.
+        /// Id of the key, from `railhead keys list`.
         #[arg(value_name = "ID")]
         id: String,
         #[command(flatten)]
@@ -525,14 +549,14 @@ pub(super) struct SolveArgs {
 /// Settings of `healthcheck`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct HealthcheckArgs {
-    /// What to ask; only plain `http://` is possible [default: `/readyz` at the address that RAILHEAD_PROBE_LISTEN or
-    /// RAILHEAD_LISTEN says, else at 127.0.0.1:8080].
+    /// URL to request, with `http://` [default: `/readyz` at the address in RAILHEAD_PROBE_LISTEN or RAILHEAD_LISTEN, or else at
+    /// 127.0.0.1:8080].
     #[arg(long, env = "RAILHEAD_HEALTHCHECK_URL", value_name = "URL")]
     pub url: Option<String>,
-    /// The listener for probes of the service, if it has one.
+    /// Address and port of the service's listener for probes, if it has one.
     #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
     pub probe_listen: Option<SocketAddr>,
-    /// Where the service listens.
+    /// Address and port on which the service listens.
     #[arg(
         long,
         env = "RAILHEAD_LISTEN",

@@ -28,7 +28,7 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     let (keys, place) = match &database.database_url {
         Some(url) => (Keyring::open_shared(url).await?, "the database".to_owned()),
         None if !creates && !Keyring::is_there(data_dir) => {
-            bail!("{} is no data folder of a service", data_dir.display());
+            bail!("{} is not the data folder of a service", data_dir.display());
         }
         None => (
             Keyring::open(data_dir).await?,
@@ -48,7 +48,7 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
                 .create(tenant, name.clone(), *read_only, labels)
                 .await?;
             print_error(&format!(
-                "key {} of tenant {} in {} follows; it is shown this one time",
+                "key {} of tenant {} in {} follows; it is not shown again",
                 key.id, key.tenant, place
             ));
             print(&secret)

@@ -13,11 +13,9 @@ use crate::jobs::store::postgres::schema::{Migrated, migrate};
 pub(super) fn run(args: &DatabaseUrlArgs) -> anyhow::Result<ExitCode> {
     let made = block_on(migrate(&args.database_url))??;
     print(match made {
-        Migrated::Made => "the job table was made",
-        Migrated::Upgraded => "the job table was brought forward to the version of this program",
-        Migrated::AlreadyCurrent => {
-            "the job table is there, in a version that this program can use"
-        }
+        Migrated::Made => "the job table was created",
+        Migrated::Upgraded => "the job table was upgraded to the version of this program",
+        Migrated::AlreadyCurrent => "the job table exists in a version that this program can use",
     })
 }
 

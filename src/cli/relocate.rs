@@ -34,7 +34,7 @@ pub(super) fn run_results(args: &MoveResultsArgs) -> anyhow::Result<ExitCode> {
     let place = args
         .results
         .place()
-        .context("say by --results-url where the results are to be")?;
+        .context("give the new location of the results with --results-url")?;
     let moved = block_on(move_results(&args.database.database_url, &place))??;
     let from = match moved.from.as_str() {
         "" => "the database",

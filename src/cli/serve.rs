@@ -140,11 +140,13 @@ impl Role {
                 bail!("`railhead worker` needs the --database-url of the nodes that accept jobs")
             }
             Role::Work if args.worker_count() == 0 => {
-                bail!("--workers 0 leaves `railhead worker` nothing to do")
+                bail!(
+                    "`railhead worker` needs at least one worker; --workers 0 is for `railhead serve`"
+                )
             }
             Role::Serve if !shared && args.worker_count() == 0 => {
                 bail!(
-                    "--workers 0 needs a --database-url, where other nodes find the jobs to solve them"
+                    "--workers 0 requires a --database-url, because other nodes must solve the jobs"
                 )
             }
             _ => Ok(()),
@@ -159,7 +161,7 @@ pub(super) fn run(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     for name in unknown_variables() {
         tracing::warn!(
             name,
-            "this variable is not known; `railhead config` lists those that are"
+            "this variable is not known; `railhead config` lists the known ones"
         );
     }
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -194,9 +196,9 @@ async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     if role == Role::Serve && !anonymous && !jobs.any_key().await? {
         jobs.shutdown(Duration::ZERO).await;
         bail!(
-            "nobody could use a service on {address}: there is no API key, and requests without one are only answered \
-             on loopback; make a key with `railhead keys create --tenant NAME --data-dir {}`, or let everybody in who \
-             reaches the port with `--anonymous always`",
+            "no client could use a service on {address}: there is no API key, and requests without one are only answered on \
+             loopback; create a key with `railhead keys create --tenant NAME --data-dir {}`, or answer everyone who can reach \
+             the port with `--anonymous always`",
             args.data_dir.display()
         );
     }
@@ -204,7 +206,7 @@ async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     let stop = CancellationToken::new();
     let mut server = start_listening(args, role, &jobs, listener, anonymous, stop.clone()).await?;
     if role == Role::Serve && anonymous && !address.ip().is_loopback() {
-        tracing::warn!(%address, "whoever reaches this address may use the service without a key");
+        tracing::warn!(%address, "everyone who can reach this address can use the service without a key");
     }
     let loopback = anonymous && args.anonymous == Anonymous::Loopback;
     if role == Role::Serve && loopback && jobs.any_key().await? {
@@ -335,7 +337,7 @@ async fn stop_service(
     let closed = timeout_at(schedule.folder_closed, jobs.shutdown(grace)).await;
     if closed.is_err() {
         tracing::warn!(
-            "the data folder could not be closed in time; the next start takes the running jobs back"
+            "the data folder could not be closed in time; the next start returns the running jobs to the queue"
         );
     }
     Ok(())
@@ -366,7 +368,7 @@ fn http_options(
                 tracing::warn!(
                     files,
                     connections = most,
-                    "the process may open few files, so fewer connections than asked for"
+                    "the process may open few files, so the number of connections is lower than configured"
                 );
                 options.connections_max = most;
             }

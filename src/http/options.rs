@@ -15,90 +15,93 @@ use crate::jobs::options::{defaults, mib, seconds};
 
 /// The limits of a service; nearly every one is a flag of `serve`, declared here.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Requests")]
 pub struct HttpOptions {
-    /// Maximum number of open connections. A further one replaces the connection that has waited longest for a request. Lowered
-    /// if the process may not open so many files.
+    /// Maximum number of open connections. A further one replaces the connection that has waited longest for a request. The number is
+    /// lowered if the process may not open so many files.
     #[arg(long, env = "RAILHEAD_CONNECTIONS_MAX", default_value = "4096", value_name = "N", value_parser = count(1..))]
     pub connections_max: usize,
-    /// The same for the connections of one address (IPv6: of one network of 64 bits), loopback included.
+    /// Maximum number of open connections of one address, loopback included. For IPv6, the addresses of a /64 network count together.
     #[arg(long, env = "RAILHEAD_ADDRESS_CONNECTIONS_MAX", default_value = "1024", value_name = "N", value_parser = count(1..))]
     pub address_connections_max: usize,
-    /// Requests of one tenant under way, streams of events and waits aside; beyond: 429.
+    /// Maximum number of concurrent requests of one tenant, except event streams and waits; beyond it: 429.
     #[arg(long, env = "RAILHEAD_TENANT_REQUESTS_MAX", default_value = "512", value_name = "N", value_parser = count(1..))]
     pub tenant_requests_max: usize,
-    /// Streams of events open in all; beyond: 429.
+    /// Maximum number of open event streams; beyond it: 429.
     #[arg(long, env = "RAILHEAD_STREAMS_MAX", default_value = "1024", value_name = "N", value_parser = count(..))]
     pub streams_max: usize,
-    /// Streams of events of one tenant; beyond: 429.
+    /// Maximum number of open event streams of one tenant; beyond it: 429.
     #[arg(long, env = "RAILHEAD_TENANT_STREAMS_MAX", default_value = "256", value_name = "N", value_parser = count(..))]
     pub tenant_streams_max: usize,
-    /// Requests that wait for the end of a job or a batch; beyond, a job is answered without waiting, a batch by 429.
+    /// Maximum number of requests that wait for the end of a job or a batch. Beyond it, a request for a job is answered without
+    /// waiting, and one for a batch with 429.
     #[arg(long, env = "RAILHEAD_WAITS_MAX", default_value = "1024", value_name = "N", value_parser = count(..))]
     pub waits_max: usize,
-    /// The same of one tenant.
+    /// Maximum number of such requests of one tenant.
     #[arg(long, env = "RAILHEAD_TENANT_WAITS_MAX", default_value = "256", value_name = "N", value_parser = count(..))]
     pub tenant_waits_max: usize,
-    /// Seconds for the head of the first request on a connection.
+    /// Seconds within which the head of the first request on a connection must arrive.
     #[arg(long = "first-head-timeout-s", env = "RAILHEAD_FIRST_HEAD_TIMEOUT_S", default_value = "10", value_name = "SECONDS", value_parser = seconds(1..))]
     pub first_head_timeout: Duration,
-    /// Seconds for the head of each further request, idle time included.
+    /// Seconds within which the head of each further request must arrive, including idle time.
     // By default longer than the usual proxies keep an idle connection, so that they close it first.
     #[arg(long = "head-timeout-s", env = "RAILHEAD_HEAD_TIMEOUT_S", default_value = "75", value_name = "SECONDS", value_parser = seconds(1..))]
     pub head_timeout: Duration,
-    /// Seconds for the body of a case, or between two pieces of that of a batch, a run or an evaluation.
+    /// Seconds within which the body of a case must arrive. For a batch, a run or an evaluation: maximum time between two parts of the
+    /// body.
     #[arg(long = "body-timeout-s", env = "RAILHEAD_BODY_TIMEOUT_S", default_value = "60", value_name = "SECONDS", value_parser = seconds(1..))]
     pub body_timeout: Duration,
-    /// Seconds in which a client must take a piece of its answer.
+    /// Seconds within which a client must read each part of a response.
     #[arg(long = "write-timeout-s", env = "RAILHEAD_WRITE_TIMEOUT_S", default_value = "60", value_name = "SECONDS", value_parser = seconds(1..))]
     pub write_timeout: Duration,
-    /// Memory in MiB that bodies, parsed cases and answers of all requests may take; further ones wait or get 503.
+    /// Maximum memory in MiB for bodies, parsed cases and responses of all requests; beyond it, requests wait or get 503.
     #[arg(long = "request-memory-mb", env = "RAILHEAD_REQUEST_MEMORY_MB", default_value = "512", value_name = "MIB", value_parser = memory(64..=1 << 20))]
     pub memory_max_bytes: usize,
-    /// The part of it that one tenant may take.
+    /// Maximum part of this memory for one tenant.
     #[arg(long = "tenant-request-memory-mb", env = "RAILHEAD_TENANT_REQUEST_MEMORY_MB", default_value = "256", value_name = "MIB", value_parser = memory(64..=1 << 20))]
     pub tenant_memory_max_bytes: usize,
-    /// Memory in MiB that one case may take once it is parsed; beyond: 413.
+    /// Maximum memory in MiB of one parsed case; beyond it: 413.
     #[arg(long = "parsed-case-max-mb", env = "RAILHEAD_PARSED_CASE_MAX_MB", default_value = "96", value_name = "MIB", value_parser = memory(1..=1 << 20))]
     pub parsed_max_bytes: usize,
-    /// Body of one case in MiB, or of one case of a batch; beyond: 413.
+    /// Maximum size in MiB of the body of one case, or of one case in a batch; beyond it: 413.
     #[arg(long = "body-max-mib", env = "RAILHEAD_BODY_MAX_MIB", default_value = "8", value_name = "MIB", value_parser = memory(1..=1024))]
     pub body_max_bytes: usize,
-    /// Body of one batch in MiB; beyond: 413.
+    /// Maximum size in MiB of the body of a batch; beyond it: 413.
     #[arg(long = "batch-max-mib", env = "RAILHEAD_BATCH_MAX_MIB", default_value = "1024", value_name = "MIB", value_parser = mib(1..=65536))]
     pub batch_max_bytes: u64,
-    /// Cases of one batch; beyond: 413.
+    /// Maximum number of cases in a batch; beyond it: 413.
     #[arg(long, env = "RAILHEAD_BATCH_MAX_CASES", default_value = "200000", value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub batch_max_cases: u32,
-    /// Milliseconds for which `/v1/cases/check` solves a case to find out how long it takes; 0: it is told by formulas alone.
+    /// Milliseconds for which `/v1/cases/check` solves a case to estimate its solve time; 0: formulas alone give the estimate.
     #[arg(long = "check-trial-ms", env = "RAILHEAD_CHECK_TRIAL_MS", default_value = "200", value_name = "MS", value_parser = milliseconds(..=10_000))]
     pub check_trial: Duration,
-    /// Pictures, grids and tables made at the same time [default: half of the cores, at least 1].
+    /// Number of pictures, grids and tables rendered at the same time [default: half of the cores, at least 1].
     #[arg(long, env = "RAILHEAD_RENDERINGS", default_value_t = half_of_the_cores(), hide_default_value = true, value_name = "N",
           value_parser = value_parser!(u16).range(1..).map(usize::from))]
     pub renderings: usize,
-    /// Requests that wait for their turn at that, half as many of one tenant; beyond: 503.
+    /// Maximum number of requests that wait to be rendered, half as many for one tenant; beyond it: 503.
     #[arg(long, env = "RAILHEAD_RENDERINGS_WAITING_MAX", default_value = "512", value_name = "N", value_parser = count(2..))]
     pub renderings_waiting_max: usize,
-    /// Samples of a regular grid (`?grid=NXxNY`); beyond: 400.
+    /// Maximum number of samples of a regular grid (`?grid=NXxNY`); beyond it: 400.
     #[arg(long, env = "RAILHEAD_GRID_MAX_SAMPLES", default_value = "250000", value_name = "N", value_parser = count(4..=1_000_000))]
     pub grid_max_samples: usize,
-    /// Body of `POST /v1/evaluate` in MiB; beyond: 413.
+    /// Maximum size in MiB of the body of `POST /v1/evaluate`; beyond it: 413.
     #[arg(long = "evaluate-max-mib", env = "RAILHEAD_EVALUATE_MAX_MIB", default_value = "64", value_name = "MIB", value_parser = memory(1..=1024))]
     pub evaluate_max_bytes: usize,
-    /// Rows of one such body; beyond: 422.
+    /// Maximum number of rows of `POST /v1/evaluate`; beyond it: 422.
     #[arg(long, env = "RAILHEAD_EVALUATE_MAX_ROWS", default_value = "1000000", value_name = "N", value_parser = count(1..))]
     pub evaluate_max_rows: usize,
-    /// Body of `POST /v1/runs` in MiB; beyond: 413.
+    /// Maximum size in MiB of the body of `POST /v1/runs`; beyond it: 413.
     #[arg(long = "run-max-mib", env = "RAILHEAD_RUN_MAX_MIB", default_value = "1024", value_name = "MIB", value_parser = mib(1..=65536))]
     pub run_max_bytes: u64,
-    /// Rows of one run; beyond: 413.
+    /// Maximum number of rows of a run; beyond it: 413.
     #[arg(long, env = "RAILHEAD_RUN_MAX_ROWS", default_value = "10000000", value_name = "N", value_parser = value_parser!(u64).range(1..=1_000_000_000))]
     pub run_max_rows: u64,
-    /// Computing seconds that the reading of one batch, run or table, or the evaluation of its rows, may take; beyond: 413.
+    /// Maximum processor time in seconds for reading a batch, run or table, or for evaluating its rows; beyond it: 413.
     // The default is ten times what the largest usual table takes on a slow core; a judgement.
     #[arg(long = "table-time-s", env = "RAILHEAD_TABLE_TIME_S", default_value = "300", value_name = "SECONDS", value_parser = seconds(1..))]
     pub table_time: Duration,
-    /// Seconds in which the solver must answer the rows of one evaluation; beyond: 422.
+    /// Maximum solver time in seconds for the rows of one evaluation; beyond it: 422.
     #[arg(long = "evaluate-time-s", env = "RAILHEAD_EVALUATE_TIME_S", default_value = "10", value_name = "SECONDS", value_parser = seconds(1..))]
     pub evaluate_time: Duration,
     /// Folder that the files of the page at `/` are read from for each request, for those who change it.
@@ -120,7 +123,7 @@ pub struct HttpOptions {
     /// Requests without a key that came through a proxy are answered too.
     #[arg(skip)]
     pub anonymous_proxied: bool,
-    /// Requests per second of one key, or of one address without a key; 0 for any number.
+    /// Requests per second of one key, or of one address without a key; 0: no limit.
     #[arg(skip)]
     pub requests_per_second: u32,
 }

@@ -35,6 +35,7 @@ impl fmt::Debug for Database {
 
 /// How jobs are kept and worked on; most of it is a flag of `serve`, declared here.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Jobs")]
 pub struct Options {
     /// Folder of the job table and the results; created if it is not there.
     #[arg(skip)]
@@ -51,41 +52,41 @@ pub struct Options {
     /// What one case may use.
     #[arg(skip)]
     pub limits: Limits,
-    /// Attempts at a job whose worker is lost each time, before it fails.
+    /// Number of attempts after which a job fails if its worker is lost each time.
     #[arg(long, env = "RAILHEAD_ATTEMPTS_MAX", default_value = "5", value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub attempts_max: u32,
-    /// Queued jobs beyond which new ones are turned away.
+    /// Maximum number of queued jobs; further jobs are refused.
     #[arg(long, env = "RAILHEAD_QUEUE_MAX", default_value = "300000", value_name = "N", value_parser = value_parser!(u64).range(1..))]
     pub queue_max: u64,
-    /// Queued jobs of one tenant beyond which its new ones are turned away.
+    /// Maximum number of queued jobs of one tenant; further jobs are refused.
     #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value = "250000", value_name = "N", value_parser = value_parser!(u64).range(1..))]
     pub tenant_queue_max: u64,
-    /// Answer a case that is identical to one solved before with that result, without solving it again.
+    /// Return the stored result for a case that is identical to one solved before, instead of solving it again.
     #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL", action = ArgAction::Set)]
     pub cache: bool,
     /// How long ended jobs are kept; `None`: until they are deleted.
     #[arg(skip)]
     pub retention: Option<Duration>,
-    /// Profiles in MB that one tenant may keep; beyond: 429.
+    /// Maximum size in MB of the stored profiles of one tenant; beyond it: 429.
     #[arg(long = "tenant-profiles-mb", env = "RAILHEAD_TENANT_PROFILES_MB", default_value = "64", value_name = "MB", value_parser = mib(1..=65536))]
     pub tenant_profiles_max_bytes: u64,
-    /// Most solver seconds of a case: for those that name no `time_limit_s`, and the most that one may name.
+    /// Maximum solver time of a case in seconds: the largest `time_limit_s`, and the limit of cases without it.
     #[arg(long = "time-limit-s", env = "RAILHEAD_TIME_LIMIT_S", default_value = "86400", value_name = "SECONDS", value_parser = seconds(1..))]
     pub time_limit: Duration,
-    /// Seconds after which the jobs of a worker that shows no sign of life are given to another; it shows one three times
-    /// as often.
+    /// Lease of a job in seconds. A worker renews it three times in this time; if it does not, another worker takes the job.
     #[arg(long = "lease-s", env = "RAILHEAD_LEASE_S", default_value = "30", value_name = "SECONDS", value_parser = seconds(1..=3600))]
     pub lease: Duration,
-    /// Solver seconds after which a solve makes room for others that wait.
+    /// Solver time in seconds after which a job yields to others that wait.
     #[arg(long = "slice-s", env = "RAILHEAD_SLICE_S", default_value = "2", value_name = "SECONDS", value_parser = part_of_a_day)]
     pub slice: Duration,
-    /// Solver threads that do not stop when they are told to, beyond which the process ends with code 75, to be started again.
+    /// Maximum number of solver threads that ignore a stop request. With more, the process ends with exit code 75 so that it can be
+    /// restarted.
     #[arg(long, env = "RAILHEAD_ABANDONED_MAX", default_value = "3", value_name = "N", value_parser = value_parser!(u16).map(usize::from))]
     pub abandoned_max: usize,
     /// Bounds of what batches that are being received stand for.
     #[command(flatten)]
     pub staging: StagingBounds,
-    /// Size in MB of the cases, templates and results that one tenant may have stored; further submissions get 507 [default: any size].
+    /// Maximum size in MB of the stored cases, templates and results of one tenant; beyond it: 507 [default: no limit].
     #[arg(long = "tenant-stored-mb", env = "RAILHEAD_TENANT_STORED_MB", value_name = "MB", value_parser = mib(..))]
     pub tenant_stored_max_bytes: Option<u64>,
     /// Most jobs a worker claims together, if they are small; 1 means no groups.
@@ -104,11 +105,12 @@ pub struct Options {
 
 /// Bounds of staged bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+#[command(next_help_heading = "Jobs")]
 pub struct StagingBounds {
-    /// Most MB that batches being received stand for, a row of a table counted with its template.
+    /// Maximum size in MB of all batches that are being received; a row of a table counts with its template.
     #[arg(id = "staged", long = "staged-mb", env = "RAILHEAD_STAGED_MB", default_value = "16384", value_name = "MB", value_parser = mib(..))]
     pub all: u64,
-    /// The same of one tenant.
+    /// Maximum size in MB of the batches of one tenant that are being received.
     #[arg(id = "tenant_staged", long = "tenant-staged-mb", env = "RAILHEAD_TENANT_STAGED_MB", default_value = "4096", value_name = "MB", value_parser = mib(..))]
     pub tenant: u64,
 }
