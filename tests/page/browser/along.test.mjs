@@ -106,7 +106,7 @@ test('a worn rail lies over a new one: difference, worn area, numbers of all pat
   assert.deepEqual([one.state, two.state], ['succeeded', 'succeeded'], JSON.stringify(two.error));
   await page.goto(`${service.base}/#/compare/${one.id}/${two.id}`);
   await page.getByRole('img', { name: 'Cross-section of the rail of B over that of A' }).waitFor();
-  await page.getByRole('img', { name: 'What the rail of B lacks against that of A' }).waitFor();
+  await page.getByRole('img', { name: 'Material missing on the rail of B, compared with A' }).waitFor();
   const told = await page.locator('section[aria-labelledby="h-overlay"]').innerText();
   const area = Number(/Worn area ([\d.]+) mm²/.exec(told)?.[1]);
   const depth = Number(/at most ([\d.]+) mm/.exec(told)?.[1]);

@@ -69,7 +69,7 @@ export async function request(path, asked = {}) {
     answer = await fetch(path, { ...asked, headers });
   } catch (error) {
     if (asked.signal?.aborted) throw error;
-    throw new Refused(problem('No answer', 0, 'The service does not answer.'));
+    throw new Refused(problem('No answer', 0, 'The service does not respond.'));
   }
   if (answer.ok) return answer;
   const told = (answer.headers.get('Content-Type') ?? '').includes('problem+json');

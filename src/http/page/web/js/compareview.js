@@ -197,7 +197,7 @@ function profilesPanel(app, of) {
       name: `Cross-section of the ${of.body} of ${letter} over that of A`, shapes, mark: most && { at: most.at, label: `${fixed(most.depth, 2)} mm` },
     })}</div>
     <div class="card">${equal(one, two, of.body) ? html`<p class="quiet">Both cases have the same ${of.body}.</p>` : html`${drawChart({
-      name: `What the ${of.body} of ${letter} lacks against that of A`, lines: [{ label: `A − ${letter}`, look: 'one', points: wear.curve }],
+      name: `Material missing on the ${of.body} of ${letter}, compared with A`, lines: [{ label: `A − ${letter}`, look: 'one', points: wear.curve }],
       x: `along the ${of.body} of A / mm`, y: 'wear, along the normal / mm', xRange: [Math.min(...lengths), Math.max(...lengths)],
     })}<p>Worn area <b>${fixed(wear.area, 1)} mm²</b>${most ? html`, at most <b>${fixed(most.depth, 2)} mm</b> deep` : nothing}${wear.added > 0.05 ? `; ${letter} has ${fixed(wear.added, 1)} mm² more elsewhere` : ''}.</p>`}</div></div></section>`;
 }

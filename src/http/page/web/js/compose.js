@@ -162,9 +162,9 @@ function previewOf(app, { preview, document, checked, understood }) {
   // With faults the result is that of another case.
   if (!checked) return nothing;
   if (preview?.failure) return html`<section class="preview" aria-label="Result while typing"><p class="fault">Solving it fails: ${preview.failure}</p>
-    ${preview.failure.includes('accept_rough_profiles') ? html`<button class="small" @click=${() => change(app, '/contact/accept_rough_profiles', true)}>Solve it all the same</button>` : nothing}</section>`;
+    ${preview.failure.includes('accept_rough_profiles') ? html`<button class="small" @click=${() => change(app, '/contact/accept_rough_profiles', true)}>Solve it anyway</button>` : nothing}</section>`;
   if (!preview) return nothing;
-  if (!preview.result) return html`<section class="preview" aria-label="Result while typing"><p class="quiet">This case takes longer than a look while typing: solve it.</p></section>`;
+  if (!preview.result) return html`<section class="preview" aria-label="Result while typing"><p class="quiet">This case takes too long to solve while typing: click Solve.</p></section>`;
   const { result, patch, point, field } = preview;
   const { patches } = result;
   const of = patches[patch].points[point];

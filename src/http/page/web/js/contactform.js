@@ -240,7 +240,7 @@ function dropZone(title, what, pointer, app, take, wanted) {
 /** @param {App} app @param {File} file */
 async function takeGap(app, file) {
   const curve = parseGapCurve(decoded(await file.arrayBuffer()));
-  if (!curve) return app.say(`${file.name} has no two columns of numbers, y and gap in mm.`);
+  if (!curve) return app.say(`${file.name} does not have two columns of numbers, y and gap in mm.`);
   const document = app.store.get().compose.document ?? {};
   editDocument(app, put(put(document, '/contact/y_mm', curve.y_mm), '/contact/gap_mm', curve.gap_mm));
 }
@@ -248,7 +248,7 @@ async function takeGap(app, file) {
 /** @param {App} app @param {File} file @param {string} member */
 async function takeGrid(app, file, member) {
   const grid = parseGrid(decoded(await file.arrayBuffer()));
-  if (!grid) return app.say(`${file.name} is no grid with x in its first row and y in its first column.`);
+  if (!grid) return app.say(`${file.name} is not a grid with x in its first row and y in its first column.`);
   const document = app.store.get().compose.document ?? {};
   const { type } = /** @type {JsonObject} */ (document.contact);
   editDocument(app, put(document, '/contact', { type, x_mm: grid.x_mm, y_mm: grid.y_mm, [member]: grid.values }));

@@ -39,7 +39,7 @@ export function damagePanel(app, looked, answer, again) {
   const chosen = shown.find(({ at }) => at === looked.patch) ?? shown[0];
   if (!hasDamage(chosen.point)) {
     if (chosen.point.history) return nothing;
-    return html`<section class="panel wait"><p>Wear, fatigue, stresses below the surface and temperature were not asked for.</p>
+    return html`<section class="panel wait"><p>Wear, fatigue, stresses below the surface and temperature were not requested.</p>
       <button class="primary" @click=${again}>Solve again with damage</button></section>`;
   }
   const figures = answer.damage_parameters;

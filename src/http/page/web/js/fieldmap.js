@@ -32,7 +32,7 @@ import { drawSections } from './field/sections.js';
 /** @typedef {CustomEvent<{ x: number, y: number, held: boolean }>} CrosshairEvent */
 
 const HELP = 'Arrow keys move the crosshair from cell to cell, with Shift by five; Home and End go to the ends of the strip; '
-  + 'Enter holds the crosshair, Escape lets it go.';
+  + 'Enter fixes the crosshair, Escape releases it.';
 
 export class FieldMap extends HTMLElement {
   /** @type {Shown | null} */ #shown = null;

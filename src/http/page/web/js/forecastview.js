@@ -259,7 +259,7 @@ function decisionText(answers, sides) {
   });
   return html`${better === null ? (ends[0].label ? 'Both reach their first limit at the same time.' : `Neither reaches a limit within ${number(distanceOf(last[0].progress), 3)} ${unit}. Until then traffic wears ${worn.join('; and ')}.`)
     : html`${name(better)} goes on longer. Its first limit: ${end(better)}. That of ${name(better ? 0 : 1)}: ${end(better ? 0 : 1)}.
-      ${sure ? 'No wear coefficients within their scatter turn this round.' : html`<span class="warn">With other wear coefficients it may be the other way round.</span>`}`}
+      ${sure ? 'No wear coefficients within their scatter reverse this.' : html`<span class="warn">Other wear coefficients within their scatter may reverse this.</span>`}`}
     ${removed.length ? ` Maintenance ${removed.join(', and ')}.` : nothing}`;
 }
 

@@ -97,7 +97,7 @@ function waiting(app, looked) {
         <p>${job.error?.detail ?? ''}</p>
         ${(job.error?.errors ?? []).filter(({ detail }) => detail !== job.error?.detail).map((fault) => html`<p><b>${inWords(fault.pointer ?? '')}</b> ${fault.detail}</p>`)}
         <div class="actions"><button @click=${() => edit(app, looked)}>Open the case</button>
-        ${job.error?.detail?.includes('accept_rough_profiles') ? html`<button @click=${() => allTheSame(app, looked)}>Solve it all the same</button>` : nothing}</div></section>`;
+        ${job.error?.detail?.includes('accept_rough_profiles') ? html`<button @click=${() => allTheSame(app, looked)}>Solve it anyway</button>` : nothing}</div></section>`;
     default:
       return html`<p class="pad quiet">Loading …</p>`;
   }
@@ -114,7 +114,7 @@ function loaded(app, looked, answer) {
     ${smoothAgain(app, looked, answer)}
     ${answer.wheelset?.kinematics ? wheelsetPanel(app, looked, answer.wheelset) : nothing}
     <div class=${mapped ? 'cols' : 'cols nofield'}>
-      ${mapped ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case asked for no fields, so there is no map.</p>
+      ${mapped ? fieldPanel(app, looked, answer) : html`<section class="panel wait"><p>The case requested no fields, so there is no map.</p>
         <button class="primary" @click=${() => again(app, looked.document)}>Solve again with fields</button></section>`}
       <div class="aside">
         ${looked.placed && patch.position ? profilePanel(app, looked, answer) : nothing}

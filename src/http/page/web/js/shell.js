@@ -74,7 +74,7 @@ function keyForm(app) {
     window.dispatchEvent(new HashChangeEvent('hashchange'));
   };
   return html`<form class="keyline" @submit=${use}><label>API key <input name="key" type="password" autocomplete="off" .value=${apiKey()}></label>
-    <button class="primary small">Use</button><span class="hint">Kept in this tab until it is closed, and sent to this service alone.</span></form>`;
+    <button class="primary small">Use</button><span class="hint">Stored for this tab only and sent only to this server.</span></form>`;
 }
 
 function switchTheme() {

@@ -59,7 +59,7 @@ export function parseTraffic(text) {
       table.unused.push(title);
       continue;
     }
-    if (wrong >= 0) return `row ${wrong + 1} of “${title}” is no number`;
+    if (wrong >= 0) return `row ${wrong + 1} of “${title}” is not a number`;
     if (pointer || !known) {
       if (known && known.key !== 'radius') table.values[known.key] = values.map((value) => value / known.factor);
       else table.others[title] = values;

@@ -76,7 +76,7 @@ function headline({ conicity, equilibrium_shift_mm: balance, contact_distance_mm
   const error = Math.hypot(accepted?.error_estimate ?? 0, accepted?.profile_uncertainty ?? 0);
   return html`${typeof accepted?.conicity === 'number' ? html`equivalent conicity <b>${fixed(accepted.conicity, 3)}</b>${error >= 0.0005 ? ` ± ${fixed(error, 3)}` : ''} at ${ACCEPTANCE_MM} mm; ` : nothing}${typeof balance === 'number'
     ? `rolls in balance at ${fixed(balance, 2)} mm, contacts ${fixed(distance, 1)} mm apart`
-    : `no shift is in balance: ${reason ?? 'Δr rises through 0 nowhere within reach'}`}`;
+    : `no shift is in balance: ${reason ?? 'Δr does not rise through 0 in this range of shifts'}`}`;
 }
 
 /** The slider, both wheels, and what they carry. @param {App} app @param {Looked} looked @param {Shifting} moving */
@@ -152,7 +152,7 @@ function curvePart(app, looked, wheelset, kinematics, moving) {
   return html`<div><div class="segs" role="group" aria-label="Curve of the wheelset">${KINDS.map(([name, label]) => html`<label class="seg">
       <input type="radio" name="wheelset" .checked=${kind === name} @change=${() => choose(app, { wheelset: name })}><span>${label}</span></label>`)}</div>
     ${curve ? html`<creep-curve .shown=${{ curve, chosen: overShift ? moving.at : -1, pick }}></creep-curve>`
-      : html`<p class="pad quiet">No amplitude has a conicity: ${kinematics.conicity[0]?.reason ?? kinematics.reason ?? 'fewer than two were asked for'}.</p>`}
+      : html`<p class="pad quiet">No amplitude has a conicity: ${kinematics.conicity[0]?.reason ?? kinematics.reason ?? 'fewer than two amplitudes were requested'}.</p>`}
     ${overShift ? nothing : windowPart(app, looked, kinematics)}</div>`;
 }
 
