@@ -150,7 +150,7 @@ pub async fn run() {
     );
     let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
     assert_eq!(counted(&pool, twice).await, 0, "a job ended twice");
-    assert!(cluster.logged("lease ran out").is_empty());
+    assert!(cluster.logged("lease expired").is_empty());
     freed(&cluster, &pool, &folder).await;
 }
 

@@ -83,9 +83,7 @@ pub async fn run() {
             })
         });
         let seconds = began.elapsed().as_secs_f64();
-        let did = nodes
-            .iter()
-            .filter(|(said, _, _)| !said.contains("is there"));
+        let did = nodes.iter().filter(|(said, _, _)| !said.contains("exists"));
         assert_eq!(did.count(), 1, "one makes or changes the tables");
         work(&nodes).await;
         let before = match form {

@@ -34,7 +34,7 @@ impl Fault {
 pub struct FaultFigures {
     /// The kind of the fault.
     pub code: FaultCode,
-    /// The value given, where it is no array, no object and no long text.
+    /// The value given, unless it is an array, an object or a long text.
     pub value: Option<Value>,
     /// Smallest number allowed.
     pub minimum: Option<Number>,
@@ -42,9 +42,9 @@ pub struct FaultFigures {
     pub minimum_excluded: bool,
     /// Largest number, or number of elements or characters, allowed.
     pub maximum: Option<Number>,
-    /// Unit of these numbers.
+    /// Unit of `minimum` and `maximum`.
     pub unit: Option<&'static str>,
-    /// The words that are allowed.
+    /// The values that are allowed.
     pub allowed: Vec<String>,
 }
 
@@ -112,7 +112,7 @@ pub enum SolveError {
         strips: u32,
     },
     /// There is no region and pressure to go on with.
-    #[error("the normal problem has no answer: {reason}")]
+    #[error("the normal problem has no solution: {reason}")]
     NormalProblem {
         /// Why, as a clause.
         reason: String,
@@ -144,7 +144,7 @@ pub enum SolveError {
     },
     /// The answer contains a number that is not finite; none of it is usable.
     #[error(
-        "the answer is not finite: {quantity}; check the case for values that are extremely large or small"
+        "the result is not finite: {quantity}; check the case for values that are extremely large or small"
     )]
     NotFinite {
         /// Where it stands in the answer.

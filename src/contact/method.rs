@@ -16,7 +16,7 @@ pub enum Method {
     Table,
 }
 
-/// Where `fastsim` lets tractions slip.
+/// Traction bound at which `fastsim` slips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TractionBound {
     /// At μ times the pressure.

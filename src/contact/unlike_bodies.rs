@@ -167,7 +167,7 @@ fn rough(case: &CheckedCase) -> CheckedCase {
 fn rounds_used_up(residual: f64, tolerance: f64) -> Remark {
     Remark::IterationInexact {
         iteration: "pressure and tractions of unlike bodies",
-        reason: "the rounds were used up",
+        reason: "the iteration limit was reached",
         residual,
         tolerance,
     }

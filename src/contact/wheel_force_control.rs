@@ -280,7 +280,7 @@ impl ForceSearch<'_> {
             [None, None] => "within limits that were not found".to_owned(),
         };
         let beside = match self.forces[0] {
-            Some(_) => ", and less beside a longitudinal force",
+            Some(_) => ", and less together with a longitudinal force",
             None => "",
         };
         SolveError::NormalProblem {
@@ -298,7 +298,7 @@ impl ForceSearch<'_> {
         let (asked, reason) = (self.asked(), end.reason());
         SolveError::NormalProblem {
             reason: format!(
-                "no creepage was found that gives what was asked for, {asked}: {reason}; friction may not carry it beside what else is given"
+                "no creepage was found that gives {asked}: {reason}; friction may not carry it together with the other given values"
             ),
         }
     }

@@ -364,7 +364,7 @@ impl<'a> WheelSolve<'a> {
             nearest.and_then(|(_, start)| self.curve.over(&place, x, contact.centre, &start));
         let over = over.ok_or_else(|| SolveError::NormalProblem {
             reason: format!(
-                "the wheel's surface was not found over the place x = {x:.3} mm, s = {s:.3} mm of the rail"
+                "the wheel's surface was not found above the position x = {x:.3} mm, s = {s:.3} mm of the rail"
             ),
         })?;
         Ok((place, over))

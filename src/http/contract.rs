@@ -22,18 +22,18 @@ use crate::http::problem::{ProblemBody, ProblemKind, describe, describe_together
 #[openapi(
     info(
         title = "railhead",
-        description = "Rolling-contact stress service: describe how two bodies touch, press and roll, and get tractions, stick and slip zones and forces.\n\nUnits are part of every name: mm, N, MPa; creepages are dimensionless, spin is in 1/mm. x is along rolling, y to the left, z up; forces and tractions act on the lower body. Numbers are of double precision; times are RFC 3339 in UTC. Every failure is a problem (RFC 9457) with a `type` that explains itself.",
+        description = "Rolling-contact stress service. A case describes how two bodies touch, press and roll; the result has tractions, stick and slip zones and forces.\n\nNames include the unit: mm, N, MPa. Creepages are dimensionless, spin is in 1/mm. x is along rolling, y to the left, z up. Forces and tractions act on the lower body. Numbers have double precision; times are RFC 3339 in UTC. Failures are problems (RFC 9457); their `type` is a path with an explanation.",
         license(name = "MIT OR Apache-2.0", identifier = "MIT OR Apache-2.0")
     ),
-    servers((url = "/", description = "The service that answers this document")),
+    servers((url = "/", description = "This service")),
     tags(
         (name = "jobs", description = "Submit cases and follow them"),
         (name = "batches", description = "Many cases at once"),
         (name = "profiles", description = "Cross-sections that cases name"),
-        (name = "runs", description = "Many rows over one case"),
+        (name = "runs", description = "Many rows, each a variation of one case"),
         (name = "evolutions", description = "Profiles that wear under a traffic"),
-        (name = "results", description = "What came out, part by part"),
-        (name = "cases", description = "What can be asked"),
+        (name = "results", description = "Results, part by part"),
+        (name = "cases", description = "Checks of cases, and their possible values"),
         (name = "service", description = "State of the service, its problems and this document")
     ),
     components(schemas(ProblemBody))
@@ -58,7 +58,7 @@ pub(super) fn conditional<S: Clone + Send + Sync + 'static>(
             .name("If-None-Match")
             .parameter_in(ParameterIn::Header)
             .required(Required::False)
-            .description(Some("Tags of answers that the client has"))
+            .description(Some("Values of `ETag` that the client has stored"))
             .schema(text());
         operation
             .parameters
@@ -68,10 +68,11 @@ pub(super) fn conditional<S: Clone + Send + Sync + 'static>(
         if let Some(RefOr::T(found)) = responses.get_mut("200") {
             let tag = HeaderBuilder::new()
                 .schema(text())
-                .description(Some("Digest of the answer, for `If-None-Match`"));
+                .description(Some("Digest of the response, for `If-None-Match`"));
             found.headers.insert("ETag".to_owned(), tag.build().into());
         }
-        let unchanged = ResponseBuilder::new().description("The client has this answer already");
+        let unchanged = ResponseBuilder::new()
+            .description("The response that the client has stored is still valid");
         responses.insert("304".to_owned(), unchanged.build().into());
     }
     routes
@@ -123,7 +124,7 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
     let scheme = HttpBuilder::new()
         .scheme(HttpAuthScheme::Bearer)
         .description(Some(
-            "An API key; not needed where the service lets anybody in, as it does on loopback",
+            "An API key; not needed if the service accepts requests without one, as it does on loopback",
         ))
         .build();
     let components = document.components.get_or_insert_default();
@@ -198,7 +199,7 @@ fn add_example(
     content.examples.insert(name.to_owned(), example);
 }
 
-/// This document.
+/// Returns this document.
 #[utoipa::path(
     get,
     path = "/openapi.json",
@@ -226,17 +227,17 @@ macro_rules! examples {
 pub(super) const EXAMPLES: [(&str, &str, &str); 18] = examples! {
     "hertz-steel": "A wheel on a rail by its radii, with both creepages and spin";
     "spin": "An ellipse with lateral creepage and spin";
-    "uic60-crown": "A wheel on a UIC60-like crown of arcs, as a measured gap: region and pressure are found";
+    "uic60-crown": "A wheel on a UIC60-like crown of arcs, as a measured gap; region and pressure are computed";
     "area-132re-crown": "A coned wheel on an AREA-132RE-like crown, touching beside the middle";
     "two-patches": "A gap on a grid with two contact patches";
     "wheel-rail": "A wheel on a rail by their cross-sections, under a vertical force, with the motion of the wheelset";
     "wheel-rail-flange": "A wheel on a rail by their cross-sections, touching at the gauge corner and at the flange";
     "guard-rail": "A wheel on a rail with a guard rail beside it, which the back of the flange touches";
     "wheelset": "A wheelset on both rails at three shifts, rolling freely, with its equivalent conicity";
-    "maintenance": "What one wheel does to a rail: stresses below the worst point, wear and fatigue, temperatures";
+    "maintenance": "Damage of a rail by one wheel: stresses below the worst point, wear and fatigue, temperatures";
     "friction": "A creep curve of a wet rail: friction that falls with slip, and a layer between the bodies";
     "unlike-bodies": "A soft roller driving on steel: bodies whose pressure and tractions depend on each other";
-    "rolling": "Rolling that changes: a shift, driving, then braking, each with what the contact remembers";
+    "rolling": "Rolling that changes: a shift, driving, then braking, each depending on the one before";
     "pressure-grid": "A given pressure over a patch of any shape";
     "sweep": "A creep curve: many motions on the same patch";
     "paper-figure-3": "Slip and stick under longitudinal creepage and several spins, as figure 3 of Liu and Hsu, on a patch without symmetry";

@@ -20,28 +20,28 @@ use crate::jobs::codec::table::TableKind;
 use crate::jobs::model::{Batch, Job, Kind, Priority, QueuePlace, State as JobState};
 use crate::jobs::run::model::{Run, RunColumn};
 
-/// A job as the client sees it. Times are RFC 3339 in UTC with milliseconds.
+/// A job. Times are RFC 3339 in UTC with milliseconds.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Job)]
 pub(crate) struct JobAnswer {
     /// Identifier; sorts by time of submission.
     #[schema(value_type = String, format = "uuid")]
     id: String,
-    /// Where the job stands.
+    /// State of the job.
     state: JobState,
-    /// Free text of the case.
+    /// Name of the case.
     name: Option<String>,
     /// Labels of the case.
     labels: BTreeMap<String, String>,
     /// The batch that the job belongs to; null for a job submitted alone.
     #[schema(format = "uuid")]
     batch_id: Option<String>,
-    /// Its place among the queued jobs of the tenant.
+    /// Priority among the tenant's queued jobs.
     priority: Priority,
     /// Time of submission.
     #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
     created_at: String,
-    /// Time of the last change, progress aside.
+    /// Time of the last change, except changes of progress.
     #[schema(format = "date-time")]
     updated_at: String,
     /// Start of the current or last attempt; null while queued.
@@ -50,29 +50,29 @@ pub(crate) struct JobAnswer {
     /// End of the job; null before it.
     #[schema(format = "date-time")]
     ended_at: Option<String>,
-    /// When the job fails if it has not ended by then; null where no deadline was set.
+    /// Time at which the job fails if it has not ended; null without a deadline.
     #[schema(format = "date-time")]
     deadline_at: Option<String>,
-    /// When the job will be removed with its result; null before its end, and where ended jobs are kept for ever.
+    /// Time at which the job and its result will be removed; null before the job ends, and if ended jobs are kept for ever.
     #[schema(format = "date-time")]
     expires_at: Option<String>,
-    /// Attempts since the last slice of the job was stored, the current one included.
+    /// Number of attempts since the last slice of the job was stored, including the current one.
     attempt: u32,
-    /// The result was computed for an identical case before, so nothing was solved.
+    /// Whether the result is that of an identical earlier case, so that nothing was solved.
     cached: bool,
-    /// Rough progress. A queued job of which some slices are solved keeps theirs.
+    /// Rough progress. A queued job keeps the progress of its stored slices.
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
-    /// Its place among the queued jobs; only where one job is looked at, as long as it is queued and not too far behind.
+    /// Position in the queue; only in responses about one job that is queued and not too far behind.
     #[serde(skip_serializing_if = "Option::is_none")]
     queue: Option<QueuePlace>,
-    /// What the client should know before using the numbers.
+    /// Remarks to read before using the numbers.
     remarks: Vec<RemarkEntry>,
-    /// Why the job failed; null unless it did.
+    /// Why the job failed; null otherwise.
     error: Option<ProblemBody>,
-    /// Where to go from here.
+    /// Links to related resources.
     links: BTreeMap<String, String>,
-    /// The result; only in the answer to `Prefer: wait`, when the job succeeded in time.
+    /// The result; only for `Prefer: wait`, if the job succeeded in time.
     #[serde(skip_serializing_if = "Option::is_none")]
     result: Option<JobResult>,
 }
@@ -147,7 +147,7 @@ pub(crate) fn rfc3339(epoch_ms: i64) -> String {
 )]
 pub(crate) struct Cases(Vec<BatchElement>);
 
-/// A case, alone or with options of its own.
+/// A case, alone or with its own options.
 #[derive(ToSchema)]
 #[serde(untagged)]
 #[expect(
@@ -155,13 +155,13 @@ pub(crate) struct Cases(Vec<BatchElement>);
     reason = "the form of a body that is cut into cases while it arrives"
 )]
 pub(crate) enum BatchElement {
-    /// The case alone.
+    /// A case without options.
     Case(Case),
-    /// The case with options in place of those of the batch.
+    /// A case with options that replace those of the batch.
     WithOptions(CaseWithOptions),
 }
 
-/// A case with options in place of those of its batch.
+/// A case with options that replace those of its batch.
 #[derive(ToSchema)]
 #[expect(
     dead_code,
@@ -170,35 +170,35 @@ pub(crate) enum BatchElement {
 pub(crate) struct CaseWithOptions {
     /// The case.
     case: Case,
-    /// Which of the queued jobs of the tenant are solved first.
+    /// Priority among the tenant's queued jobs.
     #[schema(nullable = false)]
     priority: Option<Priority>,
-    /// Seconds from now within which the job must have ended.
+    /// Seconds from now within which the job must end.
     #[schema(nullable = false, minimum = 1, maximum = 2_592_000)]
     deadline_s: Option<u32>,
 }
 
-/// A batch that was accepted, with the faults of cases that were left out.
+/// An accepted batch, with the faults of the skipped cases.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct BatchReceipt {
     #[serde(flatten)]
     pub batch: BatchAnswer,
-    /// The faults of the cases that were left out, those of the first 1000; none unless the request said `on_invalid=skip`.
+    /// Faults of the first 1000 skipped cases; empty unless the request has `on_invalid=skip`.
     pub errors: Vec<Fault>,
 }
 
-/// A batch: how far it is.
+/// A batch and its progress.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Batch)]
 pub(crate) struct BatchAnswer {
     /// Identifier of the batch.
     #[schema(value_type = String, format = "uuid")]
     id: String,
-    /// Where the batch stands.
+    /// State of the batch.
     state: BatchState,
-    /// Free text of the client.
+    /// Free text given by the client.
     name: Option<String>,
-    /// Labels of the client; those of its cases are with the jobs.
+    /// Labels of the batch; the labels of its cases are on the jobs.
     labels: BTreeMap<String, String>,
     /// Time of submission.
     #[schema(format = "date-time", example = "2026-01-31T09:30:00.000Z")]
@@ -206,22 +206,22 @@ pub(crate) struct BatchAnswer {
     /// End of the last job; null until every job has ended.
     #[schema(format = "date-time")]
     ended_at: Option<String>,
-    /// Number of jobs made.
+    /// Number of jobs in the batch.
     count: u32,
-    /// Number of faulty cases that were left out.
+    /// Number of faulty cases that were skipped.
     rejected: u32,
     /// Number of jobs in each state.
     states: BatchStates,
     /// Share of the jobs that have ended.
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
-    /// Every job has ended.
+    /// Whether every job has ended.
     pub ended: bool,
-    /// Where to go from here.
+    /// Links to related resources.
     links: BTreeMap<String, String>,
 }
 
-/// Where a batch stands.
+/// State of a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum BatchState {
@@ -229,7 +229,7 @@ pub(crate) enum BatchState {
     Queued,
     /// Some jobs have begun, and not all have ended.
     Running,
-    /// Every job has ended.
+    /// Whether every job has ended.
     Ended,
 }
 
@@ -288,7 +288,7 @@ fn batch_links(batch: &Batch) -> BTreeMap<String, String> {
     links
 }
 
-/// Rows to solve: a case, and columns of values that stand in place of some of its members.
+/// Rows to solve: a case, and columns of values that replace some of its members.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = RunRequest)]
 #[allow(
@@ -296,13 +296,13 @@ fn batch_links(batch: &Batch) -> BTreeMap<String, String> {
     reason = "the contract; bodies are read straight into columns"
 )]
 pub(crate) struct RunRequest {
-    /// A case with one motion. Members that a column holds may be left out. Of `outputs` only `resultants`, `zones` and `gradients` are
+    /// A case with one motion. Members that a column replaces may be omitted. Of `outputs` only `resultants`, `zones` and `gradients` are
     /// allowed.
     #[schema(value_type = Object)]
     template: Value,
     /// Columns of numbers or of texts, all of the same length. A JSON pointer such as `/load/normal_force_n` or a short name such as
-    /// `normal_force_n` varies the case. Columns of places, times and sections, such as `km`, and those of `?carry=` are carried along to the
-    /// answers; any other name is refused.
+    /// `normal_force_n` replaces a member of the case. Columns of places, times and sections, such as `km`, and those of `?carry=` are
+    /// copied to the results; any other name is refused.
     columns: BTreeMap<String, Vec<CellValue>>,
 }
 
@@ -320,16 +320,16 @@ pub(crate) enum CellValue {
     Text(String),
 }
 
-/// A run: how far it is.
+/// A run and its progress.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Run)]
 pub(crate) struct RunAnswer {
     /// Identifier of the run.
     #[schema(value_type = String, format = "uuid")]
     id: String,
-    /// Where the run stands. A run that was cancelled keeps the answers that were there; one is `failed` if no row could be tried.
+    /// State of the run. A cancelled run keeps the results that it has; a run is `failed` if no row could be tried.
     state: JobState,
-    /// Free text of the client.
+    /// Free text given by the client.
     name: Option<String>,
     /// Labels of the client.
     labels: BTreeMap<String, String>,
@@ -339,33 +339,33 @@ pub(crate) struct RunAnswer {
     /// End of the last row; null before it.
     #[schema(format = "date-time")]
     ended_at: Option<String>,
-    /// The method asked for.
+    /// The requested method.
     method: String,
     /// Number of rows.
     rows: u64,
-    /// Rows that are over.
+    /// Number of rows that are finished.
     rows_done: u64,
-    /// Rows of these that have no answer; the column `status` says why.
+    /// Number of finished rows without a result; the column `status` says why.
     rows_without_answer: u64,
-    /// Share of the work that is done.
+    /// Completed share of the work.
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
-    /// The pieces in which the rows are solved.
+    /// The chunks in which the rows are solved.
     chunks: RunChunks,
-    /// The columns that were sent.
+    /// The submitted columns.
     columns: Vec<SentColumn>,
-    /// The columns of the answers, in their order.
+    /// The result columns, in order.
     answers: Vec<AnswerColumn>,
-    /// Where to go from here.
+    /// Links to related resources.
     links: BTreeMap<String, String>,
 }
 
-/// The pieces of a run.
+/// The chunks of a run.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct RunChunks {
-    /// Number of pieces.
+    /// Number of chunks.
     count: u32,
-    /// Rows of each but the last.
+    /// Rows of each chunk except the last.
     rows: u32,
     queued: u64,
     running: u64,
@@ -374,27 +374,27 @@ pub(crate) struct RunChunks {
     cancelled: u64,
 }
 
-/// A column that was sent.
+/// A submitted column.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct SentColumn {
-    /// Its name.
+    /// Name of the column.
     name: String,
-    /// The place in the case that it varies; null if it is carried along to the answers.
+    /// Member of the case that it replaces; null if it is copied to the results.
     pointer: Option<String>,
-    /// What its numbers are multiplied by, from the unit of the column to that of the case.
+    /// Factor from the unit of the column to that of the case.
     factor: f64,
-    /// The unit that its title or a line of units names.
+    /// Unit named in its title or in a line of units.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(nullable = false)]
     unit: Option<String>,
 }
 
-/// A column of the answers.
+/// A column of the results.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct AnswerColumn {
-    /// Its name.
+    /// Name of the column.
     name: String,
-    /// What it holds.
+    /// Type of its values.
     kind: TableKind,
 }
 
@@ -447,14 +447,14 @@ impl From<Run> for RunAnswer {
     }
 }
 
-/// The result of a job: the solution without its fields, and where to get those.
+/// The result of a job: the solution without its fields, and links to them.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct JobResult {
     #[serde(flatten)]
     solution: Solution,
-    /// The result was computed for an identical case before; `seconds` are those of that solve.
+    /// Whether the result is that of an identical earlier case; `seconds` then refer to that solve.
     cached: bool,
-    /// The job, and every part of the result that the case asked for.
+    /// Links to the job and to every part of the result that the case requested.
     links: BTreeMap<String, String>,
 }
 
@@ -492,13 +492,13 @@ impl JobResult {
 /// Limits of the requests of the tenant.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct TenantLimits {
-    /// Most requests of the tenant under way, streams of events and waits aside.
+    /// Largest number of concurrent requests of the tenant, not counting event streams and waits.
     requests_max: usize,
-    /// Most streams of events of the tenant.
+    /// Largest number of event streams of the tenant.
     streams_max: usize,
-    /// Most requests of the tenant that wait for the end of a job or a batch.
+    /// Largest number of requests of the tenant that wait for work to end.
     waits_max: usize,
-    /// Requests per second of one key, or of one address without a key; 0 for any number.
+    /// Requests per second of one key, or of one address without a key; 0: no limit.
     requests_per_second: u32,
 }
 
@@ -518,29 +518,29 @@ impl TenantLimits {
 /// Forces and moments.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Resultants {
-    /// One entry per contact patch, or the one that was asked for.
+    /// One entry per contact patch, or only the requested one.
     pub patches: Vec<PatchResultants>,
-    /// One entry per motion, or the one that was asked for: plain sums over all patches.
+    /// One entry per motion, or only the requested one: plain sums over all patches.
     pub total: Vec<Total>,
-    /// The point that moments refer to.
+    /// Reference point of the moments.
     pub origin: Origin,
 }
 
 /// Forces and moments of one patch.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct PatchResultants {
-    /// Number of the patch, counted from 0.
+    /// Index of the patch, from 0.
     pub patch: usize,
     /// Normal force in N.
     pub normal_force_n: f64,
-    /// One entry per motion, or the one that was asked for.
+    /// One entry per motion, or only the requested one.
     pub points: Vec<PointResultants>,
 }
 
-/// Forces and moment of one patch for one motion; on the lower body.
+/// Forces and moment on the lower body, for one patch and one motion.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct PointResultants {
-    /// Number of the motion, counted from 0.
+    /// Index of the motion, from 0.
     pub point: usize,
     /// The motion.
     pub motion: MotionWords,
@@ -550,19 +550,19 @@ pub(crate) struct PointResultants {
     pub force_y_n: f64,
     /// Moment about the origin in N·mm.
     pub moment_z_n_mm: f64,
-    /// Estimated absolute errors; null where there is nothing to estimate them from.
+    /// Estimated absolute errors; null if they cannot be estimated.
     pub error_estimate: Option<ErrorEstimate>,
-    /// What the measurement of the profiles leaves open; only for `profiles`.
+    /// Uncertainty due to the measured profiles; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<ProfileUncertainty>)]
     pub profile_uncertainty: Option<Box<ProfileUncertainty>>,
     /// Dissipated power divided by rolling speed, in N.
     pub friction_power_n: f64,
-    /// The same without the part of spin, as |ν_x F_x| + |ν_y F_y|, in N.
+    /// Friction power without the part of spin, |ν_x F_x| + |ν_y F_y|, in N.
     pub friction_power_without_spin_n: f64,
-    /// A prescribed force could not be reached.
+    /// Whether a prescribed force could not be reached.
     pub saturated: bool,
-    /// What a history adds; only of `motion.history`.
+    /// Additional values of a history; only for `motion.history`.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<HistoryPoint>, nullable = false)]
     pub history: Option<Box<HistoryPoint>>,
@@ -631,7 +631,7 @@ pub(crate) struct Sum {
     pub friction_power_n: f64,
     /// The same without the part of spin, in N.
     pub friction_power_without_spin_n: f64,
-    /// A prescribed force could not be reached.
+    /// Whether a prescribed force could not be reached.
     pub saturated: bool,
     /// What a history adds, with what all patches have dissipated.
     pub history: Option<HistoryPoint>,
@@ -677,26 +677,26 @@ pub(crate) fn sums(solution: &Solution) -> Vec<Sum> {
 pub(crate) struct Outlines {
     /// The border of the patch.
     pub patch: Vec<Vec<[f64; 2]>>,
-    /// Around the cells that stick; only with zones.
+    /// Borders of the stick zones; only with zones.
     pub stick: Option<Vec<Vec<[f64; 2]>>>,
-    /// Around the cells that slip; only with zones.
+    /// Borders of the slip zones; only with zones.
     pub slip: Option<Vec<Vec<[f64; 2]>>>,
 }
 
-/// Values per cell, strip by strip from smaller to larger y, in each strip from smaller to larger x. All arrays have
-/// the same length; those of other fields are absent.
+/// Values per cell, strip by strip by increasing y, and within a strip by increasing x. All arrays have the same length; those of other
+/// fields are absent.
 #[none_is_absent(nullable)]
 #[derive(Serialize, ToSchema)]
 pub(crate) struct Cells {
     /// Centre of the cell along x in mm.
     pub x_mm: Vec<f64>,
-    /// Centre of the cell across in mm.
+    /// Centre of the cell along y in mm.
     pub y_mm: Vec<f64>,
     /// Width of the cell along x in mm.
     pub dx_mm: Vec<f64>,
-    /// Width of the cell across in mm.
+    /// Width of the cell along y in mm.
     pub dy_mm: Vec<f64>,
-    /// Number of the strip, counted from 0.
+    /// Index of the strip, from 0.
     pub strip: Vec<u32>,
     /// Stick or slip.
     pub zone: Option<Vec<Zone>>,
@@ -704,30 +704,30 @@ pub(crate) struct Cells {
     pub pressure_mpa: Option<Vec<f64>>,
     /// Traction on the lower body along x in MPa.
     pub traction_x_mpa: Option<Vec<f64>>,
-    /// Traction on the lower body across in MPa.
+    /// Traction on the lower body along y in MPa.
     pub traction_y_mpa: Option<Vec<f64>>,
     /// Slip along x, divided by rolling speed.
     pub slip_x: Option<Vec<f64>>,
-    /// Slip across, divided by rolling speed.
+    /// Slip along y, divided by rolling speed.
     pub slip_y: Option<Vec<f64>>,
     /// Temperature of both surfaces in °C.
     pub temperature_c: Option<Vec<f64>>,
 }
 
-/// Values on a regular grid over the bounding box of the patch: `values[iy][ix]` at `(x_mm[ix], y_mm[iy])`, null
-/// outside the patch; those of other fields are absent.
+/// Values on a regular grid over the bounding box of the patch: `values[iy][ix]` at `(x_mm[ix], y_mm[iy])`, null outside the patch. Arrays
+/// of other fields are absent.
 #[none_is_absent(nullable)]
 #[derive(Serialize, ToSchema)]
 pub(crate) struct GriddedField {
-    /// Number of the patch, counted from 0.
+    /// Index of the patch, from 0.
     pub patch: usize,
-    /// Number of the motion, counted from 0.
+    /// Index of the motion, from 0.
     pub point: usize,
-    /// The border of the patch, and of its zones where they are part of the answer.
+    /// The border of the patch, and of its zones if included.
     pub outlines: Outlines,
     /// Samples along x in mm, ascending.
     pub x_mm: Vec<f64>,
-    /// Samples across in mm, ascending.
+    /// Samples along y in mm, ascending.
     pub y_mm: Vec<f64>,
     /// Stick or slip.
     pub zone: Option<Vec<Vec<Option<Zone>>>>,
@@ -735,11 +735,11 @@ pub(crate) struct GriddedField {
     pub pressure_mpa: Option<Vec<Vec<Option<f64>>>>,
     /// Traction on the lower body along x in MPa.
     pub traction_x_mpa: Option<Vec<Vec<Option<f64>>>>,
-    /// Traction on the lower body across in MPa.
+    /// Traction on the lower body along y in MPa.
     pub traction_y_mpa: Option<Vec<Vec<Option<f64>>>>,
     /// Slip along x, divided by rolling speed.
     pub slip_x: Option<Vec<Vec<Option<f64>>>>,
-    /// Slip across, divided by rolling speed.
+    /// Slip along y, divided by rolling speed.
     pub slip_y: Option<Vec<Vec<Option<f64>>>>,
     /// Temperature of both surfaces in °C.
     pub temperature_c: Option<Vec<Vec<Option<f64>>>>,

@@ -134,7 +134,7 @@ impl Turns {
     /// `overloaded`: it does not come in time.
     pub(crate) async fn take_in_time(&self, tenant: &str) -> Result<Turn> {
         let turn = timeout(WITHIN, self.take(tenant)).await;
-        turn.map_err(|_| overloaded("other requests of this kind take all turns"))
+        turn.map_err(|_| overloaded("other requests of this kind use all slots"))
     }
 }
 
@@ -193,7 +193,7 @@ impl Pace {
             return Err(ApiError::new(
                 ProblemKind::BodyTooLarge,
                 format!(
-                    "reading and computing the rows has taken {} s, as long as one request may (`--table-time-s`); send fewer rows at once",
+                    "reading and computing the rows took {} s, the limit of one request (`--table-time-s`); send fewer rows at once",
                     self.limit.as_secs_f64()
                 ),
             ));
@@ -249,7 +249,7 @@ impl ConcurrencyLimits {
     pub fn request(&self, tenant: &str) -> Result<Permit> {
         self.requests.try_take(tenant, 1).ok_or_else(|| {
             too_many(
-                "the tenant has as many requests under way as it may (`--tenant-requests-max`)",
+                "the tenant has reached its limit of concurrent requests (`--tenant-requests-max`)",
             )
         })
     }
@@ -260,7 +260,7 @@ impl ConcurrencyLimits {
     /// As [`ConcurrencyLimits::request`].
     pub fn stream(&self, tenant: &str) -> Result<Permit> {
         self.streams.try_take(tenant, 1).ok_or_else(|| {
-            too_many("as many streams of events are open as there may be (`--tenant-streams-max`, `--streams-max`)")
+            too_many("the limit of open event streams is reached (`--tenant-streams-max`, `--streams-max`)")
         })
     }
 
@@ -276,7 +276,9 @@ impl ConcurrencyLimits {
     /// As [`ConcurrencyLimits::request`].
     pub fn require_wait(&self, tenant: &str) -> Result<Permit> {
         self.wait(tenant).ok_or_else(|| {
-            too_many("as many requests wait as there may be (`--tenant-waits-max`, `--waits-max`)")
+            too_many(
+                "the limit of waiting requests is reached (`--tenant-waits-max`, `--waits-max`)",
+            )
         })
     }
 }
@@ -324,7 +326,7 @@ const UNIT: usize = 1 << 10;
 /// Smaller amounts are not counted: even the largest number of requests takes little memory with them.
 pub(crate) const SMALL_BYTES: usize = 64 << 10;
 /// The word for the memory of answers in refusals.
-const ANSWERS: &str = "answers that clients have not taken yet";
+const ANSWERS: &str = "responses that clients have not read yet";
 
 /// Memory and turns to compute of all requests; clones share them.
 #[derive(Debug, Clone)]
@@ -476,7 +478,7 @@ impl Memory {
     /// `overloaded`: too many wait already, or too long.
     pub async fn rendering(&self, tenant: &str, bytes: usize) -> Result<Rendering> {
         let waiting = self.waiting.try_take(tenant, 1).ok_or_else(|| {
-            overloaded("as many requests wait for pictures, grids and tables as there may be (`--renderings-waiting-max`)")
+            overloaded("the limit of requests that wait for pictures, grids and tables is reached (`--renderings-waiting-max`)")
         })?;
         let share = take(&self.answers, tenant, bytes, ANSWERS).await?;
         let turns = if bytes > SMALL_BYTES {
@@ -543,7 +545,7 @@ fn units(bytes: usize) -> u32 {
 
 fn no_memory(what: &str, bytes: usize) -> ApiError {
     overloaded(&format!(
-        "the memory for {what} is taken; {bytes} bytes are needed (`--request-memory-mb`, `--tenant-request-memory-mb`)"
+        "the memory for {what} is in use; {bytes} bytes are needed (`--request-memory-mb`, `--tenant-request-memory-mb`)"
     ))
 }
 

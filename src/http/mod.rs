@@ -249,7 +249,7 @@ async fn method_not_allowed(method: axum::http::Method, uri: Uri) -> ApiError {
     ApiError::new(
         ProblemKind::MethodNotAllowed,
         format!(
-            "`{method}` is not possible on `{}`; the header `Allow` lists what is{hint}",
+            "`{method}` is not supported on `{}`; the header `Allow` lists the supported methods{hint}",
             uri.path()
         ),
     )

@@ -49,57 +49,57 @@ macro_rules! kinds {
 }
 
 kinds! {
-    MalformedJson 400 "malformed-json" "The body is not JSON" "The body could not be parsed as JSON; `line` and `column` say where. Members written twice and numbers too large for a 64-bit float count as malformed."
-    BadQuery 400 "bad-query" "The query is not understood" "A query parameter is unknown, repeated or has a value that is not allowed; `errors` names every such parameter."
-    BadHeader 400 "bad-header" "A header is not understood" "A request header has a value that is not allowed; `errors` names it."
-    UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended or broke before the whole body had arrived."
-    Unauthorized 401 "unauthorized" "A key is needed" "The service is asked with `Authorization: Bearer` and an API key; there was none, or it is unknown or revoked. Keys come from the operator of the service."
-    Forbidden 403 "forbidden" "This key may not do that" "The key is good, but it may only read, or it is bound to labels and this concerns the whole tenant, or only the tenant `operator` may do this."
-    CrossSite 403 "cross-site" "A foreign page may not change anything" "Without a key nothing is changed on behalf of a web page of another origin; the operator names origins that may with `--cors-origin`."
-    HostNotAllowed 403 "host-not-allowed" "The service has another name" "Without a key the service is asked by an address, as `localhost`, or by a name that its operator gave with `--allowed-host`; `Host` was another."
-    UnknownRoute 404 "unknown-route" "There is nothing at this address" "The path names no resource of this service; `/openapi.json` lists all of them."
-    JobNotFound 404 "job-not-found" "There is no such job" "No job has this id; it was never made here, or it was deleted."
-    BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id; it was never made here, or it was deleted."
-    RunNotFound 404 "run-not-found" "There is no such run" "No run has this id; it was never made here, or it was deleted."
-    RowNotFound 404 "row-not-found" "There is no such row" "The run has no row of this number; rows are counted from 0 in the order in which they were sent."
-    ProfileNotFound 404 "profile-not-found" "There is no such profile" "No profile of the tenant has this digest; it was never kept here, or it was deleted."
-    OutputNotAsked 404 "output-not-asked" "This output was not asked for" "The case did not ask for this output, so it was not computed; submit the case again with the output named in `outputs`."
-    MethodNotAllowed 405 "method-not-allowed" "This method is not allowed here" "The resource exists, but not for this HTTP method; the header `Allow` lists those it has."
-    NotAcceptable 406 "not-acceptable" "This form cannot be answered" "The header `Accept` excludes every form in which this resource can be answered, or `format` names another; the detail names them. Most answer `application/json` only."
-    BodyTimeout 408 "body-timeout" "The body came too slowly" "The whole body did not arrive within the allowed time (60 s for one case), or a batch came at less than 1024 bytes per second."
+    MalformedJson 400 "malformed-json" "The body is not JSON" "The body is not valid JSON; `line` and `column` give the position. Repeated members and numbers too large for a 64-bit float count as malformed."
+    BadQuery 400 "bad-query" "The query is not valid" "A query parameter is unknown, repeated or has a value that is not allowed; `errors` names every such parameter."
+    BadHeader 400 "bad-header" "A header is not valid" "A request header has a value that is not allowed; `errors` names it."
+    UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended before the whole body had arrived."
+    Unauthorized 401 "unauthorized" "An API key is required" "Requests must have the header `Authorization: Bearer` with an API key. The key is missing, unknown or revoked. The operator of the service creates keys."
+    Forbidden 403 "forbidden" "This key may not do that" "The key is valid but does not permit this request: it is read-only, or it is bound to labels and the request concerns the whole tenant, or the request is reserved for the tenant `operator`."
+    CrossSite 403 "cross-site" "Cross-site requests may not change anything" "Without an API key, web pages of other origins may not change anything. The operator can allow origins with `--cors-origin`."
+    HostNotAllowed 403 "host-not-allowed" "The host name is not allowed" "Without an API key, the header `Host` must be an IP address, `localhost` or a name that the operator allows with `--allowed-host`."
+    UnknownRoute 404 "unknown-route" "There is nothing at this address" "No resource has this path; `/openapi.json` lists all paths."
+    JobNotFound 404 "job-not-found" "There is no such job" "No job has this id: it never existed here, or it was deleted."
+    BatchNotFound 404 "batch-not-found" "There is no such batch" "No batch has this id: it never existed here, or it was deleted."
+    RunNotFound 404 "run-not-found" "There is no such run" "No run has this id: it never existed here, or it was deleted."
+    RowNotFound 404 "row-not-found" "There is no such row" "The run has no row with this index; rows are counted from 0 in the order of the request."
+    ProfileNotFound 404 "profile-not-found" "There is no such profile" "The tenant has no profile with this digest: it was never stored, or it was deleted."
+    OutputNotAsked 404 "output-not-asked" "This output was not requested" "The case did not request this output, so it was not computed; submit the case again with the output in `outputs`."
+    MethodNotAllowed 405 "method-not-allowed" "This method is not allowed here" "The resource does not support this HTTP method; the header `Allow` lists the methods that it supports."
+    NotAcceptable 406 "not-acceptable" "No acceptable format" "The header `Accept` excludes every format of this resource, or `format` names one that it does not have; the detail lists its formats. Most resources have `application/json` only."
+    BodyTimeout 408 "body-timeout" "The body arrived too slowly" "The whole body did not arrive within the allowed time (60 s for one case), or a batch arrived at less than 1024 bytes per second."
     ResultNotReady 409 "result-not-ready" "The job has not ended" "The job is queued or running, so there is no result yet; ask again after `Retry-After` seconds, or submit with `Prefer: wait=N`."
-    JobFailed 409 "job-failed" "The job failed" "The job ended without a result; the member `error` of the job says why."
+    JobFailed 409 "job-failed" "The job failed" "The job ended without a result; its member `error` says why."
     JobCancelled 409 "job-cancelled" "The job was cancelled" "The job was cancelled before it had a result."
     JobNotEnded 409 "job-not-ended" "The job has not ended" "Only an ended job can be deleted; cancel it first."
-    BatchNotEnded 409 "batch-not-ended" "The batch has not ended" "Only a batch of which every job has ended can be deleted; cancel it first."
-    RunNotEnded 409 "run-not-ended" "The run has not ended" "Only a run of which every row is over can be deleted; cancel it first."
-    Expired 410 "expired" "This has expired" "The job or batch was here, but ended longer ago than this service keeps ended jobs (`expires_at` of a job says until when); it was removed with its results. Its id is remembered for 30 days."
-    BodyTooLarge 413 "body-too-large" "The body is too large" "The body exceeds the size that this service accepts for one case, or for a batch; a batch has too many cases, or its rows take longer to read or to evaluate than one request may."
+    BatchNotEnded 409 "batch-not-ended" "The batch has not ended" "A batch can be deleted only after all of its jobs have ended; cancel it first."
+    RunNotEnded 409 "run-not-ended" "The run has not ended" "A run can be deleted only after all of its rows are finished; cancel it first."
+    Expired 410 "expired" "This has expired" "The job or batch existed, but its retention time is over (`expires_at` of a job); it was removed with its results. Its id is remembered for 30 days."
+    BodyTooLarge 413 "body-too-large" "The body is too large" "The body exceeds the size limit for one case or for a batch, or a batch has too many cases, or its rows take longer to read or to evaluate than one request is allowed."
     UnsupportedMediaType 415 "unsupported-media-type" "The body is not declared as JSON" "A case is sent with `Content-Type: application/json`, a batch also with `application/x-ndjson`."
-    UnsupportedEncoding 415 "unsupported-encoding" "The body is packed in a way that is not understood" "A body may be sent with `Content-Encoding: gzip` or `zstd`, one of them, or as it is; `Accept-Encoding` of the answer names them."
-    FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` names every fault by its JSON pointer, with the value given and what is allowed."
-    FaultyBatch 422 "faulty-batch" "The batch has faults" "The body holds no cases, or some of them have faults: `errors` names every fault by a JSON pointer that begins with the place of its case (counted from 0), and by its line in NDJSON. Nothing was stored; with `?on_invalid=skip` the good cases are taken."
-    FaultyTable 422 "faulty-table" "The header of the table has faults" "The first line of a table names its columns by JSON pointers such as `/load/normal_force_n`, by short names or by quantities with their units; the detail names the column, what it may mean and what is allowed. With `errors` there is one for each faulty column."
-    TooManyRequests 429 "too-many-requests" "Too many requests" "The key, or without one the address, sends more requests per second than it may, or the tenant has as many requests, streams or waits under way as it may; the detail says which. Try again after `Retry-After` seconds."
-    QuotaExceeded 429 "quota-exceeded" "Too many jobs are waiting" "The tenant has as many queued jobs as it may; nothing was stored, try again after `Retry-After` seconds."
-    StoredQuotaExceeded 507 "stored-quota-exceeded" "The tenant has stored as much as it may" "The cases, templates and results of the tenant take as many bytes as they may; nothing was stored, and nothing stored is removed. Delete ended jobs, batches or runs, then send it again."
-    ProfilesFull 429 "profiles-full" "No more profiles are kept" "The profiles of the tenant take as many bytes as they may; delete some, then send it again."
-    EvaluationTooLong 422 "evaluation-too-long" "The rows take too long to answer at once" "The rows need the solver, and more time, memory or rows than one evaluation may take; the detail says which. Nothing was stored. Submit them to `/v1/runs`, which takes the same body and any number of rows, or one case to `/v1/jobs`."
-    IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another case" "The `Idempotency-Key` was used before with a different body, priority, deadline or `no-cache`; use a new key for a new case."
-    Internal 500 "internal" "The service failed" "Something went wrong inside the service; its log has the reason under the request id in the header `x-request-id`."
-    QueueFull 503 "queue-full" "The queue is full" "The service holds as many unfinished jobs as it may; nothing was stored, try again after `Retry-After` seconds."
-    StorageUnwritable 503 "storage-unwritable" "The disk cannot be written" "The disk of the service is read-only or fails, or its job table is locked by another process; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
-    StorageUnreachable 503 "storage-unreachable" "The storage cannot be reached" "The database that the nodes share, or the store of the results, does not answer or takes nothing; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
-    StorageFull 507 "storage-full" "The disk is full" "The disk of the service has no room for another job; nothing was stored, jobs already accepted are kept. Try again after `Retry-After` seconds."
-    Draining 503 "draining" "The service is shutting down" "The service takes no new jobs because it is shutting down; jobs already accepted are kept. Try again after `Retry-After` seconds."
-    Overloaded 503 "overloaded" "The service has too much to do" "The memory or the turns for requests of this kind are taken, or every connection has a request under way; nothing was done. Try again after `Retry-After` seconds."
-    NotReady 503 "not-ready" "The service is not ready" "The job store cannot be reached at the moment."
-    NotConverged 422 "not-converged" "The solver did not converge" "Only inside a job: the iteration ended without meeting its tolerance; `residual` and `iterations` belong to the best iterate, `detail` says what to try."
-    Unsolvable 422 "unsolvable" "The contact has no answer" "Only inside a job: the region cannot be meshed or the contact does not exist; the detail says why."
-    OutOfTime 422 "out-of-time" "The solve ran out of time" "Only inside a job: the case's `solver.time_limit_s` was used up."
-    DeadlinePassed 422 "deadline-passed" "The job came too late" "Only inside a job: `deadline_s` of the submission was over before the job had ended; it was not solved any further."
-    SolverPanic 500 "solver-panic" "The solver failed" "Only inside a job: the solver stopped on a defect of its own. Other jobs are not affected."
-    WorkerLost 500 "worker-lost" "The workers of this job were lost" "Only inside a job: each worker that took the job ended without an answer, as often as is allowed."
+    UnsupportedEncoding 415 "unsupported-encoding" "The content encoding is not supported" "A body may be sent uncompressed or with `Content-Encoding: gzip` or `zstd`; `Accept-Encoding` of the response lists these encodings."
+    FaultyCase 422 "faulty-case" "The case has faults" "The body is JSON but not a case that can be solved; `errors` lists every fault with its JSON pointer, the value given and what is allowed."
+    FaultyBatch 422 "faulty-batch" "The batch has faults" "The body has no cases, or some of its cases have faults. `errors` lists every fault with a JSON pointer, which begins with the index of its case from 0, and with its line in NDJSON and CSV. Nothing was stored; with `?on_invalid=skip` the valid cases are accepted."
+    FaultyTable 422 "faulty-table" "The header of the table has faults" "The first line of a table names its columns by JSON pointers such as `/load/normal_force_n`, by short names or by quantities with units. The detail names the faulty column and what is allowed; `errors`, if present, has one entry per faulty column."
+    TooManyRequests 429 "too-many-requests" "Too many requests" "The key, or without one the address, exceeds its requests per second, or the tenant exceeds its number of concurrent requests, event streams or waits; the detail says which. Try again after `Retry-After` seconds."
+    QuotaExceeded 429 "quota-exceeded" "Too many jobs are queued" "The tenant has reached its limit of queued jobs. Nothing was stored; try again after `Retry-After` seconds."
+    StoredQuotaExceeded 507 "stored-quota-exceeded" "The storage quota of the tenant is used up" "The cases, templates and results of the tenant have reached their limit in bytes. Nothing was stored and nothing was removed. Delete ended jobs, batches or runs, then send the request again."
+    ProfilesFull 429 "profiles-full" "The profile quota of the tenant is used up" "The profiles of the tenant have reached their limit in bytes; delete some, then send the request again."
+    EvaluationTooLong 422 "evaluation-too-long" "The rows take too long for one request" "The rows need the solver, and exceed the time, the memory or the number of rows of one evaluation; the detail says which. Nothing was stored. Submit them to `/v1/runs`, which accepts the same body with any number of rows, or submit a single case to `/v1/jobs`."
+    IdempotencyConflict 422 "idempotency-conflict" "The idempotency key belongs to another request" "The `Idempotency-Key` was used before with a different body, priority, deadline or `no-cache`; use a new key for a new request."
+    Internal 500 "internal" "The service failed" "An internal error; the log of the service has the reason under the request id in the header `x-request-id`."
+    QueueFull 503 "queue-full" "The queue is full" "The service has reached its limit of unfinished jobs. Nothing was stored; try again after `Retry-After` seconds."
+    StorageUnwritable 503 "storage-unwritable" "The disk cannot be written" "The disk of the service is read-only or fails, or another process locks its job table. Nothing was stored; accepted jobs are kept. Try again after `Retry-After` seconds."
+    StorageUnreachable 503 "storage-unreachable" "The storage cannot be reached" "The shared database or the store of the results does not respond or rejects writes. Nothing was stored; accepted jobs are kept. Try again after `Retry-After` seconds."
+    StorageFull 507 "storage-full" "The disk is full" "The disk of the service has no space for another job. Nothing was stored; accepted jobs are kept. Try again after `Retry-After` seconds."
+    Draining 503 "draining" "The service is shutting down" "The service is shutting down and accepts no new jobs; accepted jobs are kept. Try again after `Retry-After` seconds."
+    Overloaded 503 "overloaded" "The service is overloaded" "The memory or the slots for requests of this kind are in use, or every connection has an active request. Nothing was done; try again after `Retry-After` seconds."
+    NotReady 503 "not-ready" "The service is not ready" "The job store is currently unreachable."
+    NotConverged 422 "not-converged" "The solver did not converge" "Only inside a job: the iteration ended without meeting its tolerance. `residual` and `iterations` belong to the best iterate; `detail` says what to try."
+    Unsolvable 422 "unsolvable" "The contact has no solution" "Only inside a job: the region cannot be meshed or the contact does not exist; the detail says why."
+    OutOfTime 422 "out-of-time" "The solve ran out of time" "Only inside a job: the solver used up `solver.time_limit_s` of the case."
+    DeadlinePassed 422 "deadline-passed" "The deadline of the job has passed" "Only inside a job: the job did not end within `deadline_s` of the submission, so its solution was stopped."
+    SolverPanic 500 "solver-panic" "The solver failed" "Only inside a job: the solver stopped on an internal error. Other jobs are not affected."
+    WorkerLost 500 "worker-lost" "The workers of this job were lost" "Only inside a job: every worker that took the job ended without a result, up to the allowed number of attempts."
 }
 
 impl ProblemKind {
@@ -142,25 +142,25 @@ impl ProblemKind {
     }
 }
 
-/// A failure as the client reads it (RFC 9457).
+/// A failed request or job (RFC 9457).
 #[none_is_absent(nullable)]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[schema(as = Problem)]
 pub(crate) struct ProblemBody {
-    /// Address of the kind of problem, relative to this service; it answers with an explanation.
+    /// Path of the kind of problem on this service, which returns an explanation.
     #[serde(rename = "type")]
     #[schema(example = "/problems/faulty-case")]
     pub kind: String,
     /// The kind of problem in a few words.
     pub title: String,
-    /// HTTP status code. Inside a job: the one that describes the failure best.
+    /// HTTP status code; inside a job, the code that describes the failure best.
     #[schema(minimum = 400, maximum = 599)]
     pub status: u16,
-    /// What happened this time: what was given and what is allowed.
+    /// What happened: the value given and what is allowed.
     pub detail: String,
-    /// Path of the resource that the request was for.
+    /// Path of the requested resource.
     pub instance: Option<String>,
-    /// Every fault found, not only the first.
+    /// All faults found, not only the first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false)]
     pub errors: Vec<Fault>,
@@ -174,7 +174,7 @@ pub(crate) struct ProblemBody {
     pub iterations: Option<u32>,
 }
 
-/// One fault of a request. Exactly one of `pointer`, `parameter` and `header` says where it is.
+/// One fault of a request. Exactly one of `pointer`, `parameter` and `header` gives its location.
 #[none_is_absent]
 #[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 pub struct Fault {
@@ -188,31 +188,31 @@ pub struct Fault {
     /// Name of a request header.
     #[schema(nullable = true)]
     pub header: Option<String>,
-    /// Line of the body that holds the faulty case of a batch, counted from 1; only of NDJSON.
+    /// Line of the body that contains the faulty case of a batch, counted from 1; only for NDJSON and CSV.
     #[schema(nullable = true)]
     pub line: Option<u64>,
-    /// Kind of the fault: `invalid` where only `detail` tells more, else `missing`, `unknown-member`, `wrong-type`, `out-of-range`,
-    /// `unknown-word`, `too-long`, `unknown-parameter`, or `repeated`. There may be more.
+    /// Kind of the fault: `missing`, `unknown-member`, `wrong-type`, `out-of-range`, `unknown-word`, `too-long`, `unknown-parameter`,
+    /// `repeated`, or `invalid` if only `detail` explains the fault. More kinds may be added.
     #[schema(example = "out-of-range")]
     pub code: Cow<'static, str>,
     /// The value given and what is allowed.
     pub detail: String,
-    /// The value given, where it is no array, no object and no long text.
+    /// The value given, unless it is an array, an object or a long text.
     #[schema(value_type = Option<Value>)]
     #[schema(nullable = true)]
     pub value: Option<Value>,
     /// Smallest number allowed.
     #[schema(value_type = Option<f64>)]
     pub minimum: Option<Number>,
-    /// The smallest number itself is not allowed; absent if it is.
+    /// `true` if `minimum` itself is not allowed; absent otherwise.
     pub minimum_excluded: Option<bool>,
-    /// Largest number, or number of characters, allowed.
+    /// Largest number, or largest number of characters, allowed.
     #[schema(value_type = Option<f64>)]
     pub maximum: Option<Number>,
-    /// Unit of these numbers.
+    /// Unit of `minimum` and `maximum`.
     #[schema(value_type = Option<String>)]
     pub unit: Option<&'static str>,
-    /// The words that are allowed.
+    /// The values that are allowed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(required = false)]
     pub allowed: Vec<String>,
@@ -304,7 +304,7 @@ impl ProblemBody {
 #[derive(Debug, Clone, Serialize, ToSchema)]
 #[schema(as = ProblemKind)]
 pub(crate) struct ProblemMeaning {
-    /// The `type` that problems of this kind carry.
+    /// The `type` of problems of this kind.
     #[serde(rename = "type")]
     #[schema(example = "/problems/faulty-case")]
     path: String,
@@ -312,7 +312,7 @@ pub(crate) struct ProblemMeaning {
     title: &'static str,
     /// HTTP status code.
     status: u16,
-    /// What it means and what to do about it.
+    /// What the kind means and what to do about it.
     meaning: &'static str,
 }
 
@@ -381,7 +381,7 @@ pub(crate) fn describe_together(kinds: &[ProblemKind]) -> RefOr<utoipa::openapi:
         let schema = ObjectBuilder::new().schema_type(Type::Integer);
         let header = HeaderBuilder::new()
             .schema(Some(schema))
-            .description(Some("Seconds after which to try again."))
+            .description(Some("Seconds to wait before trying again."))
             .build();
         response = response.header("Retry-After", header);
     }
@@ -579,7 +579,7 @@ impl From<JobsError> for ApiError {
 
 /// The storage rejects writes; the log has the message of the system.
 fn storage_failed(fault: StorageFault, reason: &JobsError) -> ApiError {
-    tracing::warn!(%reason, "a request failed for want of its storage");
+    tracing::warn!(%reason, "a request failed because its storage is not available");
     let (kind, what) = match fault {
         StorageFault::Full => (ProblemKind::StorageFull, "the disk of the service is full"),
         StorageFault::Unwritable => (
@@ -588,7 +588,7 @@ fn storage_failed(fault: StorageFault, reason: &JobsError) -> ApiError {
         ),
         StorageFault::Damaged => (
             ProblemKind::StorageUnwritable,
-            "the job table of the service is damaged; its operator has to restore it",
+            "the job table of the service is damaged; its operator must restore a backup",
         ),
         StorageFault::Unreachable => (
             ProblemKind::StorageUnreachable,

@@ -92,31 +92,31 @@ pub enum JobsError {
     StoredQuotaExceeded(u64),
     /// The batches of the tenant that are being received are as large as they may be together.
     #[error(
-        "batches of this tenant that are being received stand for {0} bytes, which is the limit; try again later, or send fewer cases at once"
+        "the batches of this tenant that are being received take {0} bytes, which is the limit; try again later, or send fewer cases at once"
     )]
     StagingQuotaExceeded(u64),
     /// The batches that are being received are as large as they may be together.
     #[error(
-        "the batches that are being received stand for {0} bytes, which is the limit of the service; try again later"
+        "the batches that are being received take {0} bytes, which is the limit of the service; try again later"
     )]
     StagingFull(u64),
     /// The name cannot be that of a tenant.
-    #[error("a tenant is named by 1 to 64 letters, digits, dots, dashes and underscores")]
+    #[error("the name of a tenant is 1 to 64 letters, digits, dots, dashes and underscores")]
     BadTenant,
     /// The idempotency key was used before with another case, or with other options.
-    #[error("this `Idempotency-Key` was used before with a different case")]
+    #[error("this `Idempotency-Key` was used before with a different request")]
     IdempotencyConflict,
     /// There is no work of this kind with this id.
     #[error("no {} has this id", .0.noun())]
     NotFound(Kind),
     /// There was such a job or batch, but its time is over.
-    #[error("ended longer ago than this service keeps ended jobs, so it was removed")]
+    #[error("it ended longer ago than this service keeps ended jobs, so it was removed")]
     Expired,
     /// The work must end first.
     #[error("the {} has not ended; cancel it first, then delete it", .0.noun())]
     NotEnded(Kind),
     /// The key is bound to labels, and this concerns the whole tenant.
-    #[error("this key is bound to {labels}; it may not {action}, use a key without labels")]
+    #[error("this key is bound to {labels} and may not {action}; use a key without labels")]
     BoundKey {
         /// The labels of the key.
         labels: String,
@@ -173,12 +173,12 @@ pub enum JobsError {
     Store(#[from] StoreError),
     /// The job table is damaged.
     #[error(
-        "the job table is damaged ({0}); a copy of a folder in use is no backup: restore one that `railhead backup` made"
+        "the job table is damaged ({0}); a copy of a folder in use is not a backup; restore one made by `railhead backup`"
     )]
     TableDamaged(String),
     /// The data folder was written by another version.
     #[error(
-        "the job table was written by another version of railhead that this one cannot go on with; use a new data folder or \
+        "the job table was written by another version of railhead and this version cannot read it; use a new data folder or \
          database, or that version"
     )]
     UnsupportedSchema,
@@ -191,7 +191,7 @@ pub enum JobsError {
     #[error("the connection to the database is not encrypted as its URL asks for: {0}")]
     NoTls(String),
     /// A data folder with jobs in it cannot be used beside a database.
-    #[error("{} holds the jobs of a service without a database; use another --data-dir beside --database-url", .0.display())]
+    #[error("{} holds the jobs of a service without a database; use another --data-dir with --database-url", .0.display())]
     DataDirOfEmbedded(PathBuf),
     /// This program was built without a part that the settings need.
     #[error(
@@ -205,7 +205,7 @@ pub enum JobsError {
     },
     /// A data folder is moved only into a database without jobs.
     #[error(
-        "the database has jobs or batches already; move into one that `railhead migrate` has just made"
+        "the database already has jobs or batches; move into one newly created by `railhead migrate`"
     )]
     DatabaseNotEmpty,
     /// There is no job table in the database.
@@ -215,17 +215,17 @@ pub enum JobsError {
     NotMigrated,
     /// The job table in the data folder is that of an earlier version, and the service may be using it.
     #[error(
-        "the job table in the data folder is that of an earlier version: start `railhead serve` of this version with the folder once, which \
-         brings it forward"
+        "the job table in the data folder is from an earlier version: start `railhead serve` of this version with the folder \
+         once to upgrade it"
     )]
     OldFolder,
     /// The tables in the database are those of an earlier version.
     #[error(
-        "the job table in the database is that of an earlier version: run `railhead migrate --database-url …` of this version once"
+        "the job table in the database is from an earlier version: run `railhead migrate --database-url …` of this version once"
     )]
     OldTables,
     /// The place of the results cannot be used, or belongs to another database.
-    #[error("the place of the results cannot be used: {0}")]
+    #[error("the location of the results cannot be used: {0}")]
     ResultPlace(String),
     /// Reading or writing a stored result failed.
     #[error("the stored results failed: {0}")]

@@ -119,9 +119,9 @@ impl Jobs {
             jobs.shared.show_node(cluster).await?;
         }
         match jobs.shared.recover().await {
-            // What can be read is served; the rest is done once the disk takes data again.
+            // What can be read is served; the rest is done once the disk accepts writes again.
             Err(error) if error.storage_fault().is_some() => {
-                tracing::error!(%error, "the disk takes nothing; the service starts for reading");
+                tracing::error!(%error, "the disk rejects writes; the service starts read-only");
             }
             recovered => {
                 recovered?;
@@ -191,7 +191,7 @@ impl Jobs {
                 .is_err()
             {
                 tracing::warn!(
-                    "some workers did not stop; their jobs will be taken back at the next start"
+                    "some workers did not stop; their jobs return to the queue at the next start"
                 );
             }
         }
@@ -215,7 +215,7 @@ async fn open_blobs(store: &dyn Store, options: &Options, metrics: &Metrics) -> 
         }
         (None, None) => Blobs::open(&options.data_dir),
         (None, Some(_)) => Err(JobsError::ResultPlace(
-            "--results-url goes with --database-url; without it results are in the data folder, where `railhead backup` finds them"
+            "--results-url requires --database-url; without a database, results are in the data folder, which `railhead backup` copies"
                 .to_owned(),
         )),
     }

@@ -64,19 +64,19 @@ metrics! {
     pub(crate) queue_cost_seconds: Gauge<f64, AtomicU64> = Gauge::default(), "queue_cost_seconds" "Expected solver seconds of all queued jobs, from the mean of up to 1000 of them";
     pub(crate) database_bytes: Gauge = Gauge::default(), "database_bytes" "Size of the job table with its write-ahead log";
     pub(crate) result_bytes: Gauge = Gauge::default(), "result_bytes" "Size of the results kept outside the job table";
-    pub(crate) operator_bytes: Gauge = Gauge::default(), "operator_store_bytes" "Size of the operators of meshes that are kept in memory for the next cases";
-    solve_seconds: Family<Label, Histogram> = Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)), "solve_seconds" "Wall time of one case on a solver thread, by the method that gave the numbers";
+    pub(crate) operator_bytes: Gauge = Gauge::default(), "operator_store_bytes" "Size of the mesh operators kept in memory for later cases";
+    solve_seconds: Family<Label, Histogram> = Family::new_with_constructor(|| Histogram::new(SOLVE_SECONDS)), "solve_seconds" "Wall time of one case on a solver thread, by method";
     iterations: Family<Label, Histogram> = Family::new_with_constructor(|| Histogram::new(ITERATIONS)), "newton_iterations" "Newton iterations of one motion on one patch";
-    rows: Family<Label, Counter> = Family::default(), "run_rows" "Rows of runs that were answered, by what became of them";
+    rows: Family<Label, Counter> = Family::default(), "run_rows" "Rows of runs, by outcome";
     ended: Family<Label, Counter> = Family::default(), "jobs_ended" "Jobs that ended, by state";
     failures: Family<Label, Counter> = Family::default(), "job_failures" "Jobs that failed, by reason";
     storage_failing: Gauge = Gauge::default(), "storage_failing" "1 while the disk is full or cannot be written, or database or object store cannot be reached";
-    pub(crate) abandoned: Gauge = Gauge::default(), "solver_threads_abandoned" "Solver threads that did not stop when they were told to and still run";
-    pub(crate) workers: Gauge = Gauge::default(), "workers" "Workers, each with one solver at work at most";
-    working: Gauge = Gauge::default(), "workers_busy" "Workers whose solver is at work";
-    cache_hits: Counter = Counter::default(), "cache_hits" "Cases answered with the result of an identical earlier one";
-    cache_misses: Counter = Counter::default(), "cache_misses" "Cases for which an earlier result was looked for in vain";
-    pub(crate) results_swept: Counter = Counter::default(), "results_swept" "Results without a job removed from outside the database";
+    pub(crate) abandoned: Gauge = Gauge::default(), "solver_threads_abandoned" "Solver threads that ignored a stop request and still run";
+    pub(crate) workers: Gauge = Gauge::default(), "workers" "Number of workers";
+    working: Gauge = Gauge::default(), "workers_busy" "Workers that are solving";
+    cache_hits: Counter = Counter::default(), "cache_hits" "Cases answered with an identical earlier result";
+    cache_misses: Counter = Counter::default(), "cache_misses" "Cases without an identical earlier result";
+    pub(crate) results_swept: Counter = Counter::default(), "results_swept" "Results without a job that were removed outside the database";
     pub(crate) store_requests: StoreRequests = Family::default(), "result_store_requests" "Requests to the object store of the results, repeated ones included, by the class of the answer";
 }
 

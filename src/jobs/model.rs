@@ -117,7 +117,7 @@ pub(crate) fn is_tenant(name: &str) -> bool {
     (1..=TENANT_MAX_CHARS).contains(&name.len()) && name.bytes().all(allowed)
 }
 
-/// Which of its queued jobs a tenant wants solved first. Among tenants it means nothing: they take turns.
+/// Order among the tenant's queued jobs. It has no effect between tenants, which take turns.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, ToSchema, Names,
 )]
@@ -150,7 +150,7 @@ impl Priority {
 /// Options of a submission: of one job, or of all jobs of a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SubmitOptions {
-    /// Its place among the queued jobs of the tenant.
+    /// Priority among the tenant's queued jobs.
     pub priority: Priority,
     /// Time after the submission within which it must have ended; `None`: it may take any time.
     pub ends_within: Option<Duration>,
@@ -224,17 +224,17 @@ pub struct Job {
     pub kind: Kind,
     /// Where it stands.
     pub state: State,
-    /// Free text of the client.
+    /// Free text given by the client.
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,
     /// The batch it belongs to, if it was submitted in one.
     pub batch_id: Option<Uuid>,
-    /// Its place among the queued jobs of the tenant.
+    /// Priority among the tenant's queued jobs.
     pub priority: Priority,
     /// Time of submission.
     pub created_at: i64,
-    /// Time of the last change, progress aside.
+    /// Time of the last change, except changes of progress.
     pub updated_at: i64,
     /// Start of the current or last attempt; absent while queued.
     pub started_at: Option<i64>,
@@ -261,16 +261,16 @@ pub struct Job {
     pub queue: Option<QueuePlace>,
 }
 
-/// Where a queued job stands.
+/// Position of a job in the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct QueuePlace {
-    /// Jobs of the tenant that come before it.
+    /// Number of jobs of the tenant before it.
     pub position: u32,
-    /// Expected time until it is begun, in s, from the estimated costs of those before it and the turns of other tenants; rough.
+    /// Expected time in s until the job starts, from the estimated costs of the jobs before it and the turns of other tenants; rough.
     pub starts_in_s: f64,
 }
 
-/// Where a job stands.
+/// State of a job.
 #[derive(
     Debug,
     Clone,
@@ -436,9 +436,9 @@ pub struct Batch {
     pub created_at: i64,
     /// Number of jobs it was made of.
     pub count: u32,
-    /// Number of faulty cases that were left out.
+    /// Number of faulty cases that were skipped.
     pub rejected: u32,
-    /// Free text of the client.
+    /// Free text given by the client.
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,
@@ -482,7 +482,7 @@ pub struct RunRecord {
 /// One job of a batch with what is needed to show its result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchItem {
-    /// Place of the case in what was sent, counted from 0.
+    /// Index of the case in the request, from 0.
     pub index: u32,
     /// The job.
     pub job: Job,

@@ -123,7 +123,7 @@ impl Jobs {
         known: &mut KnownSections,
     ) -> Result<Value> {
         if let Some(place) = named_and_given(&case) {
-            let detail = "given together with points; a stored profile stands in place of points_mm or of text and format";
+            let detail = "given together with points; a stored profile replaces points_mm, or text and format";
             return Err(CaseError(vec![Fault::new(format!("{place}/profile"), detail)]).into());
         }
         for (place, digest) in named_sections(&case) {
@@ -157,7 +157,7 @@ impl Jobs {
 /// The fault of a name that stands for nothing.
 pub(crate) fn unknown(pointer: String, digest: &str) -> Fault {
     let detail = format!(
-        "`{digest}` given, which is no profile of this tenant; `POST /v1/profiles` keeps one and answers its digest"
+        "`{digest}` given, which is not a profile of this tenant; `POST /v1/profiles` stores one and returns its digest"
     );
     Fault::new(pointer, detail)
 }

@@ -70,9 +70,9 @@ impl Shared {
                 tracing::error!(?place, ?fault, "the disk takes nothing");
             }
             (FaultChange::AllOver, _) if self.store.cluster().is_some() => {
-                tracing::info!("the database takes data again");
+                tracing::info!("the database accepts writes again");
             }
-            (FaultChange::AllOver, _) => tracing::info!("the disk takes data again"),
+            (FaultChange::AllOver, _) => tracing::info!("the disk accepts writes again"),
             _ => {}
         }
     }

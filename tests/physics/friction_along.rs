@@ -172,13 +172,13 @@ fn what_does_not_go_with_it_is_refused_with_the_member() {
     let jump = with(&case, "/friction/along", Some(jump));
     assert!(
         contact::check(&jump, &Limits::default()).is_ok(),
-        "two equal places"
+        "two equal positions"
     );
     let thrice = json!({ "x_mm": [0.0, 1.0, 1.0, 1.0], "coefficient": [0.3, 0.3, 0.2, 0.1] });
     assert_fault(
         &with(&case, "/friction/along", Some(thrice)),
         "/friction/along/x_mm/3",
-        &["1 given three times", "two equal places"],
+        &["1 given three times", "two equal positions"],
     );
     assert_fault(
         &with(&case, "/friction/along/coefficient", Some(json!([0.3]))),

@@ -242,7 +242,10 @@ fn two_forces_that_friction_carries_one_by_one_but_not_together_are_refused() {
         reason.contains("force_x_n") && reason.contains("force_y_n"),
         "{reason}"
     );
-    assert!(reason.contains("beside a longitudinal force"), "{reason}");
+    assert!(
+        reason.contains("together with a longitudinal force"),
+        "{reason}"
+    );
 }
 
 /// How many times as long as its creepages forces take, and are told to take: the median over random motions on tread and flange.

@@ -354,7 +354,7 @@ fn paths_and_other_formats_are_named_for_what_they_are() {
     ] {
         for format in [Format::Columns, Format::Simpack, Format::Miniprof] {
             let fault = read(format, path).unwrap_err();
-            assert!(fault.contains("not its path"), "{path}: {fault}");
+            assert!(fault.contains("the content of the file"), "{path}: {fault}");
         }
     }
     for (text, own) in [

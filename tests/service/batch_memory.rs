@@ -93,7 +93,7 @@ async fn a_result_that_is_larger_than_all_memory_for_answers_passes_through_the_
     assert_eq!(table.lines().count(), 1 + 2 + 1 + 3, "{table}");
     let refused = table.lines().nth(3).expect("a line");
     assert!(
-        refused.contains("more memory than a table may"),
+        refused.contains("exceeds the memory limit of a table"),
         "{refused}"
     );
     let (_, body) = ask(

@@ -187,7 +187,7 @@ async fn a_service_that_nobody_or_everybody_could_use_says_so_at_the_start() {
     let service = Service::start(folder.path(), &everywhere);
     service.get("/v1/jobs").await;
     assert_eq!(
-        service.logged("whoever reaches this address may use the service without a key"),
+        service.logged("everyone who can reach this address can use the service without a key"),
         1
     );
     service.kill();

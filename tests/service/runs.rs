@@ -278,7 +278,7 @@ async fn a_row_that_cannot_be_solved_has_a_status_and_faults_of_a_run_are_named(
             "all columns need as many",
         ),
         ("force_x_n", json!(["a", "b"]), "/columns/force_x_n/0"),
-        ("status", json!(["a", "b"]), "carried along"),
+        ("status", json!(["a", "b"]), "a column that is copied"),
     ] {
         let mut body =
             json!({ "template": template("auto"), "columns": { "creepage_x": [0.0, 1e-3] } });

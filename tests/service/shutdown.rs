@@ -112,7 +112,10 @@ async fn a_stopped_service_hands_its_running_job_to_the_next_one() {
     let service = Service::start(folder.path(), &flags);
     let job = service.until(&id, "running").await;
     assert_eq!(job["attempt"], 1, "the first attempt does not count");
-    assert_eq!(service.logged("job of a dead process taken back"), 0);
+    assert_eq!(
+        service.logged("job of a dead process returned to the queue"),
+        0
+    );
     service.cancel(&id).await;
     service.until(&id, "cancelled").await;
 }

@@ -369,7 +369,7 @@ async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     until_ready(&service).await;
     all_succeed(&service, &[first]).await;
     service.submit(&case("after")).await;
-    assert_eq!(service.logged("the disk takes data again"), 1);
+    assert_eq!(service.logged("the disk accepts writes again"), 1);
 }
 
 #[tokio::test]

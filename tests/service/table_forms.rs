@@ -139,7 +139,7 @@ async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
     // What is carried along by a run has no place here.
     let (csv, carried) = forms(&rows(Some("section"))).remove(0);
     let refused = server.post_as(&path, csv, carried).await;
-    let words = "only runs carry columns along";
+    let words = "only runs copy further columns";
     assert_problem(&refused, 422, "faulty-table", words);
 }
 
@@ -352,7 +352,7 @@ async fn a_table_whose_units_are_not_clear_is_refused() {
         (
             "&column=Q:creepage_x",
             "normal_force_n,q\n5e4,0.4\n",
-            ["`Q`", "no title"],
+            ["`Q`", "not a title"],
         ),
     ] {
         let query = format!("{template}{query}");

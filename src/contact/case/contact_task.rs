@@ -129,7 +129,7 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
         return Err(Fault::new(
             "/contact",
             format!(
-                "a patch of {} mm by {} mm (semi-axes) comes out; {:e} to {:e} mm are allowed",
+                "a patch with semi-axes of {} mm by {} mm results; {:e} to {:e} mm are allowed",
                 short(a),
                 short(b),
                 SEMI_AXES.start(),
@@ -140,14 +140,14 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
     if patch.area.is_nan() || patch.area <= 0.0 {
         return Err(Fault::new(
             load_pointer,
-            "the edge of a patch cannot be told from these samples; a finer or more even grid is needed".to_owned(),
+            "the edge of a patch cannot be determined from these samples; a finer or more even grid is needed".to_owned(),
         ));
     }
     if a.max(b) > SLENDERNESS_MAX * a.min(b) {
         return Err(Fault::new(
             "/contact",
             format!(
-                "a patch of {} mm by {} mm (semi-axes) comes out; a ratio of at most {SLENDERNESS_MAX:e} is allowed",
+                "a patch with semi-axes of {} mm by {} mm results; a ratio of at most {SLENDERNESS_MAX:e} is allowed",
                 short(a),
                 short(b)
             ),
@@ -157,7 +157,7 @@ pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> 
         return Err(Fault::new(
             load_pointer,
             format!(
-                "the largest pressure of a patch comes out as {} MPa; {:e} to {:e} MPa are allowed",
+                "the largest pressure of a patch is {} MPa; {:e} to {:e} MPa are allowed",
                 short(patch.pressure_max),
                 PRESSURES.start(),
                 PRESSURES.end()

@@ -362,7 +362,7 @@ pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limi
         .friction
         .is_some_and(|friction| friction.largest() == 0.0)
     {
-        let detail = "no friction given; without tractions nothing is remembered";
+        let detail = "no friction given; without tractions a history has no effect";
         faults.push(Fault::new("/friction", detail));
     }
     faults.extend(given.friction.and_then(friction_fault));

@@ -282,7 +282,7 @@ pub(crate) fn exchanged(
     };
     let refused = |remark: RemarkEntry| {
         format!(
-            "{}; to solve all the same give accept_rough_profiles: true",
+            "{}; to solve it anyway, give accept_rough_profiles: true",
             remark.detail
         )
     };
@@ -368,7 +368,7 @@ fn own_profile(pointer: &str, body: Body, section: &CrossSection) -> Result<Prof
     if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
         let other = if is_wheel { "rail" } else { "wheel" };
         return Err(refuse(format!(
-            "the file says that it belongs to a {other}; that of a {name} is needed"
+            "the file states that it is of a {other}; a file of a {name} is needed"
         )));
     }
     let senses = senses_of(body, format, &contents);

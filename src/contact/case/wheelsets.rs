@@ -152,7 +152,7 @@ fn moving(
     let together = combine == Combine::Together;
     if together && motions > 1 && places > 1 && motions != places {
         return fault(format!(
-            "{motions} motions given for {places} positions; as many as positions are needed, or one, or \"combine\": \"grid\" in the contact"
+            "{motions} motions given for {places} positions; give one motion, one per position, or \"combine\": \"grid\" in the contact"
         ));
     }
     let count = if together {

@@ -29,7 +29,7 @@ pub enum RowStatus {
     Unsolvable,
     /// No resultants: the time limit of a row was reached.
     OutOfTime,
-    /// No resultants: the solver stopped on a defect of its own.
+    /// No resultants: the solver stopped on an internal error.
     SolverFailed,
 }
 

@@ -186,7 +186,7 @@ fn take(
     }
     if !status.has_answer() {
         let reason = format!(
-            "a/b of the ellipse is beyond {} to {}; \"method\": \"table\" covers no other, use boundary_element or fastsim",
+            "a/b of the ellipse is outside {} to {}, the range of \"method\": \"table\"; use boundary_element or fastsim",
             RATIO_RANGE.start(),
             RATIO_RANGE.end()
         );
@@ -285,7 +285,7 @@ fn solve_each(
             Err(_) => {
                 let failure = RowFailure {
                     status: RowStatus::SolverFailed,
-                    reason: "the solver stopped on a defect of its own".to_owned(),
+                    reason: "the solver stopped on an internal error".to_owned(),
                 };
                 answer.set(*row, Err(failure));
             }

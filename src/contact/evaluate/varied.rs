@@ -240,7 +240,7 @@ pub fn put(case: &mut Value, path: &[String], value: Value) -> Result<(), String
             }
             _ => {
                 return Err(format!(
-                    "leads to `{member}` of what is neither an object nor an array in the template"
+                    "leads to `{member}` of a value in the template that is neither an object nor an array"
                 ));
             }
         };

@@ -254,7 +254,7 @@ impl Evolution {
 }
 
 fn not_profiles() -> CaseError {
-    let detail = "\"profiles\" is needed, whose sections wear";
+    let detail = "\"profiles\" is needed, because its sections wear";
     Fault::new("/template/contact/type", detail).into()
 }
 
@@ -281,8 +281,7 @@ fn template(plan: &EvolutionWords) -> Result<Value, CaseError> {
         }
     }
     if template["solver"]["method"] == "table" {
-        let detail =
-            "\"table\" given; a method with values per cell, which wear is made from, is needed";
+        let detail = "\"table\" given; a method with values per cell is needed, because wear is computed from them";
         return Err(Fault::new("/template/solver/method", detail).into());
     }
     let mut damage = json!({ "models": ["t_gamma", plan.wear_model, "wlrm"], "across": true });

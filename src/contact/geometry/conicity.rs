@@ -60,12 +60,12 @@ impl fmt::Display for NoConicity {
             ),
             NoConicity::BeyondShifts([from, until]) => write!(
                 to,
-                "the motion turns beyond the shifts from {from:.2} to {until:.2} mm, where the radius difference is known"
+                "the motion reverses outside the shifts from {from:.2} to {until:.2} mm for which the radius difference is known"
             ),
             NoConicity::PassesUnstable([from, until]) => write!(
                 to,
-                "no motion has this amplitude: the one of {from:.2} mm reaches an unstable equilibrium, beyond which the amplitude is \
-                 {until:.2} mm"
+                "no motion has this amplitude: at {from:.2} mm the motion reaches an unstable equilibrium, beyond which \
+                 amplitudes are at least {until:.2} mm"
             ),
         }
     }

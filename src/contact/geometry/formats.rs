@@ -50,7 +50,7 @@ const BYTE_ORDER_MARKS: [&str; 4] = ["\u{feff}", "\u{fffd}", "ï»¿", "ÿþ"];
 pub fn read(format: Format, text: &str) -> Result<ProfileFile, String> {
     if is_path(text) {
         return Err(format!(
-            "{:?} given, which looks like a path; text is what the file holds, not its path",
+            "{:?} given, which looks like a path; text must be the content of the file",
             text.trim()
         ));
     }

@@ -106,9 +106,9 @@ fn wheel_unclear(points: &[[f64; 2]], several: bool, y: Option<bool>, z: Option<
     let reason = if sure_body(points) == Some(SureBody::Rail) {
         "the points look like the head of a rail (were rail and wheel exchanged?)"
     } else if several {
-        "the shape has a flange in more than one sense of y and z"
+        "the shape has a flange for more than one direction of y and z"
     } else {
-        "no flange beside a tread was found, so the shape does not show the senses of y and z"
+        "no flange beside a tread was found, so the shape does not show the directions of y and z"
     };
     let members = match (y, z) {
         (None, None) => {

@@ -200,8 +200,8 @@ impl Profile {
             .fold(f64::NEG_INFINITY, f64::max);
         if reach >= end {
             return Err(format!(
-                "the guard rail reaches y = {reach:.2} mm (positive to the field side), and the running rail begins at {end:.2} mm; a guard rail lies at the side \
-                 of the track centre, beside the running rail"
+                "the guard rail reaches y = {reach:.2} mm (positive to the field side), and the running rail begins at {end:.2} mm; a \
+                 guard rail lies beside the running rail, on the side of the track centre"
             ));
         }
         let heights = own.points.iter().map(|at| at[1]);
@@ -291,13 +291,13 @@ impl Profile {
         }
     }
 
-    /// Median distance of neighbouring points in mm.
+    /// Median distance between neighbouring points in mm.
     pub fn usual_chord(&self) -> f64 {
         let mut chords: Vec<f64> = self.chords().collect();
         profile_quality::median(&mut chords)
     }
 
-    /// Largest distance of neighbouring points in mm.
+    /// Largest distance between neighbouring points in mm.
     pub fn longest_chord(&self) -> f64 {
         self.chords().fold(0.0, f64::max)
     }

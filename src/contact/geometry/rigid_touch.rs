@@ -29,7 +29,7 @@ pub struct RigidTouch {
     pub at: [f64; 3],
     /// Turn about x from the track's axes to those of the plane of contact, in rad.
     pub angle: f64,
-    /// Radius of the wheel there in mm.
+    /// Radius of the wheel at the contact point in mm.
     pub radius: f64,
 }
 

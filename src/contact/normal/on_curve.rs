@@ -461,8 +461,8 @@ impl CurveTask<'_> {
             // On a face that is nearly vertical, the contact outgrows every grid.
             if !found.settled {
                 return Err(NormalError::NoAnswer(
-                    "the contact outgrows the surfaces on which it was looked for, and no height of the wheel carries its load there, as beside a \
-                     face that is nearly vertical"
+                    "the contact extends beyond the surfaces that were searched, and no height of the wheel carries its load \
+                     on them, as next to a face that is nearly vertical"
                         .to_owned(),
                 ));
             }
@@ -478,7 +478,7 @@ impl CurveTask<'_> {
             };
         }
         Err(NormalError::NoAnswer(
-            "the contact reaches the end of the surfaces on which it was looked for".to_owned(),
+            "the contact reaches the end of the surfaces that were searched".to_owned(),
         ))
     }
 

@@ -46,7 +46,7 @@ impl Termination {
             Termination::Converged => "the tolerance was met",
             Termination::AtLimit => "no change of sign was found",
             Termination::Jump => "the value jumps where its sign changes",
-            Termination::TrialsUsedUp => "the trials were used up",
+            Termination::TrialsUsedUp => "the iteration limit was reached",
         }
     }
 }

@@ -39,7 +39,7 @@ pub struct CheckedCase {
 /// What a case is called; the answer does not depend on it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {
-    /// Free text of the client.
+    /// Free text given by the client.
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,

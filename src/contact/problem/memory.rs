@@ -259,7 +259,7 @@ impl CheckedCase {
         if bytes > self.run.memory_bytes {
             return Err(SolveError::NormalProblem {
                 reason: format!(
-                    "the contact falls apart into {patches} patches with {sum:.1} segments per strip, which need about {} MiB; at \
+                    "the contact splits into {patches} patches with {sum:.1} segments per strip, which need about {} MiB; at \
                      most {} MiB are allowed for one case",
                     bytes >> 20,
                     self.run.memory_bytes >> 20

@@ -213,7 +213,7 @@ pub struct Run {
     pub method: Method,
     /// The word it was asked for with.
     pub method_asked: MethodName,
-    /// Where `fastsim` lets tractions slip.
+    /// Traction bound at which `fastsim` slips.
     pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,

@@ -152,7 +152,7 @@ fn at_rest(wheel: &WheelContact) -> WheelAtRest {
 }
 
 /// Advice that ends the error about a refused profile.
-const ACCEPT: &str = "; to solve all the same give accept_rough_profiles: true";
+const ACCEPT: &str = "; to solve it anyway, give accept_rough_profiles: true";
 
 /// The error that a finding causes, with a further clause.
 fn rough(finding: &Finding, more: &str) -> SolveError {

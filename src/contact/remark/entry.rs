@@ -13,30 +13,30 @@ use crate::contact::remark::list::Remark;
 /// Number of motions with the same remark for which the figures are kept; of the others only the index is kept.
 const KEPT_MAX: usize = 4;
 
-/// Something the client should know about an answer: its code, its place, a sentence, and the figures in it by name.
+/// A remark on a result: its code, its location, a sentence, and the values in it by name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RemarkEntry {
     /// The kind of remark; `/v1/remarks` lists them all.
     #[schema(example = "friction-unusual")]
     pub code: String,
-    /// How much it asks of the client.
+    /// How much attention it needs.
     pub severity: Severity,
-    /// The patch it belongs to, counted from 0; absent if it belongs to all.
+    /// Index of the patch that it applies to, from 0; absent if it applies to all.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub patch: Option<usize>,
-    /// The motion it belongs to, counted from 0; absent if it belongs to all.
+    /// Index of the motion that it applies to, from 0; absent if it applies to all.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub point: Option<usize>,
-    /// Further motions with the same remark and figures of their own, as ranges `[first, last]`.
+    /// Further motions with the same remark but their own values, as ranges `[first, last]`.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     #[schema(required = false)]
     pub also_at_points: Vec<[usize; 2]>,
-    /// JSON pointer (RFC 6901) to the part of the case it belongs to, where it belongs to one.
+    /// JSON pointer (RFC 6901) to the part of the case that it applies to, if there is one.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub pointer: Option<String>,
     /// One sentence.
     pub detail: String,
-    /// The figures in the sentence by name, with the unit in the name.
+    /// Values in the sentence by name; the name includes the unit.
     #[serde(flatten)]
     pub figures: BTreeMap<String, Figure>,
 }

@@ -8,7 +8,7 @@ use std::fmt::{Display, Formatter, Result};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// How much a remark asks of the client.
+/// How much attention a remark needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -21,10 +21,10 @@ pub enum Severity {
 /// One kind of remark, explained.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct RemarkKind {
-    /// The `code` that remarks of this kind carry; it never changes.
+    /// The `code` of remarks of this kind; it never changes.
     #[schema(value_type = String, example = "friction-unusual")]
     pub code: &'static str,
-    /// How much it asks of the client.
+    /// How much attention it needs.
     pub severity: Severity,
     /// What it means.
     #[schema(value_type = String)]
@@ -32,14 +32,14 @@ pub struct RemarkKind {
     /// What to do about it.
     #[schema(value_type = String)]
     pub advice: &'static str,
-    /// Names of its figures.
+    /// Names of the values in its sentence.
     #[schema(value_type = Vec<String>)]
     pub figures: &'static [&'static str],
     /// The `detail` of a remark of this kind with figures made up.
     pub example: String,
 }
 
-/// A number or a word in a remark.
+/// A value in a remark.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(untagged)]
 pub enum Figure {
@@ -127,7 +127,7 @@ macro_rules! remarks {
         }
 
         impl Remark {
-            /// How much it asks of the client.
+            /// How much attention it needs.
             pub fn severity(&self) -> Severity {
                 match self { $( Remark::$name { .. } => Severity::$severity, )+ }
             }

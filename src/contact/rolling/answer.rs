@@ -185,7 +185,7 @@ pub type RelativeErrors = Vec<Option<f64>>;
 pub struct MotionAnswer {
     /// The motion it was solved for.
     pub motion: Motion,
-    /// A prescribed force could not be reached.
+    /// Whether a prescribed force could not be reached.
     pub saturated: bool,
     /// Resultants of every patch about the origin of the case: the best known.
     pub resultants: Vec<Resultants>,

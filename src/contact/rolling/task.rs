@@ -48,7 +48,7 @@ pub struct RollingTask<'a> {
     pub first_motion: usize,
     /// The method.
     pub method: Method,
-    /// Where `fastsim` lets tractions slip.
+    /// Traction bound at which `fastsim` slips.
     pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,

@@ -171,7 +171,7 @@ fn slow_remark(peclet: f64) -> Option<Remark> {
 fn ball_remark(gap: f64) -> Option<Remark> {
     (gap > GAP).then_some(Remark::IterationInexact {
         iteration: "the smallest ball about the stresses of a passage",
-        reason: "the steps were used up",
+        reason: "the iteration limit was reached",
         residual: gap,
         tolerance: GAP,
     })

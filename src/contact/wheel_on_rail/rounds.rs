@@ -99,7 +99,7 @@ impl WheelSolve<'_> {
                 if change > 1.0 && residual > CHANGE_POOR {
                     return Err(SolveError::NormalProblem {
                         reason: format!(
-                            "pressures and tractions on the curve of the rail do not come to agree in {ROUNDS_MAX} rounds: forces still change by \
+                            "pressures and tractions on the curve of the rail do not converge in {ROUNDS_MAX} iterations: forces still change by \
                              {:.1} % of the friction limit; give reference_surface \"plane\"",
                             100.0 * residual
                         ),
@@ -107,7 +107,7 @@ impl WheelSolve<'_> {
                 }
                 let remark = Remark::IterationInexact {
                     iteration: "pressures and tractions on the curve of the rail",
-                    reason: "the rounds were used up",
+                    reason: "the iteration limit was reached",
                     residual,
                     tolerance: negligible,
                 };

@@ -82,7 +82,7 @@ impl WheelSolve<'_> {
         if patches > PATCHES_MAX && !self.curve.is_flat() {
             return Err(SolveError::NormalProblem {
                 reason: format!(
-                    "the contact on the curve of the rail falls into {patches} patches, of which at most {PATCHES_MAX} are solved together; smooth the \
+                    "the contact on the curve of the rail splits into {patches} patches; at most {PATCHES_MAX} can be solved together; smooth the \
                      profiles, or give reference_surface \"plane\""
                 ),
             });

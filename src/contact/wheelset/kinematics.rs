@@ -232,7 +232,7 @@ fn conicity(amplitude: f64, [radii, other, rolled]: [&Sampled; 3]) -> Equivalent
     let profile_uncertainty = change("profile_uncertainty, from the other reading", &other.fine);
     if own.is_some_and(|own| own.turns.is_none()) {
         reasons.push(
-            "wavelength_mm, turns_mm: the radii are equal over the whole amplitude, so that nothing steers"
+            "wavelength_mm, turns_mm: the radii are equal over the whole amplitude, so that the wheelset does not steer"
                 .to_owned(),
         );
     }

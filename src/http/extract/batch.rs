@@ -154,7 +154,7 @@ fn require_fitting(place: impl Display, bytes: usize, most: usize) -> Result<()>
 fn no_array() -> ApiError {
     ApiError::new(
         ProblemKind::FaultyBatch,
-        "the body is no array; send `[case, case, …]`, or one case per line with `Content-Type: application/x-ndjson`",
+        "the body is not an array; send `[case, case, …]`, or one case per line with `Content-Type: application/x-ndjson`",
     )
 }
 
@@ -222,7 +222,7 @@ pub fn set_option(own: &mut CaseOptions, name: &str, value: &Value) -> Result<()
         }
         _ => {
             return Err(format!(
-                "unknown member; beside `case` there may be `{}`",
+                "unknown member; allowed besides `case`: `{}`",
                 OPTION_NAMES.join("`, `")
             ));
         }
@@ -260,7 +260,7 @@ pub fn columns_of(titles: &[Title]) -> Result<Vec<TemplateColumn>> {
             false => column.path.clone(),
         };
         if !seen.insert(place) {
-            return Err(faulty(format!("the column `{name}` is there twice")));
+            return Err(faulty(format!("the column `{name}` is given twice")));
         }
         columns.push(column);
     }

@@ -163,7 +163,7 @@ impl<S: Send + Sync> FromRequestParts<S> for RunRowId {
             .map_err(|rejection| ApiError::new(ProblemKind::RunNotFound, rejection.body_text()))?;
         let id = work_id(Kind::Rows, &id)?;
         let number = row.parse().map_err(|_| {
-            let detail = format!("`{row}` is no number of a row; rows are counted from 0");
+            let detail = format!("`{row}` is not the index of a row; rows are counted from 0");
             ApiError::new(ProblemKind::RowNotFound, detail)
         })?;
         Ok(RunRowId(id, number))
@@ -183,7 +183,7 @@ async fn read_id<S: Send + Sync>(parts: &mut Parts, state: &S, kind: Kind) -> Re
 /// The text is not an id.
 pub(crate) fn work_id(kind: Kind, text: &str) -> Result<Uuid> {
     let id = Uuid::try_parse(text).map_err(|_| {
-        let detail = format!("`{text}` is no {} id; ids are UUIDs", kind.noun());
+        let detail = format!("`{text}` is not a {} id; ids are UUIDs", kind.noun());
         ApiError::new(ProblemKind::not_found(kind), detail)
     })?;
     if ProblemKind::not_found(kind) == ProblemKind::JobNotFound {

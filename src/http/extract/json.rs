@@ -396,7 +396,7 @@ impl BodyReader {
             ApiError::new(
                 ProblemKind::BodyTimeout,
                 format!(
-                    "nothing of the body arrived for {} s, or all of it at less than {LOWEST_RATE} bytes per second",
+                    "no part of the body arrived for {} s, or it arrived at less than {LOWEST_RATE} bytes per second",
                     self.timeout.as_secs_f64()
                 ),
             )
@@ -439,7 +439,7 @@ pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
     }
     ApiError::new(
         ProblemKind::UnreadableBody,
-        format!("the body broke off or cannot be unpacked: {deepest}"),
+        format!("the body ended early or cannot be decompressed: {deepest}"),
     )
 }
 

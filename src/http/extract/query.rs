@@ -416,10 +416,11 @@ pub const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;
 query! {
     /// Options of a submission.
     SubmitQuery(() => ()) {
-        /// Which of the queued jobs of the tenant are solved first: `high` before `normal` (when left out) before `low`. Tenants take turns whatever the priorities of their jobs
+        /// Order of the tenant's queued jobs: `high` before `normal` (default) before `low`. Priorities have no effect between tenants,
+        /// which take turns
         #[param(example = "high")]
         priority: Priority as Priority = reader(Priority::ALL.map(Priority::name).join(", "), Priority::from_name);
-        /// Seconds from now within which a job must have ended. One that has not, queued or running, fails as `deadline-passed`
+        /// Seconds from now within which each job must end. A job that is still queued or running then fails as `deadline-passed`
         #[param(minimum = 1, maximum = 2_592_000, example = 600)]
         deadline_s: u32 as u32 = seconds(1, DEADLINE_MAX_SECONDS);
     }

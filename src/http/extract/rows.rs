@@ -370,7 +370,7 @@ fn content_type_of(part: &Field<'_>) -> HeaderValue {
 pub(crate) struct TableUpload {
     /// The case whose members the columns of the table replace; the first part.
     template: Case,
-    /// The table; its content type, or else the extension of its file name, tells its form.
+    /// The table; its content type, or else the extension of its file name, gives its format.
     #[schema(content_media_type = "application/octet-stream")]
     table: String,
 }

@@ -198,7 +198,7 @@ pub fn place(title: &str, below: Option<&str>) -> Result<Option<Place>, String> 
     let unit = match (in_title, below) {
         (Some(one), Some(other)) if one != other => {
             return Err(format!(
-                "has the unit `{one}`, and `{other}` in the line of units; they have to agree"
+                "has the unit `{one}`, and `{other}` in the line of units; they must agree"
             ));
         }
         (in_title, below) => in_title.or(below),
@@ -263,7 +263,7 @@ impl Quantity {
         };
         match unit {
             Some(unit) if self.units.factor(unit) != Some(factor) => Err(format!(
-                "ends in one unit and has the unit `{unit}` beside it; they have to agree"
+                "ends in one unit and has the unit `{unit}` beside it; they must agree"
             )),
             _ => Ok(Some(factor)),
         }
@@ -327,7 +327,7 @@ fn factor_at(pointer: &str, unit: Option<&str>) -> Result<f64, String> {
     match known {
         Some((_, units)) if units.factor(unit) == Some(1.0) => Ok(1.0),
         Some((_, units)) => Err(format!(
-            "is in {} by its name, and in `{unit}` by the line of units; they have to agree",
+            "is in {} by its name, and in `{unit}` by the line of units; they must agree",
             units.list[0].0
         )),
         None => RATIO.factor(unit).ok_or_else(|| {
@@ -499,7 +499,7 @@ impl NamedColumns {
                 .map(|(title, ..)| format!("`{title}`"))
                 .collect();
             return Err(faulty(format!(
-                "the query names the column `{title}`, which is no title of the table; its titles: {}",
+                "the query names the column `{title}`, which is not a title of the table; its titles: {}",
                 titles.join(", ")
             )));
         }
@@ -516,7 +516,7 @@ fn place_of(
     below: Option<&str>,
     named: Option<&str>,
 ) -> Result<Option<Place>, String> {
-    let carry = format!("`?carry={title}` carries it along to the answers");
+    let carry = format!("`?carry={title}` copies it to the results");
     match named {
         Some("") => Ok(None),
         // Rows are no jobs that have a name.
@@ -530,7 +530,7 @@ fn place_of(
                     let known = QUANTITIES.iter().map(Quantity::first_name);
                     let known: Vec<&str> = known.collect();
                     Err(format!(
-                        "`{what}` is named in `column`, which is no place in a case; allowed: a JSON pointer, a short name, or one of {} with a unit",
+                        "`{what}` is named in `column`, but is not a place in a case; allowed: a JSON pointer, a short name, or one of {} with a unit",
                         known.join(", ")
                     ))
                 }
@@ -544,7 +544,7 @@ fn place_of(
                 let example = suggested(title, below).into_iter().next();
                 let example = example.unwrap_or_else(|| "creepage_x [%]".to_owned());
                 Err(format!(
-                    "is not known; {asked}{} `?column={title}:{example}` says so, and {carry}",
+                    "is not known; {asked}{} `?column={title}:{example}` gives its meaning, and {carry}",
                     if asked.is_empty() {
                         "if it is a quantity of the case,"
                     } else {
@@ -873,9 +873,9 @@ mod tests {
             let columns = NamedColumns(named.collect()).columns([("a", None, false)].into_iter());
             format!("{:?}", columns.expect_err("a refusal"))
         };
-        assert!(of(&["a:load"]).contains("no place in a case"));
+        assert!(of(&["a:load"]).contains("not a place in a case"));
         assert!(of(&["a:creepage_x", "a:creepage_y"]).contains("twice"));
-        assert!(of(&["b:creepage_x"]).contains("no title"));
+        assert!(of(&["b:creepage_x"]).contains("not a title"));
         let refused = of(&["a:spin"]);
         assert!(
             refused.contains("`spin` has no unit") && refused.contains("column `a`"),

@@ -43,7 +43,7 @@ impl PackedLength {
         ApiError::new(
             ProblemKind::BodyTooLarge,
             format!(
-                "the body unpacks to more than {UNPACKED_PER_BYTE} times its size; send it in parts, or as it is"
+                "the body decompresses to more than {UNPACKED_PER_BYTE} times its size; send it in parts, or uncompressed"
             ),
         )
     }
@@ -88,7 +88,7 @@ pub(crate) async fn limit_packed(
     if declared.is_some_and(|length| length > most) {
         return ApiError::new(
             ProblemKind::BodyTooLarge,
-            format!("the packed body is larger than the {most} bytes that are allowed"),
+            format!("the compressed body is larger than the {most} bytes that are allowed"),
         )
         .into_response();
     }

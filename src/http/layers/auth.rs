@@ -68,7 +68,7 @@ impl Access {
             }
             (None, _) => {
                 return Err(unauthorized(
-                    "the request has no key; send `Authorization: Bearer` with one",
+                    "the request has no API key; send one with `Authorization: Bearer`",
                 ));
             }
             (Some(header), None) => header.to_str().ok().and_then(bearer),
@@ -101,7 +101,7 @@ impl Access {
         if key.read_only && changes(parts) {
             return Err(ApiError::new(
                 ProblemKind::Forbidden,
-                "this key may only read; make, cancel and delete jobs with another key of the tenant",
+                "this key is read-only; submit, cancel and delete jobs with another key of the tenant",
             ));
         }
         Ok(Some(key))
@@ -172,9 +172,9 @@ impl Guard {
             Some(name) if !self.proxied => Err(ApiError::new(
                 ProblemKind::Unauthorized,
                 format!(
-                    "the request came through a proxy (`{name}`), so it needs a key: send `Authorization: Bearer` with one. \
-                     Without a key only direct requests of this machine are answered (`--anonymous loopback`); keys are made with \
-                     `railhead keys create`"
+                    "the request came through a proxy (`{name}`), so it needs an API key: send one with `Authorization: \
+                     Bearer`. Without a key, only direct requests from this machine are answered (`--anonymous loopback`); \
+                     `railhead keys create` creates keys"
                 ),
             )),
             _ => Ok(()),
@@ -196,7 +196,7 @@ impl Guard {
         Err(ApiError::new(
             ProblemKind::HostNotAllowed,
             format!(
-                "the service is asked as `{name}`; without a key it answers to addresses, to `localhost` and to names given by `--allowed-host`"
+                "the header `Host` is `{name}`; without a key it must be an IP address, `localhost` or a name given by `--allowed-host`"
             ),
         ))
     }
@@ -226,7 +226,7 @@ impl Guard {
         Err(ApiError::new(
             ProblemKind::CrossSite,
             format!(
-                "a page of another origin ({}) may not change anything here without a key; `--cors-origin` names the origins that may",
+                "a page of another origin ({}) may not change anything without a key; `--cors-origin` lists the origins that may",
                 origin.unwrap_or("not named")
             ),
         ))
@@ -266,7 +266,7 @@ pub(crate) async fn admit(request: Request, next: Next) -> Response {
     }
     let crowded = request.extensions().get::<ProbesOnly>().is_some();
     if crowded && !PROBES.contains(&request.uri().path()) {
-        let detail = "every connection of the service, or of this address, has a request under way";
+        let detail = "every connection of the service, or of this address, has an active request";
         let mut refusal = ApiError::new(ProblemKind::Overloaded, detail).into_response();
         let close = axum::http::HeaderValue::from_static("close");
         refusal.headers_mut().insert(header::CONNECTION, close);
@@ -415,7 +415,7 @@ impl RateLimit {
         Err(ApiError::new(
             ProblemKind::TooManyRequests,
             format!(
-                "{who} sends more requests than it may: {} per second, and {} at once",
+                "{who} sends too many requests; allowed: {} per second, and {} at once",
                 self.per_second,
                 self.per_second.saturating_mul(BURST_SECONDS)
             ),

@@ -62,7 +62,7 @@ impl Metrics {
         );
         registry.register(
             "http_request_seconds",
-            "Time from a request to the head of its answer, waits that the client asked for included",
+            "Time from a request to the head of its response, including waits that the client requested",
             Family::clone(&seconds),
         );
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
@@ -144,7 +144,7 @@ pub(crate) struct Process {
 impl Collector for Process {
     fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> Result<(), std::fmt::Error> {
         let dropped = ConstCounter::new((self.dropped_lines)());
-        let about = "Log lines dropped because nobody read them";
+        let about = "Log lines dropped because they were not read";
         let metric =
             encoder.encode_descriptor("log_lines_dropped", about, None, dropped.metric_type())?;
         dropped.encode(metric)?;

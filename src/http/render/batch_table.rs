@@ -113,7 +113,7 @@ impl Columns {
     #[must_use]
     pub(crate) fn allowed() -> String {
         let names = COLUMNS.map(|(name, _)| name).join(", ");
-        format!("names with commas between, of {names} and `label:KEY`")
+        format!("comma-separated names, of {names} and `label:KEY`")
     }
 
     /// The names with the kinds of their values.

@@ -207,7 +207,7 @@ pub(crate) enum Rows {
     Grid {
         /// Samples along x in mm, ascending.
         x_mm: Vec<f64>,
-        /// Samples across in mm, ascending.
+        /// Samples along y in mm, ascending.
         y_mm: Vec<f64>,
     },
 }

@@ -47,10 +47,10 @@ problems! {
 query! {
     /// What the query of a submission says about the batch itself.
     BatchQuery(() => ()) {
-        /// `reject` (when left out): one faulty case refuses the batch; `skip`: faulty cases are left out and reported
+        /// `reject` (default): one faulty case refuses the batch; `skip`: faulty cases are skipped and reported
         #[param(pattern = "^(reject|skip)$", example = "skip")]
         on_invalid: bool as String = word(&[("reject", false), ("skip", true)]);
-        /// The job whose case is the template of a table; not with `multipart/form-data`, which holds the template itself
+        /// Id of the job whose case is the template of a table; not with `multipart/form-data`, which contains the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
     }
@@ -58,11 +58,11 @@ query! {
 
 /// Submits many cases as one batch of jobs.
 ///
-/// The body is a JSON array of cases, one case per line (`application/x-ndjson`), or a table whose lines fill the cells of
-/// a template case: as `multipart/form-data` with the parts `template` and `table`, or alone with `?template=` naming a job. Tables are CSV,
-/// Arrow, Parquet or NPZ, and with a template also NDJSON with a row per line. JSON, NDJSON and CSV are read as they arrive. All jobs of
-/// a batch answered with `202` are stored durably. Without `on_invalid=skip` one faulty case refuses the whole batch (`422`), and
-/// nothing is stored; every fault names its case, and its line in NDJSON and CSV. A JSON array that is not JSON is `400`; a line that is not JSON is a faulty case.
+/// The body is a JSON array of cases, one case per line (`application/x-ndjson`), or a table whose rows fill a template case: as
+/// `multipart/form-data` with the parts `template` and `table`, or alone with a job id in `?template=`. Tables are CSV, Arrow, Parquet or
+/// NPZ, and with a template also NDJSON with a row per line. JSON, NDJSON and CSV are read as they arrive. Jobs of a batch answered with
+/// `202` are stored durably. Without `on_invalid=skip`, one faulty case refuses the whole batch (`422`); every fault names its case, and
+/// its line in NDJSON and CSV. A malformed array is `400`; a malformed line is a faulty case.
 #[utoipa::path(
     post,
     path = "/v1/batches",
@@ -217,7 +217,7 @@ impl Source {
         let needed = 2 * bytes;
         if !self.memory.has_room_for(needed) {
             let detail = format!(
-                "the result of {bytes} bytes takes more memory than a table may (`--tenant-request-memory-mb`); ask for NDJSON"
+                "the result of {bytes} bytes exceeds the memory limit of a table (`--tenant-request-memory-mb`); ask for NDJSON"
             );
             return without(problem(&item, ProblemKind::Overloaded, detail));
         }
@@ -408,21 +408,21 @@ const LABEL_COLUMNS_MAX: u32 = 100;
 /// One line of the results of a batch.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct BatchLine {
-    /// Place of the case in what was sent, counted from 0.
+    /// Index of the case in the request, from 0.
     index: u32,
     /// Identifier of the job.
     #[schema(format = "uuid")]
     id: String,
-    /// Free text of the case.
+    /// Name of the case.
     name: Option<String>,
     /// Labels of the case.
     labels: std::collections::BTreeMap<String, String>,
-    /// Where the job stands.
+    /// State of the job.
     state: JobState,
-    /// The result, as `/v1/jobs/{id}/result` answers it; only of a succeeded job.
+    /// The result, as `/v1/jobs/{id}/result` returns it; only for a succeeded job.
     #[serde(skip_serializing_if = "Option::is_none")]
     result: Option<JobResult>,
-    /// Why there is no result: why the job failed, or that its result was removed while the lines were read or cannot be read.
+    /// Why there is no result: the job failed, its result was removed while the lines were read, or the result cannot be read.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<ProblemBody>,
 }
@@ -430,13 +430,13 @@ pub(crate) struct BatchLine {
 query! {
     /// Parameters of the results of a batch.
     BatchResultsQuery(() => ()) {
-        /// Only lines after that of this job, as to go on after the last line that was read
+        /// Only lines after that of this job, to continue after the last line that was read
         #[param(format = "uuid")]
         after: Uuid as String = id("job");
-        /// Only lines of jobs in this state; may be repeated for jobs in one of several
+        /// Only lines of jobs in this state; if repeated, of jobs in any of these states
         state: Vec<JobState> as Vec<JobState> = repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
-        /// Columns of a table, with commas between, such as `label:km,force_y_n`; with `patch` among them there is a line for each patch. See `docs/formats.md`.
-        /// When left out: the usual columns, and one for each label of the jobs, at most 100
+        /// Comma-separated columns of a table, such as `label:km,force_y_n`; with `patch` among them there is a row for each patch. See
+        /// `docs/formats.md`. Default: the usual columns, and one for each label of the jobs, at most 100
         #[param(example = "label:km,pressure_max_mpa,target_met")]
         columns: Columns as String = reader(Columns::allowed(), Columns::read);
         /// `ndjson`, `csv`, `arrow` or `parquet`; overrides `Accept`
@@ -450,11 +450,11 @@ problems! {
     BatchResultProblems: BadQuery, BatchNotFound
 }
 
-/// The results of a batch in the order its cases were sent.
+/// Returns the results of a batch in the order of its cases.
 ///
-/// NDJSON: exactly one line per job, nothing else. A table (CSV, Arrow, Parquet) has one row per job and motion with the sums over
-/// all patches, or with the column `patch` one row per job, motion and patch; a job without a result has one row without numbers. With a wait, lines are
-/// sent as soon as everything before them is there. Without one, unfinished jobs appear with their state.
+/// NDJSON: exactly one line per job. A table (CSV, Arrow, Parquet) has one row per job and motion with sums over all patches, or with the
+/// column `patch` one row per patch; a job without a result has one row without numbers. With a wait, each line is sent when all lines
+/// before it are complete; otherwise unfinished jobs appear with their state.
 #[utoipa::path(
     get,
     path = "/v1/batches/{id}/results",

@@ -23,7 +23,7 @@ use crate::jobs::sync::blocking;
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = CheckedCase)]
 pub(crate) struct CheckReport {
-    /// Digest of everything that determines the answer; cases with equal digests have equal answers.
+    /// Digest of everything that determines the result; cases with equal digests have equal results.
     digest: String,
     /// The method the case asks for.
     method: MethodName,
@@ -33,24 +33,24 @@ pub(crate) struct CheckReport {
     motions: usize,
     /// Expected cost.
     estimate: Estimate,
-    /// What the case was understood as; absent where no part of the wheel lies above the rail.
+    /// How the case was interpreted; absent if no part of the wheel lies above the rail.
     understood: Option<Understanding>,
-    /// How far the points of the profiles can be trusted, as far as that is known without the contact; only for `profiles`.
+    /// Quality of the points of the profiles, as far as it is known before solving; only for `profiles`.
     quality: Option<PairQuality>,
-    /// What the client should know before using the numbers.
+    /// Remarks to read before using the numbers.
     remarks: Vec<RemarkEntry>,
 }
 
-/// Expected cost of a case, rough.
+/// Rough estimate of the cost of a case.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Estimate {
     /// Peak memory in bytes.
     bytes: u64,
-    /// Of these, what stays in the store of operators that all workers share.
+    /// Part of `bytes` that stays in the operator store, which all workers share.
     operator_store_bytes: u64,
     /// Solve time on one core, in s.
     seconds: f64,
-    /// How `seconds` were found.
+    /// How `seconds` was determined.
     found_by: FoundBy,
 }
 
@@ -61,8 +61,7 @@ problems! {
 
 /// Checks a case and estimates its cost, without making a job.
 ///
-/// The case is solved for a moment, a fifth of a second where the operator sets nothing else: most cases end within it, and of others the
-/// formulas tell the rest.
+/// The case is solved for 0.2 s, unless the operator sets another time. If it does not end within this time, formulas estimate the rest.
 #[utoipa::path(
     post,
     path = "/v1/cases/check",

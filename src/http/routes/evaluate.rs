@@ -49,7 +49,7 @@ const FORMATS: &[Format] = &[
     Format::Npz,
 ];
 
-/// Rows to evaluate: a case, and columns of numbers that stand in place of some of its numbers.
+/// Rows to evaluate: a case, and columns of values that replace some of its members.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = EvaluateRequest)]
 #[allow(
@@ -57,15 +57,16 @@ const FORMATS: &[Format] = &[
     reason = "the contract; bodies are read straight into columns"
 )]
 pub(crate) struct EvaluateRequest {
-    /// A case with one motion, of any contact and method. Values that a column holds may be left out. Of `outputs` only `gradients` counts.
+    /// A case with one motion, of any contact and method. Members that a column replaces may be omitted. Of `outputs` only `gradients` has
+    /// an effect.
     #[schema(value_type = Object)]
     template: Value,
-    /// Columns by the JSON pointer of the value that they stand for, such as `/load/normal_force_n`; all of the same length. Texts are digests
-    /// of stored profiles or words of the case.
+    /// Columns by the JSON pointer of the member that they replace, such as `/load/normal_force_n`; all of the same length. Texts are
+    /// digests of stored profiles or keywords of the case.
     columns: BTreeMap<String, Vec<CellValue>>,
 }
 
-/// Answers to rows, in their order; null where a row has none.
+/// Results of the rows, in their order; null where a row has none.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = EvaluateAnswer)]
 #[allow(
@@ -79,7 +80,7 @@ pub(crate) struct EvaluateAnswer {
     columns: EvaluateColumns,
 }
 
-/// Columns of an answer.
+/// Result columns.
 #[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(
@@ -93,9 +94,9 @@ pub(crate) struct EvaluateColumns {
     force_y_n: Vec<Option<f64>>,
     /// Moment about the centre of the ellipse in N·mm.
     moment_z_n_mm: Vec<Option<f64>>,
-    /// Bound of the error of either force in N; that of the moment is this times √(ab). It holds for 99 of 100 motions.
+    /// Bound of the error of each force in N; the bound for the moment is this value times √(ab). It holds for 99 of 100 motions.
     error_estimate: Vec<Option<f64>>,
-    /// ν_x F_x + ν_y F_y + φ M_z in N (J/m).
+    /// Friction power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m).
     friction_power_n: Vec<Option<f64>>,
     /// Share of the patch that sticks, 0 to 1.
     stick_share: Vec<Option<f64>>,
@@ -117,7 +118,7 @@ pub(crate) struct EvaluateColumns {
     moment_z_n_mm_by_creepage_y: Option<Vec<Option<f64>>>,
     /// ∂`moment_z_n_mm`/∂`spin_per_mm`; with `gradients` only.
     moment_z_n_mm_by_spin_per_mm: Option<Vec<Option<f64>>>,
-    /// Sum of the normal forces in N. This and the next columns are there only if the template needs the solver.
+    /// Sum of the normal forces in N. This column and the following ones are present only if the template needs the solver.
     normal_force_n: Option<Vec<Option<f64>>>,
     /// Estimated error of the moment in N·mm.
     moment_error_estimate: Option<Vec<Option<f64>>>,
@@ -137,10 +138,10 @@ pub(crate) struct EvaluateColumns {
     angular_velocity_rad_per_s: Option<Vec<Option<f64>>>,
     /// Lateral velocity found for a prescribed force, in mm/s.
     lateral_velocity_mm_per_s: Option<Vec<Option<f64>>>,
-    /// `ok`; `target_missed`: the estimated error is above the target; `needs_solver`: with `auto`, the table does not answer the row, and more
-    /// than 200 rows of the request need the solver: submit them as a run; `not_covered`: the method does not cover the patch; `refused`: the
-    /// case of the row has faults, which `POST /v1/cases/check` names; `not_finite`: a number of the answer is not finite; `not_converged`,
-    /// `unsolvable`, `out_of_time`, `solver_failed`: the solver has no answer. Only rows that are `ok` or `target_missed` have numbers.
+    /// `ok`; `target_missed`: the estimated error exceeds the target; `needs_solver`: with `auto`, the table does not cover the row, and
+    /// more than 200 rows need the solver (submit a run); `not_covered`: the method does not cover the patch; `refused`: the case has
+    /// faults (see `POST /v1/cases/check`); `not_finite`: the result is not finite; `not_converged`, `unsolvable`, `out_of_time`,
+    /// `solver_failed`: the solver found no solution. Only rows with `ok` or `target_missed` have numbers.
     status: Vec<String>,
 }
 
@@ -153,7 +154,7 @@ problems! {
 query! {
     /// Parameters of an evaluation.
     EvaluateQuery(() => ()) {
-        /// The job whose case is the template of a table; not with `multipart/form-data`, which holds the template itself
+        /// Id of the job whose case is the template of a table; not with `multipart/form-data`, which contains the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
         /// `json`, `csv`, `ndjson`, `arrow`, `parquet` or `npz`; overrides `Accept`
@@ -162,12 +163,12 @@ query! {
     }
 }
 
-/// Answers rows at once. No job is made and nothing is stored.
+/// Evaluates rows immediately. No job is created and nothing is stored.
 ///
-/// A row is the template with the row's values in place of its own; the template may be any case of one motion. Contacts of type `radii` and
-/// `ellipse` are answered by the table of creep forces or by FASTSIM where the method allows, 1 000 000 rows at most. Everything else is solved as
-/// a run solves it: at most 200 rows, in 10 s. A request beyond that is refused with `evaluation-too-long`; `/v1/runs` takes the same body. If a
-/// number is outside the range allowed in a case, the request is refused with its row and column.
+/// A row is the template with the values of the row; the template is any case with one motion. Contacts of type `radii` and `ellipse` are
+/// answered by the table of creep forces or FASTSIM if the method allows it, at most 1 000 000 rows; all others are solved, at most 200
+/// rows within 10 s. A larger request is refused with `evaluation-too-long`; `/v1/runs` accepts the same body. A number outside the range
+/// of a case is refused with its row and column.
 #[utoipa::path(
     post,
     path = "/v1/evaluate",
@@ -175,7 +176,7 @@ query! {
     operation_id = "evaluate_rows",
     params(EvaluateQuery),
     request_body(content((EvaluateRequest = "application/json"), (String = "text/csv"), (String = "application/x-ndjson"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/vnd.apache.parquet"), (Vec<u8> = "application/x-npz"), (TableUpload = "multipart/form-data")), description = "At most 1 000 000 rows and 64 MiB"),
-    responses((status = 200, description = "The rows' resultants", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (String = "application/x-ndjson"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/vnd.apache.parquet"), (Vec<u8> = "application/x-npz"))), EvaluateProblems)
+    responses((status = 200, description = "The resultants of the rows", content((EvaluateAnswer = "application/json"), (String = "text/csv"), (String = "application/x-ndjson"), (Vec<u8> = "application/vnd.apache.arrow.stream"), (Vec<u8> = "application/vnd.apache.parquet"), (Vec<u8> = "application/x-npz"))), EvaluateProblems)
 )]
 pub(crate) async fn evaluate(
     Caller(jobs): Caller,
@@ -275,7 +276,7 @@ fn varied_alone(columns: Vec<RunColumn>) -> Result<ReceivedRows> {
     match carried {
         None => Ok(ReceivedRows::new(columns)?),
         Some(RunColumn { name, .. }) => Err(faulty(format!(
-            "the column `{name}` stands for nothing in the case; only runs carry columns along"
+            "the column `{name}` names nothing in the case; only runs copy further columns"
         ))),
     }
 }

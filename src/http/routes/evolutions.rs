@@ -32,8 +32,8 @@ const TABLES: &[Format] = &[Format::Csv, Format::Ndjson, Format::Arrow, Format::
 
 /// Submits an evolution: profiles that wear under a traffic, step by step.
 ///
-/// An evolution is followed, waited for, cancelled and deleted like a job. Its steps are stored as they are taken, and one that is interrupted goes
-/// on from the last of them to the same answer.
+/// An evolution is followed, waited for, cancelled and deleted like a job. Its steps are stored; an interrupted evolution continues from
+/// the last one and gives the same result.
 #[utoipa::path(
     post,
     path = "/v1/evolutions",
@@ -126,7 +126,7 @@ fn scale(values: &mut Value, factor: f64) {
     }
 }
 
-/// An evolution as it was submitted, with the columns of its traffic named by JSON pointers.
+/// Returns an evolution as it was submitted, with the columns of its traffic named by JSON pointers.
 #[utoipa::path(
     get,
     path = "/v1/evolutions/{id}/request",
@@ -139,14 +139,14 @@ pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Re
     jobs::case(Caller(jobs.of_kind(Kind::Evolution)), JobId(id)).await
 }
 
-/// The answer of a succeeded evolution.
+/// Returns the result of a succeeded evolution.
 #[utoipa::path(
     get,
     path = "/v1/evolutions/{id}/result",
     tag = "evolutions",
     operation_id = "get_evolution_result",
     params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
-    responses((status = 200, description = "The answer", body = EvolutionAnswer), ResultProblems)
+    responses((status = 200, description = "The result", body = EvolutionAnswer), ResultProblems)
 )]
 pub(crate) async fn result(
     Caller(jobs): Caller,
@@ -163,7 +163,7 @@ pub(crate) async fn result(
 query! {
     /// Parameters of the tables of an evolution.
     EvolutionTableQuery(() => ()) {
-        /// `records`, a row for each stored step (when left out), or `points`, a row for each point of both sections in each of them
+        /// `records` (default), a row for each stored step, or `points`, a row for each point of both sections in each stored step
         #[param(pattern = "^(records|points)$", example = "records")]
         of: TableOf as String = word(&ROWS);
         /// `csv`, `ndjson`, `arrow` or `parquet`; overrides `Accept`
@@ -177,7 +177,7 @@ type TableOf = fn(&EvolutionAnswer) -> RowTable;
 /// What the rows of a table are.
 const ROWS: [(&str, TableOf); 2] = [("records", records_table), ("points", points_table)];
 
-/// The answer of a succeeded evolution as a table.
+/// Returns the result of a succeeded evolution as a table.
 #[utoipa::path(
     get,
     path = "/v1/evolutions/{id}/table",
@@ -215,10 +215,10 @@ const BODIES: [(&str, BodyOf); 2] = [("rail", |r| &r.rail), ("wheel", |r| &r.whe
 query! {
     /// Parameters of a section of an evolution.
     SectionQuery(() => ()) {
-        /// Number of the record, from 0; the last when left out
+        /// Index of the record, from 0; default: the last
         #[param(minimum = 0, maximum = 100000, example = 3)]
         record: u32 as u32 = count(0, 100_000);
-        /// `columns` (when left out), `miniprof` or `simpack`
+        /// `columns` (default), `miniprof` or `simpack`
         #[param(pattern = "^(columns|miniprof|simpack)$", example = "miniprof")]
         format: SectionForm as String = word(&FORMS);
     }
@@ -235,7 +235,7 @@ const FORMS: [(&str, SectionForm); 3] = [
     ("simpack", (["prr", "prw"], simpack)),
 ];
 
-/// A section of a succeeded evolution as a file for other programs.
+/// Returns a section of a succeeded evolution as a file for other programs.
 #[utoipa::path(
     get,
     path = "/v1/evolutions/{id}/sections/{body}",
@@ -257,7 +257,7 @@ pub(crate) async fn section(
     let query = SectionQuery::read(&uri, &())?;
     let id = work_id(Kind::Evolution, &id)?;
     let Some(k) = BODIES.iter().position(|(name, _)| *name == body) else {
-        let detail = format!("`{body}` is no body; allowed: rail, wheel");
+        let detail = format!("`{body}` is not a body; allowed: rail, wheel");
         return Err(ApiError::new(ProblemKind::JobNotFound, detail));
     };
     let (extensions, text) = query.format.unwrap_or(FORMS[0].1);
@@ -265,7 +265,7 @@ pub(crate) async fn section(
         let last = evolution.records.len().saturating_sub(1);
         let number = query.record.map_or(last, |number| number as usize);
         let record = evolution.records.get(number).ok_or_else(|| {
-            ApiError::bad_parameter("record", format!("{number} given; 0 to {last} are there"))
+            ApiError::bad_parameter("record", format!("{number} given; allowed: 0 to {last}"))
         })?;
         let extension = extensions[k];
         let name = format!("attachment; filename=\"{body}-{id}.{extension}\"");

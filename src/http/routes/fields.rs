@@ -46,13 +46,13 @@ const FORMATS: &[Format] = &[
 #[serde(untagged)]
 #[expect(dead_code, reason = "describes an answer in the contract")]
 pub(crate) enum Field {
-    /// Without `grid`: the values where they were computed.
+    /// Without `grid`: values at the cells for which they were computed.
     PerCell {
-        /// Number of the patch, counted from 0.
+        /// Index of the patch, from 0.
         patch: usize,
-        /// Number of the motion, counted from 0.
+        /// Index of the motion, from 0.
         point: usize,
-        /// The border of the patch, and of its zones where they are part of the answer.
+        /// The border of the patch, and of its zones if included.
         outlines: Outlines,
         /// Geometry and values of the cells.
         cells: Cells,
@@ -64,15 +64,15 @@ pub(crate) enum Field {
 query! {
     /// The parameters of a field.
     FieldQuery(samples_max => usize) {
-        /// The motion, counted from 0; 0 when left out
+        /// Index of the motion, from 0; default 0
         point: usize as u32 = index();
-        /// The patch, counted from 0; 0 when left out
+        /// Index of the patch, from 0; default 0
         patch: usize as u32 = index();
-        /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis, and
-        /// 250 000 in all where the operator says nothing else
+        /// `NXxNY`: resample on a regular grid over the bounding box of the patch; 2 to 1000 samples along each axis, by default at most
+        /// 250 000 in all
         #[param(example = "60x40")]
         grid: (usize, usize) as String = grid(*samples_max);
-        /// `single`: numbers of 32 bits, which is enough for a picture; `double` when left out. VTK is always `double`
+        /// `double` (default) or `single`: 32-bit numbers, which are enough for a picture. VTK is always `double`
         #[param(pattern = "^(single|double)$", example = "single")]
         precision: Precision as String = precision();
         /// `json`, `csv`, `npz`, `vtk`, or `svg` and `png` for a picture; overrides `Accept`
@@ -176,8 +176,7 @@ pub(crate) fn grid(samples_max: usize) -> Reader<(usize, usize)> {
 macro_rules! field_routes {
     ($($(#[doc = $summary:tt])* $name:ident($path:tt, $operation:tt, $output:ident, $schema:tt, $described:tt);)*) => {$(
         $(#[doc = $summary])*
-        ///
-        /// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
+        /// CSV, NPZ and VTK use the names of the JSON; see `docs/formats.md`.
         #[utoipa::path(
             get,
             path = $path,
@@ -200,16 +199,16 @@ macro_rules! field_routes {
 }
 
 field_routes! {
-    /// Tangential tractions of a succeeded job.
+    /// Returns the tangential tractions of a succeeded job.
     tractions("/v1/jobs/{id}/tractions", "get_tractions", Tractions, Field, "Tractions on the lower body, in MPa");
-    /// Pressure of a succeeded job; the same for every motion.
+    /// Returns the pressure of a succeeded job; the same for every motion.
     pressure("/v1/jobs/{id}/pressure", "get_pressure", Pressure, Field, "Pressure in MPa");
-    /// Slip of a succeeded job: the upper body relative to the lower one, divided by rolling speed.
+    /// Returns the slip of a succeeded job: that of the upper body relative to the lower one, divided by rolling speed.
     slip("/v1/jobs/{id}/slip", "get_slip", Slip, Field, "Relative slip, dimensionless");
-    /// Temperature of both surfaces in the contact of a succeeded job; both bodies have the same there.
+    /// Returns the temperature in the contact of a succeeded job, which is the same on both surfaces.
     temperature("/v1/jobs/{id}/temperature", "get_temperature", Temperature, Field, "Temperature at the middle of every cell, in °C");
-    /// Stick and slip zones of a succeeded job.
-    zones("/v1/jobs/{id}/zones", "get_zones", Zones, Zones, "Areas, outlines and the zone of every cell, or zones on a regular grid; only cells or grid in forms other than JSON");
+    /// Returns the stick and slip zones of a succeeded job.
+    zones("/v1/jobs/{id}/zones", "get_zones", Zones, Zones, "Areas, outlines and the zone of every cell, or zones on a regular grid; formats other than JSON contain only the cells or the grid");
 }
 
 async fn answer(request: &PartRequest, output: Output) -> Result<Response> {
@@ -335,18 +334,18 @@ const PART_FORMATS: &[Format] = &[Format::Json, Format::Csv, Format::Npz, Format
 query! {
     /// The parameters of all fields of a motion.
     FieldsQuery(samples_max => usize) {
-        /// The motion, counted from 0; 0 when left out
+        /// Index of the motion, from 0; default 0
         point: usize as u32 = index();
-        /// The patch, counted from 0; 0 when left out
+        /// Index of the patch, from 0; default 0
         patch: usize as u32 = index();
-        /// Parts that the case has among its `outputs`, with commas between; all of them when left out
+        /// Comma-separated parts, each among the `outputs` of the case; default: all of them
         #[param(pattern = "^(pressure|tractions|slip|temperature|zones)(,(pressure|tractions|slip|temperature|zones))*$", example = "pressure,tractions")]
         parts: Vec<Output> as String = parts();
-        /// `NXxNY`: resample on a regular grid over the bounding box of the patch, 2 to 1000 samples along each axis, and
-        /// 250 000 in all where the operator says nothing else
+        /// `NXxNY`: resample on a regular grid over the bounding box of the patch; 2 to 1000 samples along each axis, by default at most
+        /// 250 000 in all
         #[param(example = "60x40")]
         grid: (usize, usize) as String = grid(*samples_max);
-        /// `single`: numbers of 32 bits, which is enough for a picture; `double` when left out. VTK is always `double`
+        /// `double` (default) or `single`: 32-bit numbers, which are enough for a picture. VTK is always `double`
         #[param(pattern = "^(single|double)$", example = "single")]
         precision: Precision as String = precision();
         /// `json`, `csv`, `npz` or `vtk`; overrides `Accept`
@@ -373,10 +372,10 @@ fn parts() -> Reader<Vec<Output>> {
     })
 }
 
-/// Everything that was stored per cell for one patch and motion of a succeeded job, with the border of the patch: what a
-/// picture needs, in one request.
+/// Returns all values stored per cell for one patch and motion of a succeeded job, with the border of the patch: everything that a picture
+/// needs.
 ///
-/// CSV, NPZ and VTK have the same names as the JSON; see `docs/formats.md`.
+/// CSV, NPZ and VTK use the names of the JSON; see `docs/formats.md`.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{id}/fields",
@@ -423,13 +422,13 @@ pub(crate) enum Zones {
 /// Areas, outlines and the zone of every cell.
 #[derive(Serialize, ToSchema)]
 pub(crate) struct ZoneCells {
-    /// Number of the patch, counted from 0.
+    /// Index of the patch, from 0.
     patch: usize,
-    /// Number of the motion, counted from 0.
+    /// Index of the motion, from 0.
     point: usize,
     /// Area that sticks in mm²: the share of the sticking cells in the area of the patch.
     stick_area_mm2: f64,
-    /// Area that slips in mm², likewise; both add up to the area of the patch.
+    /// Area that slips in mm², computed in the same way; both add up to the area of the patch.
     slip_area_mm2: f64,
     /// Number of cells that stick.
     stick_cells: u32,

@@ -19,9 +19,9 @@ problems! {
 
 /// Submits one case as a job.
 ///
-/// A job answered with `202` or `200` is stored durably. With `?wait=N` or `Prefer: wait=N` the answer is the ended job (`200`) if it
-/// ends within N seconds, including its result if it succeeded and its `error` if it failed. A case that is identical to one
-/// solved before (`name` and `labels` aside) succeeds at once with that result, marked `cached`.
+/// A job answered with `202` or `200` is stored durably. With `?wait=N` or `Prefer: wait=N`, the response is the ended job (`200`) if it
+/// ends within N seconds, with its result or `error`. A case identical to one solved before (except for `name` and `labels`) succeeds at
+/// once with that result, marked `cached`.
 #[utoipa::path(
     post,
     path = "/v1/jobs",
@@ -53,7 +53,7 @@ problems! {
     GetProblems: BadQuery, JobNotFound
 }
 
-/// The case of a job, as it was submitted.
+/// Returns the case of a job, as it was submitted.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{id}/case",

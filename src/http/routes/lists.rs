@@ -44,10 +44,10 @@ static MEMBERS: LazyLock<Vec<String>> = LazyLock::new(|| match JobAnswer::schema
 query! {
     /// The page of a list.
     PageQuery(() => ()) {
-        /// Entries in one page; 50 when left out. A page of batches or runs has at most 100
+        /// Entries per page; default 50. Batches and runs: at most 100
         #[param(minimum = 1, maximum = 1000)]
         limit: u32 as u32 = count(1, PAGE_MAX);
-        /// `next_cursor` of the page before, with the same filters
+        /// `next_cursor` of the previous page; the filters must be the same
         #[param(pattern = "^[0-9a-f]{40}$")]
         cursor: String as String = reader("a cursor of this service", |text| Some(text.to_owned()));
     }
@@ -56,16 +56,16 @@ query! {
 query! {
     /// Filters of every kind of work.
     FilterQuery(() => ()) {
-        /// Only those with this label, written `key:value`; may be repeated for those that have all of them
+        /// Only entries with this label, written `key:value`; if repeated, entries with all of these labels
         #[param(example = json!(["line:A12"]))]
         label: Vec<(String, String)> as Vec<String> = repeated(label());
-        /// Only those whose name contains this text; the letters A to Z match in either case
+        /// Only entries whose name contains this text; case is ignored for the letters A to Z
         #[param(min_length = 1, max_length = 200, example = "crown")]
         name: String as String = name();
-        /// Only those submitted at or after this time (RFC 3339)
+        /// Only entries submitted at or after this time (RFC 3339)
         #[param(format = "date-time", example = "2026-01-31T09:30:00Z")]
         created_after: i64 as String = time();
-        /// Only those submitted before this time (RFC 3339)
+        /// Only entries submitted before this time (RFC 3339)
         #[param(format = "date-time")]
         created_before: i64 as String = time();
     }
@@ -74,12 +74,12 @@ query! {
 query! {
     /// Filters of jobs and evolutions, and what is shown of them.
     StateQuery(() => ()) {
-        /// Only those in this state; may be repeated for those in one of several
+        /// Only entries in this state; if repeated, entries in any of these states
         state: Vec<JobState> as Vec<JobState> = repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
-        /// Only those that changed at or after this time (RFC 3339), progress aside
+        /// Only entries that changed at or after this time (RFC 3339); a change of progress alone does not count
         #[param(format = "date-time")]
         updated_after: i64 as String = time();
-        /// A comma-separated list of the members to answer; all when left out
+        /// Comma-separated list of the members to return; default: all
         #[param(pattern = "^[a-z_]+(,[a-z_]+)*$", example = "id,state,progress")]
         fields: Vec<String> as String = fields();
     }
@@ -123,7 +123,7 @@ pub(crate) fn list(kind: Kind) -> OpenApiRouter<AppState> {
     };
     let nouns = kind.nouns();
     let page = Content::new(Some(Ref::from_schema_name(page_name(kind))));
-    let link = text_header("The next page (`rel=next`), unless this is the last one");
+    let link = text_header("The next page (`rel=next`); absent on the last page");
     let found = ResponseBuilder::new()
         .description(format!("A page of {nouns}"))
         .content(Format::Json.media_type(), page)
@@ -140,8 +140,8 @@ pub(crate) fn list(kind: Kind) -> OpenApiRouter<AppState> {
         .response("200", found.build());
     if has_states(kind) {
         listing = listing.description(Some(
-            "A filter by `name`, `updated_after`, a second `label`, or a label together with `batch=none`, examines everything that matches the other filters, up to \
-             20 000 per page: such a page may have fewer entries than asked for, or none, although `next_cursor` is there.",
+            "The filters `name`, `updated_after`, a second `label`, and `label` with `batch=none` examine at most 20 000 entries \
+             per page. Such a page may have fewer entries than requested, or none, although `next_cursor` is present.",
         ));
     }
     for (status, response) in describe(&[ProblemKind::BadQuery]) {
@@ -262,18 +262,19 @@ fn page_schema(kind: Kind) -> RefOr<Schema> {
                 .into_iter()
                 .collect::<utoipa::openapi::schema::SchemaType>(),
         )
-        .description(Some(
-            "Give this as `cursor` for the next page; null on the last one",
-        ));
+        .description(Some("`cursor` of the next page; null on the last page"));
     ObjectBuilder::new()
         .description(Some(format!("A page of {}, newest first", kind.nouns())))
-        .property(kind.nouns(), ArrayBuilder::new().items(Ref::from_schema_name(entry)))
+        .property(
+            kind.nouns(),
+            ArrayBuilder::new().items(Ref::from_schema_name(entry)),
+        )
         .required(kind.nouns())
         .property("next_cursor", cursor)
-        .property("total", count("Number of entries of the whole list"))
+        .property("total", count("Number of entries in the whole list"))
         .property(
             "total_at_least",
-            count("Lower bound of the number of entries, instead of `total` if an exact count would be too expensive"),
+            count("Lower bound, in place of `total` if an exact count is too expensive"),
         )
         .into()
 }

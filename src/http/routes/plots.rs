@@ -24,7 +24,7 @@ use crate::http::routes::parts::{FieldProblems, PartRequest, motion_of, stored};
 use crate::jobs::Jobs;
 use crate::jobs::error::JobsError;
 
-/// What a picture shows.
+/// View shown by a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Names)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum View {
@@ -336,24 +336,24 @@ const FIELDS: [(&str, Output); 5] = [
 query! {
     /// The parameters of a picture.
     PlotQuery(() => ()) {
-        /// `patch` (when left out): one patch from above; `section`: traction and friction's bound along and across, through the largest traction
-        /// of a patch; `curve`: the forces over the motions, with their errors; `profiles`: every patch on wheel and rail, with its pressure if
-        /// the case asks for it
+        /// `patch` (default): one patch from above; `section`: traction and friction bound along x and y, through the largest traction of a
+        /// patch; `curve`: forces over the motions, with their errors; `profiles`: every patch on wheel and rail, with its pressure if
+        /// requested
         #[param(inline, example = "curve")]
         view: View as View = reader(View::ALL.map(View::name).join(", "), View::from_name);
-        /// Field of the view `patch`: `traction` (default), `pressure`, `slip`, `temperature` or `zones`; the case must request that output. The
-        /// border of the stick zone is drawn if the case requests `zones` too
+        /// Field of the view `patch`: `traction` (default), `pressure`, `slip`, `temperature` or `zones`; must be an output of the case. If
+        /// `zones` is an output too, the border of the stick zone is drawn
         #[param(example = "traction")]
         field: Output as String = word(&FIELDS);
-        /// The motion, counted from 0; 0 when left out
+        /// Index of the motion, from 0; default 0
         point: usize as u32 = index();
-        /// The patch, counted from 0; 0 when left out
+        /// Index of the patch, from 0; default 0
         patch: usize as u32 = index();
-        /// Width in pixels; 800 when left out. The height follows from the patch. Below 200 the patch is drawn alone, for lists
+        /// Width in pixels; default 800. The height follows from the patch. Below 200, only the patch is drawn, for lists
         #[param(minimum = 48, maximum = 2400)]
         width: u32 as u32 = count(WIDTH[0], WIDTH[1]);
-        /// Of the view `patch`, `low,high`: the values at both ends of the scale, in the unit of the field, so that several pictures share one; from 0 to the
-        /// largest value of the picture when left out. Zones have none
+        /// For the view `patch`: `low,high`, both ends of the scale in the unit of the field, so that pictures can share a scale; default:
+        /// 0 to the largest value. Not for zones
         #[param(example = "0,400")]
         range: [f64; 2] as String = reader("`low,high`: two numbers, the second above the first", range);
     }
@@ -405,10 +405,10 @@ impl PlotOptions {
     }
 }
 
-/// A picture of a patch, or of another view of the result, as SVG.
+/// Draws a patch, or another view of the result, as SVG.
 ///
-/// A patch: a smooth heat map inside the border of the patch with a scale, the border of the stick zone, arrows along the traction or the slip, axes in mm with the same
-/// scale, and the rolling direction. Readable without colour.
+/// The view `patch` is a heat map inside the border of the patch, with a scale, the border of the stick zone, arrows along the traction or
+/// slip, axes in mm with equal scales, and the rolling direction. It is readable without colour.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{id}/plot.svg",
@@ -421,7 +421,7 @@ pub(crate) async fn svg(request: PartRequest) -> Result<Response> {
     plot(&request, Format::Svg).await
 }
 
-/// The same picture as PNG.
+/// Draws the same picture as PNG.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{id}/plot.png",

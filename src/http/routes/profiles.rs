@@ -36,18 +36,18 @@ impl<S: Send + Sync> FromRequestParts<S> for Digest {
     }
 }
 
-/// A cross-section that is kept.
+/// A stored cross-section.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct KeptProfile {
-    /// What cases name it by: `{ "profile": "<digest>" }` in place of points or text.
+    /// Digest by which cases refer to it: `{ "profile": "<digest>" }` in place of points or text.
     digest: String,
-    /// `rail` or `wheel`: what the file says, or what the points look like.
+    /// `rail` or `wheel`, from the file or from the shape of the points.
     body: &'static str,
-    /// How far its points can be trusted.
+    /// Quality of its points.
     quality: SectionQuality,
-    /// How its points or its file were read, with pointers into the cross-section.
+    /// Remarks on how its points or its file were read, with pointers into the cross-section.
     remarks: Vec<RemarkEntry>,
-    /// When it was first sent.
+    /// Time at which it was first stored.
     #[schema(format = "date-time")]
     created_at: String,
 }
@@ -58,10 +58,10 @@ problems! {
     ProfilesFull, Draining, StorageFull, StorageUnwritable
 }
 
-/// Keeps a cross-section, so that cases can name it.
+/// Stores a cross-section, so that cases can refer to it.
 ///
-/// The body is a cross-section as `rail` and `wheel` of a case have it. It is kept for the tenant until it is deleted; the same one again changes
-/// nothing. A case that names it in place of points or text is submitted with its points, so that jobs do not depend on what is deleted later.
+/// The body is a cross-section as in `rail` and `wheel` of a case. It is stored for the tenant until it is deleted; storing it again
+/// changes nothing. A case that refers to it is stored with its points, so jobs do not depend on a later deletion.
 #[utoipa::path(
     post,
     path = "/v1/profiles",
@@ -69,8 +69,8 @@ problems! {
     operation_id = "keep_profile",
     request_body(content = CrossSection, description = "One cross-section", content_type = "application/json"),
     responses(
-        (status = 201, description = "It is kept", body = KeptProfile, headers(("Location" = String, description = "Path of the profile"))),
-        (status = 200, description = "It was kept before", body = KeptProfile, headers(("Location" = String, description = "Path of the profile"))),
+        (status = 201, description = "The profile is stored", body = KeptProfile, headers(("Location" = String, description = "Path of the profile"))),
+        (status = 200, description = "The profile was stored before", body = KeptProfile, headers(("Location" = String, description = "Path of the profile"))),
         KeepProfileProblems
     )
 )]
@@ -96,26 +96,26 @@ pub(crate) async fn keep(
     Ok((status, location, body).into_response())
 }
 
-/// A kept cross-section in a list.
+/// A stored cross-section in a list.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct ProfileEntry {
-    /// What cases name it by.
+    /// Digest by which cases refer to it.
     digest: String,
-    /// What it counts toward `--tenant-profiles-mb`.
+    /// Bytes that count toward `--tenant-profiles-mb`.
     bytes: u64,
-    /// When it was first sent.
+    /// Time at which it was first stored.
     #[schema(format = "date-time")]
     created_at: String,
 }
 
-/// What a tenant keeps.
+/// The stored cross-sections of a tenant.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct ProfileList {
     /// The cross-sections of this page, newest first.
     profiles: Vec<ProfileEntry>,
-    /// Give this as `cursor` for the next page; null on the last one.
+    /// Value of `cursor` for the next page; null on the last page.
     next_cursor: Option<String>,
-    /// Bytes that may be kept in all.
+    /// Largest number of bytes that may be stored in all.
     bytes_max: u64,
 }
 
@@ -124,7 +124,7 @@ problems! {
     ListProfilesProblems: BadQuery, Forbidden
 }
 
-/// Lists what is kept, newest first.
+/// Lists stored profiles, newest first.
 ///
 /// A key that is bound to labels may not list profiles.
 #[utoipa::path(
@@ -133,8 +133,8 @@ problems! {
     tag = "profiles",
     operation_id = "list_profiles",
     params(PageQuery),
-    responses((status = 200, description = "What is kept", body = ProfileList, headers(
-        ("Link" = String, description = "The next page (`rel=next`), unless this is the last one")
+    responses((status = 200, description = "A page of stored profiles", body = ProfileList, headers(
+        ("Link" = String, description = "The next page (`rel=next`); absent on the last page")
     )), ListProfilesProblems)
 )]
 pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response> {
@@ -159,7 +159,7 @@ problems! {
     ProfileProblems: BadQuery, ProfileNotFound
 }
 
-/// The cross-section as it was sent.
+/// Returns the cross-section as it was sent.
 #[utoipa::path(
     get,
     path = "/v1/profiles/{digest}",
@@ -174,7 +174,7 @@ pub(crate) async fn get(Caller(jobs): Caller, Digest(digest): Digest) -> Result<
     Ok(Json(value.map_err(|error| ApiError::internal(&error))?))
 }
 
-/// Removes a kept cross-section. Jobs and runs that named it are not touched.
+/// Removes a stored cross-section. Jobs and runs that refer to it are not affected.
 ///
 /// A key that is bound to labels may not remove profiles.
 #[utoipa::path(
@@ -183,7 +183,7 @@ pub(crate) async fn get(Caller(jobs): Caller, Digest(digest): Digest) -> Result<
     tag = "profiles",
     operation_id = "delete_profile",
     params(("digest" = String, Path, description = "Digest of the profile")),
-    responses((status = 204, description = "It is gone"), ProfileProblems)
+    responses((status = 204, description = "The profile is deleted"), ProfileProblems)
 )]
 pub(crate) async fn delete(Caller(jobs): Caller, Digest(digest): Digest) -> Result<StatusCode> {
     jobs.delete_profile(&digest).await?;

@@ -37,7 +37,7 @@ problems! {
     ResultProblems: BadQuery, JobNotFound, ResultNotReady, JobFailed, JobCancelled
 }
 
-/// The result of a succeeded job.
+/// Returns the result of a succeeded job.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{id}/result",
@@ -49,7 +49,7 @@ problems! {
         ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
     ),
     responses((status = 200, description = "The result", body = JobResult, headers(
-        ("Preference-Applied" = String, description = "The wait that was applied, if one was asked for")
+        ("Preference-Applied" = String, description = "The wait that was applied, if one was requested")
     )), ResultProblems)
 )]
 pub(crate) async fn result(
@@ -111,9 +111,9 @@ const FORMS: &[Format] = &[Format::Json, Format::Csv];
 query! {
     /// Parameters of resultants.
     ResultantsQuery(() => ()) {
-        /// Only this motion, counted from 0
+        /// Only this motion, by its index from 0
         point: usize as u32 = index();
-        /// Only this patch, counted from 0; `total` stays the sum over all
+        /// Only this patch, by its index from 0; `total` remains the sum over all patches
         patch: usize as u32 = index();
         /// `json` or `csv`; overrides `Accept`
         #[param(pattern = "^(json|csv)$", example = "csv")]
@@ -121,7 +121,7 @@ query! {
     }
 }
 
-/// Forces and moments of a succeeded job. They are always computed, whatever the case asked for.
+/// Returns the forces and moments of a succeeded job. They are always computed, even if the case does not request them.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{id}/resultants",
@@ -131,7 +131,7 @@ query! {
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
         ResultantsQuery
     ),
-    responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` as its patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
+    responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` in place of the patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
 )]
 pub(crate) async fn resultants(request: PartRequest) -> Result<Response> {
     let query = ResultantsQuery::read(&request.uri, &())?;
@@ -178,9 +178,9 @@ const POINT_BYTES: usize = 900;
 query! {
     /// Parameters of stresses below the surface.
     SubsurfaceQuery(() => ()) {
-        /// The motion, counted from 0; 0 when left out
+        /// Index of the motion, from 0; default 0
         point: usize as u32 = index();
-        /// The patch, counted from 0; 0 when left out
+        /// Index of the patch, from 0; default 0
         patch: usize as u32 = index();
         /// `json` or `csv`; overrides `Accept`
         #[param(pattern = "^(json|csv)$", example = "csv")]
@@ -193,23 +193,23 @@ query! {
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Stresses)]
 pub(crate) struct SubsurfaceAnswer {
-    /// Number of the patch, counted from 0.
+    /// Index of the patch, from 0.
     patch: usize,
-    /// Number of the motion, counted from 0.
+    /// Index of the motion, from 0.
     point: usize,
     /// The body.
     body: BodyName,
-    /// Points asked for above this depth in mm are answered at it.
+    /// Smallest depth in mm; shallower points are evaluated at this depth.
     least_depth_mm: f64,
     /// The requested points, in the order of the case.
     points: Vec<StressPoint>,
-    /// Where von Mises' stress is largest; absent if the case did not want it.
+    /// The point with the largest von Mises stress; absent unless requested.
     worst: Option<StressPoint>,
-    /// What a point of the body lives through while the contact rolls over it; absent if the case did not want it.
+    /// Criteria for a point of the body while the contact rolls over it; absent unless requested.
     passage: Option<PassageSummary>,
 }
 
-/// Stresses below the surface of a succeeded job.
+/// Returns the stresses below the surface of a succeeded job.
 ///
 /// Axes of the patch: x along rolling, y to the left, z up; depth is positive into the body, tension is positive.
 #[utoipa::path(
@@ -271,9 +271,9 @@ async fn write_stresses(
 query! {
     /// Parameters of damage.
     DamageQuery(() => ()) {
-        /// The motion, counted from 0; 0 when left out
+        /// Index of the motion, from 0; default 0
         point: usize as u32 = index();
-        /// The patch, counted from 0; 0 when left out
+        /// Index of the patch, from 0; default 0
         patch: usize as u32 = index();
     }
 }
@@ -281,18 +281,18 @@ query! {
 /// Damage of one pass over one patch for one motion.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct PatchDamage {
-    /// Number of the patch, counted from 0.
+    /// Index of the patch, from 0.
     patch: usize,
-    /// Number of the motion, counted from 0.
+    /// Index of the motion, from 0.
     point: usize,
     /// The models that the case asked for.
     #[serde(flatten)]
     damage: Damage,
-    /// The figures they were evaluated with.
+    /// The parameters that the models were evaluated with.
     parameters: DamageFiguresUsed,
 }
 
-/// Damage of a succeeded job.
+/// Returns the damage of a succeeded job.
 #[utoipa::path(
     get,
     path = "/v1/jobs/{id}/damage",
@@ -302,7 +302,7 @@ pub(crate) struct PatchDamage {
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
         DamageQuery
     ),
-    responses((status = 200, description = "The models that the case asked for", body = PatchDamage), FieldProblems)
+    responses((status = 200, description = "The models that the case requested", body = PatchDamage), FieldProblems)
 )]
 pub(crate) async fn damage(request: PartRequest) -> Result<Response> {
     let query = DamageQuery::read(&request.uri, &())?;

@@ -42,26 +42,28 @@ problems! {
 query! {
     /// What the query of a submission says about the run itself.
     RunQuery(() => ()) {
-        /// The job whose case is the template of a table; not with `multipart/form-data`, which holds the template itself
+        /// Id of the job whose case is the template of a table; not with `multipart/form-data`, which contains the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
-        /// What a column is whose title does not say it, as `TITLE:NAME`; may be repeated. The name is a JSON pointer, a short name or a name with a
-        /// unit, such as `Q:vertical_force [kN]`; a unit in the title or in a line of units may be left out. Without a name the column is carried along
-        /// to the answers
+        /// Meaning of a column, as `TITLE:NAME`; may be repeated. NAME is a JSON pointer, a short name or a name with a unit, such as
+        /// `Q:vertical_force [kN]`; the unit may be omitted if the title or a line of units gives it. Without NAME, the column is copied to
+        /// the results
         #[param(max_items = 100, example = json!(["Q:vertical_force [kN]"]))]
         column: Vec<(String, String)> as Vec<String> = repeated(reader("`TITLE:NAME`", named_column));
-        /// Titles of columns that are carried along to the answers, with commas between. Columns of places, times, sections and vehicles, such as `km`,
-        /// `time` or `axle_no`, need no mention; any other column whose title names nothing in the case is refused
+        /// Comma-separated titles of columns that are copied to the results. Columns of places, times, sections and vehicles, such as `km`,
+        /// `time` or `axle_no`, are always copied; other unknown titles are refused
         #[param(example = "Y_left,curvature")]
-        carry: Vec<String> as String = names("titles of columns with commas between");
+        carry: Vec<String> as String = names("comma-separated titles of columns");
     }
 }
 
 /// Submits many rows as one run.
 ///
-/// A row is the template with the row's values in place of its own; it is solved as a case of its own, to the last bit, whatever other rows there are. With `auto`, a row takes the table of creep forces where its bound meets the target, and `boundary_element` elsewhere. The body is
-/// JSON with `template` and `columns`, at most as large as one of `/v1/evaluate`, or a table, which is read as it arrives: as `multipart/form-data` with the parts `template` and `table`, or alone with `?template=` naming a job. A
-/// row that cannot be solved has a `status` in the results that says why, and does not affect other rows.
+/// A row is the template with the values of the row. It is solved like a separate case, to the last bit. With `auto`, a row is answered by
+/// the table of creep forces if its error bound meets the target, otherwise by `boundary_element`. The body is JSON with `template` and
+/// `columns`, at most as large as for `/v1/evaluate`, or a table, which is read as it arrives: as `multipart/form-data` with the parts
+/// `template` and `table`, or alone with a job id in `?template=`. A row that cannot be solved has a `status` with the reason and does not
+/// affect other rows.
 #[utoipa::path(
     post,
     path = "/v1/runs",
@@ -109,12 +111,12 @@ const STREAM_BYTES: usize = 12 << 20;
 query! {
     /// Parameters of the results of a run.
     RunResultsQuery(() => ()) {
-        /// Only these columns, with commas between, such as `row,force_y_n,status`
+        /// Comma-separated columns, such as `row,force_y_n,status`; default: all
         #[param(example = "row,status,force_y_n")]
-        columns: Vec<String> as String = names("names of columns with commas between");
-        /// Only the rows from the first number on and before the second, such as `1000:2000`; either may be left out
+        columns: Vec<String> as String = names("comma-separated names of columns");
+        /// Rows from the first index up to, but not including, the second, such as `1000:2000`; either may be omitted
         #[param(pattern = "^[0-9]*:[0-9]*$", example = "1000:2000")]
-        rows: Range<u64> as String = reader("two row numbers with a colon between, such as `1000:2000`; either may be left out", row_range);
+        rows: Range<u64> as String = reader("two row indices separated by a colon, such as `1000:2000`; either may be omitted", row_range);
         /// `ndjson`, `csv`, `arrow` or `parquet`; overrides `Accept`
         #[param(pattern = "^(ndjson|csv|arrow|parquet)$", example = "parquet")]
         format: Format as String = one_of(RESULT_FORMATS);
@@ -144,26 +146,26 @@ problems! {
     RunResultProblems: BadQuery, RunNotFound, ResultNotReady, Overloaded
 }
 
-/// One row of the results, in NDJSON. The other columns are those that `answers` of the run lists.
+/// One row of the results, in NDJSON. `answers` of the run lists the other columns.
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(dead_code, reason = "the contract; rows are written column by column")]
 pub(crate) struct RunRow {
-    /// Number of the row in what was sent, counted from 0.
+    /// Index of the row in the request, from 0.
     row: u64,
-    /// What became of the row: `ok`; `target_missed`, the estimated error is above the target; `refused`, its case has faults; `not_covered`,
-    /// `not_converged`, `unsolvable`, `out_of_time`, `solver_failed`; or why its piece of the run was not solved, such as `cancelled`.
+    /// Outcome of the row: `ok`; `target_missed`, the estimated error exceeds the target; `refused`, its case has faults; `not_covered`,
+    /// `not_converged`, `unsolvable`, `out_of_time`, `solver_failed`; or why its chunk of the run was not solved, such as `cancelled`.
     status: String,
-    /// The method that answered it; null without an answer.
+    /// The method that was used; null without a result.
     method: Option<String>,
-    /// Why it has no answer, such as the first fault of its case; null with an answer.
+    /// Why the row has no result, such as the first fault of its case; null with a result.
     reason: Option<String>,
 }
 
-/// The answers of an ended run in the order of its rows.
+/// Returns the results of an ended run in the order of its rows.
 ///
-/// One line, or one row of a table, for each row that was sent, whatever became of it. Columns: `row`, the columns that were passed through unchanged,
-/// `status`, `method`, then numbers and `reason`: forces and moment are sums over the patches about the origin of the case, `error_estimate` is that of
-/// the less certain force, and `reason` tells why a row has no answer. A cancelled run keeps the answers it had computed.
+/// One line, or one row of a table, for each row that was sent. Columns: `row`, the copied columns, `status`, `method`, then numbers and
+/// `reason`. Forces and moment are sums over the patches about the origin of the case, `error_estimate` is that of the less certain force,
+/// and `reason` says why a row has no result. A cancelled run keeps the results it computed.
 #[utoipa::path(
     get,
     path = "/v1/runs/{id}/results",
@@ -175,7 +177,7 @@ pub(crate) struct RunRow {
         WaitQuery,
         ("Prefer" = Option<String>, Header, description = "`wait=N`, as `?wait=N` (RFC 7240)", example = "wait=10")
     ),
-    responses((status = 200, description = "One line or row for each row", content(
+    responses((status = 200, description = "One line or table row for each row of the run", content(
         (RunRow = "application/x-ndjson"),
         (String = "text/csv"),
         (Vec<u8> = "application/vnd.apache.arrow.stream"),
@@ -220,7 +222,7 @@ fn require_ended(run: &Run) -> Result<()> {
         state => Err(ApiError::new(
             ProblemKind::ResultNotReady,
             format!(
-                "the run is {}; {} of {} rows are over",
+                "the run is {}; {} of {} rows are finished",
                 state.name(),
                 run.rows_done(),
                 run.head.rows
@@ -243,7 +245,7 @@ fn selected(run: &Run, wanted: Option<Vec<String>>) -> Result<Vec<(String, Table
         return Err(ApiError::bad_parameter(
             "columns",
             format!(
-                "`{unknown}` is no column of this run; allowed: {}",
+                "`{unknown}` is not a column of this run; allowed: {}",
                 known.join(", ")
             ),
         ));
@@ -277,7 +279,7 @@ fn answers(
     })
 }
 
-/// The files of an ended run, for programs that read them in place.
+/// The files of an ended run, for programs that read them directly.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct RunManifest {
     /// Identifier of the run.
@@ -285,26 +287,26 @@ pub(crate) struct RunManifest {
     id: String,
     /// Number of rows.
     rows: u64,
-    /// The columns of every file, in their order.
+    /// The columns of every file, in order.
     columns: Vec<AnswerColumn>,
     /// The files in the order of their rows.
     files: Vec<RunFile>,
 }
 
-/// A file of answers.
+/// A file of results.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct RunFile {
-    /// Number of its first row.
+    /// Index of its first row.
     first_row: u64,
     /// Number of its rows.
     rows: u64,
-    /// Key of the Parquet file below `--results-url`, or below the data folder; null where these rows were not solved.
+    /// Key of the Parquet file below `--results-url`, or below the data folder; null if these rows were not solved.
     key: Option<String>,
-    /// Where these rows are answered as Parquet.
+    /// Path of these rows as Parquet.
     url: String,
 }
 
-/// Where the answers of an ended run lie: a Parquet file for each piece of it.
+/// Lists the files of an ended run: one Parquet file per chunk.
 #[utoipa::path(
     get,
     path = "/v1/runs/{id}/manifest",
@@ -344,21 +346,21 @@ problems! {
     RunRowProblems: BadQuery, RunNotFound, RowNotFound, Expired
 }
 
-/// A row of a run by itself.
+/// One row of a run.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct RunRowAlone {
-    /// Number of the row in what was sent, counted from 0.
+    /// Index of the row in the request, from 0.
     row: u64,
-    /// The case that the row stands for: the template with the values of the row in their places. Submitted as a job it has the values per cell
-    /// that a run leaves out.
+    /// The case of the row: the template with the values of the row. Submitted as a job, it also gives the values per cell, which a run
+    /// omits.
     #[schema(value_type = Object)]
     case: Value,
-    /// The row of the results, by the names of their columns; null while it is not solved.
+    /// The result of the row by column name; null until it is solved.
     #[schema(value_type = Option<Object>)]
     answer: Option<Map<String, Value>>,
 }
 
-/// One row of a run: the case that it stands for, and its answer as soon as it is there.
+/// Returns one row of a run: its case, and its result as soon as there is one.
 #[utoipa::path(
     get,
     path = "/v1/runs/{id}/rows/{row}",
@@ -366,7 +368,7 @@ pub(crate) struct RunRowAlone {
     operation_id = "get_run_row",
     params(
         ("id" = String, Path, description = "Id of the run", format = "uuid"),
-        ("row" = u64, Path, description = "Number of the row, counted from 0", minimum = 0)
+        ("row" = u64, Path, description = "Index of the row, from 0", minimum = 0)
     ),
     responses((status = 200, description = "The row", body = RunRowAlone), RunRowProblems)
 )]
@@ -408,21 +410,21 @@ const SECTIONS_MAX: usize = 10_000;
 query! {
     /// Parameters of the totals of a run.
     RunTotalsQuery(() => ()) {
-        /// Columns of numbers, with commas between; forces, power and pressure when left out
+        /// Comma-separated columns of numbers; default: forces, power and pressure
         #[param(example = "force_y_n,friction_power_n")]
-        columns: Vec<String> as String = names("names of columns with commas between");
-        /// Percentiles from 0 to 100, with commas between; 50, 90, 99 and 100 when left out
+        columns: Vec<String> as String = names("comma-separated names of columns");
+        /// Comma-separated percentiles from 0 to 100; default: 50, 90, 99 and 100
         #[param(example = "50,95,99.9")]
-        percentiles: Vec<f64> as String = reader("numbers from 0 to 100 with commas between", |text| {
+        percentiles: Vec<f64> as String = reader("comma-separated numbers from 0 to 100", |text| {
             numbers(text).filter(|all| all.iter().all(|percent| (0.0..=100.0).contains(percent)))
         });
         /// Comma-separated thresholds: counts the rows whose absolute value is at least each threshold
         #[param(example = "20000,30000")]
         above: Vec<f64> as String = reader("numbers with commas between", numbers);
-        /// A column that was passed through unchanged: totals for each of its values, or of its intervals if it holds numbers
+        /// A column copied from the request: statistics for each of its values, or of its intervals if it contains numbers
         #[param(example = "section")]
         by: String as String = reader("the name of a column", |text| Some(text.to_owned()));
-        /// With `by`, and needed there if it holds numbers: the length of an interval
+        /// Length of the intervals; required with `by` if that column contains numbers
         #[param(exclusive_minimum = 0.0, example = 100)]
         width: f64 as f64 = reader("a number above 0", |text| {
             text.parse().ok().filter(|width: &f64| *width > 0.0 && width.is_finite())
@@ -440,7 +442,7 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',').map(number).collect()
 }
 
-/// What the answers of a run come to.
+/// Statistics of the results of a run.
 #[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct RunTotals {
@@ -450,40 +452,40 @@ pub(crate) struct RunTotals {
     sections: Option<Vec<SectionTotals>>,
 }
 
-/// What the answers to some rows come to.
+/// Statistics of the results of some rows.
 #[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct SectionTotals {
-    /// The value of `by`; only for texts.
+    /// Value of the column `by`; only for texts.
     value: Option<String>,
-    /// Where the interval begins; only for numbers.
+    /// Start of the interval; only for numbers.
     from: Option<f64>,
     /// Number of rows.
     rows: u64,
-    /// Number of rows by what became of them.
+    /// Number of rows by `status`.
     statuses: BTreeMap<String, u64>,
-    /// Totals by column; of the rows that have a number there.
+    /// Statistics by column, over the rows with a number in that column.
     columns: BTreeMap<String, ColumnTotals>,
 }
 
-/// What the numbers of a column come to.
+/// Statistics of the numbers in a column.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct ColumnTotals {
-    /// Rows that have a number.
+    /// Number of rows with a value.
     count: u64,
-    /// The least number; null if there is none.
+    /// Smallest value; null if there is none.
     min: Option<f64>,
-    /// The largest number.
+    /// Largest value.
     max: Option<f64>,
-    /// The mean.
+    /// Mean value.
     mean: Option<f64>,
     /// Percentiles of the absolute values.
     percentiles: BTreeMap<String, f64>,
-    /// How many are at least this large, whatever their signs.
+    /// Number of rows whose absolute value is at least each threshold.
     above: BTreeMap<String, u64>,
 }
 
-/// Totals of the answers of an ended run: percentiles, exceedances, in all and per section of the line.
+/// Returns statistics of the results of an ended run: percentiles and exceedances, in total and per section of the line.
 #[utoipa::path(
     get,
     path = "/v1/runs/{id}/totals",
@@ -493,7 +495,7 @@ pub(crate) struct ColumnTotals {
         ("id" = String, Path, description = "Id of the run", format = "uuid"),
         RunTotalsQuery
     ),
-    responses((status = 200, description = "The totals", body = RunTotals), RunResultProblems)
+    responses((status = 200, description = "The statistics", body = RunTotals), RunResultProblems)
 )]
 pub(crate) async fn totals(
     Caller(jobs): Caller,
@@ -560,17 +562,17 @@ fn section_of(
     let kind = columns.iter().find(|(known, _)| *known == name);
     match (kind, width) {
         (None, _) => {
-            let detail = format!("`{name}` is no column of this run");
+            let detail = format!("`{name}` is not a column of this run");
             Err(ApiError::bad_parameter("by", detail))
         }
         (Some((_, TableKind::Texts)), None) => Ok(Some(RowSection { name, width })),
         (Some((_, TableKind::Texts)), Some(_)) => Err(ApiError::bad_parameter(
             "width",
-            format!("`{name}` holds texts, which have no intervals"),
+            format!("`{name}` holds texts; `width` is for numbers only"),
         )),
         (Some(_), None) => Err(ApiError::bad_parameter(
             "width",
-            format!("`{name}` holds numbers; `width` says how long an interval is"),
+            format!("`{name}` holds numbers; give `width`, the length of an interval"),
         )),
         (Some(_), Some(_)) => Ok(Some(RowSection { name, width })),
     }

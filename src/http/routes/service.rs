@@ -46,36 +46,36 @@ pub(crate) struct Capabilities {
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = MethodAbility)]
 pub(crate) struct MethodCapability {
-    /// The word for `solver.method`.
+    /// Value of `solver.method`.
     name: MethodName,
-    /// Used when the case names none.
+    /// Whether it is used if the case names no method.
     default: bool,
-    /// What it is and when to choose it.
+    /// What the method is and when to choose it.
     #[schema(value_type = String)]
     summary: &'static str,
 }
 
-/// A way to describe where the bodies touch.
+/// A type of contact.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = ContactAbility)]
 pub(crate) struct ContactCapability {
-    /// The word for `contact.type`.
+    /// Value of `contact.type`.
     #[schema(value_type = String)]
     name: &'static str,
-    /// Must the case have a `load`?
+    /// Whether the case must have a `load`.
     needs_load: bool,
-    /// What it describes.
+    /// What the type describes.
     #[schema(value_type = String)]
     summary: &'static str,
 }
 
-/// Something a case can ask for.
+/// An output that a case can request.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = OutputAbility)]
 pub(crate) struct OutputCapability {
-    /// The word for `outputs`.
+    /// Value in `outputs`.
     name: Output,
-    /// Computed when the case names no outputs.
+    /// Whether it is computed if the case names no outputs.
     default: bool,
     /// What it is.
     #[schema(value_type = String)]
@@ -89,40 +89,40 @@ pub(crate) struct RequestLimits {
     body_max_bytes: usize,
     /// Longest `Prefer: wait`, in s.
     wait_max_seconds: u32,
-    /// Most jobs in one page of a list.
+    /// Largest number of jobs in one page of a list.
     list_limit_max: u32,
-    /// Most motions of one case.
+    /// Largest number of motions in a case.
     motions_max: usize,
-    /// Most samples of a grid in a case, one axis times the other.
+    /// Largest number of samples of a grid in a case, over both axes.
     samples_max: usize,
-    /// Most memory in bytes that a case may be estimated to need.
+    /// Largest estimated memory of a case in bytes.
     memory_max_bytes: u64,
-    /// Longest solver time of a case in s, also of one that names no `time_limit_s`.
+    /// Longest solver time of a case in s, even if it names no `time_limit_s`.
     time_limit_max_seconds: f64,
     /// Largest body of a batch in bytes.
     batch_max_bytes: u64,
-    /// Most cases of a batch.
+    /// Largest number of cases in a batch.
     batch_max_cases: u32,
     /// Largest body of a run in bytes.
     run_max_bytes: u64,
-    /// Most rows of a run.
+    /// Largest number of rows in a run.
     run_max_rows: u64,
-    /// Most queued jobs of the tenant.
+    /// Largest number of queued jobs of the tenant.
     queue_max: u64,
-    /// Most samples of a `grid` that a result is resampled on.
+    /// Largest number of samples of a `grid` that a result is resampled on.
     grid_max_samples: usize,
     /// Limits of the requests of the tenant.
     #[serde(flatten)]
     tenant: TenantLimits,
 }
 
-/// The methods, contacts and outputs that a case can name.
+/// Lists the methods, contacts and outputs that a case can name.
 #[utoipa::path(
     get,
     path = "/v1/methods",
     tag = "cases",
     operation_id = "list_methods",
-    responses((status = 200, description = "What the service can do", body = Capabilities), PlainProblems)
+    responses((status = 200, description = "The capabilities of the service", body = Capabilities), PlainProblems)
 )]
 pub(crate) async fn methods(
     State(options): State<HttpOptions>,
@@ -179,20 +179,20 @@ macro_rules! entries {
 }
 
 const METHODS: [(MethodName, &str); 5] = entries! {
-    MethodName::Auto, "Resultants by `table` for elliptic contacts of like bodies with one coefficient of friction and given creepages, where the bound of its error meets `target_error`, and else by `boundary_element`. Values per cell are by `boundary_element`.";
-    MethodName::BoundaryElement, "Boundary elements with a semismooth Newton iteration: fast, for every motion and any shape of patch.";
-    MethodName::LiuHsu, "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; it does not converge at every spin and then says so.";
-    MethodName::Fastsim, "Kalker's simplified theory: a draft in microseconds, with a stated error instead of an estimated one.";
-    MethodName::Table, "Resultants and their derivatives interpolated in a table that `boundary_element` made, in about a microsecond, with a bound of the error: elliptic patches with a/b from 0.1 to 10, others by the ellipse that carries their load the same way.";
+    MethodName::Auto, "Resultants by `table` for elliptic contacts of like bodies with one coefficient of friction and given creepages, if its error bound meets `target_error`; otherwise by `boundary_element`. Values per cell by `boundary_element`.";
+    MethodName::BoundaryElement, "Boundary elements with a semismooth Newton iteration: fast, for every motion and patches of any shape.";
+    MethodName::LiuHsu, "The Newton–Raphson method of Liu and Hsu with its two initial guesses. Slower, for small meshes; for some values of spin it does not converge and reports an error.";
+    MethodName::Fastsim, "Kalker's simplified theory: an approximate result in microseconds, with a fixed instead of an estimated error.";
+    MethodName::Table, "Resultants and their derivatives from a table computed by `boundary_element`, in about a microsecond, with an error bound: for elliptic patches with a/b from 0.1 to 10, and for other patches by an equivalent ellipse.";
 };
 
 const CONTACTS: [(&str, bool, &str); 7] = entries! {
-    "radii", true, "Relative radii of curvature: an elliptic patch after Hertz.";
+    "radii", true, "An elliptic patch by Hertz's theory, from relative radii of curvature.";
     "ellipse", true, "An elliptic patch of given semi-axes with Hertz's pressure.";
-    "gap_profile", true, "A gap measured across, between bodies that are circular along rolling: region and pressure are found.";
-    "gap_grid", true, "Any gap on a grid: region and pressure are found, in one or several patches.";
-    "profiles", true, "A wheel on a rail by their cross-sections: every patch is found, with its place and its own frame.";
-    "wheelset", true, "A wheelset on both rails by their cross-sections, in one or several positions: its roll, its height and every patch are found; with its equivalent conicity if asked.";
+    "gap_profile", true, "A gap measured laterally between bodies that are circular along rolling; region and pressure are computed.";
+    "gap_grid", true, "Any gap on a grid; region and pressure are computed, in one or several patches.";
+    "profiles", true, "A wheel on a rail by their cross-sections; every patch is found, with its position and its own frame.";
+    "wheelset", true, "A wheelset on both rails by their cross-sections, in one or several positions; its roll, its height and every patch are computed, and its equivalent conicity if requested.";
     "pressure_grid", false, "A given pressure on a grid; its positive part is the contact, in one or several patches.";
 };
 
@@ -205,10 +205,10 @@ const OUTPUTS: [(Output, bool, &str); 9] = entries! {
     Output::Subsurface, false, "Stresses below the surface at the points of `subsurface`, and the worst point of every patch.";
     Output::Damage, false, "Friction power, wear and fatigue of one pass by the models of `damage`.";
     Output::Temperature, false, "Temperature of both surfaces per cell; needs `thermal` and `speed_mm_per_s` in the motion.";
-    Output::Gradients, false, "Derivatives of forces and moment by creepages and spin, and by the normal force of Hertz contacts; not of a `history`.";
+    Output::Gradients, false, "Derivatives of forces and moment with respect to creepages and spin, and to the normal force for Hertz contacts; not for a `history`.";
 };
 
-/// Every remark that an answer can carry: its code, what it means and what to do about it.
+/// Lists every remark that a result can have: its code, what it means and what to do about it.
 #[utoipa::path(
     get,
     path = "/v1/remarks",
@@ -220,27 +220,27 @@ pub(crate) async fn remarks() -> Json<Vec<RemarkKind>> {
     Json(Remark::kinds())
 }
 
-/// A case to begin with.
+/// An example case.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct ExampleCase {
-    /// Its name, as in `api/examples/{name}.case.json`.
+    /// Name of the example, as in `api/examples/{name}.case.json`.
     #[schema(value_type = String)]
     name: &'static str,
-    /// What it shows.
+    /// What the example shows.
     #[schema(value_type = String)]
     summary: &'static str,
-    /// The case, ready to be submitted.
+    /// The case, ready to submit.
     #[schema(value_type = Case)]
     case: Value,
 }
 
-/// Cases to begin with, each ready to be submitted.
+/// Lists example cases, each ready to submit.
 #[utoipa::path(
     get,
     path = "/v1/examples",
     tag = "cases",
     operation_id = "list_examples",
-    responses((status = 200, description = "All examples", body = Vec<ExampleCase>), PlainProblems)
+    responses((status = 200, description = "All example cases", body = Vec<ExampleCase>), PlainProblems)
 )]
 pub(crate) async fn examples() -> Result<Json<Vec<ExampleCase>>> {
     let read = |(name, summary, text): (&'static str, &'static str, &str)| {
@@ -259,7 +259,7 @@ pub(crate) async fn examples() -> Result<Json<Vec<ExampleCase>>> {
         .map(Json)
 }
 
-/// A healthy answer.
+/// Response of a healthy service.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Health {
     /// `alive` or `ready`.
@@ -279,7 +279,7 @@ impl Health {
     }
 }
 
-/// Is the process alive? Asks nothing else.
+/// Checks that the process is alive, and nothing else.
 #[utoipa::path(
     get,
     path = "/healthz",
@@ -296,13 +296,13 @@ problems! {
     ReadyProblems: NotReady, Draining, StorageFull, StorageUnwritable, StorageUnreachable
 }
 
-/// Can the service take jobs? Asks the job store.
+/// Checks that the service can accept jobs; queries the job store.
 #[utoipa::path(
     get,
     path = "/readyz",
     tag = "service",
     operation_id = "readyz",
-    responses((status = 200, description = "The service takes jobs", body = Health), ReadyProblems)
+    responses((status = 200, description = "The service accepts jobs", body = Health), ReadyProblems)
 )]
 pub(crate) async fn ready(State(AnyTenant(jobs)): State<AnyTenant>) -> Result<Json<Health>> {
     match jobs.ready().await {
@@ -313,7 +313,7 @@ pub(crate) async fn ready(State(AnyTenant(jobs)): State<AnyTenant>) -> Result<Js
             Err(reason.into())
         }
         Err(reason) => {
-            tracing::warn!(%reason, "the job store does not answer");
+            tracing::warn!(%reason, "the job store does not respond");
             Err(ApiError::new(
                 ProblemKind::NotReady,
                 "the job store cannot be reached; the service's log has the reason",
@@ -333,15 +333,15 @@ problems! {
     MetricsProblems: Unauthorized, Forbidden, TooManyRequests
 }
 
-/// What the service counts, as OpenMetrics text, or in the older text form for those who accept only that.
+/// Returns the metrics as OpenMetrics text, or as Prometheus text for clients that accept only that.
 ///
-/// Every name begins with `railhead_`. Labels have few values; none holds an id or a text of a client.
+/// Every name begins with `railhead_`. Labels have few values; none contains an id or a text of a client.
 #[utoipa::path(
     get,
     path = "/metrics",
     tag = "service",
     operation_id = "get_metrics",
-    responses((status = 200, description = "The figures", content((String = "application/openmetrics-text"), (String = "text/plain"))), MetricsProblems)
+    responses((status = 200, description = "The metrics", content((String = "application/openmetrics-text"), (String = "text/plain"))), MetricsProblems)
 )]
 pub(crate) async fn metrics(
     Operator(jobs): Operator,
@@ -403,7 +403,7 @@ problems! {
     ExplainProblems: BadQuery, UnknownRoute
 }
 
-/// Every kind of problem that this service knows.
+/// Lists every kind of problem.
 #[utoipa::path(
     get,
     path = "/problems",
@@ -421,7 +421,7 @@ pub(crate) async fn list_problems() -> Json<Vec<ProblemMeaning>> {
     )
 }
 
-/// One kind of problem, explained; a problem's `type` leads here.
+/// Explains one kind of problem; the `type` of a problem is this path.
 #[utoipa::path(
     get,
     path = "/problems/{name}",
@@ -438,58 +438,58 @@ pub(crate) async fn explain(Path(name): Path<String>) -> Result<Json<ProblemMean
     known.map(|kind| Json(kind.into())).ok_or_else(|| {
         ApiError::new(
             ProblemKind::UnknownRoute,
-            format!("`{name}` is no kind of problem; `/problems` lists them all"),
+            format!("`{name}` is not a kind of problem; `/problems` lists all kinds"),
         )
     })
 }
 
-/// Who asks, what it uses, and what it may use.
+/// The client with its usage and limits.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Me {
     /// The tenant that the key belongs to; `anonymous` without a key.
     tenant: String,
     /// Labels that the key is bound to: the key can access only resources with these labels, and resources created with it get them.
     labels: BTreeMap<String, String>,
-    /// What the tenant may use at most.
+    /// Largest usage allowed to the tenant.
     quota: Quota,
-    /// What the tenant uses at present.
+    /// Present usage of the tenant.
     used: Used,
     /// Limits of requests.
     limits: TenantLimits,
 }
 
-/// What a tenant may use at most.
+/// Largest usage allowed to a tenant.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Quota {
-    /// Queued jobs and chunks of runs, with those of batches that are being received.
+    /// Queued jobs and chunks of runs, including those of batches that are being received.
     queued: u64,
     /// Bytes reserved for batches that are being received.
     staged_bytes: u64,
-    /// Bytes of stored cases, templates and results; null: any number.
+    /// Bytes of stored cases, templates and results; null: no limit.
     stored_bytes: Option<u64>,
 }
 
-/// What a tenant uses at present.
+/// Present usage of a tenant.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct Used {
-    /// Queued jobs and chunks of runs, with the places that are reserved for batches being received.
+    /// Queued jobs and chunks of runs, including the places reserved for batches that are being received.
     queued: u64,
     /// Bytes reserved for batches that are being received.
     staged_bytes: u64,
     /// Bytes of stored cases, templates and results.
     stored_bytes: u64,
-    /// Number of its jobs in each state, the chunks of its runs included.
+    /// Number of its jobs in each state, including the chunks of its runs.
     #[schema(value_type = BTreeMap<String, u64>)]
     jobs: BTreeMap<&'static str, u64>,
 }
 
-/// Returns the client's tenant, its use and its limits.
+/// Returns the client's tenant, its usage and its limits.
 #[utoipa::path(
     get,
     path = "/v1/me",
     tag = "service",
     operation_id = "get_me",
-    responses((status = 200, description = "The tenant with its use and its limits", body = Me), PlainProblems)
+    responses((status = 200, description = "The tenant with its usage and its limits", body = Me), PlainProblems)
 )]
 pub(crate) async fn me(
     Caller(jobs): Caller,

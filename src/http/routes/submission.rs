@@ -37,10 +37,10 @@ const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 query! {
     /// Name and labels of work whose body has none.
     NamedQuery(() => ()) {
-        /// Free text of the client
+        /// Free text given by the client
         #[param(min_length = 1, max_length = 200, example = "timetable 2026")]
         name: String as String = name();
-        /// A label, written `key:value`; may be repeated, for at most 32 labels with different keys
+        /// A label, written `key:value`; may be repeated for up to 32 labels with different keys
         #[param(max_items = 32, example = json!(["line:A12"]))]
         label: Vec<(String, String)> as Vec<String> = repeated(new_label());
     }
@@ -223,12 +223,12 @@ impl IntoParams for SubmitParameters {
             .pattern(Some("^[!-~]+$"));
         let key = header_parameter(
             "Idempotency-Key",
-            "1 to 255 visible ASCII characters. Repeating a request with the same key, body and options answers what the first one made instead of making another",
+            "1 to 255 visible ASCII characters. A repetition with the same key, body and options returns what the first request created",
         )
         .schema(Some(key));
         let cache = header_parameter(
             "Cache-Control",
-            "`no-cache`: solve every case, also those that are identical to cases solved before",
+            "`no-cache`: solve every case, even if the result of an identical case is stored",
         )
         .example(Some("no-cache".into()));
         let trace = header_parameter(
@@ -265,22 +265,23 @@ fn accepted_as(schema: &str) -> BTreeMap<String, RefOr<utoipa::openapi::Response
         ResponseBuilder::new()
             .description(about)
             .content(Format::Json.media_type(), content)
-            .header("Location", text_header("Path of what was submitted"))
+            .header("Location", text_header("Path of the created resource"))
             .header(
                 "Preference-Applied",
-                text_header("The wait that was applied, if one was preferred"),
+                text_header("The wait that was applied, if one was requested"),
             )
             .header(
                 "Idempotency-Replayed",
-                text_header("`true` if an earlier request with the same `Idempotency-Key` made this; absent otherwise"),
+                text_header("`true` if an earlier request with the same `Idempotency-Key` created this; absent otherwise"),
             )
     };
     let seconds = ObjectBuilder::new().schema_type(Type::Integer);
     let again = utoipa::openapi::HeaderBuilder::new()
         .schema(Some(seconds))
         .description(Some("Seconds to wait before asking again"));
-    let stored = response("It is stored and will be solved").header("Retry-After", again.build());
-    let ended = response("It ended within the wait");
+    let stored = response("The submission is stored and will be solved")
+        .header("Retry-After", again.build());
+    let ended = response("The work ended within the wait");
     BTreeMap::from([
         ("200".to_owned(), ended.build().into()),
         ("202".to_owned(), stored.build().into()),

@@ -28,7 +28,8 @@ const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-appli
 query! {
     /// The parameter that asks to wait; [`Wait`] reads it.
     WaitQuery(() => ()) {
-        /// Answer when the work has ended, at most this many seconds later. The header `Prefer: wait=N` means the same, but is ignored if too many requests wait
+        /// Respond when the work has ended, or after this many seconds. `Prefer: wait=N` means the same, but is ignored while too many
+        /// requests wait
         #[param(minimum = 0, maximum = 3600, example = 10)]
         wait: u32 as u32 = seconds(0, WAIT_MAX_SECONDS);
     }

@@ -37,16 +37,16 @@ use crate::jobs::work::{Follower, Work};
 /// Every kind of work.
 pub(crate) const KINDS: [Kind; 4] = [Kind::Case, Kind::Cases, Kind::Evolution, Kind::Rows];
 
-/// The data of an event of `/v1/events`, by the name of the event.
+/// Data of an event of `/v1/events`, by the name of the event.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = TenantEvent)]
 #[serde(untagged)]
 pub(crate) enum WorkAnswer {
-    /// `job` and `evolution`: the job or evolution as its own address answers it.
+    /// `job` and `evolution`: the job or evolution as its own path returns it.
     Job(Box<JobAnswer>),
-    /// `batch`: the batch as `/v1/batches/{id}` answers it.
+    /// `batch`: the batch as `/v1/batches/{id}` returns it.
     Batch(Box<BatchAnswer>),
-    /// `run`: the run as `/v1/runs/{id}` answers it.
+    /// `run`: the run as `/v1/runs/{id}` returns it.
     Run(Box<RunAnswer>),
 }
 
@@ -60,15 +60,15 @@ impl From<Work> for WorkAnswer {
     }
 }
 
-/// The data of an event of a job or an evolution.
+/// Data of an event of a job or an evolution.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct JobEvent {
-    /// Where the job stands.
+    /// State of the job.
     state: JobState,
     /// Rough progress.
     #[schema(minimum = 0.0, maximum = 1.0)]
     progress: f64,
-    /// Grows with every change; also the id of the event.
+    /// Version number that grows with every change; also the id of the event.
     version: u64,
 }
 
@@ -86,16 +86,14 @@ pub(crate) fn one(kind: Kind) -> OpenApiRouter<AppState> {
         Ok::<_, ApiError>(StatusCode::NO_CONTENT)
     };
     let noun = kind.noun();
-    let applied = text_header("The wait that was applied, if one was preferred");
+    let applied = text_header("The wait that was applied, if one was requested");
     let found = answer(kind, &format!("The {noun}")).header("Preference-Applied", applied);
     let reading = operation(kind, "get", &format!("Returns {}.", a(kind)), &[])
         .parameters(Some(WaitQuery::into_params(|| Some(ParameterIn::Query))))
         .parameter(prefer())
         .response("200", found.build());
-    let gone = ResponseBuilder::new().description(format!("The {noun} is gone"));
-    let summary = format!(
-        "Removes an ended {noun} with all that belongs to it: jobs or rows, cases and results."
-    );
+    let gone = ResponseBuilder::new().description(format!("The {noun} is deleted"));
+    let summary = format!("Removes an ended {noun} with its jobs or rows, cases and results.");
     let removing = operation(kind, "delete", &summary, &[ProblemKind::not_ended(kind)])
         .response("204", gone.build());
     OpenApiRouter::new()
@@ -152,7 +150,10 @@ pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
         Ok::<_, ApiError>((status, Json(WorkAnswer::from(work))))
     };
     let noun = kind.noun();
-    let summary = format!("Stops {}. What has ended stays as it is.", a(kind));
+    let summary = format!(
+        "Cancels {}. Parts that have ended keep their results.",
+        a(kind)
+    );
     let stopping = operation(kind, "cancel", &summary, &[])
         .response(
             "200",
@@ -160,7 +161,7 @@ pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
         )
         .response(
             "202",
-            answer(kind, "What is being solved will stop shortly").build(),
+            answer(kind, "Running solves will stop shortly").build(),
         );
     OpenApiRouter::new().routes(route(
         kind,
@@ -182,23 +183,24 @@ pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
     let noun = kind.noun();
     let about = match kind {
         Kind::Case => {
-            "Events are called `state`; their data is JSON with `state`, `progress` and `version`. Changes in quick succession are merged into one \
-             event. The first event comes at once, unless `Last-Event-ID` says that it was seen; the stream closes after the final state, and when \
-             the service shuts down. If the last event was seen the answer is `204`, which tells an `EventSource` not to connect again."
+            "Events are named `state`; their data is JSON with `state`, `progress` and `version`. Changes in quick succession are \
+             merged. The first event is sent at once, unless `Last-Event-ID` is its id; the stream closes after the final state, \
+             and when the service shuts down. If the client has received the last event, the response is `204`, which tells an \
+             `EventSource` not to reconnect."
                 .to_owned()
         }
-        Kind::Evolution => "As the events of a job.".to_owned(),
+        Kind::Evolution => "Like the events of a job.".to_owned(),
         _ => format!(
-            "As the events of a job; their data is the {noun} as `/v1/{}/{{id}}` answers it.",
+            "Like the events of a job; their data is the {noun} as `/v1/{}/{{id}}` returns it.",
             kind.nouns()
         ),
     };
-    let seen = header_parameter("Last-Event-ID", "Id of the last event that was seen");
+    let seen = header_parameter("Last-Event-ID", "Id of the last event received");
     let stream = Content::new(Some(Ref::from_schema_name(event_name(kind))));
     let sent = ResponseBuilder::new()
         .description("One event per change")
         .content("text/event-stream", stream);
-    let over = format!("The {noun} has ended and the client has seen it");
+    let over = format!("The {noun} has ended and the client has received the last event");
     let following = operation(kind, "follow", &format!("Follows {}.", a(kind)), &[])
         .description(Some(about))
         .parameter(seen)
@@ -299,17 +301,17 @@ pub(crate) fn event_schema(data: &str, names: &str) -> RefOr<Schema> {
         text.description(Some(what))
     };
     let holds = json!({ "$ref": format!("#/components/schemas/{data}") });
-    let data = text("What changed, as JSON")
+    let data = text("Data of the event, as JSON")
         .content_media_type("application/json")
         .extensions(Some(Extensions::from_iter([("contentSchema", holds)])));
     let retry = ObjectBuilder::new()
         .schema_type(Type::Integer)
-        .description(Some("Milliseconds after which to connect again"));
+        .description(Some("Milliseconds to wait before reconnecting"));
     let event = ObjectBuilder::new()
-        .description(Some("One event of the stream, line by line"))
+        .description(Some("Fields of one server-sent event"))
         .property("event", text(names))
         .required("event")
-        .property("id", text("What was seen, for `Last-Event-ID`"))
+        .property("id", text("Id to send as `Last-Event-ID`"))
         .required("id")
         .property("retry", retry)
         .property("data", data)
@@ -402,17 +404,17 @@ impl ToSchema for TenantEventSent {
     }
 }
 
-/// Follows everything of the tenant: jobs that were submitted alone, evolutions, batches and runs.
+/// Follows all changes of the tenant: jobs that were submitted alone, evolutions, batches and runs.
 ///
-/// The first event is `start`. To miss no change, connect first and read the lists after `start`. Each `job`, `evolution`, `batch` or `run` event
-/// carries the changed resource as its route returns it; jobs of a batch and rows of a run are reported through these. Changes in quick succession are merged into one
-/// event; after `Last-Event-ID` some events may repeat. Deletions are not reported. The stream ends when the service shuts down.
+/// The first event is `start`. To miss no change, connect first and read the lists after `start`. Each `job`, `evolution`, `batch` or `run`
+/// event contains the changed resource; a batch or run also reports its jobs or rows. Changes in quick succession are merged; after
+/// `Last-Event-ID` some events may repeat. Deletions are not reported. The stream ends when the service shuts down.
 #[utoipa::path(
     get,
     path = "/v1/events",
     tag = "jobs",
     operation_id = "follow_all",
-    params(("Last-Event-ID" = Option<String>, Header, description = "Id of the last event that was seen: the stream goes on from there")),
+    params(("Last-Event-ID" = Option<String>, Header, description = "Id of the last event received: the stream continues from there")),
     responses((status = 200, description = "One event per change", content((TenantEventSent = "text/event-stream"))), PlainProblems)
 )]
 pub(crate) async fn follow_all(request: EventRequest) -> Result<Response> {

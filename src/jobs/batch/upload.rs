@@ -145,7 +145,7 @@ const UNRESERVED_MAX: u32 = 1000;
 /// A faulty case of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FaultyCase {
-    /// Place of the case in what was sent, counted from 0.
+    /// Index of the case in the request, from 0.
     pub index: u32,
     /// Line of the text on which it stands, counted from 1, if cases are lines.
     pub line: Option<u64>,

@@ -220,7 +220,7 @@ impl<R: ChunkReader + 'static> TableReader<R> {
                 }
             };
             if column.len() != rows {
-                let detail = format!("the column `{name}` is nested; columns have to be flat");
+                let detail = format!("the column `{name}` is nested; columns must be flat");
                 return Err(ParquetError::General(detail));
             }
             columns.push((name, column));

@@ -17,7 +17,7 @@ pub enum TableColumn {
     Texts(Vec<Option<String>>),
 }
 
-/// What a column of answers holds.
+/// Type of the values of a result column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[schema(as = AnswerColumnKind)]
 pub enum TableKind {
@@ -56,7 +56,7 @@ impl TableColumn {
         self.len() == 0
     }
 
-    /// What it holds.
+    /// Type of its values.
     #[must_use]
     pub fn kind(&self) -> TableKind {
         match self {

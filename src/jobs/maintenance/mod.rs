@@ -33,7 +33,7 @@ impl Shared {
             let released = match self.store.released_blobs(&done, COLLECT_CHUNK).await {
                 Ok(released) => released,
                 Err(error) => {
-                    tracing::warn!(%error, "results without a job could not be looked for");
+                    tracing::warn!(%error, "results without a job could not be searched for");
                     return;
                 }
             };
@@ -222,7 +222,7 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
         match reaped.await {
             Ok(taken) => {
                 for (id, state) in taken {
-                    tracing::warn!(job = %id, state = state.name(), "lease ran out, job taken back");
+                    tracing::warn!(job = %id, state = state.name(), "lease expired, job returned to the queue");
                     if state.ended() {
                         count_taken(&shared, state);
                         shared.announce(id);
@@ -231,7 +231,7 @@ pub(crate) async fn reap_expired(shared: Arc<Shared>) {
                     }
                 }
             }
-            Err(error) => tracing::warn!(%error, "expired leases could not be looked for"),
+            Err(error) => tracing::warn!(%error, "expired leases could not be searched for"),
         }
     }
 }
@@ -263,7 +263,7 @@ pub(crate) async fn recover(shared: Arc<Shared>) {
         if shared.recovered.get().is_none()
             && let Err(error) = shared.recover().await
         {
-            tracing::warn!(%error, "jobs of a dead process cannot be taken back yet");
+            tracing::warn!(%error, "jobs of a dead process cannot be returned to the queue yet");
         }
         if !shared.unfinished_batches().abandoned.is_empty() {
             shared.drop_abandoned().await;
@@ -300,7 +300,7 @@ impl Shared {
         let taken = taken.map_err(JobsError::from);
         self.observe_storage(StoragePlace::Table, &taken);
         for (id, state) in taken? {
-            tracing::info!(job = %id, state = state.name(), "job of a dead process taken back");
+            tracing::info!(job = %id, state = state.name(), "job of a dead process returned to the queue");
         }
         // Set once; whoever was first is right.
         let _ = self.recovered.set(());

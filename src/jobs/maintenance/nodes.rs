@@ -108,7 +108,7 @@ async fn beat(shared: Arc<Shared>) {
             return;
         };
         if let Err(error) = shared.show_node(cluster).await {
-            tracing::warn!(%error, "this node could not show itself");
+            tracing::warn!(%error, "the heartbeat of this node failed");
             continue;
         }
         if let Err(error) = keep_batches(&shared, cluster).await {
@@ -153,7 +153,7 @@ async fn watch_cancellations(shared: Arc<Shared>) {
         };
         match cluster.cancel_requests(&running).await {
             Ok(ids) => ids.into_iter().for_each(|id| shared.stop_here(id)),
-            Err(error) => tracing::debug!(%error, "cancellations could not be looked for"),
+            Err(error) => tracing::debug!(%error, "cancellations could not be read"),
         }
     }
 }

@@ -105,7 +105,7 @@ async fn without_nodes(database: &PostgresStore) -> Result<Deployment> {
     match deployment.nodes {
         0 => Ok(deployment),
         nodes => Err(JobsError::ResultPlace(format!(
-            "{nodes} nodes were seen within 20 s; results are moved while all nodes are stopped"
+            "{nodes} nodes were seen within 20 s; stop all nodes to move results"
         ))),
     }
 }

@@ -56,8 +56,8 @@ pub(crate) async fn settle(
 pub(super) fn on_this_machine_alone(place: &ResultsPlace) -> Result<()> {
     match (&place.url, place.shared) {
         (ResultsUrl::Folder(path), false) => Err(JobsError::ResultPlace(format!(
-            "{} is a folder of this machine, and the nodes of a database have their results in common; say --results-shared if \
-             every node has the same folder there (NFS), or use an object store",
+            "{} is a folder of this machine, and all nodes of a database share their results; give --results-shared if every \
+             node has the same folder there (NFS), or use an object store",
             path.display()
         ))),
         _ => Ok(()),
@@ -98,7 +98,7 @@ async fn settle_outside(
                 && is_another(objects, known, &deployment).await?
             {
                 return refused(format!(
-                    "the results of this database are in {known}; {place} holds a copy of them, or what a move has left there. Start the \
+                    "the results of this database are in {known}; {place} has a copy of them, or the remains of a move. Start the \
                      node with --results-url {known}"
                 ));
             }
@@ -107,16 +107,16 @@ async fn settle_outside(
         Some(_) | None if deployment.in_use() => {
             let known = match deployment.results_place.as_deref() {
                 Some(IN_DATABASE) => {
-                    "this database has its results in itself; start the node without --results-url"
+                    "the results of this database are in the database itself; start the node without --results-url"
                         .to_owned()
                 }
                 Some(known) if known == place => format!(
-                    "there is no {MARKER} in {place}, where this database has its results: they are gone, or this is another bucket of that name"
+                    "there is no {MARKER} in {place}, where the results of this database are: they were removed, or this is another bucket with that name"
                 ),
                 Some(known) => format!(
                     "the results of this database are in {known}; start the node with --results-url {known}"
                 ),
-                None => "other nodes have just decided otherwise; start again".to_owned(),
+                None => "other nodes have just determined another location; start again".to_owned(),
             };
             refused(known)
         }
@@ -167,13 +167,13 @@ async fn is_another(
 pub(super) async fn decide(cluster: &dyn Cluster, before: &Deployment, place: &str) -> Result<()> {
     let known = before.results_place.as_deref();
     if cluster.place_results(known, place).await? {
-        tracing::info!(place, "the place of the results was decided");
+        tracing::info!(place, "the location of the results was determined");
         return Ok(());
     }
     match cluster.deployment().await?.results_place {
         Some(now) if now == place => Ok(()),
         _ => Err(JobsError::ResultPlace(
-            "another node decided otherwise at the same moment; start again".to_owned(),
+            "another node determined another location at the same time; start again".to_owned(),
         )),
     }
 }
@@ -281,7 +281,7 @@ async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<()> {
     removed.map_err(|error| unusable(&error))?;
     match read {
         Ok(read) if read == text.slice(9..15) => Ok(()),
-        Ok(_) => wrong("what was written is read back as something else".to_owned()),
+        Ok(_) => wrong("the object read back differs from the object written".to_owned()),
         Err(error) => Err(unusable(&error)),
     }
 }

@@ -84,7 +84,7 @@ impl FromStr for ResultsUrl {
         let (bucket, prefix) = rest.split_once('/').unwrap_or((rest, ""));
         let named = |c: char| c.is_ascii_alphanumeric() || ".-_".contains(c);
         if bucket.is_empty() || !bucket.chars().all(named) {
-            return Err(format!("`{bucket}` is no name of a bucket; {shape}"));
+            return Err(format!("`{bucket}` is not the name of a bucket; {shape}"));
         }
         let prefix = prefix.trim_matches('/').to_owned();
         if !prefix.chars().all(|c| named(c) || c == '/') || prefix.contains("//") {
@@ -232,9 +232,9 @@ mod tests {
             ("results", "s3://bucket"),
             ("ftp://a/b", "s3://bucket"),
             #[cfg(feature = "cluster")]
-            ("s3://", "no name of a bucket"),
+            ("s3://", "not the name of a bucket"),
             #[cfg(feature = "cluster")]
-            ("s3://u:p@host/b", "no name of a bucket"),
+            ("s3://u:p@host/b", "not the name of a bucket"),
             #[cfg(feature = "cluster")]
             ("s3://b/a//b", "prefix"),
             ("file://folder", "from the root"),

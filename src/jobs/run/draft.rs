@@ -363,7 +363,7 @@ impl ReceivedRows {
             } else if matches!(values, Values::Texts(_)) != column.text {
                 let needed = if column.text { "texts" } else { "numbers" };
                 let detail =
-                    format!("a value of another kind given; {needed} are needed in this column");
+                    format!("a value of another type given; {needed} are needed in this column");
                 faults.push(Fault::new(pointer, detail));
             } else if let Values::Texts(texts) = values {
                 faults.extend(faults_of_texts(&column.name, texts, self.received));
@@ -381,7 +381,7 @@ fn fields_asked_for(checked: &CheckedCase) -> Option<Fault> {
     let mut asked = checked.run.outputs.iter();
     let other = asked.find(|asked| !numbers.contains(asked))?;
     let detail = format!(
-        "{other:?} asked for; rows are answered with numbers: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
+        "{other:?} requested; rows have numbers only: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
     );
     Some(Fault::new("/outputs", detail))
 }
@@ -406,11 +406,11 @@ fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
         let place = column.pointer.as_deref();
         let before = place.and_then(|place| places.insert(place, &column.name));
         if !names.insert(&column.name) {
-            let detail = format!("the column `{}` is there twice", column.name);
+            let detail = format!("the column `{}` is given twice", column.name);
             faults.push(Fault::new(pointer.clone(), detail));
         } else if let (Some(before), Some(place)) = (before, place) {
             let detail = format!(
-                "the columns `{before}` and `{}` are there for one member of the case, `{place}`",
+                "the columns `{before}` and `{}` are given for one member of the case, `{place}`",
                 column.name
             );
             faults.push(Fault::new(pointer.clone(), detail));
@@ -424,14 +424,14 @@ fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
         }
         if place.is_none() && answered.contains(&*column.name) {
             let detail = format!(
-                "`{}` is the name of a column of the answers; a column that is carried along needs another name",
+                "`{}` is the name of a result column; a column that is copied needs another name",
                 column.name
             );
             faults.push(Fault::new(pointer, detail));
         }
     }
     if columns.iter().all(|column| column.pointer.is_none()) {
-        let detail = "no column varies the case; name at least one by a JSON pointer such as `/load/normal_force_n` or by a short name";
+        let detail = "no column varies the case; at least one must be named by a JSON pointer such as `/load/normal_force_n` or by a short name";
         faults.push(Fault::new("/columns", detail));
     }
     faults

@@ -28,7 +28,7 @@ pub struct RunColumn {
     /// What makes a number that was sent one of the case, in its unit.
     #[serde(default = "unchanged")]
     pub factor: f64,
-    /// The unit that its title or a line of units names.
+    /// Unit named in its title or in a line of units.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
     /// It holds texts; otherwise numbers.
@@ -57,7 +57,7 @@ impl RunColumn {
         converted(number, self.factor)
     }
 
-    /// What it holds.
+    /// Type of its values.
     #[must_use]
     pub fn kind(&self) -> TableKind {
         match self.text {
@@ -89,7 +89,7 @@ pub struct RunHead {
     /// Kept cross-sections that rows name.
     #[serde(default)]
     pub profiles: BTreeMap<String, Value>,
-    /// The method asked for.
+    /// The requested method.
     pub method: String,
     /// Always false. Stored runs have the member, and a repeated submission is recognised by the bytes of its head.
     #[serde(default)]

@@ -382,7 +382,7 @@ pub struct Claim {
     pub attempt: u32,
     /// The fencing token: random, the same for all jobs that were claimed together.
     pub lease_token: u64,
-    /// The method asked for.
+    /// The requested method.
     pub method: String,
     /// W3C trace context of its submission, if its trace is collected.
     pub traceparent: Option<String>,
@@ -1017,7 +1017,7 @@ pub struct NewJob {
     /// Time of submission.
     #[serde(skip)]
     pub created_at: i64,
-    /// Free text of the client.
+    /// Free text given by the client.
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,
@@ -1105,7 +1105,7 @@ pub struct NewBatch {
     pub count: u32,
     /// Number of cases that were refused.
     pub rejected: u32,
-    /// Free text of the client.
+    /// Free text given by the client.
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,

@@ -84,7 +84,7 @@ pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Di
                 Some(StopReason::TooLong) => Disposition::ReleaseAsLong,
                 Some(StopReason::Lost) => Disposition::Discard,
                 Some(StopReason::Deadline) => Disposition::End(Ending::Failed(too_late())),
-                None => failed("the solver stopped although nobody asked it to".to_owned()),
+                None => failed("the solver stopped without a request".to_owned()),
             }
         }
         Outcome::Unsolved(error) => match Failure::of_solve(&error) {

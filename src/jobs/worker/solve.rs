@@ -48,7 +48,7 @@ pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Wor
     let ended = done.unwrap_or_else(|payload| {
         // What a defect says of the program is for the log, not for clients.
         tracing::error!(reason = panic_text(payload.as_ref()), "the solver panicked");
-        let detail = "the solver stopped on a defect of its own; the service's log has the reason";
+        let detail = "the solver stopped on an internal error; the service's log has the reason";
         Ok(Outcome::Broken(Failure::new(FailureKind::Panic, detail)))
     });
     ended.unwrap_or_else(|early| *early)

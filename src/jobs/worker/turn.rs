@@ -130,7 +130,7 @@ impl Worker {
                     });
                     let mut since = told.into_iter().chain(unwanted.map(|(_, since)| since));
                     if since.any(|since| since.elapsed() >= STOP_TIMEOUT) {
-                        tracing::warn!("the solver does not stop; its thread is left behind");
+                        tracing::warn!("the solver does not stop; its thread is abandoned");
                         self.leave_behind(attempt.abandon());
                         break;
                     }
@@ -177,7 +177,7 @@ impl Worker {
         let _ = thread.left.set(Counted(shared.abandoned.clone()));
         drop(thread);
         let most = shared.options.abandoned_max;
-        tracing::error!(left, most, "a solver thread was left behind");
+        tracing::error!(left, most, "a solver thread was abandoned");
         if left > most {
             shared.broken.cancel();
         }
@@ -200,7 +200,7 @@ impl Worker {
         let mut step = StepReport::default();
         let released = self.release(attempt, &held, ReleaseReason::NotBegun, &mut step);
         if let Err(error) = released.await {
-            tracing::warn!(%error, "claimed jobs could not be given back; their leases will run out");
+            tracing::warn!(%error, "claimed jobs could not be returned; their leases will expire");
         }
     }
 }

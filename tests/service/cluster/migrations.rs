@@ -25,8 +25,8 @@ fn five_starts(url: &str) -> [(String, Service); 5] {
 #[tokio::test(flavor = "multi_thread")]
 async fn five_nodes_start_at_once_on_an_empty_and_on_an_old_database() {
     for (before, says) in [
-        (None, "was made"),
-        (Some(old_tables::newest() - 1), "was brought forward"),
+        (None, "was created"),
+        (Some(old_tables::newest() - 1), "was upgraded"),
     ] {
         let url = or_skip!(database().await);
         if let Some(form) = before {
@@ -37,7 +37,7 @@ async fn five_nodes_start_at_once_on_an_empty_and_on_an_old_database() {
         let (did, found): (Vec<_>, Vec<_>) =
             nodes.iter().partition(|(said, _)| said.contains(says));
         assert_eq!(did.len(), 1, "{before:?}");
-        assert!(found.iter().all(|(said, _)| said.contains("is there")));
+        assert!(found.iter().all(|(said, _)| said.contains("exists")));
         // Nodes 0, 2 and 4 answer requests, 1 and 3 solve.
         let apis = [&nodes[0].1, &nodes[2].1, &nodes[4].1];
         for (number, api) in apis.iter().enumerate() {

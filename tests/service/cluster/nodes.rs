@@ -227,7 +227,7 @@ async fn a_node_says_what_is_wrong_with_its_database() {
         makers.map(|maker| maker.join().unwrap())
     });
     assert!(made.iter().all(|(done, _)| *done), "{made:?}");
-    let made = made.iter().filter(|(_, said)| said.contains("was made"));
+    let made = made.iter().filter(|(_, said)| said.contains("was created"));
     assert_eq!(made.count(), 1);
     let words = ["config", "--database-url", "postgres://u:hush@h/d"];
     let (_, configured) = said_by(&mut railhead(), &words);

@@ -90,7 +90,7 @@ async fn a_node_is_refused_that_would_look_for_the_results_elsewhere() {
     assert!(said.contains("results of another database"), "{said}");
     solve_one(options(&second, data.path(), None)).await;
     let said = refusal(options(&second, data.path(), Some(other_place))).await;
-    assert!(said.contains("results in itself"), "{said}");
+    assert!(said.contains("in the database itself"), "{said}");
 
     // The same results under another name, and gone.
     let looked = examine_results(&url, Some(&shared)).await.unwrap();

@@ -15,7 +15,7 @@ use crate::contact::case::words::samples;
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[serde(tag = "type", rename_all = "snake_case")]
 pub enum Contact {
-    /// Relative radii of curvature: an elliptic patch after Hertz.
+    /// An elliptic patch by Hertz's theory, from relative radii of curvature.
     Radii {
         /// Relative radius in the rolling direction, in mm.
         #[member(positive(1e9, "mm"))]
@@ -33,45 +33,45 @@ pub enum Contact {
         #[member(positive(1e6, "mm"))]
         b_mm: f64,
     },
-    /// A gap measured across the rolling direction between bodies that are circular along it:
-    /// `x²/(2 rolling_mm) + gap(y)`. Region and pressure are found.
+    /// A gap measured laterally between bodies that are circular along the rolling direction: `x²/(2 rolling_mm) + gap(y)`. The contact
+    /// region and the pressure are computed.
     GapProfile {
         /// Relative radius in the rolling direction, in mm.
         #[member(positive(1e9, "mm"))]
         rolling_mm: f64,
-        /// Strictly increasing coordinates across, in mm.
+        /// Strictly increasing coordinates along y, in mm.
         #[member(with = samples::axis)]
         y_mm: Vec<f64>,
-        /// Distance of the undeformed surfaces at `y_mm` and x = 0, in mm; any constant may be added.
+        /// Distance of the undeformed surfaces at `y_mm` and x = 0, in mm; may include any constant offset.
         #[member(with = samples::gap_line)]
         gap_mm: Vec<f64>,
     },
-    /// Any gap on a grid. Region and pressure are found; outside the grid there is no contact.
+    /// Any gap on a grid. The contact region and the pressure are computed; outside the grid there is no contact.
     GapGrid {
         /// Strictly increasing coordinates along the rolling direction, in mm.
         #[member(with = samples::axis)]
         x_mm: Vec<f64>,
-        /// Strictly increasing coordinates across, in mm.
+        /// Strictly increasing coordinates along y, in mm.
         #[member(with = samples::axis)]
         y_mm: Vec<f64>,
-        /// Distance of the undeformed surfaces, in mm: `gap_mm[j][i]` at `(x_mm[i], y_mm[j])`; any constant may be added.
+        /// Distance of the undeformed surfaces in mm: `gap_mm[j][i]` at `(x_mm[i], y_mm[j])`; may include any constant offset.
         #[member(with = samples::gap_grid)]
         gap_mm: Vec<Vec<f64>>,
     },
-    /// A given pressure on a grid; its positive part is the contact region, which may have several patches. It is kept as it stands, also where
-    /// the bodies differ, so that it has to contain what tractions do to it.
+    /// A given pressure on a grid; its positive part is the contact region, in one or several patches. Tractions do not change it; for
+    /// bodies with different materials it must include their effect.
     PressureGrid {
         /// Strictly increasing coordinates along the rolling direction, in mm.
         #[member(with = samples::axis)]
         x_mm: Vec<f64>,
-        /// Strictly increasing coordinates across, in mm.
+        /// Strictly increasing coordinates along y, in mm.
         #[member(with = samples::axis)]
         y_mm: Vec<f64>,
         /// `pressure_mpa[j][i]` at `(x_mm[i], y_mm[j])`, not negative, 0 outside the contact.
         #[member(with = samples::pressure_grid)]
         pressure_mpa: Vec<Vec<f64>>,
     },
-    /// A wheel on a rail, by their cross-sections. Every patch is found, and solved in a frame of its own.
+    /// A wheel on a rail, given by their cross-sections. Every patch is found, and solved in its own frame.
     #[members(faults_of_pair)]
     Profiles {
         /// Cross-section of the rail.
@@ -83,107 +83,107 @@ pub enum Contact {
         /// The side of the wheel in its wheelset, seen in the rolling direction.
         #[member(what = "left or right")]
         side: SideName,
-        /// Radius of the wheel where z of its cross-section is 0, in mm.
+        /// Radius of the wheel at z = 0 of its cross-section, in mm.
         #[member(positive(1e5, "mm"))]
         rolling_radius_mm: f64,
-        /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
+        /// Distance between the gauge faces of the two rails, in mm; default 1435.
         #[member(whole = gauge)]
         gauge_mm: Option<f64>,
-        /// Depth at which the gauge is measured, below the highest point of the rail as it lies, in mm; 14 when left out.
+        /// Depth at which the gauge is measured, below the highest point of the rail as it lies, in mm; default 14.
         #[member(whole = gauge_height)]
         gauge_height_mm: Option<f64>,
-        /// Distance of the origin of the rail's cross-section from the middle of the track, in mm. It places the rail instead of the gauge.
+        /// Distance of the origin of the rail's cross-section from the middle of the track, in mm; places the rail instead of the gauge.
         #[schema(minimum = 0.0)]
         #[member(closed(0.0, 1e5, "mm"))]
         rail_origin_mm: Option<f64>,
-        /// Turn of the rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
-        /// when left out.
+        /// Rotation of the rail about the origin of its cross-section, in rad, positive with its top toward the track centre; default 0.
         #[member(closed(-0.5, 0.5, "rad"), default)]
         cant_rad: f64,
-        /// Distance of the backs of the two flanges, in mm; 1360 when left out.
+        /// Distance between the backs of the two flanges, in mm; default 1360.
         #[member(closed(0.0, 1e5, "mm"), default = 1360.0)]
         flange_back_distance_mm: f64,
-        /// y of the back of the flange in the wheel's cross-section, in mm. When left out it is found from the points; -70 where they agree with
-        /// that or show no flange.
+        /// y of the back of the flange in the wheel's cross-section, in mm. Default: found from the points, or -70 if they agree with that
+        /// or show no flange.
         #[member(closed(-1e3, 1e3, "mm"))]
         flange_back_position_mm: Option<f64>,
-        /// Shift of the wheelset to the left, in mm; 0 when left out.
+        /// Shift of the wheelset to the left, in mm; default 0.
         #[member(closed(-1e3, 1e3, "mm"), default)]
         lateral_shift_mm: f64,
-        /// Yaw of the wheelset in rad, positive from x to y; 0 when left out.
+        /// Yaw of the wheelset in rad, positive from x to y; default 0.
         #[member(closed(-0.3, 0.3, "rad"), default)]
         yaw_rad: f64,
-        /// Roll of the wheelset in rad, positive from y to z; 0 when left out.
+        /// Roll of the wheelset in rad, positive from y to z; default 0.
         #[member(closed(-0.3, 0.3, "rad"), default)]
         roll_rad: f64,
-        /// Solve even if the points of a profile are so coarse or rough under the contact that an answer would mislead, or if rail and wheel
-        /// seem exchanged. When `false` or left out, the job fails in these cases and says where the fault is.
+        /// Solve even if the points of a profile are too coarse or rough for a reliable result, or if rail and wheel seem exchanged. If
+        /// `false` (default), the job fails in these cases with the location of the fault.
         #[serde(skip_serializing_if = "is_false")]
         #[member(default)]
         accept_rough_profiles: bool,
-        /// The surface on which the contact is solved. When left out, the curve where it can be solved, else planes with the remark `on-planes`.
+        /// The surface on which the contact is solved. Default: the curve of the rail if possible, otherwise planes with the remark
+        /// `on-planes`.
         reference_surface: Option<SurfaceName>,
-        /// How cells of a curved surface act on each other; not with `reference_surface: "plane"`, `angle_corrected` when left out.
+        /// How cells of a curved surface act on each other; default `angle_corrected`. Not with `reference_surface: "plane"`.
         influence: Option<InfluenceName>,
     },
-    /// A wheelset on both rails of a track, by their cross-sections. Its roll and its height are found, and every patch of both wheels.
+    /// A wheelset on both rails of a track, given by their cross-sections. Its roll, its height and every patch of both wheels are
+    /// computed.
     #[members(faults_of_pair, faults_of_poses)]
     Wheelset {
-        /// Cross-section of both rails, or of the left one where `right` has another.
+        /// Cross-section of both rails, or of the left one if `right` gives another.
         #[schema(inline = false)]
         rail: Box<CrossSection>,
-        /// Cross-section of both wheels, or of the left one where `right` has another.
+        /// Cross-section of both wheels, or of the left one if `right` gives another.
         #[schema(inline = false)]
         wheel: Box<CrossSection>,
-        /// What differs on the right; nothing when left out.
+        /// Differences on the right; default none.
         #[schema(inline = false)]
         right: Option<Box<RightSide>>,
-        /// Radius of the wheels where z of their cross-section is 0, in mm.
+        /// Radius of the wheels at z = 0 of their cross-section, in mm.
         #[member(positive(1e5, "mm"))]
         rolling_radius_mm: f64,
-        /// Distance of the gauge faces of the two rails, in mm; 1435 when left out.
+        /// Distance between the gauge faces of the two rails, in mm; default 1435.
         #[member(whole = gauge)]
         gauge_mm: Option<f64>,
-        /// Depth at which the gauge is measured, below the highest point of the rail as it lies, in mm; 14 when left out.
+        /// Depth at which the gauge is measured, below the highest point of the rail as it lies, in mm; default 14.
         #[member(whole = gauge_height)]
         gauge_height_mm: Option<f64>,
-        /// Distance of the origin of the rail's cross-section from the middle of the track, in mm. It places the rail instead of the gauge.
+        /// Distance of the origin of the rail's cross-section from the middle of the track, in mm; places the rail instead of the gauge.
         #[schema(minimum = 0.0)]
         #[member(closed(0.0, 1e5, "mm"))]
         rail_origin_mm: Option<f64>,
-        /// Turn of each rail about the origin of its cross-section, in rad, positive with its top toward the track centre; 0
-        /// when left out.
+        /// Rotation of each rail about the origin of its cross-section, in rad, positive with its top toward the track centre; default 0.
         #[member(closed(-0.5, 0.5, "rad"), default)]
         cant_rad: f64,
-        /// Distance of the backs of the two flanges, in mm; 1360 when left out.
+        /// Distance between the backs of the two flanges, in mm; default 1360.
         #[member(closed(0.0, 1e5, "mm"), default = 1360.0)]
         flange_back_distance_mm: f64,
-        /// y of the back of the flange in the wheels' cross-section, in mm. When left out it is found from the points of each wheel; -70 where they
+        /// y of the back of the flange in the wheels' cross-section, in mm. Default: found from the points of each wheel, or -70 if they
         /// agree with that or show no flange.
         #[member(closed(-1e3, 1e3, "mm"))]
         flange_back_position_mm: Option<f64>,
-        /// Shift of the wheelset to the left, in mm: a number, or several; 0 when left out. A shift and a yaw make a position, and every
-        /// position has its own patches.
+        /// Shift of the wheelset to the left, in mm: one number or several; default 0. Each shift with a yaw is a position with its own
+        /// patches.
         #[schema(inline = false)]
         #[member(with = swept, closed(-1e3, 1e3, "mm"), default = Swept::Constant(0.0))]
         lateral_shift_mm: Swept,
-        /// Yaw of the wheelset in rad, positive from x to y: a number, or several; 0 when left out.
+        /// Yaw of the wheelset in rad, positive from x to y: one number or several; default 0.
         #[schema(inline = false)]
         #[member(with = swept, closed(-0.3, 0.3, "rad"), default = Swept::Constant(0.0))]
         yaw_rad: Swept,
-        /// How several shifts and several yaws make positions: `together` (default) or `grid`, yaw fastest.
+        /// How several shifts and yaws form positions: `together` (default), or `grid`, in which the yaw varies fastest.
         #[member(default)]
         combine: Combine,
-        /// Asks for the difference of the rolling radii over the shift, and for the equivalent conicity.
+        /// Requests the difference of the rolling radii over the shift, and the equivalent conicity.
         #[schema(inline = false)]
         kinematics: Option<KinematicsWords>,
-        /// As of `profiles`.
+        /// As in `profiles`.
         #[serde(skip_serializing_if = "is_false")]
         #[member(default)]
         accept_rough_profiles: bool,
-        /// As of `profiles`.
+        /// As in `profiles`.
         reference_surface: Option<SurfaceName>,
-        /// As of `profiles`.
+        /// As in `profiles`.
         influence: Option<InfluenceName>,
     },
 }
@@ -192,7 +192,7 @@ fn is_false(value: &bool) -> bool {
     !value
 }
 
-/// What differs on the right of a wheelset or of the track; at least one member is given.
+/// Differences on the right of a wheelset or of the track; at least one member is given.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_right)]
@@ -203,23 +203,23 @@ pub struct RightSide {
     /// Cross-section of the right wheel.
     #[schema(inline = false)]
     pub wheel: Option<Box<CrossSection>>,
-    /// Radius of the right wheel where z of its cross-section is 0, in mm.
+    /// Radius of the right wheel at z = 0 of its cross-section, in mm.
     #[member(positive(1e5, "mm"))]
     pub rolling_radius_mm: Option<f64>,
 }
 
-/// What is asked of the rigid wheelset over a range of shifts, without yaw.
+/// Kinematics to compute for the rigid wheelset over a range of shifts, without yaw.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_kinematics)]
 pub struct KinematicsWords {
-    /// Largest shift to either side, in mm; 10 when left out.
+    /// Largest shift to either side, in mm; default 10.
     #[member(positive(50.0, "mm"), default = 10.0)]
     pub reach_mm: f64,
-    /// Distance of the shifts, in mm; 0.1 when left out.
+    /// Step between shifts, in mm; default 0.1.
     #[member(positive(5.0, "mm"), default = 0.1)]
     pub step_mm: f64,
-    /// Amplitudes in mm at which the equivalent conicity is answered; 1 to 7 when left out. That of vehicle acceptance is 3.
+    /// Amplitudes in mm for the equivalent conicity; default 1 to 7. Vehicle acceptance uses 3.
     #[member(with = amplitudes, default = (1..=7).map(f64::from).collect())]
     pub amplitudes_mm: Vec<f64>,
 }
@@ -248,23 +248,23 @@ impl Contact {
     }
 }
 
-/// How hard the bodies are pressed together; exactly one member is given, for `wheelset` with `left_share` beside it.
+/// The load that presses the bodies together: exactly one member, and `left_share` with `wheelset`.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Load {
-    /// Normal force in N, more than 0. For `profiles` the sum over all patches, each along its own normal.
+    /// Normal force in N, more than 0. For `profiles`: sum over all patches, each along its own normal.
     #[schema(exclusive_minimum = 0.0)]
     pub normal_force_n: Option<f64>,
-    /// Vertical force of the wheel on the rail in N, more than 0; for `profiles` only. For `wheelset`, which needs it, that of both
-    /// wheels together.
+    /// Vertical force of the wheel on the rail in N, more than 0; only for `profiles` and `wheelset`, which requires it: the force of both
+    /// wheels.
     #[schema(exclusive_minimum = 0.0)]
     pub vertical_force_n: Option<f64>,
-    /// The part of the vertical force that the left wheel carries; for `wheelset` only, 0.5 when left out.
+    /// Share of the vertical force that the left wheel carries; only for `wheelset`, default 0.5.
     #[schema(minimum = 0.01, maximum = 0.99)]
     pub left_share: Option<f64>,
     /// Approach of distant points in mm. For `radii` and `ellipse` it is measured from first touch and is more than 0. For gaps it is
-    /// measured from gap = 0 of the data and is more than the least gap. For `profiles` it is the vertical distance by which the wheel is
-    /// lowered from first touch.
+    /// measured from gap = 0 of the data and is more than the smallest gap. For `profiles` it is the vertical displacement of the wheel
+    /// below first touch.
     pub approach_mm: Option<f64>,
 }
 

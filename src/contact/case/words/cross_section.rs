@@ -12,7 +12,8 @@ use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
 
 /// A cross-section of a rail or a wheel, as points or as the text of a file; exactly one of the two.
 ///
-/// y is positive to the field side and z positive down, unless `mirror_y` and `mirror_z`, the shape or the format specify another sense.
+/// y is positive to the field side and z positive down, unless `mirror_y`, `mirror_z`, the shape or the format specify the opposite
+/// direction.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_section)]
@@ -20,28 +21,28 @@ pub struct CrossSection {
     /// Points `[y, z]` in order along the cross-section, in mm or in `unit`.
     #[member(with = points)]
     pub points_mm: Option<Vec<[f64; 2]>>,
-    /// Points `[y, z]` of a guard rail beside a rail, toward the track centre, in order along its surface; unit, origin and senses are those of the rail's own points.
-    /// The gauge and the highest point are those of the running rail.
+    /// Points `[y, z]` of a guard rail beside a rail, toward the track centre, in order along its surface; unit, origin and directions are
+    /// those of the rail's own points. The gauge and the highest point are those of the running rail.
     #[member(with = points)]
     pub guard_rail_points_mm: Option<Vec<[f64; 2]>>,
-    /// Digest of a cross-section that was kept with `POST /v1/profiles`, in place of points or text.
+    /// Digest of a cross-section stored with `POST /v1/profiles`, in place of points or text.
     #[member(skip)]
     pub profile: Option<String>,
     /// Format of `text`.
     pub format: Option<FormatName>,
-    /// The content of the file, not its path.
+    /// Content of the file, not its path.
     #[member(with = text)]
     pub text: Option<String>,
-    /// Unit of the points or of the text. When left out it is the unit that the file names, else mm. All other lengths of a case are in mm.
+    /// Unit of the points or of the text. Default: the unit named in the file, otherwise mm. All other lengths of a case are in mm.
     pub unit: Option<UnitName>,
-    /// `true` if y of the points is positive toward the track centre. When left out, the side of the flange decides for a wheel, and the
-    /// format for a rail (points: `false`, MiniProf: `true`). A wheel without a flange needs it, except in Simpack files.
+    /// `true` if y of the points is positive toward the track centre. Default: the flange of a wheel decides; for a rail, the format
+    /// (points: `false`, MiniProf: `true`). A wheel without a flange requires this member, except in Simpack files.
     pub mirror_y: Option<bool>,
-    /// `true` if z of the points is positive upward. When left out, the flange of a wheel or the head of a rail decides. Where the shape does
-    /// not show it, the case is refused, except for Simpack files.
+    /// `true` if z of the points is positive upward. Default: the flange of a wheel or the head of a rail decides. If the shape does not
+    /// show it, the case is refused, except for Simpack files.
     pub mirror_z: Option<bool>,
-    /// Waves along the cross-section that are shorter than about this are smoothed away, in mm; 0 (no smoothing) when left out. `auto` chooses
-    /// 0, or 2 to 8 mm, by the noise of the points and the pressure; the answer says what was used.
+    /// Waves along the cross-section shorter than about this wavelength in mm are smoothed away; default 0 (no smoothing). `auto` chooses
+    /// 0, or 2 to 8 mm, from the noise of the points and the pressure; the result states it.
     #[member(with = smoothing, default = Smoothing::Length(0.0))]
     pub smoothing_mm: Smoothing,
 }
@@ -50,9 +51,9 @@ pub struct CrossSection {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum Smoothing {
-    /// By a cut wavelength in mm; 0 for none.
+    /// A cut-off wavelength in mm; 0 for no smoothing.
     Length(f64),
-    /// By a wavelength that the service chooses.
+    /// A wavelength that the service chooses.
     ByNoise(SmoothingWord),
 }
 
@@ -159,7 +160,7 @@ pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 2]>> {
         block.faults().add(
             pointer,
             format!(
-                "{} more points are refused like those before; each has to be a pair [y, z], both {COORDINATE}",
+                "{} more points are refused for the same reason; each must be a pair [y, z], both {COORDINATE}",
                 refused - LISTED_MAX
             ),
         );

@@ -16,25 +16,25 @@ use crate::contact::numerics::quadrature::PRIMES;
 #[members(faults_of_extent)]
 #[schema(as = EvolutionRequest)]
 pub struct EvolutionWords {
-    /// A case of one motion whose contact is of the type `profiles`. Members that a column holds may be left out; `outputs` is not needed, and
-    /// `solver` has a target of 0.02 when left out.
+    /// A case with one motion and a contact of type `profiles`. Members that a column replaces may be omitted; `outputs` is not needed. The
+    /// default of `solver` is a target of 0.02.
     #[schema(value_type = Object)]
     #[member(with = template)]
     pub template: Value,
     /// The states of the traffic.
     #[member(with = traffic)]
     pub traffic: Traffic,
-    /// Which bodies wear; `both` when left out.
+    /// Which bodies wear; default `both`.
     #[schema(required = false)]
     #[member(default)]
     pub wearing: WearingBodies,
-    /// Law of wear: `usfd_wear` (when left out) or `archard_wear`. Its figures are those of `damage.parameters` in the template.
+    /// Wear law: `usfd_wear` (default) or `archard_wear`, with the parameters in `damage.parameters` of the template.
     #[schema(required = false)]
     #[member(with = wear_model, default = DamageModel::UsfdWear)]
     pub wear_model: DamageModel,
     /// Traffic over the rail and distance of the wheel.
     pub extent: EvolutionExtent,
-    /// Stored steps after the start, equally spaced over the extent; 10 when left out.
+    /// Number of stored steps after the start, equally spaced over the extent; default 10.
     #[schema(required = false, minimum = 1, maximum = 500)]
     #[member(1..=500, default = 10)]
     pub records: u32,
@@ -42,7 +42,7 @@ pub struct EvolutionWords {
     #[schema(required = false)]
     #[member(empty)]
     pub accuracy: EvolutionAccuracy,
-    /// Losses for which the time is reported.
+    /// Losses for which the result reports when they are reached.
     #[schema(required = false)]
     #[member(default)]
     pub limits: WearLosses,
@@ -50,8 +50,8 @@ pub struct EvolutionWords {
     #[schema(required = false)]
     #[member(with = events, default)]
     pub events: Vec<EvolutionEvent>,
-    /// Uncertainty of a wear coefficient whose scatter is not published: it lies between the value divided and multiplied by this with a
-    /// probability of 90 %; 2 when left out.
+    /// Uncertainty of a wear coefficient whose scatter is not published: with 90 % probability it lies between its value divided and
+    /// multiplied by this factor; default 2.
     #[schema(required = false, minimum = 1.0)]
     #[member(closed(1.0, 100.0, ""), default = 2.0)]
     pub coefficient_factor: f64,
@@ -60,14 +60,14 @@ pub struct EvolutionWords {
 /// States of a traffic: a table, distributions that the service samples, or both.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Traffic {
-    /// Columns named as those of a run: a number for each row, or a distribution that is sampled once for each row. Distributions are independent of
-    /// each other.
+    /// Columns named as those of a run: a number for each row, or a distribution that is sampled once for each row, independently of
+    /// others.
     #[schema(value_type = BTreeMap<String, TrafficColumn>)]
     pub columns: Vec<(String, TrafficColumn)>,
-    /// Relative numbers of passes of the rows; 1 for each when left out.
+    /// Relative number of passes of each row; default 1.
     #[schema(required = false)]
     pub passes: Vec<f64>,
-    /// Rows of a traffic whose columns are all distributions; 4096 when left out.
+    /// Number of rows of a traffic whose columns are all distributions; default 4096.
     #[schema(required = false, minimum = 1, maximum = 200_000)]
     pub samples: u32,
 }
@@ -82,17 +82,17 @@ pub enum TrafficColumn {
     Distribution(TrafficDistribution),
 }
 
-/// Distribution of a column: normal between two values if it has a mean and a standard deviation, else uniform.
+/// Distribution of a column: normal between two values if a mean and a standard deviation are given, otherwise uniform.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct TrafficDistribution {
-    /// Least value.
+    /// Smallest value.
     pub min: f64,
     /// Largest value.
     pub max: f64,
-    /// Mean before the ends are cut off.
+    /// Mean before truncation.
     #[schema(nullable = false)]
     pub mean: Option<f64>,
-    /// Standard deviation before the ends are cut off.
+    /// Standard deviation before truncation.
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     pub standard_deviation: Option<f64>,
 }
@@ -137,7 +137,7 @@ pub struct EvolutionExtent {
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     #[member(positive(1e12, ""))]
     pub axle_passes: Option<f64>,
-    /// Distance that the wheel rolls under this traffic in km; needed where the wheel wears.
+    /// Distance in km that the wheel rolls under this traffic; required if the wheel wears.
     #[schema(nullable = false, exclusive_minimum = 0.0)]
     #[member(positive(1e12, ""))]
     pub wheel_distance_km: Option<f64>,
@@ -147,30 +147,31 @@ pub struct EvolutionExtent {
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
 pub struct EvolutionAccuracy {
-    /// Largest number of representative states; 100 when left out.
+    /// Largest number of representative states; default 100.
     #[schema(minimum = 1, maximum = 2000)]
     #[member(1..=2000, default = 100)]
     pub states_max: u32,
-    /// Error of the representative states relative to the worn area, at which no more are added; 0.03 when left out.
+    /// Error of the representative states, relative to the worn area, below which no more are added; default 0.03.
     #[member(positive(1.0, ""), default = 0.03)]
     pub states_tolerance: f64,
-    /// Change of the distribution of wear over a step, relative to the worn area; 0.1 when left out.
+    /// Largest change of the wear distribution over a step, relative to the worn area; default 0.1.
     #[member(positive(1.0, ""), default = 0.1)]
     pub step_tolerance: f64,
-    /// Largest depth that one step removes, in mm; 0.03 when left out.
+    /// Largest depth that one step removes, in mm; default 0.03.
     #[member(positive(1.0, "mm"), default = 0.03)]
     pub step_depth_mm: f64,
-    /// Most steps; 1000 when left out.
+    /// Largest number of steps; default 1000.
     #[schema(minimum = 1)]
     #[member(1..=100_000, default = 1000)]
     pub steps_max: u32,
-    /// Standard deviation in mm of the kernel that smooths the wear of a step along the section; 0.5 when left out.
+    /// Standard deviation in mm of the kernel that smooths the wear of a step along the section; default 0.5.
     #[schema(minimum = 0.0)]
     #[member(closed(0.0, 5.0, "mm"), default = 0.5)]
     pub smoothing_mm: f64,
 }
 
-/// Losses of the sections in mm, or limits of them; absent where a section has no such place, and where no limit is wanted.
+/// Losses of the sections in mm, or limits of these losses. A loss is absent if the section has no such place; a limit is absent if none is
+/// wanted.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Members)]
 pub struct WearLosses {
@@ -204,25 +205,25 @@ impl WearLosses {
     }
 }
 
-/// Maintenance at one time.
+/// A maintenance event.
 #[derive(Debug, Clone, PartialEq, ToSchema, Members)]
 #[members(faults_of_event)]
 pub struct EvolutionEvent {
-    /// Time of the event, in the unit of the extent: `mgt` or `axle_passes`, and km where only the wheel wears.
+    /// Time of the event in the unit of the extent: `mgt` or `axle_passes`, or km if only the wheel wears.
     #[schema(minimum = 0.0)]
     #[member(closed(0.0, 1e12, ""))]
     pub at: f64,
-    /// Grinds the rail to this section, lowered until it lies nowhere above the present one.
+    /// Grinds the rail to this section, lowered until it lies nowhere above the current one.
     #[schema(nullable = false, inline = false)]
     pub grind: Option<Box<CrossSection>>,
-    /// Turns the wheel to this section, moved toward the axle until it lies nowhere outside the present one.
+    /// Turns the wheel to this section, moved toward the axle until it lies nowhere outside the current one.
     #[schema(nullable = false, inline = false)]
     pub reprofile: Option<Box<CrossSection>>,
-    /// Depth in mm by which grinding or turning goes beyond that; 0 when left out.
+    /// Additional depth in mm that grinding or turning removes; default 0.
     #[schema(required = false, minimum = 0.0)]
     #[member(closed(0.0, 20.0, "mm"), default)]
     pub depth_mm: f64,
-    /// Coefficient of friction of all states from then on, as of a lubricator.
+    /// Coefficient of friction of all states from this time on, for example after a lubricator is installed.
     #[schema(nullable = false, minimum = 0.0)]
     #[member(closed(0.0, 2.0, ""))]
     pub friction_coefficient: Option<f64>,
@@ -311,7 +312,10 @@ pub(crate) fn events(all: &mut Object, name: &str) -> Option<Vec<EvolutionEvent>
 pub(crate) fn faults_of_event(block: &mut Object, _: Option<&EvolutionEvent>) -> Option<()> {
     let kinds = ["grind", "reprofile", "friction_coefficient"];
     if block.given(&kinds).is_empty() {
-        block.fault_here(format!("nothing happens; give one of {}", kinds.join(", ")));
+        block.fault_here(format!(
+            "the event has no effect; give one of {}",
+            kinds.join(", ")
+        ));
         return None;
     }
     Some(())

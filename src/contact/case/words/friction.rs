@@ -8,7 +8,7 @@ use crate::contact::case::words::object::{AllowedRange, Object, join};
 use crate::contact::case::words::samples::AXIS_POINTS;
 
 /// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across`, `along` and `by_temperature`. `layer` and
-/// `reduction` make the contact softer to tractions and may stand beside each of them.
+/// `reduction` make the contact more compliant and may be added to each of them.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema, Members)]
 #[members(faults_of_friction)]
@@ -17,32 +17,32 @@ pub struct Friction {
     #[schema(minimum = 0.0, maximum = 100.0)]
     #[member(closed(0.0, 100.0, ""))]
     pub coefficient: Option<f64>,
-    /// How the coefficient falls with the speed of slip; every motion needs its `speed_mm_per_s`.
+    /// How the coefficient falls with slip speed; requires `speed_mm_per_s` in every motion.
     pub law: Option<FallName>,
-    /// The coefficient that is left at the highest speeds of slip, 0 to 100; with `law`.
+    /// Limit of the coefficient at high slip speed, 0 to 100; with `law`.
     #[schema(minimum = 0.0, maximum = 100.0)]
     #[member(closed(0.0, 100.0, ""))]
     pub limit: Option<f64>,
-    /// What falls: one or two terms; with `law`.
+    /// One or two terms that fall with slip speed; with `law`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(min_items = 1, max_items = 2)]
     #[member(with = terms, default)]
     pub terms: Vec<FallTermWords>,
     /// A coefficient that varies across the contact.
     pub across: Option<AcrossWords>,
-    /// A coefficient that varies along the track; the case needs a `history`, which rolls over it.
+    /// A coefficient that varies along the track; requires a `history` that rolls over it.
     pub along: Option<AlongWords>,
-    /// A coefficient that falls with the temperature of the contact; the case needs `thermal` and every motion its `speed_mm_per_s`.
+    /// A coefficient that falls with the temperature of the contact; requires `thermal`, and `speed_mm_per_s` in every motion.
     pub by_temperature: Option<ByTemperatureWords>,
     /// A layer between the bodies, such as wet leaves, sand or oxides.
     pub layer: Option<LayerWords>,
-    /// Kalker's reduction factor, more than 0 and at most 1: the initial slope of the creep curves is this part of that of clean bodies.
+    /// Kalker's reduction factor, more than 0 and at most 1: ratio of the initial slope of the creep curves to that of clean bodies.
     #[schema(maximum = 1.0)]
     #[member(positive(1.0, ""))]
     pub reduction: Option<f64>,
 }
 
-/// How a coefficient falls with the speed of slip v: with f₀ the `limit`, f₁, f₂ the `coefficient` and v₁, v₂ the
+/// How a coefficient falls with the slip speed v. In the formulas, f₀ is `limit`; f₁, f₂ are the `coefficient` and v₁, v₂ the
 /// `half_speed_mm_per_s` of the terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
@@ -55,59 +55,60 @@ pub enum FallName {
     Linear,
 }
 
-/// A part of the coefficient that falls with the speed of slip.
+/// A part of the coefficient that falls with slip speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[schema(as = FallTerm)]
 pub struct FallTermWords {
-    /// Its value at rest, 0 to 100.
+    /// Value at rest, 0 to 100.
     #[schema(minimum = 0.0, maximum = 100.0)]
     #[member(closed(0.0, 100.0, ""))]
     pub coefficient: f64,
-    /// Speed of slip in mm/s at which half of it is left, more than 0.
+    /// Slip speed in mm/s at which half of the value remains, more than 0.
     #[schema(exclusive_minimum = 0.0)]
     #[member(positive(1e9, "mm/s"))]
     pub half_speed_mm_per_s: f64,
 }
 
-/// A coefficient across the contact: linear between points, constant outside; two points at the same place are a jump. Exactly one of
-/// `y_mm` and `angle_rad` says where the points are.
+/// A coefficient that varies across the contact: linear between points, constant outside; two points at the same position form a jump.
+/// Exactly one of `y_mm` and `angle_rad` gives the positions of the points.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[members(faults_of_across)]
 #[schema(as = FrictionAcross)]
 pub struct AcrossWords {
-    /// Places in mm, in order: y in the axes of the case; with `profiles` the y of the rail's profile.
+    /// Positions in mm, in ascending order: y in the axes of the case; with `profiles`, y of the rail's profile.
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(-1e6, 1e6, "mm"))]
     pub y_mm: Option<Vec<f64>>,
-    /// Inclinations of the rail's surface in rad, in order, positive as contact angles are; with `profiles` only.
+    /// Inclinations of the rail's surface in rad, in ascending order, positive as contact angles are; with `profiles` only.
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(-1.6, 1.6, "rad"))]
     pub angle_rad: Option<Vec<f64>>,
-    /// The coefficient at each of them, 1e-12 to 100.
+    /// Coefficient at each point, 1e-12 to 100.
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(1e-12, 100.0, ""))]
     pub coefficient: Vec<f64>,
 }
 
-/// A coefficient along the track, on which it lies still while the contact rolls over it: linear between points, constant outside; two
-/// points at the same place are a jump.
+/// A coefficient along the track that does not move with the contact: linear between points, constant outside; two points at the same
+/// position form a jump.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[members(faults_of_along)]
 #[schema(as = FrictionAlong)]
 pub struct AlongWords {
-    /// Places in mm, in order: x in the axes of the case when the history begins. After a rolled distance q the contact's x = 0 stands at q.
+    /// Positions in mm, in ascending order: x in the axes of the case at the start of the history. After a rolled distance q, x = 0 of the
+    /// contact is at q.
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(-1e6, 1e6, "mm"))]
     pub x_mm: Vec<f64>,
-    /// The coefficient at each of them, 1e-12 to 100.
+    /// Coefficient at each point, 1e-12 to 100.
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(1e-12, 100.0, ""))]
     pub coefficient: Vec<f64>,
 }
 
-/// A coefficient by the temperature of both surfaces in the contact: linear between points, constant outside. Friction heats the contact,
-/// and every place has the coefficient of the temperature it reaches.
+/// A coefficient that depends on the temperature of both surfaces in the contact: linear between points, constant outside. Friction heats
+/// the contact, and each point has the coefficient of the temperature it reaches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[members(faults_of_temperatures)]
 #[schema(as = FrictionByTemperature)]
@@ -116,15 +117,14 @@ pub struct ByTemperatureWords {
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(-273.15, 1e5, "°C"))]
     pub temperature_c: Vec<f64>,
-    /// The coefficient at each of them, 1e-12 to 100, never rising.
+    /// Coefficient at each temperature, 1e-12 to 100, never rising.
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(1e-12, 100.0, ""))]
     pub coefficient: Vec<f64>,
 }
 
-/// An elastic layer between the bodies, so thin that each of its points shears by itself: the surfaces move apart by
-/// thickness/modulus times the traction, beside what the bodies give. With `yield_mpa` it transmits no more than that stress, which grows with
-/// the plastic displacement of the layer.
+/// A thin elastic layer between the bodies. Each of its points shears independently: it adds a displacement of thickness/modulus times the
+/// traction. With `yield_mpa` it transmits at most that stress, which grows with its plastic displacement.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[members(faults_of_layer)]
@@ -136,10 +136,10 @@ pub struct LayerWords {
     /// Thickness in mm, more than 0.
     #[member(positive(1e3, "mm"))]
     pub thickness_mm: f64,
-    /// Shear stress in MPa at which the layer yields, more than 0; left out, it never does.
+    /// Shear stress in MPa at which the layer yields, more than 0; default: it never yields.
     #[member(positive(1e9, "MPa"))]
     pub yield_mpa: Option<f64>,
-    /// Growth of that stress in MPa per mm of plastic displacement, 0 or more; 0 when left out.
+    /// Growth of the yield stress in MPa per mm of plastic displacement, 0 or more; default 0.
     #[schema(minimum = 0.0)]
     #[member(closed(0.0, 1e9, "MPa/mm"))]
     pub hardening_mpa_per_mm: Option<f64>,
@@ -211,7 +211,7 @@ pub(crate) fn faults_of_friction(block: &mut Object, read: Option<&Friction>) ->
         }
         None if falls && !(COEFFICIENT_LEAST..=100.0).contains(&largest) => {
             block.fault_here(format!(
-                "limit and terms add up to {largest}; the coefficient at rest has to be a number from {COEFFICIENT_LEAST:e} to 100"
+                "limit and terms add up to {largest}; the coefficient at rest must be a number from {COEFFICIENT_LEAST:e} to 100"
             ));
             return None;
         }
@@ -268,10 +268,10 @@ fn in_places(block: &mut Object, name: &str, places: &[f64], coefficient: &[f64]
     let (given, before) = (places[k], places[k - 1]);
     let detail = match falls(k) {
         true => format!(
-            "{given} given after {before}; places must increase, or be equal twice where the coefficient jumps"
+            "{given} given after {before}; positions must increase; two equal positions form a jump of the coefficient"
         ),
         false => format!(
-            "{given} given three times; two equal places are a jump of the coefficient, and no more may be equal"
+            "{given} given three times; two equal positions form a jump of the coefficient; three are not allowed"
         ),
     };
     let pointer = join(&block.pointer_to(name), k);
@@ -304,7 +304,7 @@ pub(crate) fn faults_of_temperatures(
     if let Some(k) = temperature.windows(2).position(|pair| pair[1] <= pair[0]) {
         let pointer = join(&block.pointer_to("temperature_c"), k + 1);
         let [before, given] = [temperature[k], temperature[k + 1]];
-        let detail = format!("{given} given after {before}; the temperatures have to rise");
+        let detail = format!("{given} given after {before}; temperatures must rise");
         block.faults().add(pointer, detail);
         return None;
     }

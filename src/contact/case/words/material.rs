@@ -12,7 +12,7 @@ use crate::contact::case::words::object::{AllowedRange, Object};
 pub enum Material {
     /// Both bodies are of the same material.
     Same(Elastic),
-    /// The bodies differ; they are combined as in quasi-identical contact.
+    /// Different materials, combined as in quasi-identical contact.
     Pair {
         /// The lower body (body 2, the rail).
         lower: Elastic,
@@ -61,9 +61,9 @@ impl Elastic {
 #[serde(untagged)]
 #[schema(as = Thermal)]
 pub enum ThermalWords {
-    /// Both bodies alike.
+    /// The same constants for both bodies.
     Same(ThermalBodyWords),
-    /// One set for each.
+    /// One set for each body.
     Pair {
         /// The lower body (body 2, the rail).
         lower: ThermalBodyWords,

@@ -24,28 +24,29 @@ pub struct MotionWords {
     pub spin_per_mm: f64,
 }
 
-/// A motion as a case gives it: creepages and spin. A tangential force may be given in place of a creepage; the creepage that gives this
-/// force is then found and reported in the answer.
+/// A motion of a case: creepages and spin. A tangential force may replace a creepage; the creepage is then computed and reported.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema, Members)]
 #[members(faults_of_components)]
 pub struct AskedMotion {
-    /// Longitudinal creepage, dimensionless; 0 when left out.
+    /// Longitudinal creepage, dimensionless; default 0.
     #[member(closed(-1e6, 1e6, ""))]
     pub creepage_x: Option<f64>,
-    /// Lateral creepage, dimensionless; 0 when left out.
+    /// Lateral creepage, dimensionless; default 0.
     #[member(closed(-1e6, 1e6, ""))]
     pub creepage_y: Option<f64>,
     /// Spin in 1/mm.
     #[member(closed(-1e6, 1e6, "1/mm"), default)]
     pub spin_per_mm: f64,
-    /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`; with `profiles` in one motion alone.
+    /// Longitudinal force on the lower body in N, over all patches, at most μN. Excludes `creepage_x`. With `profiles`: only for a single
+    /// motion.
     #[member(closed(-1e15, 1e15, "N"))]
     pub force_x_n: Option<f64>,
-    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`; with `profiles` in one motion alone: in track axes, with the normal forces.
+    /// Lateral force on the lower body in N, over all patches, at most μN. Excludes `creepage_y`. With `profiles`: only for a single
+    /// motion, in track axes and including normal forces.
     #[member(closed(-1e15, 1e15, "N"))]
     pub force_y_n: Option<f64>,
-    /// Rolling speed in mm/s; only temperatures, Archard's wear and friction that falls with slip depend on it.
+    /// Rolling speed in mm/s; affects only temperatures, Archard's wear and friction that falls with slip.
     #[member(positive(1e9, "mm/s"))]
     pub speed_mm_per_s: Option<f64>,
 }
@@ -54,30 +55,30 @@ pub struct AskedMotion {
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum Motions {
-    /// One motion; components left out are 0, but at least one has to be given.
+    /// One motion; omitted components are 0, but at least one must be given.
     One(AskedMotion),
     /// Several motions on the same patch, solved in order.
     Many(Vec<AskedMotion>),
-    /// Motions generated from values of their components.
+    /// Motions generated from lists or ranges of their components.
     Sweep {
-        /// The values of its components.
+        /// Values of the components.
         sweep: Sweep,
     },
-    /// Rolling that changes: motions or forces in the distance rolled.
+    /// A motion that changes with the rolled distance.
     History {
         /// Motions, forces and shifts, distance by distance.
         history: History,
-        /// The state at the distance 0; `rest` when left out.
+        /// State at distance 0; default `rest`.
         #[schema(required = false)]
         start: HistoryStartName,
     },
-    /// The motion of the wheelset, from which every patch gets its own creepages; for `profiles` and `wheelset`.
+    /// The motion of the wheelset, from which the creepages of each patch follow; for `profiles` and `wheelset`.
     Wheelset {
         /// How the wheelset moves.
         wheelset: Wheelset,
     },
-    /// Several motions of the wheelset, for the contact `wheelset` only: with `combine: together` one for each position, or all in the same
-    /// position; with `grid` every position with every motion, motions fastest.
+    /// Several motions of the wheelset, for the contact `wheelset` only. `combine: together`: one motion per position, or all in the same
+    /// position; `grid`: every position with every motion, motions varying fastest.
     Wheelsets {
         /// How the wheelset moves; never empty.
         wheelset: Vec<Wheelset>,
@@ -99,33 +100,33 @@ pub struct Wheelset {
     /// Angular velocity Ω about the axle in rad/s, positive for rolling forward.
     #[member(closed(-1e6, 1e6, "rad/s"))]
     pub angular_velocity_rad_per_s: Option<f64>,
-    /// Radius in mm at which the wheel would roll freely: Ω is the speed divided by it.
+    /// Radius in mm at which the wheel would roll freely: Ω is the speed divided by this radius.
     #[member(positive(1e9, "mm"))]
     pub free_rolling_radius_mm: Option<f64>,
     /// Torque about the axle that a drive or a brake exerts on the wheelset, in N mm, positive if it drives forward; for the contact
-    /// `wheelset` only. The angular velocity is found at which the rails balance it: 0 is a wheelset that rolls freely.
+    /// `wheelset` only. The angular velocity that balances it is computed; 0 is free rolling.
     #[member(closed(-1e15, 1e15, "N mm"))]
     pub drive_torque_n_mm: Option<f64>,
-    /// Longitudinal force on the rail in N, over all patches of the wheel; for the contact `profiles` only. The angular velocity is found at which
-    /// the rail carries it.
+    /// Longitudinal force on the rail in N, over all patches of the wheel; for the contact `profiles` only. The angular velocity is
+    /// computed.
     #[member(closed(-1e15, 1e15, "N"))]
     pub force_x_n: Option<f64>,
-    /// Velocity of the centre to the left in mm/s; 0 when left out.
+    /// Velocity of the centre to the left in mm/s; default 0.
     #[member(closed(-1e9, 1e9, "mm/s"))]
     pub lateral_velocity_mm_per_s: Option<f64>,
-    /// Lateral force on the rail in N, over all patches of the wheel, in track axes and with the normal forces; for the contact `profiles` only.
-    /// The lateral velocity is found at which the rail carries it.
+    /// Lateral force on the rail in N, over all patches of the wheel, in track axes and including normal forces; for the contact `profiles`
+    /// only. The lateral velocity is computed.
     #[member(closed(-1e15, 1e15, "N"))]
     pub force_y_n: Option<f64>,
-    /// Rate of the yaw in rad/s; 0 when left out.
+    /// Yaw rate in rad/s; default 0.
     #[member(closed(-1e6, 1e6, "rad/s"), default)]
     pub yaw_rate_rad_per_s: f64,
-    /// Rate of the roll in rad/s; 0 when left out.
+    /// Roll rate in rad/s; default 0.
     #[member(closed(-1e6, 1e6, "rad/s"), default)]
     pub roll_rate_rad_per_s: f64,
 }
 
-/// Values of the motion's components. A component left out is 0.
+/// Values of the motion's components; omitted components are 0.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_components, faults_of_sweep)]
@@ -145,11 +146,11 @@ pub struct Sweep {
     /// Lateral force on the lower body in N, in place of `creepage_y`.
     #[member(with = swept, closed(-1e15, 1e15, "N"))]
     pub force_y_n: Option<Swept>,
-    /// Rolling speed in mm/s, the same for all motions; only temperatures, Archard's wear and friction that falls with slip depend on it.
+    /// Rolling speed in mm/s, the same for all motions; affects only temperatures, Archard's wear and friction that falls with slip.
     #[member(positive(1e9, "mm/s"))]
     pub speed_mm_per_s: Option<f64>,
     /// `together` (default): all components that vary have the same number of values, and motion n has value n of each; `grid`: every
-    /// combination of values. In a grid, the last component of this list varies fastest; a force takes the position of the creepage it
+    /// combination of values. In a grid, the last component of this list varies fastest; a force takes the position of the creepage that it
     /// replaces.
     #[member(default)]
     pub combine: Combine,
@@ -174,11 +175,11 @@ pub enum Swept {
     Constant(f64),
     /// Equally spaced values.
     Range(Range),
-    /// These values, in this order.
+    /// A list of values, in this order.
     List(ValueList),
 }
 
-/// Values one by one.
+/// A list of values.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct ValueList {
     /// The values, at least one.
@@ -197,11 +198,12 @@ impl Swept {
     }
 }
 
-/// A motion that changes as the bodies roll. Creepages, spin and forces change linearly from one distance to the next; before the first
-/// distance they are those of the first. The points of the answer are the distances.
+/// A motion that changes as the bodies roll. Creepages, spin and forces change linearly between distances and are constant before the first
+/// one. The result has a point at each distance.
 ///
-/// Where a distance equals the one before, or is 0 at first, the bodies do not roll but are shifted: by `shift_x_mm`, `shift_y_mm` and
-/// `turn_rad`, or until the prescribed forces are reached. Two equal distances are thus also a jump of a creepage or force.
+/// At a distance equal to the previous one, or at a first distance of 0, the bodies do not roll but are displaced: by `shift_x_mm`,
+/// `shift_y_mm` and `turn_rad`, or until the prescribed forces are reached. Two equal distances can therefore describe a jump of a creepage
+/// or force.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_history)]
@@ -218,22 +220,22 @@ pub struct History {
     /// Spin in 1/mm.
     #[member(with = course, closed(-1e6, 1e6, "1/mm"))]
     pub spin_per_mm: Option<HistoryCourse>,
-    /// Longitudinal force on the lower body in N, in place of `creepage_x`; creepages and shifts that give it are found.
+    /// Longitudinal force on the lower body in N, in place of `creepage_x`; the creepages and shifts that produce it are computed.
     #[member(with = course, closed(-1e15, 1e15, "N"))]
     pub force_x_n: Option<HistoryCourse>,
     /// Lateral force on the lower body in N, in place of `creepage_y`.
     #[member(with = course, closed(-1e15, 1e15, "N"))]
     pub force_y_n: Option<HistoryCourse>,
-    /// Rolling speed in mm/s, which friction that falls with slip needs.
+    /// Rolling speed in mm/s; required by friction that falls with slip.
     #[member(positive(1e9, "mm/s"))]
     pub speed_mm_per_s: Option<f64>,
-    /// Displacement of the upper body against the lower one along x in mm, from the point before; 0 where the bodies roll.
+    /// Displacement of the upper body relative to the lower one along x in mm, since the previous point; 0 where the bodies roll.
     #[member(with = course, closed(-1e6, 1e6, "mm"))]
     pub shift_x_mm: Option<HistoryCourse>,
-    /// The same along y.
+    /// Displacement along y, as `shift_x_mm`.
     #[member(with = course, closed(-1e6, 1e6, "mm"))]
     pub shift_y_mm: Option<HistoryCourse>,
-    /// Turn of the upper body against the lower one about z in rad, from the point before; 0 where the bodies roll.
+    /// Rotation of the upper body relative to the lower one about z in rad, since the previous point; 0 where the bodies roll.
     #[member(with = course, closed(-10.0, 10.0, "rad"))]
     pub turn_rad: Option<HistoryCourse>,
 }
@@ -255,12 +257,12 @@ impl History {
     }
 }
 
-/// A number for all points of a history, or one value per point.
+/// One value for all points of a history, or one value per point.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 #[schema(as = Course)]
 pub enum HistoryCourse {
-    /// The same at every point.
+    /// The same value at every point.
     Constant(f64),
     /// Equally spaced values.
     Range(Range),
@@ -426,7 +428,7 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
     for name in &foreign {
         block.fault(
             name,
-            format!("given, but {balanced} is what such a contact can balance"),
+            format!("given, but such a contact can balance only {balanced}"),
         );
     }
     let read = Wheelset::members(block);
@@ -603,7 +605,7 @@ pub(crate) fn faults_of_history(block: &mut Object, read: Option<&History>) -> O
         };
         if count != points {
             let detail = format!(
-                "{count} values given for {points} distances; as many as distances are needed, or one number"
+                "{count} values given for {points} distances; give one value per distance, or one number"
             );
             block.fault(name, detail);
             sound = false;

@@ -429,7 +429,7 @@ pub(crate) fn count_rest(
         faults.add(
             pointer,
             format!(
-                "{} more values are refused like those before; {allowed} is needed",
+                "{} more values are refused for the same reason; {allowed} is needed",
                 refused - LISTED_MAX
             ),
         );

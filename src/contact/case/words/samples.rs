@@ -31,7 +31,7 @@ pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
         block.faults().add(
             join(&pointer, i),
             format!(
-                "{} given after {}; coordinates have to increase strictly, each by more than {least:e} mm",
+                "{} given after {}; coordinates must increase strictly, each by more than {least:e} mm",
                 axis[i],
                 axis[i - 1]
             ),

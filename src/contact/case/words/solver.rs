@@ -24,7 +24,7 @@ use crate::contact::case::words::object::{Object, names, shown, word};
 use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
 use crate::contact::rolling::task::{PrescribedForces, TARGET_LEAST, TARGET_USUAL};
 
-/// How to solve, and how exactly.
+/// Method and accuracy of the solution.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema, Members)]
 #[members(mismatches)]
@@ -34,17 +34,17 @@ pub struct Solver {
     pub method: MethodName,
     /// Allowed error of the resultants relative to μN (moment: μN√(A/π)), 1e-4 to 0.5. Excludes `mesh`.
     ///
-    /// Most cases reach 0.001, few 1e-4. One that ends above its target has `target_met: false` and the remark `target-missed`. 0.005 when
-    /// left out, except for `fastsim`: its stated error is fixed, so that it has no target, and no `target_met`, unless one is given.
+    /// Most cases reach 0.001, few 1e-4. A case that ends above its target has `target_met: false` and the remark `target-missed`. Default
+    /// 0.005, except for `fastsim`: its stated error is fixed, so it has no target and no `target_met` unless a target is given.
     #[schema(minimum = 0.0001, maximum = 0.5)]
     #[member(closed(TARGET_LEAST, 0.5, ""))]
     pub target_error: Option<f64>,
-    /// What the allowed error is relative to; `friction_limit` when left out. With `force` a motion is solved again until its error is
-    /// `target_error` of its own tangential force, but at most to 1e-4 of μN. Not allowed with `mesh` and for histories.
+    /// What the allowed error is relative to; default `friction_limit`. With `force`, a motion is solved again until its error is
+    /// `target_error` of its own tangential force, but not below 1e-4 of μN. Not allowed with `mesh` or for histories.
     pub relative_to: Option<RelativeToName>,
     /// An explicit mesh instead of a target.
     pub mesh: Option<MeshSizeWords>,
-    /// The bound of the tractions in `fastsim`; `elliptic` when left out. Not allowed for other methods.
+    /// Traction bound of `fastsim`; default `elliptic`. Not allowed for other methods.
     pub traction_bound: Option<TractionBoundName>,
     /// Give up after this many seconds of solving.
     #[member(positive(86_400.0, "s"))]
@@ -83,7 +83,7 @@ pub enum MethodName {
     Table,
 }
 
-/// What an error is relative to.
+/// Reference quantity of a relative error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = RelativeTo)]
@@ -95,7 +95,7 @@ pub enum RelativeToName {
     Force,
 }
 
-/// Where `fastsim` lets tractions slip.
+/// Traction bound at which `fastsim` slips.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
 #[schema(as = TractionBound)]
@@ -121,7 +121,7 @@ pub struct MeshSizeWords {
     pub cells: u32,
 }
 
-/// What a case may ask for. What is not asked for is not part of the answer.
+/// A quantity that a case can request. The result contains requested quantities only.
 #[derive(
     Debug,
     Clone,
@@ -168,37 +168,37 @@ impl Output {
     }
 }
 
-/// One contact case: two bodies, how they are pressed together and how they roll.
+/// One contact case: two bodies, their load and their motion.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Case {
-    /// Free text for people, at most 200 characters, none of them a control character.
+    /// Free text for people, at most 200 characters, no control characters.
     pub name: Option<String>,
-    /// Free key–value pairs to find the case again, at most 32 of them, without control characters; no key has a colon.
+    /// Key–value pairs for finding the case again: at most 32, without control characters; keys contain no colon.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     #[schema(required = false)]
     pub labels: BTreeMap<String, String>,
     /// Elastic constants of the two bodies.
     pub material: Material,
-    /// Friction between them.
+    /// Friction between the bodies.
     pub friction: Friction,
     /// Where and how the bodies touch.
     pub contact: Contact,
-    /// How hard they are pressed together; needed unless the contact carries its own pressure.
+    /// The load that presses the bodies together; required unless `contact` gives the pressure.
     pub load: Option<Load>,
     /// One motion, a list of motions, or a sweep.
     pub motion: Motions,
-    /// Method and accuracy; `{"method": "auto", "target_error": 0.005}` when left out.
+    /// Method and accuracy; default `{"method": "auto", "target_error": 0.005}`.
     #[schema(required = false)]
     pub solver: Solver,
-    /// What to compute; `["resultants", "zones"]` when left out.
+    /// Quantities to compute; default `["resultants", "zones"]`.
     #[schema(required = false)]
     pub outputs: Vec<Output>,
-    /// Where stresses below the surface are computed; for the output `subsurface`, which finds the worst point without it.
+    /// Points for the output `subsurface`, which computes stresses below the surface; default: only the worst point is found.
     pub subsurface: Option<SubsurfaceWords>,
-    /// Damage models for the output `damage`. When left out, the models with confirmed parameters are evaluated.
+    /// Damage models for the output `damage`. Default: the models with confirmed parameters.
     pub damage: Option<DamageWords>,
-    /// What the bodies do with heat; for the output `temperature`.
+    /// Thermal properties of the bodies, for the output `temperature`.
     pub thermal: Option<ThermalWords>,
 }
 

@@ -12,8 +12,8 @@ use crate::contact::case::words::object::{
     AllowedRange, Member, Object, join, names, number, shown, word,
 };
 
-/// Where stresses below the surface are asked for, in the axes of the patch: x along rolling, y to the left, depth positive into the
-/// body. At most one of `points_mm`, `along_depth_at_mm` and `plane`; without any, only the worst point is found.
+/// Points for stresses below the surface, in the axes of the patch: x along rolling, y to the left, depth positive into the body. At most
+/// one of `points_mm`, `along_depth_at_mm` and `plane`; without them only the worst point is found.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_places)]
@@ -22,7 +22,7 @@ pub struct SubsurfaceWords {
     /// Points `[x, y, depth]` in mm.
     #[member(with = points)]
     pub points_mm: Option<Vec<[f64; 3]>>,
-    /// The line straight down from `[x, y]` in mm, or below the `"worst"` point of the patch; needs `depths_mm`.
+    /// The vertical line below `[x, y]` in mm, or below the `"worst"` point of the patch; requires `depths_mm`.
     #[member(with = line_at)]
     pub along_depth_at_mm: Option<DepthLineAt>,
     /// Depths on that line in mm.
@@ -30,17 +30,17 @@ pub struct SubsurfaceWords {
     pub depths_mm: Option<Vec<f64>>,
     /// A grid of points, usually in a plane.
     pub plane: Option<StressGrid>,
-    /// The body: `lower` when left out.
+    /// The body; default `lower`.
     #[member(default)]
     pub body: BodyName,
-    /// Find the point of every patch where von Mises' stress is largest; `true` when left out.
+    /// Find the point of every patch with the largest von Mises stress; default `true`.
     #[member(default = true)]
     pub worst: bool,
-    /// Judge what a point of the body lives through while the contact rolls over it: Dang Van's criterion and shakedown.
+    /// Evaluate Dang Van's criterion and shakedown for a point of the body while the contact rolls over it.
     pub passage: Option<PassageWords>,
 }
 
-/// What is judged of a passage of the contact in steady rolling: shakedown always, Dang Van's criterion with its slope.
+/// Criteria to evaluate for the passage of the contact in steady rolling: always shakedown, and Dang Van's criterion if its slope is given.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
 #[schema(as = Passage)]
 pub struct PassageWords {
@@ -51,13 +51,13 @@ pub struct PassageWords {
     pub dang_van_slope: Option<f64>,
 }
 
-/// Where a line of depths begins.
+/// The surface point below which depths are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum DepthLineAt {
     /// At `[x, y]` in mm.
     Place([f64; 2]),
-    /// At a point that is found.
+    /// A point that the service finds.
     Found(FoundPlace),
 }
 
@@ -69,7 +69,7 @@ pub enum FoundPlace {
     Worst,
 }
 
-/// The product of three axes, x fastest, then y, then depth; for a plane one of them is a single number.
+/// The product of three axes: x varies fastest, then y, then depth. For a plane, one axis is a single number.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 pub struct StressGrid {
     /// x in mm.
@@ -89,9 +89,9 @@ pub struct StressGrid {
 pub enum GridAxis {
     /// One coordinate.
     One(f64),
-    /// As listed.
+    /// A list of coordinates.
     List(Vec<f64>),
-    /// Equally spaced, both ends included.
+    /// Equally spaced coordinates, both ends included.
     Spaced {
         /// First coordinate.
         from: f64,
@@ -117,18 +117,18 @@ pub enum BodyName {
     Upper,
 }
 
-/// Which damage models are evaluated, and with which figures.
+/// Damage models to evaluate, and their parameters.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[schema(as = Damage)]
 pub struct DamageWords {
-    /// Models to evaluate. When left out: `t_gamma` and `usfd_wear`, the models whose parameters are confirmed.
+    /// Models to evaluate. Default: `t_gamma` and `usfd_wear`, the models with confirmed parameters.
     #[member(with = models, default = MODELS_USUAL.to_vec())]
     pub models: Vec<DamageModel>,
-    /// The name of a set of figures, or figures in place of some of the default set's.
+    /// Name of a parameter set, or parameters that replace some of the default set's.
     #[member(with = parameters)]
     pub parameters: Option<DamageParameterWords>,
-    /// Wear strip by strip across the patch, from the power of every cell, beside that of the patch as a whole; `false` when left out.
+    /// Also compute wear strip by strip across the patch, from the power of every cell; default `false`.
     #[member(default)]
     pub across: bool,
 }
@@ -160,21 +160,21 @@ pub enum DamageModel {
     Wlrm,
     /// Surface fatigue index.
     SurfaceFatigueIndex,
-    /// Place on the shakedown map.
+    /// Position on the shakedown map.
     Shakedown,
 }
 
-/// The name of a set, or figures of the client's.
+/// Name of a parameter set, or parameters of the client.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum DamageParameterWords {
     /// A named set: `900a-r8t-1`.
     Named(DamageSetName),
-    /// Figures in place of the default set's.
+    /// Parameters that replace those of the default set.
     Own(Box<OwnDamageFigures>),
 }
 
-/// Named sets of figures; a set that is changed gets another name.
+/// Named parameter sets; a set that is changed gets another name.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words, Finite,
 )]
@@ -185,17 +185,17 @@ pub enum DamageSetName {
     Rail900aWheelR8t,
 }
 
-/// Figures of the client's; those left out are the default set's.
+/// Parameters of the client; the default set supplies those omitted.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema, Members)]
 pub struct OwnDamageFigures {
     /// Density of the worn material in kg/m³.
     #[member(positive(1e5, "kg/m³"))]
     pub density_kg_per_m3: Option<f64>,
-    /// Yield stress in shear in MPa, of the surface fatigue index and the shakedown map.
+    /// Yield stress in shear in MPa, for the surface fatigue index and the shakedown map.
     #[member(positive(1e6, "MPa"))]
     pub shear_yield_mpa: Option<f64>,
-    /// Hardness of the worn material in MPa, of Archard's law.
+    /// Hardness of the worn material in MPa, for Archard's law.
     #[member(positive(1e6, "MPa"))]
     pub hardness_mpa: Option<f64>,
     /// The wear map of the University of Sheffield.
@@ -206,55 +206,55 @@ pub struct OwnDamageFigures {
     pub wlrm: Option<WlrmFigures>,
 }
 
-/// Wear rate over power per area x in N/mm²: proportional to x, then constant, then rising again; without steps.
+/// Wear rate over power per area x in N/mm²: proportional to x, then constant, then rising again, without jumps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members, Finite)]
 #[members(faults_of_usfd)]
 pub struct UsfdFigures {
     /// Rate over x where wear is mild, in µg/(m mm²) per N/mm².
     #[member(positive(1e12, ""))]
     pub mild_slope: f64,
-    /// Mild up to this x in N/mm².
+    /// Wear is mild up to this x in N/mm².
     #[member(positive(1e12, ""))]
     pub mild_until: f64,
-    /// Severe, with the rate reached there, up to this x in N/mm².
+    /// Wear is severe, at the rate reached at `mild_until`, up to this x in N/mm².
     #[member(positive(1e12, ""))]
     pub severe_until: f64,
-    /// Slope of the rate beyond.
+    /// Slope of the rate above `severe_until`.
     #[member(positive(1e12, ""))]
     pub catastrophic_slope: f64,
 }
 
-/// Archard's coefficients, each as the range `[low, high]` that measurements leave.
+/// Archard's wear coefficients, each as the range `[low, high]` of the measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members, Finite)]
 pub struct ArchardFigures {
-    /// Of mild wear, below the first and above the second sliding speed.
+    /// Mild wear: below the first and above the second sliding speed.
     #[member(with = pair)]
     pub mild: [f64; 2],
-    /// Of severe wear, between them.
+    /// Severe wear: between the two sliding speeds.
     #[member(with = pair)]
     pub severe: [f64; 2],
-    /// Of seizure, where the pressure exceeds its limit.
+    /// Seizure: where the pressure exceeds its limit.
     #[member(with = pair)]
     pub seizure: [f64; 2],
     /// The two sliding speeds in mm/s.
     #[member(with = pair)]
     pub speeds_mm_per_s: [f64; 2],
-    /// Seizure from this pressure over hardness on.
+    /// Ratio of pressure to hardness above which seizure occurs.
     #[member(positive(1e12, ""))]
     pub seizure_pressure: f64,
 }
 
-/// Damage of one pass over Tγ without spin: 0 up to a threshold, linear to a peak, linear down to 0 and on below it.
+/// Damage of one pass over Tγ without spin: 0 up to a threshold, then linear up to a peak, then linear down through 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members, Finite)]
 #[members(faults_of_wlrm)]
 pub struct WlrmFigures {
-    /// No damage up to this Tγ in N.
+    /// Tγ in N up to which there is no damage.
     #[member(positive(1e12, ""))]
     pub threshold_n: f64,
-    /// Most damage at this Tγ in N.
+    /// Tγ in N of the peak.
     #[member(positive(1e12, ""))]
     pub peak_at_n: f64,
-    /// Wear outweighs fatigue from this Tγ on, in N.
+    /// Tγ in N above which wear outweighs fatigue.
     #[member(positive(1e12, ""))]
     pub zero_at_n: f64,
     /// Damage of one pass at the peak; 1 is a visible crack.

@@ -488,7 +488,7 @@ impl From<conjugate_gradients::PressureFailure> for NormalError {
 
 pub(crate) fn no_touch(approach: f64, least: f64) -> String {
     format!(
-        "the bodies do not touch: the approach of {approach} mm is not more than the least gap of {least} mm"
+        "the bodies do not touch: the approach of {approach} mm is not more than the smallest gap of {least} mm"
     )
 }
 

@@ -21,7 +21,7 @@ const CELLS_ACROSS_MIN: f64 = 11.0;
 
 /// A patch with too few cells.
 struct Coarse {
-    /// Where it is, `[x, y]` in mm.
+    /// Position of the highest temperature, `[x, y]` in mm.
     middle: [f64; 2],
     /// Cells across its narrower side.
     cells: f64,

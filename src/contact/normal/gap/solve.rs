@@ -29,12 +29,12 @@ impl GapTask {
         let gap = |reason: String| Err(("/contact/gap_mm", reason));
         if least == largest {
             return gap(format!(
-                "the gap is {least} mm everywhere; a least gap inside is needed"
+                "the gap is {least} mm everywhere; a smallest gap inside the data is needed"
             ));
         }
         if let Some(place) = self.gap.least_at_edge() {
             return gap(format!(
-                "the least gap, {least} mm, lies at the edge of the data, at {place}; a least gap inside is needed"
+                "the smallest gap, {least} mm, lies at the edge of the data, at {place}; a smallest gap inside the data is needed"
             ));
         }
         match self.loading {

@@ -69,7 +69,7 @@ impl GridPressure {
         }
         if !q.iter().any(|q| *q > 0.0) {
             return Err(
-                "no pressure more than 0 given; at least one is needed for a contact".to_owned(),
+                "no pressure above 0 given; at least one is needed for a contact".to_owned(),
             );
         }
         let (mut field, samples) = GridPressure::from_squares(grid, q, pressure_max)?;

@@ -34,10 +34,10 @@ macro_rules! motion_remarks {
                 /// Difference of the two forces relative to the friction limit.
                 force_change: f64 = 0.08,
             }
-            advice: "The answer is the state reached from small slip. Ask with less speed, pressure or fall to see where the two part.",
+            advice: "The result is the state reached from small slip. Reduce the speed, the pressure or the fall of friction to see where the two states separate.",
             detail: format!(
                 "friction falls so fast with slip that a second state exists, reached from sliding, whose force differs by {} of \
-                 the friction limit; the answer is the one reached from rest",
+                 the friction limit; the result is the one reached from rest",
                 short(force_change)
             ),
 
@@ -54,7 +54,7 @@ macro_rules! motion_remarks {
                 short(peclet)
             ),
 
-            /// The error is not known to be below the target.
+            /// The estimated error exceeds the target, or is unknown.
             Warning TargetMissed {
                 /// What error and target are relative to.
                 relative_to: &'static str = "μN",
@@ -63,7 +63,7 @@ macro_rules! motion_remarks {
                 /// The target.
                 target: f64 = 1e-3,
             }
-            advice: "Use the numbers with their error estimate, or ask for a larger target.",
+            advice: "Use the numbers with their error estimate, or request a larger target.",
             detail: match estimate {
                 Some(estimate) => format!(
                     "the error relative to {relative_to} is estimated at {}, the target was {target}", short(estimate)
@@ -87,7 +87,7 @@ macro_rules! motion_remarks {
                 100.0 * error_over_force
             ),
 
-            /// No creepage gives the prescribed force; the answer has the nearest force found.
+            /// No creepage gives the prescribed force; the result has the nearest force found.
             Warning ForceUnreachable {
                 /// Force asked for along rolling; absent if none was.
                 wanted_x_n: Option<f64> = Some(29_000.0),
@@ -98,44 +98,44 @@ macro_rules! motion_remarks {
                 /// Force found across.
                 found_y_n: f64 = -350.0,
             }
-            advice: "Ask for a smaller force: the tractions due to spin use up a part of μN. The motion has `saturated: true`.",
+            advice: "Prescribe a smaller force: the tractions due to spin use up a part of μN. The motion has `saturated: true`.",
             detail: {
                 let wanted = |force: &Option<f64>| {
                     force.map_or_else(|| "free".to_owned(), |force| format!("{force} N"))
                 };
                 format!(
-                    "no creepage gives the force asked for (x: {}, y: {}); the nearest found is {found_x_n:.6e} N, {found_y_n:.6e} N",
+                    "no creepage gives the prescribed force (x: {}, y: {}); the nearest found is {found_x_n:.6e} N, {found_y_n:.6e} N",
                     wanted(wanted_x_n), wanted(wanted_y_n)
                 )
             },
 
-            /// An iteration ended before it met its tolerance, and its result was used all the same.
+            /// An iteration ended before it met its tolerance; its result is used.
             Warning IterationInexact {
                 /// Which iteration.
                 iteration: &'static str = "force control",
                 /// How it ended, as a clause.
-                reason: &'static str = "the trials were used up",
+                reason: &'static str = "the iteration limit was reached",
                 /// Its last residual, in the measure of the iteration.
                 residual: f64 = 3e-5,
                 /// The residual that was wanted.
                 tolerance: f64 = 2e-6,
             }
-            advice: "Judge by `residual` against `tolerance` whether the answer is still good enough; it is not part of the error estimate.",
+            advice: "Compare `residual` with `tolerance` to decide whether the result is accurate enough; the error estimate does not include this deviation.",
             detail: format!(
-                "{iteration} ended before its tolerance was met: {reason}; the residual is {residual:.2e}, {tolerance:.2e} was wanted"
+                "{iteration} ended before its tolerance was met: {reason}; the residual is {residual:.2e}, the tolerance {tolerance:.2e}"
             ),
 
-            /// The scatter of the wear coefficients is not published; a stated factor stands for it.
+            /// The scatter of the wear coefficients is not published; a stated factor replaces it.
             Info CoefficientScatterStated {
                 /// The factor.
                 factor: f64 = 2.0,
             }
-            advice: "Give the factor that your own measurements leave as `coefficient_factor`.",
+            advice: "Give the scatter of your own measurements as `coefficient_factor`.",
             detail: format!(
-                "no scatter of the coefficients of this wear map is published; it is taken as a factor of {factor}, with a probability of 90 %"
+                "no scatter of the coefficients of this wear map is published; it is assumed to be a factor of {factor} with a probability of 90 %"
             ),
 
-            /// A profile has worn to a pressure at which steel flows.
+            /// The contact pressure of a worn profile exceeds the hardness of the steel.
             Warning PressureAboveHardness {
                 /// Largest pressure of the evolution.
                 largest_mpa: f64 = 3100.0,
@@ -156,19 +156,19 @@ macro_rules! motion_remarks {
             }
             advice: "Raise `accuracy.states_max`.",
             detail: format!(
-                "twice the states would change the distribution of wear by {} %; {} % were asked for",
+                "twice the number of states would change the distribution of wear by {} %; the tolerance is {} %",
                 short(100.0 * traffic_error),
                 short(100.0 * tolerance_asked)
             ),
 
-            /// Some of the traffic has no answer and wears nothing.
+            /// Part of the traffic could not be solved and causes no wear.
             Warning StatesUnsolved {
                 /// Largest share of the traffic without an answer.
                 unsolved_share: f64 = 0.03,
             }
             advice: "`failure` in the states of the records says why.",
             detail: format!(
-                "up to {} % of the traffic have no answer; they wear nothing",
+                "up to {} % of the traffic could not be solved and causes no wear",
                 short(100.0 * unsolved_share)
             ),
         }

@@ -23,7 +23,7 @@ macro_rules! normal_remarks {
                 /// Its part of the load.
                 load_share: f64 = 0.059,
             }
-            advice: "Take the width and the pressure of this patch as uncertain by some per cent; if it matters, solve it in a case of its own.",
+            advice: "Take the width and the pressure of this patch as uncertain by some per cent; if it matters, solve it in a separate case.",
             detail: format!(
                 "the patch carries {} % of the load and has only {cells_across:.0} cells across: its width and its pressure are uncertain by \
                  some per cent",
@@ -72,7 +72,7 @@ macro_rules! normal_remarks {
                 /// Rolling radius.
                 rolling_radius_mm: f64 = 20.0,
             }
-            advice: "Half-spaces do not describe such bodies: take the answer as approximate.",
+            advice: "Half-spaces do not describe such bodies: treat the result as approximate.",
             detail: format!(
                 "the contact is {} mm long, compared with a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
                  conformal, and half-spaces do not describe them",
@@ -86,7 +86,7 @@ macro_rules! normal_remarks {
                 /// Smaller half width of the contact.
                 half_width_mm: f64 = 3.4,
             }
-            advice: "Check units and load. If they are right, the bodies yield and pressures are lower than the answer says.",
+            advice: "Check units and load. If they are right, the bodies yield and pressures are lower than those of the result.",
             detail: format!(
                 "the bodies overlap by {} mm, compared with a half width of {} mm of the contact: strains are too large for linear elasticity",
                 short(overlap_mm),
@@ -108,20 +108,20 @@ macro_rules! normal_remarks {
                 short(half_width_mm)
             ),
 
-            /// The largest pressure is far beyond what steel bears.
+            /// The largest pressure is far above the strength of steel.
             Warning PressureImplausible {
                 /// Largest pressure.
                 pressure_max_mpa: f64 = 8100.0,
                 /// The largest that passes without a remark.
                 usual_max_mpa: f64 = 5000.0,
             }
-            advice: "Check the units of load and geometry. If they are right, the bodies yield and the pressure is lower than the answer says.",
+            advice: "Check the units of load and geometry. If they are right, the bodies yield and the pressure is lower than that of the result.",
             detail: format!(
                 "the largest pressure is {} MPa, more than {usual_max_mpa} MPa: bodies of steel would yield",
                 short(pressure_max_mpa)
             ),
 
-            /// A length of the track or the wheelset would be usual in another unit than mm.
+            /// A length of the track or the wheelset is unusual in mm, but usual in another unit.
             Warning LengthUnusual {
                 /// The length as given.
                 length_mm: f64 = 1.435,
@@ -138,13 +138,13 @@ macro_rules! normal_remarks {
                 /// The shakedown limit.
                 shakedown_limit_mpa: f64 = 1500.0,
             }
-            advice: "The answer is elastic. Harder steel has a higher limit; traction lowers it.",
+            advice: "The result is elastic. Harder steel has a higher limit; traction lowers it.",
             detail: format!(
                 "the largest pressure of {pressure_max_mpa:.0} MPa is above {shakedown_limit_mpa} MPa, the shakedown limit of rail steel R260 in \
                  pure rolling: repeated passages deform the surface plastically"
             ),
 
-            /// The load is larger than any wheel bears.
+            /// The load is larger than any wheel carries.
             Warning LoadImplausible {
                 /// Normal force of all patches.
                 normal_force_n: f64 = 1e12,
@@ -184,28 +184,29 @@ macro_rules! case_remarks {
                 /// The unit that it is likely given in.
                 likely_unit: String = "kN".to_owned(),
             }
-            advice: "Check the unit of the member that `pointer` names; if the number is meant as it stands, nothing is wrong.",
+            advice: "Check the unit of the member that `pointer` names; if the number is intended, no action is needed.",
             detail: format!("{given} {unit} is unusual for wheel and rail: is it given in {likely_unit}?"),
 
-            /// The two bodies differ. Their materials are combined, but pressure and traction are solved one after the other.
+            /// The materials of the bodies differ. They are combined, but the coupling of pressure and traction is neglected.
             Warning CouplingNeglected {
                 /// Difference parameter K (Kalker 1990, eq. 1.44).
                 difference_parameter: f64 = 0.021,
             }
-            advice: "Expect errors of the order of K in tractions, or take `boundary_element`, which couples them.",
+            advice: "Expect errors of the order of K in tractions, or use `boundary_element`, which includes the coupling.",
             detail: format!(
                 "the two bodies differ (K = {}); the coupling of pressure and traction is neglected",
                 short(difference_parameter)
             ),
 
-            /// The two bodies differ. Tractions follow from the pressure, but the pressure is that without tractions.
+            /// The materials of the bodies differ. The effect of pressure on tractions is included, the effect of tractions on pressure
+            /// is not.
             Warning CouplingFirstOrder {
                 /// Difference parameter K (Kalker 1990, eq. 1.44).
                 difference_parameter: f64 = 0.1,
                 /// Error of forces that this leaves, relative to the friction limit; it is part of the error estimates.
                 error: f64 = 0.018,
             }
-            advice: "The error is part of the estimates. Steady motions also include the effect of tractions on pressure, but for those whose tractions part or join patches.",
+            advice: "The error estimates include this error. Steady motions include both effects, except motions whose tractions separate or join patches.",
             detail: format!(
                 "the two bodies differ (K = {}); the effect of pressure on tractions is included, the effect of tractions on \
                  pressure is not; this leaves an error of {} of the friction limit",
@@ -252,7 +253,8 @@ macro_rules! wheel_remarks {
                  a longer profile", y_mm[0], y_mm[1], short(left_mm)
             ),
 
-            /// The target is smaller than the uncertainty that the measurement of the profiles leaves: a finer solve adds nothing.
+            /// The target is smaller than the uncertainty due to the measurement of the profiles; a finer solution does not improve the
+            /// result.
             Info TargetBelowProfileUncertainty {
                 /// The target, relative to μN.
                 target: f64 = 1e-3,
@@ -265,7 +267,7 @@ macro_rules! wheel_remarks {
                 short(100.0 * uncertainty), short(100.0 * target)
             ),
 
-            /// The case does not ask for a reference surface, and the curve of the rail does not solve it: it is solved on planes of contact.
+            /// The case names no reference surface and cannot be solved on the curve of the rail, so it is solved on planes of contact.
             Warning OnPlanes {
                 /// Why.
                 reason: String = "only boundary_element is solved on the curve of the rail".to_owned(),
@@ -273,32 +275,35 @@ macro_rules! wheel_remarks {
             advice: "Expect larger errors than the error estimate where the rail bends under a patch: 15 % of μN at a gauge corner. Give `reference_surface` \"plane\" to solve on planes without this remark.",
             detail: format!("solved on planes of contact: {reason}"),
 
-            /// The surface turns over the contact by more than the factors of the influence are known for.
+            /// The slope of the surface changes over the contact by more than the range for which influence factors are known.
             Info TurnBeyondRange {
                 /// Turn of the rail's surface from one end of the contact to the other.
                 turn_rad: f64 = 1.4,
                 /// Turn up to which the factors were compared with boundary elements.
                 range_rad: f64 = 1.25,
             }
-            advice: "Take the forces as approximate: the influence between the ends of the contact is extrapolated, and the rail head is no half-space there.",
+            advice: "Treat the forces as approximate: the influence between the ends of the contact is extrapolated, and the rail head is not a half-space there.",
             detail: format!(
                 "the surface turns by {} rad over the contact; the influence between its ends is known up to {range_rad} rad",
                 short(turn_rad)
             ),
 
-            /// The tractions of a motion in a list change the number of patches, or leave no answer; its pressures are those without tractions.
+            /// The tractions of one of several motions change the number of patches or have no solution; the pressures of this motion
+            /// are those without tractions.
             Warning NormalForcesAloneBalance {}
-            advice: "Ask for the motion in a case of its own if its tractions should change the pressures, and its friction forces be included in the vertical balance.",
-            detail: "the tractions of this motion change the number of patches, of which an answer to several motions has one list, or leave no answer: its pressures are                      those without tractions, and normal forces alone balance the load".to_owned(),
+            advice: "Submit the motion as a separate case to include the effect of its tractions on the pressures and of its friction on the vertical balance.",
+            detail: "the tractions of this motion change the number of patches, which must be the same for all motions of a case, or have no \
+                     solution: its pressures are those without tractions, and normal forces alone balance the load".to_owned(),
 
-            /// A history under a vertical force has the pressures that belong to its last point.
+            /// All points of a history under a vertical force have the pressures of its last point.
             Info PressuresOfLastPoint {
                 /// The largest difference of the vertical force of a point to that of the last one, relative to it.
                 part: f64 = 0.12,
             }
             advice: "Compare `total.force_z_n` of the points with the load; end the history where the forces are needed, or give `normal_force_n`.",
             detail: format!(
-                "all points of a history have the pressures that belong to its last one, at which the vertical force is met; at others friction changes it by up to {} %,                  which the error estimates of their forces contain",
+                "all points of a history have the pressures of its last one, at which the vertical force is met; at other points friction \
+                 changes the vertical force by up to {} %, which the error estimates of their forces include",
                 short(100.0 * part)
             ),
         }

@@ -15,7 +15,7 @@ macro_rules! profile_remarks {
             advice: "Give `mirror_z` to decide this yourself.",
             detail: format!("{profile}: z was recognised as positive upward and has been mirrored"),
 
-            /// The flange of a wheel lies at the other end of its y than usual for the format; the sense of y was taken from the flange.
+            /// The flange of a wheel is not at the end of y that is usual for the format; the direction of y was taken from the flange.
             Info ProfileYMirrored {
                 /// Whose.
                 profile: &'static str = "wheel",
@@ -32,7 +32,7 @@ macro_rules! profile_remarks {
                 )
             },
 
-            /// A stated sense of y or z contradicts the shape of the profile.
+            /// A stated direction of y or z contradicts the shape of the profile.
             Warning ProfileSenseContradicted {
                 /// Whose.
                 profile: &'static str = "wheel",
@@ -41,12 +41,12 @@ macro_rules! profile_remarks {
                 /// Its value.
                 given: &'static str = "true",
             }
-            advice: "Leave out `mirror_y` or `mirror_z`, or check what was measured. The case is solved as stated.",
+            advice: "Omit `mirror_y` or `mirror_z`, or check the measurement. The case is solved as stated.",
             detail: format!(
                 "{profile}: {member}: {given} is stated, but the shape of the points shows the opposite; the case is solved as stated"
             ),
 
-            /// `flange_back_position_mm` was left out, and the back of the flange was found in the points of the wheel.
+            /// `flange_back_position_mm` was omitted, and the back of the flange was found in the points of the wheel.
             Info FlangeBackFound {
                 /// Whose.
                 profile: &'static str = "wheel",
@@ -55,7 +55,7 @@ macro_rules! profile_remarks {
             }
             advice: "Give `flange_back_position_mm` to decide this yourself.",
             detail: format!(
-                "{profile}: flange_back_position_mm was left out; the back of the flange was found at y = {position_mm:.2} mm and has been used"
+                "{profile}: flange_back_position_mm was omitted; the back of the flange was found at y = {position_mm:.2} mm and was used"
             ),
 
             /// The stated position of the back of a flange differs from that in the points of the wheel.
@@ -67,7 +67,7 @@ macro_rules! profile_remarks {
                 /// y of the back in the points.
                 found_mm: f64 = -70.0,
             }
-            advice: "Leave out `flange_back_position_mm`, or check it. The case is solved as stated.",
+            advice: "Omit `flange_back_position_mm`, or check it. The case is solved as stated.",
             detail: format!(
                 "{profile}: flange_back_position_mm: {given_mm} is stated, but the back of the flange was found at y = {found_mm:.2} mm; the case is \
                  solved as stated"
@@ -82,7 +82,7 @@ macro_rules! profile_remarks {
                 /// Rows that were read.
                 found: usize = 83,
             }
-            advice: "Nothing if the file was edited by hand; otherwise check that it is complete.",
+            advice: "No action is needed if the file was edited by hand; otherwise check that it is complete.",
             detail: format!("{profile}: {found} points were read, while the header of the file states {stated}"),
 
             /// Rows of numbers above the points of a profile file were read as a part of its header.
@@ -94,10 +94,10 @@ macro_rules! profile_remarks {
                 /// Line of the first.
                 line: usize = 7,
             }
-            advice: "Nothing if these rows are no points: old files state dimensions of the wheel there.",
+            advice: "No action is needed if these rows are not points: old files have dimensions of the wheel there.",
             detail: format!("{profile}: rows of numbers above the points ({count}, the first in line {line}) were read as a part of the header"),
 
-            /// The case states another unit for a profile than its file does; the case was followed.
+            /// The unit in the case differs from the unit in the file of a profile; the unit in the case was used.
             Warning ProfileUnitDiffers {
                 /// Whose.
                 profile: &'static str = "rail",
@@ -106,10 +106,10 @@ macro_rules! profile_remarks {
                 /// Length of the unit that the file names.
                 file_mm: f64 = 1000.0,
             }
-            advice: "Leave `unit` out to use the unit of the file.",
+            advice: "Omit `unit` to use the unit of the file.",
             detail: format!("{profile}: unit states {stated_mm} mm per unit of length, while the file states {file_mm} mm; unit was used"),
 
-            /// A profile has a usual size only if its numbers are in another unit.
+            /// The size of a profile is unusual in mm, but usual in another unit.
             Warning ProfileSizeUnusual {
                 /// Whose.
                 profile: &'static str = "rail",
@@ -118,10 +118,10 @@ macro_rules! profile_remarks {
                 /// The unit in which its width would be usual.
                 unit: &'static str = "cm",
             }
-            advice: "State `unit` of the cross-section if its numbers are not in mm; models of a reduced scale need nothing.",
+            advice: "State `unit` of the cross-section if its numbers are not in mm; for models of a reduced scale no action is needed.",
             detail: format!("{profile}: the profile is {width_mm} mm wide; if its numbers are in {unit}, state unit: \"{unit}\"", width_mm = short(width_mm)),
 
-            /// Points of a profile that lie nearly at the same place were merged.
+            /// Points of a profile that nearly coincide were merged.
             Info ProfilePointsMerged {
                 /// Whose.
                 profile: &'static str = "rail",
@@ -130,10 +130,10 @@ macro_rules! profile_remarks {
                 /// Points nearer than this are one.
                 nearer_than_mm: f64 = 0.001,
             }
-            advice: "Nothing: files that repeat points at the joints of arcs are common.",
+            advice: "No action is needed: files often repeat points at the joints of arcs.",
             detail: format!("{profile}: {count} points less than {nearer_than_mm} mm from another one were merged with it"),
 
-            /// Points of a profile that ran back between their neighbours were dropped.
+            /// Points of a profile that ran backwards were dropped.
             Warning ProfilePointsDropped {
                 /// Whose.
                 profile: &'static str = "rail",
@@ -141,7 +141,7 @@ macro_rules! profile_remarks {
                 count: usize = 2,
             }
             advice: "Check the measurement where pieces are joined.",
-            detail: format!("{profile}: {count} points that ran back (zig-zag) were dropped"),
+            detail: format!("{profile}: {count} points that ran backwards (zig-zag) were dropped"),
 
             /// One or two points at an end of a profile, far from all others, were dropped.
             Info ProfileEndDropped {
@@ -152,7 +152,7 @@ macro_rules! profile_remarks {
                 /// Their distance from the next point.
                 distance_mm: f64 = 67.0,
             }
-            advice: "Nothing if the profile ends there; otherwise check the file.",
+            advice: "No action is needed if the profile ends there; otherwise check the file.",
             detail: format!("{profile}: {count} stray points at an end, {distance_mm} mm from the next one, were dropped", distance_mm = short(distance_mm)),
 
             /// A profile has the shape of the other body.
@@ -165,21 +165,22 @@ macro_rules! profile_remarks {
             advice: "Check that rail and wheel were not exchanged. If each looks like the other, the case is refused.",
             detail: format!("the profile given as {profile} looks like {like}; were rail and wheel exchanged?"),
 
-            /// The smoothing of a profile was chosen from its noise and the pressure, as the case asked for.
+            /// The smoothing of a profile was chosen from its noise and the pressure, as requested.
             Info SmoothingChosen {
                 /// Whose.
                 profile: &'static str = "rail",
                 /// Cut wavelength; 0 for none.
                 smoothing_mm: f64 = 3.4,
             }
-            advice: "Nothing; give `smoothing_mm` as a number to use the same for other cases.",
+            advice: "No action is needed; give `smoothing_mm` as a number to use the same smoothing in other cases.",
             detail: if *smoothing_mm > 0.0 {
                 format!("{profile}: smoothed by {smoothing_mm} mm, chosen from the noise of its points", smoothing_mm = short(smoothing_mm))
             } else {
-                format!("{profile}: not smoothed, since its points are hardly noisy")
+                format!("{profile}: not smoothed, because its points have little noise")
             },
 
-            /// The points of a profile are too few or too far apart to tell their noise from its shape, so that `smoothing_mm: "auto"` chose no smoothing.
+            /// The points of a profile are too few or too far apart to distinguish noise from shape, so `smoothing_mm: "auto"` chose no
+            /// smoothing.
             Warning SmoothingUndecided {
                 /// Whose.
                 profile: &'static str = "rail",
@@ -188,7 +189,7 @@ macro_rules! profile_remarks {
             }
             advice: "Send points that lie nearer to each other, 0.25 mm at gauge corner and flange, or give `smoothing_mm` as a number.",
             detail: format!(
-                "{profile}: with points {spacing_mm} mm apart noise cannot be told from shape, so no smoothing was chosen and none is used",
+                "{profile}: with points {spacing_mm} mm apart, noise cannot be distinguished from shape, so no smoothing is used",
                 spacing_mm = short(spacing_mm)
             ),
 
@@ -315,7 +316,7 @@ macro_rules! profile_remarks {
                 /// That of both profiles over the largest pressure.
                 share: f64 = 0.17,
             }
-            advice: "If they come from the measurement, remove them with a `smoothing_mm` of about their length; waves that are really there belong to the answer.",
+            advice: "If they come from the measurement, remove them with a `smoothing_mm` of about their length; real waves belong to the result.",
             detail: format!(
                 "waves on the {profile} shorter than {shorter_than_mm} mm (y {:.1} to {:.1} mm) are equivalent to {waviness_mpa} MPa of \
                  contact pressure: if they come from the measurement, remove them with smoothing_mm", y_mm[0], y_mm[1],
@@ -345,7 +346,7 @@ macro_rules! profile_remarks {
                 ambiguity_mpa = short(ambiguity_mpa)
             ),
 
-            /// A profile has a stretch without points near the contact over which the bodies may touch as well.
+            /// A profile has a stretch without points near the contact in which the bodies may also touch.
             Warning ProfileHole {
                 /// Whose.
                 profile: &'static str = "rail",

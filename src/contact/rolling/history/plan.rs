@@ -272,7 +272,7 @@ pub struct PointRecord {
     pub slip: [Vec<f64>; 2],
     /// See [`PointRecord::traction`].
     pub slips: Vec<bool>,
-    /// A prescribed force could not be reached.
+    /// Whether a prescribed force could not be reached.
     pub saturated: bool,
     /// Work since the point before.
     pub work: Work,

@@ -92,7 +92,7 @@ pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -
     (steps > steps_max as f64).then(|| {
         let rolled = history.distances.last().copied().unwrap_or(0.0);
         format!(
-            "{rolled} mm are rolled over, which takes {steps:.0} steps of {} mm; at most {steps_max} are allowed in one case",
+            "{rolled} mm of rolling take {steps:.0} steps of {} mm; at most {steps_max} are allowed in one case",
             short(longest)
         )
     })

@@ -24,7 +24,7 @@ use crate::contact::solution::words::damage::{
 };
 use crate::contact::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
-/// The answer to one case, without fields.
+/// The result of one case, without fields.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Solution {
@@ -32,40 +32,43 @@ pub struct Solution {
     pub patches: Vec<PatchSolution>,
     /// One entry per motion: plain sums over the patches.
     pub total: Vec<Total>,
-    /// What the client should know before using the numbers.
+    /// Remarks to read before using the numbers.
     #[serde(default)]
     pub remarks: Vec<RemarkEntry>,
-    /// How region and pressure were found; absent where they were known beforehand. Of several motions of bodies that differ, those of the first.
+    /// How region and pressure were computed; absent if they were known beforehand. For several motions of bodies with different materials:
+    /// those of the first.
     #[schema(nullable = true)]
     pub normal: Option<NormalReport>,
-    /// How far the wheel is below the height of first touch, vertically, in mm; only for `profiles`. On planes, where bodies
-    /// differ, it is that of a wheel without tractions.
+    /// Vertical displacement of the wheel below first touch in mm; only for `profiles`. On planes, for bodies with different materials,
+    /// that of a wheel without tractions.
     #[schema(nullable = true)]
     pub wheel_lowering_mm: Option<f64>,
-    /// Angular velocity of the wheelset in rad/s, found for the longitudinal force that was prescribed; only for `profiles` with `wheelset.force_x_n`.
+    /// Angular velocity of the wheelset in rad/s, found for the prescribed longitudinal force; only for `profiles` with
+    /// `wheelset.force_x_n`.
     pub angular_velocity_rad_per_s: Option<f64>,
-    /// Velocity of the wheelset's centre to the left in mm/s, found for the lateral force that was prescribed; only for `profiles` with `wheelset.force_y_n`.
+    /// Velocity of the wheelset's centre to the left in mm/s, found for the prescribed lateral force; only for `profiles` with
+    /// `wheelset.force_y_n`.
     pub lateral_velocity_mm_per_s: Option<f64>,
-    /// The positions of the wheelset and its kinematics; only for `wheelset`. `total` then has one entry per position, and every patch
-    /// belongs to one side of one position.
+    /// Positions and kinematics of the wheelset; only for `wheelset`. `total` then has one entry per position, and every patch belongs to
+    /// one side in one position.
     pub wheelset: Option<Box<WheelsetAnswer>>,
-    /// The point that rigid slip and moments refer to, and where it is.
+    /// Reference point of rigid slip and moments.
     pub origin: Origin,
-    /// The frame in words.
+    /// Description of the frame.
     pub frame: String,
     /// Combined elastic constants that were used.
     pub material: CombinedMaterial,
-    /// Version of the solver that computed this.
+    /// Version of the solver that computed the result.
     pub solver_version: String,
     /// Digest of the canonical case; equal cases have equal digests.
     pub case_digest: String,
-    /// What of the case is needed to read the numbers.
+    /// The parts of the case that are needed to interpret the numbers.
     pub asked: Option<Asked>,
-    /// The figures that damage was computed with; only with the output `damage`.
+    /// The parameters that damage was computed with; only with the output `damage`.
     pub damage_parameters: Option<Box<DamageFiguresUsed>>,
 }
 
-/// What of a case is needed to read its answer.
+/// The parts of a case that are needed to interpret its result.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Asked {
@@ -73,30 +76,30 @@ pub struct Asked {
     pub contact: String,
     /// Largest coefficient of friction: no tangential traction exceeds it times the pressure.
     pub friction_coefficient: f64,
-    /// Whether the coefficient is less elsewhere: it falls with slip, or varies across.
+    /// Whether the coefficient is smaller in some places, because it falls with slip or varies across the contact.
     #[serde(skip_serializing_if = "std::ops::Not::not", default)]
     #[schema(required = false)]
     pub friction_varies: bool,
-    /// The load; absent where the case has none.
+    /// The load; absent if the case has none.
     pub load: Option<Load>,
 }
 
 /// How the normal problem of a gap was solved.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct NormalReport {
-    /// Cells of the finest grid along x and y; of several grids, of the one that carries most.
+    /// Cells of the finest grid along x and y; for several grids, of the one with the largest load.
     pub cells: [u32; 2],
-    /// Grids: one per gap, or one per patch where patches of a gap differ much in size.
+    /// Number of grids: one per gap, or one per patch if the patches of a gap differ much in size.
     pub grids: u32,
     /// Iterations over all grids.
     pub iterations: u32,
     /// Largest violation of the contact conditions on the finest grid (distance in the contact, overlap outside), relative
     /// to the deepest overlap of the undeformed surfaces.
     pub residual: f64,
-    /// Largest pressure on the last grid but one, relative to that on the last, less 1; 0 if there was only one.
+    /// Largest pressure on the last grid but one divided by that on the last, minus 1; 0 if there was only one grid.
     pub pressure_change: f64,
-    /// For a wheel on a rail: relative difference between the force found at the last height and the prescribed force, before the
-    /// contact was scaled to the prescribed force by Hertz's laws; 0 if no height was searched for.
+    /// For a wheel on a rail: relative difference between the prescribed force and the force at the last height, before scaling to the
+    /// prescribed force by Hertz's laws; 0 if no height was searched for.
     pub force_residual: f64,
     /// Wall time in s.
     pub seconds: f64,
@@ -128,7 +131,7 @@ impl NormalReport {
     }
 }
 
-/// Origin of moments and rigid slip.
+/// Reference point of moments and rigid slip.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Origin {
     /// x in mm, in the coordinates of the answer.
@@ -150,8 +153,8 @@ pub struct CombinedMaterial {
     pub difference_parameter: f64,
 }
 
-/// One contact patch with its answers for every motion. Of several motions of bodies that differ its numbers are those of the first; every
-/// point has its own in `region`.
+/// One contact patch with its results for every motion. For several motions of bodies with different materials, its values are those of the
+/// first motion; every point has its own in `region`.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PatchSolution {
@@ -159,29 +162,29 @@ pub struct PatchSolution {
     pub normal_force_n: f64,
     /// The largest tangential force that friction allows, in N.
     pub friction_limit_n: Option<f64>,
-    /// Approach of distant points in mm; absent where the pressure was given.
+    /// Approach of distant points in mm; absent if the pressure was given.
     #[schema(nullable = true)]
     pub approach_mm: Option<f64>,
     /// Contact area in mm².
     pub area_mm2: f64,
     /// Largest pressure in MPa.
     pub pressure_max_mpa: f64,
-    /// Semi-axes along and across rolling in mm; only for elliptic patches.
+    /// Semi-axes along x and y in mm; only for elliptic patches.
     #[schema(nullable = true)]
     pub semi_axes_mm: Option<[f64; 2]>,
     /// Extent of the patch `[x_min, x_max, y_min, y_max]` in mm.
     pub extent_mm: [f64; 4],
-    /// Where the patch lies on wheel and rail; only for `profiles`.
+    /// Position of the patch on wheel and rail; only for `profiles`.
     #[schema(nullable = true)]
     pub position: Option<Position>,
-    /// How far the points of the profiles can be trusted here; only for `profiles`.
+    /// Quality of the profile points under the patch; only for `profiles`.
     #[schema(nullable = true)]
     pub quality: Option<PatchQuality>,
     /// One entry per motion, in the order of the case.
     pub points: Vec<PointSolution>,
 }
 
-/// Place of a patch of wheel and rail, that of its load centre, and the frame of its coordinates.
+/// Position of the load centre of a patch on wheel and rail, and the frame of the patch's coordinates.
 ///
 /// Track axes: x along rolling, y to the left from the middle of the track, z up from the top of the rail.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
@@ -190,22 +193,22 @@ pub struct Position {
     pub track_mm: [f64; 3],
     /// The load centre on the rail's cross-section, `[y, z]` in mm, y to the field side and z down.
     pub rail_mm: [f64; 2],
-    /// The same on the wheel's cross-section.
+    /// The load centre on the wheel's cross-section, in the same form.
     pub wheel_mm: [f64; 2],
-    /// Turn about x from the track's axes to those of the patch, in rad: its normal is `(0, −sin, cos)` of this angle.
+    /// Rotation about x from the track axes to those of the patch, in rad: its normal is `(0, −sin, cos)` of this angle.
     pub contact_angle_rad: f64,
     /// Radius of the wheel at the load centre in mm.
     pub rolling_radius_mm: f64,
-    /// Origin of the coordinates of the patch in track axes, `[x, y, z]` in mm: the load centre of the patches that share
-    /// these coordinates because they lie near each other; usually the patch is alone.
+    /// Origin of the patch's coordinates in track axes, `[x, y, z]` in mm: the load centre of the neighbouring patches that share these
+    /// coordinates, usually of one patch.
     pub origin_track_mm: [f64; 3],
 }
 
-/// The tangential answer of one patch for one motion.
+/// Tangential solution of one patch for one motion.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PointSolution {
-    /// The motion this belongs to.
+    /// The motion of this point.
     pub motion: MotionWords,
     /// The same motion in the dimensionless form of the literature.
     pub normalised: NormalisedMotion,
@@ -215,57 +218,58 @@ pub struct PointSolution {
     pub force_y_n: f64,
     /// Moment about the origin on the lower body in N·mm.
     pub moment_z_n_mm: f64,
-    /// Estimated absolute errors of the three resultants; null where there is nothing to estimate them from.
+    /// Estimated absolute errors of the three resultants; null if they cannot be estimated.
     #[or_null]
     pub error_estimate: Option<ErrorEstimate>,
-    /// Force of the patch on the lower body in N in track axes, `[x, y, z]`, with the normal force; only for `profiles` and `wheelset`. On the curve of a rail pressures and
-    /// tractions of a patch have several directions, so that their sum does not follow from `normal_force_n` and the contact angle.
+    /// Force of the patch on the lower body in track axes, `[x, y, z]` in N, including the normal force; only for `profiles` and
+    /// `wheelset`. On the curve of a rail, pressures and tractions have several directions, so the force does not follow from
+    /// `normal_force_n` and the contact angle.
     pub force_track_n: Option<[f64; 3]>,
-    /// What the measurement of the profiles leaves open; only for `profiles`.
+    /// Uncertainty due to the measured profiles; only for `profiles`.
     #[schema(nullable = true)]
     pub profile_uncertainty: Option<ProfileUncertainty>,
-    /// Area that sticks in mm²; absent unless zones were asked for. The method `table` always gives it, right to some hundredths of the
+    /// Area that sticks in mm²; absent unless zones were requested. The method `table` always gives it, accurate to some hundredths of the
     /// area.
     #[schema(nullable = true)]
     pub stick_area_mm2: Option<f64>,
-    /// Area that slips in mm²; absent unless zones were asked for, but for `table`.
+    /// Area that slips in mm²; absent unless zones were requested, except for `table`.
     #[schema(nullable = true)]
     pub slip_area_mm2: Option<f64>,
-    /// Derivatives of the three resultants; absent unless asked for.
+    /// Derivatives of the three resultants; absent unless requested.
     pub gradients: Option<Box<Gradients>>,
-    /// Number of cells that stick; absent unless zones were asked for.
+    /// Number of cells that stick; absent unless zones were requested.
     #[schema(nullable = true)]
     pub stick_cells: Option<u32>,
-    /// Number of cells that slip; absent unless zones were asked for.
+    /// Number of cells that slip; absent unless zones were requested.
     #[schema(nullable = true)]
     pub slip_cells: Option<u32>,
     /// Largest tangential traction in MPa; absent without a mesh.
     pub traction_max_mpa: Option<f64>,
-    /// Tγ: dissipated power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m); of a history the sum over the cells at this
-    /// point, where elastic energy grows or falls besides, and 0 of a shift.
+    /// Tγ: dissipated power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m). For a history it is the sum over the cells at
+    /// this point, because the elastic energy also changes; it is 0 for a shift.
     pub friction_power_n: f64,
-    /// |ν_x F_x| + |ν_y F_y| in N, the form damage models use.
+    /// |ν_x F_x| + |ν_y F_y| in N, the form that damage models use.
     pub friction_power_without_spin_n: f64,
     /// How this point was computed.
     pub solver: SolverReport,
-    /// The error estimate is not larger than the target; absent with an explicit mesh.
+    /// Whether the error estimate meets the target; absent with an explicit mesh.
     #[schema(nullable = true)]
     pub target_met: Option<bool>,
-    /// A prescribed force could not be reached.
+    /// Whether a prescribed force could not be reached.
     pub saturated: bool,
-    /// What a history adds: the distance, shifts, and what was dissipated; only of `motion.history`.
+    /// Additional values of a history: distance, shifts and dissipated energy; only for `motion.history`.
     pub history: Option<HistoryPoint>,
-    /// Stresses below the surface in short; only with the output `subsurface`.
+    /// Summary of the stresses below the surface; only with the output `subsurface`.
     pub subsurface: Option<SubsurfaceSummary>,
     /// Damage of one pass; only with the output `damage`.
     pub damage: Option<Box<Damage>>,
-    /// Temperatures in short; only with the output `temperature`.
+    /// Summary of the temperatures; only with the output `temperature`.
     pub temperature: Option<TemperatureSummary>,
-    /// Region and pressure under this motion; only of several motions of bodies that differ, whose tractions change both.
+    /// Region and pressure under this motion; only for several motions of bodies with different materials, whose tractions change both.
     pub region: Option<Box<MotionRegion>>,
 }
 
-/// Region and pressure of a patch under one motion.
+/// Contact region and pressure of a patch under one motion.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct MotionRegion {
@@ -289,21 +293,21 @@ pub struct MotionRegion {
 pub struct HistoryPoint {
     /// Distance rolled since the start in mm.
     pub distance_mm: f64,
-    /// Displacement of the upper body against the lower one along x from the point before, in mm; only where the bodies did not roll.
+    /// Displacement of the upper body relative to the lower one along x since the previous point, in mm; only if the bodies did not roll.
     pub shift_x_mm: Option<f64>,
-    /// The same along y.
+    /// Displacement along y, as `shift_x_mm`.
     pub shift_y_mm: Option<f64>,
-    /// Turn about z in rad; only where the bodies did not roll.
+    /// Rotation about z in rad; only if the bodies did not roll.
     pub turn_rad: Option<f64>,
-    /// Estimated absolute error of `creepage_x`; only where its force was prescribed.
+    /// Estimated absolute error of `creepage_x`; only if its force was prescribed.
     pub creepage_x_error: Option<f64>,
-    /// The same of `creepage_y`.
+    /// Estimated absolute error of `creepage_y`; only if its force was prescribed.
     pub creepage_y_error: Option<f64>,
-    /// Estimated absolute error of `shift_x_mm`; only where its force was prescribed.
+    /// Estimated absolute error of `shift_x_mm`; only if its force was prescribed.
     pub shift_x_error_mm: Option<f64>,
-    /// The same of `shift_y_mm`.
+    /// Estimated absolute error of `shift_y_mm`; only if its force was prescribed.
     pub shift_y_error_mm: Option<f64>,
-    /// What friction has dissipated since the start in this patch, in N·mm.
+    /// Energy dissipated by friction in this patch since the start, in N·mm.
     pub dissipated_n_mm: f64,
 }
 
@@ -323,11 +327,11 @@ pub struct NormalisedMotion {
 /// Absolute errors, each in the unit of its quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct ErrorEstimate {
-    /// Of `force_x_n`, in N.
+    /// Error of `force_x_n` in N.
     pub force_x_n: f64,
-    /// Of `force_y_n`, in N.
+    /// Error of `force_y_n` in N.
     pub force_y_n: f64,
-    /// Of `moment_z_n_mm`, in N·mm.
+    /// Error of `moment_z_n_mm` in N·mm.
     pub moment_z_n_mm: f64,
 }
 
@@ -342,19 +346,19 @@ impl ErrorEstimate {
     }
 }
 
-/// Derivatives of the resultants of a patch at constant region and pressure, each by `[creepage_x, creepage_y, spin_per_mm]`: the creep
-/// coefficients.
+/// Derivatives of the resultants of a patch with respect to `[creepage_x, creepage_y, spin_per_mm]`, at constant region and pressure: the
+/// creep coefficients.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Gradients {
-    /// Of `force_x_n`, in N, N and N·mm.
+    /// Derivatives of `force_x_n`, in N, N and N·mm.
     pub force_x_n: [f64; 3],
-    /// Of `force_y_n`, in N, N and N·mm.
+    /// Derivatives of `force_y_n`, in N, N and N·mm.
     pub force_y_n: [f64; 3],
-    /// Of `moment_z_n_mm`, in N·mm, N·mm and N·mm².
+    /// Derivatives of `moment_z_n_mm`, in N·mm, N·mm and N·mm².
     pub moment_z_n_mm: [f64; 3],
-    /// Of the three resultants by the normal force at constant creepages: dimensionless, dimensionless and in mm. Only of Hertz contacts
-    /// of like bodies with a constant coefficient and without a layer, whose patch grows with the load.
+    /// Derivatives of the three resultants with respect to the normal force at constant creepages: dimensionless, dimensionless and in mm.
+    /// Only for Hertz contacts of like bodies with a constant coefficient and no layer, whose patch grows with the load.
     pub by_normal_force: Option<[f64; 3]>,
     /// Estimated absolute errors; absent for the method `table`.
     pub error_estimate: Option<GradientErrors>,
@@ -364,13 +368,13 @@ pub struct Gradients {
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct GradientErrors {
-    /// Of `force_x_n`.
+    /// Errors of `force_x_n`.
     pub force_x_n: [f64; 3],
-    /// Of `force_y_n`.
+    /// Errors of `force_y_n`.
     pub force_y_n: [f64; 3],
-    /// Of `moment_z_n_mm`.
+    /// Errors of `moment_z_n_mm`.
     pub moment_z_n_mm: [f64; 3],
-    /// Of `by_normal_force`.
+    /// Errors of `by_normal_force`.
     pub by_normal_force: Option<[f64; 3]>,
 }
 
@@ -378,9 +382,10 @@ pub struct GradientErrors {
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct SolverReport {
-    /// The method that gave the resultants. With `auto` it may be `table`; values per cell are then those of `boundary_element` on `mesh`.
+    /// The method that gave the resultants. With `auto` it may be `table`; values per cell are then computed by `boundary_element` on
+    /// `mesh`.
     pub method: MethodName,
-    /// The finest mesh: strips of this patch, cells along x in each; absent where none was needed.
+    /// The finest mesh: strips of this patch, cells along x in each; absent if none was needed.
     pub mesh: Option<MeshReport>,
     /// Newton iterations over all levels and rules.
     pub iterations: u32,
@@ -391,7 +396,7 @@ pub struct SolverReport {
     /// Descriptions of the solver steps that this motion did not need; empty if none.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub skipped: Vec<String>,
-    /// Wall time of this point's share, in s.
+    /// Share of this point in the wall time, in s.
     pub seconds: f64,
 }
 
@@ -404,21 +409,21 @@ pub struct MeshReport {
     pub cells: u32,
 }
 
-/// Sums over all patches for one motion; for `profiles` in track axes, normal forces included.
+/// Sums over all patches for one motion; for `profiles` in track axes, including normal forces.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Total {
     /// Longitudinal force on the lower body in N.
     pub force_x_n: f64,
     /// Lateral force on the lower body in N.
     pub force_y_n: f64,
-    /// Vertical force on the lower body in N, z up, so that a wheel's load is negative; only for `profiles`.
+    /// Vertical force on the lower body in N, positive up, so that a wheel's load is negative; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub force_z_n: Option<f64>,
     /// Moment about the origin on the lower body in N·mm.
     pub moment_z_n_mm: f64,
-    /// Estimated absolute errors; null where there is nothing to estimate them from.
+    /// Estimated absolute errors; null if they cannot be estimated.
     pub error_estimate: Option<ErrorEstimate>,
-    /// What the measurement of the profiles leaves open; only for `profiles`.
+    /// Uncertainty due to the measured profiles; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub profile_uncertainty: Option<ProfileUncertainty>,
 }
@@ -452,11 +457,11 @@ impl PatchFields {
 pub struct PatchCells {
     /// Centre of the cell along x in mm.
     pub x_mm: Vec<f64>,
-    /// Centre of the cell across in mm.
+    /// Centre of the cell along y in mm.
     pub y_mm: Vec<f64>,
     /// Width of the cell along x in mm.
     pub dx_mm: Vec<f64>,
-    /// Width of the cell across in mm.
+    /// Width of the cell along y in mm.
     pub dy_mm: Vec<f64>,
     /// Number of the strip, counted from 0; segments of one strip share it.
     pub strip: Vec<u32>,
@@ -473,12 +478,12 @@ pub struct PointFields {
     pub zone: Option<Vec<Zone>>,
     /// Traction on the lower body along x in MPa.
     pub traction_x_mpa: Option<Vec<f64>>,
-    /// Traction on the lower body across in MPa.
+    /// Traction on the lower body along y in MPa.
     pub traction_y_mpa: Option<Vec<f64>>,
     /// Mean slip of the cell, upper body relative to the lower, along x, divided by rolling speed: along the traction, and such that the
     /// power of the cells adds up to that of the patch (see [`local_power`](crate::contact::post::local_power)).
     pub slip_x: Option<Vec<f64>>,
-    /// Slip across, divided by rolling speed.
+    /// Slip along y, divided by rolling speed.
     pub slip_y: Option<Vec<f64>>,
     /// Temperature of both surfaces at the middle of the cell in °C.
     pub temperature_c: Option<Vec<f64>>,
@@ -486,7 +491,7 @@ pub struct PointFields {
     pub subsurface: Option<Vec<f64>>,
 }
 
-/// What a cell of the contact patch does.
+/// State of a cell of the contact patch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Named, Finite)]
 #[serde(rename_all = "snake_case")]
 pub enum Zone {
@@ -496,13 +501,13 @@ pub enum Zone {
     Slip,
 }
 
-/// What is answered of a wheelset beside its patches.
+/// Results of a wheelset in addition to its patches.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct WheelsetAnswer {
     /// One entry per position, in the order of the case.
     pub positions: Vec<WheelsetPosition>,
-    /// The rigid wheelset over a range of shifts; only if `kinematics` was asked for.
+    /// The rigid wheelset over a range of shifts; only if `kinematics` was requested.
     pub kinematics: Option<Box<Kinematics>>,
 }
 
@@ -515,13 +520,13 @@ pub struct WheelsetPosition {
     pub yaw_rad: f64,
     /// Roll in rad, positive from y to z (the left wheel higher), at which both wheels carry their loads.
     pub roll_rad: f64,
-    /// Height of the wheelset's centre over the top of the rails in mm; its change from one position to another is the lift.
+    /// Height of the wheelset's centre over the top of the rails in mm; its change between positions is the lift.
     pub centre_height_mm: f64,
     /// Angular velocity about the axle in rad/s, given or found.
     pub angular_velocity_rad_per_s: f64,
-    /// Torque about the axle in N mm that balances the forces of the rails: what a drive exerts, negative for a brake.
+    /// Torque about the axle in N mm that balances the forces of the rails: the torque of a drive, negative for a brake.
     pub drive_torque_n_mm: f64,
-    /// Rolling radius of the left wheel less that of the right one in mm.
+    /// Rolling radius of the left wheel minus that of the right one in mm.
     pub radius_difference_mm: f64,
     /// The left wheel on its rail.
     pub left: WheelOnRail,
@@ -529,69 +534,69 @@ pub struct WheelsetPosition {
     pub right: WheelOnRail,
 }
 
-/// One wheel of a wheelset; forces act on the rail, in track axes, normal forces included.
+/// One wheel of a wheelset. Forces act on the rail, in track axes, and include normal forces.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct WheelOnRail {
     /// Indices of its patches in `patches`.
     pub patches: Vec<usize>,
-    /// Rolling radius in mm at the patch that carries most.
+    /// Rolling radius in mm at the patch with the largest load.
     pub rolling_radius_mm: f64,
-    /// Contact angle in rad of the patch that carries most.
+    /// Contact angle in rad of the patch with the largest load.
     pub contact_angle_rad: f64,
-    /// How far the wheel is below first touch, vertically, in mm.
+    /// Vertical displacement of the wheel below first touch, in mm.
     pub wheel_lowering_mm: f64,
-    /// Along the track, in N.
+    /// Force along the track, in N.
     pub force_x_n: f64,
-    /// To the left, in N.
+    /// Force to the left, in N.
     pub force_y_n: f64,
-    /// Upward, in N; negative under a load.
+    /// Upward force in N; negative under a load.
     pub force_z_n: f64,
-    /// About the vertical line through the middle of the track, in N mm.
+    /// Moment about the vertical line through the middle of the track, in N mm.
     pub moment_z_n_mm: f64,
 }
 
-/// A rigid wheelset without yaw over a range of shifts; lists have one entry per shift.
+/// A rigid wheelset without yaw over a range of lateral shifts; lists have one entry per shift.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Kinematics {
-    /// Shifts to the left in mm. They end where a wheel leaves its rail or touches at the end of a cross-section.
+    /// Lateral shifts to the left in mm. The list ends where a wheel leaves its rail or touches at the end of a cross-section.
     pub lateral_shift_mm: Vec<f64>,
     /// Roll in rad at which both wheels touch; null where there is none.
     pub roll_rad: Vec<Option<f64>>,
-    /// Height of the wheelset's centre over the top of the rails in mm, with the roll; null where there is no roll.
+    /// Height of the wheelset's centre over the top of the rails in mm, with roll; null where `roll_rad` is null.
     pub centre_height_mm: Vec<Option<f64>>,
-    /// Δr of EN 15302, in mm: rolling radius of the left wheel less that of the right one, with the axle held level.
+    /// Δr of EN 15302, in mm: rolling radius of the left wheel minus that of the right one, with a level axle.
     pub radius_difference_mm: Vec<f64>,
-    /// Δr in mm with the roll; null where there is no roll.
+    /// Δr in mm with roll; null where `roll_rad` is null.
     #[serde(default)]
     pub radius_difference_with_roll_mm: Vec<Option<f64>>,
     /// Deprecated name of `radius_difference_mm`.
     pub radius_difference_without_roll_mm: Vec<f64>,
-    /// How much Δr changes with another reading of the cross-sections, in mm.
+    /// Change of Δr under a smoother interpolation of the cross-sections, in mm.
     pub profile_uncertainty_mm: Vec<f64>,
-    /// Where the left wheel touches, with the axle held level.
+    /// Contact points of the left wheel, with a level axle.
     pub left: TouchLine,
-    /// Where the right wheel touches, with the axle held level.
+    /// Contact points of the right wheel, with a level axle.
     pub right: TouchLine,
-    /// The shift in mm nearest to 0 at which Δr rises through 0: where a free wheelset runs on straight track. The middle of the shifts at which
-    /// Δr is 0, if there are several. Absent if there is none.
+    /// Shift in mm nearest to 0 at which Δr rises through 0: the position of a free wheelset on straight track; if Δr is 0 at several
+    /// shifts, their middle. Absent if there is none.
     pub equilibrium_shift_mm: Option<f64>,
-    /// How much this shift changes with another reading of the cross-sections, in mm.
+    /// Change of `equilibrium_shift_mm` under a smoother interpolation of the cross-sections, in mm.
     pub equilibrium_uncertainty_mm: Option<f64>,
-    /// Distance across of the two places of contact in mm, at the shift nearest to the equilibrium, else to 0.
+    /// Lateral distance between the two contact points in mm, at the shift nearest to the equilibrium, or to 0 if there is no equilibrium.
     pub contact_distance_mm: f64,
     /// Equivalent conicity, one entry per amplitude of the case.
     pub conicity: Vec<EquivalentConicity>,
-    /// Why the shifts or values of the lists end early, or why there is no equilibrium.
+    /// Why the lists end early or lack values, or why there is no equilibrium.
     pub reason: Option<String>,
 }
 
-/// Where a rigid wheel touches its rail, shift by shift.
+/// Contact points of a rigid wheel on its rail, one per shift.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct TouchLine {
-    /// Radius of the wheel there in mm.
+    /// Radius of the wheel at the contact point in mm.
     pub rolling_radius_mm: Vec<f64>,
-    /// Contact angle in rad, signed as that of a patch.
+    /// Contact angle in rad, with the sign of that of a patch.
     pub contact_angle_rad: Vec<f64>,
     /// y on the rail's cross-section in mm, positive to the field side.
     pub rail_y_mm: Vec<f64>,
@@ -603,92 +608,90 @@ pub struct TouchLine {
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct EquivalentConicity {
-    /// Half the distance of the turning points in mm.
+    /// Half the distance between the turning points in mm.
     pub amplitude_mm: f64,
-    /// tan γ of EN 15302, by integration of the wheelset's equation of motion with Δr of the level axle. 0 where Δr is 0 over the whole
+    /// tan γ of EN 15302, by integration of the wheelset's equation of motion with Δr of the level axle; 0 if Δr is 0 over the whole
     /// amplitude.
     pub conicity: Option<f64>,
-    /// tan γ from Δr with the roll. Of a cone the roll adds some percent to the cone's own tangent.
+    /// tan γ from Δr with roll. For a cone, roll adds some percent to the cone's own tangent.
     pub conicity_with_roll: Option<f64>,
     /// Deprecated name of `conicity`.
     pub conicity_without_roll: Option<f64>,
     /// tan γ by harmonic linearisation of Δr between the same turning points.
     pub conicity_harmonic: Option<f64>,
-    /// Error of `conicity` from the distance of the shifts.
+    /// Error of `conicity` due to the step between shifts.
     pub error_estimate: Option<f64>,
-    /// How much `conicity` changes with another reading of the cross-sections.
+    /// Change of `conicity` under a smoother interpolation of the cross-sections.
     pub profile_uncertainty: Option<f64>,
     /// Wavelength of the motion in mm.
     pub wavelength_mm: Option<f64>,
-    /// Shifts in mm at which the motion turns.
+    /// Shifts in mm at which the motion reverses.
     pub turns_mm: Option<[f64; 2]>,
     /// Why members are absent.
     pub reason: Option<String>,
 }
 
-/// What a case was understood as, without solving it.
+/// How a case was interpreted, without solving it.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Understanding {
-    /// The patches, where they are known beforehand: of `radii` and `ellipse` by Hertz's formulas, of `pressure_grid` from the grid.
-    /// Empty where they have to be found.
+    /// The patches, if known beforehand: by Hertz's formulas for `radii` and `ellipse`, from the grid for `pressure_grid`. Otherwise empty.
     pub patches: Vec<KnownPatch>,
-    /// Friction coefficient times normal force in N, which no tangential force can exceed; absent where the normal force has to be
-    /// found.
+    /// Friction coefficient times normal force in N, which no tangential force can exceed; absent if the normal force must be computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_limit_n: Option<f64>,
-    /// Where wheel and rail lie; only for `profiles`.
+    /// Position of wheel and rail; only for `profiles`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub placement: Option<PlacedProfiles>,
 }
 
-/// A patch that is known before anything is solved.
+/// A patch that is known before solving.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct KnownPatch {
     /// Normal force in N.
     pub normal_force_n: f64,
-    /// Approach of distant points in mm; absent where the pressure was given.
+    /// Approach of distant points in mm; absent if the pressure was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub approach_mm: Option<f64>,
     /// Contact area in mm².
     pub area_mm2: f64,
     /// Largest pressure in MPa.
     pub pressure_max_mpa: f64,
-    /// Semi-axes along and across rolling in mm; only for elliptic patches.
+    /// Semi-axes along x and y in mm; only for elliptic patches.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub semi_axes_mm: Option<[f64; 2]>,
     /// Extent of the patch `[x_min, x_max, y_min, y_max]` in mm.
     pub extent_mm: [f64; 4],
 }
 
-/// Cross-sections of rail and wheel in track axes, `[y, z]` in mm: y to the left from the middle of the track, z up from the top of
-/// the rail. Both are read, turned, shifted and smoothed as for the solution; coordinates are rounded to 0.0001 mm.
+/// Cross-sections of rail and wheel in track axes, `[y, z]` in mm: y to the left from the middle of the track, z up from the top of the
+/// rail. Both are rotated, shifted and smoothed as in the solution; coordinates are rounded to 0.0001 mm.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct PlacedProfiles {
     /// The rail.
     pub rail_mm: Vec<[f64; 2]>,
-    /// The wheel at the height of first touch, as it meets a rail that is straight along x: of the circle on which a point of the profile
-    /// runs, the place where the surface has no slope along x, else the place below the axle. Without yaw this is the cut through the axle.
+    /// The wheel at the height of first touch, projected along x. Each point of the profile is shown where the surface of its circle has no
+    /// slope along x, or else below the axle. Without yaw this is the section through the axle.
     pub wheel_mm: Vec<[f64; 2]>,
     /// Where the wheel touches first when it is lowered onto the rail.
     pub first_touch: FirstTouch,
-    /// About how far the wheel comes to rest below first touch, in mm; the result has the computed `wheel_lowering_mm`.
+    /// Estimated vertical displacement of the wheel below first touch, in mm; the result has the computed `wheel_lowering_mm`.
     pub lowering_estimate_mm: f64,
 }
 
 /// The point of first touch of a wheel on a rail.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct FirstTouch {
-    /// In track axes, `[x, y, z]` in mm; x differs from 0 where the wheelset is yawed.
+    /// The point in track axes, `[x, y, z]` in mm; x differs from 0 if the wheelset is yawed.
     pub track_mm: [f64; 3],
-    /// On the rail's cross-section, `[y, z]` in mm, y to the field side and z down.
+    /// The point on the rail's cross-section, `[y, z]` in mm, y to the field side and z down.
     pub rail_mm: [f64; 2],
-    /// On the wheel's cross-section, likewise.
+    /// The point on the wheel's cross-section, in the same form.
     pub wheel_mm: [f64; 2],
-    /// Inclination of the surfaces there in rad, as `contact_angle_rad` of a patch.
+    /// Inclination of the surfaces at the point in rad, as `contact_angle_rad` of a patch.
     pub contact_angle_rad: f64,
 }
 
-/// How a time was found.
+/// How a solve time was determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FoundBy {

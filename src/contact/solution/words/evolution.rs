@@ -11,22 +11,22 @@ use crate::contact::case::words::subsurface::BodyName;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::solution::words::damage::DamageFiguresUsed;
 
-/// The answer of an evolution.
+/// The result of an evolution.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EvolutionAnswer {
     /// Profiles and contact at the start, at each stored step, and before and after each event.
     pub records: Vec<EvolutionRecord>,
-    /// When each limit is reached, interpolated linearly between records.
+    /// The time at which each limit is reached, interpolated linearly between records.
     pub limits: Vec<LimitReached>,
     /// The representative states that stand for the traffic.
     pub traffic: CondensedTraffic,
-    /// Accepted steps.
+    /// Number of accepted steps.
     pub steps: u32,
-    /// Steps that were repeated with a shorter length.
+    /// Number of steps that were repeated with a shorter length.
     pub steps_rejected: u32,
-    /// Contacts solved.
+    /// Number of contacts solved.
     pub solves: u32,
-    /// The figures that wear and damage were computed with.
+    /// The parameters that wear and damage were computed with.
     pub damage_parameters: DamageFiguresUsed,
     /// Remarks that matter to the use of the numbers.
     pub remarks: Vec<RemarkEntry>,
@@ -37,13 +37,13 @@ pub struct EvolutionAnswer {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = EvolutionProgress)]
 pub struct Progress {
-    /// Fraction of the extent that is done.
+    /// Completed share of the extent.
     pub share: f64,
-    /// Traffic over the rail in million gross tonnes; absent where only the wheel wears.
+    /// Traffic over the rail in million gross tonnes; absent if only the wheel wears.
     pub mgt: Option<f64>,
-    /// Axles over the rail.
+    /// Axle passes over the rail.
     pub axle_passes: Option<f64>,
-    /// Distance of the wheel in km; absent where only the rail wears.
+    /// Distance rolled by the wheel in km; absent if only the rail wears.
     pub wheel_distance_km: Option<f64>,
 }
 
@@ -51,36 +51,36 @@ pub struct Progress {
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EvolutionRecord {
-    /// When.
+    /// Progress at the time of the record.
     pub progress: Progress,
-    /// Events that have happened.
+    /// Events that have taken place.
     pub events_done: u32,
     /// The rail.
     pub rail: WornBody,
     /// The wheel.
     pub wheel: WornBody,
-    /// Losses against the sections at the start.
+    /// Losses relative to the sections at the start.
     pub losses: WearLosses,
-    /// Equivalent conicity (EN 15302) at 3 mm of a wheelset with this wheel on both sides of a track of this rail; absent where it has none.
+    /// Equivalent conicity (EN 15302) at 3 mm of this wheel on both sides of a track of this rail; absent if it does not exist.
     pub conicity: Option<f64>,
     /// The contact over all states.
     pub contact: ContactRange,
-    /// The contact of each state.
+    /// The contact in each state.
     pub states: Vec<StateContact>,
 }
 
-/// A worn section. Arrays have one entry for each point.
+/// A worn section. Arrays have one entry per point.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct WornBody {
     /// Points `[y, z]` in mm, y to the field side and z down, as `points_mm` of a cross-section.
     pub points_mm: Vec<[f64; 2]>,
     /// Depth worn away along the normal in mm, without maintenance.
     pub depth_mm: Vec<f64>,
-    /// Damage by the Whole Life Rail Model: 1 is a visible crack; not below 0, where wear outweighs fatigue.
+    /// Damage by the Whole Life Rail Model: 1 is a visible crack; limited to 0 where wear outweighs fatigue.
     pub damage: Vec<f64>,
-    /// Area of the section that wear has removed, in mm²; times the length, the volume.
+    /// Area of the section removed by wear, in mm²; multiplied by the length, it is the worn volume.
     pub worn_area_mm2: f64,
-    /// Area that grinding or turning has removed, in mm².
+    /// Area of the section removed by grinding or turning, in mm².
     pub machined_area_mm2: f64,
     /// Uncertainty of the worn area.
     pub uncertainty: WearUncertainty,
@@ -89,13 +89,13 @@ pub struct WornBody {
 /// Uncertainties of worn areas and depths by their source, relative to the worn area.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct WearUncertainty {
-    /// Of the step length, from halving each step.
+    /// Uncertainty due to the step length, from halving each step.
     pub steps: f64,
-    /// Of replacing the traffic by representative states, from halving each group of rows along each column.
+    /// Uncertainty due to replacing the traffic by representative states, from halving each group of rows along each column.
     pub states: f64,
-    /// Of the contact solutions, from the error estimates of their friction power.
+    /// Uncertainty due to the contact solutions, from the error estimates of their friction power.
     pub contact: f64,
-    /// Of the wear coefficients: the factors on worn areas that bound 90 % of the sampled coefficients.
+    /// Uncertainty due to the wear coefficients: the factors on worn areas that bound 90 % of the sampled coefficients.
     pub coefficients: [f64; 2],
 }
 
@@ -104,19 +104,19 @@ pub struct WearUncertainty {
 pub struct ContactRange {
     /// Largest pressure in MPa.
     pub pressure_max_mpa: f64,
-    /// Mean over the traffic of the largest pressure of each state.
+    /// Mean of the largest pressure of each state over the traffic.
     pub pressure_mean_mpa: f64,
     /// Largest Y/Q: lateral over vertical force of the wheel.
     pub y_over_q_max: f64,
-    /// Mean over the traffic.
+    /// Mean of Y/Q over the traffic.
     pub y_over_q_mean: f64,
-    /// Mean over the traffic of the friction power over the speed, in N.
+    /// Mean of the friction power divided by the speed over the traffic, in N.
     pub t_gamma_mean_n: f64,
-    /// Share of the traffic whose contact could not be solved; it is taken to wear nothing.
+    /// Share of the traffic whose contact could not be solved; it is assumed to cause no wear.
     pub unsolved_share: f64,
 }
 
-/// The contact of one state.
+/// The contact in one state.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct StateContact {
@@ -124,37 +124,37 @@ pub struct StateContact {
     pub share: f64,
     /// Y/Q.
     pub y_over_q: f64,
-    /// Its patches; none where it was not solved.
+    /// Its patches; empty if the contact was not solved.
     pub patches: Vec<StatePatch>,
-    /// Why it was not solved.
+    /// Why the contact was not solved.
     pub failure: Option<String>,
 }
 
-/// A patch of a state.
+/// A patch in a state.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct StatePatch {
     /// Load centre on the rail's section, `[y, z]` in mm.
     pub rail_mm: [f64; 2],
-    /// The same on the wheel's section.
+    /// Load centre on the wheel's section, in the same form.
     pub wheel_mm: [f64; 2],
     /// Normal force in N.
     pub normal_force_n: f64,
     /// Largest pressure in MPa.
     pub pressure_max_mpa: f64,
-    /// Friction power over the speed, in N.
+    /// Friction power divided by the speed, in N.
     pub t_gamma_n: f64,
 }
 
 /// A traffic condensed to a few states.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct CondensedTraffic {
-    /// Rows that were sent.
+    /// Number of rows submitted.
     pub rows: u32,
-    /// Places in the case that the values belong to.
+    /// JSON pointers to the parts of the case that `values` replace.
     pub pointers: Vec<String>,
-    /// The states.
+    /// The representative states.
     pub states: Vec<TrafficState>,
-    /// Change of the distribution of wear of rail and wheel when every group of rows is halved, relative to the worn area; after spreading.
+    /// Change of the wear distribution of rail and wheel, after spreading, when every group of rows is halved; relative to the worn area.
     pub error: [f64; 2],
 }
 
@@ -165,25 +165,26 @@ pub struct TrafficState {
     pub share: f64,
     /// Number of rows that it represents.
     pub rows: u32,
-    /// Their means, in the order of `pointers`.
+    /// Mean values of its rows, in the order of `pointers`.
     pub values: Vec<f64>,
-    /// Standard deviation in mm by which the wear of the state is spread along rail and wheel, for the places at which its rows touch.
+    /// Standard deviation in mm over which the wear of the state is spread along rail and wheel, to represent the contact positions of its
+    /// rows.
     pub spread_mm: [f64; 2],
 }
 
-/// When a limit is reached.
+/// The time at which a limit is reached.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct LimitReached {
-    /// The loss, as `limits` names it.
+    /// Name of the loss, as in `limits`.
     pub loss: String,
     /// The limit in mm.
     pub limit_mm: f64,
-    /// When; absent where the extent ends before.
+    /// Time at which the limit is reached; absent if the extent ends earlier.
     pub reached: Option<Progress>,
-    /// The earliest time within the uncertainty of the loss.
+    /// Earliest time within the uncertainty of the loss.
     pub earliest: Option<Progress>,
-    /// The latest time within it; absent where the extent ends before.
+    /// Latest time within the uncertainty of the loss; absent if the extent ends earlier.
     pub latest: Option<Progress>,
 }
 
@@ -196,7 +197,7 @@ pub struct EvolutionState {
     pub next: f64,
     /// The present time has a record.
     pub recorded: bool,
-    /// Events that have happened.
+    /// Events that have taken place.
     pub events_done: u32,
     /// Coefficient of friction in place of that of the states.
     pub friction: Option<f64>,
@@ -206,11 +207,11 @@ pub struct EvolutionState {
     pub wheel_y: Vec<f64>,
     /// Rail and wheel.
     pub bodies: [BodyState; 2],
-    /// Accepted steps.
+    /// Number of accepted steps.
     pub steps: u32,
     /// Repeated steps.
     pub rejected: u32,
-    /// Contacts solved.
+    /// Number of contacts solved.
     pub solves: u32,
 }
 
@@ -249,23 +250,23 @@ pub struct StressTensor {
 /// The stress at one point below the surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct StressPoint {
-    /// Where: `[x, y, depth]` in mm, depth positive into the body.
+    /// Position `[x, y, depth]` in mm, depth positive into the body.
     pub at_mm: [f64; 3],
     /// The stress tensor.
     pub stress_mpa: StressTensor,
     /// Von Mises' equivalent stress.
     pub von_mises_mpa: f64,
-    /// Tresca's: the largest principal stress less the smallest.
+    /// Tresca's equivalent stress: the largest principal stress minus the smallest.
     pub tresca_mpa: f64,
     /// Principal stresses from the largest to the smallest.
     pub principal_mpa: [f64; 3],
     /// Mean of the normal stresses.
     pub hydrostatic_mpa: f64,
-    /// The largest shear stress, half of Tresca's.
+    /// Largest shear stress, half of `tresca_mpa`.
     pub shear_max_mpa: f64,
-    /// Normal of a plane that carries it; the plane of `shear_direction` carries it too.
+    /// Normal of a plane with the largest shear stress; the plane with normal `shear_direction` has it too.
     pub shear_plane_normal: [f64; 3],
-    /// Direction of that shear stress in the plane.
+    /// Direction of the largest shear stress in that plane.
     pub shear_direction: [f64; 3],
 }
 
@@ -273,52 +274,53 @@ pub struct StressPoint {
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct SubsurfaceSummary {
-    /// The body whose stresses these are.
+    /// The body that the stresses belong to.
     pub body: BodyName,
     /// Smallest depth in mm at which stresses are evaluated; closer to the surface, mesh steps would distort them. Shallower points are
     /// evaluated at this depth.
     pub least_depth_mm: f64,
-    /// Where von Mises' stress is largest; absent unless it was asked for.
+    /// The point with the largest von Mises stress; absent unless it was requested.
     pub worst: Option<StressPoint>,
-    /// What a point of the body lives through while the contact rolls over it; absent unless it was asked for.
+    /// Criteria for a point of the body while the contact rolls over it; absent unless they were requested.
     pub passage: Option<PassageSummary>,
 }
 
-/// The worst places of a passage of the contact in steady rolling. A place is a line along x; stresses belong to all of its history.
+/// The worst places for the passage of the contact in steady rolling. A place is a line along x; its stresses cover its whole stress
+/// history.
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PassageSummary {
     /// Where Dang Van's stress is largest; absent without a slope.
     pub dang_van: Option<PassagePlace>,
-    /// Smallest yield stress in shear (von Mises) with which nothing yields although there is no residual stress.
+    /// Smallest yield stress in shear (von Mises) at which nothing yields even without residual stress.
     pub yield_without_residual: PassagePlace,
-    /// Smallest yield stress in shear (von Mises) with which residual stresses can end yielding: the limit of elastic shakedown.
+    /// Smallest yield stress in shear (von Mises) at which residual stresses can end yielding: the limit of elastic shakedown.
     pub yield_with_residual: PassagePlace,
 }
 
 /// A stress and the line along x that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PassagePlace {
-    /// Where: `[y, depth]` in mm.
+    /// Position `[y, depth]` of the line in mm.
     pub at_mm: [f64; 2],
     /// The stress.
     pub stress_mpa: f64,
 }
 
-/// Temperatures of both surfaces in the contact in short; both bodies have one temperature there.
+/// Summary of the temperatures in the contact, which are the same on both surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct TemperatureSummary {
     /// Highest temperature in °C.
     pub max_c: f64,
-    /// Highest rise by friction in K.
+    /// Largest temperature rise by friction in K.
     pub rise_max_k: f64,
-    /// Where it is, `[x, y]` in mm.
+    /// Position of the highest temperature, `[x, y]` in mm.
     pub at_mm: [f64; 2],
-    /// Temperature in the contact without friction, in °C: between those of the bodies.
+    /// Temperature in the contact without friction, in °C; it lies between those of the bodies.
     pub without_friction_c: f64,
     /// Share of the friction heat that flows into the lower body.
     pub heat_share_lower: f64,
-    /// Smaller of the two bodies' Péclet numbers. The theory assumes that heat flows only into the depth, which holds for large
+    /// Smaller of the two bodies' Péclet numbers. The theory assumes that heat flows only in the direction of depth, which holds for large
     /// values.
     pub peclet: f64,
 }

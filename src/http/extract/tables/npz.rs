@@ -63,7 +63,7 @@ pub fn too_large(max_bytes: usize) -> ApiError {
 
 /// The numbers of an NPY file.
 fn array(file: &[u8]) -> Result<Vec<f64>, String> {
-    let broken = || "this is no NPY file".to_owned();
+    let broken = || "this is not an NPY file".to_owned();
     let rest = file.strip_prefix(b"\x93NUMPY").ok_or_else(broken)?;
     let [version, _, rest @ ..] = rest else {
         return Err(broken());
@@ -102,7 +102,7 @@ fn array(file: &[u8]) -> Result<Vec<f64>, String> {
         Ok(numbers)
     } else {
         Err(format!(
-            "it should have {count} numbers, {} are there",
+            "it must have {count} numbers, but has {}",
             numbers.len()
         ))
     }
@@ -188,7 +188,7 @@ mod tests {
             (
                 header("'<f8'", "(3,)"),
                 16,
-                "should have 3 numbers, 2 are there",
+                "must have 3 numbers, but has 2",
             ),
         ] {
             let told = array(&file(&header, &vec![0; values])).unwrap_err();

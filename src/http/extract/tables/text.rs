@@ -238,7 +238,7 @@ impl<R: BufRead> JsonRows<R> {
                     }
                     (_, Some(value)) => {
                         return Err(self.wrong(&format!(
-                            "`{}` is {value}, which is of another kind than in the first row",
+                            "`{}` is {value}, which has another type than in the first row",
                             column.name
                         )));
                     }

@@ -4,7 +4,7 @@ use crate::contact::case::words::solver::Output;
 use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
 use crate::http::render::shape::sheet::AtBorder;
 
-/// What a picture shows.
+/// View shown by a picture.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
     /// First line, a text of the client.

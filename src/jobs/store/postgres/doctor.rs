@@ -43,7 +43,7 @@ const NUMBERS: [Question; 10] = questions! {
     "server version"
         "SELECT CAST(current_setting('server_version_num') AS bigint)"
         |version| version < VERSION_MIN;
-    "server takes no data (1: it is a standby)"
+    "server is read-only (1: it is a standby)"
         "SELECT CASE WHEN pg_is_in_recovery() THEN 1::bigint ELSE 0 END"
         |standby| standby > 0;
     "commits are on the disk when they are answered (0: they may be lost)"

@@ -67,7 +67,7 @@ pub const STEPS_MAX: u32 = 60;
 /// How a solve went.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Convergence {
-    /// Did the residual reach the tolerance, before the steps were used up?
+    /// Did the residual reach the tolerance, before the iteration limit was reached?
     pub converged: bool,
     /// Newton steps.
     pub iterations: u32,

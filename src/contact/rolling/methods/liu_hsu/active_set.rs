@@ -43,8 +43,8 @@ impl ZonesTermination {
         match self {
             ZonesTermination::Converged => "converged",
             ZonesTermination::NewtonDiverged => "Newton-Raphson diverged",
-            ZonesTermination::ZonesRepeat => "the division into stick and slip repeats itself",
-            ZonesTermination::IterationLimit => "too many divisions into stick and slip",
+            ZonesTermination::ZonesRepeat => "the stick and slip zones repeat in a cycle",
+            ZonesTermination::IterationLimit => "too many changes of the stick and slip zones",
             ZonesTermination::Inexact => "the residual stays above the tolerance",
         }
     }

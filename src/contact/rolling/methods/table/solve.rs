@@ -100,7 +100,7 @@ pub fn outside(ratio: f64) -> Option<String> {
 fn covers(number: usize, load_mismatch: f64, ratio: f64) -> Result<(), SolveError> {
     let reason = if load_mismatch > MISPLACED_MAX {
         Some(format!(
-            "{:.0} % of the load of patch {number} is elsewhere than on the best ellipse; at most {:.0} % may be, use boundary_element",
+            "{:.0} % of the load of patch {number} lies outside the best ellipse; at most {:.0} % is allowed, use boundary_element",
             100.0 * load_mismatch,
             100.0 * MISPLACED_MAX
         ))
