@@ -37,7 +37,7 @@ pub struct HttpOptions {
     /// waiting, and one for a batch with 429.
     #[arg(long, env = "RAILHEAD_WAITS_MAX", default_value = "1024", value_name = "N", value_parser = count(..))]
     pub waits_max: usize,
-    /// Maximum number of such requests of one tenant.
+    /// Maximum number of waiting requests of one tenant; beyond it, as for `--waits-max`.
     #[arg(long, env = "RAILHEAD_TENANT_WAITS_MAX", default_value = "256", value_name = "N", value_parser = count(..))]
     pub tenant_waits_max: usize,
     /// Seconds within which the head of the first request on a connection must arrive.
@@ -57,7 +57,7 @@ pub struct HttpOptions {
     /// Maximum memory in MiB for bodies, parsed cases and responses of all requests; beyond it, requests wait or get 503.
     #[arg(long = "request-memory-mb", env = "RAILHEAD_REQUEST_MEMORY_MB", default_value = "512", value_name = "MIB", value_parser = memory(64..=1 << 20))]
     pub memory_max_bytes: usize,
-    /// Maximum part of this memory for one tenant.
+    /// Maximum memory in MiB for bodies, parsed cases and responses of the requests of one tenant.
     #[arg(long = "tenant-request-memory-mb", env = "RAILHEAD_TENANT_REQUEST_MEMORY_MB", default_value = "256", value_name = "MIB", value_parser = memory(64..=1 << 20))]
     pub tenant_memory_max_bytes: usize,
     /// Maximum memory in MiB of one parsed case; beyond it: 413.

@@ -32,7 +32,7 @@ test('a curve radius becomes a yaw rate at the speed of its row, or of the case;
 
 test('what is wrong with a table is said with its column and row', () => {
   assert.match(String(parseTraffic('mood\ngood')), /no column of the table is known/);
-  assert.match(String(parseTraffic('Q [kN],shift [mm]\n75,1\n80,x')), /row 2 of “shift \[mm\]” is no number/);
+  assert.match(String(parseTraffic('Q [kN],shift [mm]\n75,1\n80,x')), /row 2 of “shift \[mm\]” is not a number/);
   assert.match(String(parseTraffic('Q [furlongs]\n75')), /unit furlongs/);
   assert.match(String(parseTraffic('Q [kN]')), /row of titles and rows/);
 });
