@@ -203,7 +203,10 @@ impl Jobs {
         if self.shared.options.database.is_none() && !self.shared.storage.damaged() {
             note_closed(&self.shared.options.data_dir);
         }
-        drop(lock(&self.shared.lock).take());
+        if let Some(held) = lock(&self.shared.lock).take() {
+            // A program that is being started has a copy of the file for a moment, so closing it does not free the lock.
+            let _ = held.unlock();
+        }
     }
 }
 
