@@ -1,6 +1,7 @@
 //! Five nodes that start at once, tables first, on databases of every age with many jobs in them: are the tables brought forward once, and
 //! do all nodes work afterwards?
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use reqwest::Method;
@@ -58,8 +59,22 @@ async fn work(nodes: &[(String, Service, TempDir)]) {
     }
 }
 
+/// The form of tables that the present program makes.
+fn newest() -> u32 {
+    let steps = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/jobs/store/postgres/steps");
+    let names = std::fs::read_dir(steps).expect("the steps");
+    let forms = names.map(|name| {
+        let path = name.expect("a step").path();
+        let form = path
+            .file_stem()
+            .and_then(|name| name.to_str()?.parse().ok());
+        form.expect("a number")
+    });
+    forms.max().expect("a step")
+}
+
 pub async fn run() {
-    for form in 0..old_tables::newest() {
+    for form in 0..newest() {
         let Some(url) = postgres::database().await else {
             return;
         };

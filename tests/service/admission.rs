@@ -1,11 +1,14 @@
 //! Are the bounds of the queue exact, whoever submits how much at the same time, and is nothing kept that was refused?
 
+use std::collections::BTreeSet;
+
+use futures_util::future::join_all;
 use railhead::jobs::State;
 use railhead::jobs::options::StagingBounds;
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
-use crate::batches::{lines, results, send, small};
+use crate::batches::{lines, send, small};
 use crate::errors::assert_problem;
 use crate::evolutions::request as evolution;
 use crate::runs::{columns, template};
@@ -43,8 +46,8 @@ async fn queued(server: &Server) -> usize {
 async fn batches_at_the_same_time_do_not_pass_the_bound_of_the_queue() {
     // Below and above the size from which places are reserved while a batch arrives.
     for (queue_max, of_tenant, size, kind, fit) in [
-        (600, 10_000, 500, "queue-full", 1),
-        (10_000, 1_100, 500, "quota-exceeded", 2),
+        (60, 10_000, 50, "queue-full", 1),
+        (10_000, 110, 50, "quota-exceeded", 2),
         (2_500, 10_000, 2_000, "queue-full", 1),
     ] {
         let server = bounded(queue_max, of_tenant).await;
@@ -87,24 +90,6 @@ async fn until_accepted(server: &Server, body: &str) -> crate::server::Answer {
 }
 
 #[tokio::test]
-async fn places_come_back_when_jobs_leave_the_queue() {
-    let server = bounded(3, 3).await;
-    let mut paths = Vec::new();
-    for number in 0..3 {
-        paths.push(server.submit(&small(&number.to_string())).await);
-    }
-    let full = server.post("/v1/jobs", &small("too many")).await;
-    assert_problem(&full, 429, "quota-exceeded", "");
-    server
-        .post(&format!("{}/cancel", paths[0]), &Value::Null)
-        .await;
-    server.submit(&small("fits again")).await;
-    assert_eq!(server.delete(&paths[0]).await.status, 204);
-    let full = server.post("/v1/jobs", &small("too many")).await;
-    assert_problem(&full, 429, "quota-exceeded", "");
-}
-
-#[tokio::test]
 async fn a_batch_that_is_broken_off_gives_its_places_back() {
     let server = bounded(3_000, 3_000).await;
     // 2 000 good cases, then an element that is no JSON: the array is refused after places were reserved.
@@ -113,43 +98,6 @@ async fn a_batch_that_is_broken_off_gives_its_places_back() {
     body.push_str(", nonsense]");
     send(&server, "", "application/json", body).await.is(400);
     until_accepted(&server, &lines(&many(3_000))).await.is(202);
-}
-
-#[tokio::test]
-async fn rows_of_a_table_are_kept_without_their_template() {
-    let setup = Setup::idle();
-    let data_dir = setup.options.data_dir.clone();
-    let server = setup.start().await;
-    let y: Vec<f64> = (0..1000)
-        .map(|place| f64::from(place - 500) * 0.04)
-        .collect();
-    let gap: Vec<f64> = y.iter().map(|y| y * y / 600.0).collect();
-    let mut template = small("template");
-    template["contact"] =
-        json!({ "type": "gap_profile", "rolling_mm": 460, "y_mm": y, "gap_mm": gap });
-    let id = server.keep(&template).await;
-    let rows: String = (0..400)
-        .map(|row| format!("{},r{row}\n", 50_000 + row))
-        .collect();
-    let table = format!("normal_force_n,name\n{rows}");
-    let batch = send(&server, &format!("?template={id}"), "text/csv", table).await;
-    assert_eq!(batch.status, 202, "{}", batch.text);
-    let lines = results(&server, &batch.json, "").await;
-    let job = format!("/v1/jobs/{}", lines[7]["id"].as_str().expect("an id"));
-    let filled = server.read(&format!("{job}/case")).await;
-    assert_eq!(filled["load"]["normal_force_n"], 50_007);
-    assert_eq!(
-        (&filled["name"], &filled["contact"]),
-        (&json!("r7"), &template["contact"])
-    );
-    let expanded = 400 * template.to_string().len() as u64;
-    let files = ["jobs.db", "jobs.db-wal"].map(|name| data_dir.join(name));
-    let stored = files.iter().filter_map(|file| std::fs::metadata(file).ok());
-    let stored: u64 = stored.map(|about| about.len()).sum();
-    assert!(
-        stored < expanded / 3,
-        "{stored} bytes for {expanded} expanded ones"
-    );
 }
 
 #[tokio::test]
@@ -194,13 +142,18 @@ async fn a_key_stands_for_one_piece_of_work_with_its_options() {
         };
         let first = ask("?priority=low", path, &body).await.is(202);
         assert_eq!(first.header("idempotency-replayed"), None);
-        let again = ask("?priority=low", path, &body).await.is(202);
-        assert_eq!(again.header("idempotency-replayed"), Some("true"));
-        assert_eq!(again.json, first.json);
-        let another = ask("?priority=low", &format!("{path}/2"), &body)
-            .await
-            .is(202);
-        assert_ne!(another.json["id"], first.json["id"]);
+        let again = (0..6).map(|_| ask("?priority=low", path, &body));
+        for again in join_all(again).await {
+            assert_eq!(again.header("idempotency-replayed"), Some("true"));
+            assert_eq!(again.is(202).json, first.json);
+        }
+        // Requests with a new key that arrive together make one piece of work.
+        let key = format!("{path}/2");
+        let new = (0..6).map(|_| ask("?priority=low", &key, &body));
+        let new = join_all(new).await.into_iter();
+        let ids: BTreeSet<String> = new.map(|made| made.is(202).location()).collect();
+        assert_eq!(ids.len(), 1, "{ids:?}");
+        assert!(!ids.contains(&first.location()));
         for options in ["", "?priority=high", "?priority=low&deadline_s=60"] {
             let refused = ask(options, path, &body).await;
             assert_problem(&refused, 422, "idempotency-conflict", "");

@@ -6,7 +6,7 @@ use railhead::http::{HttpOptions, Peer, router};
 use serde_json::{Value, json};
 use tower::ServiceExt;
 
-use crate::server::{Server, Setup, link};
+use crate::server::{Server, link};
 use crate::support::long_case;
 
 /// What one reader is counted with for small results, in bytes.
@@ -71,7 +71,7 @@ async fn readers(router: &axum::Router, path: &str) -> usize {
 #[tokio::test]
 async fn a_result_that_is_larger_than_all_memory_for_answers_passes_through_the_lines_of_its_batch()
 {
-    let server = Setup::new().start().await;
+    let server = Server::start().await;
     let (path, large) = solved(&server, 1500).await;
     let result = server.get(&large).await;
     let little = with_answers(&server, 3 * READER_BYTES / 2);
@@ -102,15 +102,13 @@ async fn a_result_that_is_larger_than_all_memory_for_answers_passes_through_the_
     )
     .await;
     assert_eq!(text_of(body).await.lines().count(), 1 + 2 + 1500 + 3);
+    assert_counted_while_read(&server, &path, result.bytes.len()).await;
 }
 
-#[tokio::test]
-async fn a_large_result_is_counted_as_long_as_its_table_is_being_read() {
-    let server = Setup::new().start().await;
-    let (path, large) = solved(&server, 1500).await;
-    let bytes = server.get(&large).await.bytes.len();
+/// Asserts that a large result is counted as long as its table is being read.
+async fn assert_counted_while_read(server: &Server, path: &str, bytes: usize) {
     let places = 2 * bytes / READER_BYTES + 3;
-    let router = with_answers(&server, places * READER_BYTES);
+    let router = with_answers(server, places * READER_BYTES);
     let table = format!("{path}?format=csv");
     assert_eq!(readers(&router, &table).await, places);
 

@@ -3,7 +3,6 @@
 use serde_json::{Value, json};
 
 use crate::batches::{lines, send, small};
-use crate::errors::assert_problem;
 use crate::server::Server;
 
 const NDJSON: &str = "application/x-ndjson";
@@ -47,20 +46,4 @@ async fn a_case_of_a_batch_may_have_options_of_its_own_in_every_form_of_a_batch(
     let case = server.read(&format!("/v1/jobs/{job}/case")).await;
     assert_eq!(case["name"], "b");
     assert!(case.get("priority").is_none() && case.get("case").is_none());
-}
-
-#[tokio::test]
-async fn faults_of_options_and_of_their_cases_are_named_where_they_stand() {
-    let server = Server::idle().await;
-    let mut faulty = small("b");
-    faulty["friction"]["coefficient"] = json!(-1);
-    let cases = [
-        json!({ "case": small("a"), "priority": "soon" }),
-        json!({ "case": faulty }),
-    ];
-    let answer = send(&server, "", NDJSON, lines(&cases)).await;
-    assert_problem(&answer, 422, "faulty-batch", "");
-    let errors = answer.json["errors"].as_array().expect("faults");
-    let pointers: Vec<_> = errors.iter().map(|fault| &fault["pointer"]).collect();
-    assert_eq!(pointers, ["/0/priority", "/1/case/friction/coefficient"]);
 }

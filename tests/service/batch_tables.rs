@@ -2,50 +2,12 @@
 
 use serde_json::json;
 
-use crate::batches::{results, send, small};
-use crate::csv_table::Csv;
+use crate::batches::{send, small};
 use crate::errors::assert_problem;
-use crate::server::{Server, link};
+use crate::server::Server;
 
 async fn template(server: &Server) -> String {
     format!("?template={}", server.keep(&small("template")).await)
-}
-
-#[tokio::test]
-async fn table_makes_a_case_of_each_line() {
-    let server = Server::start().await;
-    let query = template(&server).await;
-    let table = "label:km,normal_force_n,/motion/creepage_x,name\r\n\
-                 37.2,80000,0.002,\"a, b\"\r\n\r\n\"37.4, above\",,,\r\n37.6,9e4,0,last";
-    let batch = send(&server, &query, "text/csv; charset=utf-8", table.to_owned()).await;
-    assert_eq!(batch.status, 202, "{}", batch.text);
-    assert_eq!(batch.json["count"], 3);
-    let lines = results(&server, &batch.json, "?wait=60").await;
-    let said: Vec<_> = lines
-        .iter()
-        .map(|line| {
-            (
-                &line["name"],
-                &line["labels"]["km"],
-                &line["labels"]["line"],
-            )
-        })
-        .collect();
-    let line = &json!("A12");
-    assert_eq!(
-        said,
-        [
-            (&json!("a, b"), &json!("37.2"), line),
-            (&json!("template"), &json!("37.4, above"), line),
-            (&json!("last"), &json!("37.6"), line),
-        ]
-    );
-    let loads: Vec<_> = lines
-        .iter()
-        .map(|line| &line["result"]["patches"][0]["normal_force_n"])
-        .map(|load| load.as_f64().expect("a load").round())
-        .collect();
-    assert_eq!(loads, [80_000.0, 100_000.0, 90_000.0]);
 }
 
 #[tokio::test]
@@ -106,27 +68,6 @@ async fn faults_of_a_table_are_named_by_line() {
     }
     let answer = send(&server, &query, "application/json", "[]".to_owned()).await;
     assert_problem(&answer, 400, "bad-query", "text/csv");
-}
-
-#[tokio::test]
-async fn names_and_labels_that_look_like_formulas_are_texts_in_a_table() {
-    let server = Server::start().await;
-    let names = ["=1+1", "+1+1", "-1", "@SUM(1)", "plain=1"];
-    let mut cases = names.map(small);
-    cases[0]["labels"] = json!({ "km": "-5", "line": "=1+1" });
-    cases[1]["labels"] = json!({ "km": "-5,25" });
-    let batch = server.post("/v1/batches", &json!(cases)).await.json;
-    let path = link(&batch, "results");
-    let table = server.get(&format!("{path}?wait=60&format=csv")).await.text;
-    let table = Csv::read(&table);
-    assert_eq!(table.head[2], "name");
-    assert_eq!(
-        table.column("name"),
-        ["'=1+1", "'+1+1", "-1", "'@SUM(1)", "plain=1"]
-    );
-    assert_eq!(table.column("label:km")[..2], ["-5", "-5,25"]);
-    let lines = ["'=1+1", "", "A12", "A12", "A12"];
-    assert_eq!(table.column("label:line"), lines);
 }
 
 #[tokio::test]

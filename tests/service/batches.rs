@@ -99,6 +99,7 @@ async fn one_faulty_case_refuses_the_batch_and_names_its_line() {
     assert_problem(&answer, 422, "faulty-batch", "2 of 4 cases");
     let errors = answer.json["errors"].as_array().expect("errors");
     assert_eq!(errors[0]["pointer"], "/1/friction/coefficient");
+    assert_eq!(errors[0]["code"], "out-of-range");
     assert_eq!(errors[0]["line"], 3);
     assert_eq!(errors[1]["line"], 4);
     assert_eq!(errors[1]["pointer"], "/2");

@@ -138,16 +138,20 @@ async fn a_bound_key_uses_profiles_by_their_digests_and_neither_lists_nor_delete
 }
 
 #[tokio::test]
-async fn a_bound_key_takes_no_template_of_others() {
+async fn templates_of_another_tenant_or_line_are_not_found() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;
     let foreign = make(&guarded, "jobs", 1, "8").await;
     let own = make(&guarded, "jobs", 1, "7").await;
+    let (bound, south) = (&guarded.line_7, &guarded.south);
     for path in ["/v1/batches", "/v1/runs", "/v1/evaluate"] {
-        for (template, refused) in [(&foreign, true), (&own, false)] {
+        for (key, template, refused) in [
+            (bound, &foreign, true),
+            (south, &foreign, true),
+            (bound, &own, false),
+        ] {
             let path = format!("{path}?template={template}");
             let table = "/friction/coefficient,creepage_x\n0.3,0.001\n";
-            let sent = guarded.post_as(&guarded.line_7, &path, "text/csv", table);
-            let answer = sent.await;
+            let answer = guarded.post_as(key, &path, "text/csv", table).await;
             assert_eq!(answer.status == 404, refused, "{path}: {}", answer.text);
         }
     }

@@ -106,38 +106,6 @@ async fn what_changes_the_answer_or_refuses_the_cache_is_solved() {
 }
 
 #[tokio::test]
-async fn either_job_can_be_deleted_without_the_other() {
-    for small_result_max_bytes in [32 << 10, 0] {
-        for first_goes in [true, false] {
-            let mut setup = Setup::new();
-            setup.options.small_result_max_bytes = small_result_max_bytes;
-            let folder = setup.options.data_dir.join("results");
-            let server = setup.start().await;
-            let first = server.solve(&case("first")).await;
-            let second = server.solve(&case("second")).await;
-            let third = server.solve(&case("third")).await;
-            assert_eq!(second["cached"], true);
-            assert_eq!(third["cached"], true);
-            let (gone, kept) = if first_goes {
-                (&first, &second)
-            } else {
-                (&second, &first)
-            };
-            assert_eq!(server.delete(&path_of(gone)).await.status, 204);
-            for stays in [kept, &third] {
-                let fields = server.get(&format!("{}/tractions", path_of(stays))).await;
-                assert_eq!(fields.status, 200, "{}", fields.text);
-            }
-            for last in [kept, &third] {
-                assert_eq!(server.delete(&path_of(last)).await.status, 204);
-            }
-            assert!(files_below(&folder).is_empty(), "nothing is left behind");
-            assert_eq!(server.solve(&case("again")).await["cached"], false);
-        }
-    }
-}
-
-#[tokio::test]
 async fn a_batch_is_answered_from_earlier_results() {
     let (server, solves) = counting(|_| {}).await;
     let cases: Vec<Value> = (1..=30).map(|number| loaded(10_000 * number)).collect();

@@ -115,27 +115,6 @@ async fn wheel_and_rail_are_placed_where_they_touch_when_solved() {
 }
 
 #[tokio::test]
-async fn the_time_is_that_of_a_solve_where_one_ends_soon() {
-    let case = example("hertz-steel.case.json");
-    let mut longer = example("sweep.case.json");
-    let range = json!({ "from": 0.0, "to": 0.01, "points": 5000 });
-    longer["motion"] = json!({ "sweep": { "creepage_x": range } });
-    longer["outputs"] = json!(["resultants"]);
-    for (trial_ms, case, found_by) in [
-        (3_600_000, &case, "solve"),
-        (1, &longer, "part_of_solve"),
-        (0, &case, "formulas"),
-    ] {
-        let server =
-            Server::with(|setup| setup.http.check_trial = Duration::from_millis(trial_ms)).await;
-        let answer = server.post("/v1/cases/check", case).await.is(200);
-        let estimate = &answer.json["estimate"];
-        assert_eq!(estimate["found_by"], found_by, "{estimate}");
-        assert!(number(&estimate["seconds"]) > 0.0, "{estimate}");
-    }
-}
-
-#[tokio::test]
 async fn a_solve_that_fails_while_it_is_tried_is_told() {
     let server = Server::with(|setup| setup.http.check_trial = Duration::from_secs(3600)).await;
     let mut case = example("uic60-crown.case.json");
@@ -149,68 +128,4 @@ async fn a_solve_that_fails_while_it_is_tried_is_told() {
     );
     let job = server.solve(&case).await;
     assert_eq!(job["state"], "failed", "{job}");
-}
-
-/// The wheel of a shipped case as points, in other senses and with another origin.
-fn turned_wheel(case: &Value) -> Value {
-    let text = case["contact"]["wheel"]["text"].as_str().expect("a text");
-    let row = |line: &str| {
-        let mut words = line.split(|c: char| c.is_whitespace() || c == ',');
-        let mut next = || words.find(|word| !word.is_empty())?.parse::<f64>().ok();
-        Some([70.0 - next()?, -next()?])
-    };
-    let points: Vec<[f64; 2]> = text.lines().filter_map(row).collect();
-    json!({ "points_mm": points })
-}
-
-/// Code, pointer and sentence of the remarks on the profiles of a case.
-fn on_profiles(remarks: &Value) -> Vec<[String; 3]> {
-    let remarks = remarks.as_array().expect("remarks").iter();
-    let word = |remark: &Value, name: &str| remark[name].as_str().unwrap_or_default().to_owned();
-    let all = remarks.map(|r| ["code", "pointer", "detail"].map(|name| word(r, name)));
-    all.filter(|[_, pointer, _]| pointer.starts_with("/contact/"))
-        .collect()
-}
-
-#[tokio::test]
-async fn the_check_and_the_result_have_the_same_remarks_on_how_profiles_were_read() {
-    let server = Server::start().await;
-    let mut case = example("wheel-rail.case.json");
-    let plain = server.post("/v1/cases/check", &case).await.json;
-    assert_eq!(on_profiles(&plain["remarks"]), Vec::<[String; 3]>::new());
-    let wheel = turned_wheel(&case);
-    case["contact"]["wheel"] = wheel.clone();
-    let contact = case["contact"].as_object_mut().expect("a contact");
-    contact.remove("flange_back_position_mm");
-    let kept = server.post("/v1/profiles", &wheel).await.json;
-    assert_eq!(kept["body"], "wheel", "{kept}");
-    let mut named = case.clone();
-    named["contact"]["wheel"] = json!({ "profile": kept["digest"] });
-    for case in [case, named] {
-        let checked = server.post("/v1/cases/check", &case).await.json;
-        let told = on_profiles(&checked["remarks"]);
-        let codes: Vec<&str> = told.iter().map(|[code, ..]| code.as_str()).collect();
-        let expected = [
-            "profile-z-mirrored",
-            "profile-y-mirrored",
-            "flange-back-found",
-        ];
-        assert_eq!(codes, expected, "{checked}");
-        let solved = server.solve(&case).await;
-        assert_eq!(on_profiles(&solved["result"]["remarks"]), told, "{solved}");
-    }
-}
-
-#[tokio::test]
-async fn a_wheel_that_would_stand_on_its_flange_is_told_before_it_is_solved() {
-    let server = Server::start().await;
-    let mut case = example("wheel-rail.case.json");
-    case["contact"]["lateral_shift_mm"] = json!(-40.0);
-    let checked = server.post("/v1/cases/check", &case).await.json;
-    let told = on_profiles(&checked["remarks"]);
-    assert!(
-        told.iter()
-            .any(|[code, ..]| code == "contact-on-flange-tip"),
-        "{checked}"
-    );
 }

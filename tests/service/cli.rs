@@ -143,7 +143,14 @@ fn settings_come_from_the_environment_too_and_flags_win() {
     };
     fails(&serve(&[]), 2, "127.0.0.1:1:1");
 
-    let running = Service::start(folder.path(), &[]);
+    let mut misspelt = railhead();
+    misspelt.envs([("RAILHEAD_WORKRES", "3"), ("RAILHEAD_WORKERS", "1")]);
+    let running = Service::start_as(&mut misspelt, "serve", folder.path(), &[]);
+    let log = running.log_text();
+    assert!(
+        log.contains("RAILHEAD_WORKRES") && !log.contains("RAILHEAD_WORKERS"),
+        "{log}"
+    );
     fails(&serve(&["--listen", "127.0.0.1:0"]), 1, "in use");
     running.kill();
 }

@@ -3,12 +3,11 @@
 use railhead::jobs::codec::table::{COLUMNS_MAX, RowTable, TableColumn};
 use serde_json::{Value, json};
 
-use crate::batches::{results, send, small};
 use crate::csv_table::Csv;
 use crate::errors::assert_problem;
 use crate::runs::answers;
 use crate::server::{Answer, Server};
-use crate::table_forms::{ARROW, NPZ, forms, kept_template, send_rows};
+use crate::table_forms::{forms, kept_template, send_rows};
 
 async fn rows_of(server: &Server, sent: &Answer) -> Vec<Value> {
     assert_eq!(sent.status, 202, "{}", sent.text);
@@ -123,87 +122,8 @@ async fn columns_are_known_bounded_and_there_once_in_every_form() {
         let mut case = crate::runs::template("table");
         case["load"]["normal_force_n"] = json!(1e5);
         let body = json!({ "template": case, "columns": columns });
-        let _refused = server.post("/v1/runs", &body).await.is(422);
+        server.post("/v1/runs", &body).await.is(422);
         server.post("/v1/evaluate", &body).await.is(422);
-    }
-    let evaluate = async |form: &str, body: Vec<u8>| {
-        let path = format!("/v1/evaluate?template={template}");
-        server.post_as(&path, form, body).await
-    };
-    let twice = owned(&["creepage_x", "/motion/creepage_x"]);
-    for (form, body) in forms(&one_row(&twice)) {
-        if ["text/csv", ARROW, NPZ].contains(&form) {
-            let refused = evaluate(form, body).await;
-            assert_problem(&refused, 422, "faulty-case", "for one member");
-        }
-    }
-    let plain = evaluate(
-        "text/csv",
-        b"normal_force_n,creepage_x\n61500,0.001\n".to_vec(),
-    )
-    .await;
-    let units = "Normal force;nu_x\n[kN];[%]\n61,5;0,1\n";
-    let units = evaluate("text/csv", units.as_bytes().to_vec()).await;
-    assert_eq!(plain.status, 200, "{}", plain.text);
-    assert_eq!(units.json, plain.json, "{}", units.text);
-}
-
-#[tokio::test]
-async fn a_table_of_a_batch_is_read_with_units_semicolons_and_decimal_commas() {
-    let server = Server::start().await;
-    let query = format!("?template={}", server.keep(&small("template")).await);
-    let mut cases = Vec::new();
-    for table in [
-        "label:km,normal_force_n,creepage_x\n37.2,64100,0.002\n37.4,,\n37.6,64100,\n",
-        "label:km;Normal force [kN];nu_x [%]\n37.2;64,1;0,2\n37.4;;\n37.6;64,1;\n",
-        "label:km\tNormal force\tcreepage_x\n[km]\t[kN]\t[%]\n37.2\t64,1\t0,2\n37.4\t\t\n37.6\t64,1\t\n",
-    ] {
-        let batch = send(&server, &query, "text/csv", table.to_owned()).await;
-        assert_eq!(batch.status, 202, "{}", batch.text);
-        let mut own = Vec::new();
-        for line in results(&server, &batch.json, "?wait=60").await {
-            let id = line["id"].as_str().expect("an id");
-            own.push(server.read(&format!("/v1/jobs/{id}/case")).await);
-        }
-        cases.push(own);
-    }
-    let of = |km: &str, load: f64, creepage: &Value| {
-        let mut case = small("template");
-        case["labels"]["km"] = json!(km);
-        case["load"]["normal_force_n"] = json!(load);
-        case["motion"]["creepage_x"] = creepage.clone();
-        case
-    };
-    // Nothing of a row stays for the next.
-    let plain = small("template");
-    let creepage = &plain["motion"]["creepage_x"];
-    let load = plain["load"]["normal_force_n"].as_f64().expect("a load");
-    let expected = [
-        of("37.2", 64_100.0, &json!(0.002)),
-        of("37.4", load, creepage),
-        of("37.6", 64_100.0, creepage),
-    ];
-    for own in &cases {
-        for (found, expected) in own.iter().zip(&expected) {
-            for place in ["/labels/km", "/load/normal_force_n", "/motion/creepage_x"] {
-                let number = |case: &Value| {
-                    let value = case.pointer(place).expect("a value");
-                    value
-                        .as_f64()
-                        .map_or_else(|| value.clone(), |number| json!(number))
-                };
-                assert_eq!(number(found), number(expected), "{place}");
-            }
-        }
-    }
-    for (table, word) in [
-        ("km,normal_force_n\n1,2\n", "label:"),
-        ("Q_left [kN]\n61\n", "normal_force [kN]"),
-        ("normal_force_n\nkN\n61\n", "agree"),
-        ("spin\n0.4\n", "has no unit"),
-    ] {
-        let refused = send(&server, &query, "text/csv", table.to_owned()).await;
-        assert_problem(&refused, 422, "faulty-table", word);
     }
 }
 
@@ -255,33 +175,4 @@ async fn texts_of_rows_come_back_as_they_were_and_are_no_formulas_in_csv() {
     let quoted = "creepage_x,section\n0.001,\"a\nb\"\n";
     let refused = send_rows(&server, &template, "text/csv", quoted).await;
     assert_problem(&refused, 422, "faulty-case", "control characters");
-}
-
-#[tokio::test]
-async fn damaged_files_of_columns_are_refused_and_are_no_failures_of_the_service() {
-    let server = Server::idle().await;
-    let template = kept_template(&server).await;
-    let table = RowTable {
-        columns: vec![
-            ("creepage_x".to_owned(), TableColumn::Numbers(vec![1e-3; 9])),
-            (
-                "section".to_owned(),
-                TableColumn::Texts(vec![Some("curve".to_owned()); 9]),
-            ),
-        ],
-    };
-    for (form, file) in forms(&table).split_off(2) {
-        // Every fifth byte, so that lengths and offsets of each kind are hit.
-        for place in (0..file.len()).step_by(5) {
-            let mut damaged = file.clone();
-            let end = (place + 4).min(damaged.len());
-            damaged[place..end].copy_from_slice(&[0xff, 0xff, 0xff, 0x7f][..end - place]);
-            let answer = send_rows(&server, &template, form, damaged).await;
-            assert!(
-                [202, 413, 422].contains(&answer.status),
-                "{form}, byte {place}: {}",
-                answer.text
-            );
-        }
-    }
 }

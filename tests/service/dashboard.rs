@@ -9,15 +9,16 @@ use crate::batches::{small, small_loaded as case};
 use crate::errors::assert_problem;
 use crate::events::Reader;
 use crate::evolutions::request as evolution;
+use crate::results::path_of;
 use crate::server::{Server, count, example, link};
 
 #[tokio::test]
 async fn a_list_is_narrowed_counted_and_not_sent_twice() {
     let server = Server::idle().await;
     for number in 0..4 {
-        server
-            .submit(&case(&format!("Crown {number}"), 50_000 + number))
-            .await;
+        let mut crown = case(&format!("Crown {number}"), 50_000 + number);
+        crown["labels"] = json!({ "time": "12:30" });
+        server.submit(&crown).await;
     }
     let own = server.submit(&case("to be cancelled", 60_000)).await;
     let cancelled = own.rsplit('/').next().expect("an id");
@@ -31,6 +32,16 @@ async fn a_list_is_narrowed_counted_and_not_sent_twice() {
         .await;
     assert_eq!(count(&two["jobs"]), 4);
     assert_eq!(two["total_at_least"], 4);
+    // Only the first colon of a label divides; the `+` of an offset is written as `%2B`.
+    for (query, expected) in [
+        ("label=time:12:30", 4),
+        ("label=time:12:30&state=cancelled", 0),
+        ("created_after=2000-01-01T00:00:00%2B02:00", 5),
+        ("created_before=2001-01-01T00:00:00Z", 0),
+    ] {
+        let found = server.read(&format!("/v1/jobs?{query}")).await;
+        assert_eq!(count(&found["jobs"]), expected, "{query}");
+    }
     let slim = server
         .read("/v1/jobs?fields=id,state&state=cancelled")
         .await;
@@ -126,29 +137,6 @@ async fn a_client_learns_who_it_is_and_what_it_uses() {
 }
 
 #[tokio::test]
-async fn examples_are_the_shipped_ones_and_each_can_be_asked() {
-    let server = Server::idle().await;
-    let examples = server.read("/v1/examples").await;
-    let examples = examples.as_array().expect("a list");
-    let shipped =
-        std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/api/examples")).expect("a folder");
-    let names = shipped.map(|file| {
-        file.expect("a file")
-            .file_name()
-            .into_string()
-            .expect("a name")
-    });
-    let cases = names.filter(|name| name.ends_with(".case.json") && !name.starts_with("faulty"));
-    assert_eq!(examples.len(), cases.count());
-    for shown in examples {
-        let name = shown["name"].as_str().expect("a name");
-        assert_eq!(shown["case"], example(&format!("{name}.case.json")));
-        let checked = server.post("/v1/cases/check", &shown["case"]).await;
-        assert_eq!(checked.status, 200, "{name}: {}", checked.text);
-    }
-}
-
-#[tokio::test]
 async fn a_job_and_its_result_can_be_waited_for() {
     let server = Server::start().await;
     let own = server.submit(&example("spin.case.json")).await;
@@ -218,4 +206,48 @@ async fn one_stream_tells_all_work_and_goes_on_where_it_was() {
     };
     later.until(&batch, told).await;
     assert!(seen.parse::<i64>().expect("a moment") >= start.id.parse().expect("a moment"));
+}
+
+#[tokio::test]
+async fn wait_that_is_too_short_answers_the_job_as_it_is() {
+    let server = Server::idle().await;
+    for (place, (prefer, applied)) in [
+        (Some("wait=0"), Some("wait=0")),
+        (Some("respond-async"), None),
+        (None, None),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let case = example("spin.case.json");
+        let answer = server
+            .send(Method::POST, "/v1/jobs", |request| {
+                let request = request.json(&case);
+                match prefer {
+                    Some(prefer) => request.header("prefer", prefer),
+                    None => request,
+                }
+            })
+            .await;
+        assert_eq!(answer.status, 202, "{}", answer.text);
+        assert_eq!(answer.json["state"], "queued");
+        assert_eq!(answer.header("preference-applied"), applied);
+        assert_eq!(
+            answer.header("location"),
+            answer.json["links"]["self"].as_str()
+        );
+        assert_eq!(answer.header("retry-after"), Some("1"));
+        let path = path_of(&answer.json);
+        let mut looked = server.read(&path).await;
+        let queue = looked.as_object_mut().expect("a job").remove("queue");
+        let queue = queue.expect("a place in the queue");
+        assert_eq!(queue["position"], place);
+        assert_eq!(
+            queue["starts_in_s"].as_f64() > Some(0.0),
+            place > 0,
+            "{queue}"
+        );
+        assert_eq!(looked, answer.json);
+        assert_eq!(server.read(&format!("{path}/case")).await, case);
+    }
 }

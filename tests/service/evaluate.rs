@@ -224,19 +224,6 @@ fn wheel_on_rail() -> (Value, Value) {
 }
 
 #[tokio::test]
-async fn auto_solves_the_rows_that_the_table_leaves() {
-    let server = Server::idle().await;
-    let mut case = template("auto");
-    // Far beyond the table.
-    case["contact"] = json!({ "type": "ellipse", "a_mm": 12.0, "b_mm": 1.0 });
-    let columns = json!({ "/load/normal_force_n": [5e4], "/motion/creepage_x": [0.001] });
-    let answer = evaluate(&server, case, columns).await.is(200);
-    let rows = &answer.json["columns"];
-    assert!(rows["force_x_n"][0].as_f64() > Some(1e3), "{}", answer.text);
-    assert_eq!(rows["status"], json!(["ok"]));
-}
-
-#[tokio::test]
 async fn rows_beyond_the_budget_of_the_solver_belong_to_a_run() {
     let server =
         Server::idle_with(|setup| setup.http.evaluate_time = std::time::Duration::ZERO).await;

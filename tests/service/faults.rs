@@ -72,18 +72,6 @@ async fn faults_of_a_case_have_codes_values_ranges_units_and_words() {
 }
 
 #[tokio::test]
-async fn faults_of_a_batch_say_the_same_with_their_case() {
-    let server = Server::idle().await;
-    let mut case = example("hertz-steel.case.json");
-    case["friction"]["coefficient"] = json!(200);
-    let answer = server
-        .post("/v1/batches", &json!([example("spin.case.json"), case]))
-        .await;
-    let range = json!({ "code": "out-of-range", "value": 200, "minimum": 0.0, "maximum": 100.0 });
-    assert_eq!(at(&answer.json, "/1/friction/coefficient"), range);
-}
-
-#[tokio::test]
 async fn a_result_says_what_is_needed_to_read_it() {
     let server = Server::start().await;
     for (file, contact) in [

@@ -2,13 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
-use std::process::Command;
 
 use serde_json::Value;
 
 use crate::csv_table::Csv;
 use crate::errors::assert_problem;
-use crate::guides::python;
 use crate::results::{number, numbers, path_of};
 use crate::server::{Answer, Server, example};
 
@@ -164,36 +162,6 @@ async fn every_form_of_a_grid_says_the_same_numbers() {
 }
 
 #[tokio::test]
-async fn numpy_reads_the_archive() {
-    // Without it the archive is read by this test's own reader only.
-    let python = or_skip!(python());
-    let server = Server::start().await;
-    let path = path_of(&server.solve(&example("spin.case.json")).await);
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("field.npz");
-    let archive = server.get(&format!("{path}/tractions?format=npz")).await;
-    std::fs::write(&file, archive.bytes).expect("a file");
-    let sum = "import numpy, sys; f = numpy.load(sys.argv[1]); print(repr(float((f['traction_y_mpa'] * f['dx_mm'] * f['dy_mm']).sum())))";
-    let output = Command::new(&python).args(["-c", sum]).arg(&file).output();
-    let output = output.expect("python runs");
-    let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let force: f64 = text.trim().parse().unwrap_or_else(|_| panic!("{output:?}"));
-    let cells = server.read(&format!("{path}/tractions")).await["cells"].take();
-    let column = |name: &str| numbers(&cells[name]);
-    let (values, dx, dy) = (column("traction_y_mpa"), column("dx_mm"), column("dy_mm"));
-    let areas = dx.iter().zip(&dy).map(|(dx, dy)| dx * dy);
-    let expected: f64 = values
-        .iter()
-        .zip(areas)
-        .map(|(value, area)| value * area)
-        .sum();
-    assert!(
-        (force - expected).abs() < 1e-9 * expected.abs(),
-        "{force} and {expected}"
-    );
-}
-
-#[tokio::test]
 async fn the_form_is_chosen_by_query_before_accept() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("spin.case.json")).await);
@@ -237,41 +205,4 @@ async fn the_form_is_chosen_by_query_before_accept() {
     }
     let answer = ask("resultants?format=npz", "*/*").await;
     assert_problem(&answer, 400, "bad-query", "`json`, `csv`");
-}
-
-#[tokio::test]
-async fn resultants_as_a_table_have_a_line_per_patch_motion_and_sum() {
-    let server = Server::start().await;
-    let path = path_of(&server.solve(&example("two-patches.case.json")).await);
-    let whole = server.read(&format!("{path}/resultants")).await;
-    let patches = whole["patches"].as_array().expect("patches");
-    let motions = whole["total"].as_array().expect("totals").len();
-    assert!(patches.len() > 1);
-    let answer = server.get(&format!("{path}/resultants?format=csv")).await;
-    let table = Csv::read(&answer.text);
-    assert_eq!(table.rows.len(), (patches.len() + 1) * motions);
-    for line in 0..table.rows.len() {
-        let (row, point) = (line / motions, line % motions);
-        let (source, label) = match patches.get(row) {
-            Some(patch) => (&patch["points"][point], row.to_string()),
-            None => (&whole["total"][point], "total".to_owned()),
-        };
-        let read = (table.text(line, "patch"), table.text(line, "point"));
-        assert_eq!(read, (label.as_str(), point.to_string().as_str()));
-        for name in ["force_x_n", "force_y_n", "moment_z_n_mm"] {
-            assert_eq!(table.number(line, name), source[name].as_f64());
-            let error = &source["error_estimate"][name];
-            let written = table.number(line, &format!("error_{name}"));
-            assert_eq!(written, error.as_f64(), "{name} of line {line}");
-        }
-        let spin = &patches[0]["points"][point]["motion"]["spin_per_mm"];
-        assert_eq!(table.number(line, "spin_per_mm"), Some(number(spin)));
-    }
-    let load = |line| table.number(line, "normal_force_n").expect("N");
-    let parts = (0..patches.len() * motions).step_by(motions).map(load);
-    let sum = load(table.rows.len() - 1);
-    assert!((sum - parts.sum::<f64>()).abs() < 1e-6);
-    let one = format!("{path}/resultants?format=csv&patch=1");
-    let one = server.get(&one).await.text;
-    assert_eq!(one.lines().count(), 1 + 2 * motions, "{one}");
 }

@@ -5,10 +5,9 @@ use std::collections::BTreeMap;
 use railhead::jobs::Options;
 use railhead::jobs::keys::Keyring;
 use reqwest::{Body, Method, RequestBuilder};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::server::{Answer, Server, Setup};
-use crate::support::pause;
 
 /// A service with keys of two tenants and of the operator, and one that is bound to a label.
 pub struct Guarded {
@@ -95,19 +94,9 @@ impl Guarded {
         answer.is(202).location()
     }
 
-    pub async fn batch(&self, key: &str, cases: &[Value]) -> String {
-        let cases = json!(cases);
-        let sent = self.send(key, Method::POST, "/v1/batches", Some(&cases));
-        sent.await.is(202).location()
-    }
-
     pub async fn until_ended(&self, key: &str, path: &str) -> Value {
-        loop {
-            let job = self.get(key, path).await.json;
-            if job["state"] != "queued" && job["state"] != "running" {
-                return job;
-            }
-            pause().await;
-        }
+        let ended = self.get(key, &format!("{path}?wait=600")).await.is(200);
+        assert!(ended.json["ended_at"].is_string(), "{}", ended.text);
+        ended.json
     }
 }

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use tempfile::TempDir;
 
-use crate::schemathesis::{environment, said_by};
+use crate::schemathesis::said_by;
 use crate::support::{Service, skip};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -140,17 +140,13 @@ fn creep_curve_from_python_runs_as_it_stands() {
     }
 }
 
-/// A Python with the packages of the guide: `RAILHEAD_TEST_PYTHON`, `python3`, or in continuous integration an environment made for this.
+/// A Python with the packages of the guide: `RAILHEAD_TEST_PYTHON` or `python3`.
 pub fn python() -> Option<PathBuf> {
     let named = std::env::var_os("RAILHEAD_TEST_PYTHON");
     let python = named.map_or_else(|| PathBuf::from("python3"), PathBuf::from);
     let packages = ["-c", "import httpx, numpy, matplotlib"];
     if succeeds(&python, &packages) {
         return Some(python);
-    }
-    if std::env::var_os("CI").is_some() {
-        let packages = ["httpx", "numpy", "matplotlib"];
-        return Some(environment("guide", &packages).join("python"));
     }
     skip(
         "the guide for Python and NumPy need httpx, numpy and matplotlib; name a Python that has them in RAILHEAD_TEST_PYTHON",

@@ -1,18 +1,16 @@
-//! HTTP/2 by prior knowledge: many requests on one connection, and answers that its client does not take.
+//! HTTP/2 by prior knowledge: requests on one connection, and answers that its client does not take.
 
 use std::time::Duration;
 
 use axum::body::Bytes;
-use futures_util::future::join_all;
-use http_body_util::{BodyExt, Empty};
+use http_body_util::Empty;
 use hyper::client::conn::http2::{Builder, SendRequest};
-use hyper::{Method, Request, Version};
+use hyper::{Method, Request};
 use hyper_util::rt::{TokioExecutor, TokioIo};
-use serde_json::Value;
 use tokio::net::TcpStream;
 use tokio::task::JoinHandle;
 
-use crate::server::{Server, Setup, example};
+use crate::server::{Server, example};
 
 /// Far beyond every limit that the tests set.
 const FOR_EVER: Duration = Duration::from_secs(60);
@@ -37,28 +35,8 @@ fn request(method: Method, server: &Server, path: &str) -> Request<Empty<Bytes>>
 }
 
 #[tokio::test]
-async fn many_requests_share_one_connection() {
-    let server = Setup::new().start().await;
-    let job = server.solve(&example("spin.case.json")).await;
-    let path = format!("/v1/jobs/{}", job["id"].as_str().expect("an id"));
-    let (sender, _connection) = connect(&server, 1 << 16).await;
-    let asked = (0..200).map(|_| {
-        let (mut sender, request) = (sender.clone(), request(Method::GET, &server, &path));
-        async move {
-            let answer = sender.send_request(request).await.expect("an answer");
-            assert_eq!(answer.version(), Version::HTTP_2);
-            let body = answer.collect().await.expect("a body").to_bytes();
-            serde_json::from_slice::<Value>(&body).expect("JSON")
-        }
-    });
-    for answer in join_all(asked).await {
-        assert_eq!(answer["state"], "succeeded");
-    }
-}
-
-#[tokio::test]
 async fn without_a_key_the_name_in_the_address_is_judged() {
-    let server = Setup::new().start().await;
+    let server = Server::start().await;
     let (mut sender, _connection) = connect(&server, 1 << 16).await;
     for (name, allowed) in [("localhost", true), ("rail.example", false)] {
         let address = format!("http://{name}/v1/jobs");

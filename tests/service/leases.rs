@@ -8,7 +8,7 @@ use uuid::Uuid;
 use crate::lab::{AT_MOST, Lab};
 use crate::support::case;
 
-const LEASE: Duration = Duration::from_millis(600);
+const LEASE: Duration = Duration::from_millis(400);
 
 /// A service whose results are kept outside the table, and its job that is being solved.
 async fn solving() -> (Lab, Uuid) {

@@ -10,9 +10,7 @@ macro_rules! or_skip {
 
 mod access;
 mod admission;
-mod api;
 mod batch_columns;
-mod batch_deletion;
 mod batch_memory;
 mod batch_options;
 mod batch_tables;
@@ -38,7 +36,6 @@ mod evaluate;
 mod events;
 mod evolutions;
 mod faults;
-mod forces;
 mod formats;
 mod fuzzed;
 mod guarded;
@@ -54,12 +51,9 @@ mod leases;
 mod maintenance;
 mod malformed;
 mod manners;
-#[cfg(target_os = "linux")]
-mod memory;
 mod metrics;
 mod model;
 mod old_folders;
-mod one_key;
 mod order;
 mod orphans;
 mod ownership;
@@ -72,7 +66,6 @@ mod requests;
 mod results;
 mod retention;
 mod revoked;
-mod run_forces;
 mod runs;
 mod same_answers;
 mod schema;

@@ -1,12 +1,10 @@
 //! Stresses, damage and temperatures over HTTP: the parts say what the result says, and are there only where they were asked for.
 
-use std::time::Duration;
-
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
 use crate::results::{number, numbers, path_of};
-use crate::server::{Server, Setup, example, link};
+use crate::server::{Server, example, link};
 
 #[tokio::test]
 async fn parts_of_maintenance_say_what_the_result_says() {
@@ -57,10 +55,7 @@ async fn parts_of_maintenance_say_what_the_result_says() {
 
 #[tokio::test]
 async fn a_part_that_was_not_asked_for_says_so_and_a_batch_has_columns_for_it() {
-    let mut setup = Setup::new();
-    // The formulas alone tell what an output costs; a solve takes longer or shorter by chance.
-    setup.http.check_trial = Duration::ZERO;
-    let server = setup.start().await;
+    let server = Server::start().await;
     let job = server.solve(&example("hertz-steel.case.json")).await;
     for part in ["subsurface", "damage", "temperature"] {
         let answer = server.get(&format!("{}/{part}", path_of(&job))).await;

@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use railhead::contact::monitor::Stop;
 use reqwest::Method;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::server::{Server, Setup, example};
-use crate::support::{case, loaded};
+use crate::support::case;
 
 /// The samples of `/metrics`: name with labels, value.
 pub async fn samples(server: &Server) -> BTreeMap<String, f64> {
@@ -111,18 +111,6 @@ async fn results_outside_the_table_are_weighed_until_they_are_deleted() {
     let path = format!("/v1/jobs/{}", job["id"].as_str().unwrap());
     assert_eq!(server.delete(&path).await.status, 204);
     assert_eq!(value(&samples(&server).await, "railhead_result_bytes"), 0.0);
-}
-
-#[tokio::test]
-async fn a_batch_is_counted_job_by_job() {
-    let server = Server::start().await;
-    let cases: Vec<Value> = (1..=20).map(|number| loaded(10_000 * number)).collect();
-    let answer = server.post("/v1/batches", &json!(cases)).await;
-    let results = format!("{}/results?wait=60", answer.header("location").unwrap());
-    assert_eq!(server.get(&results).await.text.lines().count(), 20);
-    let after = samples(&server).await;
-    let ended = r#"railhead_jobs_ended_total{state="succeeded"}"#;
-    assert_eq!(value(&after, ended), 20.0);
 }
 
 #[tokio::test]

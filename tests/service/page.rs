@@ -1,14 +1,6 @@
-//! The page at `/`: its headers, how long its files are kept, and that vendored files are those of their packages.
-
-use std::fs;
-use std::path::Path;
-
-use serde_json::Value;
-use sha2::{Digest, Sha256};
+//! The page at `/`: its headers, and how long its files are kept.
 
 use crate::server::Server;
-
-const WEB: &str = "src/http/page/web";
 
 /// The paths of the scripts, styles and pictures that a text of HTML names.
 fn linked(text: &str) -> Vec<String> {
@@ -68,46 +60,4 @@ async fn files_of_the_page_may_be_kept_for_good_and_the_page_itself_not() {
     ] {
         assert_eq!(server.get(path).await.status, 404, "{path}");
     }
-}
-
-#[tokio::test]
-async fn page_names_no_other_server() {
-    let server = Server::idle().await;
-    let page = server.get("/").await;
-    assert!(!page.text.contains("//"), "{}", page.text);
-}
-
-#[test]
-fn vendored_files_are_those_of_their_packages() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join(WEB)
-        .join("vendor");
-    let text = fs::read_to_string(folder.join("vendor.json")).expect("the list");
-    let list: Value = serde_json::from_str(&text).expect("JSON");
-    let mut listed = vec!["vendor.json".to_owned()];
-    for package in list.as_array().expect("packages") {
-        for file in package["files"].as_array().expect("files") {
-            let name = file["file"].as_str().expect("a name");
-            let body = fs::read(folder.join(name)).expect("a vendored file");
-            let digest = Sha256::digest(&body);
-            let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-            assert_eq!(file["sha256"], digest, "{name}");
-            listed.push(name.to_owned());
-        }
-        let licence = package["licence"].as_str().expect("a licence");
-        assert!(["BSD-3-Clause", "MIT"].contains(&licence), "{licence}");
-    }
-    let entries = fs::read_dir(&folder).expect("the folder");
-    let mut there: Vec<String> = entries
-        .map(|entry| {
-            entry
-                .expect("an entry")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
-        .collect();
-    listed.sort();
-    there.sort();
-    assert_eq!(there, listed);
 }

@@ -21,7 +21,8 @@ fn everything() -> Value {
 #[tokio::test]
 async fn every_field_is_drawn_as_svg_and_as_png() {
     let server = Server::start().await;
-    let case = asked("two-patches.case.json", &everything());
+    let mut case = asked("two-patches.case.json", &everything());
+    case["solver"] = json!({ "mesh": { "strips": 8, "cells": 8 } });
     let path = path_of(&server.solve(&case).await);
     for (field, label, part) in [
         ("traction", "traction in MPa", "tractions"),
@@ -44,12 +45,12 @@ async fn every_field_is_drawn_as_svg_and_as_png() {
         let arrows = svg.text.contains("stroke-width=\"2.8\"");
         assert_eq!(arrows, field != "pressure", "arrows of {field}");
         let png = server
-            .get(&format!("{path}/plot.png?field={field}&patch=1&width=640"))
+            .get(&format!("{path}/plot.png?field={field}&patch=1&width=320"))
             .await;
         assert_eq!(png.status, 200, "{}", png.text);
         assert_eq!(png.header("content-type"), Some("image/png"));
         let pixels = Pixmap::decode_png(&png.bytes).expect("a PNG");
-        assert_eq!(pixels.width(), 640);
+        assert_eq!(pixels.width(), 320);
         let same = server
             .get(&format!("{path}/{part}?format=svg&patch=1"))
             .await;
@@ -66,40 +67,6 @@ fn light(pixels: &Pixmap, x: u32, y: u32) -> f64 {
     0.2126 * f64::from(pixel.red())
         + 0.7152 * f64::from(pixel.green())
         + 0.0722 * f64::from(pixel.blue())
-}
-
-#[tokio::test]
-async fn pressure_is_light_in_the_middle_and_dark_at_the_border() {
-    let server = Server::start().await;
-    // Pressure alone: no line and no arrow lies over the cells.
-    let case = asked("spin.case.json", &json!(["pressure"]));
-    let path = path_of(&server.solve(&case).await);
-    let png = server.get(&format!("{path}/plot.png?field=pressure")).await;
-    let pixels = Pixmap::decode_png(&png.bytes).expect("a PNG");
-    // The plotting area begins at 78, 84 and is 560 wide; the ellipse of 16 mm by 8 mm fills it to 1/1.12 of its width.
-    let scale = 560.0 / (16.0 * 1.12);
-    let at = |x_mm: f64, y_mm: f64| {
-        let (x, y) = (
-            78.0 + 280.0 + x_mm * scale,
-            84.0 + 0.5 * 8.0 * 1.12 * scale - y_mm * scale,
-        );
-        light(&pixels, x as u32, y as u32)
-    };
-    let along: Vec<f64> = [0.0, 3.0, 5.0, 6.5, 7.3].map(|x| at(x, 0.2)).to_vec();
-    assert!(
-        along.is_sorted_by(|a, b| a >= b),
-        "lightness along x: {along:?}"
-    );
-    let across: Vec<f64> = [0.2, 1.5, 2.6, 3.4].map(|y| at(0.0, y)).to_vec();
-    assert!(
-        across.is_sorted_by(|a, b| a >= b),
-        "lightness across: {across:?}"
-    );
-    assert!(along[0] > 150.0 && along[4] < 0.6 * along[0], "{along:?}");
-    assert!(
-        at(0.0, 4.3) > 200.0 && at(8.3, 0.2) > 200.0,
-        "outside it is white"
-    );
 }
 
 #[tokio::test]
@@ -280,28 +247,23 @@ async fn pictures_share_a_scale_when_asked() {
 async fn small_pictures_are_small_files() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&at_default_accuracy()).await);
-    let mut sizes = Vec::new();
-    for (width, most) in [(120, 10_000), (800, 80_000)] {
+    // Pixels of a large picture are not counted.
+    for (form, width, most) in [
+        ("svg", 120, 10_000),
+        ("png", 120, 10_000),
+        ("svg", 800, 80_000),
+    ] {
         for field in ["traction", "pressure", "slip", "zones"] {
-            for form in ["svg", "png"] {
-                let query = format!("{path}/plot.{form}?field={field}&width={width}");
-                let bytes = server.get(&query).await.bytes;
-                if let Ok(folder) = std::env::var("RAILHEAD_PICTURES") {
-                    std::fs::write(format!("{folder}/{field}-{width}.{form}"), &bytes)
-                        .expect("written");
-                }
-                sizes.push((field, form, width, bytes.len(), most));
+            let query = format!("{path}/plot.{form}?field={field}&width={width}");
+            let bytes = server.get(&query).await.bytes;
+            if let Ok(folder) = std::env::var("RAILHEAD_PICTURES") {
+                let file = format!("{folder}/{field}-{width}.{form}");
+                std::fs::write(file, &bytes).expect("written");
             }
+            let size = bytes.len();
+            assert!(size <= most, "{field} as {form}, {width} wide: {size}");
         }
     }
-    let large = sizes.iter().filter(|size| form_limit(size));
-    assert_eq!(large.count(), 0, "{sizes:?}");
-    println!("{sizes:?}");
-}
-
-/// Is a file larger than allowed? Pixels of a large picture are not counted.
-fn form_limit((_, form, width, bytes, most): &(&str, &str, u32, usize, usize)) -> bool {
-    bytes > most && (*width == 120 || *form == "svg")
 }
 
 #[tokio::test]
@@ -355,7 +317,8 @@ async fn a_creep_curve_has_a_bar_for_every_estimated_error() {
 #[tokio::test]
 async fn sections_and_patches_on_the_profiles_are_drawn_where_there_are_any() {
     let server = Server::start().await;
-    let case = asked("wheel-rail-flange.case.json", &everything());
+    let mut case = asked("wheel-rail-flange.case.json", &everything());
+    case["solver"] = json!({ "mesh": { "strips": 8, "cells": 8 } });
     let job = server.solve(&case).await;
     let path = path_of(&job);
     let patches = job["result"]["patches"].as_array().expect("patches").len();
@@ -380,7 +343,12 @@ async fn sections_and_patches_on_the_profiles_are_drawn_where_there_are_any() {
     ] {
         assert!(section.text.contains(word), "the section lacks `{word}`");
     }
-    let wheelset = path_of(&server.solve(&example("wheelset.case.json")).await);
+    let mut wheelset = example("wheelset.case.json");
+    wheelset["solver"] = json!({ "mesh": { "strips": 4, "cells": 4 } });
+    wheelset["contact"]["lateral_shift_mm"] = json!(0.0);
+    let contact = wheelset["contact"].as_object_mut().expect("a contact");
+    contact.remove("kinematics");
+    let wheelset = path_of(&server.solve(&wheelset).await);
     let refused = server
         .get(&format!("{wheelset}/plot.svg?view=profiles"))
         .await;

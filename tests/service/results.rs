@@ -63,70 +63,6 @@ async fn a_result_is_read_without_a_look_at_the_case() {
     assert_eq!(checks.load(Ordering::SeqCst), before);
 }
 
-#[tokio::test]
-async fn fields_add_up_to_the_resultants() {
-    let server = Server::start().await;
-    // With a target, forces are extrapolated from the last meshes; on an explicit mesh they are the sums.
-    let mut case = example("spin.case.json");
-    case["solver"] = json!({ "mesh": { "strips": 12, "cells": 16 } });
-    let job = server.solve(&case).await;
-    let path = path_of(&job);
-    let patch = &job["result"]["patches"][0];
-    let point = &patch["points"][0];
-    let load = number(&patch["normal_force_n"]);
-    let resultants = server.read(&format!("{path}/resultants")).await;
-    for name in [
-        "force_x_n",
-        "force_y_n",
-        "moment_z_n_mm",
-        "friction_power_n",
-    ] {
-        assert_eq!(
-            resultants["patches"][0]["points"][0][name], point[name],
-            "{name}"
-        );
-    }
-    let sum = |cells: &Value, name: &str| -> f64 {
-        let (dx, dy) = (numbers(&cells["dx_mm"]), numbers(&cells["dy_mm"]));
-        numbers(&cells[name])
-            .iter()
-            .zip(dx.iter().zip(&dy))
-            .map(|(value, (dx, dy))| value * dx * dy)
-            .sum()
-    };
-    let tractions = server
-        .read(&format!("{path}/tractions?point=0&patch=0"))
-        .await;
-    assert_close(
-        sum(&tractions["cells"], "traction_x_mpa"),
-        number(&point["force_x_n"]),
-        load,
-        "force x",
-    );
-    assert_close(
-        sum(&tractions["cells"], "traction_y_mpa"),
-        number(&point["force_y_n"]),
-        load,
-        "force y",
-    );
-    let pressure = server.read(&format!("{path}/pressure")).await;
-    assert_close(
-        sum(&pressure["cells"], "pressure_mpa"),
-        load,
-        load,
-        "normal force",
-    );
-    assert!(
-        tractions["cells"].get("pressure_mpa").is_none(),
-        "a field answers its own values only"
-    );
-    let slip = server.read(&format!("{path}/slip")).await;
-    assert_eq!(
-        numbers(&slip["cells"]["slip_x"]).len(),
-        numbers(&pressure["cells"]["pressure_mpa"]).len()
-    );
-}
-
 /// Area inside closed polygons; holes count negative.
 pub fn area(polygons: &Value) -> f64 {
     let polygons = polygons
@@ -197,59 +133,6 @@ async fn outlines_enclose_the_areas_of_the_zones() {
         (whole - contact).abs() < 0.02 * contact,
         "the outline of the patch encloses {whole}, not {contact}"
     );
-}
-
-#[tokio::test]
-async fn grid_is_ordered_by_y_then_x_and_empty_outside() {
-    let server = Server::start().await;
-    let path = path_of(&server.solve(&example("spin.case.json")).await);
-    let pressure = server.read(&format!("{path}/pressure?grid=21x11")).await;
-    let (x, y) = (numbers(&pressure["x_mm"]), numbers(&pressure["y_mm"]));
-    assert_eq!((x.len(), y.len()), (21, 11));
-    assert!(x.is_sorted() && y.is_sorted());
-    // The ellipse of the example has semi-axes of 8 mm and 4 mm.
-    for (row, y) in pressure["pressure_mpa"]
-        .as_array()
-        .expect("rows")
-        .iter()
-        .zip(&y)
-    {
-        assert_eq!(row.as_array().expect("a row").len(), 21);
-        for (value, x) in row.as_array().expect("a row").iter().zip(&x) {
-            let inside = (x / 8.0).powi(2) + (y / 4.0).powi(2);
-            match value.as_f64() {
-                Some(value) => assert!(inside < 1.1 && value > 0.0, "{value} MPa at ({x}, {y})"),
-                None => assert!(inside > 0.9 && value.is_null(), "nothing at ({x}, {y})"),
-            }
-        }
-    }
-    let peak = number(&pressure["pressure_mpa"][5][10]);
-    assert!(
-        (peak - 1.5 * 82_000.0 / (std::f64::consts::PI * 32.0)).abs() < 0.03 * peak,
-        "Hertz's peak is {peak} MPa"
-    );
-    for (part, name) in [
-        ("tractions", "traction_y_mpa"),
-        ("slip", "slip_y"),
-        ("zones", "zone"),
-    ] {
-        let field = server.read(&format!("{path}/{part}?grid=4x3")).await;
-        let rows = field[name]
-            .as_array()
-            .unwrap_or_else(|| panic!("{part} has no {name}: {field}"));
-        assert!(
-            rows.len() == 3
-                && rows
-                    .iter()
-                    .all(|row| row.as_array().is_some_and(|row| row.len() == 4)),
-            "{part}"
-        );
-        assert!(
-            rows[1][1].is_number() || rows[1][1] == "stick" || rows[1][1] == "slip",
-            "{part}: {}",
-            rows[1][1]
-        );
-    }
 }
 
 #[tokio::test]

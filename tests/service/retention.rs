@@ -124,13 +124,13 @@ async fn jobs_that_have_not_ended_and_services_without_retention_lose_nothing() 
 
 #[tokio::test]
 async fn a_batch_goes_with_the_last_of_its_jobs() {
-    let (setup, turned) = keeping_30_days();
+    let (mut setup, turned) = keeping_30_days();
+    setup.working = false;
     let server = setup.start().await;
     let cases: Vec<Value> = (10_001..=10_600).map(loaded).collect();
     let answer = server.post("/v1/batches", &json!(cases)).await;
     let batch = answer.location();
-    let lines = server.get(&format!("{batch}/results?wait=60")).await.text;
-    assert_eq!(lines.lines().count(), 600);
+    server.cancel(&batch).await.is(200);
     turned.turn(31);
     assert_eq!(server.jobs.sweep_expired().await.unwrap(), 600);
     assert_expired(&server, &batch).await;

@@ -1,7 +1,5 @@
 //! Runs: many rows over one case, as one piece of work.
 
-use std::time::{Duration, Instant};
-
 use railhead::jobs::codec::arrow::read;
 use railhead::jobs::codec::parquet::TableReader;
 use railhead::jobs::codec::table::{RowTable, TableColumn};
@@ -10,9 +8,6 @@ use serde_json::{Value, json};
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup};
 use crate::support::files_below;
-
-/// Time after which a guard reports that a test hangs.
-const WITHIN: Duration = Duration::from_secs(240);
 
 pub fn template(method: &str) -> Value {
     json!({
@@ -41,16 +36,11 @@ pub async fn submit(server: &Server, body: &Value) -> String {
     answer.location()
 }
 
-pub async fn ended(server: &Server, run: &str) -> Value {
-    let begun = Instant::now();
-    loop {
-        let answer = server.get(run).await.is(200);
-        if answer.json["ended_at"].is_string() {
-            return answer.json;
-        }
-        assert!(begun.elapsed() < WITHIN, "{}", answer.text);
-        tokio::time::sleep(Duration::from_millis(20)).await;
-    }
+/// A run or an evolution once it has ended.
+pub async fn ended(server: &Server, path: &str) -> Value {
+    let answer = server.get(&format!("{path}?wait=240")).await.is(200);
+    assert!(answer.json["ended_at"].is_string(), "{}", answer.text);
+    answer.json
 }
 
 /// The answers of a run that has ended.

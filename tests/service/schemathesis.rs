@@ -9,39 +9,18 @@ use crate::support::{Service, skip};
 /// The version that the settings are written for.
 const VERSION: &str = "4.32.5";
 
-/// A program of a Python package in this version: the one that the variable names, the one on the path, or in continuous integration
-/// one installed for this.
+/// A program of a Python package in this version: the one that the variable names, or the one on the path.
 pub fn python_program(name: &str, package: &str, version: &str, variable: &str) -> Option<PathBuf> {
-    let fits = |program: &Path| {
-        let output = Command::new(program).arg("--version").output();
-        output.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).contains(version))
-    };
     let named = std::env::var_os(variable);
     let program = named.map_or_else(|| PathBuf::from(name), PathBuf::from);
-    if fits(&program) {
+    let output = Command::new(&program).arg("--version").output();
+    if output.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).contains(version)) {
         return Some(program);
-    }
-    if std::env::var_os("CI").is_some() {
-        let place = environment(package, &[&format!("{package}=={version}")]);
-        let own = place.join(name);
-        assert!(fits(&own), "{}", own.display());
-        return Some(own);
     }
     skip(&format!(
         "`{name}` is not there: `pip install {package}=={version}`, or name it in {variable}"
     ));
     None
-}
-
-/// The programs of an environment of Python with these packages, made for a test.
-pub fn environment(name: &str, packages: &[&str]) -> PathBuf {
-    let place = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}-venv"));
-    let python = Path::new("python3");
-    run(python, &["-m", "venv", &place.to_string_lossy()]);
-    let programs = place.join("bin");
-    let install = [&["-m", "pip", "install", "--quiet"], packages].concat();
-    run(&programs.join("python"), &install);
-    programs
 }
 
 /// Runs a program that has to succeed; what it prints.

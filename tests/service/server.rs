@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 use std::path::Path;
+use std::time::Duration;
 
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
@@ -16,8 +17,8 @@ use tempfile::TempDir;
 use tokio_util::sync::CancellationToken;
 
 use crate::schema::assert_documented;
-use crate::support::pause;
 pub use crate::support::{Answer, unpacked};
+use crate::support::{pause, waiting};
 
 /// A running service. It ends with the test's runtime.
 pub struct Server {
@@ -38,12 +39,15 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// The defaults: real physics, one worker.
+    /// The defaults: real physics, one worker. Checks estimate times by formulas alone.
     pub fn new() -> Setup {
         let folder = tempfile::tempdir().expect("a temporary folder");
         Setup {
             options: Options::new(folder.path()),
-            http: HttpOptions::default(),
+            http: HttpOptions {
+                check_trial: Duration::ZERO,
+                ..HttpOptions::default()
+            },
             recipe: Engine::contact(),
             working: true,
             folder,
@@ -199,8 +203,9 @@ impl Server {
 
     /// Waits until the job, batch or run at a path is in a state, and returns it.
     pub async fn until(&self, path: &str, state: &str) -> Value {
+        let path = waiting(path, state);
         loop {
-            let work = self.read(path).await;
+            let work = self.read(&path).await;
             if work["state"] == state {
                 return work;
             }

@@ -84,19 +84,6 @@ async fn with_key(router: &axum::Router, address: &str, key: &str) -> u16 {
 const WRONG: &str = "rh_0123456789ab_0";
 
 #[tokio::test]
-async fn an_address_may_try_so_many_wrong_keys_and_no_more() {
-    let folder = tempfile::tempdir().unwrap();
-    let jobs = Jobs::open(Options::new(folder.path())).await.unwrap();
-    let router = railhead::http::router(jobs, HttpOptions::default());
-    let mut statuses = Vec::new();
-    for _ in 0..30 {
-        statuses.push(with_key(&router, "192.0.2.1", WRONG).await);
-    }
-    assert_eq!((statuses[0], statuses[29]), (401, 429), "{statuses:?}");
-    assert_eq!(with_key(&router, "192.0.2.2", WRONG).await, 401, "another");
-}
-
-#[tokio::test]
 async fn wrong_keys_lock_no_good_key_of_the_same_address_out() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;
     let router = railhead::http::router(guarded.server.jobs.clone(), HttpOptions::default());
@@ -166,13 +153,16 @@ async fn a_tenant_may_have_so_many_queued_jobs_and_no_more() {
 #[tokio::test]
 async fn a_flood_of_one_tenant_does_not_hold_up_another() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;
-    let flood: Vec<Value> = (1..=3000).map(|number| loaded(1000 + number)).collect();
-    let batch = guarded.batch(&guarded.north, &flood).await;
+    let flood: Vec<Value> = (1..=1000).map(|number| loaded(1000 + number)).collect();
+    let batch = guarded
+        .post(&guarded.north, "/v1/batches", &json!(flood))
+        .await;
+    let batch = batch.is(202).location();
     let job = guarded.submit(&guarded.south, &case("one")).await;
     guarded.until_ended(&guarded.south, &job).await;
     let batch = guarded.get(&guarded.north, &batch).await.json;
     let waiting = batch["states"]["queued"].as_u64().unwrap();
-    assert!(waiting > 1000, "the flood is still there: {batch}");
+    assert!(waiting > 300, "the flood is still there: {batch}");
 }
 
 #[tokio::test]

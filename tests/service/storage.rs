@@ -158,9 +158,9 @@ async fn send_batch(service: &Service, key: &str, cases: &[Value]) -> Answer {
 
 #[tokio::test]
 async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once() {
-    let disk = or_skip!(Disk::mount("size=64m"));
+    let disk = or_skip!(Disk::mount("size=32m"));
     let service = disk.serve(&[]);
-    let cases: Vec<Value> = (0..6000)
+    let cases: Vec<Value> = (0..2000)
         .map(|number| small_loaded(&number.to_string(), 50_000 + number))
         .collect();
     let bytes: usize = cases.iter().map(|case| case.to_string().len() + 1).sum();
@@ -173,9 +173,8 @@ async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once(
     std::fs::remove_file(ballast).unwrap();
     let again = send_batch(&service, "k", &cases).await.is(202);
     let path = again.location();
-    while service.get(&path).await["states"]["succeeded"] != json!(cases.len()) {
-        pause().await;
-    }
+    let ended = service.get(&format!("{path}?wait=600")).await;
+    assert_eq!(ended["states"]["succeeded"], json!(cases.len()), "{ended}");
     // A job is counted just after its end is stored.
     let name = "\nrailhead_jobs_ended_total{state=\"succeeded\"} ";
     let mut solved = 0;
@@ -349,11 +348,11 @@ fn limit_files(service: &Service, limit: &str) {
 async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     let folder = tempfile::tempdir().unwrap();
     // A write beyond the limit shall be an error, as on a disk that fails, and not the end of the process.
-    let service = Service::start_by(
-        Command::new("sh").args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\""]),
-        folder.path(),
-        &["--cache", "false", "--workers", "1"],
-    );
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\""]);
+    shell.arg(env!("CARGO_BIN_EXE_railhead"));
+    let flags = ["--cache", "false", "--workers", "1"];
+    let service = Service::start_as(&mut shell, "serve", folder.path(), &flags);
     let first = service.submit(&large_case()).await;
     service.until(&first, "running").await;
     limit_files(&service, "0");

@@ -3,13 +3,11 @@
 use std::time::Duration;
 
 use bytes::Bytes;
+use railhead::jobs::State;
 use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::model::SubmitOptions;
 use railhead::jobs::store::{
-    Claim, ClaimKind, ClaimRequest, Ending, Moment, NewJob, NewSlice, Reap, ReleaseReason,
-    SliceRecord, Store, StoredResult,
+    Claim, ClaimKind, ClaimRequest, NewSlice, Reap, ReleaseReason, SliceRecord, Store, StoredResult,
 };
-use railhead::jobs::{Failure, State};
 use uuid::Uuid;
 
 use crate::store::*;
@@ -22,11 +20,6 @@ async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
         ..request(&queue, 1, now)
     };
     store.claim(&request).await.unwrap().pop()
-}
-
-/// The file, for what no store tells.
-fn other_connection(table: &Table) -> rusqlite::Connection {
-    rusqlite::Connection::open(table.folder.path().join("jobs.db")).unwrap()
 }
 
 fn slice(number: u32, key: Option<&str>) -> NewSlice {
@@ -104,100 +97,6 @@ async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attemp
     );
 }
 
-async fn whatever_ends_a_job_releases_its_slices(kind: StoreKind) {
-    for end in [
-        "succeeded",
-        "failed",
-        "cancelled",
-        "cancelled queued",
-        "reaped",
-        "late",
-    ] {
-        the_end_releases_slices(kind, end).await;
-    }
-}
-
-async fn the_end_releases_slices(kind: StoreKind, end: &str) {
-    let table = Table::new(kind).await;
-    let store = &*table.store;
-    let new = NewJob {
-        options: SubmitOptions {
-            ends_within: Some(Duration::from_secs(1)),
-            ..SubmitOptions::default()
-        },
-        ..new_job()
-    };
-    let created_at = new.created_at;
-    let id = table.add(new).await.id;
-    let claim = table.claim(0).await.unwrap();
-    assert!(store.add_slice(&claim, &slice(0, Some("a"))).await.unwrap());
-    assert!(store.add_slice(&claim, &slice(1, None)).await.unwrap());
-    end_it(store, &claim, end, created_at).await;
-    assert!(
-        store
-            .job("anonymous", id)
-            .await
-            .unwrap()
-            .unwrap()
-            .state
-            .ended(),
-        "{end}"
-    );
-    assert!(store.slices(id).await.unwrap().is_empty(), "{end}");
-    assert_eq!(store.released_blobs(&[], 9).await.unwrap(), ["a"], "{end}");
-    match kind {
-        #[cfg(feature = "cluster")]
-        StoreKind::Postgres => {
-            let url = table.url.as_deref().unwrap();
-            let pool = sqlx::PgPool::connect(url).await.unwrap();
-            let blobs: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM blobs")
-                .fetch_one(&pool)
-                .await
-                .unwrap();
-            assert_eq!(blobs, i64::from(end == "succeeded"), "{end}");
-        }
-        StoreKind::Sqlite => {
-            let blobs =
-                other_connection(&table)
-                    .query_row("SELECT COUNT(*) FROM blobs", (), |row| row.get(0));
-            let blobs: i64 = blobs.unwrap();
-            assert_eq!(blobs, i64::from(end == "succeeded"), "{end}");
-        }
-    }
-}
-
-/// Ends a claimed job in one of the ways there are.
-async fn end_it(store: &dyn Store, claim: &Claim, end: &str, created_at: i64) {
-    let lost = || Ending::Failed(Failure::worker_lost(1));
-    let released = store.release(std::slice::from_ref(claim), ReleaseReason::NotBegun, 1);
-    match end {
-        "succeeded" => drop(finish_one(store, claim, &success(), 1).await.unwrap()),
-        "failed" => drop(finish_one(store, claim, &lost(), 1).await.unwrap()),
-        "cancelled" => drop(
-            finish_one(store, claim, &Ending::Cancelled, 1)
-                .await
-                .unwrap(),
-        ),
-        "cancelled queued" => {
-            released.await.unwrap();
-            store.cancel("anonymous", claim.id, 2).await.unwrap();
-        }
-        "reaped" => drop(store.reap(Reap::Dead, 1, 1).await.unwrap()),
-        _ => {
-            released.await.unwrap();
-            let now = created_at + 2000;
-            let moment = Moment {
-                now,
-                set_at: 0,
-                unset: now,
-            };
-            let late = store.pass_deadlines(&Failure::worker_lost(1), moment).await;
-            assert_eq!(late.unwrap().ended, [claim.id]);
-        }
-    }
-}
-
 conformance! {
     a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attempts_anew,
-    whatever_ends_a_job_releases_its_slices,
 }

@@ -138,15 +138,6 @@ impl Service {
         Service::spawn(program, role, (&path, Some(folder)), flags)
     }
 
-    /// The same, by a program that is given the real one and its flags.
-    pub fn start_by(program: &mut Command, data_dir: &Path, flags: &[&str]) -> Service {
-        for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
-            program.env_remove(name);
-        }
-        program.arg(env!("CARGO_BIN_EXE_railhead"));
-        Service::spawn(program, "serve", (data_dir, None), flags)
-    }
-
     /// The real program as it was prepared, `serve` or `worker`.
     pub fn start_as(program: &mut Command, role: &str, data_dir: &Path, flags: &[&str]) -> Service {
         Service::spawn(program, role, (data_dir, None), flags)
@@ -244,8 +235,9 @@ impl Service {
 
     /// Waits until a job is in a state; it may not end in another one.
     pub async fn until(&self, id: &str, state: &str) -> Value {
+        let path = waiting(&format!("/v1/jobs/{id}"), state);
         loop {
-            let job = self.get(&format!("/v1/jobs/{id}")).await;
+            let job = self.get(&path).await;
             if job["state"] == state {
                 return job;
             }
@@ -353,6 +345,14 @@ pub fn files_below(folder: &Path) -> Vec<PathBuf> {
         false => vec![path],
     });
     files.collect()
+}
+
+/// The path of a piece of work, with a wait for its end if this state is one.
+pub fn waiting(path: &str, state: &str) -> String {
+    match ["queued", "running"].contains(&state) {
+        true => path.to_owned(),
+        false => format!("{path}?wait=60"),
+    }
 }
 
 /// Between two looks at a service that can only be asked.

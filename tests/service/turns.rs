@@ -89,21 +89,6 @@ async fn beside_a_long_solve_jobs_that_turn_out_to_be_long_go_back() {
 }
 
 #[tokio::test]
-async fn long_solves_are_handed_back_at_the_end() {
-    let mut lab = lab(|options| options.workers = 2).await;
-    lab.jobs.start().unwrap();
-    let ids = submit_long(&lab, 2).await;
-    for id in &ids {
-        until_running(&lab, *id).await;
-    }
-    lab.reopen(Duration::from_millis(50)).await;
-    for id in ids {
-        let job = lab.get(id).await;
-        assert_eq!((job.state, job.attempt), (State::Queued, 0));
-    }
-}
-
-#[tokio::test]
 async fn suspects_are_solved_one_after_the_other_and_hold_nobody_up() {
     let lab = lab(|options| options.workers = 3).await;
     let store = open_beside(lab.folder.path()).await;

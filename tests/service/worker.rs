@@ -3,7 +3,6 @@
 use std::sync::mpsc;
 use std::time::Duration;
 
-use futures_util::future::join_all;
 use railhead::contact::solve;
 use railhead::jobs::engine::Engine;
 use railhead::jobs::model::SubmitOptions;
@@ -136,15 +135,4 @@ async fn end_of_deaf(lease: Duration, deadline: Option<Duration>) -> State {
     assert_eq!(lab.wait(next).await.state, State::Succeeded);
     lab.end().await;
     ended
-}
-
-#[tokio::test]
-async fn a_pool_solves_everything_and_waiting_callers_hear_of_it() {
-    let lab = Lab::start(|options| options.workers = 3).await;
-    let mut ids = Vec::new();
-    for number in 0..40 {
-        ids.push(lab.submit(case(&number.to_string())).await);
-    }
-    join_all(ids.into_iter().map(|id| lab.succeeds_at_once(id))).await;
-    lab.end().await;
 }

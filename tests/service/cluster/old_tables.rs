@@ -1,7 +1,5 @@
 //! Tables of a database as earlier versions made them.
 
-use std::path::Path;
-
 use sqlx::postgres::PgConnection;
 
 /// The tables as the first version made them, with the row that says so.
@@ -9,20 +7,6 @@ const FIRST_FORM: &str = concat!(
     include_str!("../../../src/jobs/store/postgres/schema.sql"),
     "INSERT INTO deployment (one, form) VALUES (1, 1);"
 );
-
-/// The form that the present program makes.
-pub fn newest() -> u32 {
-    let steps = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/jobs/store/postgres/steps");
-    let names = std::fs::read_dir(steps).expect("the steps");
-    let forms = names.map(|name| {
-        let path = name.expect("a step").path();
-        let form = path
-            .file_stem()
-            .and_then(|name| name.to_str()?.parse().ok());
-        form.expect("a number")
-    });
-    forms.max().expect("a step")
-}
 
 /// Makes the tables of a form, the first being 1.
 pub async fn make(connection: &mut PgConnection, form: u32) {

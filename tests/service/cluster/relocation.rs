@@ -129,65 +129,47 @@ async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
 }
 
 #[tokio::test]
-async fn results_of_a_database_move_to_another_place_and_from_there_to_a_third() {
-    let url = or_skip!(tables().await);
-    let [first, second] = [(); 2].map(|()| tempfile::tempdir().unwrap());
-    let places =
-        [first, second].map(|folder| (format!("file://{}", folder.path().display()), folder));
-    let mut service = node(&url, "serve", &SOLVES);
-    let paths = fill(&service).await;
-    let known = read(&service, &paths).await;
-    for (place, _) in &places {
-        let words = ["move-results", "--database-url", &url];
-        let there = ["--results-url", place, "--results-shared"];
-        assert_refused(say(&[&words[..], &there[..2]].concat()), "--results-shared");
-        let words = [&words[..], &there].concat();
-        assert_refused(say(&words), "1 nodes");
-        service.stop().await;
-        assert_moved(say(&words));
-        assert_refused(say(&words), "already");
-        service = node(&url, "serve", &[&SOLVES[..], &there].concat());
-        assert_eq!(read(&service, &paths).await, known);
-    }
-    let pool = sqlx::PgPool::connect(&url).await.unwrap();
-    let left: i64 = sqlx::query_scalar("SELECT COUNT(*) FROM objects")
-        .fetch_one(&pool)
-        .await
-        .unwrap();
-    assert_eq!(left, 0, "what was in the database is not kept twice");
-    assert_refused_to_another(&places[1].0).await;
-}
-
-#[tokio::test]
-async fn results_of_a_database_move_into_a_bucket_and_from_there_into_another() {
+async fn results_of_a_database_move_to_a_folder_from_there_to_a_bucket_and_to_another() {
     let (url, port) = (or_skip!(tables().await), or_skip!(server()));
+    let place = tempfile::tempdir().unwrap();
+    let folder = format!("file://{}", place.path().display());
     let mut service = node(&url, "serve", &SOLVES);
     let paths = fill(&service).await;
     let known = read(&service, &paths).await;
-    for place in ["s3://first/results", "s3://second/results"] {
+    let move_results = |url: &str, there: &[&str]| {
+        let words = [&["move-results", "--database-url", url], there].concat();
+        said_by(&mut railhead_at(port), &words)
+    };
+    let unshared = ["--results-url", &folder];
+    assert_refused(move_results(&url, &unshared), "--results-shared");
+    for there in [
+        &["--results-url", &folder, "--results-shared"][..],
+        &["--results-url", "s3://first/results"],
+        &["--results-url", "s3://second/results"],
+    ] {
+        assert_refused(move_results(&url, there), "1 nodes");
         service.stop().await;
-        let there = ["--database-url", &url, "--results-url", place];
-        let words = [&["move-results"], &there[..]].concat();
-        assert_moved(said_by(&mut railhead_at(port), &words));
-        let flags = [&SOLVES[..], &there].concat();
+        assert_moved(move_results(&url, there));
+        assert_refused(move_results(&url, there), "already");
+        let flags = [&SOLVES[..], there].concat();
         service = node_by(railhead_at(port), &url, "serve", &flags);
         assert_eq!(read(&service, &paths).await, known);
     }
+    let pool = sqlx::PgPool::connect(&url).await.unwrap();
+    let left = sqlx::query_scalar("SELECT COUNT(*) FROM objects");
+    let left: i64 = left.fetch_one(&pool).await.unwrap();
+    assert_eq!(left, 0, "what was in the database is not kept twice");
     // A node that still names the bucket before is refused.
     service.stop().await;
-    let folder = tempfile::tempdir().unwrap();
+    let data = tempfile::tempdir().unwrap();
     let mut before = railhead_at(port);
     before.args(["serve", "--listen", "127.0.0.1:0", "--data-dir"]);
-    before.arg(folder.path()).args(["--database-url", &url]);
+    before.arg(data.path()).args(["--database-url", &url]);
     let there = ["--results-url", "s3://first/results"];
     assert_refused(said_by(&mut before, &there), "s3://second/results");
-}
-
-/// The place of a database is not given to another one.
-async fn assert_refused_to_another(place: &str) {
+    // The place of a database is not given to another one.
     let other = tables().await.unwrap();
     node(&other, "serve", &SOLVES).stop().await;
-    let words = ["move-results", "--database-url", &other];
-    let there = ["--results-url", place, "--results-shared"];
-    assert_refused(say(&[&words[..], &there].concat()), "another database");
+    let there = ["--results-url", "s3://second/results"];
+    assert_refused(move_results(&other, &there), "another database");
 }
