@@ -20,26 +20,30 @@ use crate::contact::rolling::task::{Resolution, TARGET_LEAST, TARGET_USUAL};
 const MOTION_SECONDS: f64 = 3e-4;
 /// Power with which the time grows as the target falls.
 const TARGET_POWER: f64 = 1.4;
-/// Time of a motion with spin, with a prescribed force, or with friction that depends on slip, over that of one without; of a wheel on profiles that are
-/// judged by other readings; and of a position of a wheelset, or of a wheel that is to carry prescribed forces.
+/// Factor of what makes a case slow: spin, a prescribed force or friction that depends on slip, each for its motion; profiles judged by other readings,
+/// for the wheel; a pose of a wheelset; a wheel that is to carry prescribed forces.
 const HARD_TIMES: f64 = 3.0;
 /// A motion by the table, with its place in the answer, in s; twice what a row of a run of a million takes on an idle machine
 /// (`cargo bench --bench load -- rows`).
 pub(crate) const TABLE_SECONDS: f64 = 5e-6;
-/// Time in s to find region and pressure of a gap with one patch, which grows with the square of their number; to place the rigid wheelset at one shift
-/// with two readings of its profiles; and to find the worst point below a patch (`cargo bench --bench stress -- --only after`).
-const SHORT_SECONDS: f64 = 2.5e-3;
+/// Time in s to find region and pressure of a gap with one patch. It grows with the square of their number.
+const GAP_SECONDS: f64 = 2.5e-3;
 /// Time in s to bring a wheel to rest on its rail.
 const WHEEL_SECONDS: f64 = 9e-3;
-/// Time in s that pressure and opening of a gap take for each motion of unlike bodies (12 contacts of `tests/physics/unlike.rs`), and that the passages
-/// below a patch take for each thing that is judged of them.
-const LONG_SECONDS: f64 = 0.04;
+/// Time in s to place the rigid wheelset at one shift, with two readings of its profiles.
+const PLACEMENT_SECONDS: f64 = 2.5e-3;
+/// Time in s that pressure and opening of a gap take for each motion of unlike bodies (12 contacts of `tests/physics/unlike.rs`).
+const COUPLED_SECONDS: f64 = 0.04;
+/// Time in s to find the worst point below a patch (`cargo bench --bench stress -- --only after`).
+const WORST_POINT_SECONDS: f64 = 2.5e-3;
+/// Time in s to find the worst passage below a patch by one criterion, from the same bench.
+const PASSAGE_SECONDS: f64 = 0.04;
 
 /// Time in s to find region and pressure of a number of patches.
 fn normal_seconds(task: &NormalTask, patches: usize) -> f64 {
     match task {
         NormalTask::Hertz(_) | NormalTask::Given(_) => 0.0,
-        NormalTask::Gap(_) => SHORT_SECONDS * (patches as f64).powi(2),
+        NormalTask::Gap(_) => GAP_SECONDS * (patches as f64).powi(2),
         NormalTask::Wheel(task) => at_rest(task),
         NormalTask::Wheelset(task) => task.sides.iter().map(at_rest).sum(),
     }
@@ -69,7 +73,7 @@ impl CheckedCase {
         };
         let motions = self.problem.motions.len() as f64;
         let coupled = if self.problem.is_coupled(&self.run) {
-            motions * LONG_SECONDS
+            motions * COUPLED_SECONDS
         } else {
             0.0
         };
@@ -79,7 +83,7 @@ impl CheckedCase {
             return once * self.problem.pull().map_or(1.0, |_| HARD_TIMES);
         };
         let kinematics = task.kinematics.as_ref().map_or(0.0, |asked| {
-            SHORT_SECONDS * (1.0 + 2.0 * asked.reach / asked.step)
+            PLACEMENT_SECONDS * (1.0 + 2.0 * asked.reach / asked.step)
         });
         once * HARD_TIMES * task.moves.len() as f64 + kinematics
     }
@@ -158,12 +162,12 @@ impl CheckedCase {
                 0.0
             };
             // Each stress; a fine mesh takes several times as long. Other outputs take less than 0.1 ms.
-            seconds += 4e-7 * count + SHORT_SECONDS * searched;
+            seconds += 4e-7 * count + WORST_POINT_SECONDS * searched;
             if let Some(passage) = task.passage {
                 let judged = 1 + u8::from(passage.dang_van_slope.is_some());
-                seconds += LONG_SECONDS * f64::from(judged) * patches;
+                seconds += PASSAGE_SECONDS * f64::from(judged) * patches;
                 if searched == 0.0 {
-                    seconds += SHORT_SECONDS * patches;
+                    seconds += WORST_POINT_SECONDS * patches;
                 }
             }
         }

@@ -31,9 +31,10 @@ const LOOKED_AT: f64 = 0.02;
 const DEEPEST: f64 = 2.0;
 /// A wheel farther from the rail than this along the normal, in mm, does not touch it.
 const FAR: f64 = 8.0;
-/// Least cosine between directions that follow each other: between the outward normal of a body and the inward one of another that faces it, and between the
-/// tangent of the rail and a plane of contact, which ends where it is smaller.
-const FOLLOWS: f64 = 0.1;
+/// Least cosine between the outward normal of the wheel and the inward normal of the rail where they face each other.
+const FACING_LEAST: f64 = 0.1;
+/// Least cosine between the tangent of the rail and a plane of contact. The plane ends where it is smaller.
+const PLANE_COSINE_LEAST: f64 = 0.1;
 /// Intervals between the points along x at which the gap is computed, for a wheel without yaw, and at most; and the distance in mm across the
 /// wheel's profile for which there is one more.
 const INTERVALS: usize = 4;
@@ -194,7 +195,7 @@ impl<'g> ReferenceCurve<'g> {
     pub fn on_planes(&self, planes: Vec<ContactPlane>) -> ReferenceCurve<'g> {
         let mut rail = Vec::new();
         for plane in &planes {
-            let facing = |place: &CurvePlace| plane.follows(place.angle) > FOLLOWS;
+            let facing = |place: &CurvePlace| plane.follows(place.angle) > PLANE_COSINE_LEAST;
             let inside = |place: &CurvePlace| {
                 (plane.range[0]..plane.range[1]).contains(&place.s) && facing(place)
             };
@@ -505,7 +506,7 @@ impl<'g> ReferenceCurve<'g> {
                 let outward = [0, 1, 2].map(|k| (a * radial[k] / radius - r * axle[k]) / size);
                 let facing = outward[1] * normal[0] + outward[2] * normal[1];
                 let inside = wheel > first && wheel < last;
-                return (facing < -FOLLOWS && inside).then(|| WheelOver {
+                return (facing < -FACING_LEAST && inside).then(|| WheelOver {
                     gap,
                     wheel,
                     lift: outward[2] / facing,

@@ -27,8 +27,10 @@ const LEVEL_BYTES_PER_CELL: f64 = 200.0;
 const LEVELS_PER_MOTION: f64 = 4.0;
 /// Bytes of a motion in the answer, for each patch, and of its text.
 const MOTION_BYTES: f64 = 2000.0;
-/// Bytes of a stress, and of the fields of a cell in a motion, in the answer and in its stored form.
-const PLACE_BYTES: f64 = 160.0;
+/// Bytes of a stress in the answer and in its stored form.
+const STRESS_BYTES: f64 = 160.0;
+/// Bytes of the fields of a cell and a motion, in the answer and in their stored form.
+const FIELDS_BYTES_PER_CELL: f64 = 160.0;
 
 /// Bytes per cell and point of a history on a level: tractions, slips, and which slip.
 const HISTORY_BYTES_PER_CELL: f64 = 33.0;
@@ -114,7 +116,7 @@ impl SizeInput {
         let patches = self.segments.len() as f64;
         let fields = if self.fields {
             // Many motions need twice the average at most.
-            motions * cells.min(2.0 * self.usual_cells(cells)) * PLACE_BYTES
+            motions * cells.min(2.0 * self.usual_cells(cells)) * FIELDS_BYTES_PER_CELL
         } else {
             0.0
         };
@@ -122,7 +124,7 @@ impl SizeInput {
             + solve
             + cells * (WORK_BYTES_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
             + self.kept_of_history(cells)
-            + motions * patches * (MOTION_BYTES + PLACE_BYTES * self.stress_points as f64)
+            + motions * patches * (MOTION_BYTES + STRESS_BYTES * self.stress_points as f64)
             + fields
     }
 
