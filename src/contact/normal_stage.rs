@@ -68,7 +68,7 @@ pub(crate) fn solve_gap(
     case: &CheckedCase,
     task: &GapTask,
     fineness: GridFineness,
-    workspace: &mut GridWorkspace<f32>,
+    workspace: &mut GridWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<SolvedFootprint, SolveError> {
     let found = task.solve_as(fineness, workspace, monitor)?;

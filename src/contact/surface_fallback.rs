@@ -53,7 +53,6 @@ pub(crate) fn fallback(contact: &WheelTask, error: SolveError) -> Result<RemarkE
     let of_surface = matches!(
         error,
         SolveError::NormalProblem { .. }
-            | SolveError::RoughProfile { .. }
             | SolveError::NotConverged { .. }
             | SolveError::Unmeshable { .. }
     );

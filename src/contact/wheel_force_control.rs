@@ -274,9 +274,11 @@ impl ForceSearch<'_> {
     fn unreached(&self, ends: [Option<f64>; 2]) -> SolveError {
         let asked = self.asked();
         let reach = match ends {
-            [Some(least), Some(most)] => format!("from {least:.1} N to {most:.1} N"),
-            [Some(least), None] => format!("at least {least:.1} N"),
-            [None, Some(most)] => format!("at most {most:.1} N"),
+            [Some(least), Some(most)] => {
+                format!("about {} N to {} N", rounded(least), rounded(most))
+            }
+            [Some(least), None] => format!("about {} N at least", rounded(least)),
+            [None, Some(most)] => format!("about {} N at most", rounded(most)),
             [None, None] => "within limits that were not found".to_owned(),
         };
         let beside = match self.forces[0] {
@@ -424,6 +426,12 @@ impl FreeRollingState {
 pub(crate) fn angle_of(patch: &PatchSolution) -> f64 {
     let position = patch.position.as_ref();
     position.map_or(0.0, |position| position.contact_angle_rad)
+}
+
+/// A force in N to three digits. A coarse solve does not know more of it.
+fn rounded(force: f64) -> f64 {
+    let step = 10_f64.powf(force.abs().max(1.0).log10().floor() - 2.0);
+    (force / step).round() * step
 }
 
 fn radius_of(patch: &PatchSolution) -> f64 {

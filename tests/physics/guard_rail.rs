@@ -157,6 +157,30 @@ fn guard_rails_have_the_unit_and_the_senses_of_the_rail_and_either_order() {
 }
 
 #[test]
+fn a_straight_face_that_is_touched_is_no_hole_in_its_points() {
+    for load in [
+        json!({ "approach_mm": 0.1 }),
+        json!({ "normal_force_n": 3000 }),
+    ] {
+        let mut case = beside_guard_rail(4.25);
+        case["load"] = load;
+        let solution = solve(&case);
+        let place = solution.patches[0].position.as_ref().unwrap();
+        assert!((place.rail_mm[0] - FACE).abs() < 0.01, "{place:?}");
+    }
+}
+
+#[test]
+fn kinematics_of_a_wheelset_refuse_a_guard_rail() {
+    let mut case = beside_guard_rail(0.0);
+    let contact = case["contact"].as_object_mut().unwrap();
+    contact.insert("type".to_owned(), json!("wheelset"));
+    contact.remove("side");
+    contact.insert("kinematics".to_owned(), json!({}));
+    assert_fault(&case, "/contact/rail/guard_rail_points_mm", &["kinematics"]);
+}
+
+#[test]
 fn guard_rails_in_other_places_are_refused() {
     let mut wheel = beside_guard_rail(0.0);
     wheel["contact"]["wheel"]["guard_rail_points_mm"] = json!(guard_rail());

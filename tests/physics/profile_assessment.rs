@@ -76,6 +76,33 @@ fn sound_profiles_carry_their_quality_and_no_blame() {
 }
 
 #[test]
+fn planes_do_not_answer_for_points_that_are_refused() {
+    let sound = rail_60e1();
+    let touched = solved(&on_rail(&sound)).patches[0].position.clone();
+    let y = touched.expect("a place").rail_mm[0];
+    let near = |at: &[f64; 2]| (at[0] - y).abs();
+    let nearest = (0..sound.len()).min_by(|a, b| near(&sound[*a]).total_cmp(&near(&sound[*b])));
+    let nearest = nearest.expect("points");
+    let mut refused = 0;
+    for height in [0.02, 0.04, 0.08] {
+        for point in [nearest - 2, nearest, nearest + 2] {
+            let mut rail = sound.clone();
+            rail[point][1] -= height;
+            let checked = check(&on_rail(&rail), &Limits::default()).expect("a case");
+            match solve(&checked, &Unmonitored) {
+                Ok((found, _)) => {
+                    let mut details = found.remarks.iter().map(|remark| &remark.detail);
+                    assert!(!details.any(|detail| detail.contains("accept_rough_profiles")));
+                }
+                Err(SolveError::RoughProfile { .. }) => refused += 1,
+                Err(_) => {}
+            }
+        }
+    }
+    assert!(refused > 0);
+}
+
+#[test]
 fn a_hole_of_50_mm_at_the_crown_is_no_contact() {
     let case = on_rail(&without(&rail_60e1(), -25.0, 25.0));
     let (pointer, reason) = refusal(&case);

@@ -4,6 +4,7 @@ use railhead::contact::geometry::contact_locus::ContactLocus;
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::contact::geometry::wheel_rail::WheelRail;
 use railhead::contact::remark::list::Remark;
+use serde_json::Value;
 
 use crate::profile_geometry::placement;
 use crate::profile_shapes::{rail_60e1, s1002};
@@ -73,6 +74,19 @@ fn loops_are_refused() {
     let points: Vec<[f64; 2]> = (0..180).map(circle).collect();
     let fault = rail(&points).unwrap_err();
     assert!(fault.contains("loops are refused"), "{fault}");
+}
+
+#[test]
+fn points_that_are_given_twice_are_refused() {
+    // The chord from the last point back to the first crosses no other.
+    let text = include_str!("../../api/examples/wheel-rail.case.json");
+    let case: Value = serde_json::from_str(text).unwrap();
+    let given: Vec<[f64; 2]> =
+        serde_json::from_value(case["contact"]["rail"]["points_mm"].clone()).unwrap();
+    for times in [2, 3] {
+        let fault = rail(&given.repeat(times)).unwrap_err();
+        assert!(fault.contains("given twice"), "{fault}");
+    }
 }
 
 #[test]

@@ -25,8 +25,7 @@ use crate::sweeps::timeless;
 #[test]
 fn operators_equations_meshes_and_stores_are_shared_by_threads() {
     fn shared<T: Send + Sync>() {}
-    shared::<GridOperator<f32>>();
-    shared::<GridOperator<f64>>();
+    shared::<GridOperator>();
     shared::<StripOperator>();
     shared::<OperatorStore>();
     shared::<CaseOperators>();
@@ -108,7 +107,7 @@ fn a_product_allocates_nothing_after_the_first() {
             assert_eq!(later, 0, "{:?}", equations.rule);
         });
     }
-    let mut workspace = GridWorkspace::<f32>::default();
+    let mut workspace = GridWorkspace::default();
     let operator = GridOperator::new([30, 20], [0.1; 2], 1e5, &mut workspace);
     let (pressure, mut displacement) = (vec![1.0; 600], vec![0.0; 600]);
     operator.apply(&pressure, &mut displacement, &mut workspace);

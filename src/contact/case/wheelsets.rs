@@ -49,6 +49,22 @@ pub(crate) fn task(
     let poses = poses(lateral_shift_mm, yaw_rad, *combine, limits)?;
     let (poses, moves) = moving(poses, motion, *combine, limits)?;
     let sections = sections(contact);
+    if kinematics.is_some() {
+        let rails = sections.into_iter().map(|[rail, _]| rail);
+        let mut guarded: Vec<&str> = rails
+            .filter(|(_, rail)| rail.guard_rail_points_mm.is_some())
+            .map(|(pointer, _)| pointer)
+            .collect();
+        guarded.dedup();
+        let detail = "given together with kinematics, which take the running rail alone; leave one of the two out";
+        let faults: Vec<Fault> = guarded
+            .into_iter()
+            .map(|rail| Fault::new(format!("{rail}/guard_rail_points_mm"), detail))
+            .collect();
+        if !faults.is_empty() {
+            return Err(faults);
+        }
+    }
     let profiles = sections.map(|[rail, wheel]| {
         let rail = profile_at(rail.0, Body::Rail, rail.1);
         (rail, profile_at(wheel.0, Body::Wheel, wheel.1))

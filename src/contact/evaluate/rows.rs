@@ -378,8 +378,11 @@ impl Shapes {
 fn is_plain(case: &Value, checked: &CheckedCase) -> bool {
     let CheckedCase { problem, run, .. } = checked;
     let asked_mesh = matches!(run.resolution, Resolution::Mesh(_));
+    // A list or a sweep of one motion does not have its creepages where rows read them.
+    let listed = |motion: &Value| motion.is_array() || motion.get("sweep").is_some();
     problem.plain().is_some()
         && problem.motions.len() == 1
+        && !case.get("motion").is_some_and(listed)
         && problem.history.is_none()
         && problem.forces.iter().all(|forces| *forces == [None; 2])
         && case.pointer(Variable::NormalForce.pointer()).is_some()

@@ -489,11 +489,29 @@ fn lengths(points: &[[f64; 2]]) -> Result<Vec<f64>, String> {
             first[0], -first[1], second[0], -second[1]
         ));
     }
+    if let Some([y, z]) = visited_again(points) {
+        return Err(format!(
+            "the profile passes the point [{y:.3}, {:.3}] twice; are its points given twice? loops are refused",
+            -z
+        ));
+    }
     let mut along = vec![0.0];
     for pair in points.windows(2) {
         along.push(along[along.len() - 1] + distance(pair[0], pair[1]));
     }
     Ok(along)
+}
+
+/// A point that the profile comes back to. An outline may end where it begins.
+fn visited_again(points: &[[f64; 2]]) -> Option<[f64; 2]> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    let by_place = |a: &[f64; 2], b: &[f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
+    order.sort_by(|a, b| by_place(&points[*a], &points[*b]).then(a.cmp(b)));
+    let again = order.windows(2).find(|pair| {
+        let ends = [0, points.len() - 1];
+        points[pair[0]] == points[pair[1]] && pair[..] != ends
+    });
+    again.map(|pair| points[pair[0]])
 }
 
 fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {

@@ -627,7 +627,7 @@ const TAPER: f64 = 2.0;
 
 thread_local! {
     /// Plans of the transforms, which take longer to make than to use. They follow from their lengths alone; there are a dozen at most.
-    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+    static PLANNER: RefCell<RealFftPlanner<f32>> = RefCell::new(RealFftPlanner::new());
 }
 
 /// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height.
@@ -638,11 +638,11 @@ pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
     let mut values = vec![0.0; padded];
     for (k, height) in heights.iter().enumerate() {
         let from_end = step * k.min(count - 1 - k) as f64;
-        values[k] = if from_end < TAPER {
-            height * 0.5 * (1.0 - (PI * from_end / TAPER).cos())
-        } else {
-            *height
+        let share = match from_end < TAPER {
+            true => 0.5 * (1.0 - (PI * from_end / TAPER).cos()),
+            false => 1.0,
         };
+        values[k] = (share * height) as f32;
     }
     let (forward, backward) = PLANNER.with_borrow_mut(|planner| {
         (
@@ -656,7 +656,7 @@ pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
     debug_assert!(done.is_ok());
     for (m, entry) in spectrum.iter_mut().enumerate() {
         let wavenumber = TAU * m as f64 / (padded as f64 * step);
-        *entry *= 0.5 * modulus * wavenumber / padded as f64;
+        *entry *= (0.5 * modulus * wavenumber / padded as f64) as f32;
     }
     if let Some(last) = spectrum.last_mut() {
         last.im = 0.0;
@@ -665,7 +665,7 @@ pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
     let done = backward.process(&mut spectrum, &mut values);
     debug_assert!(done.is_ok());
     values.truncate(count);
-    values
+    values.into_iter().map(f64::from).collect()
 }
 
 /// Pressure in MPa that white noise of deviation `noise` mm at a spacing of `spacing` mm leaves after a smoothing that halves

@@ -63,7 +63,7 @@ pub struct BentOperator {
     step: [f64; 2],
     /// Padded length of a strip.
     width: usize,
-    plans: FftPlans<f32>,
+    plans: FftPlans,
     /// The normal influence of a cell; and that along x at other strips, over the turn, and at its own strip, over its curvature.
     normal: Spectrum,
     along: Option<Spectrum>,
@@ -488,7 +488,7 @@ impl std::fmt::Debug for BentOperator {
 /// Buffers of products, and plans of transforms.
 #[derive(Default)]
 pub struct BentWorkspace {
-    planners: FftPlanners<f32>,
+    planners: FftPlanners,
     /// Strips, two as the real and the imaginary part of one line.
     lines: Vec<Complex<f32>>,
     scratch: Vec<Complex<f32>>,

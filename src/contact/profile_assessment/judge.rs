@@ -141,7 +141,8 @@ impl<'a> Under<'a> {
     }
 }
 
-fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
+/// Two ends in increasing order.
+pub(crate) fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
     [a.min(b), a.max(b)]
 }
 

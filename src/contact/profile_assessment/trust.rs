@@ -11,13 +11,15 @@ use crate::contact::monitor::Monitor;
 use crate::contact::normal::wheel::{ReferenceSurface, WheelContact, WheelPatch, WheelTask};
 use crate::contact::problem::checked_case;
 use crate::contact::problem::checked_case::{CheckedCase, PRESSURE_USUAL};
-use crate::contact::profile_assessment::judge::{Cause, Finding, FoundPatch, HARMLESS, judge};
+use crate::contact::profile_assessment::judge::{
+    Cause, Finding, FoundPatch, HARMLESS, judge, sorted,
+};
 use crate::contact::profile_assessment::uncertainty;
 use crate::contact::remark::entry::RemarkEntry;
 use crate::contact::remark::list::Remark;
 use crate::contact::rolling::operator_store::OperatorStore;
 use crate::contact::solution::words::answer::{Fields, Solution};
-use crate::contact::solution::words::damage::{PatchQuality, ProfileQuality};
+use crate::contact::solution::words::damage::PatchQuality;
 use crate::contact::wheel_on_rail;
 use crate::contact::wheel_on_rail::SolvedWheel;
 
@@ -268,32 +270,31 @@ impl<'a> Judgement<'a> {
         };
         holes(&search, wheel.lowering, width)
             .into_iter()
-            .filter_map(|hole| self.beside(&hole, width, qualities))
+            .filter_map(|hole| self.beside(&hole, wheel, width, qualities))
             .collect()
     }
 
     /// The finding about a hole outside all patches, attributed to the nearest one.
-    fn beside(&self, hole: &Hole, width: f64, qualities: &mut [PatchQuality]) -> Option<Finding> {
-        let [rail, wheel] = self.contact.geometry.profiles();
-        let profile = match hole.body {
-            Body::Rail => rail,
-            Body::Wheel => wheel,
+    fn beside(
+        &self,
+        hole: &Hole,
+        wheel: &WheelContact,
+        width: f64,
+        qualities: &mut [PatchQuality],
+    ) -> Option<Finding> {
+        let body = hole.body as usize;
+        let profile = self.contact.geometry.profiles()[body];
+        let [from, to] = hole.chord;
+        let distance = |patch: &WheelPatch| {
+            let [low, high] = sorted(patch.ends.map(|end| end[body]));
+            (low - to).max(from - high)
         };
-        let own = |quality: &PatchQuality| match hole.body {
-            Body::Rail => quality.rail,
-            Body::Wheel => quality.wheel,
-        };
-        let y = hole.chord.map(|s| profile.at(s).at[0]);
-        let under = |own: ProfileQuality| own.y_mm[0] < y[1] && own.y_mm[1] > y[0];
-        if qualities.iter().any(|quality| under(own(quality))) {
+        let distances = wheel.patches.iter().map(distance);
+        let (nearest, distance) = (distances.enumerate()).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        if distance < 0.0 {
             return None;
         }
-        let distance = |quality: &PatchQuality| {
-            let [from, to] = own(quality).y_mm;
-            (from + to - y[0] - y[1]).abs()
-        };
-        let nearest = (0..qualities.len())
-            .min_by(|a, b| distance(&qualities[*a]).total_cmp(&distance(&qualities[*b])))?;
+        let y = hole.chord.map(|s| profile.at(s).at[0]);
         let length = hole.chord[1] - hole.chord[0];
         let quality = match hole.body {
             Body::Rail => &mut qualities[nearest].rail,

@@ -9,6 +9,7 @@ use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
 use crate::contact::half_space::strip_operator::operator::StripOperator;
 use crate::contact::half_space::unlike_bodies::{Elasticity, pressure_slips};
 use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips, strips_about};
+use crate::contact::method::Method;
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::footprint::{Footprint, SurfaceSlip};
 use crate::contact::normal::hertz::Ellipse;
@@ -128,7 +129,9 @@ impl StripMesh {
         operators: Arc<CaseOperators>,
     ) -> Result<StripMesh, SolveError> {
         let plan: MeshPlan = plan.into();
-        let fitted = fitted_chords(task.footprint, &plan)?;
+        // Rows by the simplified theory share one mesh.
+        let like_circle = task.method == Method::Fastsim;
+        let fitted = fitted_chords(task.footprint, &plan, like_circle)?;
         let Elasticity {
             shear_modulus,
             poisson_ratio,
@@ -333,7 +336,11 @@ fn bounds(
 ///
 /// # Errors
 /// [`SolveError::Unmeshable`] if no strip meets a patch.
-fn fitted_chords(footprint: &Footprint, plan: &MeshPlan) -> Result<Vec<StripChord>, SolveError> {
+fn fitted_chords(
+    footprint: &Footprint,
+    plan: &MeshPlan,
+    like_circle: bool,
+) -> Result<Vec<StripChord>, SolveError> {
     let strips = plan.size.strips;
     let mut fitted = Vec::new();
     for (k, patch) in footprint.patches().iter().enumerate() {
@@ -342,7 +349,7 @@ fn fitted_chords(footprint: &Footprint, plan: &MeshPlan) -> Result<Vec<StripChor
             Some([_, y]) => strips_about(y, low, high, strips as usize),
             None => equal_strips(low, high, strips as usize),
         };
-        let chords = load_ellipse::chords(footprint, k, &edges);
+        let chords = load_ellipse::chords(footprint, k, &edges, like_circle);
         if chords.is_empty() {
             return Err(SolveError::Unmeshable { patch: k, strips });
         }

@@ -8,6 +8,8 @@ use crate::contact::normal::wheel::WheelContact;
 use crate::contact::post::damage::{DamagedPatch, damage};
 use crate::contact::problem::physics::Run;
 use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::contact::remark::list::Remark;
+use crate::contact::rolling::task::Resolution;
 use crate::contact::solution::assemble::normalised;
 use crate::contact::solution::finish::move_origin;
 use crate::contact::solution::words::answer::{
@@ -88,6 +90,12 @@ impl WheelSolve<'_> {
             .collect();
         let mut remarks = self.case.remarks.clone();
         remarks.extend(wheel.remarks.iter().cloned());
+        if let Resolution::Target(target) = self.case.run.resolution
+            && left_open > target
+        {
+            let error = left_open;
+            remarks.push(Remark::TargetBelowCurveError { target, error }.into());
+        }
         let centre = load_centre_of_all(self.curve, &parts);
         let nothing = Total {
             force_x_n: 0.0,

@@ -39,15 +39,15 @@ pub fn arithmetic(level: SimdLevel) -> String {
         digest.word(solved[(i, 0)].to_bits());
         digest.word(product[(i, n - 1 - i)].to_bits());
     }
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(180);
-    let mut values: Vec<f64> = (0..180).map(|i| entry(i, 1)).collect();
+    let transform = RealFftPlanner::<f32>::new().plan_fft_forward(180);
+    let mut values: Vec<f32> = (0..180).map(|i| entry(i, 1) as f32).collect();
     let mut spectrum = transform.make_output_vec();
     transform
         .process(&mut values, &mut spectrum)
         .expect("lengths that fit");
     for value in spectrum {
-        digest.word(value.re.to_bits());
-        digest.word(value.im.to_bits());
+        digest.word(f64::from(value.re).to_bits());
+        digest.word(f64::from(value.im).to_bits());
     }
     format!("{} {level} {}", std::env::consts::ARCH, digest.text())
 }

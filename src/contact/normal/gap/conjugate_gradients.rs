@@ -3,7 +3,7 @@
 //! The unknowns satisfy `p ≥ 0`, `g = u(p) + h − δ ≥ 0` and `p g = 0` at every cell; either the sum of p or the approach δ is
 //! prescribed (Polonsky and Keer 1999). Distances may be scaled by what a cell's own pressure displaces.
 
-use crate::contact::half_space::grid_operator::{FftFloat, GridOperator, GridWorkspace};
+use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::contact::monitor::{Monitor, Stop};
 use crate::contact::normal::gap::cell_sums;
 use crate::contact::normal::gap::cell_sums::{
@@ -28,11 +28,11 @@ pub(crate) trait PressureInfluence {
     fn weights(&self, cells: usize) -> Vec<f64>;
 }
 
-impl<T: FftFloat> PressureInfluence for GridOperator<T> {
+impl PressureInfluence for GridOperator {
     const CHANGES_MAX: usize = 12;
-    type Workspace = GridWorkspace<T>;
+    type Workspace = GridWorkspace;
 
-    fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut GridWorkspace<T>) {
+    fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut GridWorkspace) {
         GridOperator::apply(self, pressure, displacement, workspace);
     }
 
@@ -316,11 +316,51 @@ impl PressureIterate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::half_space::grid_operator::coefficients;
     use crate::contact::monitor::Unmonitored;
 
     const CELLS: usize = 24;
     const STEP: f64 = 0.5;
     const MODULUS: f64 = 115_000.0;
+
+    /// The influence of the cells in double precision, summed cell by cell.
+    struct Summed(Vec<f64>);
+
+    impl Summed {
+        fn new() -> Summed {
+            Summed(coefficients(CELLS, CELLS, STEP, STEP, MODULUS))
+        }
+    }
+
+    impl PressureInfluence for Summed {
+        const CHANGES_MAX: usize = 0;
+        type Workspace = ();
+
+        fn apply(&self, pressure: &[f64], displacement: &mut [f64], (): &mut ()) {
+            displacement.fill(0.0);
+            let all: Vec<(usize, f64)> = pressure.iter().copied().enumerate().collect();
+            self.add(&all, displacement);
+        }
+
+        fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
+            for (at, u) in displacement.iter_mut().enumerate() {
+                let (i, j) = (at % CELLS, at / CELLS);
+                let by = |(of, p): &(usize, f64)| {
+                    let (k, l) = (of % CELLS, of / CELLS);
+                    p * self.0[j.abs_diff(l) * CELLS + i.abs_diff(k)]
+                };
+                *u += changes.iter().map(by).sum::<f64>();
+            }
+        }
+
+        fn own(&self) -> f64 {
+            self.0[0]
+        }
+
+        fn weights(&self, cells: usize) -> Vec<f64> {
+            vec![1.0; cells.next_multiple_of(LANES)]
+        }
+    }
 
     fn paraboloid() -> Vec<f64> {
         let at = |i: usize| (i as f64 - 11.3) * STEP;
@@ -330,21 +370,17 @@ mod tests {
     }
 
     fn solved(loading: NormalLoad, start: Vec<f64>) -> PressureAnswer {
-        let mut workspace = GridWorkspace::<f64>::default();
-        let influence = GridOperator::new([CELLS; 2], [STEP; 2], MODULUS, &mut workspace);
         let task = PressureTask {
             gap: &paraboloid(),
             cell: STEP * STEP,
             loading,
             tolerance: 1e-9,
         };
-        solve_pressure(&task, &influence, start, &mut workspace, &Unmonitored).unwrap()
+        solve_pressure(&task, &Summed::new(), start, &mut (), &Unmonitored).unwrap()
     }
 
     #[test]
     fn a_tolerance_that_cannot_be_met_is_said() {
-        let mut workspace = GridWorkspace::<f64>::default();
-        let influence = GridOperator::new([CELLS; 2], [STEP; 2], MODULUS, &mut workspace);
         let task = PressureTask {
             gap: &paraboloid(),
             cell: STEP * STEP,
@@ -352,7 +388,7 @@ mod tests {
             tolerance: -1.0,
         };
         let start = vec![1.0; CELLS * CELLS];
-        match solve_pressure(&task, &influence, start, &mut workspace, &Unmonitored) {
+        match solve_pressure(&task, &Summed::new(), start, &mut (), &Unmonitored) {
             Err(PressureFailure::NotConverged(residual)) => assert!(residual < 1e-6, "{residual}"),
             Err(PressureFailure::Stopped(_)) => panic!("stopped"),
             Ok(pressed) => panic!("{}", pressed.residual),

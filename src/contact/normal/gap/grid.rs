@@ -132,8 +132,8 @@ impl PressureGrid {
     pub(crate) fn influence(
         &self,
         contact_modulus: f64,
-        workspace: &mut GridWorkspace<f32>,
-    ) -> GridOperator<f32> {
+        workspace: &mut GridWorkspace,
+    ) -> GridOperator {
         GridOperator::new(self.cells, self.step, contact_modulus, workspace)
     }
 

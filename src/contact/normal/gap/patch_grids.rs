@@ -33,7 +33,7 @@ impl GapTask {
         whole: &PatchGrid,
         least: f64,
         mut fineness: GridFineness,
-        workspace: &mut GridWorkspace<f32>,
+        workspace: &mut GridWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<Option<GapOutcome>, NormalError> {
         let mut grids = boxes(whole, self.gap.window());

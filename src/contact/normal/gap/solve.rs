@@ -55,7 +55,7 @@ impl GapTask {
     pub(crate) fn solve_as(
         &self,
         resolution: GridFineness,
-        workspace: &mut GridWorkspace<f32>,
+        workspace: &mut GridWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
         let reach = self.touching_reach()?;
@@ -91,7 +91,7 @@ impl GapTask {
         mut solved: Option<(PressureGrid, PressureAnswer)>,
         mut reach: SearchBox,
         resolution: GridFineness,
-        workspace: &mut GridWorkspace<f32>,
+        workspace: &mut GridWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<(GapOutcome, bool), NormalError> {
         let (mut iterations, mut pressure_change) = (0, 0.0);
@@ -159,7 +159,7 @@ impl GapTask {
             reach,
             tolerance,
         }: GridStart,
-        workspace: &mut GridWorkspace<f32>,
+        workspace: &mut GridWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<PressureAnswer, NormalError> {
         let gap = grid.gap(&self.gap);

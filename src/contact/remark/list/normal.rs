@@ -267,6 +267,19 @@ macro_rules! wheel_remarks {
                 short(100.0 * uncertainty), short(100.0 * target)
             ),
 
+            /// The target is smaller than the error that the factors for the turn of the contact surface leave: a finer solve adds nothing.
+            Info TargetBelowCurveError {
+                /// The target, relative to μN.
+                target: f64 = 5e-3,
+                /// Error of forces that the factors leave, relative to μN; it is part of the error estimates.
+                error: f64 = 0.035,
+            }
+            advice: "The error is part of the estimates; `target_met` judges the rest of them. Give `reference_surface` \"half_space\" to leave the factors out.",
+            detail: format!(
+                "the surface turns under the contact, which leaves forces uncertain by {} % of μN, more than the target of {} %",
+                short(100.0 * error), short(100.0 * target)
+            ),
+
             /// The case names no reference surface and cannot be solved on the curve of the rail, so it is solved on planes of contact.
             Warning OnPlanes {
                 /// Why.

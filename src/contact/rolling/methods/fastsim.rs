@@ -109,8 +109,7 @@ fn brushes<'a>(
     })
 }
 
-/// The mesh of an ellipse for many ellipses and motions: that of the circle, since all ellipses are its images. The chords of meshes made
-/// for one ellipse depend a little on its a/b, so that forces differ from theirs by up to 0.002 μN.
+/// The mesh of an ellipse for many ellipses and motions: that of the circle, since all ellipses are its images.
 #[derive(Debug)]
 pub struct EllipseMesh {
     level: StripMesh,

@@ -8,7 +8,7 @@ use crate::contact::rolling::answer::{LevelOutcome, RelativeErrors, Resultants};
 use crate::contact::rolling::methods::fastsim;
 use crate::contact::rolling::methods::full_slip::NEGLIGIBLE;
 use crate::contact::rolling::refinement::on_mesh::DiscreteSolution;
-use crate::contact::rolling::task::RollingTask;
+use crate::contact::rolling::task::{Resolution, RollingTask};
 
 /// Factor on the root of the squares of both changes. Chosen on 230 of the 920 ellipses, smooth grids and gaps of `benches/calibrate`: 0.9 covers .89
 /// to 1.0 of the classes, 1.3 covers .95 to 1.0 for up to 1.4 times the work.
@@ -21,11 +21,12 @@ const SURPRISES: [f64; 2] = [0.06, 0.31];
 const EXTRAPOLATED: f64 = 1.0 / 3.0;
 /// Part of the cells of a mesh that a coarser one may have to be compared with it.
 const COARSER: f64 = 0.6;
-/// Meshes with fewer cells, all of them given by clients, may agree by chance; the meshes of a family that are judged have more.
-const CELLS_FEW: f64 = 64.0;
-/// Least relative error on so few cells, times their number: errors of an ellipse 6 mm × 5 mm on 3 × 3 to 8 × 8 cells, 10 creepages each.
-const ERROR_FEW: f64 = 0.6;
-/// Meshes with fewer cells or strips have no coarser one along that axis to be compared with; the least relative error is 1 over the square of their number.
+/// Meshes with fewer strips, or fewer cells in one, that a client gives may agree by chance.
+const SIDE_GOOD: u32 = 8;
+/// Least relative error on them, over the sum of the inverse squares of both numbers: errors of an ellipse 6 mm × 5 mm on 3 × 3 to 8 × 8 cells, 10 creepages
+/// each. It also covers 3 to 7 strips of 40 cells and the reverse.
+const ERROR_FEW: f64 = 0.3;
+/// Meshes with fewer have no coarser one along that axis to be compared with. Their least relative error is 1 over the square of that number.
 const SIDE_FEW: u32 = 3;
 /// Error of the resultants from region and pressure of a gap with [`REGION_CELLS`] cells of the normal problem across a patch (100 gaps and 96 patches
 /// of wheels on rails).
@@ -89,7 +90,13 @@ impl Estimate {
             found.errors.fill(Some(class));
             return Some(found);
         }
+        let size = finest.mesh.plan.size;
+        let side = size.cells.min(size.strips);
+        let alone = f64::from(side).powi(-2);
         let Some(middle) = coarser(solved, solved.len() - 1) else {
+            if task.method == Method::BoundaryElement && side < SIDE_FEW {
+                found.errors.fill(Some(alone));
+            }
             return Some(found);
         };
         // The power of the number of cells that the error falls with. A layer between the bodies lowers the order at the leading edge (60 ellipses with
@@ -118,13 +125,12 @@ impl Estimate {
             None => one.clone(),
         };
         let safety = safety(task);
-        let cells = finest.cells();
-        let size = finest.mesh.plan.size;
-        let side = size.cells.min(size.strips);
+        let given = matches!(task.resolution, Resolution::Mesh(_));
+        let inverse_squares = || [size.strips, size.cells].map(|n| f64::from(n).powi(-2));
         let least = match tangential.exit {
             LevelOutcome::RigidSlip => 1.0 / NEGLIGIBLE,
-            _ if side < SIDE_FEW => f64::from(side).powi(-2),
-            _ if cells < CELLS_FEW => ERROR_FEW / cells,
+            _ if given && side < SIDE_FEW => alone,
+            _ if given && side < SIDE_GOOD => ERROR_FEW * inverse_squares().iter().sum::<f64>(),
             _ => task.tolerance(index),
         };
         let normal = normal_errors(task, patches);

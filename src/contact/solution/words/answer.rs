@@ -252,7 +252,7 @@ pub struct PointSolution {
     pub friction_power_without_spin_n: f64,
     /// How this point was computed.
     pub solver: SolverReport,
-    /// Whether the error estimate meets the target; absent with an explicit mesh.
+    /// Whether the error estimate, without the part that no mesh reduces, meets the target; absent with an explicit mesh.
     #[schema(nullable = true)]
     pub target_met: Option<bool>,
     /// Whether a prescribed force could not be reached.
