@@ -39,7 +39,6 @@ use axum::extract::DefaultBodyLimit;
 use axum::http::Uri;
 use axum::middleware::{from_fn, from_fn_with_state};
 use tower_http::catch_panic::CatchPanicLayer;
-use tower_http::decompression::RequestDecompressionLayer;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
@@ -124,8 +123,7 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
         .fallback(|uri: Uri| async move { problem::unknown_route(uri.path()) })
         .method_not_allowed_fallback(method_not_allowed)
         .layer(DefaultBodyLimit::max(options.body_max_bytes))
-        .layer(RequestDecompressionLayer::new().gzip(true).zstd(true))
-        .layer(from_fn_with_state(options.clone(), admission::limit_packed))
+        .layer(from_fn_with_state(options.clone(), admission::unpack))
         .layer(CatchPanicLayer::custom(response::answer_panic))
         .layer(from_fn(limits::hold))
         .layer(from_fn({

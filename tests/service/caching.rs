@@ -11,6 +11,7 @@ use crate::errors::assert_problem;
 use crate::results::path_of;
 use crate::server::{Answer, Server, example, example_text, unpacked};
 use crate::support::{Service, case};
+use crate::table_forms::kept_template;
 
 #[tokio::test]
 async fn finished_results_are_kept_for_good_and_asked_for_by_tag() {
@@ -202,6 +203,43 @@ async fn packed_cases_and_batches_are_unpacked() {
     )
     .await;
     assert_problem(&answer, 400, "unreadable-body", "");
+}
+
+/// RFC 1952 allows several members, as parallel compressors and `cat` make them.
+#[tokio::test]
+async fn every_member_of_a_packed_body_is_read_and_nothing_may_follow() {
+    let server = Server::idle().await;
+    let line = format!("{}\n", example("spin.case.json"));
+    let (text, middle) = (line.repeat(2), line.find("0.").expect("a number") + 1);
+    let zstd = |text: &[u8]| zstd::encode_all(text, 3).expect("zstd");
+    let pack: [(&str, &dyn Fn(&[u8]) -> Vec<u8>); 2] = [("gzip", &gzip), ("zstd", &zstd)];
+    for (coding, pack) in pack {
+        for cut in [line.len(), line.len() + middle] {
+            let (one, other) = text.as_bytes().split_at(cut);
+            let whole = [pack(one), pack(other)].concat();
+            let send = |body: Vec<u8>| {
+                send_packed(&server, "/v1/batches", "application/x-ndjson", coding, body)
+            };
+            let answer = send(whole.clone()).await.is(202);
+            assert_eq!(answer.json["count"], 2, "{coding}");
+            let last = whole.len() - 1;
+            let damaged = [
+                [&whole, &b"x"[..]].concat(),
+                [&whole, &b"no more of it is packed"[..]].concat(),
+                whole[..last].to_vec(),
+                whole[..pack(one).len() + 5].to_vec(),
+            ];
+            for body in damaged {
+                let answer = send(body).await;
+                assert_problem(&answer, 400, "unreadable-body", "cannot be unpacked");
+            }
+        }
+    }
+    let id = kept_template(&server).await;
+    let rows = ["creepage_x\n0.00", "1\n0.002\n"].map(|part| gzip(part.as_bytes()));
+    let path = format!("/v1/runs?template={id}");
+    let run = send_packed(&server, &path, "text/csv", "gzip", rows.concat()).await;
+    assert_eq!(run.is(202).json["rows"], 2);
 }
 
 #[tokio::test]

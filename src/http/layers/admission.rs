@@ -3,15 +3,19 @@
 //! The limits of a body hold before and after it is unpacked, so a small body that unpacks to a large one is given up as soon
 //! as the limit is passed, and one that unpacks to nothing cannot be sent for ever.
 
+use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use async_compression::tokio::bufread::{GzipDecoder, ZstdDecoder};
 use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::{HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
+use futures_util::TryStreamExt;
 use http_body_util::{BodyExt, LengthLimitError, Limited};
+use tokio_util::io::{ReaderStream, StreamReader};
 
 use crate::http::options::HttpOptions;
 use crate::http::problem::{ApiError, ProblemKind};
@@ -49,8 +53,8 @@ impl PackedLength {
     }
 }
 
-/// Refuses codings that cannot be unpacked, and limits a packed body before it is; layer around the unpacking.
-pub(crate) async fn limit_packed(
+/// Layer that unpacks bodies. It refuses unknown codings, and limits a packed body before it is unpacked.
+pub(crate) async fn unpack(
     State(options): State<HttpOptions>,
     request: Request,
     next: Next,
@@ -60,10 +64,11 @@ pub(crate) async fn limit_packed(
         .iter()
         .map(|value| value.to_str().unwrap_or("?").trim().to_ascii_lowercase())
         .collect();
-    match codings.as_slice() {
+    let is_gzip = match codings.as_slice() {
         [] => return next.run(request).await,
         [one] if one == "identity" => return next.run(request).await,
-        [one] if one == "gzip" || one == "zstd" => {}
+        [one] if one == "gzip" => true,
+        [one] if one == "zstd" => false,
         _ => {
             let detail = format!(
                 "`Content-Encoding` is `{}`; allowed: one of `gzip` and `zstd`, or none",
@@ -76,7 +81,7 @@ pub(crate) async fn limit_packed(
                 .insert(header::ACCEPT_ENCODING, ACCEPTED);
             return refusal;
         }
-    }
+    };
     let most = match request.uri().path() {
         "/v1/batches" => options.batch_max_bytes,
         "/v1/runs" => options.run_max_bytes,
@@ -101,10 +106,30 @@ pub(crate) async fn limit_packed(
             arrived.0.fetch_add(bytes, Ordering::Relaxed);
             frame
         });
-        Body::new(counted)
+        unpacked(Body::new(counted), is_gzip)
     });
     request.extensions_mut().insert(packed);
+    for name in [header::CONTENT_ENCODING, header::CONTENT_LENGTH] {
+        request.headers_mut().remove(name);
+    }
     next.run(request).await
+}
+
+/// A body without its gzip or zstd coding: all members of it (RFC 1952, RFC 8878), one after the other. Reading it fails if anything
+/// follows the last member, or if that is not complete.
+fn unpacked(body: Body, is_gzip: bool) -> Body {
+    let packed = StreamReader::new(TryStreamExt::map_err(
+        body.into_data_stream(),
+        io::Error::other,
+    ));
+    if is_gzip {
+        let mut members = GzipDecoder::new(packed);
+        members.multiple_members(true);
+        return Body::from_stream(ReaderStream::new(members));
+    }
+    let mut frames = ZstdDecoder::new(packed);
+    frames.multiple_members(true);
+    Body::from_stream(ReaderStream::new(frames))
 }
 
 /// Did reading a body fail because it passed a limit?
