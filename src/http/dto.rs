@@ -66,7 +66,7 @@ pub(crate) struct JobAnswer {
     /// Position in the queue; only in responses about one job that is queued and not too far behind.
     #[serde(skip_serializing_if = "Option::is_none")]
     queue: Option<QueuePlace>,
-    /// Remarks to read before using the numbers.
+    /// Remarks to read before using the numbers; for a failed job those of the check of its case.
     remarks: Vec<RemarkEntry>,
     /// Why the job failed; null otherwise.
     error: Option<ProblemBody>,

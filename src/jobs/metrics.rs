@@ -147,7 +147,7 @@ impl Metrics {
         match ending {
             Ending::Succeeded { .. } | Ending::Cached { .. } => self.ended(State::Succeeded, 1),
             Ending::Cancelled => self.ended(State::Cancelled, 1),
-            Ending::Failed(failure) => self.failed(failure.kind),
+            Ending::Failed { failure, .. } => self.failed(failure.kind),
         }
     }
 

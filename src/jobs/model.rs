@@ -249,7 +249,7 @@ pub struct Job {
     pub attempt: u32,
     /// 0 to 1, rough; written at most with each heartbeat.
     pub progress: f64,
-    /// What the client should know before using the numbers; filled on success.
+    /// What the client should know before using the numbers; filled when it succeeds or fails.
     pub remarks: Vec<RemarkEntry>,
     /// Why there is no answer; present exactly when the state is `failed`.
     pub failure: Option<Failure>,

@@ -204,6 +204,21 @@ async fn draining_service_is_not_ready_and_takes_no_jobs() {
     server.get("/healthz").await.is(200);
 }
 
+/// The check often names what makes a case unsolvable.
+#[tokio::test]
+async fn a_failed_job_has_the_remarks_of_its_check() {
+    let server = Server::start().await;
+    let mut case = example("wheel-rail.case.json");
+    case["contact"]["rail"] = case["contact"]["wheel"].clone();
+    case["outputs"] = json!(["resultants"]);
+    let checked = server.post("/v1/cases/check", &case).await.is(200).json;
+    let remark = &checked["remarks"][0];
+    assert_eq!(remark["code"], "profile-of-other-body", "{checked:#}");
+    let job = server.solve(&case).await;
+    assert_eq!(job["state"], "failed", "{job:#}");
+    assert_eq!(job["remarks"], json!([remark]));
+}
+
 #[tokio::test]
 async fn failed_job_is_answered_with_its_reason_in_time() {
     let setup = Setup::new().solving(|checked, _| match checked.label.name.as_deref() {

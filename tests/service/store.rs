@@ -310,5 +310,8 @@ pub fn success() -> Ending {
 }
 
 pub fn failure() -> Ending {
-    Ending::Failed(Failure::new(FailureKind::Panic, "boom"))
+    Ending::Failed {
+        failure: Failure::new(FailureKind::Panic, "boom"),
+        remarks: vec![remark()],
+    }
 }

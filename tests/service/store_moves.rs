@@ -15,7 +15,7 @@ use railhead::jobs::{Failure, FailureKind, State};
 use uuid::Uuid;
 
 use crate::model::{ATTEMPTS_MAX, BOUNDS, Model, Row};
-use crate::store::{Table, new_job, queue_of, request};
+use crate::store::{Table, failure, new_job, queue_of, request};
 use crate::store_back::Saved;
 
 pub const LEASE: i64 = 10;
@@ -252,10 +252,7 @@ impl Pair {
     pub async fn finish(&mut self, claim: &Claim, how: u8) {
         let (ending, blob) = match how {
             0 => (Ending::Cancelled, None),
-            1 => (
-                Ending::Failed(Failure::new(FailureKind::Panic, "boom")),
-                None,
-            ),
+            1 => (failure(), None),
             how => self.success(claim, how == 2),
         };
         let ends = [(claim.clone(), ending.clone())];

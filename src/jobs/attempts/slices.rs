@@ -141,6 +141,14 @@ impl SlicedWork {
         }
     }
 
+    /// The remarks of the check.
+    pub(crate) fn remarks(self) -> Vec<RemarkEntry> {
+        match self {
+            SlicedWork::Case(case) => case.checked.remarks,
+            SlicedWork::Evolution(_) => Vec::new(),
+        }
+    }
+
     /// Part that is done once the slice that was solved last is stored, 0 to 1.
     pub(crate) fn done_after_next(&self) -> f64 {
         match self {
@@ -252,8 +260,11 @@ pub(crate) enum Outcome {
         sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
     },
-    /// The solver gave up or was stopped.
-    Unsolved(SolveError),
+    /// The solver gave up or was stopped. The remarks are those of the check.
+    Unsolved {
+        error: SolveError,
+        remarks: Vec<RemarkEntry>,
+    },
     /// The case no longer passes its checks.
     Refused(CaseError),
     /// The fault is ours.
@@ -275,7 +286,10 @@ pub(crate) type Ended = Result<Outcome, Box<Outcome>>;
 
 impl From<SolveError> for Box<Outcome> {
     fn from(error: SolveError) -> Box<Outcome> {
-        Box::new(Outcome::Unsolved(error))
+        Box::new(Outcome::Unsolved {
+            error,
+            remarks: Vec::new(),
+        })
     }
 }
 

@@ -622,7 +622,12 @@ pub enum Ending {
         field_patches: u32,
     },
     /// There is no answer.
-    Failed(Failure),
+    Failed {
+        /// Why.
+        failure: Failure,
+        /// Remarks of the check, which may explain the failure.
+        remarks: Vec<RemarkEntry>,
+    },
     /// The client no longer wanted it.
     Cancelled,
     /// It gets the result of this succeeded job; the attempt does not count.
@@ -638,7 +643,7 @@ impl Ending {
     pub fn state(&self) -> State {
         match self {
             Ending::Succeeded { .. } | Ending::Cached { .. } => State::Succeeded,
-            Ending::Failed(_) => State::Failed,
+            Ending::Failed { .. } => State::Failed,
             Ending::Cancelled => State::Cancelled,
         }
     }

@@ -43,10 +43,11 @@ pub(crate) fn advance(
         return Ok(Outcome::Slice { sliced, part: None });
     };
     if evolution.spent >= shared.options.time_limit {
-        return Ok(Outcome::Unsolved(SolveError::OutOfTime {
+        let limit = SolveError::OutOfTime {
             limit_s: None,
             motions: None,
-        }));
+        };
+        return Err(limit.into());
     }
     let context = SolveContext {
         threads: shared.options.workers,

@@ -44,12 +44,21 @@ pub(crate) enum Disposition {
 
 /// What follows from an outcome and the reason for which the solver was stopped, if it was.
 pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Disposition {
-    let failed = |reason: String| {
+    let failed = |failure, remarks| Disposition::End(Ending::Failed { failure, remarks });
+    let internal = |reason: String| {
         tracing::error!(reason, "a job fails inside the service");
-        Disposition::End(Ending::Failed(Failure::new(
-            FailureKind::Internal,
-            INTERNAL,
-        )))
+        Failure::new(FailureKind::Internal, INTERNAL)
+    };
+    let stopped = |remarks| match reason {
+        Some(StopReason::Cancel) => Disposition::End(Ending::Cancelled),
+        Some(StopReason::Shutdown) => Disposition::Release,
+        Some(StopReason::TooLong) => Disposition::ReleaseAsLong,
+        Some(StopReason::Lost) => Disposition::Discard,
+        Some(StopReason::Deadline) => failed(too_late(), remarks),
+        None => {
+            let reason = "the solver stopped without a request";
+            failed(internal(reason.to_owned()), remarks)
+        }
     };
     match outcome {
         Outcome::Solved { .. } | Outcome::Slice { .. } if reason == Some(StopReason::Lost) => {
@@ -77,24 +86,24 @@ pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Di
             remarks,
             field_patches,
         },
-        Outcome::Unsolved(SolveError::Cancelled) | Outcome::Abandoned | Outcome::Slice { .. } => {
-            match reason {
-                Some(StopReason::Cancel) => Disposition::End(Ending::Cancelled),
-                Some(StopReason::Shutdown) => Disposition::Release,
-                Some(StopReason::TooLong) => Disposition::ReleaseAsLong,
-                Some(StopReason::Lost) => Disposition::Discard,
-                Some(StopReason::Deadline) => Disposition::End(Ending::Failed(too_late())),
-                None => failed("the solver stopped without a request".to_owned()),
-            }
+        Outcome::Unsolved {
+            error: SolveError::Cancelled,
+            remarks,
+        } => stopped(remarks),
+        Outcome::Slice { sliced, .. } => stopped(sliced.remarks()),
+        Outcome::Abandoned => stopped(Vec::new()),
+        Outcome::Unsolved { error, remarks } => {
+            let failure = Failure::of_solve(&error);
+            failed(
+                failure.unwrap_or_else(|| internal(error.to_string())),
+                remarks,
+            )
         }
-        Outcome::Unsolved(error) => match Failure::of_solve(&error) {
-            Some(failure) => Disposition::End(Ending::Failed(failure)),
-            None => failed(error.to_string()),
-        },
         Outcome::Refused(error) => {
-            failed(format!("the stored case is no longer accepted: {error}"))
+            let reason = format!("the stored case is no longer accepted: {error}");
+            failed(internal(reason), Vec::new())
         }
-        Outcome::Broken(failure) => Disposition::End(Ending::Failed(failure)),
+        Outcome::Broken(failure) => failed(failure, Vec::new()),
     }
 }
 
@@ -466,10 +475,11 @@ struct PendingWrites {
 /// The end of a job whose result could not be stored.
 fn not_stored(error: &JobsError) -> Ending {
     tracing::error!(%error, "result could not be stored");
-    Ending::Failed(Failure::new(
-        FailureKind::Internal,
-        "the result could not be stored; the log of the service says why",
-    ))
+    let detail = "the result could not be stored; the log of the service says why";
+    Ending::Failed {
+        failure: Failure::new(FailureKind::Internal, detail),
+        remarks: Vec::new(),
+    }
 }
 
 #[cfg(test)]
@@ -529,7 +539,10 @@ mod tests {
             part: None,
         };
         let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));
-        let stopped = || Outcome::Unsolved(SolveError::Cancelled);
+        let stopped = || Outcome::Unsolved {
+            error: SolveError::Cancelled,
+            remarks: Vec::new(),
+        };
         let late = || Outcome::Refused(CaseError(Vec::new()));
         for reason in reasons {
             // An answer counts even if it came while the solver was told to stop, unless the job is somebody else's.

@@ -82,7 +82,10 @@ fn solve_next(shared: &Shared, control: &AttemptControl, sliced: SlicedCase) -> 
     control.begin(sliced.spent);
     let solved = (shared.engine.solve)(&sliced.checked, slice, control);
     let spent = control.pause();
-    let (solution, fields) = solved?;
+    let (solution, fields) = solved.map_err(|error| Outcome::Unsolved {
+        error,
+        remarks: sliced.checked.remarks.clone(),
+    })?;
     if sliced.is_one() {
         return whole(shared, &sliced, spent, solution, &fields);
     }
@@ -106,7 +109,10 @@ fn join_parts(
     };
     match joined {
         Ok(Some((solution, fields))) => whole(shared, &sliced, sliced.spent, solution, &fields),
-        Ok(None) => Ok(Outcome::Unsolved(SolveError::Cancelled)),
+        Ok(None) => Ok(Outcome::Unsolved {
+            error: SolveError::Cancelled,
+            remarks: sliced.checked.remarks,
+        }),
         Err(error) => {
             tracing::error!(%error, "the slices of a sweep cannot be used; it is solved again");
             sliced.begin_again();

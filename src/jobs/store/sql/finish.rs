@@ -222,8 +222,9 @@ impl EndRow<'_> {
                 row.field_patches = *field_patches;
                 row.result = Some(result);
             }
-            Ending::Failed(failure) => {
+            Ending::Failed { failure, remarks } => {
                 row.state = State::Failed;
+                row.remarks = to_json(remarks)?;
                 row.failure = Some(to_json(failure)?);
             }
             // The latter is written elsewhere.
