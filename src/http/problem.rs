@@ -459,13 +459,14 @@ impl ApiError {
         )
     }
 
-    /// Malformed JSON with its position.
+    /// Malformed JSON, or JSON with a value of another kind than is needed, with its position.
     #[must_use]
     pub fn malformed(error: &serde_json::Error) -> Self {
-        let mut failure = ApiError::new(
-            ProblemKind::MalformedJson,
-            format!("the body is not JSON: {error}"),
-        );
+        let what = match error.is_data() {
+            true => "the body is JSON that cannot be used",
+            false => "the body is not JSON",
+        };
+        let mut failure = ApiError::new(ProblemKind::MalformedJson, format!("{what}: {error}"));
         failure.problem.line = Some(error.line());
         failure.problem.column = Some(error.column());
         failure

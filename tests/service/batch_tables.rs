@@ -2,9 +2,10 @@
 
 use serde_json::json;
 
-use crate::batches::{send, small};
+use crate::batches::{results, send, small};
 use crate::errors::assert_problem;
 use crate::server::Server;
+use crate::table_forms::send_rows;
 
 async fn template(server: &Server) -> String {
     format!("?template={}", server.keep(&small("template")).await)
@@ -84,5 +85,65 @@ async fn names_and_labels_have_no_control_characters() {
         *case.pointer_mut(pointer).expect("a member") = value;
         let answer = server.post("/v1/jobs", &case).await;
         assert_problem(&answer, 422, "faulty-case", "1 fault");
+    }
+}
+
+/// Numbers are read as in runs.
+#[tokio::test]
+async fn numbers_may_have_a_plus_sign() {
+    let server = Server::idle().await;
+    let query = template(&server).await;
+    let table = "normal_force_n,creepage_x,deadline_s,/solver/mesh/strips\n+100000,+.5e-3,+60,+6\n";
+    let batch = send(&server, &query, "text/csv", table.to_owned()).await;
+    let batch = batch.is(202);
+    let jobs = results(&server, &batch.json, "").await;
+    let case = server
+        .read(&format!(
+            "/v1/jobs/{}/case",
+            jobs[0]["id"].as_str().expect("an id")
+        ))
+        .await;
+    assert_eq!(case["load"]["normal_force_n"], 100_000);
+    assert_eq!(case["motion"]["creepage_x"], 0.5e-3);
+    let table = "normal_force_n,creepage_x\n+100000,+.5e-3\n";
+    let run = send_rows(&server, &query[10..], "text/csv", table).await;
+    assert_eq!(run.is(202).json["rows"], 1);
+}
+
+#[tokio::test]
+async fn a_table_that_is_not_utf8_says_so() {
+    let server = Server::idle().await;
+    let query = template(&server).await;
+    let utf16 = |text: &str, bytes: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        "\u{feff}"
+            .encode_utf16()
+            .chain(text.encode_utf16())
+            .flat_map(bytes)
+            .collect()
+    };
+    let table = "normal_force_n\n80000\n";
+    for (body, said) in [
+        (
+            utf16(table, u16::to_le_bytes),
+            "the table is UTF-16, not UTF-8",
+        ),
+        (
+            utf16(table, u16::to_be_bytes),
+            "the table is UTF-16, not UTF-8",
+        ),
+        (
+            b"name,speed_\xb5\nx,1\n".to_vec(),
+            "not UTF-8, as its line 1 shows",
+        ),
+        (
+            b"creepage_x,name\n0.001,\xb0\n".to_vec(),
+            "not UTF-8, as its line 2 shows",
+        ),
+    ] {
+        for kind in ["batches", "runs", "evaluate"] {
+            let path = format!("/v1/{kind}{query}");
+            let answer = server.post_as(&path, "text/csv", body.clone()).await;
+            assert_problem(&answer, 422, "faulty-table", said);
+        }
     }
 }

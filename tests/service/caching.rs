@@ -231,7 +231,7 @@ async fn every_member_of_a_packed_body_is_read_and_nothing_may_follow() {
             ];
             for body in damaged {
                 let answer = send(body).await;
-                assert_problem(&answer, 400, "unreadable-body", "cannot be unpacked");
+                assert_problem(&answer, 400, "unreadable-body", "cannot be decompressed");
             }
         }
     }

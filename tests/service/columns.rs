@@ -1,5 +1,6 @@
 //! Columns of tables that come in and go out: titles, units, bounds, texts, damage.
 
+use railhead::jobs::codec::parquet::encode;
 use railhead::jobs::codec::table::{COLUMNS_MAX, RowTable, TableColumn};
 use serde_json::{Value, json};
 
@@ -7,7 +8,7 @@ use crate::csv_table::Csv;
 use crate::errors::assert_problem;
 use crate::runs::answers;
 use crate::server::{Answer, Server};
-use crate::table_forms::{forms, kept_template, send_rows};
+use crate::table_forms::{PARQUET, forms, kept_template, send_rows};
 
 async fn rows_of(server: &Server, sent: &Answer) -> Vec<Value> {
     assert_eq!(sent.status, 202, "{}", sent.text);
@@ -175,4 +176,18 @@ async fn texts_of_rows_come_back_as_they_were_and_are_no_formulas_in_csv() {
     let quoted = "creepage_x,section\n0.001,\"a\nb\"\n";
     let refused = send_rows(&server, &template, "text/csv", quoted).await;
     assert_problem(&refused, 422, "faulty-case", "control characters");
+}
+
+#[tokio::test]
+async fn a_codec_that_is_not_read_is_named_with_those_that_are() {
+    let server = Server::idle().await;
+    let template = kept_template(&server).await;
+    let mut file = encode(&one_row(&["creepage_x".to_owned()])).expect("a file");
+    // The codec of a column is the field after its name, twice its number: 1 for SNAPPY, 6 for ZSTD.
+    let codec = b"creepage_x\x15\x02";
+    let place = file.windows(codec.len()).rposition(|bytes| bytes == codec);
+    file[place.expect("the codec") + codec.len() - 1] = 12;
+    let refused = send_rows(&server, &template, PARQUET, file).await;
+    let said = "the column `creepage_x` is compressed with ZSTD; allowed: UNCOMPRESSED, SNAPPY";
+    assert_problem(&refused, 422, "faulty-table", said);
 }

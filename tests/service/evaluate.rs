@@ -196,6 +196,19 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
         assert_problem(&answer, 422, "faulty-case", "");
         assert_eq!(pointers(&answer), [pointer], "{}", answer.text);
     }
+    for (values, said) in [
+        (json!([61000, null]), "row 1: invalid type: null"),
+        (json!([true]), "row 0: invalid type: boolean `true`"),
+        (json!(["a", 1]), "row 1: `1` is a number, row 0 has a text"),
+    ] {
+        let body =
+            json!({ "template": template("table"), "columns": { "normal_force_n": values } });
+        let answer = server.post("/v1/evaluate", &body).await;
+        let said = format!("the body is JSON that cannot be used: column `normal_force_n`, {said}");
+        assert_problem(&answer, 400, "malformed-json", &said);
+        let allowed = "expected a number, or a text if the whole column has texts";
+        assert!(answer.text.contains("row 0 has") || answer.text.contains(allowed));
+    }
     let text =
         json!({ "template": template("table"), "columns": { "/motion/creepage_x": [0, "a"] } });
     let answer = server.post("/v1/evaluate", &text).await;

@@ -9,6 +9,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use crate::crowds::{read_answer, send};
 use crate::errors::assert_problem;
 use crate::server::{Server, example, example_text};
+use crate::table_forms::kept_template;
 
 #[tokio::test]
 async fn malformed_json_is_answered_with_its_position() {
@@ -58,6 +59,69 @@ async fn body_must_be_declared_as_json() {
             .body(case.clone())
     };
     server.send(Method::POST, "/v1/jobs", charset).await.is(202);
+    for (path, kind) in [
+        ("/v1/jobs", "application/json"),
+        ("/v1/cases/check", "application/json"),
+        ("/v1/profiles", "application/json"),
+        ("/v1/batches", "application/x-ndjson"),
+        ("/v1/runs", "application/json"),
+        ("/v1/evaluate", "text/csv"),
+    ] {
+        for charset in ["latin1", "\"UTF-16\""] {
+            let kind = format!("{kind}; Charset={charset}");
+            let answer = server.post_as(path, &kind, case.clone()).await;
+            let word = format!("the charset is `{}`", charset.trim_matches('"'));
+            assert_problem(&answer, 415, "unsupported-media-type", &word);
+        }
+    }
+    let quoted = "application/json; profile=x; charset=\"Utf-8\"";
+    server.post_as("/v1/jobs", quoted, case).await.is(202);
+}
+
+#[tokio::test]
+async fn a_byte_order_mark_is_skipped_before_lines_and_named_before_json() {
+    let server = Server::idle().await;
+    let case = example("spin.case.json");
+    let id = kept_template(&server).await;
+    for (path, line) in [
+        ("/v1/batches".to_owned(), case.to_string()),
+        (
+            format!("/v1/batches?template={id}"),
+            "{\"creepage_x\":0.001}".to_owned(),
+        ),
+        (
+            format!("/v1/runs?template={id}"),
+            "{\"creepage_x\":0.001}".to_owned(),
+        ),
+    ] {
+        let lines = format!("\u{feff}{line}\n{line}\n");
+        let sent = server
+            .post_as(&path, "application/x-ndjson", lines)
+            .await
+            .is(202);
+        let count = if path.starts_with("/v1/runs") {
+            "rows"
+        } else {
+            "count"
+        };
+        assert_eq!(sent.json[count], 2, "{}", sent.text);
+    }
+    let rows = format!("{{\"template\":{case},\"columns\":{{\"creepage_x\":[0.001]}}}}");
+    for (path, body) in [
+        ("/v1/jobs", case.to_string()),
+        ("/v1/batches", format!("[{case}]")),
+        ("/v1/runs", rows.clone()),
+        ("/v1/evaluate", rows),
+    ] {
+        let body = format!("\u{feff}{body}");
+        let answer = server.post_as(path, "application/json", body).await;
+        assert_problem(
+            &answer,
+            400,
+            "malformed-json",
+            "begins with a byte order mark",
+        );
+    }
 }
 
 /// Writes raw bytes to the service and reads the whole answer.

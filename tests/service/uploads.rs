@@ -112,6 +112,22 @@ async fn parts_that_are_missing_or_wrong_are_named() {
             assert_problem(&answer, 422, "faulty-table", said);
         }
     }
+    for path in ["/v1/runs", "/v1/batches", "/v1/evaluate"] {
+        for (name, text) in [
+            ("table", table.1),
+            ("template", &case),
+            ("on_invalid", "skip"),
+        ] {
+            let more = format!("name=\"{name}\"");
+            let answer = upload(&server, path, &[template, table, (&more, text)]).await;
+            let said = format!("the part `{name}` after the table; allowed are");
+            assert_problem(&answer, 422, "faulty-table", &said);
+        }
+    }
+    for kind in ["runs", "batches"] {
+        let kept = server.get(&format!("/v1/{kind}")).await.is(200);
+        assert_eq!(kept.json[kind], json!([]));
+    }
     let broken = upload(&server, "/v1/runs", &[("name=\"template\"", "{"), table]).await;
     assert_problem(&broken, 400, "malformed-json", "");
     let job = uuid::Uuid::nil();

@@ -15,7 +15,9 @@ use serde_json::{Deserializer, Value};
 
 use crate::contact::error::Fault;
 use crate::contact::evaluate::varied::{Values, members};
-use crate::http::extract::json::{essence, read_strict, weigh_case};
+use crate::http::extract::json::{
+    essence, not_json, read_strict, unlike_json, weigh_case, without_mark,
+};
 use crate::http::extract::query::DEADLINE_MAX_SECONDS;
 use crate::http::extract::rows::{Table, read_spooled};
 use crate::http::extract::tables::{Chunk, CsvRows, TableForm, TableRows, TableSource, Title};
@@ -46,8 +48,9 @@ pub fn read_lines(mut source: impl BufRead, most: usize, add: Add<'_>) -> Result
         }
         text.pop_if(|byte| *byte == b'\n');
         require_fitting(format_args!("line {line}"), text.len(), most)?;
+        let text = without_mark(&text, line);
         if !text.iter().all(u8::is_ascii_whitespace) {
-            add(Some(line), &text)?;
+            add(Some(line), text)?;
         }
     }
     Ok(())
@@ -63,7 +66,14 @@ pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()>
         source,
         left: &left,
     };
-    let mut json = Deserializer::from_reader(BufReader::new(source));
+    let mut source = BufReader::new(source);
+    let begin = source
+        .fill_buf()
+        .map_err(|error| ApiError::internal(&error))?;
+    // Where blanks come first, only the beginning of the text is known here.
+    let blank = begin.first().is_some_and(u8::is_ascii_whitespace);
+    let unlike = unlike_json(begin).filter(|_| !blank);
+    let mut json = Deserializer::from_reader(source);
     let mut elements = Elements {
         most,
         left: &left,
@@ -80,7 +90,7 @@ pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()>
         (Err(error), None) => Err(match error.classify() {
             Category::Data => no_array(),
             Category::Io => ApiError::internal(&error),
-            Category::Syntax | Category::Eof => ApiError::malformed(&error),
+            Category::Syntax | Category::Eof => not_json(unlike, &error),
         }),
     }
 }
@@ -363,15 +373,13 @@ pub fn row_of(columns: &[TemplateColumn], decimal_comma: bool, record: &csv::Str
 
 /// A number in the unit of the case, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.
 fn read_value(field: &str, factor: f64, decimal_comma: bool) -> Value {
-    let value = match serde_json::from_str(field) {
-        Ok(value @ (Value::Number(_) | Value::Bool(_) | Value::Null)) => value,
-        _ => {
-            let number = number(field, decimal_comma).filter(|number| number.is_finite());
-            match number.filter(|_| decimal_comma) {
-                Some(number) => Value::from(number),
-                None => Value::from(field),
-            }
-        }
+    let number = number(field, decimal_comma).filter(|number| number.is_finite());
+    // JSON numbers have no plus sign. Whole numbers stay whole.
+    let text = number.map_or(field, |_| field.trim_start_matches('+'));
+    let value = match (serde_json::from_str(text), number) {
+        (Ok(value @ (Value::Number(_) | Value::Bool(_) | Value::Null)), _) => value,
+        (_, Some(number)) => Value::from(number),
+        _ => Value::from(field),
     };
     match value.as_f64() {
         Some(number) if factor != 1.0 => Value::from(converted(number, factor)),

@@ -117,13 +117,24 @@ pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize> {
 /// # Errors
 /// `malformed-json` with its position.
 pub fn read_json(text: &[u8]) -> Result<Value> {
-    read_strict(text).map_err(|error| {
-        let refusal = ApiError::malformed(&error);
-        match unlike_json(text) {
-            Some(reason) => refusal.saying(format!("the body is not JSON: {reason}")),
-            None => refusal,
-        }
-    })
+    read_strict(text).map_err(|error| not_json(unlike_json(text), &error))
+}
+
+/// The refusal of a body that is not JSON, with what is wrong with its beginning, if anything is.
+#[must_use]
+pub fn not_json(unlike: Option<&str>, error: &serde_json::Error) -> ApiError {
+    let refusal = ApiError::malformed(error);
+    match unlike {
+        Some(reason) => refusal.saying(format!("the body is not JSON: {reason}")),
+        None => refusal,
+    }
+}
+
+/// The text of a line without the byte order mark that the first one may begin with.
+#[must_use]
+pub fn without_mark(text: &[u8], line: u64) -> &[u8] {
+    let rest = text.strip_prefix(b"\xef\xbb\xbf").filter(|_| line == 1);
+    rest.unwrap_or(text)
 }
 
 /// What is wrong with a text that does not even begin like JSON.
@@ -154,7 +165,31 @@ pub fn essence(headers: &HeaderMap) -> String {
     essence.trim().to_ascii_lowercase()
 }
 
+/// Refuses a content type that names another charset than UTF-8.
+///
+/// # Errors
+/// `unsupported-media-type`
+pub fn require_utf8(headers: &HeaderMap) -> Result<()> {
+    let given = headers.get(header::CONTENT_TYPE);
+    let text = given.map_or("", |value| value.to_str().unwrap_or("?"));
+    for parameter in text.split(';').skip(1) {
+        let (name, value) = parameter.split_once('=').unwrap_or_default();
+        let value = value.trim().trim_matches('"');
+        let known = ["utf-8", "utf8"].map(|known| value.eq_ignore_ascii_case(known));
+        if name.trim().eq_ignore_ascii_case("charset") && !known.contains(&true) {
+            return Err(ApiError::new(
+                ProblemKind::UnsupportedMediaType,
+                format!(
+                    "the charset is `{value}`; send UTF-8, with `charset=utf-8` or without a charset"
+                ),
+            ));
+        }
+    }
+    Ok(())
+}
+
 fn require_json(headers: &HeaderMap) -> Result<()> {
+    require_utf8(headers)?;
     let given = headers
         .get(header::CONTENT_TYPE)
         .map(|value| value.to_str().unwrap_or("?"));
@@ -431,11 +466,22 @@ impl BodyReader {
     }
 }
 
-/// A body that broke off or could not be unpacked.
+/// A part of `multipart/form-data` after the last one that is allowed.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the body has the part `{0}` after the table; allowed are one part `template` (the case, JSON) and one part `table`, in this order; \
+         options are parameters of the query"
+)]
+pub struct UnexpectedPart(pub String);
+
+/// A body that broke off, could not be unpacked, or has a part that is not allowed.
 pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
     let mut deepest = error;
     while let Some(next) = deepest.source() {
         deepest = next;
+    }
+    if deepest.is::<UnexpectedPart>() {
+        return ApiError::new(ProblemKind::FaultyTable, deepest.to_string());
     }
     ApiError::new(
         ProblemKind::UnreadableBody,

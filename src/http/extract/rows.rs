@@ -5,9 +5,11 @@ use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::time::Duration;
 
+use axum::BoxError;
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, header};
+use futures_util::stream;
 use multer::{Field, Multipart};
 use serde::Deserialize;
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
@@ -19,7 +21,10 @@ use uuid::Uuid;
 
 use crate::contact::case::words::solver::Case;
 use crate::contact::evaluate::varied::Values;
-use crate::http::extract::json::{BodyReader, Strict, essence, read_json, unreadable, weigh_case};
+use crate::http::extract::json::{
+    BodyReader, Strict, UnexpectedPart, essence, not_json, read_json, require_utf8, unlike_json,
+    unreadable, weigh_case,
+};
 use crate::http::extract::tables::{TableForm, TableRows, TableSource, unsupported};
 use crate::http::extract::titles::{NamedColumns, faulty, require_few};
 use crate::http::limits::{Memory, Pace, Permit};
@@ -72,7 +77,7 @@ pub fn read_json_columns(
     named: &NamedColumns,
 ) -> Result<(Value, Vec<RunColumn>, Vec<Values>)> {
     let read: RowsBody =
-        serde_json::from_slice(text).map_err(|error| ApiError::malformed(&error))?;
+        serde_json::from_slice(text).map_err(|error| not_json(unlike_json(text), &error))?;
     require_few(read.columns.count)?;
     let columns = read.columns.columns;
     let titles = columns.iter();
@@ -132,7 +137,7 @@ impl<'de> Visitor<'de> for RowColumnsVisitor {
     }
 }
 
-/// Reads the values of a column: numbers, or texts if the first is one.
+/// Reads the values of a column: numbers, or texts if the first one is a text.
 struct RowValues<'a>(&'a str);
 
 impl<'de> DeserializeSeed<'de> for RowValues<'_> {
@@ -151,45 +156,68 @@ impl<'de> Visitor<'de> for RowValues<'_> {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Values, A::Error> {
-        let first = items.next_element::<First>();
-        match first.map_err(|error| self.at(0, &error))? {
-            None => Ok(Values::Numbers(Vec::new())),
-            Some(First::Number(first)) => self.rest(items, first).map(Values::Numbers),
-            Some(First::Text(first)) => {
-                let texts = self.rest::<_, String>(items, first)?;
-                Ok(Values::Texts(texts.into_iter().map(Some).collect()))
-            }
-        }
-    }
-}
-
-impl RowValues<'_> {
-    fn rest<'de, A: SeqAccess<'de>, T: Deserialize<'de>>(
-        &self,
-        mut items: A,
-        first: T,
-    ) -> Result<Vec<T>, A::Error> {
-        let mut values = vec![first];
+        let (mut numbers, mut texts) = (Vec::new(), Vec::new());
         loop {
-            match items.next_element::<T>() {
-                Ok(Some(value)) => values.push(value),
-                Ok(None) => return Ok(values),
-                Err(error) => return Err(self.at(values.len(), &error)),
+            let row = numbers.len() + texts.len();
+            let at = |reason: &dyn fmt::Display| {
+                A::Error::custom(format_args!("column `{}`, row {row}: {reason}", self.0))
+            };
+            match items.next_element().map_err(|error| at(&error))? {
+                Some(RowValue::Number(number)) if texts.is_empty() => numbers.push(number),
+                Some(RowValue::Text(text)) if numbers.is_empty() => texts.push(Some(text)),
+                Some(RowValue::Number(number)) => {
+                    return Err(at(&format_args!(
+                        "`{number}` is a number, row 0 has a text"
+                    )));
+                }
+                Some(RowValue::Text(text)) => {
+                    return Err(at(&format_args!("{text:?} is a text, row 0 has a number")));
+                }
+                None if texts.is_empty() => return Ok(Values::Numbers(numbers)),
+                None => return Ok(Values::Texts(texts)),
             }
         }
     }
-
-    fn at<E: Error>(&self, row: usize, error: &E) -> E {
-        E::custom(format_args!("column `{}`, row {row}: {error}", self.0))
-    }
 }
 
-/// The first value of a column, which decides what it holds.
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a number or a text")]
-enum First {
+/// A value of a column.
+enum RowValue {
     Number(f64),
     Text(String),
+}
+
+impl<'de> Deserialize<'de> for RowValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(RowValueVisitor)
+    }
+}
+
+struct RowValueVisitor;
+
+impl Visitor<'_> for RowValueVisitor {
+    type Value = RowValue;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str("a number, or a text if the whole column has texts")
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<RowValue, E> {
+        Ok(RowValue::Number(value))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+    fn visit_i64<E>(self, value: i64) -> Result<RowValue, E> {
+        Ok(RowValue::Number(value as f64))
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+    fn visit_u64<E>(self, value: u64) -> Result<RowValue, E> {
+        Ok(RowValue::Number(value as f64))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<RowValue, E> {
+        Ok(RowValue::Text(value.to_owned()))
+    }
 }
 
 /// What JSON is in a request with rows; NDJSON is a table.
@@ -233,6 +261,7 @@ pub async fn separate_table(
         true => separate_parts(jobs, memory, options, request).await?,
         false => (request, None),
     };
+    require_utf8(request.headers())?;
     let alone = part.is_none() && job.is_none();
     let essence = essence(request.headers());
     let form = match TableForm::of(&essence) {
@@ -292,6 +321,7 @@ async fn separate_parts(
     head.headers.remove(header::CONTENT_LENGTH);
     let mut parts = Multipart::new(body.into_data_stream(), boundary);
     let template = next_part(&mut parts, options, TEMPLATE).await?;
+    require_utf8(template.headers())?;
     let mut reader = BodyReader::new(
         options.body_timeout,
         options.body_max_bytes as u64,
@@ -310,8 +340,27 @@ async fn separate_parts(
     let table = next_part(&mut parts, options, TABLE).await?;
     head.headers
         .insert(header::CONTENT_TYPE, content_type_of(&table));
+    let table = stream::try_unfold((parts, Some(table)), last_part);
     let request = Request::from_parts(head, Body::from_stream(table));
     Ok((request, Some(template)))
+}
+
+/// The parts that are still to come, and the last one that is allowed.
+type LastPart = (Multipart<'static>, Option<Field<'static>>);
+
+/// The next piece of the last part. At its end no other part may follow.
+async fn last_part((mut parts, mut part): LastPart) -> Result<Option<(Bytes, LastPart)>, BoxError> {
+    if let Some(field) = &mut part
+        && let Some(piece) = field.chunk().await?
+    {
+        return Ok(Some((piece, (parts, part))));
+    }
+    // The next part can be read once this one is gone.
+    drop(part);
+    match parts.next_field().await? {
+        Some(other) => Err(UnexpectedPart(other.name().unwrap_or_default().to_owned()).into()),
+        None => Ok(None),
+    }
 }
 
 /// The next part, which must have this name.

@@ -5,7 +5,7 @@
 use std::io::Write;
 use std::sync::Arc;
 
-use parquet::basic::{Compression, ConvertedType, Repetition, Type as Physical};
+use parquet::basic::{Compression, CompressionCodec, ConvertedType, Repetition, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{
     ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type,
@@ -25,6 +25,9 @@ const GROUP_ROWS_MAX: usize = 1 << 21;
 const GROUP_VALUES_MAX: usize = 1 << 24;
 /// Bytes of the texts of one column of a group at most.
 const TEXT_BYTES_MAX: usize = 1 << 27;
+
+/// The codecs of columns that are read.
+const CODECS: [CompressionCodec; 2] = [CompressionCodec::UNCOMPRESSED, CompressionCodec::SNAPPY];
 
 /// The bytes that a file begins and ends with.
 pub const MAGIC: &[u8] = b"PAR1";
@@ -201,6 +204,14 @@ impl<R: ChunkReader + 'static> TableReader<R> {
         for (place, name) in names.into_iter().enumerate() {
             if !wanted(&name) {
                 continue;
+            }
+            let codec = group.metadata().column(place).compression_codec();
+            if !CODECS.contains(&codec) {
+                let [none, snappy] = CODECS;
+                let detail = format!(
+                    "the column `{name}` is compressed with {codec}; allowed: {none}, {snappy}"
+                );
+                return Err(ParquetError::General(detail));
             }
             let column = match group.get_column_reader(place)? {
                 ColumnReader::Int64ColumnReader(reader) => integers(reader, rows)?,

@@ -5,6 +5,7 @@ use std::io::{self, BufRead, Chain, Cursor, Read};
 use serde_json::{Map, Value};
 
 use crate::contact::evaluate::varied::Values;
+use crate::http::extract::json::without_mark;
 use crate::http::extract::tables::{Chunk, Title};
 use crate::http::extract::titles::{
     delimiter, faulty, is_line_of_units, is_text, number, require_few,
@@ -60,6 +61,9 @@ impl<R: BufRead> CsvRows<R> {
         let read = (&mut source).take(LINE_BYTES_MAX);
         let read = { read }.read_until(b'\n', &mut first);
         read.map_err(|error| ApiError::internal(&error))?;
+        if first.starts_with(b"\xff\xfe") || first.starts_with(b"\xfe\xff") {
+            return Err(faulty("the table is UTF-16, not UTF-8; send it as UTF-8"));
+        }
         let delimiter = delimiter(&first);
         // With this end of line the reader counts lines exactly; other files end their lines with `\r` alone.
         let terminator = match first.ends_with(b"\r\n") || !first.contains(&b'\r') {
@@ -78,7 +82,7 @@ impl<R: BufRead> CsvRows<R> {
                 source: Cursor::new(first).chain(source).chain(&b"\n"[..]),
             });
         let titles = reader.headers();
-        let titles = titles.map_err(|error| faulty(format!("line 1: {error}")))?;
+        let titles = titles.map_err(|error| unread(&error))?;
         require_few(titles.len())?;
         let titles: Vec<String> = titles
             .iter()
@@ -171,7 +175,7 @@ impl<R: BufRead> CsvRows<R> {
             let source = self.reader.get_mut();
             source.left = source.max;
             let more = self.reader.read_record(record);
-            if !more.map_err(|error| faulty(format!("the table cannot be read: {error}")))? {
+            if !more.map_err(|error| unread(&error))? {
                 self.record = None;
             } else if record.len() > 1 || record.get(0) != Some("") {
                 break;
@@ -186,6 +190,17 @@ impl<R: BufRead> CsvRows<R> {
         let after = self.reader.position().line();
         after.saturating_sub(1 + inside.count() as u64)
     }
+}
+
+/// The refusal of a CSV table that cannot be read.
+fn unread(error: &csv::Error) -> ApiError {
+    faulty(match error.kind() {
+        csv::ErrorKind::Utf8 { pos, .. } => {
+            let line = pos.as_ref().map_or(1, csv::Position::line);
+            format!("the table is not UTF-8, as its line {line} shows; send it as UTF-8")
+        }
+        _ => format!("the table cannot be read: {error}"),
+    })
 }
 
 /// Rows as JSON objects, one in a line.
@@ -268,10 +283,11 @@ impl<R: BufRead> JsonRows<R> {
                 self.row = None;
                 return Ok(());
             }
+            let text = without_mark(&text, self.line);
             if text.iter().all(u8::is_ascii_whitespace) {
                 continue;
             }
-            let row = serde_json::from_slice(&text);
+            let row = serde_json::from_slice(text);
             self.row = Some(row.map_err(|error| self.wrong(&error.to_string()))?);
             return Ok(());
         }
