@@ -76,7 +76,7 @@ impl JobTrace {
         let outcome = solve();
         let fault = match &outcome {
             Outcome::Solved { .. } | Outcome::Slice { .. } => None,
-            Outcome::Unsolved(error) => Some(error.to_string()),
+            Outcome::Unsolved { error, .. } => Some(error.to_string()),
             Outcome::Refused(error) => Some(error.to_string()),
             Outcome::Broken(failure) => Some(failure.detail.clone()),
             Outcome::Abandoned => Some("the solver did not stop".to_owned()),

@@ -78,7 +78,7 @@ fn sound_profiles_carry_their_quality_and_no_blame() {
 #[test]
 fn planes_do_not_answer_for_points_that_are_refused() {
     let sound = rail_60e1();
-    let touched = solved(&on_rail(&sound)).patches[0].position.clone();
+    let touched = solved(&on_rail(&sound)).patches[0].position;
     let y = touched.expect("a place").rail_mm[0];
     let near = |at: &[f64; 2]| (at[0] - y).abs();
     let nearest = (0..sound.len()).min_by(|a, b| near(&sound[*a]).total_cmp(&near(&sound[*b])));

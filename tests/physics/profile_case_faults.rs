@@ -182,7 +182,7 @@ fn a_cross_section_is_points_or_the_text_of_a_file() {
     assert_fault(
         &rail(json!({ "format": "simpack", "text": wheel_file })),
         "/contact/rail/text",
-        &["is of a wheel", "that of a rail"],
+        &["is of a wheel", "a file of a rail"],
     );
 }
 

@@ -193,7 +193,7 @@ impl GridOperator {
             own.iter().any(|p| *p != 0.0)
         });
         for (wave, factor) in workspace.columns.iter_mut().zip(&self.factors) {
-            *wave = *wave * *factor;
+            *wave *= *factor;
         }
         workspace.backward(&self.plans, self.ny, |j, row| {
             for (u, value) in displacement[j * nx..(j + 1) * nx].iter_mut().zip(row) {
