@@ -137,6 +137,8 @@ export function setUp(more = []) {
       await test(page);
       assert.deepEqual(complaints, []);
       if (!look) {
+        // The page stores its case when it is left.
+        await page.goto(`${service.base}/healthz`);
         await page.evaluate(() => [localStorage, sessionStorage].forEach((storage) => storage.clear()));
         await page.goto('about:blank');
         held.page = page;
