@@ -192,8 +192,8 @@ async fn clients_that_read_nothing_cost_little_memory() {
         "{line:.300}"
     );
     let job = format!("/v1/jobs/{}", line["id"].as_str().expect("an id"));
-    // A stored text is read as it is taken. What is cut out of it is held as numbers and counted; the allocator keeps
-    // some of what was freed.
+    // A stored text is streamed to its client. Parts of it are held as numbers, which count against the limit of memory.
+    // The allocator keeps some of what was freed.
     let (streamed, counted) = (CLIENTS << 20, (64 + 64) << 20);
     for (path, allowed) in [
         (results, counted),

@@ -61,7 +61,7 @@ impl Elastic {
 #[serde(untagged)]
 #[schema(as = Thermal)]
 pub enum ThermalWords {
-    /// The same constants for both bodies.
+    /// One set of constants for both bodies.
     Same(ThermalBodyWords),
     /// One set for each body.
     Pair {

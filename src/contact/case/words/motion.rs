@@ -262,7 +262,7 @@ impl History {
 #[serde(untagged)]
 #[schema(as = Course)]
 pub enum HistoryCourse {
-    /// The same value at every point.
+    /// One value for all points.
     Constant(f64),
     /// Equally spaced values.
     Range(Range),

@@ -24,7 +24,7 @@ const COARSER: f64 = 0.6;
 /// Meshes with fewer strips, or fewer cells in one, that a client gives may agree by chance.
 const SIDE_GOOD: u32 = 8;
 /// Least relative error on them, over the sum of the inverse squares of both numbers: errors of an ellipse 6 mm × 5 mm on 3 × 3 to 8 × 8 cells, 10 creepages
-/// each. It also covers 3 to 7 strips of 40 cells and the reverse.
+/// each. On other ellipses it also covers 3 to 5 strips of 40 cells, 24 strips of 3 and 40 strips of 4.
 const ERROR_FEW: f64 = 0.3;
 /// Meshes with fewer have no coarser one along that axis to be compared with. Their least relative error is 1 over the square of that number.
 const SIDE_FEW: u32 = 3;
