@@ -7,16 +7,18 @@ WORKDIR /src
 # The dependencies are a layer of their own, compiled for an empty program: a change in src does not build them again.
 COPY Cargo.toml Cargo.lock ./
 COPY src/contact/Cargo.toml src/contact/
+COPY src/jobs/Cargo.toml src/jobs/
+COPY src/http/Cargo.toml src/http/
 COPY src/macros src/macros
 COPY benches/Cargo.toml benches/
 RUN echo 'fn main() {}' > src/main.rs \
-    && touch src/lib.rs src/contact/lib.rs \
+    && touch src/lib.rs src/contact/lib.rs src/jobs/lib.rs src/http/lib.rs \
     && cargo build --profile image --features cluster,otlp,gs,az --locked --bin railhead
 COPY api ./api
 COPY src ./src
 # Copied files keep their dates, which may be older than the empty program's: cargo must see that they are new.
 # The profile of the image is slower to build and makes a smaller program.
-RUN touch src/main.rs src/lib.rs src/contact/lib.rs \
+RUN touch src/main.rs src/lib.rs src/*/lib.rs \
     && cargo build --profile image --features cluster,otlp,gs,az --locked --bin railhead \
     && install -d /out/data \
     && install target/image/railhead /out

@@ -3,11 +3,9 @@
 use std::time::Instant;
 
 use convergence_domain::{count, motions};
-use railhead::contact::mesh::Grading;
-use railhead::contact::rolling::slip_rules::Rule;
+use railhead_contact::mesh::Grading;
+use railhead_contact::rolling::slip_rules::Rule;
 use regions::REGIONS;
-
-extern crate railhead_contact as railhead;
 
 #[allow(
     dead_code,

@@ -6,12 +6,10 @@
 use std::hint::black_box;
 
 use machine::{lu_seconds, median, quantile, seconds_of};
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::{check, normal_stage, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::{check, normal_stage, solve};
 use serde_json::{Value, json};
-
-extern crate railhead_contact as railhead;
 
 mod machine;
 

@@ -3,15 +3,13 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use railhead::contact::case::solver::Limits;
-use railhead::contact::half_space::strip_operator::kind::Precision;
-use railhead::contact::half_space::strip_operator::operator::{OperatorScratch, StripOperator};
-use railhead::contact::mesh::{Chord, Grading, Mesh, equal_strips};
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::half_space::strip_operator::kind::Precision;
+use railhead_contact::half_space::strip_operator::operator::{OperatorScratch, StripOperator};
+use railhead_contact::mesh::{Chord, Grading, Mesh, equal_strips};
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::{check, solve};
 use serde_json::json;
-
-extern crate railhead_contact as railhead;
 
 const MESHES: [(usize, usize); 3] = [(12, 6), (24, 12), (32, 16)];
 

@@ -1,8 +1,8 @@
 //! Draws the forces of a wheel on its rail over the lateral shift of the wheelset, and says how smooth they are.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::drawing::{Curve, Frame, Picture};

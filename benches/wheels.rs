@@ -9,15 +9,13 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use machine::{lu_seconds, median, quantile, seconds_of};
-use railhead::contact::case::solver::{KnownPair, Limits};
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::{check, check_with, solve, solve_with};
+use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::{check, check_with, solve, solve_with};
 use serde_json::{Value, json};
 use wheel_shift::{Shifted, draw};
 use worn_pair::worn_pair;
-
-extern crate railhead_contact as railhead;
 
 #[path = "figures/drawing.rs"]
 #[allow(dead_code, reason = "other pictures use the rest")]

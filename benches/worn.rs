@@ -6,14 +6,12 @@
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 use worn_pair::worn_pair;
-
-extern crate railhead_contact as railhead;
 
 mod worn_pair;
 

@@ -39,12 +39,16 @@ pub fn dropped_lines() -> u64 {
 /// Starts logging. A separate thread writes the lines, so that a slow reader of the log holds up nothing; it writes as long as the
 /// returned guard is held. Panics are logged as events instead of being printed between the lines.
 ///
-/// `filter` is a list such as `info,railhead::jobs=debug`.
+/// `filter` is a list such as `info,railhead_jobs=debug`. Names of earlier releases, such as `railhead::jobs`, mean the same.
 ///
 /// # Errors
 /// The filter cannot be read, or logging was started before.
 pub fn start(format: LogFormat, filter: &str) -> anyhow::Result<WorkerGuard> {
-    let mut targets: Targets = filter.parse().context("--log")?;
+    let renamed = ["contact", "jobs", "http"].iter();
+    let renamed = renamed.fold(filter.to_owned(), |filter, name| {
+        filter.replace(&format!("railhead::{name}"), &format!("railhead_{name}"))
+    });
+    let mut targets: Targets = renamed.parse().context("--log")?;
     // The renderer of pictures warns when a client's text has characters that the font lacks; operators need not know.
     if !filter.contains("usvg") {
         targets = targets.with_target("usvg", LevelFilter::ERROR);

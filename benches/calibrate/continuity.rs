@@ -1,8 +1,8 @@
 //! How much does the estimate jump along a sweep?
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 
 const POINTS: u32 = 81;

@@ -2,19 +2,19 @@
 
 use std::sync::Arc;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal::footprint::{Footprint, NormalTask};
-use railhead::contact::normal::hertz::Patch;
-use railhead::contact::normal_stage;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::answer::Resultants;
-use railhead::contact::rolling::refinement::interpolate::RefinementState;
-use railhead::contact::rolling::refinement::mesh_family::MeshFamily;
-use railhead::contact::rolling::refinement::on_mesh::{MotionTask, solve_on_mesh};
-use railhead::contact::rolling::task::Resolution;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::normal::footprint::{Footprint, NormalTask};
+use railhead_contact::normal::hertz::Patch;
+use railhead_contact::normal_stage;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::answer::Resultants;
+use railhead_contact::rolling::refinement::interpolate::RefinementState;
+use railhead_contact::rolling::refinement::mesh_family::MeshFamily;
+use railhead_contact::rolling::refinement::on_mesh::{MotionTask, solve_on_mesh};
+use railhead_contact::rolling::task::Resolution;
 use serde_json::{Value, json};
 
 use crate::patches::{self, PatchAnswer};

@@ -1,8 +1,8 @@
 //! How far an answer is from the truth.
 
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::answer::Resultants;
-use railhead::contact::solution::words::answer::{Fields, Solution};
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::answer::Resultants;
+use railhead_contact::solution::words::answer::{Fields, Solution};
 
 use crate::patches::{self, PatchAnswer, left_open};
 use crate::population::Class;

@@ -8,14 +8,12 @@
 use cpu_time::ThreadTime;
 use judge::judged;
 use population::{Class, case, on_planes};
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::json;
 use truth::{Judged, Truths};
-
-extern crate railhead_contact as railhead;
 
 mod continuity;
 mod finer;

@@ -1,10 +1,10 @@
 //! Wheels on rails: each patch has its own frame, its own estimate, and a moment about its own load centre.
 
-use railhead::contact::geometry::reference_curve::ReferenceCurve;
-use railhead::contact::normal::footprint::NormalTask;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::answer::Resultants;
-use railhead::contact::solution::words::answer::{Fields, PatchSolution, Solution};
+use railhead_contact::geometry::reference_curve::ReferenceCurve;
+use railhead_contact::normal::footprint::NormalTask;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::answer::Resultants;
+use railhead_contact::solution::words::answer::{Fields, PatchSolution, Solution};
 
 use crate::truth::{Judged, TrueResultants, Truth};
 

@@ -4,10 +4,10 @@
 use std::f64::consts::TAU;
 
 use cpu_time::ThreadTime;
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::population::{Class, case};
@@ -127,7 +127,7 @@ fn relative(question: &Value, solution: &Solution, k: usize) -> Option<([f64; 3]
         length: (a * b).sqrt(),
         limit,
     };
-    let sum = railhead::contact::rolling::answer::Resultants {
+    let sum = railhead_contact::rolling::answer::Resultants {
         force_x: total.force_x_n,
         force_y: total.force_y_n,
         moment_z: total.moment_z_n_mm,

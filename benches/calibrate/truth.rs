@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use railhead::contact::rolling::answer::Resultants;
+use railhead_contact::rolling::answer::Resultants;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 

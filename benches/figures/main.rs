@@ -6,15 +6,13 @@
 use std::path::{Path, PathBuf};
 
 use drawing::{Curve, Frame, Picture};
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::task::Motion;
-use railhead::contact::solution::words::answer::{Fields, Solution};
-use railhead::contact::{self, check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::task::Motion;
+use railhead_contact::solution::words::answer::{Fields, Solution};
+use railhead_contact::{self, check, solve};
 use serde_json::{Value, json};
 use shape::sheet::Sheet;
-
-extern crate railhead_contact as railhead;
 
 mod drawing;
 #[path = "../../src/http/render/shape/mod.rs"]

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::hint::black_box;
 
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal_stage;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::normal_stage;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::machine::{lu_seconds, median, quantile, seconds_of};

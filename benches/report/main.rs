@@ -4,8 +4,6 @@
 //! `cargo bench --bench report`. Times are of the thread, not of the wall, and in units of one 500 × 500 f64 LU (faer,
 //! factored in place) of the same run. Without the reference cases of `tests/data` nothing is written.
 
-extern crate railhead_contact as railhead;
-
 #[path = "../machine.rs"]
 mod machine;
 

@@ -1,10 +1,10 @@
 //! The reference cases as questions, and the errors of their answers.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::solution::words::answer::{Solution, Total};
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::solution::words::answer::{Solution, Total};
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::machine::{median, seconds_of};

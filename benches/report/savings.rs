@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::hint::black_box;
 use std::sync::Arc;
 
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::{solve, solve_with};
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::operator_store::OperatorStore;
+use railhead_contact::{solve, solve_with};
 use serde_json::{Value, json};
 
 use crate::allocations::during;

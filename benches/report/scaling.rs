@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use railhead::contact::half_space::strip_operator::kind::Precision;
-use railhead::contact::half_space::strip_operator::operator;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal_stage;
-use railhead::contact::rolling::refinement::adapt;
-use railhead::contact::rolling::refinement::interpolate::RefinementState;
-use railhead::contact::rolling::refinement::on_mesh::MotionTask;
+use railhead_contact::half_space::strip_operator::kind::Precision;
+use railhead_contact::half_space::strip_operator::operator;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::normal_stage;
+use railhead_contact::rolling::refinement::adapt;
+use railhead_contact::rolling::refinement::interpolate::RefinementState;
+use railhead_contact::rolling::refinement::on_mesh::MotionTask;
 use serde_json::json;
 
 use crate::plot::{Plot, Series};

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 
 const SHAPES: [f64; 6] = [0.3, 0.6, 1.0, 1.5, 2.5, 4.0];

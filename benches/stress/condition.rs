@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 
 use faer::Mat;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::mesh::MeshSize;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::slip_equations::SlipEquations;
-use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::{check, normal_stage};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::mesh::MeshSize;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::slip_equations::SlipEquations;
+use railhead_contact::rolling::slip_rules::Rule;
+use railhead_contact::rolling::strip_mesh::StripMesh;
+use railhead_contact::{check, normal_stage};
 use serde_json::json;
 
 /// Largest over smallest singular value of the map of a rule, ν = 0.28.

@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::geometry::formats::{Format, read};
-use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::geometry::formats::{Format, read};
+use railhead_contact::geometry::profile::{Body, Profile, Reading};
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::profile_reference_files::reference_file;

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::{PatchSolution, PointSolution};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::{PatchSolution, PointSolution};
 use serde_json::{Value, json};
 
 use crate::physics;

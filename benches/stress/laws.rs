@@ -1,8 +1,8 @@
 //! What every answer must obey, whatever the case.
 
-use railhead::contact::case::words::solver::MethodName;
-use railhead::contact::rolling::answer::Resultants;
-use railhead::contact::solution::words::answer::{
+use railhead_contact::case::words::solver::MethodName;
+use railhead_contact::rolling::answer::Resultants;
+use railhead_contact::solution::words::answer::{
     Fields, PatchCells, PatchFields, PatchSolution, PointFields, Solution, Zone,
 };
 use serde_json::Value;

@@ -4,8 +4,6 @@
 //! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `histories`, `rows`, `routes`, `creep-map`, `sweep-with-zones` or
 //! `damaged-profile` prints one section, `-- --case 1511` one case as JSON, of another run with its seed behind the number.
 
-extern crate railhead_contact as railhead;
-
 mod after;
 mod condition;
 mod contacts;
@@ -38,7 +36,6 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use contacts::{Sample, samples};
-use railhead::contact;
 use serde_json::Value;
 use times::{CaseTimes, told};
 use trial::{End, Trial, trial};

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::post::subsurface::states::points;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::post::subsurface::states::points;
 use serde_json::{Value, json};
 
 use crate::physics;

@@ -6,15 +6,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
-use railhead::contact;
-use railhead::contact::case::solver::{KnownPair, Limits};
-use railhead::contact::evaluate::answer::{ManyAnswer, RowStatus, RowsAnswer};
-use railhead::contact::evaluate::many::{ManyTask, solve_many};
-use railhead::contact::evaluate::rows::Rows;
-use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
-use railhead::contact::monitor::{Monitor, Unmonitored};
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead_contact as contact;
+use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::evaluate::answer::{ManyAnswer, RowStatus, RowsAnswer};
+use railhead_contact::evaluate::many::{ManyTask, solve_many};
+use railhead_contact::evaluate::rows::Rows;
+use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use railhead_contact::monitor::{Monitor, Unmonitored};
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::{Value, json};
 
 use crate::random::Random;

@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Instant;
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::{check, solve, solve_with};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::operator_store::OperatorStore;
+use railhead_contact::{check, solve, solve_with};
 use serde_json::{Value, json};
 
 /// Motions along a side of the maps: 900 and 10 000 in all.
@@ -109,7 +109,7 @@ pub fn with_zones() -> String {
             "pressure",
             "slip"
         ]));
-        let met = |solution: &railhead::contact::solution::words::answer::Solution| {
+        let met = |solution: &railhead_contact::solution::words::answer::Solution| {
             let points = solution.patches[0].points.iter();
             points.filter(|p| p.target_met == Some(true)).count()
         };

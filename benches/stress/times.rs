@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::solution::words::answer::FoundBy;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::solution::words::answer::FoundBy;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use super::contacts::{Sample, samples};

@@ -5,11 +5,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use cpu_time::ThreadTime;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::{Monitor, Stop};
-use railhead::contact::solution::words::answer::{Fields, Solution};
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::{Monitor, Stop};
+use railhead_contact::solution::words::answer::{Fields, Solution};
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use super::contacts::{Sample, reversed, scaled};

@@ -1,8 +1,8 @@
 //! From the solved columns to the values at the nodes of the table.
 
-use railhead::contact::rolling::linear_theory::{coefficients, spin_coefficient};
-use railhead::contact::rolling::methods::table::evaluate::{growth, linear, linear_part};
-use railhead::contact::rolling::methods::table::spline::{
+use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
+use railhead_contact::rolling::methods::table::evaluate::{growth, linear, linear_part};
+use railhead_contact::rolling::methods::table::spline::{
     DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, Shape, VALUES,
     direction, pole, ratio, size,
 };
@@ -39,7 +39,7 @@ fn columns(node: [usize; 2]) -> Option<Vec<Vec<Answer>>> {
     Some(columns)
 }
 
-/// The values at the nodes, as [`CreepTable`](railhead::contact::rolling::methods::table::evaluate::CreepTable) takes them.
+/// The values at the nodes, as [`CreepTable`](railhead_contact::rolling::methods::table::evaluate::CreepTable) takes them.
 pub fn values() -> Vec<f32> {
     let mut values = vec![f32::NAN; VALUES];
     for node_ratio in 0..RATIOS {

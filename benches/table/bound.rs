@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use railhead::contact::rolling::methods::table::evaluate::growth;
-use railhead::contact::rolling::methods::table::spline::{
+use railhead_contact::rolling::methods::table::evaluate::growth;
+use railhead_contact::rolling::methods::table::spline::{
     DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, size,
 };
 

@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-use railhead::contact::rolling::linear_theory::coefficients;
-use railhead::contact::rolling::methods::table::evaluate::CreepTable;
-use railhead::contact::rolling::methods::table::spline::{Shape, size, spin_factor};
-use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead_contact::rolling::linear_theory::coefficients;
+use railhead_contact::rolling::methods::table::evaluate::CreepTable;
+use railhead_contact::rolling::methods::table::spline::{Shape, size, spin_factor};
+use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::{Value, json};
 
 use crate::random::Random;

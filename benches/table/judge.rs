@@ -1,8 +1,8 @@
 //! The errors of the table at motions that it was not made from.
 
-use railhead::contact::rolling::linear_theory::coefficients;
-use railhead::contact::rolling::methods::table::evaluate::CreepTable;
-use railhead::contact::rolling::methods::table::spline::{Shape, cell, sigma, spin_factor};
+use railhead_contact::rolling::linear_theory::coefficients;
+use railhead_contact::rolling::methods::table::evaluate::CreepTable;
+use railhead_contact::rolling::methods::table::spline::{Shape, cell, sigma, spin_factor};
 use serde_json::{Value, json};
 
 use crate::held_out::{CONTACTS, contact, name};

@@ -7,13 +7,11 @@
 
 use std::path::Path;
 
-use railhead::contact::case::digest::SOLVER_REVISION;
-use railhead::contact::rolling::methods::table::evaluate::CreepTable;
-use railhead::contact::rolling::methods::table::file::{TableFile, table};
-use railhead::contact::rolling::methods::table::spline::{CELLS, RATIOS};
+use railhead_contact::case::digest::SOLVER_REVISION;
+use railhead_contact::rolling::methods::table::evaluate::CreepTable;
+use railhead_contact::rolling::methods::table::file::{TableFile, table};
+use railhead_contact::rolling::methods::table::spline::{CELLS, RATIOS};
 use serde_json::json;
-
-extern crate railhead_contact as railhead;
 
 mod assemble;
 mod bound;

@@ -5,13 +5,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use cpu_time::{ProcessTime, ThreadTime};
-use railhead::contact::rolling::linear_theory::coefficients;
-use railhead::contact::rolling::methods::table::evaluate::CreepTable;
-use railhead::contact::rolling::methods::table::spline::{
+use railhead_contact::rolling::linear_theory::coefficients;
+use railhead_contact::rolling::methods::table::evaluate::CreepTable;
+use railhead_contact::rolling::methods::table::spline::{
     DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, Shape, direction, pole, ratio,
     size,
 };
-use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead_contact::rolling::operator_store::OperatorStore;
 
 use crate::random::Random;
 use crate::solver::{Answer, Contact, largest_error, print_errors, read, solve, write};

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::json;
 
 /// c = √(ab) in mm, G in MPa, and μN/(G c²): small, so that the largest creepages are still possible ones.

@@ -1,11 +1,11 @@
 //! How long a value takes: by the table and by the simplified theory, in one process.
 
 use cpu_time::ThreadTime;
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::evaluate::rows::Rows;
-use railhead::contact::evaluate::varied::{Values, VariedColumn};
-use railhead::contact::rolling::methods::table::file::table;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::evaluate::rows::Rows;
+use railhead_contact::evaluate::varied::{Values, VariedColumn};
+use railhead_contact::rolling::methods::table::file::table;
 use serde_json::json;
 
 use crate::held_out::{CONTACTS, MOTIONS, contact};

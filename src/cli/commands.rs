@@ -376,7 +376,7 @@ pub(super) struct LogArgs {
     /// Format of log lines.
     #[arg(long, env = "RAILHEAD_LOG_FORMAT", value_enum, default_value = "text")]
     pub log_format: LogFormat,
-    /// Log filter, such as `info,railhead::jobs=debug`.
+    /// Log filter, such as `info,railhead_jobs=debug`.
     #[arg(
         long,
         env = "RAILHEAD_LOG",

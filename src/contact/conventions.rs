@@ -3,7 +3,7 @@
 //! # Units
 //!
 //! mm, N, MPa, rad, s. Creepages are dimensionless, spin is in 1/mm. Inside a mesh level everything is dimensionless by
-//! [`Scale`](crate::contact::rolling::strip_mesh::Scale). Errors of resultants are relative to μN, those of the moment to
+//! [`Scale`](crate::rolling::strip_mesh::Scale). Errors of resultants are relative to μN, those of the moment to
 //! μN√(A/π).
 //!
 //! # Frame and signs
@@ -17,9 +17,9 @@
 //! # Order of values
 //!
 //! - Cells of a mesh: patch by patch, strip by strip from smaller to larger y, segment by segment and in each from the trailing end
-//!   (smaller x) to the leading end ([`strips`](crate::contact::mesh)).
+//!   (smaller x) to the leading end ([`strips`](crate::mesh)).
 //! - Vectors of the slip equations: all x components, then all y components
-//!   ([`slip_equations`](crate::contact::rolling::slip_equations)).
+//!   ([`slip_equations`](crate::rolling::slip_equations)).
 //! - Grids: the value at `(x[i], y[j])` is `rows[j][i]`, stored at `j * nx + i`.
 //! - Patches: in order of their smallest y.
 //!
@@ -27,11 +27,11 @@
 //!
 //! | word | meaning |
 //! |---|---|
-//! | case | the question in the words of a client; checked, it is a [`CheckedCase`](crate::contact::problem::checked_case::CheckedCase) |
+//! | case | the question in the words of a client; checked, it is a [`CheckedCase`](crate::problem::checked_case::CheckedCase) |
 //! | problem, run, label | what a case asks, how it is to be solved, what it is called |
 //! | contact | what the bodies are: ellipse, radii, gap, pressure grid, profiles |
-//! | normal task | what is known of patches and pressures before they are found ([`NormalTask`](crate::contact::normal::footprint::NormalTask)) |
-//! | footprint | patches and pressures, known ([`Footprint`](crate::contact::normal::footprint::Footprint)) |
+//! | normal task | what is known of patches and pressures before they are found ([`NormalTask`](crate::normal::footprint::NormalTask)) |
+//! | footprint | patches and pressures, known ([`Footprint`](crate::normal::footprint::Footprint)) |
 //! | patch | a connected part of the contact |
 //! | approach | how far distant points of the bodies come together |
 //! | lowering | how far a wheel is below its first touch on the rail |
@@ -45,9 +45,9 @@
 //! | resultants | forces and moment of the tractions |
 //! | strip | a part of a patch between two lines along rolling; its mid-line in the patch is a *chord* |
 //! | segment | one chord of a strip; hollow patches have several in a strip |
-//! | rule | how slip is differenced along a segment ([`Rule`](crate::contact::rolling::slip_rules::Rule)) |
+//! | rule | how slip is differenced along a segment ([`Rule`](crate::rolling::slip_rules::Rule)) |
 //! | operator | the map from tractions to displacements of a half-space |
-//! | level | one mesh with its areas, pressures and operator ([`StripMesh`](crate::contact::rolling::strip_mesh::StripMesh)) |
+//! | level | one mesh with its areas, pressures and operator ([`StripMesh`](crate::rolling::strip_mesh::StripMesh)) |
 //! | regime | what tractions look like, for which a mesh is made: sticking, or turning about a pole |
 //! | companion | the same level with half the strips or half the cells, which tells the error |
 //! | target | the error of the resultants that a client allows |

@@ -4,8 +4,8 @@ use railhead_macros::Code;
 use serde_json::{Number, Value};
 use thiserror::Error;
 
-use crate::contact::method::Method;
-use crate::contact::monitor::Stop;
+use crate::method::Method;
+use crate::monitor::Stop;
 
 /// One fault of a case: where it is, what was given, what is allowed.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -7,19 +7,19 @@ use std::collections::BTreeMap;
 use serde_json::to_value;
 use thiserror::Error;
 
-use crate::contact::case::contact_task::{FLANGE_BACKS, GAUGE};
-use crate::contact::case::solver::Limits;
-use crate::contact::case::words::contact::{Contact, InfluenceName, Load, SideName, SurfaceName};
-use crate::contact::case::words::cross_section::{CrossSection, FormatName, Smoothing};
-use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::material::{Elastic, Material};
-use crate::contact::case::words::motion::{AskedMotion, Motions, Wheelset};
-use crate::contact::case::words::solver::{Case, MethodName, Output, Solver};
-use crate::contact::error::{CaseError, Fault, SolveError};
-use crate::contact::monitor::Unmonitored;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::{check, solve};
+use crate::case::contact_task::{FLANGE_BACKS, GAUGE};
+use crate::case::solver::Limits;
+use crate::case::words::contact::{Contact, InfluenceName, Load, SideName, SurfaceName};
+use crate::case::words::cross_section::{CrossSection, FormatName, Smoothing};
+use crate::case::words::friction::Friction;
+use crate::case::words::material::{Elastic, Material};
+use crate::case::words::motion::{AskedMotion, Motions, Wheelset};
+use crate::case::words::solver::{Case, MethodName, Output, Solver};
+use crate::error::{CaseError, Fault, SolveError};
+use crate::monitor::Unmonitored;
+use crate::problem::checked_case::CheckedCase;
+use crate::solution::words::answer::Solution;
+use crate::{check, solve};
 
 /// Why a case has no answer.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -165,7 +165,7 @@ impl Case {
         check(&value, limits)
     }
 
-    /// Checks and solves the case within the default limits. [`solve`](crate::contact::solve()) also gives the values per cell, and
+    /// Checks and solves the case within the default limits. [`solve`](crate::solve()) also gives the values per cell, and
     /// can be followed and stopped.
     ///
     /// # Errors

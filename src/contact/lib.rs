@@ -33,7 +33,38 @@
 //! # Ok::<(), railhead_contact::Error>(())
 //! ```
 //!
-//! `examples/` has a Hertz contact, a creep curve and a wheel on a rail. [`contact`] holds the modules, in the order in which a case passes them.
+//! `examples/` has a Hertz contact, a creep curve and a wheel on a rail.
+//!
+//! # Stages
+//!
+//! The code is synchronous and uses no clock, file, environment or output. A case passes these stages in order; none is entered again:
+//!
+//! | stage | from | to | where |
+//! |---|---|---|---|
+//! | check | JSON, [`Limits`] | [`CheckedCase`]: [`problem`], run, label | [`case`] |
+//! | region and pressure | [`NormalTask`] | [`SolvedFootprint`](normal_stage::SolvedFootprint) | [`normal_stage`], [`geometry`], [`normal`] |
+//! | motions, from coarse to fine levels | footprint, [`friction`] | [`MotionAnswer`](rolling::answer::MotionAnswer) | [`rolling_stage`], [`rolling`], [`mesh`], [`half_space`] |
+//! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
+//!
+//! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_assessment`]), [`wheelset`].
+//! Frame, signs, units and words: [`conventions`].
+//!
+//! # The way of a motion
+//!
+//! 1. **Read**: [`case::draft`] turns JSON into the words of a [`Case`] and names every fault of the text.
+//! 2. **Check**: [`case::checks`] turns each part into numbers and names every fault of them; [`case::check`] puts the parts together.
+//!    From here on there is only the [`CheckedCase`].
+//! 3. **Cut**: [`slices()`] divides a long sweep; [`solve_slice`] starts the clock of the recipe for each slice.
+//! 4. **Find region and pressure**: [`normal_stage::solve`]. A gap is solved by [`normal::gap::solve`], a wheel is brought to rest on its
+//!    rail by [`normal::on_curve`].
+//! 5. **Take one motion after the other**: [`rolling_stage`]. [`rolling::force_control`] finds the creepages of a prescribed force; for
+//!    given creepages it passes the motion on. A history goes to [`rolling::history::solve`] instead.
+//! 6. **Refine**: [`rolling::refinement::adapt`] solves the motion on the meshes of its [family](rolling::refinement::mesh_family), coarse to
+//!    fine, and stops when the [estimate](rolling::refinement::error_estimate) meets the target.
+//! 7. **Solve one mesh**: [`rolling::refinement::on_mesh`] chooses the start and calls the [method](rolling::methods).
+//! 8. **Answer**: [`solution::assemble`] turns the [`MotionAnswer`](rolling::answer::MotionAnswer) into the words of the client, with
+//!    the outputs that were asked for ([`solution::maintain`]: stresses, damage, temperatures).
+//! 9. **Finish**: [`solution::finish`] distributes the time, adds remarks on implausible numbers, and refuses numbers that are not finite.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![warn(unreachable_pub, unused_qualifications)]
@@ -48,24 +79,191 @@
     )
 )]
 
-#[path = "mod.rs"]
-pub mod contact;
+use std::ops::Range;
+use std::sync::Arc;
 
-pub use contact::case::solver::Limits;
-pub use contact::case::words::contact::{
+use serde_json::Value;
+
+use crate::case::draft;
+use crate::case::solver::KnownPair;
+use crate::monitor::MonitorPart;
+use crate::normal::footprint::NormalTask;
+use crate::profile_assessment::trust;
+use crate::rolling::operator_store::OperatorStore;
+use crate::slices::slices;
+use crate::solution::finish::finish;
+use crate::time_limit::TimeLimit;
+use crate::unlike_bodies::UnlikeGap;
+
+pub mod case;
+pub mod conventions;
+pub mod error;
+pub mod evaluate;
+pub mod evolution;
+pub mod facade;
+pub mod finite;
+pub mod friction;
+pub mod geometry;
+pub mod half_space;
+pub mod lazy_field;
+pub mod mesh;
+pub mod method;
+pub mod monitor;
+pub mod normal;
+pub mod normal_stage;
+pub mod numerics;
+pub mod post;
+pub mod problem;
+pub mod profile_assessment;
+pub mod remark;
+pub mod rolling;
+pub mod rolling_stage;
+pub mod slices;
+pub mod solution;
+pub(crate) mod surface_fallback;
+pub mod time_limit;
+pub(crate) mod traction_estimate;
+pub mod unlike_bodies;
+pub(crate) mod vertical_equilibrium;
+pub(crate) mod wheel_force_control;
+pub mod wheel_on_rail;
+pub mod wheelset;
+
+pub use crate::case::solver::Limits;
+pub use crate::case::words::contact::{
     Contact, InfluenceName as SurfaceInfluence, Load, SideName as Side,
     SurfaceName as ReferenceSurface,
 };
-pub use contact::case::words::cross_section::{CrossSection, FormatName as Format};
-pub use contact::case::words::friction::Friction;
-pub use contact::case::words::material::{Elastic, Material};
-pub use contact::case::words::motion::{AskedMotion as Motion, Motions, Wheelset};
-pub use contact::case::words::solver::Case;
-pub use contact::case::words::solver::{MethodName as Method, Output, Solver};
-pub use contact::error::{CaseError, Fault, SolveError};
-pub use contact::facade::Error;
-pub use contact::monitor::{Monitor, Unmonitored};
-pub use contact::problem::checked_case::CheckedCase;
-pub use contact::solution::words::answer::Fields;
-pub use contact::solution::words::answer::Solution;
-pub use contact::{check, solve};
+pub use crate::case::words::cross_section::{CrossSection, FormatName as Format};
+pub use crate::case::words::friction::Friction;
+pub use crate::case::words::material::{Elastic, Material};
+pub use crate::case::words::motion::{AskedMotion as Motion, Motions, Wheelset};
+pub use crate::case::words::solver::Case;
+pub use crate::case::words::solver::{MethodName as Method, Output, Solver};
+pub use crate::error::{CaseError, Fault, SolveError};
+pub use crate::facade::Error;
+pub use crate::monitor::{Monitor, Unmonitored};
+pub use crate::problem::checked_case::CheckedCase;
+pub use crate::solution::words::answer::Fields;
+pub use crate::solution::words::answer::Solution;
+
+/// Reads and checks a case.
+///
+/// # Errors
+/// Every fault of the case at once: those of the text, and those of its sound parts against physics and limits.
+pub fn check(case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
+    check_with(&KnownPair::default(), case, limits)
+}
+
+/// The same for one of many cases: profiles that were read for the one before are not read again.
+///
+/// # Errors
+/// The same.
+pub fn check_with(
+    known: &KnownPair,
+    case: &Value,
+    limits: &Limits,
+) -> Result<CheckedCase, CaseError> {
+    let (draft, mut faults) = draft::draft(case);
+    if !faults.is_empty() {
+        faults.extend(draft.faults_beside(limits));
+        return Err(CaseError(faults));
+    }
+    CheckedCase::new(&draft.complete().ok_or(CaseError(faults))?, limits, known)
+}
+
+/// Solves a checked case, slice by slice.
+///
+/// # Errors
+/// A named reason why there is no answer.
+pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
+    solve_with(&Arc::default(), case, monitor)
+}
+
+/// The same for one of many problems: operators of patches of the same shape are kept in the store for the next.
+///
+/// # Errors
+/// The same.
+pub fn solve_with(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
+    let mut answer: Option<(Solution, Fields)> = None;
+    for range in slices(case) {
+        let (more, more_fields) = solve_slice(operators, case, range, monitor)?;
+        match &mut answer {
+            None => answer = Some((more, more_fields)),
+            Some((solution, fields)) => {
+                solution.append(more);
+                fields.append(more_fields);
+            }
+        }
+    }
+    let Some(answer) = answer else {
+        unreachable!("a case has at least one slice")
+    };
+    Ok(answer)
+}
+
+/// Solves one slice of a case: the motions of a range that [`slices()`] gives. Motions are numbered as in the case.
+///
+/// # Errors
+/// A named reason why there is no answer.
+pub fn solve_slice(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    range: Range<usize>,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
+    let all = case.problem.motions.len();
+    if range == (0..all) {
+        return solve_motions(operators, case, monitor);
+    }
+    let share = MonitorPart {
+        inner: monitor,
+        before: range.start as f64 / all as f64,
+        own: range.len() as f64 / all as f64,
+    };
+    solve_motions(operators, &case.slice(range), &share)
+}
+
+/// The recipe: region and pressure, motions, answer. Every patch of a wheel passes the same two stages in a frame of its own, in rounds
+/// that balance its forces.
+fn solve_motions(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    monitor: &dyn Monitor,
+) -> Result<(Solution, Fields), SolveError> {
+    let began = monitor.elapsed();
+    let answer = match &case.problem.task {
+        NormalTask::Wheel(wheel) => {
+            let solved = surface_fallback::solve_wheel(case, wheel, monitor, |case, wheel| {
+                match case.problem.pull() {
+                    None => trust::solve(operators, case, wheel, monitor),
+                    Some(forces) => {
+                        wheel_force_control::solve(operators, case, wheel, forces, monitor)
+                    }
+                }
+            });
+            let ((mut solution, fields), remark) = solved?;
+            solution.remarks.extend(remark);
+            (solution, fields)
+        }
+        NormalTask::Wheelset(wheelset) => {
+            wheelset::balance::solve(operators, case, wheelset, monitor)?
+        }
+        NormalTask::Hertz(_) | NormalTask::Given(_) | NormalTask::Gap(_) => {
+            let monitor = &TimeLimit::new(monitor, case.run.time_limit, case.problem.motions.len());
+            let explained = |error| monitor.explained(error, case);
+            if case.problem.is_coupled(&case.run) {
+                let gap = UnlikeGap::of_case(case, monitor).map_err(explained)?;
+                unlike_bodies::solve(operators, case, &gap, monitor)?
+            } else {
+                let footprint = normal_stage::solve(case, monitor).map_err(explained)?;
+                rolling_stage::solve(operators, case, &footprint, monitor)?
+            }
+        }
+    };
+    finish(case, answer, monitor.elapsed().saturating_sub(began))
+}

@@ -6,8 +6,8 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use crate::contact::numerics::roots;
-use crate::contact::numerics::roots::{CloseEnough, Course};
+use crate::numerics::roots;
+use crate::numerics::roots::{CloseEnough, Course};
 
 /// How cells and nodes divide a chord that is mapped to `−1 … 1`.
 #[derive(Debug, Clone, PartialEq)]
@@ -390,8 +390,8 @@ pub fn observe(mesh: &Mesh, segment: &Segment, points: &mut Vec<f64>) {
 pub(crate) mod samples {
     //! Meshes for unit tests.
 
-    use crate::contact::mesh::Chord;
-    use crate::contact::mesh::{Grading, Mesh, equal_strips};
+    use crate::mesh::Chord;
+    use crate::mesh::{Grading, Mesh, equal_strips};
 
     /// A patch from y = −`half_width` to `half_width` with cosine-graded cells; `ends` returns the trailing and leading end of the chord at y.
     pub(crate) fn mesh_between(

@@ -2,7 +2,7 @@
 
 use railhead_macros::Named;
 
-/// A method; each is a file or folder of this name in [`rolling::methods`](crate::contact::rolling::methods).
+/// A method; each is a file or folder of this name in [`rolling::methods`](crate::rolling::methods).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Named)]
 pub enum Method {
     /// Semismooth Newton iteration with strip-preconditioned GMRES.

@@ -1,14 +1,14 @@
 //! The stage of the normal problem: a contact whose patches have one frame gets its region and pressure.
 
-use crate::contact::error::SolveError;
-use crate::contact::half_space::grid_operator::GridWorkspace;
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::footprint::{Footprint, NormalTask};
-use crate::contact::normal::gap::grid::{GridFineness, NormalError, NormalWork};
-use crate::contact::normal::gap::task::GapTask;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::answer::NormalReport;
+use crate::error::SolveError;
+use crate::half_space::grid_operator::GridWorkspace;
+use crate::monitor::Monitor;
+use crate::normal::footprint::{Footprint, NormalTask};
+use crate::normal::gap::grid::{GridFineness, NormalError, NormalWork};
+use crate::normal::gap::task::GapTask;
+use crate::problem::checked_case::CheckedCase;
+use crate::remark::entry::RemarkEntry;
+use crate::solution::words::answer::NormalReport;
 
 /// The solved normal problem of one frame.
 #[derive(Debug, Clone)]
@@ -29,7 +29,7 @@ pub struct SolvedFootprint {
 /// Why there are none, or why the tangential problem on them needs too much memory; or the monitor stopped the work.
 ///
 /// # Panics
-/// On a wheel, whose patches have a frame each: see [`wheel_on_rail`](crate::contact::wheel_on_rail).
+/// On a wheel, whose patches have a frame each: see [`wheel_on_rail`](crate::wheel_on_rail).
 pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprint, SolveError> {
     let first_order_error = case.problem.first_order_error(case.run.method);
     let known = |footprint, coupling_error| SolvedFootprint {

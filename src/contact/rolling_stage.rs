@@ -2,23 +2,23 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::error::SolveError;
-use crate::contact::method::Method;
-use crate::contact::normal_stage::SolvedFootprint;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::rolling::answer::{MotionAnswer, Skip};
-use crate::contact::rolling::history::plan::HistoryTask;
-use crate::contact::rolling::methods::table::solve as table;
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::gradients::add_gradients;
-use crate::contact::rolling::refinement::interpolate::RefinementState;
-use crate::contact::rolling::task::{RelativeTo, Resolution, RollingTask, TARGET_LEAST};
-use crate::contact::rolling::{force_control, history};
-use crate::contact::solution::assemble::Assembly;
-use crate::contact::solution::finish::share_seconds;
-use crate::contact::solution::words::answer::{Fields, Solution};
-use crate::contact::time_limit::TimeLimit;
+use crate::case::words::solver::Output;
+use crate::error::SolveError;
+use crate::method::Method;
+use crate::normal_stage::SolvedFootprint;
+use crate::problem::checked_case::CheckedCase;
+use crate::rolling::answer::{MotionAnswer, Skip};
+use crate::rolling::history::plan::HistoryTask;
+use crate::rolling::methods::table::solve as table;
+use crate::rolling::operator_store::OperatorStore;
+use crate::rolling::refinement::gradients::add_gradients;
+use crate::rolling::refinement::interpolate::RefinementState;
+use crate::rolling::task::{RelativeTo, Resolution, RollingTask, TARGET_LEAST};
+use crate::rolling::{force_control, history};
+use crate::solution::assemble::Assembly;
+use crate::solution::finish::share_seconds;
+use crate::solution::words::answer::{Fields, Solution};
+use crate::time_limit::TimeLimit;
 
 /// Solves every motion of a problem on a footprint.
 ///

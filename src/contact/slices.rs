@@ -1,14 +1,14 @@
 //! Cuts long sweeps into slices of about equal numbers of motions. Each slice is solved alone, and the answers are joined.
 //!
 //! No start is carried over a cut, so that an answer does not depend on when and where its slices were solved, or whether a restart came
-//! between: [`solve`](crate::contact::solve) takes the same slices one after the other.
+//! between: [`solve`](crate::solve) takes the same slices one after the other.
 
 use std::ops::Range;
 
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::merged;
-use crate::contact::rolling::task::Resolution;
-use crate::contact::solution::words::answer::{Fields, Solution};
+use crate::problem::checked_case::CheckedCase;
+use crate::remark::entry::merged;
+use crate::rolling::task::Resolution;
+use crate::solution::words::answer::{Fields, Solution};
 
 /// Most motions of a slice. Few motions keep the time short that other jobs wait; each slice finds region and pressure again. Chosen by judgement.
 const MOTIONS_MAX: usize = 100;

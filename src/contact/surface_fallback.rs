@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel::WheelTask;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::profile_assessment::trust;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
+use crate::error::SolveError;
+use crate::monitor::Monitor;
+use crate::normal::wheel::WheelTask;
+use crate::problem::checked_case::CheckedCase;
+use crate::profile_assessment::trust;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
 
 /// Solves a wheel on its reference surface, or on planes where the curve has no answer and the case does not ask for it.
 ///

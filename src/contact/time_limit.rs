@@ -4,9 +4,9 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use crate::contact::error::SolveError;
-use crate::contact::monitor::{Monitor, MonitorPart, Stop};
-use crate::contact::problem::checked_case::CheckedCase;
+use crate::error::SolveError;
+use crate::monitor::{Monitor, MonitorPart, Stop};
+use crate::problem::checked_case::CheckedCase;
 
 /// The monitor of a whole case: adds the case's own time limit and turns motions done into progress, which never falls.
 pub(crate) struct TimeLimit<'a> {

@@ -1,11 +1,11 @@
 //! The tractions of a wheel on a rail about, by the table of creep forces, so that the height of the wheel is sought with them.
 
-use crate::contact::normal::footprint::LoadAcross;
-use crate::contact::normal::wheel::WheelPatch;
-use crate::contact::problem::physics::Problem;
-use crate::contact::rolling::load_ellipse::LoadEllipse;
-use crate::contact::rolling::methods::table::solve::{forces, tells};
-use crate::contact::rolling::task::Motion;
+use crate::normal::footprint::LoadAcross;
+use crate::normal::wheel::WheelPatch;
+use crate::problem::physics::Problem;
+use crate::rolling::load_ellipse::LoadEllipse;
+use crate::rolling::methods::table::solve::{forces, tells};
+use crate::rolling::task::Motion;
 
 /// Can the tractions be estimated for this problem? The table must know its physics, and creepages be given.
 pub(crate) fn can_estimate(problem: &Problem) -> bool {

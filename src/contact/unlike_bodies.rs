@@ -10,31 +10,29 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::half_space::grid_operator::GridWorkspace;
-use crate::contact::half_space::unlike_bodies::opening;
-use crate::contact::mesh::MeshSize;
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::gap::surface::GapSurface;
-use crate::contact::normal::gap::task::{GapTask, PreviewCache};
-use crate::contact::normal::hertz::{Ellipse, NormalLoad};
-use crate::contact::normal_stage::SolvedFootprint;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::Resultants;
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::refinement::interpolate::RefinementState;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::{Resolution, RollingTask, TARGET_USUAL};
-use crate::contact::rolling::{force_control, history};
-use crate::contact::solution::words::answer::{
-    Fields, MotionRegion, NormalReport, PatchSolution, Solution,
-};
-use crate::contact::time_limit::TimeLimit;
-use crate::contact::{normal_stage, rolling_stage};
+use crate::error::SolveError;
+use crate::half_space::grid_operator::GridWorkspace;
+use crate::half_space::unlike_bodies::opening;
+use crate::mesh::MeshSize;
+use crate::monitor::Monitor;
+use crate::normal::footprint::NormalTask;
+use crate::normal::gap::grid::GridFineness;
+use crate::normal::gap::surface::GapSurface;
+use crate::normal::gap::task::{GapTask, PreviewCache};
+use crate::normal::hertz::{Ellipse, NormalLoad};
+use crate::normal_stage::SolvedFootprint;
+use crate::problem::checked_case::CheckedCase;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
+use crate::rolling::answer::Resultants;
+use crate::rolling::operator_store::OperatorStore;
+use crate::rolling::refinement::interpolate::RefinementState;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::{Resolution, RollingTask, TARGET_USUAL};
+use crate::rolling::{force_control, history};
+use crate::solution::words::answer::{Fields, MotionRegion, NormalReport, PatchSolution, Solution};
+use crate::time_limit::TimeLimit;
+use crate::{normal_stage, rolling_stage};
 
 /// Mesh of the rounds where bodies are only pressed together: approaches of the three contacts of `tests/physics/pressing.rs` are within 0.03 % of
 /// those with 48 × 48 already on 16 × 16.

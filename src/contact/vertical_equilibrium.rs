@@ -1,6 +1,6 @@
 //! Vertical equilibrium of a wheel: fixed-point iterations with secant steps between normal and tangential forces.
 
-use crate::contact::rolling::task::{NEGLIGIBLE_OF_TARGET, Resolution};
+use crate::rolling::task::{NEGLIGIBLE_OF_TARGET, Resolution};
 
 /// Range of the slope of the friction found over the friction assumed that a secant step uses. Numeric safety, not tuned.
 const SLOPES: [f64; 2] = [-0.9, 0.6];

@@ -10,22 +10,22 @@
 
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::geometry::wheel_rail::Placement;
-use crate::contact::geometry::wheelset_pose::WheelsetMotion;
-use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::normal::wheel::WheelTask;
-use crate::contact::numerics::equilibrium::{Equilibrium, Search, Termination, Trial};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::{Problem, Run};
-use crate::contact::profile_assessment::trust;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::rolling::force_control::{CubicLaw, PLACE_MAX};
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::task::{Motion, NEGLIGIBLE_OF_TARGET, PrescribedForces, RelativeTo};
-use crate::contact::solution::words::answer::{Fields, PatchSolution, Solution};
-use crate::contact::vertical_equilibrium::tolerance;
-use crate::contact::wheel_on_rail::SolvedWheel;
+use crate::error::SolveError;
+use crate::geometry::wheel_rail::Placement;
+use crate::geometry::wheelset_pose::WheelsetMotion;
+use crate::monitor::{Monitor, MonitorPart};
+use crate::normal::wheel::WheelTask;
+use crate::numerics::equilibrium::{Equilibrium, Search, Termination, Trial};
+use crate::problem::checked_case::CheckedCase;
+use crate::problem::physics::{Problem, Run};
+use crate::profile_assessment::trust;
+use crate::remark::entry::RemarkEntry;
+use crate::rolling::force_control::{CubicLaw, PLACE_MAX};
+use crate::rolling::operator_store::OperatorStore;
+use crate::rolling::task::{Motion, NEGLIGIBLE_OF_TARGET, PrescribedForces, RelativeTo};
+use crate::solution::words::answer::{Fields, PatchSolution, Solution};
+use crate::vertical_equilibrium::tolerance;
+use crate::wheel_on_rail::SolvedWheel;
 
 /// A force may be missed by this part of μN at least: what the normal problem leaves open from trial to trial is noise to the search. Chosen by
 /// judgement; how much it matters was not measured.

@@ -9,27 +9,25 @@
 
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
-use crate::contact::half_space::bent_surface::{Influence, TURN_MAX};
-use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::normal::gap::grid::GridFineness;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::on_curve::{CurveContact, CurveTask, Friction, STEEP, Workspace};
-use crate::contact::normal::wheel::{
-    ReferenceSurface, WheelContact, WheelLoad, WheelPatch, WheelTask,
-};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::negligible;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::kind::short;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::answer::{Fields, Solution};
-use crate::contact::time_limit::TimeLimit;
-use crate::contact::unlike_bodies::tell_region;
-use crate::contact::wheel_on_rail::answer::turn;
+use crate::error::SolveError;
+use crate::geometry::contact_locus::ContactLocus;
+use crate::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
+use crate::half_space::bent_surface::{Influence, TURN_MAX};
+use crate::monitor::{Monitor, MonitorPart};
+use crate::normal::gap::grid::GridFineness;
+use crate::normal::hertz::Patch;
+use crate::normal::on_curve::{CurveContact, CurveTask, Friction, STEEP, Workspace};
+use crate::normal::wheel::{ReferenceSurface, WheelContact, WheelLoad, WheelPatch, WheelTask};
+use crate::problem::checked_case::CheckedCase;
+use crate::problem::physics::negligible;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::kind::short;
+use crate::remark::list::Remark;
+use crate::rolling::operator_store::OperatorStore;
+use crate::solution::words::answer::{Fields, Solution};
+use crate::time_limit::TimeLimit;
+use crate::unlike_bodies::tell_region;
+use crate::wheel_on_rail::answer::turn;
 
 mod answer;
 mod rounds;

@@ -15,8 +15,8 @@ use utoipa::openapi::{
 };
 use utoipa_axum::router::OpenApiRouter;
 
-use crate::http::contract;
-use crate::http::problem::{ProblemBody, ProblemKind, describe, describe_together};
+use crate::contract;
+use crate::problem::{ProblemBody, ProblemKind, describe, describe_together};
 
 #[derive(OpenApi)]
 #[openapi(
@@ -621,7 +621,7 @@ mod tests {
     use super::*;
 
     fn document() -> Value {
-        serde_json::from_str(crate::http::DOCUMENT.0()).unwrap()
+        serde_json::from_str(crate::DOCUMENT.0()).unwrap()
     }
 
     #[test]

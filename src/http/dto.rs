@@ -7,18 +7,18 @@ use serde_json::Value;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::motion::MotionWords;
-use crate::contact::case::words::solver::{Case, Output};
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::answer::{
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, Fault, ProblemBody, Result};
+use railhead_contact::case::words::motion::MotionWords;
+use railhead_contact::case::words::solver::{Case, Output};
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::solution::words::answer::{
     ErrorEstimate, HistoryPoint, Origin, Solution, Total, Zone,
 };
-use crate::contact::solution::words::damage::ProfileUncertainty;
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, Fault, ProblemBody, Result};
-use crate::jobs::codec::table::TableKind;
-use crate::jobs::model::{Batch, Job, Kind, Priority, QueuePlace, State as JobState};
-use crate::jobs::run::model::{Run, RunColumn};
+use railhead_contact::solution::words::damage::ProfileUncertainty;
+use railhead_jobs::codec::table::TableKind;
+use railhead_jobs::model::{Batch, Job, Kind, Priority, QueuePlace, State as JobState};
+use railhead_jobs::run::model::{Run, RunColumn};
 
 /// A job. Times are RFC 3339 in UTC with milliseconds.
 #[derive(Debug, Serialize, ToSchema)]

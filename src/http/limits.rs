@@ -14,9 +14,9 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, Result};
-use crate::jobs::sync::{blocking, lock};
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, ProblemKind, Result};
+use railhead_jobs::sync::{blocking, lock};
 
 /// Units of memory, requests or turns, in all and for each tenant. Clones share the semaphore.
 #[derive(Debug, Clone)]

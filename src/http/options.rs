@@ -11,7 +11,7 @@ use std::time::Duration;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, value_parser};
 
-use crate::jobs::options::{defaults, mib, seconds};
+use railhead_jobs::options::{defaults, mib, seconds};
 
 /// The limits of a service; nearly every one is a flag of `serve`, declared here.
 #[derive(Debug, Clone, Args)]
@@ -206,7 +206,7 @@ mod tests {
     use clap::{Command, FromArgMatches};
 
     use super::*;
-    use crate::jobs::runtime_probe::USUAL_LIMIT;
+    use railhead_jobs::runtime_probe::USUAL_LIMIT;
 
     #[test]
     fn sizes_and_times_are_read_in_the_units_of_their_flags() {

@@ -11,12 +11,12 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use rust_embed::Embed;
 
-use crate::http::layers::etag;
-use crate::http::problem::{Result, unknown_route};
+use crate::layers::etag;
+use crate::problem::{Result, unknown_route};
 
 /// The files of the page, as they are in the program.
 #[derive(Embed)]
-#[folder = "src/http/page/web/"]
+#[folder = "page/web/"]
 struct Files;
 
 /// Digest of all files: it changes with any of them, so that addresses with it may be kept for good.

@@ -13,10 +13,10 @@ use utoipa::ToSchema;
 use utoipa::openapi::schema::Type;
 use utoipa::openapi::{ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, ResponseBuilder};
 
-use crate::contact::error::{CaseError, Fault as CaseFault, FaultCode};
-use crate::jobs::StorageFault;
-use crate::jobs::error::JobsError;
-use crate::jobs::model::{Failure, FailureKind, Job, Kind, State};
+use railhead_contact::error::{CaseError, Fault as CaseFault, FaultCode};
+use railhead_jobs::StorageFault;
+use railhead_jobs::error::JobsError;
+use railhead_jobs::model::{Failure, FailureKind, Job, Kind, State};
 
 /// Declares the kinds of problems once: name, status, slug, title, meaning.
 macro_rules! kinds {
@@ -338,7 +338,7 @@ macro_rules! problems {
                 String,
                 utoipa::openapi::RefOr<utoipa::openapi::Response>,
             > {
-                $crate::http::problem::describe(&[$($crate::http::problem::ProblemKind::$kind),*])
+                $crate::problem::describe(&[$($crate::problem::ProblemKind::$kind),*])
             }
         }
     };

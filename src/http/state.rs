@@ -2,13 +2,13 @@
 
 use axum::extract::FromRef;
 
-use crate::http::contract::Document;
-use crate::http::extract::caller::AnyTenant;
-use crate::http::layers::auth::Access;
-use crate::http::layers::metrics::Metrics;
-use crate::http::limits::{ConcurrencyLimits, Memory};
-use crate::http::options::HttpOptions;
-use crate::jobs::Jobs;
+use crate::contract::Document;
+use crate::extract::caller::AnyTenant;
+use crate::layers::auth::Access;
+use crate::layers::metrics::Metrics;
+use crate::limits::{ConcurrencyLimits, Memory};
+use crate::options::HttpOptions;
+use railhead_jobs::Jobs;
 
 /// What every handler can reach; clones share it.
 #[derive(Clone, FromRef)]

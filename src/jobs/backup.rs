@@ -5,11 +5,11 @@ use std::io;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::Path;
 
-use crate::jobs::disk_reserve::make_private_folder;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::open_store::table_file;
-use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::sync::blocking;
+use crate::disk_reserve::make_private_folder;
+use crate::error::{JobsError, Result};
+use crate::open_store::table_file;
+use crate::store::sqlite::database::SqliteStore;
+use crate::sync::blocking;
 
 /// Copies the jobs and their results into a new folder, from which a service can be started.
 ///

@@ -17,12 +17,12 @@ use object_store::path::Path;
 use object_store::{GetOptions, ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
-use crate::contact::solution::words::answer::PatchFields;
-use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
-use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::store::Claim;
-use crate::jobs::sync::blocking;
+use crate::codec::fields::{Header, PREFIX_BYTES, header_length};
+use crate::codec::result::EncodedResult;
+use crate::error::{JobsError, Result};
+use crate::store::Claim;
+use crate::sync::blocking;
+use railhead_contact::solution::words::answer::PatchFields;
 
 /// The folder of the data folder in which results lie.
 pub(crate) const ROOT: &str = "results";

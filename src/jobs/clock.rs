@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use crate::jobs::sync::lock;
+use crate::sync::lock;
 
 /// A wall clock, and beside it a steady clock, which is never set. Clones show the same times.
 #[derive(Clone)]

@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use crate::contact;
-use crate::contact::case::solver::{KnownPair, Limits};
-use crate::contact::error::{CaseError, SolveError};
-use crate::contact::monitor::Monitor;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::slices::slices;
-use crate::contact::solution::words::answer::{Fields, Solution};
-use crate::contact::solve_slice;
+use railhead_contact as contact;
+use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::error::{CaseError, SolveError};
+use railhead_contact::monitor::Monitor;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::operator_store::OperatorStore;
+use railhead_contact::slices::slices;
+use railhead_contact::solution::words::answer::{Fields, Solution};
+use railhead_contact::solve_slice;
 
 /// Checks a case against limits.
 pub type Check = dyn Fn(&Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;

@@ -1,12 +1,12 @@
-//! Why a call of this room fails.
+//! Why a call of [`Jobs`](crate::Jobs) fails.
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use thiserror::Error;
 
-use crate::contact::error::CaseError;
-use crate::jobs::model::{Job, Kind, State};
+use crate::model::{Job, Kind, State};
+use railhead_contact::error::CaseError;
 
 /// Why the storage takes nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,7 +73,7 @@ impl StoreError {
     }
 }
 
-/// Every way a call of [`Jobs`](crate::jobs::Jobs) can fail.
+/// Every way a call of [`Jobs`](crate::Jobs) can fail.
 #[derive(Debug, Error)]
 pub enum JobsError {
     /// The case cannot be asked; every fault is named.

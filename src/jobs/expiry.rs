@@ -2,9 +2,9 @@
 
 use uuid::Uuid;
 
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::Job;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::model::Job;
 
 impl Jobs {
     /// The job with the time at which it will expire.

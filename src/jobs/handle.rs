@@ -5,15 +5,15 @@ use std::time::Duration;
 use serde_json::Value;
 use tokio::time::timeout;
 
-use crate::contact::case::solver::KnownPair;
-use crate::contact::error::{CaseError, Fault, FaultCode};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::model::{Kind, Labels};
-use crate::jobs::options::Options;
-use crate::jobs::runtime_probe::{ProbedTime, probe};
-use crate::jobs::shared::Shared;
-use crate::jobs::store::Usage;
+use crate::error::{JobsError, Result};
+use crate::model::{Kind, Labels};
+use crate::options::Options;
+use crate::runtime_probe::{ProbedTime, probe};
+use crate::shared::Shared;
+use crate::store::Usage;
+use railhead_contact::case::solver::KnownPair;
+use railhead_contact::error::{CaseError, Fault, FaultCode};
+use railhead_contact::problem::checked_case::CheckedCase;
 
 /// Longest list page.
 pub const PAGE_MAX: u32 = 1000;

@@ -9,12 +9,12 @@ use opentelemetry::trace::{TraceContextExt, Tracer as _};
 use opentelemetry_sdk::propagation::TraceContextPropagator;
 use uuid::Uuid;
 
-use crate::jobs::attempts::slices::Outcome;
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::created_at;
-use crate::jobs::shared::Shared;
-use crate::jobs::store::Claim;
-use crate::jobs::trace::{KeyValue, SubmitSpan, TRACEPARENT, Tracer};
+use crate::attempts::slices::Outcome;
+use crate::handle::Jobs;
+use crate::model::created_at;
+use crate::shared::Shared;
+use crate::store::Claim;
+use crate::trace::{KeyValue, SubmitSpan, TRACEPARENT, Tracer};
 
 impl Jobs {
     /// What makes the spans, if they are collected.

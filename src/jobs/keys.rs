@@ -3,13 +3,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::jobs::clock::Clock;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::{Key, Labels, MARK, is_tenant};
-use crate::jobs::open_store::{open_beside, open_shared, table_file};
-use crate::jobs::store::Store;
-use crate::jobs::sync::lock;
+use crate::clock::Clock;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::model::{Key, Labels, MARK, is_tenant};
+use crate::open_store::{open_beside, open_shared, table_file};
+use crate::store::Store;
+use crate::sync::lock;
 
 /// The keys of a data folder, also beside a running service.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! How the jobs room is opened, started and stopped.
+//! How [`Jobs`] is opened, started and stopped.
 
 use std::fs::{File, TryLockError};
 use std::os::unix::fs::OpenOptionsExt;
@@ -15,27 +15,27 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Uuid};
 
-use crate::jobs::attempts::attempt::{AllLeases, RunningAttempts};
-use crate::jobs::attempts::fair_scheduler::FairScheduler;
-use crate::jobs::blobs::Blobs;
-use crate::jobs::clock::ClockSteps;
-use crate::jobs::disk_reserve::{self, make_private_folder};
-use crate::jobs::engine::Engine;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::maintenance::{self, nodes};
-use crate::jobs::metrics::Metrics;
-use crate::jobs::model::{ANONYMOUS, Kind};
-use crate::jobs::open_store::{note_closed, open_for_service};
-use crate::jobs::options::Options;
-use crate::jobs::recent_reads::RecentReads;
-use crate::jobs::result_place::settle::settle;
-use crate::jobs::shared::{Shared, UnfinishedBatches};
-use crate::jobs::staged_bytes::StagedBytes;
-use crate::jobs::storage_fault::StorageFaults;
-use crate::jobs::store::{Node, Store};
-use crate::jobs::sync::lock;
-use crate::jobs::worker::pool::Worker;
+use crate::attempts::attempt::{AllLeases, RunningAttempts};
+use crate::attempts::fair_scheduler::FairScheduler;
+use crate::blobs::Blobs;
+use crate::clock::ClockSteps;
+use crate::disk_reserve::{self, make_private_folder};
+use crate::engine::Engine;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::maintenance::{self, nodes};
+use crate::metrics::Metrics;
+use crate::model::{ANONYMOUS, Kind};
+use crate::open_store::{note_closed, open_for_service};
+use crate::options::Options;
+use crate::recent_reads::RecentReads;
+use crate::result_place::settle::settle;
+use crate::shared::{Shared, UnfinishedBatches};
+use crate::staged_bytes::StagedBytes;
+use crate::storage_fault::StorageFaults;
+use crate::store::{Node, Store};
+use crate::sync::lock;
+use crate::worker::pool::Worker;
 
 /// How long a shutdown waits for workers that were told to stop.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);

@@ -1,4 +1,4 @@
-//! What the jobs room counts for the operator. Labels have few values, all known beforehand: never an id, never a name
+//! Metrics of jobs for the operator. Labels have few values, all known beforehand: never an id, never a name
 //! that a client chose.
 
 use std::sync::atomic::AtomicU64;
@@ -10,11 +10,11 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Registry;
 
-use crate::contact::case::words::solver::MethodName;
-use crate::contact::evaluate::answer::ManyAnswer;
-use crate::contact::solution::words::answer::Solution;
-use crate::jobs::model::{FailureKind, State};
-use crate::jobs::store::Ending;
+use crate::model::{FailureKind, State};
+use crate::store::Ending;
+use railhead_contact::case::words::solver::MethodName;
+use railhead_contact::evaluate::answer::ManyAnswer;
+use railhead_contact::solution::words::answer::Solution;
 
 /// Upper bounds of solve times in s.
 const SOLVE_SECONDS: [f64; 14] = [

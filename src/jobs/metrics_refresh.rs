@@ -4,14 +4,14 @@ use std::sync::atomic::Ordering;
 
 use prometheus_client::registry::Registry;
 
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::metrics::state_label;
-use crate::jobs::model::State;
-use crate::jobs::storage_fault::StoragePlace;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::metrics::state_label;
+use crate::model::State;
+use crate::storage_fault::StoragePlace;
 
 impl Jobs {
-    /// The registry of what this room counts.
+    /// The registry of the metrics of this crate.
     #[must_use]
     pub fn metrics(&self) -> &Registry {
         &self.shared.registry

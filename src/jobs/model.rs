@@ -1,4 +1,4 @@
-//! The words of the room: jobs, batches, keys, and how they are submitted.
+//! Jobs, batches, keys, and how they are submitted.
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::error::SolveError;
-use crate::contact::remark::entry::RemarkEntry;
+use railhead_contact::error::SolveError;
+use railhead_contact::remark::entry::RemarkEntry;
 
 /// A kind of work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Names)]

@@ -2,11 +2,11 @@
 
 use std::time::SystemTime;
 
-use crate::jobs::attempts::slices::Outcome;
-use crate::jobs::handle::Jobs;
-use crate::jobs::shared::Shared;
-use crate::jobs::store::Claim;
-use crate::jobs::trace::SubmitSpan;
+use crate::attempts::slices::Outcome;
+use crate::handle::Jobs;
+use crate::shared::Shared;
+use crate::store::Claim;
+use crate::trace::SubmitSpan;
 
 impl Jobs {
     pub(crate) fn submit_span(&self) -> SubmitSpan {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::jobs::error::Result;
+use crate::error::Result;
 
 /// Makes spans; no value of it exists in this build.
 #[derive(Debug, Clone)]

@@ -5,13 +5,13 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::jobs::disk_reserve;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::options::{Database, NotifyMode};
-use crate::jobs::store::Store;
+use crate::disk_reserve;
+use crate::error::{JobsError, Result};
+use crate::options::{Database, NotifyMode};
+use crate::store::Store;
 #[cfg(feature = "cluster")]
-use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::store::postgres::database::PostgresStore;
+use crate::store::sqlite::database::SqliteStore;
 
 /// The file that says that the job table was closed in good order.
 const CLOSED: &str = "closed";

@@ -8,12 +8,12 @@ use std::time::Duration;
 use clap::builder::TypedValueParser;
 use clap::{ArgAction, Args, Command, value_parser};
 
-use crate::contact::case::solver::Limits;
-use crate::jobs::clock::Clock;
-use crate::jobs::result_place::url::ResultsPlace;
-use crate::jobs::trace::Tracer;
+use crate::clock::Clock;
+use crate::result_place::url::ResultsPlace;
+use crate::trace::Tracer;
+use railhead_contact::case::solver::Limits;
 
-pub use crate::jobs::store::NotifyMode;
+pub use crate::store::NotifyMode;
 
 /// A database that several processes share.
 #[derive(Clone, PartialEq, Eq)]
@@ -127,7 +127,10 @@ impl Options {
 }
 
 /// The defaults of flags, whatever the environment says.
-pub(crate) fn defaults<T: Args>() -> T {
+///
+/// # Panics
+/// A flag has no default.
+pub fn defaults<T: Args>() -> T {
     let mut command = T::augment_args(Command::new("")).mut_args(|flag| flag.env(None::<&str>));
     let none = command
         .try_get_matches_from_mut([""])
@@ -136,13 +139,13 @@ pub(crate) fn defaults<T: Args>() -> T {
 }
 
 /// A number of MiB as bytes.
-pub(crate) fn mib(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = u64> {
+pub fn mib(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = u64> {
     let number = value_parser!(u32).range(allowed);
     number.map(|number| u64::from(number) << 20)
 }
 
 /// A whole number of seconds.
-pub(crate) fn seconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = Duration> {
+pub fn seconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = Duration> {
     let number = value_parser!(u32).range(allowed);
     number.map(|number| Duration::from_secs(number.into()))
 }

@@ -7,21 +7,21 @@ use bytes::Bytes;
 use serde_json::Value;
 use tokio::runtime::Handle;
 
-use crate::contact::case::check::{SectionReport, check_section};
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::answer::RowsAnswer;
-use crate::contact::evaluate::many::{ManyTask, NotAtOnce, evaluate_at_once, several_answers};
-use crate::contact::evaluate::varied::{
+use crate::error::{JobsError, Result};
+use crate::handle::{Jobs, PAGE_MAX};
+use crate::idempotency;
+use crate::store::{Page, ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
+use crate::sync::blocking;
+use railhead_contact::case::check::{SectionReport, check_section};
+use railhead_contact::error::{CaseError, Fault};
+use railhead_contact::evaluate::answer::RowsAnswer;
+use railhead_contact::evaluate::many::{ManyTask, NotAtOnce, evaluate_at_once, several_answers};
+use railhead_contact::evaluate::varied::{
     Values, VariedColumn, case_of_row, column_pointer, named_and_given, named_sections,
     of_first_row, put_section,
 };
-use crate::contact::monitor::Monitor;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::{Jobs, PAGE_MAX};
-use crate::jobs::idempotency;
-use crate::jobs::store::{Page, ProfileCursor, ProfileEntry, ProfileKept, StoredProfile};
-use crate::jobs::sync::blocking;
+use railhead_contact::monitor::Monitor;
+use railhead_contact::problem::checked_case::CheckedCase;
 
 /// Cross-sections that were read a moment ago, by their digests.
 pub(crate) type KnownSections = HashMap<String, Value>;

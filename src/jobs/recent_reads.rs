@@ -8,7 +8,7 @@ use std::time::Duration;
 use tokio::time::Instant;
 use uuid::Uuid;
 
-use crate::jobs::sync::lock;
+use crate::sync::lock;
 
 /// Whose thing, and which.
 type OwnedId = (Arc<str>, Uuid);

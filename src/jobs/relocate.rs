@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use crate::jobs::blobs::Blobs;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::lifecycle::lock_folder;
-use crate::jobs::metrics::StoreRequests;
-use crate::jobs::open_store::table_file;
-use crate::jobs::options::Options;
-use crate::jobs::result_place::settle::settle;
-use crate::jobs::result_place::url::ResultsPlace;
-use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store::{Reap, Upkeep};
+use crate::blobs::Blobs;
+use crate::error::{JobsError, Result};
+use crate::lifecycle::lock_folder;
+use crate::metrics::StoreRequests;
+use crate::open_store::table_file;
+use crate::options::Options;
+use crate::result_place::settle::settle;
+use crate::result_place::url::ResultsPlace;
+use crate::store::postgres::database::PostgresStore;
+use crate::store::sqlite::database::SqliteStore;
+use crate::store::{Reap, Upkeep};
 
 /// What the job table is called once its rows are elsewhere, so that no service starts on it.
 const MOVED: &str = "jobs.db.moved";

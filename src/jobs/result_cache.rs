@@ -2,11 +2,11 @@
 
 use uuid::Uuid;
 
-use crate::jobs::error::Result;
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::State;
-use crate::jobs::shared::Shared;
-use crate::jobs::store::{CacheKey, NewJob};
+use crate::error::Result;
+use crate::handle::Jobs;
+use crate::model::State;
+use crate::shared::Shared;
+use crate::store::{CacheKey, NewJob};
 
 impl Jobs {
     /// The key of a case with this digest; `None` if results are not to be used again.

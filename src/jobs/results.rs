@@ -5,13 +5,13 @@ use futures_util::StreamExt;
 use futures_util::stream::{self, BoxStream};
 use uuid::Uuid;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::{PatchFields, Solution};
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::Job;
-use crate::jobs::store::{ResultRef, StoredResult};
-use crate::jobs::sync::blocking;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::model::Job;
+use crate::store::{ResultRef, StoredResult};
+use crate::sync::blocking;
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::solution::words::answer::{PatchFields, Solution};
 
 /// Solutions from this size on are read off the threads that answer requests.
 const LARGE_BYTES: usize = 64 << 10;

@@ -7,10 +7,10 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use crate::contact::error::SolveError;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::answer::FoundBy;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::{Monitor, Stop};
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::solution::words::answer::FoundBy;
 
 /// Largest memory of its own, in bytes, of a case that is probed: probes run outside the memory budget of the workers.
 const BYTES_MAX: u64 = 128 << 20;
@@ -100,8 +100,8 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::*;
-    use crate::contact::case::solver::Limits;
-    use crate::contact::{check, solve};
+    use railhead_contact::case::solver::Limits;
+    use railhead_contact::{check, solve};
 
     fn checked(motion: &Value, solver: &Value) -> CheckedCase {
         let case = json!({

@@ -12,19 +12,19 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Timestamp, Uuid};
 
-use crate::jobs::attempts::attempt::{AllLeases, RunningAttempts};
-use crate::jobs::attempts::fair_scheduler::FairScheduler;
-use crate::jobs::blobs::Blobs;
-use crate::jobs::clock::{ClockStep, ClockSteps};
-use crate::jobs::engine::Engine;
-use crate::jobs::metrics::Metrics;
-use crate::jobs::model::{Batch, Job, Trusted};
-use crate::jobs::options::Options;
-use crate::jobs::recent_reads::RecentReads;
-use crate::jobs::staged_bytes::StagedBytes;
-use crate::jobs::storage_fault::StorageFaults;
-use crate::jobs::store::{Lease, Node, Notification, Store};
-use crate::jobs::sync::lock;
+use crate::attempts::attempt::{AllLeases, RunningAttempts};
+use crate::attempts::fair_scheduler::FairScheduler;
+use crate::blobs::Blobs;
+use crate::clock::{ClockStep, ClockSteps};
+use crate::engine::Engine;
+use crate::metrics::Metrics;
+use crate::model::{Batch, Job, Trusted};
+use crate::options::Options;
+use crate::recent_reads::RecentReads;
+use crate::staged_bytes::StagedBytes;
+use crate::storage_fault::StorageFaults;
+use crate::store::{Lease, Node, Notification, Store};
+use crate::sync::lock;
 
 /// How often a waiting caller reads again although nothing was announced.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);

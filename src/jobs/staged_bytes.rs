@@ -4,9 +4,9 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::options::StagingBounds;
-use crate::jobs::sync::lock;
+use crate::error::{JobsError, Result};
+use crate::options::StagingBounds;
+use crate::sync::lock;
 
 /// The bytes that are staged at present.
 #[derive(Debug, Default)]

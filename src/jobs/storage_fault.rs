@@ -4,8 +4,8 @@ use std::error::Error;
 use std::io;
 use std::sync::{Mutex, MutexGuard};
 
-use crate::jobs::error::{JobsError, StorageFault};
-use crate::jobs::sync::lock;
+use crate::error::{JobsError, StorageFault};
+use crate::sync::lock;
 
 /// What a folder is called in errors.
 const DISK: &str = "LocalFileSystem";
@@ -153,7 +153,7 @@ impl Drop for WaitingWriter<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::model::Kind;
+    use crate::model::Kind;
 
     #[test]
     fn places_fail_and_recover_one_by_one() {

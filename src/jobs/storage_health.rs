@@ -8,12 +8,12 @@
 use std::future::Future;
 use std::time::Duration;
 
-use crate::jobs::disk_reserve;
-use crate::jobs::error::{JobsError, Result, StorageFault, StoreError};
-use crate::jobs::handle::Jobs;
-use crate::jobs::shared::Shared;
-use crate::jobs::storage_fault::{FaultChange, StoragePlace};
-use crate::jobs::sync::blocking;
+use crate::disk_reserve;
+use crate::error::{JobsError, Result, StorageFault, StoreError};
+use crate::handle::Jobs;
+use crate::shared::Shared;
+use crate::storage_fault::{FaultChange, StoragePlace};
+use crate::sync::blocking;
 
 /// Tries to write where the cause is not the disk, with pauses that double from [`FIRST_PAUSE`].
 const WRITE_TRIES: u32 = 6;

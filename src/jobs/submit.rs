@@ -5,18 +5,18 @@ use std::sync::Arc;
 use bytes::Bytes;
 use serde_json::Value;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::error::CaseError;
-use crate::contact::evaluate::varied::in_template;
-use crate::contact::evolution::task::Evolution;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::idempotency;
-use crate::jobs::model::{Job, Kind, WorkOptions, created_at};
-use crate::jobs::store::{Enqueued, NewJob, QueueBounds, Refusal};
-use crate::jobs::sync::blocking;
-use crate::jobs::trace::KeyValue;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::idempotency;
+use crate::model::{Job, Kind, WorkOptions, created_at};
+use crate::store::{Enqueued, NewJob, QueueBounds, Refusal};
+use crate::sync::blocking;
+use crate::trace::KeyValue;
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::error::CaseError;
+use railhead_contact::evaluate::varied::in_template;
+use railhead_contact::evolution::task::Evolution;
+use railhead_contact::problem::checked_case::CheckedCase;
 
 impl Jobs {
     /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case

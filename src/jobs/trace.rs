@@ -15,7 +15,7 @@ use opentelemetry::propagation::TextMapPropagator;
 use opentelemetry::trace::{Span, SpanKind, Status, TraceContextExt, Tracer as _};
 use opentelemetry_sdk::propagation::TraceContextPropagator;
 
-use crate::jobs::error::Result;
+use crate::error::Result;
 
 pub(crate) const TRACEPARENT: &str = "traceparent";
 

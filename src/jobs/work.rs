@@ -6,14 +6,14 @@ use std::time::Duration;
 use tokio::time::{Instant, sleep, timeout_at};
 use uuid::Uuid;
 
-use crate::jobs::attempts::attempt::StopReason;
-use crate::jobs::batch::control::DELETED_AT_ONCE;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
-use crate::jobs::model::{Batch, Job, Kind, Labels, QueuePlace, State};
-use crate::jobs::run::model::{Run, RunHead};
-use crate::jobs::shared::POLL_INTERVAL;
-use crate::jobs::store::{Deleted, Filter, Membership, Notification, Page};
+use crate::attempts::attempt::StopReason;
+use crate::batch::control::DELETED_AT_ONCE;
+use crate::error::{JobsError, Result};
+use crate::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
+use crate::model::{Batch, Job, Kind, Labels, QueuePlace, State};
+use crate::run::model::{Run, RunHead};
+use crate::shared::POLL_INTERVAL;
+use crate::store::{Deleted, Filter, Membership, Notification, Page};
 
 /// Time between two reads of a job or batch of which no change is announced. Within it, what another request has read serves.
 const PAUSE: Duration = Duration::from_millis(50);

@@ -97,9 +97,9 @@ pub fn words(item: TokenStream) -> TokenStream {
             pub(crate) const WORDS: &'static [(&'static str, #name)] = &[#((#words, #name::#variants)),*];
         }
 
-        impl crate::contact::case::words::object::Member for #name {
+        impl crate::case::words::object::Member for #name {
             fn read(
-                block: &mut crate::contact::case::words::object::Object,
+                block: &mut crate::case::words::object::Object,
                 name: &str,
             ) -> Option<#name> {
                 block.word(name, #name::WORDS)
@@ -181,7 +181,7 @@ pub fn finite(item: TokenStream) -> TokenStream {
         _ => return quote!(compile_error! { "a struct or an enum is needed" }).into(),
     };
     let members = fields.iter().filter_map(|it| it.ident.as_ref());
-    let finite = quote!(crate::contact::finite::Finite);
+    let finite = quote!(crate::finite::Finite);
     quote! {
         impl #finite for #name {
             fn not_finite(&self) -> Option<String> {
@@ -205,7 +205,7 @@ pub fn finite(item: TokenStream) -> TokenStream {
 /// what was read of it, and refuses members that do not go together.
 #[proc_macro_derive(Members, attributes(member, members))]
 pub fn members(item: TokenStream) -> TokenStream {
-    let object = quote!(crate::contact::case::words::object);
+    let object = quote!(crate::case::words::object);
     match parse_macro_input!(item as Item) {
         Item::Struct(item) => {
             let name = &item.ident;
@@ -292,7 +292,7 @@ fn reader(path: &Path, fields: &Fields, attributes: &[Attribute], before: &[&str
 }
 
 fn read_field(field: &Field) -> Tokens {
-    let object = quote!(crate::contact::case::words::object);
+    let object = quote!(crate::case::words::object);
     let items = items(&field.attrs, "member");
     let value = |wanted: &str| {
         items.iter().find_map(|item| match item {

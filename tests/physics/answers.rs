@@ -4,11 +4,11 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
-use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::{Monitor, Stop, Unmonitored};
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::solution::words::answer::Solution;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good, good_with, with};

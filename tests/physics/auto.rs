@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use railhead::contact;
-use railhead::contact::case::solver::{KnownPair, Limits};
-use railhead::contact::case::words::solver::MethodName;
-use railhead::contact::evaluate::many::{ManyTask, evaluate_at_once};
-use railhead::contact::monitor::{Monitor, Unmonitored};
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::solution::words::answer::{PointSolution, Solution};
+use railhead_contact as contact;
+use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::case::words::solver::MethodName;
+use railhead_contact::evaluate::many::{ManyTask, evaluate_at_once};
+use railhead_contact::monitor::{Monitor, Unmonitored};
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::operator_store::OperatorStore;
+use railhead_contact::solution::words::answer::{PointSolution, Solution};
 use serde_json::{Value, json};
 
 use crate::many_rows::{column, numbers, solved};

@@ -1,6 +1,6 @@
 //! The limit of a very wide patch: every strip is Carter's line contact.
 
-use railhead::contact::solution::words::answer::{Fields, PatchFields};
+use railhead_contact::solution::words::answer::{Fields, PatchFields};
 
 use crate::reference::{Ellipse, cases, solve};
 

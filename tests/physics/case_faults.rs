@@ -1,7 +1,7 @@
 //! A bad case is refused with every fault: where it is, what was given, what is allowed.
 
-use railhead::contact::case::words::solver::{Case, Output};
-use railhead::contact::rolling::task::Resolution;
+use railhead_contact::case::words::solver::{Case, Output};
+use railhead_contact::rolling::task::Resolution;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, good, good_with, problem, with};

@@ -1,8 +1,8 @@
 //! Whatever is done to a case, it is answered with a problem or with faults that point into it.
 
 use proptest::prelude::*;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
 use serde_json::{Value, json};
 
 use crate::cases::{good, good_with, with};

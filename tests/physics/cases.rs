@@ -1,9 +1,9 @@
 //! Valid cases to start from, and ways to change them.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::error::Fault;
-use railhead::contact::problem::checked_case::CheckedCase;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::error::Fault;
+use railhead_contact::problem::checked_case::CheckedCase;
 use serde_json::{Value, json};
 
 /// A complete, valid case.

@@ -1,10 +1,10 @@
 //! Is the contact of a wheel on the curve of its rail right? Against CONTACT with curved surfaces of contact, against boundary elements, and where the
 //! rail does not bend against planes.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;
@@ -15,7 +15,7 @@ const WHEEL: &str = include_str!("../../src/contact/examples/s1002.txt");
 
 fn solve(case: &Value) -> Solution {
     let checked = check(case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"));
-    let (solution, _) = railhead::contact::solve(&checked, &Unmonitored).unwrap();
+    let (solution, _) = railhead_contact::solve(&checked, &Unmonitored).unwrap();
     solution
 }
 
@@ -522,7 +522,7 @@ fn fields_lie_about_the_load_centres_and_carry_the_forces() {
     let mut case = usual("curve", -6.0, 0.003);
     case["outputs"] = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
     let checked = check(&case, &Limits::default()).unwrap();
-    let (solution, fields) = railhead::contact::solve(&checked, &Unmonitored).unwrap();
+    let (solution, fields) = railhead_contact::solve(&checked, &Unmonitored).unwrap();
     for (patch, fields) in solution.patches.iter().zip(&fields.patches) {
         let (cells, point) = (fields.cells(0), &fields.points[0]);
         let pressure = cells.pressure_mpa.as_ref().unwrap();
@@ -726,7 +726,7 @@ fn what_follows_from_a_patch_is_given_about_its_load_centre() {
     case["damage"] = json!({ "across": true });
     case["thermal"] = json!({ "conductivity_w_per_mk": 50, "density_kg_per_m3": 7850, "specific_heat_j_per_kgk": 450, "bulk_c": 20 });
     let checked = check(&case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"));
-    let (solution, fields) = railhead::contact::solve(&checked, &Unmonitored).unwrap();
+    let (solution, fields) = railhead_contact::solve(&checked, &Unmonitored).unwrap();
     assert!(solution.patches.len() > 1);
     for (patch, fields) in solution.patches.iter().zip(&fields.patches) {
         let point = &patch.points[0];

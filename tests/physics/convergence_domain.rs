@@ -1,14 +1,14 @@
 //! Where `liu_hsu` converges, counted over the same motions on every region.
 
-use railhead::contact::mesh::Grading;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::methods::liu_hsu::active_set::{
+use railhead_contact::mesh::Grading;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::methods::liu_hsu::active_set::{
     InitialGuess, ZonesRun, ZonesTermination,
 };
-use railhead::contact::rolling::methods::liu_hsu::solve::{
+use railhead_contact::rolling::methods::liu_hsu::solve::{
     coarse_pole, solve_by_upwind, solve_with,
 };
-use railhead::contact::rolling::slip_rules::Rule;
+use railhead_contact::rolling::slip_rules::Rule;
 
 use crate::regions::{Contact, Region, motion};
 

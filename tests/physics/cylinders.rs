@@ -1,6 +1,6 @@
 //! Cylinders of unlike bodies, after Bentall and Johnson: the middle of a very long patch across rolling.
 
-use railhead::contact::solution::words::answer::{Fields, PatchFields};
+use railhead_contact::solution::words::answer::{Fields, PatchFields};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

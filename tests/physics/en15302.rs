@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use railhead::contact::solution::words::answer::Kinematics;
+use railhead_contact::solution::words::answer::Kinematics;
 use serde_json::{Value, json};
 
 use crate::reference::solve;

@@ -1,13 +1,13 @@
 //! The kernels and the discrete equations against stored numbers (`tests/data/kernels.json`, described in
 //! `tests/data/README.md`).
 
-use railhead::contact::half_space::kernels::{Rectangle, rectangle};
-use railhead::contact::mesh::Grading;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::methods::liu_hsu::active_set::InitialGuess;
-use railhead::contact::rolling::methods::liu_hsu::solve::solve_with;
-use railhead::contact::rolling::slip_equations::SlipScratch;
-use railhead::contact::rolling::slip_rules::Rule;
+use railhead_contact::half_space::kernels::{Rectangle, rectangle};
+use railhead_contact::mesh::Grading;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::methods::liu_hsu::active_set::InitialGuess;
+use railhead_contact::rolling::methods::liu_hsu::solve::solve_with;
+use railhead_contact::rolling::slip_equations::SlipScratch;
+use railhead_contact::rolling::slip_rules::Rule;
 use serde::Deserialize;
 
 use crate::regions::{self, Contact, REGIONS, SHEAR_MODULUS, boundary_element, on_stage};

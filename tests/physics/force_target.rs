@@ -1,8 +1,8 @@
 //! A target relative to the tangential force: met by every kind of motion, or said to be missed; and what the answer says of a small force
 //! where the target is relative to the friction limit.
 
-use railhead::contact::evaluate::answer::{NUMBER_NAMES, RowStatus};
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact::evaluate::answer::{NUMBER_NAMES, RowStatus};
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good, good_with, problem, with};
@@ -21,7 +21,7 @@ fn both(case: &Value, target: f64) -> [Value; 2] {
 }
 
 fn force(solution: &Solution, point: usize) -> f64 {
-    let sum = |of: fn(&railhead::contact::solution::words::answer::PointSolution) -> f64| {
+    let sum = |of: fn(&railhead_contact::solution::words::answer::PointSolution) -> f64| {
         let patches = solution.patches.iter();
         patches.map(|patch| of(&patch.points[point])).sum::<f64>()
     };

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::cases::{assert_fault, faults, good, good_with, with};
 use crate::gap_samples::GapReference;
 use crate::reference::{Ellipse, assert_none, solve};
-use railhead::contact::solution::words::answer::{PointSolution, Solution};
+use railhead_contact::solution::words::answer::{PointSolution, Solution};
 
 const LIMIT: f64 = 0.3 * 60_000.0;
 

@@ -1,17 +1,17 @@
 //! Coulomb's law in every cell: the bound, complementarity, and slip along the traction.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::mesh::MeshSize;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal_stage;
-use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
-use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::slip_equations::SlipEquations;
-use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::rolling::task::{Motion, TOLERANCE_LEAST};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::mesh::MeshSize;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::normal_stage;
+use railhead_contact::rolling::methods::boundary_element::newton::Newton;
+use railhead_contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
+use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead_contact::rolling::slip_equations::SlipEquations;
+use railhead_contact::rolling::slip_rules::Rule;
+use railhead_contact::rolling::strip_mesh::StripMesh;
+use railhead_contact::rolling::task::{Motion, TOLERANCE_LEAST};
 
 use crate::laws::{MOTIONS, shapes};
 use crate::reference::{Ellipse, assert_none, solve};

@@ -1,8 +1,8 @@
 //! Friction that lies on the track while a history rolls over it.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::solution::words::answer::{PointSolution, Solution};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::solution::words::answer::{PointSolution, Solution};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, with};

@@ -1,10 +1,10 @@
 //! Friction that falls with slip or varies across, and what lies between the bodies: references, limits, laws and faults.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::{PatchSolution, PointSolution, Zone};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::{PatchSolution, PointSolution, Zone};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -1,6 +1,6 @@
 //! Friction that depends on what a point has met in the contact: a coefficient that falls with temperature, and a layer that yields.
 
-use railhead::contact::solution::words::answer::{Fields, Solution, Zone};
+use railhead_contact::solution::words::answer::{Fields, Solution, Zone};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, with};

@@ -1,10 +1,10 @@
 //! A gap without a contact to show is refused, or fails with its reason.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unmonitored;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, good_with, with};

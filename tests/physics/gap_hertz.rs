@@ -1,7 +1,7 @@
 //! Hertz's contact given as a gap is Hertz's contact again.
 
-use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::gap_samples::{grid, profile, spread, steel};

@@ -9,15 +9,15 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::error::SolveError;
-use railhead::contact::half_space::kernels::{Rectangle, rectangle};
-use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
-use railhead::contact::normal::gap::surface::GapSurface;
-use railhead::contact::remark::kind::Figure;
-use railhead::contact::solution::words::answer::{Fields, Solution};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::error::SolveError;
+use railhead_contact::half_space::kernels::{Rectangle, rectangle};
+use railhead_contact::monitor::{Monitor, Stop, Unmonitored};
+use railhead_contact::normal::gap::surface::GapSurface;
+use railhead_contact::remark::kind::Figure;
+use railhead_contact::solution::words::answer::{Fields, Solution};
 use serde_json::{Value, json};
 
 use crate::gap_samples::{Across, grid, profile, spread, steel};

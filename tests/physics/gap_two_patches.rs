@@ -1,8 +1,8 @@
 //! Two patches of different size in one gap: both are resolved, whatever their sizes, or the answer says that one is not.
 
-use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
-use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::json;
 
 use crate::gap_samples::{profile, spread, steel};

@@ -6,8 +6,8 @@
 
 use std::path::PathBuf;
 
-use railhead::contact::case::digest::SOLVER_REVISION;
-use railhead::contact::numerics::simd::SimdLevel;
+use railhead_contact::case::digest::SOLVER_REVISION;
+use railhead_contact::numerics::simd::SimdLevel;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 

@@ -1,7 +1,7 @@
 //! Derivatives of forces and moment: Kalker's coefficients at rest, and secants of finer answers, each within the stated error.
 
-use railhead::contact::rolling::linear_theory::{coefficients, spin_coefficient};
-use railhead::contact::solution::words::answer::{Gradients, PointSolution};
+use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
+use railhead_contact::solution::words::answer::{Gradients, PointSolution};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good_with};

@@ -1,10 +1,10 @@
 //! Contact of the back of a flange with a guard rail that is part of the rail's section.
 
-use railhead::contact::case::check::check_section;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact::case::check::check_section;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;
@@ -19,7 +19,7 @@ const CANT: f64 = 0.025;
 
 fn solve(case: &Value) -> Solution {
     let checked = check(case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"));
-    let (solution, _) = railhead::contact::solve(&checked, &Unmonitored).unwrap();
+    let (solution, _) = railhead_contact::solve(&checked, &Unmonitored).unwrap();
     solution
 }
 

@@ -1,9 +1,9 @@
 //! The error estimate on contacts that no constant was fitted to: the second half of the random populations of
 //! `benches/calibrate` and all its wheels on rails, against meshes much finer.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 
 use crate::judge::judged;

@@ -1,8 +1,8 @@
 //! Hertz's contact: worked cases of the literature and the laws of scaling.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
 use serde_json::json;
 
 /// One worked case: bodies, load, and what comes out.

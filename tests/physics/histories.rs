@@ -4,16 +4,16 @@ use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::mesh::MeshSize;
-use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
-use railhead::contact::normal_stage;
-use railhead::contact::rolling::history::level_run::LevelRun;
-use railhead::contact::rolling::history::plan::PointRecord;
-use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::solution::words::answer::{HistoryPoint, PointSolution, Solution};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::mesh::MeshSize;
+use railhead_contact::monitor::{Monitor, Stop, Unmonitored};
+use railhead_contact::normal_stage;
+use railhead_contact::rolling::history::level_run::LevelRun;
+use railhead_contact::rolling::history::plan::PointRecord;
+use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead_contact::rolling::strip_mesh::StripMesh;
+use railhead_contact::solution::words::answer::{HistoryPoint, PointSolution, Solution};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

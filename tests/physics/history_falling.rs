@@ -1,6 +1,6 @@
 //! Histories with friction that falls with slip.
 
-use railhead::contact::solution::words::answer::{PointSolution, Solution};
+use railhead_contact::solution::words::answer::{PointSolution, Solution};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, with};

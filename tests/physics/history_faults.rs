@@ -4,10 +4,10 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::{Monitor, Stop};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::{Monitor, Stop};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, with};

@@ -6,7 +6,7 @@
 use serde_json::json;
 
 use crate::reference::{Ellipse, assert_none, solve};
-use railhead::contact::rolling::linear_theory::{POISSON_RATIOS, RATIOS, coefficients, ratio};
+use railhead_contact::rolling::linear_theory::{POISSON_RATIOS, RATIOS, coefficients, ratio};
 
 /// C11, C22 and C23 of an ellipse: two meshes, extrapolated to vanishing cells; C23 is the mean of what spin does to the
 /// lateral force and what lateral creepage does to the moment.

@@ -1,6 +1,6 @@
 //! What holds exactly in theory and on every symmetric mesh: symmetry, scaling, friction, power.
 
-use railhead::contact::solution::words::answer::{Fields, PatchCells, Zone};
+use railhead_contact::solution::words::answer::{Fields, PatchCells, Zone};
 
 use crate::reference::{Ellipse, assert_none, solve};
 

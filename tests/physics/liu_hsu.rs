@@ -4,18 +4,18 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use railhead::contact::mesh::Grading;
-use railhead::contact::monitor::{Monitor, Stop, Unmonitored};
-use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::task::Convergence;
-use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::methods::liu_hsu::active_set::{InitialGuess, ZonesTermination};
-use railhead::contact::rolling::methods::liu_hsu::solve::{
+use railhead_contact::mesh::Grading;
+use railhead_contact::monitor::{Monitor, Stop, Unmonitored};
+use railhead_contact::rolling::methods::boundary_element::newton::Newton;
+use railhead_contact::rolling::methods::boundary_element::task::Convergence;
+use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead_contact::rolling::methods::liu_hsu::active_set::{InitialGuess, ZonesTermination};
+use railhead_contact::rolling::methods::liu_hsu::solve::{
     ZonesOutcome, coarse_pole, solve, solve_by_upwind, solve_with,
 };
-use railhead::contact::rolling::slip_equations::SlipScratch;
-use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::task::Motion;
+use railhead_contact::rolling::slip_equations::SlipScratch;
+use railhead_contact::rolling::slip_rules::Rule;
+use railhead_contact::rolling::task::Motion;
 
 use crate::convergence_domain::{count, motions};
 use crate::regions::{self, Contact, REGIONS, Region, boundary_element, on_stage};

@@ -1,13 +1,13 @@
 //! The algebra inside `liu_hsu`: the elimination of the stick tractions, and the Newton–Raphson step.
 
-use railhead::contact::mesh::Grading;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::methods::liu_hsu::active_set::newton_step;
-use railhead::contact::rolling::methods::liu_hsu::stick_block::{
+use railhead_contact::mesh::Grading;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::methods::liu_hsu::active_set::newton_step;
+use railhead_contact::rolling::methods::liu_hsu::stick_block::{
     DenseProblem, DenseTask, SlipSystem, both_components,
 };
-use railhead::contact::rolling::slip_equations::SlipScratch;
-use railhead::contact::rolling::slip_rules::Rule;
+use railhead_contact::rolling::slip_equations::SlipScratch;
+use railhead_contact::rolling::slip_rules::Rule;
 
 use crate::regions::{self, Contact, Region};
 

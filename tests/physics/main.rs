@@ -1,7 +1,5 @@
 //! Does the physics hold?
 
-extern crate railhead_contact as railhead;
-
 #[path = "../../benches/report/allocations.rs"]
 mod allocations;
 mod answers;

@@ -1,6 +1,6 @@
 //! Damage and temperatures of solved contacts.
 
-use railhead::contact::solution::words::answer::PointSolution;
+use railhead_contact::solution::words::answer::PointSolution;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use railhead::contact;
-use railhead::contact::case::solver::{KnownPair, Limits};
-use railhead::contact::evaluate::answer::{ManyAnswer, RowStatus};
-use railhead::contact::evaluate::many::{ManyTask, RowSolver, solve_many};
-use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead_contact as contact;
+use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::evaluate::answer::{ManyAnswer, RowStatus};
+use railhead_contact::evaluate::many::{ManyTask, RowSolver, solve_many};
+use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::{Value, json};
 
 use crate::gap_samples::steel;

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::{check, solve_with};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::operator_store::OperatorStore;
+use railhead_contact::solution::words::answer::Solution;
+use railhead_contact::{check, solve_with};
 use serde_json::{Value, json};
 
 use crate::gap_samples::{profile, steel};

@@ -1,6 +1,6 @@
 //! The examples that redraw the figures of Liu and Hsu's paper show what the paper says, on a patch without symmetry.
 
-use railhead::contact::solution::words::answer::{Fields, Solution, Zone};
+use railhead_contact::solution::words::answer::{Fields, Solution, Zone};
 use serde_json::{Value, json};
 
 use crate::reference::solve;

@@ -1,6 +1,6 @@
 //! Energy cell by cell: tractions times slips add up to the friction power of the patch, and no cell gains power.
 
-use railhead::contact::solution::words::answer::{Fields, Solution, Zone};
+use railhead_contact::solution::words::answer::{Fields, Solution, Zone};
 use serde_json::{Value, json};
 
 use crate::laws::{MOTIONS, shapes};

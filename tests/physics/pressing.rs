@@ -1,6 +1,6 @@
 //! Bodies that differ, pressed together under friction: Spence's contact, and rolling that begins there.
 
-use railhead::contact::solution::words::answer::{Fields, PointSolution, Solution};
+use railhead_contact::solution::words::answer::{Fields, PointSolution, Solution};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -1,7 +1,7 @@
 //! A pressure grid that cannot be read is refused with the place of the fault.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, grid_case, problem, with};

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use proptest::prelude::*;
-use railhead::contact::normal::pressure_field::field::PressureField;
+use railhead_contact::normal::pressure_field::field::PressureField;
 
 use crate::pressure_samples::{Samples, strip_load, strips};
 

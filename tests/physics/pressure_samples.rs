@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use railhead::contact::mesh::Chord;
-use railhead::contact::normal::pressure_field::field::PressureField;
-use railhead::contact::remark::entry::RemarkEntry;
+use railhead_contact::mesh::Chord;
+use railhead_contact::normal::pressure_field::field::PressureField;
+use railhead_contact::remark::entry::RemarkEntry;
 use serde_json::{Value, json};
 
 /// Samples `n` by `n` of a pressure over `[x_min, x_max, y_min, y_max]`, ends included.

@@ -1,10 +1,10 @@
 //! Profiles are judged before they are trusted: what exports and instruments do to points is named in the answer, or there is none.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::damaged::{Damage, blamed, linear, normal, off_normal, pressure_max, resampled, with};

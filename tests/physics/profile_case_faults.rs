@@ -1,9 +1,9 @@
 //! Faulty wheels and rails are refused by the reader, or fail with a reason; doubtful ones are remarked on.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, faults, good, with};

@@ -1,11 +1,11 @@
 //! A wheel worn to the shape of its rail, made here: tread and gauge corner touch side by side, inclined to each other by about half a
 //! radian, where two overlaps may or may not share a gap.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::geometry::wheel_rail::WheelRail;
-use railhead::contact::normal::footprint::NormalTask;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::geometry::wheel_rail::WheelRail;
+use railhead_contact::normal::footprint::NormalTask;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::profile_cases::{generated, on_planes, put};
@@ -222,7 +222,7 @@ fn places(case: &Value, solution: &Solution) -> Vec<Place> {
         let [dy, dz] = geometry.rail_at(*nearest.expect("a rail")).slope;
         (dz / dy).atan()
     };
-    let place = |patch: &railhead::contact::solution::words::answer::PatchSolution| {
+    let place = |patch: &railhead_contact::solution::words::answer::PatchSolution| {
         let position = patch.position.expect("a place");
         let [.., low, high] = patch.extent_mm;
         let [_, y, z] = position.track_mm;

@@ -1,9 +1,9 @@
 //! Are faulty profiles refused, and doubtful ones remarked on?
 
-use railhead::contact::geometry::contact_locus::ContactLocus;
-use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::contact::geometry::wheel_rail::WheelRail;
-use railhead::contact::remark::list::Remark;
+use railhead_contact::geometry::contact_locus::ContactLocus;
+use railhead_contact::geometry::profile::{Body, Profile, Reading};
+use railhead_contact::geometry::wheel_rail::WheelRail;
+use railhead_contact::remark::list::Remark;
 use serde_json::Value;
 
 use crate::profile_geometry::placement;

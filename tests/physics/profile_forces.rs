@@ -2,11 +2,11 @@
 
 use std::time::Instant;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;

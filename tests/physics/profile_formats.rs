@@ -1,8 +1,8 @@
 //! Do profile files say what their formats mean?
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::geometry::formats::{Format, ProfileFile, read};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::geometry::formats::{Format, ProfileFile, read};
 use serde_json::json;
 
 use crate::profile_cases::generated;

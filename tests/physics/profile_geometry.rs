@@ -1,11 +1,11 @@
 //! Do wheel and rail touch where they should?
 
-use railhead::contact::geometry::contact_locus::ContactLocus;
-use railhead::contact::geometry::formats;
-use railhead::contact::geometry::formats::Format;
-use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::contact::geometry::reference_curve::{ContactPlane, Nearest, ReferenceCurve};
-use railhead::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
+use railhead_contact::geometry::contact_locus::ContactLocus;
+use railhead_contact::geometry::formats;
+use railhead_contact::geometry::formats::Format;
+use railhead_contact::geometry::profile::{Body, Profile, Reading};
+use railhead_contact::geometry::reference_curve::{ContactPlane, Nearest, ReferenceCurve};
+use railhead_contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 
 use crate::profile_reference_files::reference_file;
 use crate::profile_shapes::{rail_60e1, s1002};

@@ -1,8 +1,8 @@
 //! Rolling that changes of a wheel on a rail that stays where it is: every patch has its own history of the same creepages.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::solution::words::answer::{PatchSolution, PointSolution, Solution, Total};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::solution::words::answer::{PatchSolution, PointSolution, Solution, Total};
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;

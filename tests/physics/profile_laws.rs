@@ -1,7 +1,7 @@
 //! What must hold for a wheel on a rail, whatever the shapes: closed forms, balance, mirror images.
 
-use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
-use railhead::contact::solution::words::answer::{PatchSolution, Position, Solution};
+use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
+use railhead_contact::solution::words::answer::{PatchSolution, Position, Solution};
 use serde_json::{Value, json};
 
 use crate::profile_cases::{by_origin, generated, on_planes, put, wheel_on_rail};

@@ -1,12 +1,12 @@
 //! The Manchester contact benchmark, case, through the case: 10 kN, profiles generated from their definitions.
 
-use railhead::contact::solution::words::answer::{PatchSolution, Position};
+use railhead_contact::solution::words::answer::{PatchSolution, Position};
 use serde_json::json;
 
 use crate::profile_cases::{generated, put};
 use crate::profile_geometry::{self, MANCHESTER, RAIL_ORIGIN, placement, roll};
 use crate::reference::{assert_none, solve};
-use railhead::contact::geometry::wheel_rail::Placement;
+use railhead_contact::geometry::wheel_rail::Placement;
 
 /// How far the load centre may lie from the benchmark's point, which is the mean overlap: on the flat top of the rail and
 /// where tread and corner touch together the two differ.

@@ -1,6 +1,6 @@
 //! Are forces on planes of contact those of CONTACT's planes, as far as the curve has the same? Needs the reference files.
 
-use railhead::contact::solution::words::answer::Total;
+use railhead_contact::solution::words::answer::Total;
 use serde_json::{Value, json};
 
 use crate::profile_cases::{put, wheel_on_rail};

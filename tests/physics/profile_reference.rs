@@ -1,12 +1,12 @@
 //! Do the frames and creepages of wheel and rail agree with CONTACT's? Needs the reference files beside the checkout.
 
-use railhead::contact::geometry::contact_locus::ContactLocus;
-use railhead::contact::geometry::formats;
-use railhead::contact::geometry::formats::Format;
-use railhead::contact::geometry::profile::{Body, Profile, Reading};
-use railhead::contact::geometry::reference_curve::{CurvePlace, ReferenceCurve, RigidMotion};
-use railhead::contact::geometry::wheel_rail::{Placement, WheelRail};
-use railhead::contact::geometry::wheelset_pose::WheelsetMotion;
+use railhead_contact::geometry::contact_locus::ContactLocus;
+use railhead_contact::geometry::formats;
+use railhead_contact::geometry::formats::Format;
+use railhead_contact::geometry::profile::{Body, Profile, Reading};
+use railhead_contact::geometry::reference_curve::{CurvePlace, ReferenceCurve, RigidMotion};
+use railhead_contact::geometry::wheel_rail::{Placement, WheelRail};
+use railhead_contact::geometry::wheelset_pose::WheelsetMotion;
 use serde_json::Value;
 
 use crate::profile_geometry::placement;

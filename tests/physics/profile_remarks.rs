@@ -1,7 +1,7 @@
 //! Remarks on profiles by their codes: each kind of damage gets its own, at the profile that has it.
 
-use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::remark::kind::Figure;
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::remark::kind::Figure;
 use serde_json::json;
 
 use crate::damaged::{Damage, with};

@@ -1,10 +1,10 @@
 //! A wheel comes to rest wherever it stands on its rail, or the reason is told.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::remark::kind::Figure;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::remark::kind::Figure;
+use railhead_contact::{check, solve};
 use serde_json::json;
 
 use crate::profile_cases::{generated, put};

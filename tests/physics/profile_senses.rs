@@ -1,11 +1,11 @@
 //! Are sections read the right way round? One section has one answer, in whatever senses, order, spacing and format its points are given; where its
 //! shape does not show the senses, the case is refused and names what to state.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::remark::kind::Figure;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::remark::kind::Figure;
 use serde_json::{Value, json};
 
 use crate::profile_cases::{generated, put};

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use railhead::contact::solution::words::answer::{PatchSolution, Position};
+use railhead_contact::solution::words::answer::{PatchSolution, Position};
 use serde_json::{Value, json};
 
 use crate::profile_cases::{benchmark, put};

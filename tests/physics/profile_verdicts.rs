@@ -1,10 +1,10 @@
 //! The judgement of a profile names the defect that it has: one kind of defect at a time, of many sizes and at many places, on profiles that
 //! are sound otherwise.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::error::SolveError;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::damaged::{Points, normal, off_normal, resampled, with};

@@ -1,10 +1,10 @@
 //! A measured worn wheel on a worn rail, where tread, gauge corner and flange touch close to each other. Needs the reference files beside
 //! the checkout; `profile_conforming.rs` makes a pair of its own and tests the same.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::Solution;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::Solution;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use crate::profile_cases::{on_planes, put, wheel_on_rail};

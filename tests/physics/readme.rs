@@ -1,8 +1,8 @@
 //! The answer shown in the README is the one that the example has.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::solution::words::answer::{Fields, PointSolution, Solution};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::solution::words::answer::{Fields, PointSolution, Solution};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};

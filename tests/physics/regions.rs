@@ -3,20 +3,20 @@
 
 use std::f64::consts::PI;
 
-use railhead::contact::half_space::strip_operator::kind::Precision;
-use railhead::contact::half_space::strip_operator::operator::StripOperator;
-use railhead::contact::mesh::{Chord, Grading, Mesh, equal_strips};
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::task::{
+use railhead_contact::half_space::strip_operator::kind::Precision;
+use railhead_contact::half_space::strip_operator::operator::StripOperator;
+use railhead_contact::mesh::{Chord, Grading, Mesh, equal_strips};
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::methods::boundary_element::newton::Newton;
+use railhead_contact::rolling::methods::boundary_element::task::{
     Convergence, NewtonTask, STEPS_MAX,
 };
-use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::methods::liu_hsu::solve::ZonesOutcome;
-use railhead::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
-use railhead::contact::rolling::slip_equations::SlipEquations;
-use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::task::Motion;
+use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead_contact::rolling::methods::liu_hsu::solve::ZonesOutcome;
+use railhead_contact::rolling::methods::liu_hsu::stick_block::DenseTask;
+use railhead_contact::rolling::slip_equations::SlipEquations;
+use railhead_contact::rolling::slip_rules::Rule;
+use railhead_contact::rolling::task::Motion;
 
 /// Poisson's ratio of all these contacts.
 pub const NU: f64 = 0.25;

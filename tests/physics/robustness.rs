@@ -1,8 +1,8 @@
 //! The solver ends with an answer, whatever the motion and the shape.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
 use serde_json::json;
 
 use crate::random::Random;

@@ -1,23 +1,23 @@
 //! Work that a case does not need is left out, and the answer does not move.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::half_space::strip_operator::kind::Precision;
-use railhead::contact::half_space::strip_operator::operator::StripOperator;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal_stage;
-use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::solve as boundary_element;
-use railhead::contact::rolling::methods::boundary_element::task::{
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::half_space::strip_operator::kind::Precision;
+use railhead_contact::half_space::strip_operator::operator::StripOperator;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::normal_stage;
+use railhead_contact::rolling::methods::boundary_element::newton::Newton;
+use railhead_contact::rolling::methods::boundary_element::solve as boundary_element;
+use railhead_contact::rolling::methods::boundary_element::task::{
     LevelTask, NewtonTask, STEPS_MAX,
 };
-use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::methods::fastsim;
-use railhead::contact::rolling::slip_equations::SlipEquations;
-use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::rolling::task::RollingTask;
-use railhead::contact::solution::words::answer::PointSolution;
+use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead_contact::rolling::methods::fastsim;
+use railhead_contact::rolling::slip_equations::SlipEquations;
+use railhead_contact::rolling::slip_rules::Rule;
+use railhead_contact::rolling::strip_mesh::StripMesh;
+use railhead_contact::rolling::task::RollingTask;
+use railhead_contact::solution::words::answer::PointSolution;
 
 use crate::reference::{Ellipse, solve};
 

@@ -1,9 +1,9 @@
 //! A small part of the stability stress test: random cases end in an answer that obeys the laws, or in a reason.
 
 use contacts::samples;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::{check, solve};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 use trial::{End, trial};
 

@@ -1,7 +1,7 @@
 //! Stresses below the surface: closed forms, laws, and CONTACT's stresses in the upper body.
 
-use railhead::contact::post::subsurface::states::points;
-use railhead::contact::solution::words::evolution::StressPoint;
+use railhead_contact::post::subsurface::states::points;
+use railhead_contact::solution::words::evolution::StressPoint;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -1,8 +1,8 @@
 //! What a point of a body lives through: shakedown and Dang Van's criterion against closed forms, laws, and faults of the question.
 
-use railhead::contact::half_space::kernels::Stress;
-use railhead::contact::post::subsurface::worst_passage::{PassageMeasure, judge};
-use railhead::contact::solution::words::evolution::{PassageSummary, SubsurfaceSummary};
+use railhead_contact::half_space::kernels::Stress;
+use railhead_contact::post::subsurface::worst_passage::{PassageMeasure, judge};
+use railhead_contact::solution::words::evolution::{PassageSummary, SubsurfaceSummary};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good, with};

@@ -1,11 +1,11 @@
 //! The table of creep forces: its laws, its limits, and how far it is off.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::rolling::linear_theory::{coefficients, spin_coefficient};
-use railhead::contact::rolling::methods::table::evaluate::EllipseTable;
-use railhead::contact::rolling::methods::table::file::table;
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
+use railhead_contact::rolling::methods::table::evaluate::EllipseTable;
+use railhead_contact::rolling::methods::table::file::table;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

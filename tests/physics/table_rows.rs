@@ -1,10 +1,10 @@
 //! Rows of numbers: they are answered as jobs are, and say what they cannot be answered with.
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::evaluate::answer::{RowStatus, RowsAnswer};
-use railhead::contact::evaluate::rows::Rows;
-use railhead::contact::evaluate::varied::{Values, VariedColumn};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::evaluate::answer::{RowStatus, RowsAnswer};
+use railhead_contact::evaluate::rows::Rows;
+use railhead_contact::evaluate::varied::{Values, VariedColumn};
 use serde_json::{Value, json};
 
 use crate::gap_samples::steel;

@@ -1,6 +1,6 @@
 //! A target is met, and the estimate of the error is honest.
 
-use railhead::contact::remark::kind::Figure;
+use railhead_contact::remark::kind::Figure;
 use serde_json::json;
 
 use crate::reference::{HERTZ_CLASSES, ReferenceCase, cases, force_of_cells, median, solve};

@@ -1,7 +1,7 @@
 //! Numbers in another unit are asked about, and nothing else is.
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::check;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::check;
 use serde_json::{Value, json};
 
 use crate::cases::{good, good_with, problem, with};

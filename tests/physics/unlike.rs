@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use railhead::contact;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::normal::hertz::{Ellipse, NormalLoad};
-use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::slices::slices;
-use railhead::contact::solution::words::answer::{Fields, Solution};
+use railhead_contact as contact;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
+use railhead_contact::rolling::operator_store::OperatorStore;
+use railhead_contact::slices::slices;
+use railhead_contact::solution::words::answer::{Fields, Solution};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

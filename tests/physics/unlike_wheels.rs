@@ -1,7 +1,7 @@
 //! Wheels and rails of unlike materials: patches of profiles against the same patches by their radii, and balance.
 
-use railhead::contact::remark::entry::RemarkEntry;
-use railhead::contact::solution::words::answer::{PatchSolution, Solution};
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::solution::words::answer::{PatchSolution, Solution};
 use serde_json::{Value, json};
 
 use crate::profile_cases::{generated, on_planes, put};

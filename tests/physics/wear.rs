@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use railhead::contact::solution::words::damage::WearAcross;
+use railhead_contact::solution::words::damage::WearAcross;
 use serde::Deserialize;
 use serde_json::{Value, json};
 

@@ -1,6 +1,6 @@
 //! What must hold for a wheelset on both rails: mirror images, balance, closed forms of the conicity, and the single wheel in its place.
 
-use railhead::contact::solution::words::answer::{Kinematics, Solution, WheelsetAnswer};
+use railhead_contact::solution::words::answer::{Kinematics, Solution, WheelsetAnswer};
 use serde_json::{Value, json};
 
 use crate::cases::assert_fault;

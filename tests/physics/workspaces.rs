@@ -2,21 +2,21 @@
 
 use std::sync::Arc;
 
-use railhead::contact::case::solver::Limits;
-use railhead::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
-use railhead::contact::half_space::strip_operator::operator::StripOperator;
-use railhead::contact::mesh::MeshSize;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::methods::boundary_element::newton::Newton;
-use railhead::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
-use railhead::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use railhead::contact::rolling::operator_store::{CaseOperators, OperatorStore};
-use railhead::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
-use railhead::contact::rolling::slip_rules::Rule;
-use railhead::contact::rolling::strip_mesh::StripMesh;
-use railhead::contact::rolling::task::Motion;
-use railhead::contact::{check, normal_stage, solve, solve_with};
+use railhead_contact::case::solver::Limits;
+use railhead_contact::half_space::grid_operator::{GridOperator, GridWorkspace};
+use railhead_contact::half_space::strip_operator::operator::StripOperator;
+use railhead_contact::mesh::MeshSize;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::methods::boundary_element::newton::Newton;
+use railhead_contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
+use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use railhead_contact::rolling::operator_store::{CaseOperators, OperatorStore};
+use railhead_contact::rolling::slip_equations::{SlipEquations, SlipScratch};
+use railhead_contact::rolling::slip_rules::Rule;
+use railhead_contact::rolling::strip_mesh::StripMesh;
+use railhead_contact::rolling::task::Motion;
+use railhead_contact::{check, normal_stage, solve, solve_with};
 use serde_json::{Value, json};
 
 use crate::allocations::during;

@@ -1,7 +1,5 @@
 //! Is the answer the same on every route?
 
-extern crate railhead_contact as railhead;
-
 mod features;
 mod matrix;
 #[path = "../physics/profile_shapes.rs"]

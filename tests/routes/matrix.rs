@@ -5,15 +5,15 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use railhead::contact;
-use railhead::contact::case::solver::{KnownPair, Limits};
-use railhead::contact::evaluate::many::{ManyTask, evaluate_at_once, solve_many};
-use railhead::contact::evaluate::rows::Rows;
-use railhead::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
-use railhead::contact::monitor::{Monitor, Unmonitored};
-use railhead::contact::problem::checked_case::CheckedCase;
-use railhead::contact::rolling::operator_store::OperatorStore;
-use railhead::contact::solution::words::answer::Solution;
+use railhead_contact as contact;
+use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::evaluate::many::{ManyTask, evaluate_at_once, solve_many};
+use railhead_contact::evaluate::rows::Rows;
+use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use railhead_contact::monitor::{Monitor, Unmonitored};
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::rolling::operator_store::OperatorStore;
+use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Map, Value, json};
 
 use crate::features::{Feature, Motions, ROWS};
@@ -307,7 +307,7 @@ fn answers(solution: &Solution) -> Vec<Answer> {
                 patch.friction_limit_n.unwrap_or(0.3 * patch.normal_force_n)
             }) / positions as f64;
             let error = total.error_estimate;
-            let of = |of: fn(&railhead::contact::solution::words::answer::ErrorEstimate) -> f64| {
+            let of = |of: fn(&railhead_contact::solution::words::answer::ErrorEstimate) -> f64| {
                 error.as_ref().map_or(f64::NAN, of)
             };
             let point = solution.patches[0].points.get(motion);

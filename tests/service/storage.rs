@@ -225,7 +225,7 @@ async fn starts_on_a_full_disk(killed: bool) {
 #[tokio::test]
 async fn a_full_disk_costs_a_sweep_no_slice() {
     let disk = or_skip!(Disk::mount("size=16m"));
-    let service = disk.serve(&["--log", "info,railhead::jobs=debug"]);
+    let service = disk.serve(&["--log", "info,railhead_jobs=debug"]);
     let question = sliced_case("long", 150);
     let problem = railhead::contact::check(&question, &Limits::default()).unwrap();
     let slices = railhead::contact::slices::slices(&problem).len();

@@ -1,42 +1,38 @@
-//! Checks of structure: directions of use between modules, and words that are forbidden in a room.
+//! Rules that neither the compiler nor clippy checks: comments, links and examples.
 
-mod folders;
-mod order;
-mod rules;
-mod sources;
-
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::sources::{Sources, root};
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+}
 
-/// Lines of code that contain one of the words; comments do not count.
-fn mentions(sources: &Sources, below: &str, words: &[&str]) -> Vec<String> {
-    let mut found = Vec::new();
-    for (path, text) in sources.within(below) {
-        for (number, line) in text.lines().enumerate() {
-            let code = line.split("//").next().unwrap_or_default();
-            for word in words.iter().filter(|word| code.contains(*word)) {
-                found.push(format!("{path}:{}: {word}", number + 1));
+/// The Rust files below some folders of the project, by their path from its root.
+fn sources(folders: &[&str]) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    let mut folders: Vec<PathBuf> = folders.iter().map(|name| root().join(name)).collect();
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let place = path.strip_prefix(root()).expect("below the root");
+                let text = fs::read_to_string(&path).expect("a source");
+                found.insert(place.display().to_string(), text);
             }
         }
     }
     found
 }
 
-/// Fails if code below a folder mentions one of the words.
-fn assert_free(below: &str, words: &[&str]) {
-    let found = mentions(&Sources::below(&["src"]), below, words);
-    assert_eq!(found, Vec::<String>::new(), "{below}");
-}
-
 /// Numbers of the physics are tuned, measured or chosen, and each says which: a constant has a line above it, or stands in a group
 /// whose first line speaks for all. In the files named for their constants every single one has its own.
 #[test]
 fn every_number_of_the_physics_says_what_it_is() {
-    let sources = Sources::below(&["src/contact"]);
     let mut bare = Vec::new();
-    for (path, text) in sources.within("src/contact/") {
+    for (path, text) in sources(&["src/contact"]) {
         let mut above = "";
         for (number, line) in text.lines().enumerate() {
             if line.starts_with("mod tests") || path.ends_with("/tests.rs") {
@@ -62,110 +58,25 @@ fn every_number_of_the_physics_says_what_it_is() {
 }
 
 #[test]
-fn rooms_mention_only_the_rooms_before_them() {
-    for (room, forbidden) in [
-        (
-            "src/contact",
-            &[
-                "crate::jobs",
-                "crate::http",
-                "crate::cli",
-                "crate::telemetry",
-            ][..],
-        ),
-        (
-            "src/jobs",
-            &["crate::http", "crate::cli", "crate::telemetry"],
-        ),
-        ("src/http", &["crate::cli", "crate::telemetry"]),
-        (
-            "src/telemetry.rs",
-            &["crate::contact", "crate::jobs", "crate::http", "crate::cli"],
-        ),
-    ] {
-        assert_free(room, forbidden);
-    }
-}
-
-#[test]
-fn outside_libraries_stay_in_their_rooms() {
-    for (room, forbidden) in [
-        (
-            "src/jobs",
-            &["axum", "StatusCode", "faer", "opentelemetry_otlp"][..],
-        ),
-        (
-            "src/http",
-            &[
-                "rusqlite",
-                "sqlx",
-                "object_store",
-                "faer",
-                "std::env::var",
-                "std::env::args",
-                "opentelemetry_otlp",
-                "opentelemetry_sdk",
-            ],
-        ),
-        (
-            "src/cli",
-            &["rusqlite", "sqlx", "object_store", "faer", "opentelemetry"],
-        ),
-    ] {
-        assert_free(room, forbidden);
-    }
-}
-
-#[test]
-fn databases_stay_in_the_folders_of_their_stores() {
-    let sources = Sources::below(&["src"]);
-    let found = mentions(&sources, "src/", &["rusqlite", "sqlx", "SqliteRow"]);
-    let inside = |place: &String| {
-        let folders = ["sqlite/", "postgres/", "sql/", "sql_errors.rs"];
-        place
-            .strip_prefix("src/jobs/store/")
-            .is_some_and(|rest| folders.iter().any(|folder| rest.starts_with(folder)))
-    };
-    let outside = found.into_iter().filter(|place| !inside(place));
-    assert_eq!(outside.collect::<Vec<_>>(), Vec::<String>::new());
-}
-
-#[test]
-fn forbidden_words_are_found_and_comments_are_not_code() {
-    let planted = Sources::planted(&[
-        (
-            "src/contact/a.rs",
-            "// tokio\nlet now = std::time::Instant::now();",
-        ),
-        ("src/jobs/b.rs", "use std::time::Instant;"),
-    ]);
-    let words = ["tokio", "std::time::Instant"];
-    assert_eq!(
-        mentions(&planted, "src/contact", &words),
-        ["src/contact/a.rs:2: std::time::Instant"]
-    );
-}
-
-#[test]
 fn every_file_says_what_it_is_for() {
-    let sources = Sources::below(&["src", "tests", "benches"]);
-    let silent = sources
-        .within("")
+    let silent = sources(&["src", "tests", "benches"])
+        .into_iter()
         .filter(|(_, text)| !text.starts_with("//!"));
-    let silent: Vec<&str> = silent.map(|(path, _)| path).collect();
-    assert_eq!(silent, Vec::<&str>::new());
+    let silent: Vec<String> = silent.map(|(path, _)| path).collect();
+    assert_eq!(silent, Vec::<String>::new());
 }
 
-/// Files that comments name, as `name.rs`, and that are neither in the room of the comment nor among tests and benches.
-fn names_of_no_file(sources: &Sources) -> Vec<String> {
+/// Files that comments name, as `name.rs`, and that are neither in the package of the comment nor among tests and benches.
+fn names_of_no_file(sources: &BTreeMap<String, String>) -> Vec<String> {
     let mut stale = Vec::new();
-    for (path, text) in sources.within("src/") {
-        let room: Vec<&str> = path.split('/').take(2).collect();
-        let room = room.join("/");
-        let places = [room.as_str(), "tests/", "benches/"];
+    for (path, text) in sources.iter().filter(|(path, _)| path.starts_with("src/")) {
+        let package: Vec<&str> = path.split('/').take(2).collect();
+        let package = package.join("/");
+        let places = [package.as_str(), "tests/", "benches/"];
         let exists = |name: &str| {
-            let mut files = places.iter().flat_map(|place| sources.within(place));
-            files.any(|(file, _)| file.ends_with(&format!("/{name}")) || file == name)
+            let beside = |file: &&String| places.iter().any(|place| file.starts_with(place));
+            let named = |file: &String| file.ends_with(&format!("/{name}")) || file == name;
+            sources.keys().filter(beside).any(named)
         };
         for (number, line) in text.lines().enumerate() {
             let comment = line.split_once("//").map_or("", |(_, comment)| comment);
@@ -180,18 +91,19 @@ fn names_of_no_file(sources: &Sources) -> Vec<String> {
 
 #[test]
 fn files_that_comments_name_exist() {
-    let planted = Sources::planted(&[
+    let planted = [
         ("src/jobs/a.rs", "//! See `b.rs`, `c/d.rs` and `gone.rs`."),
         ("src/jobs/b.rs", "// `a.rs`, `tests/t.rs` and `c/b.rs`"),
         ("tests/t.rs", ""),
         ("src/jobs/c/d.rs", ""),
         ("src/http/gone.rs", ""),
-    ]);
+    ]
+    .map(|(path, text)| (path.to_owned(), text.to_owned()));
     assert_eq!(
-        names_of_no_file(&planted),
+        names_of_no_file(&planted.into()),
         ["src/jobs/a.rs:1: gone.rs", "src/jobs/b.rs:1: c/b.rs"]
     );
-    let found = names_of_no_file(&Sources::below(&["src", "tests", "benches"]));
+    let found = names_of_no_file(&sources(&["src", "tests", "benches"]));
     assert_eq!(found, Vec::<String>::new());
 }
 
@@ -267,8 +179,8 @@ fn every_example_is_a_case_that_can_be_asked_or_the_faulty_one() {
         let text = fs::read_to_string(&path).expect("an example");
         let value = serde_json::from_str(&text).expect("an example is JSON");
         if name.ends_with(".case.json") {
-            let limits = railhead_contact::contact::case::solver::Limits::default();
-            let checked = railhead_contact::contact::check(&value, &limits);
+            let limits = railhead_contact::case::solver::Limits::default();
+            let checked = railhead_contact::check(&value, &limits);
             assert_eq!(checked.is_err(), name.contains("faulty"), "{name}");
         }
     }

@@ -2,18 +2,18 @@
 //!
 //! From words to task: where stresses below the surface are computed, and in which body.
 
-use crate::contact::case::solver::Limits;
-use crate::contact::case::words::material::{Material, ThermalWords};
-use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::solver::{Case, Output};
-use crate::contact::case::words::subsurface::{
+use crate::case::solver::Limits;
+use crate::case::words::material::{Material, ThermalWords};
+use crate::case::words::motion::Motions;
+use crate::case::words::solver::{Case, Output};
+use crate::case::words::subsurface::{
     BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,
 };
-use crate::contact::error::Fault;
-use crate::contact::post::damage::DamageTask;
-use crate::contact::post::local_power::ThermalTask;
-use crate::contact::post::subsurface::states::{StressPlaces, SubsurfaceTask};
-use crate::contact::problem::physics::AfterTasks;
+use crate::error::Fault;
+use crate::post::damage::DamageTask;
+use crate::post::local_power::ThermalTask;
+use crate::post::subsurface::states::{StressPlaces, SubsurfaceTask};
+use crate::problem::physics::AfterTasks;
 
 impl AfterTasks {
     /// What a case asks for.

@@ -6,28 +6,28 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::contact::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
-use crate::contact::case::digest::digest;
-use crate::contact::case::motions::ExpandedMotions;
-use crate::contact::case::solver::{KnownPair, Limits, resolution};
-use crate::contact::case::wheel_task::profile;
-use crate::contact::case::words::cross_section::CrossSection;
-use crate::contact::case::words::object::{Faults, Object};
-use crate::contact::case::words::solver::Case;
-use crate::contact::case::{units, wheel_task};
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::friction::law::FrictionLaw;
-use crate::contact::geometry::orientation::SureBody;
-use crate::contact::geometry::profile::Body;
-use crate::contact::geometry::profile_quality::advised_smoothing;
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::problem::checked_case;
-use crate::contact::problem::checked_case::{CheckedCase, Label};
-use crate::contact::problem::physics::{AfterTasks, Checked, MotionPart, Problem, Run};
-use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::remark::list::Remark;
-use crate::contact::solution::words::answer::Asked;
-use crate::contact::solution::words::damage::{PairQuality, SectionQuality};
+use crate::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
+use crate::case::digest::digest;
+use crate::case::motions::ExpandedMotions;
+use crate::case::solver::{KnownPair, Limits, resolution};
+use crate::case::wheel_task::profile;
+use crate::case::words::cross_section::CrossSection;
+use crate::case::words::object::{Faults, Object};
+use crate::case::words::solver::Case;
+use crate::case::{units, wheel_task};
+use crate::error::{CaseError, Fault};
+use crate::friction::law::FrictionLaw;
+use crate::geometry::orientation::SureBody;
+use crate::geometry::profile::Body;
+use crate::geometry::profile_quality::advised_smoothing;
+use crate::normal::footprint::NormalTask;
+use crate::problem::checked_case;
+use crate::problem::checked_case::{CheckedCase, Label};
+use crate::problem::physics::{AfterTasks, Checked, MotionPart, Problem, Run};
+use crate::remark::entry::{RemarkEntry, merged};
+use crate::remark::list::Remark;
+use crate::solution::words::answer::Asked;
+use crate::solution::words::damage::{PairQuality, SectionQuality};
 
 impl CheckedCase {
     /// Checks a case against the limits and prepares its numbers; profiles that are known are not read again.

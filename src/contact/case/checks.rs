@@ -2,28 +2,28 @@
 //!
 //! Combines the elastic constants of two bodies into those of the pair.
 
-use crate::contact::case::motions::{BesideHistory, ExpandedMotions};
-use crate::contact::case::solver::{KnownPair, Limits, resolution};
-use crate::contact::case::words::contact::{Contact, InfluenceName, Load, SurfaceName};
-use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::material::{Material, ThermalWords};
-use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::solver::{MethodName, Output, RelativeToName, Solver};
-use crate::contact::case::words::subsurface::{DamageModel, DamageWords, SubsurfaceWords};
-use crate::contact::case::{after_tasks, contact_task, motions, wheel_task, wheelsets};
-use crate::contact::error::Fault;
-use crate::contact::friction::law::FrictionLaw;
-use crate::contact::half_space::bent_surface::Influence;
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::method::Method;
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::wheel::ReferenceSurface;
-use crate::contact::problem::memory::{SizeInput, length_over_width, segments, spinning};
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::history::plan::{HistoryStart, HistoryTask};
-use crate::contact::rolling::methods::table::solve as table;
+use crate::case::motions::{BesideHistory, ExpandedMotions};
+use crate::case::solver::{KnownPair, Limits, resolution};
+use crate::case::words::contact::{Contact, InfluenceName, Load, SurfaceName};
+use crate::case::words::friction::Friction;
+use crate::case::words::material::{Material, ThermalWords};
+use crate::case::words::motion::Motions;
+use crate::case::words::solver::{MethodName, Output, RelativeToName, Solver};
+use crate::case::words::subsurface::{DamageModel, DamageWords, SubsurfaceWords};
+use crate::case::{after_tasks, contact_task, motions, wheel_task, wheelsets};
+use crate::error::Fault;
+use crate::friction::law::FrictionLaw;
+use crate::half_space::bent_surface::Influence;
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::method::Method;
+use crate::normal::footprint::NormalTask;
+use crate::normal::hertz::Patch;
+use crate::normal::wheel::ReferenceSurface;
+use crate::problem::memory::{SizeInput, length_over_width, segments, spinning};
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
+use crate::rolling::history::plan::{HistoryStart, HistoryTask};
+use crate::rolling::methods::table::solve as table;
 
 /// Friction coefficient above which the answer carries a remark.
 const FRICTION_USUAL_MAX: f64 = 1.0;
@@ -484,7 +484,7 @@ fn rounded(of_pair: f64, of_like_bodies: f64) -> f64 {
 #[cfg(test)]
 mod elasticity_tests {
     use super::*;
-    use crate::contact::case::words::material::Elastic;
+    use crate::case::words::material::Elastic;
 
     fn body(g: f64, nu: f64) -> Elastic {
         Elastic {

@@ -6,17 +6,17 @@
 
 use std::ops::RangeInclusive;
 
-use crate::contact::case::words::contact::{Contact, Load};
-use crate::contact::error::Fault;
-use crate::contact::geometry::profile::{LengthUnit, Profile};
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::gap::surface::GapSurface;
-use crate::contact::normal::gap::task::{GapTask, PreviewCache};
-use crate::contact::normal::hertz::{Ellipse, NormalLoad, Patch};
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::kind::short;
-use crate::contact::remark::list::Remark;
+use crate::case::words::contact::{Contact, Load};
+use crate::error::Fault;
+use crate::geometry::profile::{LengthUnit, Profile};
+use crate::normal::footprint::NormalTask;
+use crate::normal::gap::surface::GapSurface;
+use crate::normal::gap::task::{GapTask, PreviewCache};
+use crate::normal::hertz::{Ellipse, NormalLoad, Patch};
+use crate::normal::pressure_field::field::PressureField;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::kind::short;
+use crate::remark::list::Remark;
 
 /// Largest pressures of a patch in MPa; others are a mistake rather than a contact.
 const PRESSURES: RangeInclusive<f64> = 1e-20..=1e12;

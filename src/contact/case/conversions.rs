@@ -1,24 +1,24 @@
 //! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
 
-use crate::contact::case::words::contact::SideName;
-use crate::contact::case::words::cross_section::{FormatName, UnitName};
-use crate::contact::case::words::friction::{FallName, Friction};
-use crate::contact::case::words::material::ThermalWords;
-use crate::contact::case::words::motion::MotionWords;
-use crate::contact::case::words::solver::{
+use crate::case::words::contact::SideName;
+use crate::case::words::cross_section::{FormatName, UnitName};
+use crate::case::words::friction::{FallName, Friction};
+use crate::case::words::material::ThermalWords;
+use crate::case::words::motion::MotionWords;
+use crate::case::words::solver::{
     MeshSizeWords, MethodName, Output, RelativeToName, TractionBoundName,
 };
-use crate::contact::friction::coefficient_table::CoefficientTable;
-use crate::contact::friction::law::{AcrossLaw, AcrossPlace, FrictionLaw};
-use crate::contact::friction::path_dependent::{HeatedLaw, Interface, LayerYield};
-use crate::contact::friction::velocity_weakening::{FallForm, FallingLaw, SofteningTerm};
-use crate::contact::geometry::formats::Format;
-use crate::contact::geometry::profile::LengthUnit;
-use crate::contact::geometry::wheel_rail::Side;
-use crate::contact::mesh::MeshSize;
-use crate::contact::method::{Method, TractionBound};
-use crate::contact::post::local_power::ThermalTask;
-use crate::contact::rolling::task::{Motion, RelativeTo};
+use crate::friction::coefficient_table::CoefficientTable;
+use crate::friction::law::{AcrossLaw, AcrossPlace, FrictionLaw};
+use crate::friction::path_dependent::{HeatedLaw, Interface, LayerYield};
+use crate::friction::velocity_weakening::{FallForm, FallingLaw, SofteningTerm};
+use crate::geometry::formats::Format;
+use crate::geometry::profile::LengthUnit;
+use crate::geometry::wheel_rail::Side;
+use crate::mesh::MeshSize;
+use crate::method::{Method, TractionBound};
+use crate::post::local_power::ThermalTask;
+use crate::rolling::task::{Motion, RelativeTo};
 
 /// Words that stand for a type of the numerics variant by variant.
 macro_rules! words {

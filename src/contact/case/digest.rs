@@ -1,10 +1,10 @@
 //! Which cases have the same answer? A digest of everything that determines it, the solver's revision included.
 
-use crate::contact::case::solver::resolution;
-use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::solver::{Canonical, Case, RelativeToName, TractionBoundName};
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::rolling::task::{Motion, PrescribedForces, Resolution};
+use crate::case::solver::resolution;
+use crate::case::words::motion::Motions;
+use crate::case::words::solver::{Canonical, Case, RelativeToName, TractionBoundName};
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::rolling::task::{Motion, PrescribedForces, Resolution};
 
 /// Raised whenever a change moves numbers that clients get: equal cases share one answer, and answers of an older revision are not theirs.
 /// `tests/physics/golden.rs` fails if numbers move without it, and says how to record the new ones.

@@ -7,18 +7,18 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::contact::case::checks::{PartialCase, faults_of};
-use crate::contact::case::solver::{KnownPair, Limits};
-use crate::contact::case::words::contact::{Contact, Load};
-use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::material::{Material, ThermalWords};
-use crate::contact::case::words::motion::Motions;
-use crate::contact::case::words::object::{Faults, Member, Object, has_controls, join, shown};
-use crate::contact::case::words::solver::{Case, Output, Solver};
-use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
-use crate::contact::case::words::{contact, material, motion, solver, subsurface};
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::method::Method;
+use crate::case::checks::{PartialCase, faults_of};
+use crate::case::solver::{KnownPair, Limits};
+use crate::case::words::contact::{Contact, Load};
+use crate::case::words::friction::Friction;
+use crate::case::words::material::{Material, ThermalWords};
+use crate::case::words::motion::Motions;
+use crate::case::words::object::{Faults, Member, Object, has_controls, join, shown};
+use crate::case::words::solver::{Case, Output, Solver};
+use crate::case::words::subsurface::{DamageWords, SubsurfaceWords};
+use crate::case::words::{contact, material, motion, solver, subsurface};
+use crate::error::{CaseError, Fault};
+use crate::method::Method;
 
 /// Most characters of the name of a case.
 const NAME_LENGTH_MAX: usize = 200;

@@ -2,19 +2,19 @@
 //!
 //! What a history goes with: contact, method, material and outputs, and how long it may be.
 
-use crate::contact::case::solver::Limits;
-use crate::contact::case::words::contact::Contact;
-use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::motion::{
+use crate::case::solver::Limits;
+use crate::case::words::contact::Contact;
+use crate::case::words::friction::Friction;
+use crate::case::words::motion::{
     AskedMotion, Combine, History, HistoryCourse, HistoryStartName, Motions, Sweep, Swept, Wheelset,
 };
-use crate::contact::case::words::object::FAULTS_MAX;
-use crate::contact::case::words::solver::{MethodName, Output, Solver};
-use crate::contact::error::Fault;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::rolling::history::plan::{HistoryStart, HistoryTask};
-use crate::contact::rolling::history::solve::too_long;
-use crate::contact::rolling::task::{Motion, PrescribedForces};
+use crate::case::words::object::FAULTS_MAX;
+use crate::case::words::solver::{MethodName, Output, Solver};
+use crate::error::Fault;
+use crate::normal::hertz::Patch;
+use crate::rolling::history::plan::{HistoryStart, HistoryTask};
+use crate::rolling::history::solve::too_long;
+use crate::rolling::task::{Motion, PrescribedForces};
 
 /// The motions of a case in order, never empty.
 #[derive(Debug, Clone, PartialEq)]
@@ -382,8 +382,8 @@ pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::case::words::motion::Range;
-    use crate::contact::case::words::motion::ValueList;
+    use crate::case::words::motion::Range;
+    use crate::case::words::motion::ValueList;
 
     fn range(from: f64, to: f64, points: u32) -> Option<Swept> {
         Some(Swept::Range(Range { from, to, points }))

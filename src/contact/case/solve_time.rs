@@ -5,15 +5,15 @@
 //! which most cases need less than. Single cases differ from the figures here by a factor of 3 either way and more:
 //! `cargo bench --bench stress -- --only times` prints how many do, kind by kind.
 
-use crate::contact::geometry::profile_quality::advised_smoothing;
-use crate::contact::method::Method;
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::wheel::WheelTask;
-use crate::contact::post::subsurface::states::StressPlaces;
-use crate::contact::problem::checked_case::{self, CheckedCase, PRESSURE_USUAL};
-use crate::contact::problem::memory::segments;
-use crate::contact::rolling::history::solve::usual_work;
-use crate::contact::rolling::task::{Resolution, TARGET_LEAST, TARGET_USUAL};
+use crate::geometry::profile_quality::advised_smoothing;
+use crate::method::Method;
+use crate::normal::footprint::NormalTask;
+use crate::normal::wheel::WheelTask;
+use crate::post::subsurface::states::StressPlaces;
+use crate::problem::checked_case::{self, CheckedCase, PRESSURE_USUAL};
+use crate::problem::memory::segments;
+use crate::rolling::history::solve::usual_work;
+use crate::rolling::task::{Resolution, TARGET_LEAST, TARGET_USUAL};
 
 /// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`], from which on the bound of the creep table usually meets the
 /// target where the table is taken.

@@ -8,15 +8,15 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::contact::case::words::cross_section::CrossSection;
-use crate::contact::case::words::solver::{MethodName, Solver};
-use crate::contact::error::Fault;
-use crate::contact::geometry::wheel_rail::{Placement, WheelRail};
-use crate::contact::method::Method;
-use crate::contact::problem::memory::SizeInput;
-use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::operator_store::BYTES_DEFAULT;
-use crate::contact::rolling::task::{Resolution, TARGET_USUAL};
+use crate::case::words::cross_section::CrossSection;
+use crate::case::words::solver::{MethodName, Solver};
+use crate::error::Fault;
+use crate::geometry::wheel_rail::{Placement, WheelRail};
+use crate::method::Method;
+use crate::problem::memory::SizeInput;
+use crate::rolling::methods::fastsim;
+use crate::rolling::operator_store::BYTES_DEFAULT;
+use crate::rolling::task::{Resolution, TARGET_USUAL};
 
 pub(crate) fn resolution(solver: &Solver) -> Resolution {
     match (solver.mesh, solver.target_error) {

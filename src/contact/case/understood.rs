@@ -1,17 +1,15 @@
 //! What a case is understood as: patches that are known without a solve, and wheel and rail in place.
 
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::profile::{NEEDED_BEYOND, POINT_SPACING};
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::footprint::{Footprint, NormalTask};
-use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::wheel::{WheelLoad, WheelTask};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::remark::list::Remark;
-use crate::contact::solution::words::answer::{
-    FirstTouch, KnownPatch, PlacedProfiles, Understanding,
-};
+use crate::geometry::contact_locus::ContactLocus;
+use crate::geometry::profile::{NEEDED_BEYOND, POINT_SPACING};
+use crate::geometry::wheel_rail::WheelRail;
+use crate::normal::footprint::{Footprint, NormalTask};
+use crate::normal::hertz::Patch;
+use crate::normal::wheel::{WheelLoad, WheelTask};
+use crate::problem::checked_case::CheckedCase;
+use crate::remark::entry::{RemarkEntry, merged};
+use crate::remark::list::Remark;
+use crate::solution::words::answer::{FirstTouch, KnownPatch, PlacedProfiles, Understanding};
 
 impl CheckedCase {
     /// What can be said of the contact without solving it.

@@ -3,15 +3,15 @@
 //! The ranges are those that the number in the likely unit would have for wheels and rails: loads of 1 kN and more, speeds of 0.5 m/s and more,
 //! metals with a shear modulus of 10 to 1000 GPa, angles below 0.05 rad. Lengths of the wheel and the track are looked at in `length_units`.
 
-use crate::contact::case::motions::swept_values;
-use crate::contact::case::words::contact::{Contact, Load};
-use crate::contact::case::words::material::{Elastic, Material};
-use crate::contact::case::words::motion::{AskedMotion, HistoryCourse, Motions, Swept, Wheelset};
-use crate::contact::case::words::solver::Case;
-use crate::contact::geometry::profile::LengthUnit;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
+use crate::case::motions::swept_values;
+use crate::case::words::contact::{Contact, Load};
+use crate::case::words::material::{Elastic, Material};
+use crate::case::words::motion::{AskedMotion, HistoryCourse, Motions, Swept, Wheelset};
+use crate::case::words::solver::Case;
+use crate::geometry::profile::LengthUnit;
+use crate::normal::hertz::Patch;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
 
 /// A wheel carries at least this load in N.
 const LOAD_LEAST: f64 = 1e3;

@@ -2,29 +2,25 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::contact_task;
-use crate::contact::case::solver::KnownPair;
-use crate::contact::case::words::contact::{Contact, Load};
-use crate::contact::case::words::cross_section::{
-    CrossSection, FormatName, Smoothing, SmoothingWord,
-};
-use crate::contact::case::words::motion::{Motions, Wheelset};
-use crate::contact::error::Fault;
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::formats;
-use crate::contact::geometry::formats::ProfileFile;
-use crate::contact::geometry::orientation::{FormatSenses, Senses, StatedSenses};
-use crate::contact::geometry::profile::{Body, LengthUnit, Profile, Reading};
-use crate::contact::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
-use crate::contact::geometry::wheelset_pose::WheelsetMotion;
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::wheel::{
-    ProfileTrust, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove,
-};
-use crate::contact::problem::checked_case;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::task::PrescribedForces;
+use crate::case::contact_task;
+use crate::case::solver::KnownPair;
+use crate::case::words::contact::{Contact, Load};
+use crate::case::words::cross_section::{CrossSection, FormatName, Smoothing, SmoothingWord};
+use crate::case::words::motion::{Motions, Wheelset};
+use crate::error::Fault;
+use crate::geometry::contact_locus::ContactLocus;
+use crate::geometry::formats;
+use crate::geometry::formats::ProfileFile;
+use crate::geometry::orientation::{FormatSenses, Senses, StatedSenses};
+use crate::geometry::profile::{Body, LengthUnit, Profile, Reading};
+use crate::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
+use crate::geometry::wheelset_pose::WheelsetMotion;
+use crate::normal::footprint::NormalTask;
+use crate::normal::wheel::{ProfileTrust, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove};
+use crate::problem::checked_case;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
+use crate::rolling::task::PrescribedForces;
 
 /// The task of a wheel on a rail, whose profiles may be known, with its remarks; `None` without faults where the load or the contact
 /// modulus in MPa is not known.

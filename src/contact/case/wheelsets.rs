@@ -2,26 +2,26 @@
 
 use std::sync::Arc;
 
-use crate::contact::case::contact_task;
-use crate::contact::case::motions::swept_values;
-use crate::contact::case::solver::Limits;
-use crate::contact::case::wheel_task::{
+use crate::case::contact_task;
+use crate::case::motions::swept_values;
+use crate::case::solver::Limits;
+use crate::case::wheel_task::{
     both, exchanged, moves, profile_at, reasons, unplaced, with_reasons,
 };
-use crate::contact::case::words::contact::{Contact, Load};
-use crate::contact::case::words::cross_section::{CrossSection, Smoothing};
-use crate::contact::case::words::motion::{Combine, Motions, Swept};
-use crate::contact::error::Fault;
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::profile::{Body, Profile};
-use crate::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::wheel::{
+use crate::case::words::contact::{Contact, Load};
+use crate::case::words::cross_section::{CrossSection, Smoothing};
+use crate::case::words::motion::{Combine, Motions, Swept};
+use crate::error::Fault;
+use crate::geometry::contact_locus::ContactLocus;
+use crate::geometry::profile::{Body, Profile};
+use crate::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
+use crate::normal::footprint::NormalTask;
+use crate::normal::wheel::{
     KinematicsTask, ProfileTrust, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove,
     WheelsetTask,
 };
-use crate::contact::problem::checked_case;
-use crate::contact::remark::entry::{RemarkEntry, merged};
+use crate::problem::checked_case;
+use crate::remark::entry::{RemarkEntry, merged};
 
 /// The task of a wheelset with its remarks; `None` without faults where the load or the contact modulus in MPa is not known.
 ///

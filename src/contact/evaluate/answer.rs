@@ -2,11 +2,11 @@
 
 use railhead_macros::{Named, Names};
 
-use crate::contact::case::words::solver::{MethodName, Output};
-use crate::contact::error::{CaseError, SolveError};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::Problem;
-use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
+use crate::case::words::solver::{MethodName, Output};
+use crate::error::{CaseError, SolveError};
+use crate::problem::checked_case::CheckedCase;
+use crate::problem::physics::Problem;
+use crate::solution::words::answer::{PatchSolution, PointSolution, Solution};
 
 /// What became of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]

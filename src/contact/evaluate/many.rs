@@ -14,20 +14,19 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::contact;
-use crate::contact::case::solve_time::TABLE_SECONDS;
-use crate::contact::case::solver::{KnownPair, Limits};
-use crate::contact::case::words::solver::{MethodName, Output};
-use crate::contact::error::{CaseError, Fault, SolveError};
-use crate::contact::evaluate::answer::{
+use crate::case::solve_time::TABLE_SECONDS;
+use crate::case::solver::{KnownPair, Limits};
+use crate::case::words::solver::{MethodName, Output};
+use crate::error::{CaseError, Fault, SolveError};
+use crate::evaluate::answer::{
     ManyAnswer, NumberColumns, RowFailure, RowNumbers, RowStatus, RowsAnswer, SolvedRow,
 };
-use crate::contact::evaluate::rows::Rows;
-use crate::contact::evaluate::varied::{VariedColumn, case_of_row};
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::rolling::methods::table::solve::RATIO_RANGE;
-use crate::contact::solution::words::answer::Solution;
+use crate::evaluate::rows::Rows;
+use crate::evaluate::varied::{VariedColumn, case_of_row};
+use crate::monitor::{Monitor, Stop};
+use crate::problem::checked_case::CheckedCase;
+use crate::rolling::methods::table::solve::RATIO_RANGE;
+use crate::solution::words::answer::Solution;
 
 /// Solves rows: numbers of Hertz contacts by `table` and `fastsim`, or by `auto` where the table's bound meets the target, are evaluated
 /// without meshes; every other row is checked and solved as a case of its own.
@@ -39,7 +38,7 @@ pub fn solve_many(
     solve: &RowSolver,
     monitor: &dyn Monitor,
 ) -> Result<ManyAnswer, SolveError> {
-    let checked = contact::check_with(task.known, task.case, task.limits).ok();
+    let checked = crate::check_with(task.known, task.case, task.limits).ok();
     let columns = checked.as_ref().map(NumberColumns::of).unwrap_or_default();
     let mut answer = ManyAnswer::new(task.rows(), columns);
     let mut open: Vec<usize> = (0..task.rows()).collect();
@@ -140,7 +139,7 @@ pub fn evaluate_at_once<E>(
 /// How long the rows of a task take, in s on one core of the machine the figures were taken on; rough, and the same for the same rows.
 pub fn expected_seconds(task: &ManyTask) -> f64 {
     let rows = task.rows() as f64;
-    let Ok(checked) = contact::check_with(task.known, task.case, task.limits) else {
+    let Ok(checked) = crate::check_with(task.known, task.case, task.limits) else {
         return rows * TABLE_SECONDS;
     };
     let seconds = checked.cost().seconds;
@@ -346,7 +345,7 @@ impl ManyTask<'_> {
     pub(crate) fn checked(&self, row: usize) -> Result<CheckedCase, CaseError> {
         let case = case_of_row(self.case, self.columns, self.profiles, row)
             .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
-        let checked = contact::check_with(self.known, &case, self.limits)?;
+        let checked = crate::check_with(self.known, &case, self.limits)?;
         match several_answers(&checked) {
             Some(fault) => Err(CaseError(vec![fault])),
             None => Ok(self.as_row(checked)),

@@ -5,20 +5,20 @@ use std::f64::consts::PI;
 
 use serde_json::Value;
 
-use crate::contact::case::contact_task::plausible;
-use crate::contact::case::words::friction::COEFFICIENT_LEAST;
-use crate::contact::case::words::solver::{MethodName, Output};
-use crate::contact::evaluate::answer::{RowAnswer, RowStatus, RowsAnswer};
-use crate::contact::evaluate::variable::{Row, Variable};
-use crate::contact::evaluate::varied::{Values, VariedColumn};
-use crate::contact::normal::hertz::{Ellipse, HertzShape};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::rolling::methods::fastsim::{self, EllipseMesh};
-use crate::contact::rolling::methods::table::evaluate::{Creep, EllipseTable};
-use crate::contact::rolling::methods::table::file::table;
-use crate::contact::rolling::methods::table::solve::RATIO_RANGE;
-use crate::contact::rolling::refinement::gradients::{STEP, slope};
-use crate::contact::rolling::task::{RelativeTo, Resolution};
+use crate::case::contact_task::plausible;
+use crate::case::words::friction::COEFFICIENT_LEAST;
+use crate::case::words::solver::{MethodName, Output};
+use crate::evaluate::answer::{RowAnswer, RowStatus, RowsAnswer};
+use crate::evaluate::variable::{Row, Variable};
+use crate::evaluate::varied::{Values, VariedColumn};
+use crate::normal::hertz::{Ellipse, HertzShape};
+use crate::problem::checked_case::CheckedCase;
+use crate::rolling::methods::fastsim::{self, EllipseMesh};
+use crate::rolling::methods::table::evaluate::{Creep, EllipseTable};
+use crate::rolling::methods::table::file::table;
+use crate::rolling::methods::table::solve::RATIO_RANGE;
+use crate::rolling::refinement::gradients::{STEP, slope};
+use crate::rolling::task::{RelativeTo, Resolution};
 
 /// Rows that can be evaluated.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! The numbers of a case that may differ from row to row.
 
-use crate::contact::case::words::object::AllowedRange;
+use crate::case::words::object::AllowedRange;
 
 /// A number of a case that a column can hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-use crate::contact::case::words::object::FAULTS_MAX;
-use crate::contact::error::{CaseError, Fault, FaultCode};
-use crate::contact::evaluate::variable::Variable;
+use crate::case::words::object::FAULTS_MAX;
+use crate::error::{CaseError, Fault, FaultCode};
+use crate::evaluate::variable::Variable;
 
 /// The values of a column, one for each row.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Profiles that wear under a traffic, step by step.
 //!
 //! An [`Evolution`](task::Evolution) is a case of a wheel on a rail, a traffic of many states of it, and a plan. Its
-//! [`step`](task::Evolution::step) takes a serialisable [state](crate::contact::solution::words::evolution::EvolutionState) to the next one and
+//! [`step`](task::Evolution::step) takes a serialisable [state](crate::solution::words::evolution::EvolutionState) to the next one and
 //! depends on nothing else, so that an evolution can be left after any step and continued elsewhere to the same bits.
 //!
 //! The first step condenses the [`traffic`]. Every other one solves all states on the present sections by the stages that every case passes,
@@ -20,13 +20,13 @@ mod tests {
 
     use serde_json::{Value, json};
 
-    use crate::contact::case::solver::Limits;
-    use crate::contact::evolution::pass::pass;
-    use crate::contact::evolution::section::{area_between, distance};
-    use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
-    use crate::contact::geometry::profile::Body;
-    use crate::contact::monitor::Unmonitored;
-    use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
+    use crate::case::solver::Limits;
+    use crate::evolution::pass::pass;
+    use crate::evolution::section::{area_between, distance};
+    use crate::evolution::task::{Evolution, Sections, SolveContext};
+    use crate::geometry::profile::Body;
+    use crate::monitor::Unmonitored;
+    use crate::solution::words::evolution::{EvolutionRecord, EvolutionState};
 
     /// A wheel on a rail, by the shipped example.
     fn template() -> Value {
@@ -351,8 +351,8 @@ mod tests {
         let mut case = task.case(on, &[0.0]).expect("a case");
         case["outputs"] = json!(["resultants", "tractions", "slip", "zones"]);
         case.as_object_mut().expect("an object").remove("damage");
-        let case = crate::contact::check(&case, &Limits::default()).expect("no faults");
-        let (solution, fields) = crate::contact::solve(&case, &Unmonitored).expect("solved");
+        let case = crate::check(&case, &Limits::default()).expect("no faults");
+        let (solution, fields) = crate::solve(&case, &Unmonitored).expect("solved");
         let centre = solution.patches[0].position.expect("a place");
         // kg/m³ are µg/mm³.
         let slope = task.figures.usfd.mild_slope * 1e-3 / task.figures.density_kg_per_m3;

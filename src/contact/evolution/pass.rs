@@ -2,16 +2,15 @@
 
 use std::f64::consts::PI;
 
-use crate::contact;
-use crate::contact::case::words::subsurface::DamageModel;
-use crate::contact::error::SolveError;
-use crate::contact::evolution::section::{add, along, lengths, smoothed};
-use crate::contact::evolution::task::{Evolution, Sections, SolveContext};
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::post::local_power::NANOMETRES;
-use crate::contact::solution::words::answer::PatchSolution;
-use crate::contact::solution::words::evolution::{StateContact, StatePatch};
+use crate::case::words::subsurface::DamageModel;
+use crate::error::SolveError;
+use crate::evolution::section::{add, along, lengths, smoothed};
+use crate::evolution::task::{Evolution, Sections, SolveContext};
+use crate::monitor::Monitor;
+use crate::normal::footprint::NormalTask;
+use crate::post::local_power::NANOMETRES;
+use crate::solution::words::answer::PatchSolution;
+use crate::solution::words::evolution::{StateContact, StatePatch};
 
 /// Wear of one body: of the rail in one pass, of the wheel over 1 mm rolled.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -78,12 +77,12 @@ pub(crate) fn pass(
         },
     };
     let case = task.case(on, values);
-    let check = |case| contact::check_with(&context.known, &case, &task.limits);
+    let check = |case| crate::check_with(&context.known, &case, &task.limits);
     let checked = match case.and_then(check) {
         Ok(checked) => checked,
         Err(error) => return Ok(unsolved(error.to_string())),
     };
-    let solution = match contact::solve_with(&context.operators, &checked, monitor) {
+    let solution = match crate::solve_with(&context.operators, &checked, monitor) {
         Ok((solution, _)) => solution,
         Err(error @ (SolveError::Cancelled | SolveError::OutOfTime { .. })) => return Err(error),
         Err(error) => return Ok(unsolved(error.to_string())),

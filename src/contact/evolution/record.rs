@@ -2,18 +2,18 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use crate::contact::case::words::evolution::WearLosses;
-use crate::contact::case::words::subsurface::DamageModel;
-use crate::contact::evolution::section::{distance, lengths};
-use crate::contact::evolution::task::Evolution;
-use crate::contact::geometry::conicity::RadiusDifference;
-use crate::contact::geometry::profile::{Body, Profile, Reading};
-use crate::contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
-use crate::contact::geometry::wheelset_pose::PairOfRails;
-use crate::contact::numerics::quadrature::halton;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
-use crate::contact::solution::words::evolution::{
+use crate::case::words::evolution::WearLosses;
+use crate::case::words::subsurface::DamageModel;
+use crate::evolution::section::{distance, lengths};
+use crate::evolution::task::Evolution;
+use crate::geometry::conicity::RadiusDifference;
+use crate::geometry::profile::{Body, Profile, Reading};
+use crate::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
+use crate::geometry::wheelset_pose::PairOfRails;
+use crate::numerics::quadrature::halton;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
+use crate::solution::words::evolution::{
     BodyState, ContactRange, EvolutionAnswer, EvolutionRecord, EvolutionState, LimitReached,
     StateContact, WearUncertainty, WornBody,
 };

@@ -3,7 +3,7 @@
 //! Points are `[y, z]` in mm, y to the field side and z down, in order of increasing y as a [`Profile`] has them. A point stands for the part
 //! of the section up to the middles to its neighbours.
 
-use crate::contact::geometry::profile::{Body, POINT_SPACING, Profile};
+use crate::geometry::profile::{Body, POINT_SPACING, Profile};
 
 /// Points along the curve of a profile, at most [`POINT_SPACING`] apart.
 pub(crate) fn sampled(profile: &Profile) -> Vec<[f64; 2]> {

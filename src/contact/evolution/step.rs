@@ -11,19 +11,19 @@
 use rayon::ThreadPoolBuilder;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
-use crate::contact::error::SolveError;
-use crate::contact::evolution::pass::{BodyWear, Pass, pass};
-use crate::contact::evolution::record::record;
-use crate::contact::evolution::section::{
+use crate::error::SolveError;
+use crate::evolution::pass::{BodyWear, Pass, pass};
+use crate::evolution::record::record;
+use crate::evolution::section::{
     add, area_between, depths, distance, lengths, machined, moved, smoothed,
 };
-use crate::contact::evolution::task::{Evolution, PlannedEvent, Sections, SolveContext};
-use crate::contact::evolution::traffic::condensed;
-use crate::contact::geometry::profile::Body;
-use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::numerics::roots::ROUNDING;
-use crate::contact::remark::kind::short;
-use crate::contact::solution::words::evolution::{
+use crate::evolution::task::{Evolution, PlannedEvent, Sections, SolveContext};
+use crate::evolution::traffic::condensed;
+use crate::geometry::profile::Body;
+use crate::monitor::{Monitor, MonitorPart};
+use crate::numerics::roots::ROUNDING;
+use crate::remark::kind::short;
+use crate::solution::words::evolution::{
     BodyState, EvolutionRecord, EvolutionState, StateContact, WornBody,
 };
 

@@ -4,21 +4,20 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use crate::contact;
-use crate::contact::case::solver::{KnownPair, Limits};
-use crate::contact::case::wheel_task::profile_at;
-use crate::contact::case::words::evolution::{EvolutionEvent, EvolutionWords, TrafficColumn};
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::many::several_answers;
-use crate::contact::evaluate::varied::{column_pointer, in_template, members, put};
-use crate::contact::evolution::section::sampled;
-use crate::contact::geometry::profile::Body;
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::numerics::quadrature::{PRIMES, samples};
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::damage::DamageFiguresUsed;
-use crate::contact::solution::words::evolution::Progress;
+use crate::case::solver::{KnownPair, Limits};
+use crate::case::wheel_task::profile_at;
+use crate::case::words::evolution::{EvolutionEvent, EvolutionWords, TrafficColumn};
+use crate::error::{CaseError, Fault};
+use crate::evaluate::many::several_answers;
+use crate::evaluate::varied::{column_pointer, in_template, members, put};
+use crate::evolution::section::sampled;
+use crate::geometry::profile::Body;
+use crate::geometry::wheel_rail::WheelRail;
+use crate::normal::footprint::NormalTask;
+use crate::numerics::quadrature::{PRIMES, samples};
+use crate::rolling::operator_store::OperatorStore;
+use crate::solution::words::damage::DamageFiguresUsed;
+use crate::solution::words::evolution::Progress;
 
 /// Steps of an evolution of usual length.
 const STEPS_USUAL: f64 = 50.0;
@@ -107,7 +106,7 @@ impl Evolution {
         let (pointers, columns): (Vec<String>, Vec<Vec<f64>>) = columns.unzip();
         let first: Vec<f64> = columns.iter().map(|column| column[0]).collect();
         let first = filled(&template, &pointers, &first, None)
-            .and_then(|case| contact::check(&case, limits))
+            .and_then(|case| crate::check(&case, limits))
             .map_err(|error| located(error, &pointers, 0, None))?;
         let (NormalTask::Wheel(wheel), Some(damage)) =
             (&first.problem.task, &first.run.after.damage)
@@ -173,7 +172,7 @@ impl Evolution {
                 radius: 0.0,
             };
             self.case(on, &values)
-                .and_then(|case| contact::check_with(&known, &case, &self.limits))
+                .and_then(|case| crate::check_with(&known, &case, &self.limits))
                 .and_then(|checked| several_answers(&checked).map_or(Ok(()), |f| Err(f.into())))
                 .map_err(|error| located(error, &self.pointers, row, tested))?;
         }

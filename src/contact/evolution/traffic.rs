@@ -5,12 +5,12 @@
 //! variance along the section that its halves add. The change of the wear that is left, summed over the columns, is the error of the groups. Until it
 //! meets the tolerance, the groups that change most are replaced by the halves that change most.
 
-use crate::contact::error::SolveError;
-use crate::contact::evolution::pass::Pass;
-use crate::contact::evolution::section::{add, smoothed};
-use crate::contact::evolution::task::Evolution;
-use crate::contact::geometry::profile::POINT_SPACING;
-use crate::contact::solution::words::evolution::{CondensedTraffic, TrafficState};
+use crate::error::SolveError;
+use crate::evolution::pass::Pass;
+use crate::evolution::section::{add, smoothed};
+use crate::evolution::task::Evolution;
+use crate::geometry::profile::POINT_SPACING;
+use crate::solution::words::evolution::{CondensedTraffic, TrafficState};
 
 /// In each round the groups that change most are parted, this share of all.
 const PARTED: f64 = 0.25;

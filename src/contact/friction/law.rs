@@ -11,12 +11,12 @@
 
 use std::borrow::Borrow;
 
-use crate::contact::friction::coefficient_table::CoefficientTable;
-use crate::contact::friction::path_dependent::HeatedLaw;
-use crate::contact::friction::velocity_weakening::{FallingLaw, Softening};
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::footprint::{Footprint, LoadAcross};
-use crate::contact::normal::hertz::Patch;
+use crate::friction::coefficient_table::CoefficientTable;
+use crate::friction::path_dependent::HeatedLaw;
+use crate::friction::velocity_weakening::{FallingLaw, Softening};
+use crate::geometry::wheel_rail::WheelRail;
+use crate::normal::footprint::{Footprint, LoadAcross};
+use crate::normal::hertz::Patch;
 
 /// How the coefficient of friction varies over the contact.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,10 +3,10 @@
 //! Both only look ahead, to where the point has been: along a strip every bound follows from the slips of the cells ahead and of its own.
 //! The method solves with bounds that are given, finds the bounds that belong to the slips, and repeats until they agree.
 
-use crate::contact::friction::coefficient_table::CoefficientTable;
-use crate::contact::friction::velocity_weakening::{SLIP_OF_CELL, STABILITY_MAX};
-use crate::contact::mesh::Mesh;
-use crate::contact::numerics::roots::{self, CloseEnough, Course};
+use crate::friction::coefficient_table::CoefficientTable;
+use crate::friction::velocity_weakening::{SLIP_OF_CELL, STABILITY_MAX};
+use crate::mesh::Mesh;
+use crate::numerics::roots::{self, CloseEnough, Course};
 
 /// Largest temperature in K by which the temperature of a cell may be missed; bounds change by some 10⁻⁴ per K. Keeps the numbers safe; not tuned.
 const KELVIN: f64 = 1e-6;
@@ -230,8 +230,8 @@ impl Default for Interface {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::Chord;
-    use crate::contact::mesh::Grading;
+    use crate::mesh::Chord;
+    use crate::mesh::Grading;
 
     fn strip(cells: usize) -> Mesh {
         let chord = Chord {

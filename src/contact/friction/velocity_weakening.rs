@@ -2,7 +2,7 @@
 
 use std::f64::consts::LN_2;
 
-use crate::contact::numerics::roots::{CloseEnough, Course, find};
+use crate::numerics::roots::{CloseEnough, Course, find};
 
 /// Rounding of the slip of [`Softening::resolvent`], relative to that of a cell without traction.
 const ROUNDING: f64 = 1e-14;

@@ -10,7 +10,7 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-use crate::contact::numerics::roots::bisect;
+use crate::numerics::roots::bisect;
 
 /// Places of the quadrature between the turning points, equally spaced in the angle: with linear Δr it is exact.
 const PLACES: usize = 2000;

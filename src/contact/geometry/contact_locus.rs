@@ -6,10 +6,10 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use crate::contact::geometry::envelope::Envelope;
-use crate::contact::geometry::envelope::envelope;
-use crate::contact::geometry::locus_lines::{LocusLines, LocusPoint};
-use crate::contact::geometry::wheel_rail::{WheelCircle, WheelRail};
+use crate::geometry::envelope::Envelope;
+use crate::geometry::envelope::envelope;
+use crate::geometry::locus_lines::{LocusLines, LocusPoint};
+use crate::geometry::wheel_rail::{WheelCircle, WheelRail};
 
 /// Spacing of the search across the track, in mm, half of that of the points along the curves. The height of first touch is as exact as the rail is straight over half of it.
 pub(crate) const STEP: f64 = 0.04;

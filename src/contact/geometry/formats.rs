@@ -25,7 +25,7 @@ use std::f64::consts::TAU;
 
 use railhead_macros::Named;
 
-use crate::contact::geometry::profile::{LengthUnit, POINTS_MIN};
+use crate::geometry::profile::{LengthUnit, POINTS_MIN};
 
 /// A file format that a client can name; each is read in the file of that name in this folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]

@@ -1,7 +1,7 @@
 //! Stretches without points in which the bodies may touch.
 
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::profile::Body;
+use crate::geometry::contact_locus::ContactLocus;
+use crate::geometry::profile::Body;
 
 /// Length in mm below which a chord is not a hole and fine enough for any patch, and over which the direction of the profile at the end of a hole is taken.
 pub(crate) const LENGTH_MIN: f64 = 1.0;

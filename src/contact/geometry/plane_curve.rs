@@ -5,7 +5,7 @@
 
 use std::cell::Cell;
 
-use crate::contact::numerics::interpolation::{Spline, akima_slopes};
+use crate::numerics::interpolation::{Spline, akima_slopes};
 
 /// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable except at sharp corners, straight beyond its ends.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,14 +10,14 @@ use std::sync::Arc;
 
 use railhead_macros::Named;
 
-use crate::contact::geometry::orientation::{
+use crate::geometry::orientation::{
     self, Flange, FormatSenses, FoundSenses, Senses, StatedSenses, SureBody,
 };
-use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
-use crate::contact::geometry::profile_quality::{Points, PointsRead};
-use crate::contact::geometry::{plane_curve, profile_quality};
-use crate::contact::lazy_field::LazyField;
-use crate::contact::remark::list::Remark;
+use crate::geometry::plane_curve::{CurvePoint, PlaneCurve};
+use crate::geometry::profile_quality::{Points, PointsRead};
+use crate::geometry::{plane_curve, profile_quality};
+use crate::lazy_field::LazyField;
+use crate::remark::list::Remark;
 
 /// Length of the whole curve in mm that a profile may have; anything else is in another unit.
 pub const ARC_LENGTH: [f64; 2] = [5.0, 500.0];

@@ -11,8 +11,8 @@ use std::f64::consts::{PI, TAU};
 
 use realfft::RealFftPlanner;
 
-use crate::contact::geometry::plane_curve::{PlaneCurve, is_corner, turn};
-use crate::contact::numerics::lu::first_coefficient;
+use crate::geometry::plane_curve::{PlaneCurve, is_corner, turn};
+use crate::numerics::lu::first_coefficient;
 
 /// Chords in one window of the noise estimate.
 const NOISE_CHORDS: usize = 4;

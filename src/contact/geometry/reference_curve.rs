@@ -11,12 +11,12 @@ use std::borrow::Cow;
 use std::cell::Cell;
 use std::ops::Range;
 
-use crate::contact::geometry::plane_curve::CurvePoint;
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::geometry::wheelset_pose::WheelsetMotion;
-use crate::contact::numerics::quadrature::{GaussPoints, integral};
+use crate::geometry::plane_curve::CurvePoint;
+use crate::geometry::wheel_rail::WheelRail;
+use crate::geometry::wheelset_pose::WheelsetMotion;
+use crate::numerics::quadrature::{GaussPoints, integral};
 
-pub use crate::contact::geometry::curve_place::CurvePlace;
+pub use crate::geometry::curve_place::CurvePlace;
 
 /// Largest spacing in mm of the places of the rail where overlaps are looked for, and of the wheel's circles among which the one over a place is looked
 /// for.

@@ -1,8 +1,8 @@
 //! Where a wheel touches its rail if both are rigid, for many places of the wheelset over the same rail.
 
-use crate::contact::geometry::contact_locus::rail_points;
-use crate::contact::geometry::envelope::{Envelope, envelope};
-use crate::contact::geometry::wheel_rail::WheelRail;
+use crate::geometry::contact_locus::rail_points;
+use crate::geometry::envelope::{Envelope, envelope};
+use crate::geometry::wheel_rail::WheelRail;
 
 /// Spacing in mm of the lines on which the rail's upper edge is kept, half of that of its points.
 const LINE_STEP: f64 = 0.01;

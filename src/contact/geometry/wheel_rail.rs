@@ -9,13 +9,13 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::contact::geometry::curve_place::CurvePlace;
-use crate::contact::geometry::envelope::Envelope;
-use crate::contact::geometry::locus_lines::LocusLines;
-use crate::contact::geometry::plane_curve::{CurvePoint, PlaneCurve};
-use crate::contact::geometry::profile::Profile;
-use crate::contact::lazy_field::LazyField;
-use crate::contact::remark::entry::RemarkEntry;
+use crate::geometry::curve_place::CurvePlace;
+use crate::geometry::envelope::Envelope;
+use crate::geometry::locus_lines::LocusLines;
+use crate::geometry::plane_curve::{CurvePoint, PlaneCurve};
+use crate::geometry::profile::Profile;
+use crate::lazy_field::LazyField;
+use crate::remark::entry::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,10 +10,10 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::contact::geometry::profile::NEAR;
-use crate::contact::geometry::rigid_touch::{RailTop, RigidTouch};
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::numerics::equilibrium::{Search, Trial};
+use crate::geometry::profile::NEAR;
+use crate::geometry::rigid_touch::{RailTop, RigidTouch};
+use crate::geometry::wheel_rail::WheelRail;
+use crate::numerics::equilibrium::{Search, Trial};
 
 /// The wheels' heights may differ by so much in mm, 1e-10 rad of roll.
 const LEVEL: f64 = 1e-7;

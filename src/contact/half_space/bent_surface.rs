@@ -20,10 +20,10 @@ use std::cmp::Ordering;
 use pulp::{NullaryFnOnce, Simd, WithSimd};
 use rustfft::num_complex::Complex;
 
-use crate::contact::half_space::grid_operator::{FftPlanners, FftPlans, coefficients, lines};
-use crate::contact::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
-use crate::contact::lazy_field::LazyField;
-use crate::contact::numerics::simd::{self, LANES};
+use crate::half_space::grid_operator::{FftPlanners, FftPlans, coefficients, lines};
+use crate::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
+use crate::lazy_field::LazyField;
+use crate::numerics::simd::{self, LANES};
 
 /// How strips of a bent surface act on each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

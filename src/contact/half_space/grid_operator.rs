@@ -9,14 +9,14 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 
-use crate::contact::numerics::simd;
-use crate::contact::numerics::simd::Float;
+use crate::numerics::simd;
+use crate::numerics::simd::Float;
 
 /// Normal displacement at the centres of `nx` by `ny` equal rectangles caused by uniform pressures on them, both bodies
 /// together.
 ///
 /// With `E* = G/(1−ν)` the displacement is `1/(πE*) Σ p [[ q asinh(p/|q|) + p asinh(q/|p|) ]]` (Boussinesq; Love 1929),
-/// the coefficient [`rectangle`](crate::contact::half_space::kernels::rectangle) calls `zz`. Values are stored at
+/// the coefficient [`rectangle`](crate::half_space::kernels::rectangle) calls `zz`. Values are stored at
 /// `j * nx + i`, i along x. The product equals that of the dense matrix to about 1e-6 of the largest displacement.
 pub struct GridOperator {
     nx: usize,
@@ -361,7 +361,7 @@ impl FftPlanners {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::half_space::kernels::{Rectangle, rectangle};
+    use crate::half_space::kernels::{Rectangle, rectangle};
 
     /// Displacements by the closed form, cell by cell, for G = E*(1 − ν) = 1.
     fn dense(nx: usize, ny: usize, dx: f64, dy: f64, nu: f64, pressure: &[f64]) -> Vec<f64> {

@@ -1,6 +1,6 @@
 //! Surface displacement caused by a uniformly loaded rectangle: closed forms, one point at a time.
 //!
-//! This is the slow reference implementation; [`strips`](crate::contact::half_space::strip_operator::operator) evaluates the same forms in bulk.
+//! This is the slow reference implementation; [`strips`](crate::half_space::strip_operator::operator) evaluates the same forms in bulk.
 //!
 //! Stresses of many point loads at a point of a half-space, in the machine's lanes and in single precision.
 //!
@@ -11,8 +11,8 @@ use std::ops::Range;
 
 use pulp::NullaryFnOnce;
 
-use crate::contact::numerics::quadrature::FOUR_POINTS;
-use crate::contact::numerics::simd::{self, LANES};
+use crate::numerics::quadrature::FOUR_POINTS;
+use crate::numerics::simd::{self, LANES};
 
 /// A rectangle `x0 < x < x1`, `y0 < y < y1`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,12 +119,12 @@ fn by_quadrature(x: f64, y: f64, cell: Rectangle) -> [f64; 3] {
 pub mod rectangle_stress {
     //! Stresses below a uniformly loaded rectangle on a half-space: closed forms.
     //!
-    //! Tests compare the sums of [`point_loads`](crate::contact::half_space::kernels) with it.
+    //! Tests compare the sums of [`point_loads`](crate::half_space::kernels) with it.
     //!
     //! Axes: x, y in the surface, z into the body. Tension is positive. Pressure acts into the body, shear tractions along +x and +y.
     //! Sources: Love (1929) for pressure; Johnson 1985, §3.2 and 3.6, for the point loads that the forms for shear are the integrals of.
 
-    use crate::contact::half_space::kernels::Stress;
+    use crate::half_space::kernels::Stress;
 
     /// The primitives of one corner at `p = x − x_edge`, `q = y − y_edge` and depth z: the stress of a quarter plane under pressure 1, under
     /// shear 1 along x and under shear 1 along y, each times 2π. Four-corner differences of them are the stresses of a rectangle.
@@ -227,7 +227,7 @@ pub mod rectangle_stress {
     #[cfg(test)]
     mod tests {
         use super::*;
-        use crate::contact::half_space::kernels::{LoadPack, stress};
+        use crate::half_space::kernels::{LoadPack, stress};
 
         fn rectangle(at: [f64; 3], sides: [f64; 4], loads: [f64; 3], nu: f64) -> Stress {
             let mut sum = [0.0; 6];

@@ -8,7 +8,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::contact::mesh::{Mesh, Segment};
+use crate::mesh::{Mesh, Segment};
 
 /// `p atan(q/p) + q ln r` and the same with p and q exchanged.
 fn corner(p: f64, q: f64) -> [f64; 2] {
@@ -130,8 +130,8 @@ impl Elasticity {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::Chord;
-    use crate::contact::mesh::Grading;
+    use crate::mesh::Chord;
+    use crate::mesh::Grading;
 
     /// Corner sums of the rectangle |x| ≤ 0.5, |y| ≤ 0.3, computed with 40 digits and written with 12.
     #[test]

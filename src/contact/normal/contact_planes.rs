@@ -1,8 +1,8 @@
 //! Places of the planes of contact of a wheel on a rail.
 
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::reference_curve::{ContactPlane, Nearest, ReferenceCurve};
-use crate::contact::normal::on_curve::CurveContact;
+use crate::geometry::contact_locus::ContactLocus;
+use crate::geometry::reference_curve::{ContactPlane, Nearest, ReferenceCurve};
+use crate::normal::on_curve::CurveContact;
 
 /// Patches nearer to each other than this, in mm, and inclined to each other by less than this, in rad, share a plane of contact. CONTACT separates patches that
 /// are 8 mm or 30° apart.

@@ -1,6 +1,6 @@
 //! Grids over the unfolded surface of a rail, and the wheel over their cells.
 
-use crate::contact::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
+use crate::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
 
 /// A strip whose least gap is larger than this, in mm, is no part of the contact.
 pub(super) const APART: f64 = 0.3;

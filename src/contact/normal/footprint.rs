@@ -9,13 +9,13 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use crate::contact::lazy_field::LazyField;
-use crate::contact::mesh::Chord;
-use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::hertz::{Ellipse, Patch};
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::wheel::{WheelTask, WheelsetTask};
-use crate::contact::numerics::interpolation;
+use crate::lazy_field::LazyField;
+use crate::mesh::Chord;
+use crate::normal::gap::task::GapTask;
+use crate::normal::hertz::{Ellipse, Patch};
+use crate::normal::pressure_field::field::PressureField;
+use crate::normal::wheel::{WheelTask, WheelsetTask};
+use crate::numerics::interpolation;
 
 /// The patches of one frame with their pressures; never empty. It answers where the patches are, how long their chords are,
 /// and what pressure acts on them, and nothing else.

@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::mesh::Chord;
+use crate::mesh::Chord;
 
 /// An elliptic patch with Hertz's pressure `p0 √(1 − x²/a² − y²/b²)`, centred at the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,24 +7,22 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use crate::contact::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve, SPACING};
-use crate::contact::half_space::bent_surface::{
+use crate::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve, SPACING};
+use crate::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
 };
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::lazy_field::LazyField;
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::curve_grid::{CurveGrid, FREE, WheelOverGrid, extent_of};
-use crate::contact::normal::gap::cell_sums::LANES;
-use crate::contact::normal::gap::conjugate_gradients::{
-    PressureInfluence, PressureTask, solve_pressure,
-};
-use crate::contact::normal::gap::grid::{GridFineness, NormalError, NormalWork, no_touch, squares};
-use crate::contact::normal::hertz::NormalLoad;
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal::wheel::WheelLoad;
-use crate::contact::numerics::flood_fill::groups;
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::lazy_field::LazyField;
+use crate::monitor::Monitor;
+use crate::normal::curve_grid::{CurveGrid, FREE, WheelOverGrid, extent_of};
+use crate::normal::gap::cell_sums::LANES;
+use crate::normal::gap::conjugate_gradients::{PressureInfluence, PressureTask, solve_pressure};
+use crate::normal::gap::grid::{GridFineness, NormalError, NormalWork, no_touch, squares};
+use crate::normal::hertz::NormalLoad;
+use crate::normal::pressure_field::field::PressureField;
+use crate::normal::pressure_field::grid_pressure::GridPressure;
+use crate::normal::wheel::WheelLoad;
+use crate::numerics::flood_fill::groups;
 
 /// Cells across the largest overlap on the grid that finds the contact.
 const FIRST: f64 = 24.0;

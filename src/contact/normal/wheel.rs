@@ -4,14 +4,14 @@
 //!
 //! A wheelset over both rails, with what presses it down and what is asked of it.
 
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::reference_curve::{CurvePlace, WheelOver};
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::geometry::wheelset_pose::WheelsetMotion;
-use crate::contact::half_space::bent_surface::Influence;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::remark::entry::RemarkEntry;
+use crate::geometry::contact_locus::ContactLocus;
+use crate::geometry::reference_curve::{CurvePlace, WheelOver};
+use crate::geometry::wheel_rail::WheelRail;
+use crate::geometry::wheelset_pose::WheelsetMotion;
+use crate::half_space::bent_surface::Influence;
+use crate::normal::hertz::Patch;
+use crate::normal::pressure_field::field::PressureField;
+use crate::remark::entry::RemarkEntry;
 
 /// What presses the wheel on the rail.
 #[derive(Debug, Clone, Copy, PartialEq)]

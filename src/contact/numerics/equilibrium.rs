@@ -3,8 +3,8 @@
 //! Each residual must grow with its own unknown, as a force does with its creepage. A step was then too long if the residuals after it point back along
 //! it. Unless it has shortened the residuals it is rejected, and the next one, from the same place, is shorter.
 
-use crate::contact::numerics::roots::ROUNDING;
-use crate::contact::remark::list::Remark;
+use crate::numerics::roots::ROUNDING;
+use crate::remark::list::Remark;
 
 /// Most trials of one search.
 const TRIALS_MAX: u32 = 40;
@@ -231,7 +231,7 @@ fn times<const N: usize>(matrix: &[[f64; N]; N], a: [f64; N]) -> [f64; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::numerics::quadrature::{PRIMES, halton};
+    use crate::numerics::quadrature::{PRIMES, halton};
 
     const LIMIT: f64 = 65.0;
 

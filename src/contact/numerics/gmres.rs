@@ -1,6 +1,6 @@
 //! GMRES with right preconditioning (Saad & Schultz 1986): linear systems known only through products.
 
-use crate::contact::monitor::Stop;
+use crate::monitor::Stop;
 
 /// Basis vectors kept before a restart. A Newton step takes 4 products on average; 30 gives the same work on the 160 ellipses that
 /// `newton.rs` of the boundary element method names.

@@ -8,7 +8,7 @@
 //! `w_i` half the distance between the neighbours of `s_i`, so that `λ = (L/2π)⁴` halves waves of length L whatever the
 //! spacing. Source: Reinsch, "Smoothing by spline functions", Numerische Mathematik 10 (1967).
 
-use crate::contact::numerics::roots::interval;
+use crate::numerics::roots::interval;
 
 /// A place on an axis, found once for the curves of many rows.
 #[derive(Debug, Clone, Copy)]

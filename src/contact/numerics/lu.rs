@@ -11,8 +11,8 @@ use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Mat, MatMut};
 use pulp::NullaryFnOnce;
 
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::simd;
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::simd;
 
 /// Solves `X ← A⁻¹ X` for a square matrix. With a singular matrix, solutions are not finite.
 ///
@@ -132,7 +132,7 @@ pub(crate) fn first_coefficient<const N: usize>(samples: &[([f64; N], f64)]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::monitor::Unmonitored;
+    use crate::monitor::Unmonitored;
 
     fn wavy(n: usize) -> Mat<f64> {
         // No large diagonal: rows must be exchanged.

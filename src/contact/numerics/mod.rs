@@ -12,9 +12,9 @@
 //!
 //! Some iterations of the physics resemble one of these, and stay where they are because what they do beside the iteration differs:
 //!
-//! - [`rigid_touch`](crate::contact::geometry::rigid_touch) starts within 0.02 mm of the root and takes four steps untested; where the rail
+//! - [`rigid_touch`](crate::geometry::rigid_touch) starts within 0.02 mm of the root and takes four steps untested; where the rail
 //!   is upright, it keeps the start instead of failing.
-//! - [`spline`](crate::contact::rolling::methods::table::spline) of the creep table always takes six steps, without a test in
+//! - [`spline`](crate::rolling::methods::table::spline) of the creep table always takes six steps, without a test in
 //!   between, because it is evaluated for millions of rows.
 
 pub mod equilibrium;

@@ -2,7 +2,7 @@
 //!
 //! Points that fill a range evenly, and the normal distribution at them.
 
-use crate::contact::numerics::roots::bisect;
+use crate::numerics::roots::bisect;
 
 /// The four points on −1 … 1 with their weights.
 pub(crate) const FOUR_POINTS: [(f64, f64); 4] = [

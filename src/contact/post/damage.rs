@@ -4,15 +4,15 @@
 //!
 //! The damage of one pass over a patch, from its resultants alone.
 
-use crate::contact::case::words::subsurface::{
+use crate::case::words::subsurface::{
     ArchardFigures, DamageModel, DamageParameterWords, DamageSetName, DamageWords, UsfdFigures,
     WlrmFigures,
 };
-use crate::contact::normal::hertz::Patch;
-use crate::contact::post::local_power::{METRES, NANOMETRES};
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::solution::words::answer::PointSolution;
-use crate::contact::solution::words::damage::{
+use crate::normal::hertz::Patch;
+use crate::post::local_power::{METRES, NANOMETRES};
+use crate::rolling::strip_mesh::StripMesh;
+use crate::solution::words::answer::PointSolution;
+use crate::solution::words::damage::{
     ArchardWear, Damage, DamageFiguresUsed, RailFatigue, Ranged, ShakedownPlace, SurfaceFatigue,
     TGamma, UsfdWear, WearAcross, WearRegime,
 };

@@ -15,17 +15,17 @@
 
 use std::ops::Range;
 
-use crate::contact::case::words::material::ThermalBodyWords;
-use crate::contact::half_space::strip_operator::assembly::{CellEdges, SegmentRows};
-use crate::contact::half_space::strip_operator::kind::Precision;
-use crate::contact::mesh::{Mesh, Segment};
-use crate::contact::method::Method;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::simd;
-use crate::contact::numerics::simd::Float;
-use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome};
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::Motion;
+use crate::case::words::material::ThermalBodyWords;
+use crate::half_space::strip_operator::assembly::{CellEdges, SegmentRows};
+use crate::half_space::strip_operator::kind::Precision;
+use crate::mesh::{Mesh, Segment};
+use crate::method::Method;
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::simd;
+use crate::numerics::simd::Float;
+use crate::rolling::answer::{LevelAnswer, LevelOutcome};
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::Motion;
 
 /// What the power of the cells is taken from.
 #[derive(Debug, Clone, Copy)]
@@ -406,9 +406,9 @@ pub(crate) const NANOMETRES: f64 = 1e6;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::Chord;
-    use crate::contact::mesh::{Grading, strips_about};
-    use crate::contact::monitor::Unmonitored;
+    use crate::mesh::Chord;
+    use crate::mesh::{Grading, strips_about};
+    use crate::monitor::Unmonitored;
 
     /// Whatever the tractions: the cells give the power of the forces, on strips of one width and of many.
     #[test]
@@ -478,7 +478,7 @@ mod tests {
 #[cfg(test)]
 mod heat_tests {
     use super::*;
-    use crate::contact::mesh::Grading;
+    use crate::mesh::Grading;
 
     /// Golden values of constant heat per cell: the slopes are 0 where neighbours do not change.
     #[test]

@@ -7,21 +7,21 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::contact::case::words::contact::Contact;
-use crate::contact::case::words::solver::MethodName;
-use crate::contact::geometry::orientation::SureBody;
-use crate::contact::geometry::profile::{Body, Profile};
-use crate::contact::geometry::profile_quality::{Grain, advised_smoothing, noise_of, polygon_of};
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::gap::outcome::{APPROACH_USUAL_MAX, HALF_WIDTH_USUAL_MAX};
-use crate::contact::normal::hertz::Patch;
-use crate::contact::problem::physics::{MotionPart, Problem, Run};
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::task::{Motion, RollingTask};
-use crate::contact::solution::words::answer::Asked;
-use crate::contact::solution::words::damage::{PairQuality, SectionQuality};
+use crate::case::words::contact::Contact;
+use crate::case::words::solver::MethodName;
+use crate::geometry::orientation::SureBody;
+use crate::geometry::profile::{Body, Profile};
+use crate::geometry::profile_quality::{Grain, advised_smoothing, noise_of, polygon_of};
+use crate::geometry::wheel_rail::WheelRail;
+use crate::normal::footprint::Footprint;
+use crate::normal::gap::outcome::{APPROACH_USUAL_MAX, HALF_WIDTH_USUAL_MAX};
+use crate::normal::hertz::Patch;
+use crate::problem::physics::{MotionPart, Problem, Run};
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
+use crate::rolling::task::{Motion, RollingTask};
+use crate::solution::words::answer::Asked;
+use crate::solution::words::damage::{PairQuality, SectionQuality};
 
 /// A case that can be solved.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,19 +1,17 @@
 //! How much memory a case will take, estimated from its finest mesh and from the operators that it leaves in the store of the process.
 
-use crate::contact::error::SolveError;
-use crate::contact::mesh::MeshSize;
-use crate::contact::method::Method;
-use crate::contact::normal::footprint::{Footprint, NormalTask};
-use crate::contact::post::subsurface::states::SubsurfaceTask;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::rolling::history::plan::HistoryStart;
-use crate::contact::rolling::history::solve::{pressed_bytes, pressed_cells_max};
-use crate::contact::rolling::operator_store::{OperatorKind, kept_bytes};
-use crate::contact::rolling::refinement::interpolate::LEVELS_KEPT;
-use crate::contact::rolling::refinement::mesh_family::{
-    CELLS_MAX, PATCH_CELLS_MAX_LEAST, fixed_meshes,
-};
-use crate::contact::rolling::task::{Motion, Resolution, precision_of};
+use crate::error::SolveError;
+use crate::mesh::MeshSize;
+use crate::method::Method;
+use crate::normal::footprint::{Footprint, NormalTask};
+use crate::post::subsurface::states::SubsurfaceTask;
+use crate::problem::checked_case::CheckedCase;
+use crate::rolling::history::plan::HistoryStart;
+use crate::rolling::history::solve::{pressed_bytes, pressed_cells_max};
+use crate::rolling::operator_store::{OperatorKind, kept_bytes};
+use crate::rolling::refinement::interpolate::LEVELS_KEPT;
+use crate::rolling::refinement::mesh_family::{CELLS_MAX, PATCH_CELLS_MAX_LEAST, fixed_meshes};
+use crate::rolling::task::{Motion, Resolution, precision_of};
 
 /// Cells of the finest mesh for a target of 0.02, on average.
 const TARGET_CELLS: f64 = 128.0;

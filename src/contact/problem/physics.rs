@@ -9,23 +9,23 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::contact::case::words::solver::{MethodName, Output};
-use crate::contact::friction::law::FrictionLaw;
-use crate::contact::friction::path_dependent::Interface;
-use crate::contact::geometry::wheelset_pose::WheelsetMotion;
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::method::{Method, TractionBound};
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::hertz::Ellipse;
-use crate::contact::normal::wheel::{ReferenceSurface, WheelTask};
-use crate::contact::post::damage::DamageTask;
-use crate::contact::post::local_power::ThermalTask;
-use crate::contact::post::subsurface::states::SubsurfaceTask;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::MotionAnswer;
-use crate::contact::rolling::history::plan::HistoryTask;
-use crate::contact::rolling::methods::table::solve::{outside, unlike};
-use crate::contact::rolling::task::{
+use crate::case::words::solver::{MethodName, Output};
+use crate::friction::law::FrictionLaw;
+use crate::friction::path_dependent::Interface;
+use crate::geometry::wheelset_pose::WheelsetMotion;
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::method::{Method, TractionBound};
+use crate::normal::footprint::NormalTask;
+use crate::normal::hertz::Ellipse;
+use crate::normal::wheel::{ReferenceSurface, WheelTask};
+use crate::post::damage::DamageTask;
+use crate::post::local_power::ThermalTask;
+use crate::post::subsurface::states::SubsurfaceTask;
+use crate::remark::list::Remark;
+use crate::rolling::answer::MotionAnswer;
+use crate::rolling::history::plan::HistoryTask;
+use crate::rolling::methods::table::solve::{outside, unlike};
+use crate::rolling::task::{
     Motion, NEGLIGIBLE_OF_TARGET, PrescribedForces, RelativeTo, Resolution, TARGET_LEAST,
 };
 
@@ -80,7 +80,7 @@ pub(crate) struct PlainContact {
     pub(crate) reduction: f64,
 }
 
-/// Proof that a problem went through the checks. `tests/tidy` allows it, and literals of [`Problem`], in `case/` and here only.
+/// Proof that a problem went through the checks. Only `case/` and this file make it, and literals of [`Problem`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checked(());
 

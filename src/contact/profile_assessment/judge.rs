@@ -2,16 +2,16 @@
 //!
 //! Defects of a profile, described so that whoever measured it can correct them.
 
-use crate::contact::geometry::holes::{LENGTH_MIN, WIDE};
-use crate::contact::geometry::profile::{Body, NEEDED_BEYOND, Profile};
-use crate::contact::geometry::profile_quality::{
+use crate::geometry::holes::{LENGTH_MIN, WIDE};
+use crate::geometry::profile::{Body, NEEDED_BEYOND, Profile};
+use crate::geometry::profile_quality::{
     Grain, Oddity, UnderContact, advised_smoothing, noise_pressure, under_contact,
 };
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::normal::wheel::WheelPatch;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
-use crate::contact::solution::words::damage::{PatchQuality, ProfileQuality};
+use crate::geometry::wheel_rail::WheelRail;
+use crate::normal::wheel::WheelPatch;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
+use crate::solution::words::damage::{PatchQuality, ProfileQuality};
 
 /// Share of the roughness of both bodies from which that of one body is reported.
 const BLAMED: f64 = 0.6;

@@ -2,26 +2,24 @@
 
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::geometry::contact_locus::ContactLocus;
-use crate::contact::geometry::holes::{Hole, holes};
-use crate::contact::geometry::profile::{Body, NEEDED_BEYOND, Profile};
-use crate::contact::geometry::profile_quality::{Grain, advised_smoothing, under_contact};
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel::{ReferenceSurface, WheelContact, WheelPatch, WheelTask};
-use crate::contact::problem::checked_case;
-use crate::contact::problem::checked_case::{CheckedCase, PRESSURE_USUAL};
-use crate::contact::profile_assessment::judge::{
-    Cause, Finding, FoundPatch, HARMLESS, judge, sorted,
-};
-use crate::contact::profile_assessment::uncertainty;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::answer::{Fields, Solution};
-use crate::contact::solution::words::damage::PatchQuality;
-use crate::contact::wheel_on_rail;
-use crate::contact::wheel_on_rail::SolvedWheel;
+use crate::error::SolveError;
+use crate::geometry::contact_locus::ContactLocus;
+use crate::geometry::holes::{Hole, holes};
+use crate::geometry::profile::{Body, NEEDED_BEYOND, Profile};
+use crate::geometry::profile_quality::{Grain, advised_smoothing, under_contact};
+use crate::monitor::Monitor;
+use crate::normal::wheel::{ReferenceSurface, WheelContact, WheelPatch, WheelTask};
+use crate::problem::checked_case;
+use crate::problem::checked_case::{CheckedCase, PRESSURE_USUAL};
+use crate::profile_assessment::judge::{Cause, Finding, FoundPatch, HARMLESS, judge, sorted};
+use crate::profile_assessment::uncertainty;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
+use crate::rolling::operator_store::OperatorStore;
+use crate::solution::words::answer::{Fields, Solution};
+use crate::solution::words::damage::PatchQuality;
+use crate::wheel_on_rail;
+use crate::wheel_on_rail::SolvedWheel;
 
 /// Solves a wheel on a rail and assesses its profiles.
 ///

@@ -6,20 +6,20 @@
 
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::geometry::profile::Profile;
-use crate::contact::geometry::profile_quality::{CHORDS, SMOOTHING_ADVISED, noise_pressure};
-use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::normal::wheel::WheelTask;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::profile_assessment::judge::HARMLESS;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::rolling::task::Resolution;
-use crate::contact::solution::words::answer::{PatchSolution, Solution};
-use crate::contact::solution::words::damage::{ProfileQuality, ProfileUncertainty};
-use crate::contact::wheel_on_rail;
+use crate::error::SolveError;
+use crate::geometry::profile::Profile;
+use crate::geometry::profile_quality::{CHORDS, SMOOTHING_ADVISED, noise_pressure};
+use crate::monitor::{Monitor, MonitorPart};
+use crate::normal::wheel::WheelTask;
+use crate::problem::checked_case::CheckedCase;
+use crate::profile_assessment::judge::HARMLESS;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
+use crate::rolling::operator_store::OperatorStore;
+use crate::rolling::task::Resolution;
+use crate::solution::words::answer::{PatchSolution, Solution};
+use crate::solution::words::damage::{ProfileQuality, ProfileUncertainty};
+use crate::wheel_on_rail;
 
 /// The companion solves use the smoothing multiplied by these factors.
 pub(crate) const COMPANIONS: [f64; 2] = [0.4, 2.0];

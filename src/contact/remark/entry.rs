@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::finite::Finite;
-use crate::contact::remark::kind::Severity;
-use crate::contact::remark::kind::{AsFigure, Figure};
-use crate::contact::remark::list::Remark;
+use crate::finite::Finite;
+use crate::remark::kind::Severity;
+use crate::remark::kind::{AsFigure, Figure};
+use crate::remark::list::Remark;
 
 /// Number of motions with the same remark for which the figures are kept; of the others only the index is kept.
 const KEPT_MAX: usize = 4;

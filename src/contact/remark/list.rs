@@ -6,10 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::contact::remark::kind::{AsFigure, Figure, RemarkKind, Severity, remarks, short};
-use crate::contact::remark::list::motions::motion_remarks;
-use crate::contact::remark::list::normal::{case_remarks, normal_remarks, wheel_remarks};
-use crate::contact::remark::list::profile_quality::profile_remarks;
+use crate::remark::kind::{AsFigure, Figure, RemarkKind, Severity, remarks, short};
+use crate::remark::list::motions::motion_remarks;
+use crate::remark::list::normal::{case_remarks, normal_remarks, wheel_remarks};
+use crate::remark::list::profile_quality::profile_remarks;
 
 mod motions;
 mod normal;
@@ -24,8 +24,8 @@ mod tests {
 
     use std::collections::BTreeSet;
 
-    use crate::contact::remark::entry::RemarkEntry;
-    use crate::contact::remark::list::Remark;
+    use crate::remark::entry::RemarkEntry;
+    use crate::remark::list::Remark;
 
     #[test]
     fn every_code_is_listed_once_and_documented() {

@@ -4,12 +4,12 @@
 //!
 //! Forces and moment of tractions over a patch.
 
-use crate::contact::method::Method;
-use crate::contact::monitor::Stop;
-use crate::contact::numerics::simd::length;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::Motion;
+use crate::method::Method;
+use crate::monitor::Stop;
+use crate::numerics::simd::length;
+use crate::remark::list::Remark;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::Motion;
 
 /// The tangential answer on one level for one motion, dimensionless, one value per cell.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -3,9 +3,9 @@
 //! Slip in a frame that moves with the contact is `s = w + ∂u/∂x − ∂u/∂q`, q the distance rolled (Kalker 1990, eq. 1.44; Johnson 1985, eq. 8.2 in
 //! time). The operator between strips knows differences of u along a strip; with u at the leading edge of every strip u is known at all nodes.
 
-use crate::contact::half_space::kernels::{Rectangle, rectangle};
-use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::mesh::Mesh;
+use crate::half_space::kernels::{Rectangle, rectangle};
+use crate::half_space::strip_operator::kind::Parity;
+use crate::mesh::Mesh;
 
 /// Displacement at the leading edge of every strip per unit traction on every cell, for the unknowns of a parity.
 #[derive(Debug, Clone)]

@@ -10,20 +10,20 @@
 
 use std::convert::Infallible;
 
-use crate::contact::error::SolveError;
-use crate::contact::friction::path_dependent::Interface;
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::method::Method;
-use crate::contact::monitor::Monitor;
-use crate::contact::numerics::equilibrium::{Equilibrium, Search, Termination, Trial};
-use crate::contact::rolling::answer::{MotionAnswer, Resultants, Work};
-use crate::contact::rolling::linear_theory;
-use crate::contact::rolling::methods::table::solve as table;
-use crate::contact::rolling::refinement::adapt;
-use crate::contact::rolling::refinement::interpolate::RefinementState;
-use crate::contact::rolling::refinement::mesh_family::MeshFamily;
-use crate::contact::rolling::refinement::on_mesh::MotionTask;
-use crate::contact::rolling::task::{
+use crate::error::SolveError;
+use crate::friction::path_dependent::Interface;
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::method::Method;
+use crate::monitor::Monitor;
+use crate::numerics::equilibrium::{Equilibrium, Search, Termination, Trial};
+use crate::rolling::answer::{MotionAnswer, Resultants, Work};
+use crate::rolling::linear_theory;
+use crate::rolling::methods::table::solve as table;
+use crate::rolling::refinement::adapt;
+use crate::rolling::refinement::interpolate::RefinementState;
+use crate::rolling::refinement::mesh_family::MeshFamily;
+use crate::rolling::refinement::on_mesh::MotionTask;
+use crate::rolling::task::{
     MeshPlan, Motion, PrescribedForces, Resolution, RollingTask, TOLERANCE_LEAST,
 };
 

@@ -7,7 +7,7 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::numerics::interpolation;
+use crate::numerics::interpolation;
 
 /// Rows of the table: a/b from 1/32 to 32, two to an octave.
 pub const RATIOS: usize = 21;

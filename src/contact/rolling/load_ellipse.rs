@@ -6,11 +6,11 @@
 //!
 //! Chords that stand for their whole strip, not only for its mid-line.
 
-use crate::contact::mesh::Chord;
-use crate::contact::normal::footprint::{Footprint, LineAngles};
-use crate::contact::normal::hertz::{Ellipse, NormalLoad};
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::numerics::quadrature::FOUR_POINTS;
+use crate::mesh::Chord;
+use crate::normal::footprint::{Footprint, LineAngles};
+use crate::normal::hertz::{Ellipse, NormalLoad};
+use crate::normal::pressure_field::field::PressureField;
+use crate::numerics::quadrature::FOUR_POINTS;
 
 /// Strips over a patch, and parts of each chord: moments and load_mismatch load change by less than 0.002 with twice as many.
 const PARTS: usize = 48;
@@ -347,9 +347,9 @@ mod tests {
 #[cfg(test)]
 mod strip_chords_tests {
     use super::*;
-    use crate::contact::mesh::equal_strips;
-    use crate::contact::normal::hertz::{Ellipse, NormalLoad};
-    use crate::contact::normal::pressure_field::field::PressureField;
+    use crate::mesh::equal_strips;
+    use crate::normal::hertz::{Ellipse, NormalLoad};
+    use crate::normal::pressure_field::field::PressureField;
 
     fn circle() -> Footprint {
         let force = NormalLoad::Force(2.0 * std::f64::consts::PI / 3.0);

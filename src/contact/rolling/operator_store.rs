@@ -8,11 +8,11 @@ use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::contact::half_space::strip_operator::kind::Precision;
-use crate::contact::half_space::strip_operator::operator;
-use crate::contact::half_space::strip_operator::operator::StripOperator;
-use crate::contact::mesh::{Mesh, Segment};
-use crate::contact::monitor::{Monitor, Stop};
+use crate::half_space::strip_operator::kind::Precision;
+use crate::half_space::strip_operator::operator;
+use crate::half_space::strip_operator::operator::StripOperator;
+use crate::mesh::{Mesh, Segment};
+use crate::monitor::{Monitor, Stop};
 
 /// Default size of a store in bytes: room for two of the largest operators that targets from 0.0005 on lead to (52 MB each without
 /// mirror symmetry), or for some hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and
@@ -252,8 +252,8 @@ fn alike(a: &Mesh, b: &Mesh) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::samples::mesh_between;
-    use crate::contact::monitor::Unmonitored;
+    use crate::mesh::samples::mesh_between;
+    use crate::monitor::Unmonitored;
 
     fn mesh(half_width: f64) -> Arc<Mesh> {
         Arc::new(mesh_between(half_width, [4, 6], |_| [-1.0, 1.0]))

@@ -5,15 +5,13 @@
 
 use std::ops::Range;
 
-use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::half_space::strip_operator::operator::{
-    OperatorScratch, StripOperator, rows_of,
-};
-use crate::contact::mesh::{Mesh, Segment};
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::displacement_memory::DisplacementMemory;
-use crate::contact::rolling::slip_rules::{Rule, Stencils};
-use crate::contact::rolling::task::Motion;
+use crate::half_space::strip_operator::kind::Parity;
+use crate::half_space::strip_operator::operator::{OperatorScratch, StripOperator, rows_of};
+use crate::mesh::{Mesh, Segment};
+use crate::monitor::{Monitor, Stop};
+use crate::rolling::displacement_memory::DisplacementMemory;
+use crate::rolling::slip_rules::{Rule, Stencils};
+use crate::rolling::task::Motion;
 
 /// A rule on a mesh with its operator: the linear map from tractions to slips.
 #[derive(Debug)]
@@ -410,10 +408,10 @@ impl LayerSlip {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::half_space::strip_operator::kind::Precision;
-    use crate::contact::mesh::samples::mesh_between;
-    use crate::contact::mesh::{Chord, Grading};
-    use crate::contact::monitor::Unmonitored;
+    use crate::half_space::strip_operator::kind::Precision;
+    use crate::mesh::samples::mesh_between;
+    use crate::mesh::{Chord, Grading};
+    use crate::monitor::Unmonitored;
 
     fn parabolic_mesh() -> Mesh {
         mesh_between(0.6, [4, 5], |y| [-1.0 + y * y, 0.8 - y * y])

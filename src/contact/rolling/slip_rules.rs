@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use railhead_macros::Named;
 
-use crate::contact::mesh::{Mesh, Segment, observe};
+use crate::mesh::{Mesh, Segment, observe};
 
 /// The rules offered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
@@ -148,9 +148,9 @@ fn three_point(points: &[f64], i: usize, n: usize) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::Chord;
-    use crate::contact::mesh::Grading;
-    use crate::contact::mesh::observation_points;
+    use crate::mesh::Chord;
+    use crate::mesh::Grading;
+    use crate::mesh::observation_points;
 
     fn mesh(n: usize) -> Mesh {
         let chord = Chord {

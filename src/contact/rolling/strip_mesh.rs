@@ -3,20 +3,20 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::friction::path_dependent::{PathDependentFriction, PathDependentLaws};
-use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
-use crate::contact::half_space::strip_operator::operator::StripOperator;
-use crate::contact::half_space::unlike_bodies::{Elasticity, pressure_slips};
-use crate::contact::mesh::{Chord, Grading, Mesh, equal_strips, strips_about};
-use crate::contact::method::Method;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::footprint::{Footprint, SurfaceSlip};
-use crate::contact::normal::hertz::Ellipse;
-use crate::contact::rolling::load_ellipse;
-use crate::contact::rolling::load_ellipse::StripChord;
-use crate::contact::rolling::operator_store::{CaseOperators, OperatorKind, OperatorStore};
-use crate::contact::rolling::task::{MeshPlan, Motion, RollingTask};
+use crate::error::SolveError;
+use crate::friction::path_dependent::{PathDependentFriction, PathDependentLaws};
+use crate::half_space::strip_operator::kind::{Parity, Precision};
+use crate::half_space::strip_operator::operator::StripOperator;
+use crate::half_space::unlike_bodies::{Elasticity, pressure_slips};
+use crate::mesh::{Chord, Grading, Mesh, equal_strips, strips_about};
+use crate::method::Method;
+use crate::monitor::{Monitor, Stop};
+use crate::normal::footprint::{Footprint, SurfaceSlip};
+use crate::normal::hertz::Ellipse;
+use crate::rolling::load_ellipse;
+use crate::rolling::load_ellipse::StripChord;
+use crate::rolling::operator_store::{CaseOperators, OperatorKind, OperatorStore};
+use crate::rolling::task::{MeshPlan, Motion, RollingTask};
 
 /// With an operator in single precision, dimensionless coordinates are rounded to multiples of this, so that patches of one shape get
 /// the same mesh to the last digit whatever their size. 2⁻³⁴ is a thousandth of the last digit of single precision.

@@ -4,14 +4,14 @@
 //!
 //! The relative motion of two rolling bodies.
 
-use crate::contact::friction::law::FrictionLaw;
-use crate::contact::friction::path_dependent::{Interface, PathDependentLaws};
-use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::half_space::strip_operator::kind::Precision;
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::mesh::MeshSize;
-use crate::contact::method::{Method, TractionBound};
-use crate::contact::normal::footprint::Footprint;
+use crate::friction::law::FrictionLaw;
+use crate::friction::path_dependent::{Interface, PathDependentLaws};
+use crate::friction::velocity_weakening::Softening;
+use crate::half_space::strip_operator::kind::Precision;
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::mesh::MeshSize;
+use crate::method::{Method, TractionBound};
+use crate::normal::footprint::Footprint;
 
 /// Targets from here on are met with an operator in single precision. Chosen by judgement; how much it matters was not measured.
 const SINGLE_PRECISION_FROM: f64 = 5e-4;

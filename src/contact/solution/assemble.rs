@@ -1,25 +1,25 @@
 //! Assembles the answer that a client reads from the results of the stages: with units, and only with the outputs requested.
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::friction::law::FrictionLaw;
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::footprint::NormalTask;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::normal_stage::SolvedFootprint;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::{
+use crate::case::words::solver::Output;
+use crate::friction::law::FrictionLaw;
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::monitor::{Monitor, Stop};
+use crate::normal::footprint::NormalTask;
+use crate::normal::hertz::Patch;
+use crate::normal_stage::SolvedFootprint;
+use crate::problem::checked_case::CheckedCase;
+use crate::remark::entry::{RemarkEntry, merged};
+use crate::remark::list::Remark;
+use crate::rolling::answer::{
     HistoryAnswer, MotionAnswer, PatchGradients, Resultants, Skip, SolvedFields,
 };
-use crate::contact::rolling::refinement::interpolate::Levels;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::{Motion, RelativeTo};
-use crate::contact::solution::finish::{patch_cells, point_fields, traction_max};
-use crate::contact::solution::maintain;
-use crate::contact::solution::maintain::SolvedMotion;
-use crate::contact::solution::words::answer::{
+use crate::rolling::refinement::interpolate::Levels;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::{Motion, RelativeTo};
+use crate::solution::finish::{patch_cells, point_fields, traction_max};
+use crate::solution::maintain;
+use crate::solution::maintain::SolvedMotion;
+use crate::solution::words::answer::{
     CombinedMaterial, ErrorEstimate, Fields, GradientErrors, Gradients, HistoryPoint, MeshReport,
     NormalisedMotion, Origin, PatchFields, PatchSolution, PointFields, PointSolution, Solution,
     SolverReport, Total,

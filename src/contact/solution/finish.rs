@@ -8,22 +8,22 @@
 use std::f64::consts::PI;
 use std::time::Duration;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::error::SolveError;
-use crate::contact::finite::Finite;
-use crate::contact::numerics::simd::length;
-use crate::contact::post::subsurface::states::STORED;
-use crate::contact::problem::checked_case;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::{LevelAnswer, SolvedFields};
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::solution::words::answer::{
+use crate::case::words::solver::Output;
+use crate::error::SolveError;
+use crate::finite::Finite;
+use crate::numerics::simd::length;
+use crate::post::subsurface::states::STORED;
+use crate::problem::checked_case;
+use crate::problem::checked_case::CheckedCase;
+use crate::remark::entry::{RemarkEntry, merged};
+use crate::remark::list::Remark;
+use crate::rolling::answer::{LevelAnswer, SolvedFields};
+use crate::rolling::strip_mesh::StripMesh;
+use crate::solution::words::answer::{
     Fields, GradientErrors, Gradients, PatchCells, PatchFields, PatchSolution, PointFields,
     PointSolution, Solution, Zone,
 };
-use crate::contact::solution::words::evolution::SubsurfaceSummary;
+use crate::solution::words::evolution::SubsurfaceSummary;
 
 /// Values below this fraction of their scale are rounding residues and reported as 0.
 const DUST: f64 = 1e-14;

@@ -1,28 +1,28 @@
 //! What follows from a solved motion for maintenance: stresses below the surface, temperatures, wear across the patch.
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::case::words::subsurface::BodyName;
-use crate::contact::method::Method;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::post::damage::{CellWear, DamageTask, DamagedPatch, across, damage};
-use crate::contact::post::local_power::{CellPower, PowerTask, ThermalTask, cell_power, heating};
-use crate::contact::post::subsurface::load_parts::LoadResolution;
-use crate::contact::post::subsurface::states::{
+use crate::case::words::solver::Output;
+use crate::case::words::subsurface::BodyName;
+use crate::method::Method;
+use crate::monitor::{Monitor, Stop};
+use crate::normal::footprint::Footprint;
+use crate::normal::hertz::Patch;
+use crate::post::damage::{CellWear, DamageTask, DamagedPatch, across, damage};
+use crate::post::local_power::{CellPower, PowerTask, ThermalTask, cell_power, heating};
+use crate::post::subsurface::load_parts::LoadResolution;
+use crate::post::subsurface::states::{
     STORED, StressPlaces, SubsurfaceTask, in_patch_axes, point, stored,
 };
-use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::contact::post::subsurface::worst::{GAP, worst_place};
-use crate::contact::post::subsurface::worst_passage::{PassagesOf, passage};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::LevelAnswer;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::Motion;
-use crate::contact::solution::words::answer::{PointFields, PointSolution};
-use crate::contact::solution::words::damage::WearAcross;
-use crate::contact::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
+use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
+use crate::post::subsurface::worst::{GAP, worst_place};
+use crate::post::subsurface::worst_passage::{PassagesOf, passage};
+use crate::problem::checked_case::CheckedCase;
+use crate::remark::list::Remark;
+use crate::rolling::answer::LevelAnswer;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::Motion;
+use crate::solution::words::answer::{PointFields, PointSolution};
+use crate::solution::words::damage::WearAcross;
+use crate::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
 /// Stresses are answered from this part of the half-width of the smaller patch on: nearer to the surface the steps of the traction from cell
 /// to cell would show, whose stresses grow without bound. There the largest error in the reference contacts is 0.3 % of the largest pressure

@@ -1,24 +1,24 @@
 //! The answer to a wheel on a rail from its pressures and tractions.
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::error::SolveError;
-use crate::contact::geometry::reference_curve::{ReferenceCurve, RigidMotion};
-use crate::contact::normal::on_curve::CurveContact;
-use crate::contact::normal::wheel::WheelContact;
-use crate::contact::post::damage::{DamagedPatch, damage};
-use crate::contact::problem::physics::Run;
-use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::task::Resolution;
-use crate::contact::solution::assemble::normalised;
-use crate::contact::solution::finish::move_origin;
-use crate::contact::solution::words::answer::{
+use crate::case::words::solver::Output;
+use crate::error::SolveError;
+use crate::geometry::reference_curve::{ReferenceCurve, RigidMotion};
+use crate::normal::on_curve::CurveContact;
+use crate::normal::wheel::WheelContact;
+use crate::post::damage::{DamagedPatch, damage};
+use crate::problem::physics::Run;
+use crate::remark::entry::{RemarkEntry, merged};
+use crate::remark::list::Remark;
+use crate::rolling::task::Resolution;
+use crate::solution::assemble::normalised;
+use crate::solution::finish::move_origin;
+use crate::solution::words::answer::{
     ErrorEstimate, Fields, Origin, PatchFields, Position, Solution, Total,
 };
-use crate::contact::solution::words::damage::Damage;
-use crate::contact::wheel_on_rail::rounds::Found;
-use crate::contact::wheel_on_rail::tractions::{Part, PatchForces, creepages, each_cell};
-use crate::contact::wheel_on_rail::{WheelSolve, minus};
+use crate::solution::words::damage::Damage;
+use crate::wheel_on_rail::rounds::Found;
+use crate::wheel_on_rail::tractions::{Part, PatchForces, creepages, each_cell};
+use crate::wheel_on_rail::{WheelSolve, minus};
 
 /// Errors of the factors for the turn relative to μN: this times the standard deviation of the angle over the load, in rad, and at most that. Against
 /// boundary elements of seven wheels on rails with μ of 0.3 they are 0.2 to 1.5 % where the angle deviates by 0.07 to 0.5 rad; half of these the factors were

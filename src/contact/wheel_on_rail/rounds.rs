@@ -1,21 +1,21 @@
 //! Pressures and tractions of a wheel on a rail in turn, until each belongs to the other.
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::error::SolveError;
-use crate::contact::geometry::reference_curve::RigidMotion;
-use crate::contact::normal::gap::grid::NormalError;
-use crate::contact::normal::on_curve::{CurveContact, Friction, Workspace};
-use crate::contact::normal::wheel::{WheelContact, WheelPatch};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::Run;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::task::NEGLIGIBLE_OF_TARGET;
-use crate::contact::solution::words::answer::Total;
-use crate::contact::traction_estimate::{can_estimate, patch_forces};
-use crate::contact::unlike_bodies::LEFT_BY_PRESSURE;
-use crate::contact::vertical_equilibrium::{next_share, tolerance};
-use crate::contact::wheel_on_rail::tractions::{Part, creepages};
-use crate::contact::wheel_on_rail::{BeforeMotions, WheelSolve, minus};
+use crate::case::words::solver::Output;
+use crate::error::SolveError;
+use crate::geometry::reference_curve::RigidMotion;
+use crate::normal::gap::grid::NormalError;
+use crate::normal::on_curve::{CurveContact, Friction, Workspace};
+use crate::normal::wheel::{WheelContact, WheelPatch};
+use crate::problem::checked_case::CheckedCase;
+use crate::problem::physics::Run;
+use crate::remark::list::Remark;
+use crate::rolling::task::NEGLIGIBLE_OF_TARGET;
+use crate::solution::words::answer::Total;
+use crate::traction_estimate::{can_estimate, patch_forces};
+use crate::unlike_bodies::LEFT_BY_PRESSURE;
+use crate::vertical_equilibrium::{next_share, tolerance};
+use crate::wheel_on_rail::tractions::{Part, creepages};
+use crate::wheel_on_rail::{BeforeMotions, WheelSolve, minus};
 
 /// Allowed error of the resultants relative to μN on the coarse grid: that of the coarsest meshes, whatever the few cells of a small patch leave open.
 const TARGET_ROUGH: f64 = 0.2;

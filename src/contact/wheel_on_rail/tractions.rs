@@ -1,22 +1,22 @@
 //! Tractions of the patches of a wheel on a rail, and their forces.
 
-use crate::contact::error::SolveError;
-use crate::contact::friction::law::{FrictionLaw, on_rail};
-use crate::contact::geometry::reference_curve::{CurvePlace, RigidMotion, WheelOver};
-use crate::contact::normal::footprint::{Footprint, SurfaceSlip};
-use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::on_curve::{CurveContact, Workspace};
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::normal_stage::SolvedFootprint;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::problem::physics::Run;
-use crate::contact::rolling::task::Motion;
-use crate::contact::rolling_stage;
-use crate::contact::solution::words::answer::{Fields, NormalReport, PatchSolution, Solution};
-use crate::contact::time_limit::TimeLimit;
-use crate::contact::vertical_equilibrium::tolerance;
-use crate::contact::wheel_on_rail::{WheelSolve, minus};
+use crate::error::SolveError;
+use crate::friction::law::{FrictionLaw, on_rail};
+use crate::geometry::reference_curve::{CurvePlace, RigidMotion, WheelOver};
+use crate::normal::footprint::{Footprint, SurfaceSlip};
+use crate::normal::hertz::Patch;
+use crate::normal::on_curve::{CurveContact, Workspace};
+use crate::normal::pressure_field::field::PressureField;
+use crate::normal::pressure_field::grid_pressure::GridPressure;
+use crate::normal_stage::SolvedFootprint;
+use crate::problem::checked_case::CheckedCase;
+use crate::problem::physics::Run;
+use crate::rolling::task::Motion;
+use crate::rolling_stage;
+use crate::solution::words::answer::{Fields, NormalReport, PatchSolution, Solution};
+use crate::time_limit::TimeLimit;
+use crate::vertical_equilibrium::tolerance;
+use crate::wheel_on_rail::{WheelSolve, minus};
 
 /// Patches at most. Rough profiles have more, each of a few points; their tractions would be solved together for minutes and mean nothing.
 const PATCHES_MAX: usize = 4;

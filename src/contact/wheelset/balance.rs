@@ -10,25 +10,25 @@
 
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::geometry::wheelset_pose::{PairOfRails, RigidPose, WheelsetMotion};
-use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::normal::wheel::{WheelTask, WheelsetTask};
-use crate::contact::numerics::equilibrium::{Search, Trial};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::profile_assessment::trust;
-use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::rolling::force_control::PLACE_MAX;
-use crate::contact::rolling::operator_store::OperatorStore;
-use crate::contact::solution::words::answer::{
+use crate::error::SolveError;
+use crate::geometry::wheelset_pose::{PairOfRails, RigidPose, WheelsetMotion};
+use crate::monitor::{Monitor, MonitorPart};
+use crate::normal::wheel::{WheelTask, WheelsetTask};
+use crate::numerics::equilibrium::{Search, Trial};
+use crate::problem::checked_case::CheckedCase;
+use crate::profile_assessment::trust;
+use crate::remark::entry::{RemarkEntry, merged};
+use crate::rolling::force_control::PLACE_MAX;
+use crate::rolling::operator_store::OperatorStore;
+use crate::solution::words::answer::{
     ErrorEstimate, Fields, Kinematics, Origin, PatchSolution, Solution, Total, WheelOnRail,
     WheelsetAnswer, WheelsetPosition,
 };
-use crate::contact::solution::words::damage::ProfileUncertainty;
-use crate::contact::surface_fallback;
-use crate::contact::wheel_force_control::limit_and_law;
-use crate::contact::wheel_on_rail::SolvedWheel;
-use crate::contact::wheelset::kinematics;
+use crate::solution::words::damage::ProfileUncertainty;
+use crate::surface_fallback;
+use crate::wheel_force_control::limit_and_law;
+use crate::wheel_on_rail::SolvedWheel;
+use crate::wheelset::kinematics;
 
 /// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
 const LEVEL: f64 = 3e-4;

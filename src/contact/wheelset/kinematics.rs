@@ -5,18 +5,18 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::error::SolveError;
-use crate::contact::geometry::conicity::{Conicity, NoConicity, RadiusDifference};
-use crate::contact::geometry::profile::Profile;
-use crate::contact::geometry::profile_quality::{CHORDS, SMOOTHING_ADVISED, advised_smoothing};
-use crate::contact::geometry::wheel_rail::WheelRail;
-use crate::contact::geometry::wheelset_pose::{PairOfRails, RigidPose};
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::wheel::{KinematicsTask, WheelTask};
-use crate::contact::problem::checked_case;
-use crate::contact::problem::checked_case::PRESSURE_USUAL;
-use crate::contact::profile_assessment::uncertainty::COMPANIONS;
-use crate::contact::solution::words::answer::{EquivalentConicity, Kinematics, TouchLine};
+use crate::error::SolveError;
+use crate::geometry::conicity::{Conicity, NoConicity, RadiusDifference};
+use crate::geometry::profile::Profile;
+use crate::geometry::profile_quality::{CHORDS, SMOOTHING_ADVISED, advised_smoothing};
+use crate::geometry::wheel_rail::WheelRail;
+use crate::geometry::wheelset_pose::{PairOfRails, RigidPose};
+use crate::monitor::Monitor;
+use crate::normal::wheel::{KinematicsTask, WheelTask};
+use crate::problem::checked_case;
+use crate::problem::checked_case::PRESSURE_USUAL;
+use crate::profile_assessment::uncertainty::COMPANIONS;
+use crate::solution::words::answer::{EquivalentConicity, Kinematics, TouchLine};
 
 /// Between two shifts the radius difference is known to this in mm, a fifth of the rounding of the standard's tables ...
 const RESOLVED: f64 = 2e-3;

@@ -5,9 +5,9 @@ use axum::http::{HeaderMap, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use crate::http::extract::query::{Reader, reader};
-use crate::http::problem::{ApiError, ProblemKind, Result};
-use crate::http::render::format::Format;
+use crate::extract::query::{Reader, reader};
+use crate::problem::{ApiError, ProblemKind, Result};
+use crate::render::format::Format;
 
 /// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.
 pub async fn require_json(request: Request, next: Next) -> Response {

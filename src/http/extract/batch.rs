@@ -13,22 +13,20 @@ use serde_json::error::Category;
 use serde_json::value::RawValue;
 use serde_json::{Deserializer, Value};
 
-use crate::contact::error::Fault;
-use crate::contact::evaluate::varied::{Values, members};
-use crate::http::extract::json::{
-    essence, not_json, read_strict, unlike_json, weigh_case, without_mark,
-};
-use crate::http::extract::query::DEADLINE_MAX_SECONDS;
-use crate::http::extract::rows::{Table, read_spooled};
-use crate::http::extract::tables::{Chunk, CsvRows, TableForm, TableRows, TableSource, Title};
-use crate::http::extract::titles::{Place, faulty, is_text, number, place, question, short_names};
-use crate::http::limits::{Memory, Pace};
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, Result};
-use crate::jobs::Jobs;
-use crate::jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
-use crate::jobs::model::{CaseOptions, Kind, Priority};
-use crate::jobs::run::model::converted;
+use crate::extract::json::{essence, not_json, read_strict, unlike_json, weigh_case, without_mark};
+use crate::extract::query::DEADLINE_MAX_SECONDS;
+use crate::extract::rows::{Table, read_spooled};
+use crate::extract::tables::{Chunk, CsvRows, TableForm, TableRows, TableSource, Title};
+use crate::extract::titles::{Place, faulty, is_text, number, place, question, short_names};
+use crate::limits::{Memory, Pace};
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, ProblemKind, Result};
+use railhead_contact::error::Fault;
+use railhead_contact::evaluate::varied::{Values, members};
+use railhead_jobs::Jobs;
+use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
+use railhead_jobs::model::{CaseOptions, Kind, Priority};
+use railhead_jobs::run::model::converted;
 
 /// Takes a case with the number of its line, if it has one.
 pub type Add<'a> = &'a mut dyn FnMut(Option<u64>, &[u8]) -> Result<()>;
@@ -500,9 +498,9 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::http::extract::tables::CsvRows;
-    use crate::jobs::batch::upload::fill;
-    use crate::jobs::codec::table::COLUMNS_MAX;
+    use crate::extract::tables::CsvRows;
+    use railhead_jobs::batch::upload::fill;
+    use railhead_jobs::codec::table::COLUMNS_MAX;
 
     fn cut(array: bool, text: &str) -> Result<Vec<(Option<u64>, String)>> {
         let mut out = Vec::new();

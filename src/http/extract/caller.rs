@@ -10,11 +10,11 @@ use axum::http::request::Parts;
 use futures_util::stream::{Stream, TryStreamExt, try_unfold};
 use uuid::Uuid;
 
-use crate::http::layers::auth::{Access, bearer, unauthorized};
-use crate::http::limits::{ConcurrencyLimits, HeldPermits};
-use crate::http::problem::{ApiError, ProblemKind, Result};
-use crate::jobs::Jobs;
-use crate::jobs::model::{ANONYMOUS, Kind, OPERATOR};
+use crate::layers::auth::{Access, bearer, unauthorized};
+use crate::limits::{ConcurrencyLimits, HeldPermits};
+use crate::problem::{ApiError, ProblemKind, Result};
+use railhead_jobs::Jobs;
+use railhead_jobs::model::{ANONYMOUS, Kind, OPERATOR};
 
 /// Whose request it is, once that is known; in its extensions.
 #[derive(Debug, Clone)]

@@ -10,12 +10,12 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use serde_json::{Map, Number, Value};
 use tokio::time::{Instant, timeout_at};
 
-use crate::http::extract::caller::Tenant;
-use crate::http::layers::admission::{PackedLength, too_long};
-use crate::http::limits::{Memory, MemoryPermit, Permit, SMALL_BYTES};
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, Result};
-use crate::jobs::sync::blocking;
+use crate::extract::caller::Tenant;
+use crate::layers::admission::{PackedLength, too_long};
+use crate::limits::{Memory, MemoryPermit, Permit, SMALL_BYTES};
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, ProblemKind, Result};
+use railhead_jobs::sync::blocking;
 
 /// The JSON body of a request. What it means is for others to judge.
 #[derive(Debug)]

@@ -9,8 +9,8 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use uuid::Uuid;
 
-use crate::http::problem::{ApiError, Fault, Result};
-use crate::jobs::model::{Priority, SubmitOptions};
+use crate::problem::{ApiError, Fault, Result};
+use railhead_jobs::model::{Priority, SubmitOptions};
 
 /// Parameters that belong together; [`query`] makes such types.
 pub trait Parameters: Sized {
@@ -187,14 +187,14 @@ macro_rules! query {
             $($(#[doc = $doc])* pub $parameter: Option<$value>,)*
         }
 
-        impl $crate::http::extract::query::Parameters for $name {
+        impl $crate::extract::query::Parameters for $name {
             type Limits = $of;
 
             fn names() -> Vec<&'static str> {
                 vec![$(stringify!($parameter)),*]
             }
 
-            fn take(query: &mut $crate::http::extract::query::Query, $limits: &$of) -> Self {
+            fn take(query: &mut $crate::extract::query::Query, $limits: &$of) -> Self {
                 $name {
                     $($parameter: query.take(stringify!($parameter), &$reader),)*
                 }

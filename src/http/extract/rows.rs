@@ -19,21 +19,21 @@ use tokio::time::timeout;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::solver::Case;
-use crate::contact::evaluate::varied::Values;
-use crate::http::extract::json::{
+use crate::extract::json::{
     BodyReader, Strict, UnexpectedPart, essence, not_json, read_json, require_utf8, unlike_json,
     unreadable, weigh_case,
 };
-use crate::http::extract::tables::{TableForm, TableRows, TableSource, unsupported};
-use crate::http::extract::titles::{NamedColumns, faulty, require_few};
-use crate::http::limits::{Memory, Pace, Permit};
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, Result};
-use crate::jobs::Jobs;
-use crate::jobs::codec::table::COLUMNS_MAX;
-use crate::jobs::run::draft::RunDraft;
-use crate::jobs::run::model::RunColumn;
+use crate::extract::tables::{TableForm, TableRows, TableSource, unsupported};
+use crate::extract::titles::{NamedColumns, faulty, require_few};
+use crate::limits::{Memory, Pace, Permit};
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, ProblemKind, Result};
+use railhead_contact::case::words::solver::Case;
+use railhead_contact::evaluate::varied::Values;
+use railhead_jobs::Jobs;
+use railhead_jobs::codec::table::COLUMNS_MAX;
+use railhead_jobs::run::draft::RunDraft;
+use railhead_jobs::run::model::RunColumn;
 
 /// The bytes that a request's body may have, or has as far as it says.
 #[must_use]

@@ -5,10 +5,10 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 
-use crate::contact::evaluate::varied::column_pointer;
-use crate::http::problem::{ApiError, Fault, ProblemKind, Result};
-use crate::jobs::codec::table::COLUMNS_MAX;
-use crate::jobs::run::model::RunColumn;
+use crate::problem::{ApiError, Fault, ProblemKind, Result};
+use railhead_contact::evaluate::varied::column_pointer;
+use railhead_jobs::codec::table::COLUMNS_MAX;
+use railhead_jobs::run::model::RunColumn;
 
 /// Faulty columns and recognised columns that the sentence of a refusal names; `errors` has all faulty ones.
 const NAMED_MAX: usize = 20;

@@ -17,8 +17,8 @@ use futures_util::TryStreamExt;
 use http_body_util::{BodyExt, LengthLimitError, Limited};
 use tokio_util::io::{ReaderStream, StreamReader};
 
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind};
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, ProblemKind};
 
 /// Bytes that a packed batch may unpack to for each of its own; tables of numbers reach some 30.
 const UNPACKED_PER_BYTE: u64 = 200;

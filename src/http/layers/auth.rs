@@ -18,12 +18,12 @@ use governor::{Quota, RateLimiter};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tracing::field::display;
 
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, Result};
-use crate::http::server::connections::{Peer, ProbesOnly, network};
-use crate::jobs::Jobs;
-use crate::jobs::model::Key;
-use crate::jobs::sync::lock;
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, ProblemKind, Result};
+use crate::server::connections::{Peer, ProbesOnly, network};
+use railhead_jobs::Jobs;
+use railhead_jobs::model::Key;
+use railhead_jobs::sync::lock;
 
 /// Paths where a body is sent and nothing is changed.
 const QUESTIONS: [&str; 2] = ["/v1/cases/check", "/v1/evaluate"];

@@ -12,8 +12,8 @@ use axum::http::{HeaderMap, HeaderName, header};
 use axum::middleware::Next;
 use axum::response::Response;
 
-use crate::http::options::{AddressRange, HttpOptions};
-use crate::http::server::connections::Peer;
+use crate::options::{AddressRange, HttpOptions};
+use crate::server::connections::Peer;
 
 const X_FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 

@@ -17,10 +17,10 @@ use http_body_util::BodyExt;
 use tokio::sync::OnceCell;
 use uuid::Uuid;
 
-use crate::http::problem::{ApiError, Result};
-use crate::http::render::format::Format;
-use crate::jobs::Jobs;
-use crate::jobs::model::State;
+use crate::problem::{ApiError, Result};
+use crate::render::format::Format;
+use railhead_jobs::Jobs;
+use railhead_jobs::model::State;
 
 /// For results: they never change, but they can be deleted.
 const IMMUTABLE: HeaderValue = HeaderValue::from_static("private, max-age=3600");

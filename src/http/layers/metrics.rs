@@ -15,7 +15,7 @@ use prometheus_client::metrics::gauge::ConstGauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::Registry;
 
-use crate::jobs::Jobs;
+use railhead_jobs::Jobs;
 
 /// Upper bounds of times to the head of an answer in s; `Prefer: wait` may take 60 of them.
 const REQUEST_SECONDS: [f64; 13] = [

@@ -9,7 +9,7 @@ use opentelemetry::KeyValue;
 use opentelemetry::context::FutureExt;
 use opentelemetry::trace::{Status, TraceContextExt};
 
-use crate::jobs::trace::Tracer;
+use railhead_jobs::trace::Tracer;
 
 /// Routes that are asked every few seconds and tell nothing new.
 const UNTRACED: [&str; 3] = ["/healthz", "/readyz", "/metrics"];

@@ -11,7 +11,7 @@ use tower_http::trace::{DefaultOnFailure, DefaultOnRequest, MakeSpan, OnResponse
 use tracing::{Span, field};
 use uuid::Uuid;
 
-use crate::http::server::connections::Peer;
+use crate::server::connections::Peer;
 
 /// Header that carries the request id in both directions.
 pub(crate) const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");

@@ -17,7 +17,7 @@ use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove
 use tower_http::cors::{AllowOrigin, CorsLayer};
 use tower_http::set_header::SetResponseHeaderLayer;
 
-use crate::http::problem::ApiError;
+use crate::problem::ApiError;
 
 /// Layer around everything that answers JSON, within compression.
 pub(crate) async fn end_line(request: Request, next: Next) -> Response {
@@ -152,8 +152,8 @@ mod tests {
     use tower_http::catch_panic::CatchPanicLayer;
 
     use super::*;
-    use crate::http::layers::request_log::{carry_request_id, span_layer};
-    use crate::http::problem::{PROBLEM_JSON, name_instance};
+    use crate::layers::request_log::{carry_request_id, span_layer};
+    use crate::problem::{PROBLEM_JSON, name_instance};
 
     fn panicking() -> Router {
         async fn handler() -> &'static str {

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
-use crate::http::render::forces::Forces;
-use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
-use crate::jobs::model::BatchItem;
+use crate::render::forces::Forces;
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
+use railhead_jobs::codec::table::{RowTable, TableColumn, TableKind};
+use railhead_jobs::model::BatchItem;
 
 /// How the value of a column is found.
 #[derive(Debug, Clone, Copy)]

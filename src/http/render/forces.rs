@@ -1,7 +1,7 @@
 //! Motion, forces and their errors under the names that they have as columns of every table.
 
-use crate::contact::case::words::motion::MotionWords;
-use crate::contact::solution::words::answer::{ErrorEstimate, Total};
+use railhead_contact::case::words::motion::MotionWords;
+use railhead_contact::solution::words::answer::{ErrorEstimate, Total};
 
 /// The motion of a line, its forces and their errors.
 #[derive(Debug, Clone, Copy)]

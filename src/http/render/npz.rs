@@ -10,10 +10,10 @@ use zip::result::ZipResult;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use crate::contact::evaluate::answer::RowsAnswer;
-use crate::http::dto::Outlines;
-use crate::http::render::csv::{Precision, single};
-use crate::http::render::table::{ArrayData, Rows, Table, zone_code};
+use crate::dto::Outlines;
+use crate::render::csv::{Precision, single};
+use crate::render::table::{ArrayData, Rows, Table, zone_code};
+use railhead_contact::evaluate::answer::RowsAnswer;
 
 /// What an NPY header has to be a multiple of, the parts before it included.
 const ALIGNMENT: usize = 64;

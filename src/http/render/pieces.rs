@@ -5,8 +5,8 @@ use std::convert::Infallible;
 use axum::body::{Body, Bytes};
 use futures_util::stream;
 
-use crate::http::render::csv;
-use crate::http::render::table::{Rows, Table};
+use crate::render::csv;
+use crate::render::table::{Rows, Table};
 
 /// Pieces are at least this large, but for the last one.
 const PIECE_BYTES: usize = 32 << 10;
@@ -135,10 +135,10 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::*;
-    use crate::contact::case::words::solver::Output;
-    use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
-    use crate::http::render::csv::Precision;
-    use crate::http::render::table::{ArrayData, TableColumn};
+    use crate::render::csv::Precision;
+    use crate::render::table::{ArrayData, TableColumn};
+    use railhead_contact::case::words::solver::Output;
+    use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
     async fn text(body: Body) -> String {
         let bytes = body.collect().await.unwrap().to_bytes();

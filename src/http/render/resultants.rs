@@ -1,9 +1,9 @@
 //! Forces and moments as a table.
 
-use crate::contact::solution::words::answer::HistoryPoint;
-use crate::http::dto::{Resultants, Sum};
-use crate::http::render::forces::Forces;
-use crate::jobs::codec::table::{RowTable, TableColumn};
+use crate::dto::{Resultants, Sum};
+use crate::render::forces::Forces;
+use railhead_contact::solution::words::answer::HistoryPoint;
+use railhead_jobs::codec::table::{RowTable, TableColumn};
 
 type OfHistory = fn(&HistoryPoint) -> Option<f64>;
 
@@ -96,9 +96,9 @@ pub(crate) fn table(resultants: &Resultants, sums: &[Sum]) -> RowTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::case::words::motion::MotionWords;
-    use crate::contact::solution::words::answer::{Origin, Total};
-    use crate::http::dto::{PatchResultants, PointResultants};
+    use crate::dto::{PatchResultants, PointResultants};
+    use railhead_contact::case::words::motion::MotionWords;
+    use railhead_contact::solution::words::answer::{Origin, Total};
 
     fn resultants(patches: usize, points: usize) -> Resultants {
         let point = |point: usize| PointResultants {

@@ -7,14 +7,14 @@ use std::ops::Range;
 use axum::body::{Body, Bytes};
 use futures_util::stream::{Stream, StreamExt, TryStreamExt, iter, try_unfold};
 
-use crate::contact::evaluate::answer::RowsAnswer;
-use crate::http::render::csv::{self, Precision, text_field, write_number};
-use crate::http::render::format::Format;
-use crate::http::render::pieces::{JsonColumn, body, json_columns};
-use crate::jobs::codec::arrow::ArrowWriter;
-use crate::jobs::codec::parquet::TableWriter;
-use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
-use crate::jobs::sync::blocking;
+use crate::render::csv::{self, Precision, text_field, write_number};
+use crate::render::format::Format;
+use crate::render::pieces::{JsonColumn, body, json_columns};
+use railhead_contact::evaluate::answer::RowsAnswer;
+use railhead_jobs::codec::arrow::ArrowWriter;
+use railhead_jobs::codec::parquet::TableWriter;
+use railhead_jobs::codec::table::{RowTable, TableColumn, TableKind};
+use railhead_jobs::sync::blocking;
 
 /// Why a table cannot be written.
 pub(crate) type WriteError = Box<dyn Error + Send + Sync>;
@@ -255,7 +255,7 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::*;
-    use crate::contact::evaluate::answer::RowStatus;
+    use railhead_contact::evaluate::answer::RowStatus;
 
     fn answer(rows: usize) -> RowsAnswer {
         let column = |scale: f64| (0..rows).map(|k| scale * k as f64).collect();

@@ -2,12 +2,12 @@
 
 use utoipa::ToSchema;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
-use crate::http::dto::Outlines;
-use crate::http::render::csv::{Precision, write_number};
-use crate::http::render::shape::outlines::{outlines, patch_outline};
-use crate::http::render::shape::resample::{Gridded, resample, resample_zone};
+use crate::dto::Outlines;
+use crate::render::csv::{Precision, write_number};
+use crate::render::shape::outlines::{outlines, patch_outline};
+use crate::render::shape::resample::{Gridded, resample, resample_zone};
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// A file, byte for byte.
 #[derive(Debug, ToSchema)]

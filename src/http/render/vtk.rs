@@ -4,7 +4,7 @@
 //! points with the values as point data, NaN outside the patch. Pairs such as `traction_x_mpa`, `traction_y_mpa` come as
 //! one vector `traction_mpa` (z is 0), ready for glyphs; zones are 0 stick, 1 slip, -1 outside.
 
-use crate::http::render::table::{ArrayData, PLACES, Rows, Table, zone_code};
+use crate::render::table::{ArrayData, PLACES, Rows, Table, zone_code};
 
 /// Longest title that the format allows, its line break not counted.
 const TITLE_MAX: usize = 255;

@@ -6,17 +6,17 @@ use railhead_macros::none_is_absent;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::solver::{Case, MethodName, Output};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::{RemarkEntry, merged};
-use crate::contact::solution::words::answer::{FoundBy, Understanding};
-use crate::contact::solution::words::damage::PairQuality;
-use crate::http::extract::caller::Caller;
-use crate::http::extract::json::JsonBody;
-use crate::http::limits::{Memory, MemoryPermit};
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, Result, problems};
-use crate::jobs::sync::blocking;
+use crate::extract::caller::Caller;
+use crate::extract::json::JsonBody;
+use crate::limits::{Memory, MemoryPermit};
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, Result, problems};
+use railhead_contact::case::words::solver::{Case, MethodName, Output};
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::remark::entry::{RemarkEntry, merged};
+use railhead_contact::solution::words::answer::{FoundBy, Understanding};
+use railhead_contact::solution::words::damage::PairQuality;
+use railhead_jobs::sync::blocking;
 
 /// A case that can be solved, and its expected cost.
 #[none_is_absent]

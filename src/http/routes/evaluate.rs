@@ -15,29 +15,29 @@ use tokio::runtime::Handle;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::answer::RowsAnswer;
-use crate::contact::evaluate::many::{NotAtOnce, SOLVED_ROWS_MAX};
-use crate::contact::evaluate::varied::VariedColumn;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::http::dto::CellValue;
-use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::caller::Caller;
-use crate::http::extract::query::{Parameters, id, query};
-use crate::http::extract::rows::{
+use crate::dto::CellValue;
+use crate::extract::accept::{choose, one_of};
+use crate::extract::caller::Caller;
+use crate::extract::query::{Parameters, id, query};
+use crate::extract::rows::{
     JSON, TableUpload, declared_bytes, read_body, read_json_columns, separate_table,
 };
-use crate::http::extract::tables::{TableForm, TableRows, TableSource, too_large};
-use crate::http::extract::titles::{NamedColumns, faulty};
-use crate::http::limits::{Memory, Pace, hold_while_sent};
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, Result, problems};
-use crate::http::render::format::Format;
-use crate::http::render::npz;
-use crate::http::render::row_tables::{json_body, table_body};
-use crate::jobs::Jobs;
-use crate::jobs::run::draft::ReceivedRows;
-use crate::jobs::run::model::RunColumn;
+use crate::extract::tables::{TableForm, TableRows, TableSource, too_large};
+use crate::extract::titles::{NamedColumns, faulty};
+use crate::limits::{Memory, Pace, hold_while_sent};
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, ProblemKind, Result, problems};
+use crate::render::format::Format;
+use crate::render::npz;
+use crate::render::row_tables::{json_body, table_body};
+use railhead_contact::error::{CaseError, Fault};
+use railhead_contact::evaluate::answer::RowsAnswer;
+use railhead_contact::evaluate::many::{NotAtOnce, SOLVED_ROWS_MAX};
+use railhead_contact::evaluate::varied::VariedColumn;
+use railhead_contact::monitor::{Monitor, Stop};
+use railhead_jobs::Jobs;
+use railhead_jobs::run::draft::ReceivedRows;
+use railhead_jobs::run::model::RunColumn;
 
 /// The forms of an answer.
 const FORMATS: &[Format] = &[

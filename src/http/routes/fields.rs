@@ -7,23 +7,21 @@ use serde_json::json;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::{PatchCells, PointFields};
-use crate::http::dto::{Cells, GriddedField, Outlines};
-use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::query::{Parameters, Reader, index, query, reader, whole, word};
-use crate::http::limits::{Rendering, hold_while_sent};
-use crate::http::problem::{ApiError, Result};
-use crate::http::render::csv::Precision;
-use crate::http::render::format::Format;
-use crate::http::render::pieces::{csv_body, json_body};
-use crate::http::render::table::{File, Table};
-use crate::http::render::{npz, vtk};
-use crate::http::routes::parts::{
-    FieldProblems, PARTS, PartRequest, has, motion_of, not_asked, stored,
-};
-use crate::http::routes::plots::{PlotOptions, View, WIDTH_DEFAULT, picture};
-use crate::jobs::Jobs;
+use crate::dto::{Cells, GriddedField, Outlines};
+use crate::extract::accept::{choose, one_of};
+use crate::extract::query::{Parameters, Reader, index, query, reader, whole, word};
+use crate::limits::{Rendering, hold_while_sent};
+use crate::problem::{ApiError, Result};
+use crate::render::csv::Precision;
+use crate::render::format::Format;
+use crate::render::pieces::{csv_body, json_body};
+use crate::render::table::{File, Table};
+use crate::render::{npz, vtk};
+use crate::routes::parts::{FieldProblems, PARTS, PartRequest, has, motion_of, not_asked, stored};
+use crate::routes::plots::{PlotOptions, View, WIDTH_DEFAULT, picture};
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::solution::words::answer::{PatchCells, PointFields};
+use railhead_jobs::Jobs;
 
 /// Most samples along one axis of a regular grid.
 const GRID_AXIS_MAX: u32 = 1000;

@@ -4,12 +4,12 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
-use crate::contact::case::words::solver::Case;
-use crate::http::extract::caller::{Caller, JobId};
-use crate::http::extract::json::JsonBody;
-use crate::http::limits::Memory;
-use crate::http::problem::{Result, problems};
-use crate::http::routes::submission::{JobAccepted, Submission, SubmitParameters};
+use crate::extract::caller::{Caller, JobId};
+use crate::extract::json::JsonBody;
+use crate::limits::Memory;
+use crate::problem::{Result, problems};
+use crate::routes::submission::{JobAccepted, Submission, SubmitParameters};
+use railhead_contact::case::words::solver::Case;
 
 problems! {
     /// What `POST /v1/jobs` can fail with.

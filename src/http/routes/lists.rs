@@ -15,17 +15,17 @@ use utoipa::{IntoParams, PartialSchema};
 use utoipa_axum::router::OpenApiRouter;
 use uuid::Uuid;
 
-use crate::http::dto::JobAnswer;
-use crate::http::extract::caller::Caller;
-use crate::http::extract::query::{
+use crate::dto::JobAnswer;
+use crate::extract::caller::Caller;
+use crate::extract::query::{
     Parameters, Query, Reader, count, label, name, query, reader, repeated, time,
 };
-use crate::http::problem::{ApiError, ProblemKind, Result, describe};
-use crate::http::render::format::Format;
-use crate::http::routes::work::{WorkAnswer, answer_name, route, text_header};
-use crate::http::state::AppState;
-use crate::jobs::model::{Kind, State as JobState};
-use crate::jobs::{Filter, Membership, PAGE_MAX, Total};
+use crate::problem::{ApiError, ProblemKind, Result, describe};
+use crate::render::format::Format;
+use crate::routes::work::{WorkAnswer, answer_name, route, text_header};
+use crate::state::AppState;
+use railhead_jobs::model::{Kind, State as JobState};
+use railhead_jobs::{Filter, Membership, PAGE_MAX, Total};
 
 /// Entries of a page for which no number is given.
 pub(crate) const LIMIT_DEFAULT: u32 = 50;

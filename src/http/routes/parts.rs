@@ -5,19 +5,19 @@ use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use uuid::Uuid;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::{
+use crate::extract::caller::{Caller, JobId};
+use crate::extract::query::require_index;
+use crate::layers::etag::{Precondition, tagged};
+use crate::limits::Rendering;
+use crate::problem::{ApiError, ProblemKind, Result, problems};
+use crate::render::format::Format;
+use crate::state::AppState;
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::solution::words::answer::{
     PatchCells, PatchSolution, PointFields, PointSolution, Solution,
 };
-use crate::http::extract::caller::{Caller, JobId};
-use crate::http::extract::query::require_index;
-use crate::http::layers::etag::{Precondition, tagged};
-use crate::http::limits::Rendering;
-use crate::http::problem::{ApiError, ProblemKind, Result, problems};
-use crate::http::render::format::Format;
-use crate::http::state::AppState;
-use crate::jobs::Jobs;
-use crate::jobs::error::JobsError;
+use railhead_jobs::Jobs;
+use railhead_jobs::error::JobsError;
 
 /// A request for a part of the result of a job.
 pub(crate) struct PartRequest {
@@ -68,7 +68,7 @@ impl PartRequest {
     /// A turn and memory for an answer of so many bytes.
     ///
     /// # Errors
-    /// As [`Memory::rendering`](crate::http::limits::Memory::rendering).
+    /// As [`Memory::rendering`](crate::limits::Memory::rendering).
     pub(crate) async fn rendering(&self, bytes: usize) -> Result<Rendering> {
         self.shared
             .memory

@@ -7,22 +7,22 @@ use serde_json::Value;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
-use crate::http::extract::query::{Parameters, count, index, query, reader, word};
-use crate::http::limits::hold_while_sent;
-use crate::http::problem::{ApiError, Result};
-use crate::http::render::format::Format;
-use crate::http::render::picture::curve::{self, Curve, CurveLine};
-use crate::http::render::picture::draw::draw;
-use crate::http::render::picture::profile_view::{self, ProfileView, ProfileViewPatch};
-use crate::http::render::picture::raster;
-use crate::http::render::picture::scene::Scene;
-use crate::http::render::picture::section::{self, Sections};
-use crate::http::render::table::File;
-use crate::http::routes::parts::{FieldProblems, PartRequest, motion_of, stored};
-use crate::jobs::Jobs;
-use crate::jobs::error::JobsError;
+use crate::extract::query::{Parameters, count, index, query, reader, word};
+use crate::limits::hold_while_sent;
+use crate::problem::{ApiError, Result};
+use crate::render::format::Format;
+use crate::render::picture::curve::{self, Curve, CurveLine};
+use crate::render::picture::draw::draw;
+use crate::render::picture::profile_view::{self, ProfileView, ProfileViewPatch};
+use crate::render::picture::raster;
+use crate::render::picture::scene::Scene;
+use crate::render::picture::section::{self, Sections};
+use crate::render::table::File;
+use crate::routes::parts::{FieldProblems, PartRequest, motion_of, stored};
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
+use railhead_jobs::Jobs;
+use railhead_jobs::error::JobsError;
 
 /// View shown by a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Names)]

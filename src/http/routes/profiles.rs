@@ -9,15 +9,15 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::cross_section::CrossSection;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::damage::SectionQuality;
-use crate::http::dto::rfc3339;
-use crate::http::extract::caller::Caller;
-use crate::http::extract::json::JsonBody;
-use crate::http::extract::query::Parameters;
-use crate::http::problem::{ApiError, ProblemKind, Result, problems};
-use crate::http::routes::lists::{LIMIT_DEFAULT, PageQuery, answer};
+use crate::dto::rfc3339;
+use crate::extract::caller::Caller;
+use crate::extract::json::JsonBody;
+use crate::extract::query::Parameters;
+use crate::problem::{ApiError, ProblemKind, Result, problems};
+use crate::routes::lists::{LIMIT_DEFAULT, PageQuery, answer};
+use railhead_contact::case::words::cross_section::CrossSection;
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::solution::words::damage::SectionQuality;
 
 /// The digest in the path.
 #[derive(Debug, Clone)]

@@ -10,27 +10,27 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::case::words::subsurface::BodyName;
-use crate::contact::post::subsurface::states::{STORED, points};
-use crate::contact::solution::words::answer::Solution;
-use crate::contact::solution::words::damage::{Damage, DamageFiguresUsed};
-use crate::contact::solution::words::evolution::{PassageSummary, StressPoint};
-use crate::http::dto::{JobResult, Resultants, sums};
-use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::caller::{Caller, JobId};
-use crate::http::extract::query::{Parameters, index, query, require_index};
-use crate::http::layers::etag::{Precondition, tagged};
-use crate::http::limits::{Memory, Permit, SMALL_BYTES, hold_while_sent};
-use crate::http::problem::{ApiError, Result, problems};
-use crate::http::render::format::Format;
-use crate::http::render::row_tables::RowWriter;
-use crate::http::render::{resultants, stresses};
-use crate::http::routes::parts::{FieldProblems, PartRequest, motion_of, not_asked, stored};
-use crate::http::routes::wait::{Wait, WaitQuery};
-use crate::http::routes::work::await_end;
-use crate::jobs::Jobs;
-use crate::jobs::codec::table::RowTable;
+use crate::dto::{JobResult, Resultants, sums};
+use crate::extract::accept::{choose, one_of};
+use crate::extract::caller::{Caller, JobId};
+use crate::extract::query::{Parameters, index, query, require_index};
+use crate::layers::etag::{Precondition, tagged};
+use crate::limits::{Memory, Permit, SMALL_BYTES, hold_while_sent};
+use crate::problem::{ApiError, Result, problems};
+use crate::render::format::Format;
+use crate::render::row_tables::RowWriter;
+use crate::render::{resultants, stresses};
+use crate::routes::parts::{FieldProblems, PartRequest, motion_of, not_asked, stored};
+use crate::routes::wait::{Wait, WaitQuery};
+use crate::routes::work::await_end;
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::case::words::subsurface::BodyName;
+use railhead_contact::post::subsurface::states::{STORED, points};
+use railhead_contact::solution::words::answer::Solution;
+use railhead_contact::solution::words::damage::{Damage, DamageFiguresUsed};
+use railhead_contact::solution::words::evolution::{PassageSummary, StressPoint};
+use railhead_jobs::Jobs;
+use railhead_jobs::codec::table::RowTable;
 
 problems! {
     /// What every part of a result can fail with.

@@ -13,25 +13,25 @@ use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::http::dto::{AnswerColumn, RunRequest, answer_columns};
-use crate::http::extract::accept::{choose, one_of};
-use crate::http::extract::caller::{Caller, Credential, RunId, RunRowId};
-use crate::http::extract::query::{Parameters, Reader, id, query, reader, repeated};
-use crate::http::extract::rows::{JSON, TableUpload, read_run, separate_table};
-use crate::http::extract::titles::{NamedColumns, named_column};
-use crate::http::limits::{Memory, hold_while_sent};
-use crate::http::options::HttpOptions;
-use crate::http::problem::{ApiError, ProblemKind, Result, problems};
-use crate::http::render::format::Format;
-use crate::http::render::row_tables::{Piece, RowWriter, WriteError};
-use crate::http::routes::submission::{NamedQuery, RunAccepted, Submission, SubmitParameters};
-use crate::http::routes::wait::{Wait, WaitQuery};
-use crate::http::routes::work::{RESULT_FORMATS, await_end, table_answer};
-use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
-use crate::jobs::model::Kind;
-use crate::jobs::run::model::Run;
-use crate::jobs::sync::blocking;
-use crate::jobs::{Jobs, JobsError};
+use crate::dto::{AnswerColumn, RunRequest, answer_columns};
+use crate::extract::accept::{choose, one_of};
+use crate::extract::caller::{Caller, Credential, RunId, RunRowId};
+use crate::extract::query::{Parameters, Reader, id, query, reader, repeated};
+use crate::extract::rows::{JSON, TableUpload, read_run, separate_table};
+use crate::extract::titles::{NamedColumns, named_column};
+use crate::limits::{Memory, hold_while_sent};
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, ProblemKind, Result, problems};
+use crate::render::format::Format;
+use crate::render::row_tables::{Piece, RowWriter, WriteError};
+use crate::routes::submission::{NamedQuery, RunAccepted, Submission, SubmitParameters};
+use crate::routes::wait::{Wait, WaitQuery};
+use crate::routes::work::{RESULT_FORMATS, await_end, table_answer};
+use railhead_jobs::codec::table::{RowTable, TableColumn, TableKind};
+use railhead_jobs::model::Kind;
+use railhead_jobs::run::model::Run;
+use railhead_jobs::sync::blocking;
+use railhead_jobs::{Jobs, JobsError};
 
 problems! {
     /// What `POST /v1/runs` can fail with.

@@ -9,21 +9,19 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::solver::{Case, MethodName, Output};
-use crate::contact::remark::kind::RemarkKind;
-use crate::contact::remark::list::Remark;
-use crate::http::contract::EXAMPLES;
-use crate::http::dto::TenantLimits;
-use crate::http::extract::caller::{AnyTenant, Caller, Operator};
-use crate::http::layers::metrics::Metrics;
-use crate::http::options::HttpOptions;
-use crate::http::problem::{
-    ApiError, PlainProblems, ProblemKind, ProblemMeaning, Result, problems,
-};
-use crate::http::routes::wait::WAIT_MAX_SECONDS;
-use crate::jobs::PAGE_MAX;
-use crate::jobs::error::JobsError;
-use crate::jobs::model::State as JobState;
+use crate::contract::EXAMPLES;
+use crate::dto::TenantLimits;
+use crate::extract::caller::{AnyTenant, Caller, Operator};
+use crate::layers::metrics::Metrics;
+use crate::options::HttpOptions;
+use crate::problem::{ApiError, PlainProblems, ProblemKind, ProblemMeaning, Result, problems};
+use crate::routes::wait::WAIT_MAX_SECONDS;
+use railhead_contact::case::words::solver::{Case, MethodName, Output};
+use railhead_contact::remark::kind::RemarkKind;
+use railhead_contact::remark::list::Remark;
+use railhead_jobs::PAGE_MAX;
+use railhead_jobs::error::JobsError;
+use railhead_jobs::model::State as JobState;
 
 /// What the service can do.
 #[derive(Debug, Serialize, ToSchema)]

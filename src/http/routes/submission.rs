@@ -13,20 +13,20 @@ use utoipa::openapi::schema::Type;
 use utoipa::openapi::{Content, ObjectBuilder, Ref, RefOr, ResponseBuilder};
 use utoipa::{IntoParams, IntoResponses};
 
-use crate::http::extract::caller::Caller;
-use crate::http::extract::query::{
+use crate::extract::caller::Caller;
+use crate::extract::query::{
     LABELS_MAX, Parameters, SubmitQuery, name, new_label, query, repeated,
 };
-use crate::http::layers::auth::Access;
-use crate::http::limits::{ConcurrencyLimits, Memory, Permit, hold_while_sent};
-use crate::http::problem::{ApiError, Fault, Result};
-use crate::http::render::format::Format;
-use crate::http::routes::results::result_text;
-use crate::http::routes::wait::{Wait, WaitQuery};
-use crate::http::routes::work::{WorkAnswer, header_parameter, prefer, text_header};
-use crate::jobs::Jobs;
-use crate::jobs::model::{Kind, Labels, State as JobState, WorkOptions};
-use crate::jobs::work::Work;
+use crate::layers::auth::Access;
+use crate::limits::{ConcurrencyLimits, Memory, Permit, hold_while_sent};
+use crate::problem::{ApiError, Fault, Result};
+use crate::render::format::Format;
+use crate::routes::results::result_text;
+use crate::routes::wait::{Wait, WaitQuery};
+use crate::routes::work::{WorkAnswer, header_parameter, prefer, text_header};
+use railhead_jobs::Jobs;
+use railhead_jobs::model::{Kind, Labels, State as JobState, WorkOptions};
+use railhead_jobs::work::Work;
 
 /// Longest idempotency key in characters.
 const IDEMPOTENCY_KEY_MAX_CHARS: usize = 255;

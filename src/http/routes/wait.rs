@@ -10,14 +10,14 @@ use axum::response::{IntoResponse, Response};
 use futures_util::{Stream, StreamExt};
 use serde::Serialize;
 
-use crate::http::extract::accept::choose;
-use crate::http::extract::caller::{Caller, Credential, Tenant, revoked, revoked_meanwhile};
-use crate::http::extract::query::{Parameters, Query, query, seconds};
-use crate::http::layers::auth::Access;
-use crate::http::limits::{ConcurrencyLimits, HeldPermits, Permit, hold_while_sent};
-use crate::http::problem::{ApiError, Result};
-use crate::http::render::format::Format;
-use crate::jobs::Jobs;
+use crate::extract::accept::choose;
+use crate::extract::caller::{Caller, Credential, Tenant, revoked, revoked_meanwhile};
+use crate::extract::query::{Parameters, Query, query, seconds};
+use crate::layers::auth::Access;
+use crate::limits::{ConcurrencyLimits, HeldPermits, Permit, hold_while_sent};
+use crate::problem::{ApiError, Result};
+use crate::render::format::Format;
+use railhead_jobs::Jobs;
 
 /// Longest wait of one request in s.
 pub(crate) const WAIT_MAX_SECONDS: u32 = 3600;

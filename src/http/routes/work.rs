@@ -22,17 +22,17 @@ use utoipa::{IntoParams, PartialSchema, ToSchema};
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter};
 use uuid::Uuid;
 
-use crate::http::dto::{BatchAnswer, BatchReceipt, JobAnswer, RunAnswer};
-use crate::http::extract::caller::{Caller, Credential, revoked, until_revoked, work_id};
-use crate::http::problem::{ApiError, PlainProblems, ProblemKind, Result, describe};
-use crate::http::render::format::Format;
-use crate::http::render::row_tables::{Piece, RowWriter, WriteError};
-use crate::http::routes::wait::{EventRequest, Wait, WaitQuery, changed, event};
-use crate::http::state::AppState;
-use crate::jobs::Jobs;
-use crate::jobs::codec::table::TableKind;
-use crate::jobs::model::{Kind, State as JobState};
-use crate::jobs::work::{Follower, Work};
+use crate::dto::{BatchAnswer, BatchReceipt, JobAnswer, RunAnswer};
+use crate::extract::caller::{Caller, Credential, revoked, until_revoked, work_id};
+use crate::problem::{ApiError, PlainProblems, ProblemKind, Result, describe};
+use crate::render::format::Format;
+use crate::render::row_tables::{Piece, RowWriter, WriteError};
+use crate::routes::wait::{EventRequest, Wait, WaitQuery, changed, event};
+use crate::state::AppState;
+use railhead_jobs::Jobs;
+use railhead_jobs::codec::table::TableKind;
+use railhead_jobs::model::{Kind, State as JobState};
+use railhead_jobs::work::{Follower, Work};
 
 /// Every kind of work.
 pub(crate) const KINDS: [Kind; 4] = [Kind::Case, Kind::Cases, Kind::Evolution, Kind::Rows];

@@ -12,8 +12,8 @@ use axum::body::{Body, Bytes, HttpBody};
 use hyper::body::{Frame, SizeHint};
 use tokio_util::sync::CancellationToken;
 
-use crate::http::options::HttpOptions;
-use crate::jobs::sync::lock;
+use crate::options::HttpOptions;
+use railhead_jobs::sync::lock;
 
 /// Connections accepted beyond the maximum, which may only ask for the probes.
 const RESERVE: usize = 32;

@@ -18,7 +18,7 @@ use http_body_util::{BodyExt, Limited};
 use hyper::body::{Frame, SizeHint};
 use tokio::time::timeout;
 
-use crate::jobs::sync::lock;
+use railhead_jobs::sync::lock;
 
 /// Longest rest in bytes after which the connection is used again.
 const SHORT_BYTES: u64 = 1 << 20;

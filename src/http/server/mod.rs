@@ -22,8 +22,8 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tower::ServiceExt;
 
-use crate::http::options::HttpOptions;
-use crate::http::server::connections::{Connection, Connections, Peer, ProbesOnly};
+use crate::options::HttpOptions;
+use crate::server::connections::{Connection, Connections, Peer, ProbesOnly};
 
 /// Concurrent requests of one HTTP/2 connection; RFC 9113, section 6.5.2, advises at least 100.
 const STREAMS_MAX: u32 = 100;

@@ -9,12 +9,12 @@ use tokio::sync::OwnedMutexGuard;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
-use crate::contact::monitor::{Monitor, Stop};
-use crate::jobs::attempts::slices::{Outcome, SlicedWork};
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::model::Queue;
-use crate::jobs::store::{Claim, ClaimedCase};
-use crate::jobs::sync::lock;
+use crate::attempts::slices::{Outcome, SlicedWork};
+use crate::error::{JobsError, Result};
+use crate::model::Queue;
+use crate::store::{Claim, ClaimedCase};
+use crate::sync::lock;
+use railhead_contact::monitor::{Monitor, Stop};
 
 /// Blocks of at least this size, in bytes, are given back when they are freed. Left alone, glibc raises this limit to 32 MiB with the
 /// blocks that it sees freed, and keeps what is below. 400 mixed cases on four workers peak at 351 to 361 MB then, and at 255 to
@@ -584,7 +584,7 @@ impl Attempt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::model::Kind;
+    use crate::model::Kind;
 
     #[test]
     fn the_first_reason_to_stop_stays() {

@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use crate::jobs::model::{Kind, Queue};
-use crate::jobs::sync::lock;
+use crate::model::{Kind, Queue};
+use crate::sync::lock;
 
 /// Time after which a solver second counts half.
 const HALF_LIFE: Duration = Duration::from_secs(60);

@@ -4,14 +4,14 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use crate::contact::error::{CaseError, SolveError};
-use crate::contact::evolution::task::Evolution;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::evolution::EvolutionState;
-use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::model::{Failure, FailureKind};
-use crate::jobs::store::{SliceRecord, StoredCase};
+use crate::codec::result::EncodedResult;
+use crate::model::{Failure, FailureKind};
+use crate::store::{SliceRecord, StoredCase};
+use railhead_contact::error::{CaseError, SolveError};
+use railhead_contact::evolution::task::Evolution;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::solution::words::evolution::EvolutionState;
 
 /// A checked case with its slices, of which the first `done` are stored.
 #[derive(Debug)]
@@ -191,8 +191,8 @@ pub(crate) mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::contact;
-    use crate::contact::case::solver::Limits;
+    use railhead_contact as contact;
+    use railhead_contact::case::solver::Limits;
 
     /// Seven motions with all fields.
     pub(crate) fn checked_case() -> CheckedCase {

@@ -8,15 +8,15 @@ use futures_util::stream::BoxStream;
 use tokio::time::Instant;
 use uuid::Uuid;
 
-use crate::jobs::batch::upload::BatchUpload;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::{BatchItem, ItemFault, Kind, State, SubmitOptions, WorkOptions};
-use crate::jobs::shared::Shared;
-use crate::jobs::storage_fault::StoragePlace;
-use crate::jobs::store::{BatchBegun, NewBatch, NewJob};
-use crate::jobs::sync::blocking;
-use crate::jobs::trace::KeyValue;
+use crate::batch::upload::BatchUpload;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::model::{BatchItem, ItemFault, Kind, State, SubmitOptions, WorkOptions};
+use crate::shared::Shared;
+use crate::storage_fault::StoragePlace;
+use crate::store::{BatchBegun, NewBatch, NewJob};
+use crate::sync::blocking;
+use crate::trace::KeyValue;
 
 /// Jobs that are removed in one transaction.
 pub(crate) const DELETED_AT_ONCE: u32 = 500;

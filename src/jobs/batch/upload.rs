@@ -9,18 +9,18 @@ use serde_json::Value;
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
-use crate::contact::case::solver::KnownPair;
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::varied::{named_sections, put};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::disk_reserve::nameless;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::idempotency;
-use crate::jobs::model::{CaseOptions, Kind, SubmitOptions, WorkOptions, created_at};
-use crate::jobs::profiles::KnownSections;
-use crate::jobs::store::{NewBatch, NewJob, StoredCase};
-use crate::jobs::submit::outputs_text;
+use crate::disk_reserve::nameless;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::idempotency;
+use crate::model::{CaseOptions, Kind, SubmitOptions, WorkOptions, created_at};
+use crate::profiles::KnownSections;
+use crate::store::{NewBatch, NewJob, StoredCase};
+use crate::submit::outputs_text;
+use railhead_contact::case::solver::KnownPair;
+use railhead_contact::error::{CaseError, Fault};
+use railhead_contact::evaluate::varied::{named_sections, put};
+use railhead_contact::problem::checked_case::CheckedCase;
 
 /// A job that waits in a file: its place in what was sent, the options that it has for itself, and the job without its body.
 type Staged = (u32, CaseOptions, NewJob);
@@ -568,7 +568,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::jobs::model::Kind;
+    use crate::model::Kind;
 
     #[test]
     fn what_goes_in_comes_out_in_order_and_no_file_stays() {

@@ -4,8 +4,8 @@ use std::io::{Error, Result};
 
 use zstd::bulk::Compressor;
 
-use crate::contact::solution::words::answer::{Fields, Zone};
-use crate::jobs::codec::fields::{Block, Header, Kind, MAGIC, PREFIX_BYTES};
+use crate::codec::fields::{Block, Header, Kind, MAGIC, PREFIX_BYTES};
+use railhead_contact::solution::words::answer::{Fields, Zone};
 
 const ZSTD_LEVEL: i32 = 3;
 

@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::solution::words::answer::{PatchCells, PatchFields, PointFields, Zone};
+use railhead_contact::solution::words::answer::{PatchCells, PatchFields, PointFields, Zone};
 
 pub(crate) const MAGIC: &[u8; 8] = b"RHFIELD2";
 
@@ -259,11 +259,11 @@ fn read_u32(bytes: &[u8]) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use crate::jobs::codec::encode::encode;
+    use crate::codec::encode::encode;
     use proptest::prelude::*;
 
     use super::*;
-    use crate::contact::solution::words::answer::Fields;
+    use railhead_contact::solution::words::answer::Fields;
 
     /// Any bit pattern: NaN payloads, infinities and negative zero have to survive too.
     fn values(count: usize) -> impl Strategy<Value = Vec<f64>> {

@@ -3,17 +3,17 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use crate::contact::solution::words::answer::PatchFields;
-use crate::jobs::codec::fields::{Header, PREFIX_BYTES, header_length};
-use crate::jobs::codec::parquet;
-use crate::jobs::error::{JobsError, Result};
+use crate::codec::fields::{Header, PREFIX_BYTES, header_length};
+use crate::codec::parquet;
+use crate::error::{JobsError, Result};
+use railhead_contact::solution::words::answer::PatchFields;
 
 /// A result in its stored form.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EncodedResult {
     /// The solution as JSON.
     pub solution: Bytes,
-    /// The fields as [`encode`](crate::jobs::codec::encode::encode) writes them, if the case asked for any.
+    /// The fields as [`encode`](crate::codec::encode::encode) writes them, if the case asked for any.
     pub fields: Option<Bytes>,
 }
 

@@ -5,14 +5,14 @@ use std::time::Duration;
 use futures_util::TryStreamExt;
 use uuid::Uuid;
 
-use crate::jobs::attempts::attempt::StopReason;
-use crate::jobs::disk_reserve;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::{FailureKind, Job, State, too_late};
-use crate::jobs::shared::{Shared, heartbeat};
-use crate::jobs::storage_fault::StoragePlace;
-use crate::jobs::store::{Moment, Reap, RetentionRule};
+use crate::attempts::attempt::StopReason;
+use crate::disk_reserve;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::model::{FailureKind, Job, State, too_late};
+use crate::shared::{Shared, heartbeat};
+use crate::storage_fault::StoragePlace;
+use crate::store::{Moment, Reap, RetentionRule};
 
 pub mod nodes;
 

@@ -8,10 +8,10 @@ use std::time::Duration;
 use tokio::time::{MissedTickBehavior, interval, sleep};
 use uuid::Uuid;
 
-use crate::jobs::attempts::attempt::StopReason;
-use crate::jobs::error::JobsError;
-use crate::jobs::shared::Shared;
-use crate::jobs::store::{Cluster, ClusterView, Notification, Result};
+use crate::attempts::attempt::StopReason;
+use crate::error::JobsError;
+use crate::shared::Shared;
+use crate::store::{Cluster, ClusterView, Notification, Result};
 
 /// Time between two signs of life; the store counts a node as dead after four.
 const BEAT_EVERY: Duration = Duration::from_secs(5);

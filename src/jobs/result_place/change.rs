@@ -3,13 +3,13 @@
 use futures_util::{StreamExt, TryStreamExt, stream};
 use object_store::ObjectStore;
 
-use crate::jobs::blobs::Blobs;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::metrics::StoreRequests;
-use crate::jobs::result_place::settle::{IN_DATABASE, decide, mark, marker, on_this_machine_alone};
-use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
-use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::{Cluster, Deployment};
+use crate::blobs::Blobs;
+use crate::error::{JobsError, Result};
+use crate::metrics::StoreRequests;
+use crate::result_place::settle::{IN_DATABASE, decide, mark, marker, on_this_machine_alone};
+use crate::result_place::url::{ResultsPlace, ResultsUrl};
+use crate::store::postgres::database::PostgresStore;
+use crate::store::{Cluster, Deployment};
 
 /// Results that are copied at once: each waits for its requests most of the time. Chosen by judgement, below the usual 10 connections to
 /// the database.

@@ -16,8 +16,8 @@ use object_store::client::{
 };
 use tokio::time::timeout;
 
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::metrics::{StoreRequests, count_request};
+use crate::error::{JobsError, Result};
+use crate::metrics::{StoreRequests, count_request};
 
 /// How long a connection may take.
 const CONNECTED_WITHIN: Duration = Duration::from_secs(5);

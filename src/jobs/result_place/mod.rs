@@ -15,11 +15,11 @@ pub(crate) mod settle;
 pub mod url;
 
 #[cfg(feature = "cluster")]
-use crate::jobs::error::Result;
+use crate::error::Result;
 #[cfg(feature = "cluster")]
-use crate::jobs::result_place::url::ResultsPlace;
+use crate::result_place::url::ResultsPlace;
 #[cfg(feature = "cluster")]
-use crate::jobs::store::postgres::{database::PostgresStore, doctor::Finding};
+use crate::store::postgres::{database::PostgresStore, doctor::Finding};
 
 /// Examines the place of the results of a database.
 ///

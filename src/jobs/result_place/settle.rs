@@ -10,11 +10,11 @@ use object_store::{Error, ObjectStore, ObjectStoreExt, PutPayload};
 use serde::{Deserialize, Serialize};
 use tokio::time::timeout;
 
-use crate::jobs::blobs::Blobs;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::metrics::StoreRequests;
-use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
-use crate::jobs::store::{Cluster, Deployment};
+use crate::blobs::Blobs;
+use crate::error::{JobsError, Result};
+use crate::metrics::StoreRequests;
+use crate::result_place::url::{ResultsPlace, ResultsUrl};
+use crate::store::{Cluster, Deployment};
 
 /// The object that says whose results these are.
 const MARKER: &str = "railhead.json";

@@ -15,10 +15,10 @@ use object_store::prefix::PrefixStore;
 #[cfg(feature = "cluster")]
 use object_store::{BackoffConfig, RetryConfig};
 
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::metrics::StoreRequests;
+use crate::error::{JobsError, Result};
+use crate::metrics::StoreRequests;
 #[cfg(feature = "cluster")]
-use crate::jobs::result_place::client::Client;
+use crate::result_place::client::Client;
 
 /// Tries of a request that fails for a moment, beside the first.
 #[cfg(feature = "cluster")]

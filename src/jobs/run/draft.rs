@@ -6,22 +6,22 @@ use std::fs::File;
 use serde_json::Value;
 use uuid::Uuid;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::error::{CaseError, Fault};
-use crate::contact::evaluate::answer::NumberColumns;
-use crate::contact::evaluate::many::{ManyTask, expected_seconds};
-use crate::contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::jobs::batch::upload::BatchUpload;
-use crate::jobs::codec::table::COLUMNS_MAX;
-use crate::jobs::disk_reserve::nameless;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::{Kind, WorkOptions};
-use crate::jobs::profiles::KnownSections;
-use crate::jobs::run::model::{REASON, RunChunk, RunColumn, RunHead};
-use crate::jobs::submit::microseconds;
-use crate::jobs::sync::blocking;
+use crate::batch::upload::BatchUpload;
+use crate::codec::table::COLUMNS_MAX;
+use crate::disk_reserve::nameless;
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::model::{Kind, WorkOptions};
+use crate::profiles::KnownSections;
+use crate::run::model::{REASON, RunChunk, RunColumn, RunHead};
+use crate::submit::microseconds;
+use crate::sync::blocking;
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::error::{CaseError, Fault};
+use railhead_contact::evaluate::answer::NumberColumns;
+use railhead_contact::evaluate::many::{ManyTask, expected_seconds};
+use railhead_contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
+use railhead_contact::problem::checked_case::CheckedCase;
 
 /// Expected solve time of a chunk in s: much longer than a claim takes, shorter than a lease, and soon done again.
 const CHUNK_SECONDS: f64 = 3.0;

@@ -7,10 +7,10 @@ use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::contact::evaluate::varied::{Values, VariedColumn, case_of_row};
-use crate::jobs::codec::table::{TableColumn, TableKind};
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::model::{Batch, RunRecord, State};
+use crate::codec::table::{TableColumn, TableKind};
+use crate::error::{JobsError, Result};
+use crate::model::{Batch, RunRecord, State};
+use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 
 /// The form of heads and chunks that is written.
 const FORM: u32 = 1;

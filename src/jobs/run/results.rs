@@ -3,14 +3,14 @@ use bytes::Bytes;
 use serde_json::Value;
 use uuid::Uuid;
 
-use crate::contact::evaluate::varied::case_of_row;
-use crate::jobs::codec::parquet::TableReader;
-use crate::jobs::codec::table::{RowTable, TableColumn};
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::handle::Jobs;
-use crate::jobs::model::{BatchItem, State};
-use crate::jobs::run::model::{Run, RunChunk, RunHead, parted, table_column};
-use crate::jobs::sync::blocking;
+use crate::codec::parquet::TableReader;
+use crate::codec::table::{RowTable, TableColumn};
+use crate::error::{JobsError, Result};
+use crate::handle::Jobs;
+use crate::model::{BatchItem, State};
+use crate::run::model::{Run, RunChunk, RunHead, parted, table_column};
+use crate::sync::blocking;
+use railhead_contact::evaluate::varied::case_of_row;
 
 impl Jobs {
     /// The case that a row of a run stands for, and its answer as a table of one row if it is there.

@@ -26,12 +26,12 @@ use object_store::ObjectStore;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::contact::remark::entry::RemarkEntry;
-use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::error::StoreError;
-use crate::jobs::model::{
+use crate::codec::result::EncodedResult;
+use crate::error::StoreError;
+use crate::model::{
     Batch, BatchItem, Failure, Job, Key, Kind, Queue, RunRecord, State, SubmitOptions,
 };
+use railhead_contact::remark::entry::RemarkEntry;
 
 /// Runs a statement on a connection with a value for each of its parameters, and takes its rows as `execute`, `fetch_all` or the like do;
 /// `scalar` takes those of one column.
@@ -567,7 +567,7 @@ pub trait Cluster: Send + Sync + Debug {
     async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>>;
 
     /// Shows that these batches are still received or filled. A batch of which nobody has shown that for a minute is
-    /// [unfinished](crate::jobs::store::Batches::unfinished_batches).
+    /// [unfinished](crate::store::Batches::unfinished_batches).
     async fn keep_batches(&self, batches: &[Uuid]) -> Result<()>;
 
     /// Removes large results that were written long ago and that no job refers to: what a node left that was killed between the

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use rusqlite::ErrorCode;
 
-use crate::jobs::error::{JobsError, StorageFault, StoreError};
+use crate::error::{JobsError, StorageFault, StoreError};
 
 #[cfg(feature = "cluster")]
-use crate::jobs::storage_fault::fault_of_io;
+use crate::storage_fault::fault_of_io;
 
 impl From<rusqlite::Error> for StoreError {
     fn from(error: rusqlite::Error) -> Self {

@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use crate::contact::error::SolveError;
-use crate::contact::evolution::task::{Evolution, SolveContext};
-use crate::contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
-use crate::jobs::attempts::attempt::AttemptControl;
-use crate::jobs::attempts::slices::{Ended, Outcome, SlicedEvolution, SlicedWork};
-use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::shared::Shared;
-use crate::jobs::store::SliceRecord;
+use crate::attempts::attempt::AttemptControl;
+use crate::attempts::slices::{Ended, Outcome, SlicedEvolution, SlicedWork};
+use crate::codec::result::EncodedResult;
+use crate::shared::Shared;
+use crate::store::SliceRecord;
+use railhead_contact::error::SolveError;
+use railhead_contact::evolution::task::{Evolution, SolveContext};
+use railhead_contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
 
 /// Steps that are stored together, unless a record ends them before.
 const STEPS: u32 = 16;

@@ -6,9 +6,9 @@ use std::sync::{Arc, Weak};
 use futures_util::future::join_all;
 use tokio::time::sleep;
 
-use crate::jobs::attempts::attempt::{AttemptControl, GroupLease, HeldLeases, StopReason};
-use crate::jobs::shared::{Shared, heartbeat};
-use crate::jobs::store::{Claim, Renewal};
+use crate::attempts::attempt::{AttemptControl, GroupLease, HeldLeases, StopReason};
+use crate::shared::{Shared, heartbeat};
+use crate::store::{Claim, Renewal};
 
 /// Keeps the leases of jobs that were claimed just now.
 pub(crate) fn keep(shared: &Arc<Shared>, leases: Vec<(Claim, Arc<AttemptControl>)>) -> GroupLease {

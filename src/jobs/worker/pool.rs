@@ -5,12 +5,12 @@ use std::time::Duration;
 use tokio::time::sleep;
 use uuid::Uuid;
 
-use crate::jobs::attempts::attempt::{Attempt, SolverThread};
-use crate::jobs::error::Result;
-use crate::jobs::model::{Queue, State};
-use crate::jobs::shared::Shared;
-use crate::jobs::store::{ClaimKind, ClaimRequest};
-use crate::jobs::worker::solve;
+use crate::attempts::attempt::{Attempt, SolverThread};
+use crate::error::Result;
+use crate::model::{Queue, State};
+use crate::shared::Shared;
+use crate::store::{ClaimKind, ClaimRequest};
+use crate::worker::solve;
 
 /// How often an idle worker asks for jobs although nothing has woken it.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);

@@ -5,17 +5,17 @@ use std::time::SystemTime;
 
 use uuid::Uuid;
 
-use crate::contact::error::SolveError;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::jobs::attempts::attempt::{Attempt, Phase, StopReason};
-use crate::jobs::attempts::slices::{INTERNAL, Outcome, SlicedWork, Work};
-use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::model::{Failure, FailureKind, State, too_late};
-use crate::jobs::storage_fault::StoragePlace;
-use crate::jobs::store::{Claim, Ending, NewSlice, ReleaseReason, SliceRecord, StoredResult};
-use crate::jobs::submit::microseconds;
-use crate::jobs::worker::pool::{StepReport, Worker};
+use crate::attempts::attempt::{Attempt, Phase, StopReason};
+use crate::attempts::slices::{INTERNAL, Outcome, SlicedWork, Work};
+use crate::codec::result::EncodedResult;
+use crate::error::{JobsError, Result};
+use crate::model::{Failure, FailureKind, State, too_late};
+use crate::storage_fault::StoragePlace;
+use crate::store::{Claim, Ending, NewSlice, ReleaseReason, SliceRecord, StoredResult};
+use crate::submit::microseconds;
+use crate::worker::pool::{StepReport, Worker};
+use railhead_contact::error::SolveError;
+use railhead_contact::remark::entry::RemarkEntry;
 
 /// What follows from the outcome of an attempt.
 pub(crate) enum Disposition {
@@ -485,10 +485,10 @@ fn not_stored(error: &JobsError) -> Ending {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::error::CaseError;
-    use crate::jobs::attempts::slices::SlicedCase;
+    use crate::attempts::slices::SlicedCase;
+    use railhead_contact::error::CaseError;
 
-    fn checked() -> crate::contact::problem::checked_case::CheckedCase {
+    fn checked() -> railhead_contact::problem::checked_case::CheckedCase {
         let case = serde_json::json!({
             "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
             "friction": { "coefficient": 0.3 },
@@ -496,7 +496,7 @@ mod tests {
             "load": { "normal_force_n": 100_000 },
             "motion": [{ "creepage_x": 0.001 }, { "creepage_x": 0.002 }]
         });
-        crate::contact::check(&case, &crate::contact::case::solver::Limits::default()).unwrap()
+        railhead_contact::check(&case, &railhead_contact::case::solver::Limits::default()).unwrap()
     }
 
     /// What becomes of a job, as a word.

@@ -9,28 +9,28 @@ use serde_json::json;
 use tokio::sync::OwnedMutexGuard;
 use tokio_util::sync::CancellationToken;
 
-use crate::contact::error::SolveError;
-use crate::contact::evaluate::answer::ManyAnswer;
-use crate::contact::evaluate::many::{ManyTask, solve_many};
-use crate::contact::monitor::Monitor;
-use crate::contact::problem::checked_case::CheckedCase;
-use crate::contact::solution::words::answer::{Fields, PatchFields, Solution};
-use crate::jobs::attempts::attempt::{
+use crate::attempts::attempt::{
     Attempt, AttemptControl, Member, Outcomes, Phase, Solver, SolverThread, Task,
 };
-use crate::jobs::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Work};
-use crate::jobs::codec::encode::encode;
-use crate::jobs::codec::parquet;
-use crate::jobs::codec::result::EncodedResult;
-use crate::jobs::codec::table::{RowTable, TableColumn};
-use crate::jobs::error::{JobsError, Result};
-use crate::jobs::job_trace::JobTrace;
-use crate::jobs::model::{Failure, FailureKind, Kind, Queue};
-use crate::jobs::run::model::{REASON, RunChunk, RunHead, parted};
-use crate::jobs::shared::Shared;
-use crate::jobs::store::{Claim, SliceRecord, StoredCase};
-use crate::jobs::sync::lock;
-use crate::jobs::worker::{evolution, heartbeat};
+use crate::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Work};
+use crate::codec::encode::encode;
+use crate::codec::parquet;
+use crate::codec::result::EncodedResult;
+use crate::codec::table::{RowTable, TableColumn};
+use crate::error::{JobsError, Result};
+use crate::job_trace::JobTrace;
+use crate::model::{Failure, FailureKind, Kind, Queue};
+use crate::run::model::{REASON, RunChunk, RunHead, parted};
+use crate::shared::Shared;
+use crate::store::{Claim, SliceRecord, StoredCase};
+use crate::sync::lock;
+use crate::worker::{evolution, heartbeat};
+use railhead_contact::error::SolveError;
+use railhead_contact::evaluate::answer::ManyAnswer;
+use railhead_contact::evaluate::many::{ManyTask, solve_many};
+use railhead_contact::monitor::Monitor;
+use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::solution::words::answer::{Fields, PatchFields, Solution};
 
 /// Does the work; a panic becomes a failure and the thread stays usable.
 pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Work) -> Outcome {
@@ -376,9 +376,9 @@ pub(crate) fn begin(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::monitor::Unmonitored;
-    use crate::jobs::attempts::slices::tests::checked_case;
-    use crate::jobs::engine::Engine;
+    use crate::attempts::slices::tests::checked_case;
+    use crate::engine::Engine;
+    use railhead_contact::monitor::Unmonitored;
 
     #[test]
     fn parts_read_from_where_they_were_stored_are_the_answer_bit_for_bit() {

@@ -11,13 +11,13 @@ use std::time::{Duration, Instant};
 
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::jobs::attempts::attempt::{Attempt, Counted, Phase, SolverThread, StopReason};
-use crate::jobs::attempts::slices::Work;
-use crate::jobs::error::Result;
-use crate::jobs::shared::Shared;
-use crate::jobs::store::{ClaimedCase, ReleaseReason};
-use crate::jobs::worker::pool::{StepReport, Worker};
-use crate::jobs::worker::solve;
+use crate::attempts::attempt::{Attempt, Counted, Phase, SolverThread, StopReason};
+use crate::attempts::slices::Work;
+use crate::error::Result;
+use crate::shared::Shared;
+use crate::store::{ClaimedCase, ReleaseReason};
+use crate::worker::pool::{StepReport, Worker};
+use crate::worker::solve;
 
 /// How long a solver that was told to stop may go on before its thread is left behind.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);

@@ -2,7 +2,7 @@
 
 use faer::Mat;
 use faer::prelude::Solve;
-use railhead::contact::numerics::simd::SimdLevel;
+use railhead_contact::numerics::simd::SimdLevel;
 use realfft::RealFftPlanner;
 
 use crate::recorder::record::Digest;

@@ -9,12 +9,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use railhead::contact;
-use railhead::contact::case::digest::SOLVER_REVISION;
-use railhead::contact::case::solver::Limits;
-use railhead::contact::monitor::Unmonitored;
-use railhead::contact::numerics::simd::SimdLevel;
-use railhead::contact::rolling::operator_store::OperatorStore;
+use railhead_contact as contact;
+use railhead_contact::case::digest::SOLVER_REVISION;
+use railhead_contact::case::solver::Limits;
+use railhead_contact::monitor::Unmonitored;
+use railhead_contact::numerics::simd::SimdLevel;
+use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::Value;
 
 use crate::recorder::comparison::{Precision, compare};

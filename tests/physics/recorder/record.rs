@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use railhead::contact::solution::words::answer::{Fields, PatchFields, PointSolution, Solution};
+use railhead_contact::solution::words::answer::{Fields, PatchFields, PointSolution, Solution};
 
 /// How a change of a quantity is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,7 +75,7 @@ impl Record {
         let area: f64 = solution.patches.iter().map(|p| p.area_mm2).sum();
         let length = (area / std::f64::consts::PI).sqrt();
         record.put("scales", numbers([friction * load, length]));
-        let remark = |entry: &railhead::contact::remark::entry::RemarkEntry| {
+        let remark = |entry: &railhead_contact::remark::entry::RemarkEntry| {
             let place = |index: Option<usize>| index.map_or("-".to_owned(), |at| at.to_string());
             let also = &entry.also_at_points;
             let [patch, point] = [entry.patch, entry.point].map(place);

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::cross_section::CrossSection;
-use crate::contact::case::words::motion::{Combine, Swept, swept};
-use crate::contact::case::words::object::{AllowedRange, Object, shown};
-use crate::contact::case::words::samples;
+use crate::case::words::cross_section::CrossSection;
+use crate::case::words::motion::{Combine, Swept, swept};
+use crate::case::words::object::{AllowedRange, Object, shown};
+use crate::case::words::samples;
 
 /// Where the bodies touch.
 #[none_is_absent]

@@ -5,10 +5,8 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::object::{
-    AllowedRange, LISTED_MAX, Object, join, names, number, shown,
-};
-use crate::contact::geometry::profile::{POINTS_MAX, POINTS_MIN};
+use crate::case::words::object::{AllowedRange, LISTED_MAX, Object, join, names, number, shown};
+use crate::geometry::profile::{POINTS_MAX, POINTS_MIN};
 
 /// A cross-section of a rail or a wheel, as points or as the text of a file; exactly one of the two.
 ///

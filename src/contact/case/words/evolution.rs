@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::cross_section::CrossSection;
-use crate::contact::case::words::object::{AllowedRange, Faults, Object, join, number, shown};
-use crate::contact::case::words::subsurface::DamageModel;
-use crate::contact::error::CaseError;
-use crate::contact::numerics::quadrature::PRIMES;
+use crate::case::words::cross_section::CrossSection;
+use crate::case::words::object::{AllowedRange, Faults, Object, join, number, shown};
+use crate::case::words::subsurface::DamageModel;
+use crate::error::CaseError;
+use crate::numerics::quadrature::PRIMES;
 
 /// Profiles that wear under a traffic.
 #[derive(Debug, Clone, PartialEq, ToSchema, Members)]

@@ -4,8 +4,8 @@ use railhead_macros::{Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::case::words::object::{AllowedRange, Object, join};
-use crate::contact::case::words::samples::AXIS_POINTS;
+use crate::case::words::object::{AllowedRange, Object, join};
+use crate::case::words::samples::AXIS_POINTS;
 
 /// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across`, `along` and `by_temperature`. `layer` and
 /// `reduction` make the contact more compliant and may be added to each of them.

@@ -4,7 +4,7 @@ use railhead_macros::{Members, none_is_absent};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::object::{AllowedRange, Object};
+use crate::case::words::object::{AllowedRange, Object};
 
 /// Elastic constants: one set for both bodies, or one for each.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]

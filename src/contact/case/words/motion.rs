@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::object::{AllowedRange, Faults, Member, Object, join, shown};
+use crate::case::words::object::{AllowedRange, Faults, Member, Object, join, shown};
 
 /// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]

@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use serde_json::{Map, Number, Value};
 
-use crate::contact::error::{Fault, FaultCode, FaultFigures};
+use crate::error::{Fault, FaultCode, FaultFigures};
 
 /// Faulty values of one array or grid that are listed one by one.
 pub(crate) const LISTED_MAX: usize = 5;

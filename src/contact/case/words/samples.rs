@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::contact::case::words::object::{AllowedRange, Object, count_rest, join, numbers};
+use crate::case::words::object::{AllowedRange, Object, count_rest, join, numbers};
 
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Points of one axis of a grid, and of a coefficient of friction across, along or by temperature.

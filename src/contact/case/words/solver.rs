@@ -2,7 +2,7 @@
 //!
 //! The question as the client writes it: one contact case.
 //!
-//! A [`Case`] is only ever made by [`Case::read`](crate::contact::case::words::solver::Case::read), which collects every fault of the
+//! A [`Case`] is only ever made by [`Case::read`](crate::case::words::solver::Case::read), which collects every fault of the
 //! JSON text at once. Lengths in mm, forces in N, stresses in MPa, creepages dimensionless, spin in 1/mm.
 //!
 //! A case in the form of which its digest is taken.
@@ -14,15 +14,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::contact::{Contact, Load};
-use crate::contact::case::words::friction::Friction;
-use crate::contact::case::words::material::{Material, ThermalWords};
-use crate::contact::case::words::motion::{
-    History, HistoryStartName, MotionWords, Motions, Wheelset,
-};
-use crate::contact::case::words::object::{Object, names, shown, word};
-use crate::contact::case::words::subsurface::{DamageWords, SubsurfaceWords};
-use crate::contact::rolling::task::{PrescribedForces, TARGET_LEAST, TARGET_USUAL};
+use crate::case::words::contact::{Contact, Load};
+use crate::case::words::friction::Friction;
+use crate::case::words::material::{Material, ThermalWords};
+use crate::case::words::motion::{History, HistoryStartName, MotionWords, Motions, Wheelset};
+use crate::case::words::object::{Object, names, shown, word};
+use crate::case::words::subsurface::{DamageWords, SubsurfaceWords};
+use crate::rolling::task::{PrescribedForces, TARGET_LEAST, TARGET_USUAL};
 
 /// Method and accuracy of the solution.
 #[none_is_absent]

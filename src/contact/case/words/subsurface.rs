@@ -7,10 +7,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::contact::case::words::motion::POINTS_MAX;
-use crate::contact::case::words::object::{
-    AllowedRange, Member, Object, join, names, number, shown, word,
-};
+use crate::case::words::motion::POINTS_MAX;
+use crate::case::words::object::{AllowedRange, Member, Object, join, names, number, shown, word};
 
 /// Points for stresses below the surface, in the axes of the patch: x along rolling, y to the left, depth positive into the body. At most
 /// one of `points_mm`, `along_depth_at_mm` and `plane`; without them only the worst point is found.

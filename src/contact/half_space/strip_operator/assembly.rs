@@ -4,10 +4,10 @@ use std::ops::{ControlFlow, Range};
 
 use pulp::NullaryFnOnce;
 
-use crate::contact::mesh::{Mesh, observe};
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::simd;
-use crate::contact::numerics::simd::Float;
+use crate::mesh::{Mesh, observe};
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::simd;
+use crate::numerics::simd::Float;
 
 /// All cell edges of a mesh, as seen from the mid-line of one strip.
 pub(crate) struct CellEdges<T> {

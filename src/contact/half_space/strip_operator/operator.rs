@@ -9,13 +9,13 @@
 
 use pulp::WithSimd;
 
-use crate::contact::half_space::strip_operator::assembly::OperatorAssembly;
-use crate::contact::half_space::strip_operator::kind::{Parity, Precision};
-use crate::contact::half_space::strip_operator::product::{Product, RowLayout};
-use crate::contact::mesh::Mesh;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::simd;
-use crate::contact::numerics::simd::LANES;
+use crate::half_space::strip_operator::assembly::OperatorAssembly;
+use crate::half_space::strip_operator::kind::{Parity, Precision};
+use crate::half_space::strip_operator::product::{Product, RowLayout};
+use crate::mesh::Mesh;
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::simd;
+use crate::numerics::simd::LANES;
 
 /// How the matrix is laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -447,10 +447,10 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use crate::contact::half_space::kernels::{Rectangle, rectangle};
-    use crate::contact::mesh::samples::mesh_between;
-    use crate::contact::mesh::{Chord, Grading, observation_points};
-    use crate::contact::monitor::Unmonitored;
+    use crate::half_space::kernels::{Rectangle, rectangle};
+    use crate::mesh::samples::mesh_between;
+    use crate::mesh::{Chord, Grading, observation_points};
+    use crate::monitor::Unmonitored;
 
     fn ellipse(a: f64, b: f64, strips: usize, cells: usize) -> Mesh {
         mesh_between(b, [strips, cells], |y| {

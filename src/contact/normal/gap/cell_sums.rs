@@ -2,7 +2,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::contact::numerics::simd;
+use crate::numerics::simd;
 
 /// Arrays over cells go on to a multiple of this: no machine has more lanes.
 pub(crate) const LANES: usize = 8;

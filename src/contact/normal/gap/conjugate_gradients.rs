@@ -3,13 +3,13 @@
 //! The unknowns satisfy `p ≥ 0`, `g = u(p) + h − δ ≥ 0` and `p g = 0` at every cell; either the sum of p or the approach δ is
 //! prescribed (Polonsky and Keer 1999). Distances may be scaled by what a cell's own pressure displaces.
 
-use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::gap::cell_sums;
-use crate::contact::normal::gap::cell_sums::{
+use crate::half_space::grid_operator::{GridOperator, GridWorkspace};
+use crate::monitor::{Monitor, Stop};
+use crate::normal::gap::cell_sums;
+use crate::normal::gap::cell_sums::{
     Advance, CellSum, Direction, Distances, LANES, Parting, StepSums,
 };
-use crate::contact::normal::hertz::NormalLoad;
+use crate::normal::hertz::NormalLoad;
 
 /// Displacements that pressures on equal cells cause.
 pub(crate) trait PressureInfluence {
@@ -316,8 +316,8 @@ impl PressureIterate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::half_space::grid_operator::coefficients;
-    use crate::contact::monitor::Unmonitored;
+    use crate::half_space::grid_operator::coefficients;
+    use crate::monitor::Unmonitored;
 
     const CELLS: usize = 24;
     const STEP: f64 = 0.5;

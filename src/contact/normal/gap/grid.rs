@@ -13,15 +13,15 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::half_space::grid_operator::{GridOperator, GridWorkspace};
-use crate::contact::monitor::Stop;
-use crate::contact::normal::gap::conjugate_gradients;
-use crate::contact::normal::gap::conjugate_gradients::PressureAnswer;
-use crate::contact::normal::gap::surface::{GapSurface, Window};
-use crate::contact::normal::gap::task::SearchBox;
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::numerics::flood_fill::groups;
-use crate::contact::remark::entry::RemarkEntry;
+use crate::half_space::grid_operator::{GridOperator, GridWorkspace};
+use crate::monitor::Stop;
+use crate::normal::gap::conjugate_gradients;
+use crate::normal::gap::conjugate_gradients::PressureAnswer;
+use crate::normal::gap::surface::{GapSurface, Window};
+use crate::normal::gap::task::SearchBox;
+use crate::normal::pressure_field::field::PressureField;
+use crate::numerics::flood_fill::groups;
+use crate::remark::entry::RemarkEntry;
 
 /// Most cells along either axis.
 const CELLS_MAX: usize = 200;

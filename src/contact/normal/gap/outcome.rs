@@ -1,13 +1,13 @@
 //! The answer of a gap: pressures of the last grids as a field, and remarks on them.
 
-use crate::contact::normal::gap::grid::{
+use crate::normal::gap::grid::{
     GapOutcome, NormalAnswer, NormalError, NormalWork, PatchGrid, squares,
 };
-use crate::contact::normal::gap::task::GapTask;
-use crate::contact::normal::pressure_field::field::PressureField;
-use crate::contact::normal::pressure_field::grid_pressure::GridPressure;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
+use crate::normal::gap::task::GapTask;
+use crate::normal::pressure_field::field::PressureField;
+use crate::normal::pressure_field::grid_pressure::GridPressure;
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
 
 /// Half of a side of a patch over the radius in its direction from which on half-spaces are a poor likeness of the bodies. A judgement, not a
 /// measurement.

@@ -4,15 +4,15 @@
 //! overlap share one. Every patch is solved at the approach of all in the gap that the loads of the others open; loads and approach
 //! follow in rounds.
 
-use crate::contact::half_space::grid_operator::GridWorkspace;
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::gap::grid::{
+use crate::half_space::grid_operator::GridWorkspace;
+use crate::monitor::Monitor;
+use crate::normal::gap::grid::{
     GRIDS_MAX, GapOutcome, GridFineness, GridsExit, NEAR, NormalError, PatchGrid, PressureGrid,
     within,
 };
-use crate::contact::normal::gap::surface::{GapSurface, Window};
-use crate::contact::normal::gap::task::{GapTask, PreviewCache, SearchBox};
-use crate::contact::normal::hertz::NormalLoad;
+use crate::normal::gap::surface::{GapSurface, Window};
+use crate::normal::gap::task::{GapTask, PreviewCache, SearchBox};
+use crate::normal::hertz::NormalLoad;
 
 /// More patches than this are not solved one by one: such a gap is rough.
 const PATCHES_MAX: usize = 6;

@@ -4,19 +4,17 @@
 //! box. Each grid starts from the solution on the one before and is shrunk to the contact. Where one grid cannot resolve all
 //! patches, each gets a grid of its own (see `patch_grids.rs`). At the end the edges are placed between the cells.
 
-use crate::contact::half_space::grid_operator::GridWorkspace;
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::gap::conjugate_gradients::{
-    PressureAnswer, PressureTask, solve_pressure,
-};
-use crate::contact::normal::gap::grid::{
+use crate::half_space::grid_operator::GridWorkspace;
+use crate::monitor::Monitor;
+use crate::normal::gap::conjugate_gradients::{PressureAnswer, PressureTask, solve_pressure};
+use crate::normal::gap::grid::{
     APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, GapOutcome, GridFineness, GridSide, GridsExit,
     LEVEL_BEYOND, LOOSE_POWER, NEAR, NormalAnswer, NormalError, PRESSURE_CHANGE, PatchGrid,
     PressureGrid, REFINEMENT, RESOLUTION, TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE,
     TOLERANCE_FIRST, edge_reached, no_touch,
 };
-use crate::contact::normal::gap::task::{GapTask, SearchBox, reach_of_level};
-use crate::contact::normal::hertz::NormalLoad;
+use crate::normal::gap::task::{GapTask, SearchBox, reach_of_level};
+use crate::normal::hertz::NormalLoad;
 
 impl GapTask {
     /// What is wrong with the gap, as far as its samples tell without solving.

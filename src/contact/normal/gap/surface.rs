@@ -1,6 +1,6 @@
 //! The gap between the undeformed bodies: samples, and a smooth surface through them.
 
-use crate::contact::numerics::interpolation::{LimitedSlopes, Place, SLOPE_REACH, limited_slopes};
+use crate::numerics::interpolation::{LimitedSlopes, Place, SLOPE_REACH, limited_slopes};
 
 /// Distance of the undeformed surfaces in mm, both bodies together, over the contact plane.
 #[derive(Debug, Clone, PartialEq)]

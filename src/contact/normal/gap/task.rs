@@ -6,9 +6,9 @@
 //!
 //! The box in which a contact can be: it holds every point at which the bodies could touch, and is found before anything is solved.
 
-use crate::contact::lazy_field::LazyField;
-use crate::contact::normal::gap::surface::{GapSurface, Window};
-use crate::contact::normal::hertz::NormalLoad;
+use crate::lazy_field::LazyField;
+use crate::normal::gap::surface::{GapSurface, Window};
+use crate::normal::hertz::NormalLoad;
 
 /// Two bodies with a gap between them, pressed together.
 #[derive(Debug, Clone, PartialEq)]
@@ -321,7 +321,7 @@ mod asperities_tests {
 #[cfg(test)]
 mod search_box_tests {
     use super::*;
-    use crate::contact::normal::hertz::Ellipse;
+    use crate::normal::hertz::Ellipse;
 
     fn parabola(radius: f64, half: f64) -> (Vec<f64>, Vec<f64>) {
         let y: Vec<f64> = (-20..=20).map(|k| half * f64::from(k) / 20.0).collect();

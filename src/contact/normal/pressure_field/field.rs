@@ -2,12 +2,12 @@
 //!
 //! Fields from pressures computed on equal cells, and their mirror symmetry about y = 0.
 
-use crate::contact::mesh::Chord;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::pressure_field::grid_pressure::{
+use crate::mesh::Chord;
+use crate::normal::hertz::Patch;
+use crate::normal::pressure_field::grid_pressure::{
     GridPressure, Jump, NOWHERE, PADDING, PATCHES_MAX, SampleGrid, padded,
 };
-use crate::contact::remark::entry::RemarkEntry;
+use crate::remark::entry::RemarkEntry;
 
 /// Pressures on one grid or several, and the patches they form.
 #[derive(Debug, Clone, PartialEq)]

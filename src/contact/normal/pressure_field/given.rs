@@ -7,17 +7,17 @@
 
 use std::ops::RangeInclusive;
 
-use crate::contact::mesh::Chord;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::normal::pressure_field::grid_pressure::{
+use crate::mesh::Chord;
+use crate::normal::hertz::Patch;
+use crate::normal::pressure_field::grid_pressure::{
     GridPressure, NOWHERE, PADDING, PATCHES_MAX, PatchShape, SampleGrid, padded,
 };
-use crate::contact::normal::pressure_field::level_set::{GridLine, State};
-use crate::contact::normal::pressure_field::{grid_pressure, level_set};
-use crate::contact::numerics::quadrature::{GaussPoints, integral};
-use crate::contact::numerics::roots::{interval, weights};
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
+use crate::normal::pressure_field::level_set::{GridLine, State};
+use crate::normal::pressure_field::{grid_pressure, level_set};
+use crate::numerics::quadrature::{GaussPoints, integral};
+use crate::numerics::roots::{interval, weights};
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
 
 /// With at least this many intervals per chord, three Gauss points per interval are enough: the error stays below 1e-9 of the mean
 /// pressure for Hertz's pressure.

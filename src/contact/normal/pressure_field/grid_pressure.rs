@@ -17,11 +17,11 @@
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-use crate::contact::normal::hertz::Patch;
-use crate::contact::numerics::flood_fill::groups;
-use crate::contact::numerics::roots::{bisect, maximum};
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::remark::list::Remark;
+use crate::normal::hertz::Patch;
+use crate::numerics::flood_fill::groups;
+use crate::numerics::roots::{bisect, maximum};
+use crate::remark::entry::RemarkEntry;
+use crate::remark::list::Remark;
 
 /// Pressure samples on one rectangular grid and the patches they form.
 #[derive(Debug, Clone, PartialEq)]
@@ -478,7 +478,7 @@ impl GridPressure {
 #[cfg(test)]
 mod moments_tests {
     use super::*;
-    use crate::contact::mesh::Chord;
+    use crate::mesh::Chord;
 
     fn two_bumps() -> GridPressure {
         let x: Vec<f64> = (-20..=20).map(|k| 0.2 * f64::from(k)).collect();

@@ -6,9 +6,9 @@
 //!
 //! Squared pressure along a straight grid-parallel line: where it is positive.
 
-use crate::contact::normal::pressure_field::grid_pressure::SampleGrid;
-use crate::contact::numerics::interpolation;
-use crate::contact::numerics::roots::Cubic;
+use crate::normal::pressure_field::grid_pressure::SampleGrid;
+use crate::numerics::interpolation;
+use crate::numerics::roots::Cubic;
 
 /// Number of samples outside that get an extrapolated value, counted from the nearest one inside along either axis.
 const RINGS: usize = 3;

@@ -7,8 +7,8 @@
 
 use std::ops::Range;
 
-use crate::contact::half_space::kernels::LoadPack;
-use crate::contact::numerics::quadrature::RULES;
+use crate::half_space::kernels::LoadPack;
+use crate::numerics::quadrature::RULES;
 
 /// Parts, and packs of point loads, that are kept, in 45 MB together; only memory depends on it.
 const KEPT_MAX: usize = 100_000;

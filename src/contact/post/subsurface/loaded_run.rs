@@ -3,14 +3,14 @@
 use std::collections::HashMap;
 use std::f64::consts::PI;
 
-use crate::contact::half_space::kernels::LoadPack;
-use crate::contact::mesh::{Chord, Segment};
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::numerics::quadrature::RULES;
-use crate::contact::numerics::simd::LANES;
-use crate::contact::post::subsurface::load_parts::{LoadPart, ORDERS, PartBox};
-use crate::contact::rolling::answer::LevelAnswer;
-use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::half_space::kernels::LoadPack;
+use crate::mesh::{Chord, Segment};
+use crate::normal::footprint::Footprint;
+use crate::numerics::quadrature::RULES;
+use crate::numerics::simd::LANES;
+use crate::post::subsurface::load_parts::{LoadPart, ORDERS, PartBox};
+use crate::rolling::answer::LevelAnswer;
+use crate::rolling::strip_mesh::StripMesh;
 
 /// Points of the rule with most of them.
 const POINTS_MAX: usize = RULES[ORDERS - 1].len();

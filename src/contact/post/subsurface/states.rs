@@ -1,8 +1,8 @@
 //! From a stress tensor to what is read off it.
 
-use crate::contact::case::words::subsurface::{BodyName, PassageWords};
-use crate::contact::half_space::kernels::Stress;
-use crate::contact::solution::words::evolution::{StressPoint, StressTensor};
+use crate::case::words::subsurface::{BodyName, PassageWords};
+use crate::half_space::kernels::Stress;
+use crate::solution::words::evolution::{StressPoint, StressTensor};
 
 /// Numbers that a stored point has: `x, y, depth`, then the stress in axes of the patch.
 pub const STORED: usize = 9;

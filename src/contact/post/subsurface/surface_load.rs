@@ -9,17 +9,15 @@
 
 use std::ops::Range;
 
-use crate::contact::half_space::kernels::{LoadPack, Stress, stress};
-use crate::contact::mesh::{Chord, Segment};
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::numerics::quadrature::RULES;
-use crate::contact::numerics::simd::LANES;
-use crate::contact::post::subsurface::load_parts::{
-    LoadPart, LoadParts, LoadResolution, ORDERS, PartBox,
-};
-use crate::contact::post::subsurface::loaded_run::{KnownLines, LoadedRun};
-use crate::contact::rolling::answer::LevelAnswer;
-use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::half_space::kernels::{LoadPack, Stress, stress};
+use crate::mesh::{Chord, Segment};
+use crate::normal::footprint::Footprint;
+use crate::numerics::quadrature::RULES;
+use crate::numerics::simd::LANES;
+use crate::post::subsurface::load_parts::{LoadPart, LoadParts, LoadResolution, ORDERS, PartBox};
+use crate::post::subsurface::loaded_run::{KnownLines, LoadedRun};
+use crate::rolling::answer::LevelAnswer;
+use crate::rolling::strip_mesh::StripMesh;
 
 /// The loads on one body.
 #[derive(Debug)]

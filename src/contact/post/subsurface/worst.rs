@@ -11,10 +11,10 @@
 
 use std::convert::Infallible;
 
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::post::subsurface::load_parts::LoadResolution;
-use crate::contact::post::subsurface::states::von_mises;
-use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
+use crate::normal::footprint::Footprint;
+use crate::post::subsurface::load_parts::LoadResolution;
+use crate::post::subsurface::states::von_mises;
+use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 
 // With the numbers below the stress found is never less than the largest of a scan of 7497 points, and up to 0.39 % more, in 15 contacts with a/b
 // from 0.2 to 6 from no slip to full slip (`cargo test --test physics -- the_worst_point --nocapture`). How much each of them matters was not measured.

@@ -15,15 +15,15 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
-use crate::contact::case::words::subsurface::PassageWords;
-use crate::contact::half_space::kernels::Stress;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::post::subsurface::load_parts::LoadResolution;
-use crate::contact::post::subsurface::states::{principal, von_mises};
-use crate::contact::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::contact::post::subsurface::worst::{DEPTHS, Deviator, STEPS, climb, enclosing_ball};
-use crate::contact::solution::words::evolution::{PassagePlace, PassageSummary};
+use crate::case::words::subsurface::PassageWords;
+use crate::half_space::kernels::Stress;
+use crate::monitor::{Monitor, Stop};
+use crate::normal::footprint::Footprint;
+use crate::post::subsurface::load_parts::LoadResolution;
+use crate::post::subsurface::states::{principal, von_mises};
+use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
+use crate::post::subsurface::worst::{DEPTHS, Deviator, STEPS, climb, enclosing_ball};
+use crate::solution::words::evolution::{PassagePlace, PassageSummary};
 
 // The numbers below are chosen by judgement; `cargo test --test physics -- shakes_down` holds what they give against closed forms.
 
@@ -58,7 +58,7 @@ pub struct PassagesOf<'a> {
 pub struct JudgedPassage {
     /// The worst of the passages.
     pub summary: PassageSummary,
-    /// The largest gap of the balls on the worst lines, see [`enclosing_ball`](crate::contact::post::subsurface::worst).
+    /// The largest gap of the balls on the worst lines, see [`enclosing_ball`](crate::post::subsurface::worst).
     pub gap: f64,
 }
 
@@ -244,7 +244,7 @@ pub struct PassageValue {
     pub stress: f64,
     /// States that decide it.
     pub deciding: Vec<usize>,
-    /// What is left of the search for the smallest ball: see [`EnclosingBall`](crate::contact::post::subsurface::worst::EnclosingBall).
+    /// What is left of the search for the smallest ball: see [`EnclosingBall`](crate::post::subsurface::worst::EnclosingBall).
     pub gap: f64,
 }
 

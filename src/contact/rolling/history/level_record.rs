@@ -1,10 +1,10 @@
 //! What a step has done: friction work, elastic energy, and the record of a point.
 
-use crate::contact::rolling::answer::{Resultants, project_on_bound};
-use crate::contact::rolling::history::level_run::LevelRun;
-use crate::contact::rolling::history::plan::{PointRecord, StepEquations, StepKind, weights};
-use crate::contact::rolling::slip_equations::SlipSource;
-use crate::contact::rolling::task::Motion;
+use crate::rolling::answer::{Resultants, project_on_bound};
+use crate::rolling::history::level_run::LevelRun;
+use crate::rolling::history::plan::{PointRecord, StepEquations, StepKind, weights};
+use crate::rolling::slip_equations::SlipSource;
+use crate::rolling::task::Motion;
 
 impl LevelRun<'_> {
     /// Adds what friction has dissipated in a step that began with the tractions `from`: what the motion has given less what is stored.

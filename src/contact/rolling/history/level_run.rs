@@ -2,25 +2,25 @@
 
 use std::sync::Arc;
 
-use crate::contact::friction::coefficient_table::CoefficientTable;
-use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::half_space::strip_operator::operator::StripOperator;
-use crate::contact::mesh::Mesh;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::equilibrium::{Search, Trial};
-use crate::contact::rolling::answer::{LevelFailure, Work};
-use crate::contact::rolling::displacement_memory::LeadingEdges;
-use crate::contact::rolling::history::plan::{
+use crate::friction::coefficient_table::CoefficientTable;
+use crate::friction::velocity_weakening::Softening;
+use crate::half_space::strip_operator::kind::Parity;
+use crate::half_space::strip_operator::operator::StripOperator;
+use crate::mesh::Mesh;
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::equilibrium::{Search, Trial};
+use crate::rolling::answer::{LevelFailure, Work};
+use crate::rolling::displacement_memory::LeadingEdges;
+use crate::rolling::history::plan::{
     HistoryStep, HistoryTask, PointRecord, StepEquations, StepKind, memory, steady, steps, weights,
 };
-use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
-use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
-use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::{Motion, PrescribedForces, RollingTask};
+use crate::rolling::methods::boundary_element::newton::Newton;
+use crate::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
+use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::rolling::slip_equations::{SlipEquations, SlipScratch};
+use crate::rolling::slip_rules::Rule;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::{Motion, PrescribedForces, RollingTask};
 
 /// Tangential stiffness of a circular patch over shear modulus and radius, for the first trial of a force: 4/(2 − ν) of both bodies together
 /// (Mindlin 1949). Later trials take what was found.

@@ -9,15 +9,15 @@
 //!
 //! What is kept of a point of a history.
 
-use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::half_space::strip_operator::operator::StripOperator;
-use crate::contact::rolling::answer::{Resultants, Work};
-use crate::contact::rolling::displacement_memory::{DisplacementMemory, LeadingEdges};
-use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::slip_equations::SlipEquations;
-use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::Motion;
+use crate::half_space::strip_operator::kind::Parity;
+use crate::half_space::strip_operator::operator::StripOperator;
+use crate::rolling::answer::{Resultants, Work};
+use crate::rolling::displacement_memory::{DisplacementMemory, LeadingEdges};
+use crate::rolling::methods::boundary_element::newton::Newton;
+use crate::rolling::slip_equations::SlipEquations;
+use crate::rolling::slip_rules::Rule;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::Motion;
 
 /// A step may be longer than the one before by this factor at most; BDF2 is stable up to 1 + √2.
 const GROWTH_MAX: f64 = 2.0;
@@ -281,7 +281,7 @@ pub struct PointRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::rolling::task::Motion;
+    use crate::rolling::task::Motion;
 
     fn history(distances: &[f64]) -> HistoryTask {
         HistoryTask {

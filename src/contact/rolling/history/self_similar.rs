@@ -12,16 +12,16 @@
 //!
 //! How the steps of a run take part in friction that falls with slip.
 
-use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::half_space::kernels::{Rectangle, rectangle};
-use crate::contact::half_space::unlike_bodies::displacement;
-use crate::contact::mesh::Mesh;
-use crate::contact::numerics::interpolation;
-use crate::contact::rolling::answer::LevelFailure;
-use crate::contact::rolling::history::level_run::LevelRun;
-use crate::contact::rolling::history::plan::{PRESS_WEIGHTS, StepEquations, StepKind};
-use crate::contact::rolling::slip_equations::SlipScratch;
-use crate::contact::rolling::task::Motion;
+use crate::friction::velocity_weakening::Softening;
+use crate::half_space::kernels::{Rectangle, rectangle};
+use crate::half_space::unlike_bodies::displacement;
+use crate::mesh::Mesh;
+use crate::numerics::interpolation;
+use crate::rolling::answer::LevelFailure;
+use crate::rolling::history::level_run::LevelRun;
+use crate::rolling::history::plan::{PRESS_WEIGHTS, StepEquations, StepKind};
+use crate::rolling::slip_equations::SlipScratch;
+use crate::rolling::task::Motion;
 
 /// What the displacements of a state depend on, over all cells of a dimensionless mesh.
 #[derive(Debug, Clone, Default)]
@@ -401,7 +401,7 @@ impl LevelRun<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::samples::mesh_between;
+    use crate::mesh::samples::mesh_between;
 
     /// A field of second degree is its own smaller self.
     #[test]

@@ -1,19 +1,19 @@
 //! A history on finer and finer levels until two in a row agree.
 
-use crate::contact::error::SolveError;
-use crate::contact::mesh::MeshSize;
-use crate::contact::monitor::{Monitor, MonitorPart};
-use crate::contact::remark::kind::short;
-use crate::contact::rolling::answer::{
+use crate::error::SolveError;
+use crate::mesh::MeshSize;
+use crate::monitor::{Monitor, MonitorPart};
+use crate::remark::kind::short;
+use crate::rolling::answer::{
     HistoryAnswer, LevelAnswer, MotionAnswer, Resultants, SolvedFields, Work,
 };
-use crate::contact::rolling::history::level_run::LevelRun;
-use crate::contact::rolling::history::plan;
-use crate::contact::rolling::history::plan::{HistoryStart, HistoryTask, PointRecord};
-use crate::contact::rolling::history::self_similar::SelfSimilarState;
-use crate::contact::rolling::refinement::interpolate::RefinementState;
-use crate::contact::rolling::refinement::on_mesh::named;
-use crate::contact::rolling::task::{Motion, Resolution, RollingTask, TOLERANCE_LEAST};
+use crate::rolling::history::level_run::LevelRun;
+use crate::rolling::history::plan;
+use crate::rolling::history::plan::{HistoryStart, HistoryTask, PointRecord};
+use crate::rolling::history::self_similar::SelfSimilarState;
+use crate::rolling::refinement::interpolate::RefinementState;
+use crate::rolling::refinement::on_mesh::named;
+use crate::rolling::task::{Motion, Resolution, RollingTask, TOLERANCE_LEAST};
 
 // The numbers below are from the four histories of CONTACT in `tests/data/transient.json`, on meshes from 6 × 12 to 24 × 48 with steps of
 // a/5 to a/32, a half the length (`cargo test --test physics -- histories_agree --nocapture` prints what comes of them).

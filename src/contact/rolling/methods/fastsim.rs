@@ -7,20 +7,20 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::error::SolveError;
-use crate::contact::friction::law::FrictionLaw;
-use crate::contact::friction::path_dependent::Interface;
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::mesh::MeshSize;
-use crate::contact::method::{Method, TractionBound};
-use crate::contact::normal::footprint::Footprint;
-use crate::contact::normal::hertz::{Ellipse, NormalLoad, Patch};
-use crate::contact::numerics::simd::length;
-use crate::contact::rolling::answer::{LevelAnswer, Work};
-use crate::contact::rolling::linear_theory;
-use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::{Motion, Resolution, RollingTask};
+use crate::error::SolveError;
+use crate::friction::law::FrictionLaw;
+use crate::friction::path_dependent::Interface;
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::mesh::MeshSize;
+use crate::method::{Method, TractionBound};
+use crate::normal::footprint::Footprint;
+use crate::normal::hertz::{Ellipse, NormalLoad, Patch};
+use crate::numerics::simd::length;
+use crate::rolling::answer::{LevelAnswer, Work};
+use crate::rolling::linear_theory;
+use crate::rolling::methods::full_slip;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::{Motion, Resolution, RollingTask};
 
 /// The mesh if none is given: finer ones change the resultants by a small fraction of the error of the theory.
 pub const MESH: MeshSize = MeshSize {
@@ -46,7 +46,7 @@ pub fn error_class(bound: TractionBound, mesh: MeshSize) -> f64 {
 /// Tractions, slips and zones of one dimensionless motion on a level.
 ///
 /// Each patch is taken by itself, with the flexibilities of the ellipse that carries its load the same way (see
-/// [`LoadEllipse`](crate::contact::rolling::load_ellipse::LoadEllipse)), and creepages about its load centre; for an ellipse that is the
+/// [`LoadEllipse`](crate::rolling::load_ellipse::LoadEllipse)), and creepages about its load centre; for an ellipse that is the
 /// ellipse. Slips are those of the single flexibility
 /// `(L1|ν_x| + L2|ν_y| + L3|φ|c)/√(ν_x² + ν_y² + φ²c²)`. Tractions with the parabolic bound exceed μp in the middle of a patch.
 pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAnswer {

@@ -1,9 +1,9 @@
 //! States that need no Newton iteration: nothing slips because nothing moves, or everything slips.
 
-use crate::contact::numerics::simd::length;
-use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome, Skip};
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::Motion;
+use crate::numerics::simd::length;
+use crate::rolling::answer::{LevelAnswer, LevelOutcome, Skip};
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::Motion;
 
 /// Upper bound of the elastic slip in full slip, in units of (μ p_max)/G: three times the largest that was seen for a/b from 1/50 to 50
 /// and any ν.

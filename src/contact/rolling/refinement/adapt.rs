@@ -1,18 +1,18 @@
 //! The adaptive solve: one motion on the meshes of its family until the estimate of the error meets the target.
 
-use crate::contact::error::SolveError;
-use crate::contact::method::Method;
-use crate::contact::monitor::Monitor;
-use crate::contact::numerics::roots::ROUNDING;
-use crate::contact::rolling::answer::{MotionAnswer, SolvedFields, Work};
-use crate::contact::rolling::methods::table::solve as table;
-use crate::contact::rolling::refinement::error_estimate::{Estimate, coarser};
-use crate::contact::rolling::refinement::interpolate::RefinementState;
-use crate::contact::rolling::refinement::mesh_family::{MeshFamily, fixed_meshes};
-use crate::contact::rolling::refinement::on_mesh::{
+use crate::error::SolveError;
+use crate::method::Method;
+use crate::monitor::Monitor;
+use crate::numerics::roots::ROUNDING;
+use crate::rolling::answer::{MotionAnswer, SolvedFields, Work};
+use crate::rolling::methods::table::solve as table;
+use crate::rolling::refinement::error_estimate::{Estimate, coarser};
+use crate::rolling::refinement::interpolate::RefinementState;
+use crate::rolling::refinement::mesh_family::{MeshFamily, fixed_meshes};
+use crate::rolling::refinement::on_mesh::{
     DiscreteSolution, MotionTask, add_smooth_slips, solve_on_mesh,
 };
-use crate::contact::rolling::task::{MeshPlan, RollingTask};
+use crate::rolling::task::{MeshPlan, RollingTask};
 
 /// Where the estimate of a mesh exceeds the target by no more than this part of it, half a doubling follows, and the answer is a mean of both meshes,
 /// so that answers of near motions do not jump where the number of meshes changes.

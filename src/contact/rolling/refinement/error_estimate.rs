@@ -2,13 +2,13 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::method::Method;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::rolling::answer::{LevelOutcome, RelativeErrors, Resultants};
-use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::methods::full_slip::NEGLIGIBLE;
-use crate::contact::rolling::refinement::on_mesh::DiscreteSolution;
-use crate::contact::rolling::task::{Resolution, RollingTask};
+use crate::method::Method;
+use crate::normal::hertz::Patch;
+use crate::rolling::answer::{LevelOutcome, RelativeErrors, Resultants};
+use crate::rolling::methods::fastsim;
+use crate::rolling::methods::full_slip::NEGLIGIBLE;
+use crate::rolling::refinement::on_mesh::DiscreteSolution;
+use crate::rolling::task::{Resolution, RollingTask};
 
 /// Factor on the root of the squares of both changes. Chosen on 230 of the 920 ellipses, smooth grids and gaps of `benches/calibrate`: 0.9 covers .89
 /// to 1.0 of the classes, 1.3 covers .95 to 1.0 for up to 1.4 times the work.

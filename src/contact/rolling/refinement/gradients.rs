@@ -3,13 +3,13 @@
 //! Region and pressure stay as they are, and so do the meshes, on which the resultants are smooth functions of the motion. Central differences
 //! of two steps are extrapolated to the step 0 (Richardson).
 
-use crate::contact::error::SolveError;
-use crate::contact::monitor::Monitor;
-use crate::contact::rolling::answer::{MotionAnswer, PatchGradients, Resultants};
-use crate::contact::rolling::refinement::adapt::{solve_forces, solve_on_meshes};
-use crate::contact::rolling::refinement::interpolate::RefinementState;
-use crate::contact::rolling::refinement::on_mesh::MotionTask;
-use crate::contact::rolling::task::{Motion, RollingTask};
+use crate::error::SolveError;
+use crate::monitor::Monitor;
+use crate::rolling::answer::{MotionAnswer, PatchGradients, Resultants};
+use crate::rolling::refinement::adapt::{solve_forces, solve_on_meshes};
+use crate::rolling::refinement::interpolate::RefinementState;
+use crate::rolling::refinement::on_mesh::MotionTask;
+use crate::rolling::task::{Motion, RollingTask};
 
 /// The smaller step as a part of μN/(G c²), with c² = A/π. A creepage of that unit makes nearly everything slip, so that the force changes by about
 /// 0.02 μN, and the noise of a solve, 1e-5 μN, is far below the errors of the mesh.

@@ -7,14 +7,14 @@
 use std::cell::OnceCell;
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::mesh::{Mesh, Segment};
-use crate::contact::rolling::load_ellipse::LoadEllipse;
-use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::operator_store::{CaseOperators, OperatorStore};
-use crate::contact::rolling::refinement::predictor::Predictor;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::{MeshPlan, RollingTask};
+use crate::error::SolveError;
+use crate::mesh::{Mesh, Segment};
+use crate::rolling::load_ellipse::LoadEllipse;
+use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::rolling::operator_store::{CaseOperators, OperatorStore};
+use crate::rolling::refinement::predictor::Predictor;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::{MeshPlan, RollingTask};
 
 /// Tractions on one mesh interpolated to another. Interpolated are their ratios to the friction bound, which vary less.
 pub(crate) fn prolonged(
@@ -215,7 +215,7 @@ impl Drop for RefinementState<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::mesh::samples::mesh_between;
+    use crate::mesh::samples::mesh_between;
 
     fn square(strips: usize, cells: usize) -> Mesh {
         mesh_between(1.0, [strips, cells], |_| [-1.0, 1.0])

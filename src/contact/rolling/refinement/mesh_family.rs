@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use crate::contact::mesh::MeshSize;
-use crate::contact::method::Method;
-use crate::contact::rolling::methods::fastsim;
-use crate::contact::rolling::task::{MeshPlan, Motion, Resolution, RollingTask};
+use crate::mesh::MeshSize;
+use crate::method::Method;
+use crate::rolling::methods::fastsim;
+use crate::rolling::task::{MeshPlan, Motion, Resolution, RollingTask};
 
 /// Cells per patch of the coarsest mesh. 16 and 23 halve the work at a target of 0.02, but cover 90 to 93 % of ellipses: meshes of 4 × 4 cells
 /// agree by accident.

@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use crate::contact::error::SolveError;
-use crate::contact::mesh::MeshSize;
-use crate::contact::method::Method;
-use crate::contact::monitor::Monitor;
-use crate::contact::normal::hertz::Patch;
-use crate::contact::remark::kind::short;
-use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, LevelOutcome, Resultants, Work};
-use crate::contact::rolling::methods::boundary_element::solve as boundary_element;
-use crate::contact::rolling::methods::boundary_element::task::LevelTask;
-use crate::contact::rolling::methods::liu_hsu::on_level;
-use crate::contact::rolling::methods::{fastsim, full_slip};
-use crate::contact::rolling::refinement::interpolate::{RefinementState, prolonged};
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::{MeshPlan, Motion, RollingTask};
+use crate::error::SolveError;
+use crate::mesh::MeshSize;
+use crate::method::Method;
+use crate::monitor::Monitor;
+use crate::normal::hertz::Patch;
+use crate::remark::kind::short;
+use crate::rolling::answer::{LevelAnswer, LevelFailure, LevelOutcome, Resultants, Work};
+use crate::rolling::methods::boundary_element::solve as boundary_element;
+use crate::rolling::methods::boundary_element::task::LevelTask;
+use crate::rolling::methods::liu_hsu::on_level;
+use crate::rolling::methods::{fastsim, full_slip};
+use crate::rolling::refinement::interpolate::{RefinementState, prolonged};
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::{MeshPlan, Motion, RollingTask};
 
 /// The coarse mesh on which the method of Liu and Hsu finds its spin pole; they recommend fewer than 30 cells (see `liu_hsu`).
 const POLE_MESH: MeshSize = MeshSize {

@@ -1,7 +1,7 @@
 //! Starts of a motion from the tractions of the last motions on the same mesh. They change the time of a solve, never its mesh or estimate.
 
-use crate::contact::numerics::simd::length;
-use crate::contact::rolling::task::Motion;
+use crate::numerics::simd::length;
+use crate::rolling::task::Motion;
 
 /// Longest step that is extrapolated, in steps between the last two motions. 1.1 and 2.5 are alike on sweeps of equal steps.
 const STEP_MAX: f64 = 1.5;

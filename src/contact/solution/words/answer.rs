@@ -1,11 +1,11 @@
-//! The answer as the client reads it: everything small. The values per cell are in [`fields`](crate::contact::solution::words::answer).
+//! The answer as the client reads it: everything small. The values per cell are in [`fields`](crate::solution::words::answer).
 //!
 //! Forces and tractions act on the lower body (body 2, the rail). Frame: x along rolling (the leading edge is at the
 //! larger x), y to the left, z up; moments and spin refer to [`Solution::origin`].
 //!
 //! The values per cell: tractions, slips, zones and pressures on the meshes that motions were solved on.
 //!
-//! Frame and signs are those of [`answer`](crate::contact::solution::words::answer).
+//! Frame and signs are those of [`answer`](crate::solution::words::answer).
 //!
 //! The answer for a wheelset as the client reads it: its positions, and what it does as a rigid body over a range of shifts.
 //!
@@ -15,14 +15,12 @@ use railhead_macros::{Finite, Named, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::case::words::contact::Load;
-use crate::contact::case::words::motion::MotionWords;
-use crate::contact::case::words::solver::MethodName;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::damage::{
-    Damage, DamageFiguresUsed, PatchQuality, ProfileUncertainty,
-};
-use crate::contact::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
+use crate::case::words::contact::Load;
+use crate::case::words::motion::MotionWords;
+use crate::case::words::solver::MethodName;
+use crate::remark::entry::RemarkEntry;
+use crate::solution::words::damage::{Damage, DamageFiguresUsed, PatchQuality, ProfileUncertainty};
+use crate::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
 /// The result of one case, without fields.
 #[none_is_absent]
@@ -431,7 +429,7 @@ pub struct Total {
 /// The values per cell of all patches: what was asked for, nothing else.
 #[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct Fields {
-    /// One entry per patch, in the order of [`Solution::patches`](crate::contact::solution::words::answer::Solution::patches).
+    /// One entry per patch, in the order of [`Solution::patches`](crate::solution::words::answer::Solution::patches).
     pub patches: Vec<PatchFields>,
 }
 
@@ -481,13 +479,13 @@ pub struct PointFields {
     /// Traction on the lower body along y in MPa.
     pub traction_y_mpa: Option<Vec<f64>>,
     /// Mean slip of the cell, upper body relative to the lower, along x, divided by rolling speed: along the traction, and such that the
-    /// power of the cells adds up to that of the patch (see [`local_power`](crate::contact::post::local_power)).
+    /// power of the cells adds up to that of the patch (see [`local_power`](crate::post::local_power)).
     pub slip_x: Option<Vec<f64>>,
     /// Slip along y, divided by rolling speed.
     pub slip_y: Option<Vec<f64>>,
     /// Temperature of both surfaces at the middle of the cell in °C.
     pub temperature_c: Option<Vec<f64>>,
-    /// Stresses at the requested points, as [`stored`](crate::contact::post::subsurface::states::stored).
+    /// Stresses at the requested points, as [`stored`](crate::post::subsurface::states::stored).
     pub subsurface: Option<Vec<f64>>,
 }
 

@@ -6,7 +6,7 @@ use railhead_macros::{Finite, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::case::words::subsurface::{
+use crate::case::words::subsurface::{
     ArchardFigures, DamageModel, DamageSetName, UsfdFigures, WlrmFigures,
 };
 

@@ -6,10 +6,10 @@ use railhead_macros::{Finite, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::contact::case::words::evolution::WearLosses;
-use crate::contact::case::words::subsurface::BodyName;
-use crate::contact::remark::entry::RemarkEntry;
-use crate::contact::solution::words::damage::DamageFiguresUsed;
+use crate::case::words::evolution::WearLosses;
+use crate::case::words::subsurface::BodyName;
+use crate::remark::entry::RemarkEntry;
+use crate::solution::words::damage::DamageFiguresUsed;
 
 /// The result of an evolution.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]

@@ -10,13 +10,13 @@ use axum::body::Bytes;
 
 use self::npz::read_arrays;
 use self::text::JsonRows;
-use crate::contact::evaluate::varied::Values;
-use crate::http::extract::titles::{NamedColumns, Titled, faulty, require_few};
-use crate::http::problem::{ApiError, ProblemKind, Result};
-use crate::jobs::codec::arrow;
-use crate::jobs::codec::parquet::TableReader;
-use crate::jobs::codec::table::{RowTable, TableColumn, TableKind};
-use crate::jobs::run::model::RunColumn;
+use crate::extract::titles::{NamedColumns, Titled, faulty, require_few};
+use crate::problem::{ApiError, ProblemKind, Result};
+use railhead_contact::evaluate::varied::Values;
+use railhead_jobs::codec::arrow;
+use railhead_jobs::codec::parquet::TableReader;
+use railhead_jobs::codec::table::{RowTable, TableColumn, TableKind};
+use railhead_jobs::run::model::RunColumn;
 
 pub use self::npz::too_large;
 pub use self::text::CsvRows;

@@ -7,8 +7,8 @@ use std::io::{Cursor, Read};
 use axum::body::Bytes;
 use zip::ZipArchive;
 
-use crate::http::extract::titles::{faulty, require_few};
-use crate::http::problem::{ApiError, ProblemKind, Result};
+use crate::extract::titles::{faulty, require_few};
+use crate::problem::{ApiError, ProblemKind, Result};
 
 /// What an array may hold.
 const KINDS: &str = "float32, float64, or integers";

@@ -4,13 +4,11 @@ use std::io::{self, BufRead, Chain, Cursor, Read};
 
 use serde_json::{Map, Value};
 
-use crate::contact::evaluate::varied::Values;
-use crate::http::extract::json::without_mark;
-use crate::http::extract::tables::{Chunk, Title};
-use crate::http::extract::titles::{
-    delimiter, faulty, is_line_of_units, is_text, number, require_few,
-};
-use crate::http::problem::{ApiError, Result};
+use crate::extract::json::without_mark;
+use crate::extract::tables::{Chunk, Title};
+use crate::extract::titles::{delimiter, faulty, is_line_of_units, is_text, number, require_few};
+use crate::problem::{ApiError, Result};
+use railhead_contact::evaluate::varied::Values;
 
 /// Rows that are read at once.
 const ROWS: usize = 8192;
@@ -335,8 +333,8 @@ mod tests {
     use axum::body::Bytes;
 
     use super::*;
-    use crate::http::extract::tables::{TableForm, TableRows, TableSource};
-    use crate::http::extract::titles::NamedColumns;
+    use crate::extract::tables::{TableForm, TableRows, TableSource};
+    use crate::extract::titles::NamedColumns;
 
     fn rows(form: TableForm, text: &'static str) -> Result<TableRows> {
         let source = TableSource::Memory(Bytes::from_static(text.as_bytes()));

@@ -1,10 +1,10 @@
 //! The scale of a heat map.
 
-use crate::http::render::picture::chart::label;
-use crate::http::render::picture::colour::{VIRIDIS_PLACES, at};
-use crate::http::render::picture::frame::{Frame, exponent, ticks};
-use crate::http::render::picture::scene::Heat;
-use crate::http::render::picture::svg::{Anchor, Svg, px};
+use crate::render::picture::chart::label;
+use crate::render::picture::colour::{VIRIDIS_PLACES, at};
+use crate::render::picture::frame::{Frame, exponent, ticks};
+use crate::render::picture::scene::Heat;
+use crate::render::picture::svg::{Anchor, Svg, px};
 
 /// The scale of the heat map, between two values.
 pub(super) fn colour_bar(svg: &mut Svg, frame: &Frame, heat: &Heat, [low, high]: [f64; 2]) {

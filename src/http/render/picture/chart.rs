@@ -1,7 +1,7 @@
 //! Axes that have a scale each, for curves and sections; a patch alone has the same along both.
 
-use crate::http::render::picture::frame::{WIDTH, ticks};
-use crate::http::render::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
+use crate::render::picture::frame::{WIDTH, ticks};
+use crate::render::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
 
 /// Characters of a title that fit.
 const TITLE_MAX: usize = 74;

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::http::render::picture::chart::{Chart, open, roomy};
-use crate::http::render::picture::frame::WIDTH;
-use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};
+use crate::render::picture::chart::{Chart, open, roomy};
+use crate::render::picture::frame::WIDTH;
+use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 
 /// Height of the picture in its own units.
 const HEIGHT: f64 = 480.0;

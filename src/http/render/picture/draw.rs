@@ -1,13 +1,13 @@
 //! Draws a scene as SVG: heat map or zones, the border of the stick zone, arrows, axes in mm and a scale; or small, the patch alone.
 
-use crate::contact::case::words::solver::Output;
-use crate::http::render::picture::bar::colour_bar;
-use crate::http::render::picture::chart::open;
-use crate::http::render::picture::frame::{Frame, WIDTH};
-use crate::http::render::picture::layers;
-use crate::http::render::picture::map::Ground;
-use crate::http::render::picture::scene::{Scene, heat};
-use crate::http::render::picture::svg::{Svg, escape, px};
+use crate::render::picture::bar::colour_bar;
+use crate::render::picture::chart::open;
+use crate::render::picture::frame::{Frame, WIDTH};
+use crate::render::picture::layers;
+use crate::render::picture::map::Ground;
+use crate::render::picture::scene::{Scene, heat};
+use crate::render::picture::svg::{Svg, escape, px};
+use railhead_contact::case::words::solver::Output;
 
 /// Pictures narrower than this show the patch alone: nothing written on them could be read.
 const ALONE_BELOW: u32 = 200;

@@ -2,14 +2,14 @@
 
 use std::fmt::Write;
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::PatchCells;
-use crate::http::render::picture::chart::{border, grid_lines, label};
-use crate::http::render::picture::colour::{SLIP, STICK};
-use crate::http::render::picture::frame::{Frame, ticks};
-use crate::http::render::picture::scene::{Scene, extent, zones_present};
-use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};
-use crate::http::render::shape::resample::resample;
+use crate::render::picture::chart::{border, grid_lines, label};
+use crate::render::picture::colour::{SLIP, STICK};
+use crate::render::picture::frame::{Frame, ticks};
+use crate::render::picture::scene::{Scene, extent, zones_present};
+use crate::render::picture::svg::{Anchor, Svg, polyline, px};
+use crate::render::shape::resample::resample;
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::solution::words::answer::PatchCells;
 
 /// Distance between arrows.
 const ARROW_SPACING: f64 = 30.0;

@@ -2,13 +2,13 @@
 
 use std::fmt::Write;
 
-use crate::contact::solution::words::answer::{PatchCells, Zone};
-use crate::http::render::picture::colour::{SLIP, STICK, at};
-use crate::http::render::picture::frame::Frame;
-use crate::http::render::picture::scene::{Heat, Scene, extent, zones_present};
-use crate::http::render::picture::svg::{Svg, curves, polyline, px};
-use crate::http::render::shape::outlines::{outlines, patch_outline};
-use crate::http::render::shape::sheet::{AtBorder, Sheet};
+use crate::render::picture::colour::{SLIP, STICK, at};
+use crate::render::picture::frame::Frame;
+use crate::render::picture::scene::{Heat, Scene, extent, zones_present};
+use crate::render::picture::svg::{Svg, curves, polyline, px};
+use crate::render::shape::outlines::{outlines, patch_outline};
+use crate::render::shape::sheet::{AtBorder, Sheet};
+use railhead_contact::solution::words::answer::{PatchCells, Zone};
 
 /// Where and how finely a patch is drawn.
 pub(super) struct Ground<'a> {

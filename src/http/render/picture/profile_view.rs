@@ -1,9 +1,9 @@
 //! Draws a wheel on a rail as they lie in the track, seen along the rolling direction, with the pressure of every patch on the rail.
 
-use crate::contact::solution::words::answer::{PatchCells, PlacedProfiles, Position};
-use crate::http::render::picture::chart::{Chart, open};
-use crate::http::render::picture::frame::WIDTH;
-use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};
+use crate::render::picture::chart::{Chart, open};
+use crate::render::picture::frame::WIDTH;
+use crate::render::picture::svg::{Anchor, Svg, polyline, px};
+use railhead_contact::solution::words::answer::{PatchCells, PlacedProfiles, Position};
 
 /// What is shown above and below the top of the rail, in mm.
 const SHOWN_Z: [f64; 2] = [-38.0, 34.0];

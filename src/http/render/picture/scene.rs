@@ -1,8 +1,8 @@
 //! What a picture shows, and what follows from it: the coloured values, the box around the cells, the zones.
 
-use crate::contact::case::words::solver::Output;
-use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
-use crate::http::render::shape::sheet::AtBorder;
+use crate::render::shape::sheet::AtBorder;
+use railhead_contact::case::words::solver::Output;
+use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// View shown by a picture.
 #[derive(Debug, Clone)]

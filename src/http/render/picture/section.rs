@@ -1,9 +1,9 @@
 //! Draws the sections of a patch through its largest traction: how large the traction is, and how much friction would carry.
 
-use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
-use crate::http::render::picture::chart::{Chart, open};
-use crate::http::render::picture::frame::WIDTH;
-use crate::http::render::picture::svg::{Anchor, Svg, polyline, px};
+use crate::render::picture::chart::{Chart, open};
+use crate::render::picture::frame::WIDTH;
+use crate::render::picture::svg::{Anchor, Svg, polyline, px};
+use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// Height of the picture in its own units.
 const HEIGHT: f64 = 460.0;

@@ -11,8 +11,8 @@ use i_overlay::core::simplify::Simplify;
 use i_overlay::i_float::int::point::IntPoint;
 use i_overlay::i_shape::int::shape::IntContour;
 
-use crate::contact::numerics::interpolation;
-use crate::contact::solution::words::answer::{PatchCells, Zone};
+use railhead_contact::numerics::interpolation;
+use railhead_contact::solution::words::answer::{PatchCells, Zone};
 
 /// Outlines of the union of the cells of one zone, or of all cells when `which` is `None`, in mm.
 ///
@@ -308,7 +308,7 @@ pub(crate) fn join_tolerance(coordinate: f64, width: f64) -> f64 {
 pub(crate) mod samples {
     use std::f64::consts::PI;
 
-    use crate::contact::solution::words::answer::PatchCells;
+    use railhead_contact::solution::words::answer::PatchCells;
 
     /// Adds a segment with the given cell edges to a patch.
     pub(crate) fn push_segment(

@@ -1,7 +1,7 @@
 //! Interpolates cell values onto a regular grid, for pictures and for programs that read arrays.
 
 use super::outlines::{StoredSegment, Strips};
-use crate::contact::solution::words::answer::{PatchCells, Zone};
+use railhead_contact::solution::words::answer::{PatchCells, Zone};
 
 /// Values on a regular grid; `None` outside the patch.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 
 use super::monotone::monotone;
 use super::outlines::Strips;
-use crate::contact::solution::words::answer::{PatchCells, PointFields, Zone};
+use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// SheetNodes of the grid along one axis, at least and at most; between them four per cell or strip.
 const NODES: [usize; 2] = [65, 257];

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use tokio::time::timeout;
 
-use crate::jobs::error::{StorageFault, StoreError};
-use crate::jobs::store::Result;
+use crate::error::{StorageFault, StoreError};
+use crate::store::Result;
 
 /// How long a call may take; the server ends its statements before.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(15);

@@ -12,11 +12,11 @@ use sqlx::Row;
 use sqlx::postgres::{PgConnection, PgRow};
 use sqlx::query;
 
-use crate::jobs::model::Queue;
-use crate::jobs::store::postgres::sql::claim::peek;
-use crate::jobs::store::postgres::sql::rows::count;
-use crate::jobs::store::{ClaimRequest, Result};
-use crate::jobs::sync::lock;
+use crate::model::Queue;
+use crate::store::postgres::sql::claim::peek;
+use crate::store::postgres::sql::rows::count;
+use crate::store::{ClaimRequest, Result};
+use crate::sync::lock;
 
 /// Queues that are shorter are counted and walked from their start at every claim.
 const LONG: u64 = 2000;

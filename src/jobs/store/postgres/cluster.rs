@@ -9,12 +9,12 @@ use sqlx::Row;
 use sqlx::{query, query_scalar};
 use uuid::Uuid;
 
-use crate::jobs::store::postgres::connection::{FOLD, LOCKS};
-use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::postgres::objects::PgObjects;
-use crate::jobs::store::postgres::sql::rows::{count, read_id, read_small};
-use crate::jobs::store::postgres::{engine, notifier};
-use crate::jobs::store::{Cluster, ClusterView, Deployment, Node, Notification, Result};
+use crate::store::postgres::connection::{FOLD, LOCKS};
+use crate::store::postgres::database::PostgresStore;
+use crate::store::postgres::objects::PgObjects;
+use crate::store::postgres::sql::rows::{count, read_id, read_small};
+use crate::store::postgres::{engine, notifier};
+use crate::store::{Cluster, ClusterView, Deployment, Node, Notification, Result};
 
 const NOW: &str = "SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)";
 

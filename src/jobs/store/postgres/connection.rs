@@ -8,9 +8,9 @@ use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
 use sqlx::query;
 use tokio::time::timeout;
 
-use crate::jobs::error::{JobsError, StoreError};
-use crate::jobs::store::Result;
-use crate::jobs::store::postgres::url;
+use crate::error::{JobsError, StoreError};
+use crate::store::Result;
+use crate::store::postgres::url;
 
 /// How long a call waits for a connection.
 const CONNECT_WITHIN: Duration = Duration::from_secs(5);

@@ -5,13 +5,13 @@ use std::fmt;
 use sqlx::postgres::{PgConnectOptions, PgPool};
 use sqlx::query;
 
-use crate::jobs::error::JobsError;
-use crate::jobs::store::postgres::claim_memory::ClaimMemory;
-use crate::jobs::store::postgres::connection::{connect, session};
-use crate::jobs::store::postgres::notifier::Notifier;
-use crate::jobs::store::postgres::schema::require;
-use crate::jobs::store::postgres::sql::submit::GroupCommit;
-use crate::jobs::store::{NotifyMode, Result};
+use crate::error::JobsError;
+use crate::store::postgres::claim_memory::ClaimMemory;
+use crate::store::postgres::connection::{connect, session};
+use crate::store::postgres::notifier::Notifier;
+use crate::store::postgres::schema::require;
+use crate::store::postgres::sql::submit::GroupCommit;
+use crate::store::{NotifyMode, Result};
 
 /// The job table that several processes share.
 #[derive(Clone)]

@@ -3,9 +3,9 @@
 use sqlx::postgres::PgPool;
 use sqlx::query_scalar;
 
-use crate::jobs::error::JobsError;
-use crate::jobs::store::postgres::connection::connect;
-use crate::jobs::store::postgres::schema::require;
+use crate::error::JobsError;
+use crate::store::postgres::connection::connect;
+use crate::store::postgres::schema::require;
 
 /// Oldest version of the server that is supported, as it tells it itself.
 const VERSION_MIN: i64 = 150_000;

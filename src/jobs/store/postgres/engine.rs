@@ -6,15 +6,15 @@ use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow, Postgres};
 use sqlx::query::Query;
 use uuid::Uuid;
 
-use crate::jobs::error::StoreError;
-use crate::jobs::model::Queue;
-use crate::jobs::store::postgres::answer::in_time;
-use crate::jobs::store::postgres::claim_memory::{PEEK_BEGUN, first_queued};
-use crate::jobs::store::postgres::connection::{ADMISSION, lock};
-use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::postgres::sql::claim::{claimed, push_lease_until};
-use crate::jobs::store::postgres::sql::rows::{count, push_list, read_count, read_flag, read_id};
-use crate::jobs::store::{ClaimKind, ClaimRequest, Cluster, Result};
+use crate::error::StoreError;
+use crate::model::Queue;
+use crate::store::postgres::answer::in_time;
+use crate::store::postgres::claim_memory::{PEEK_BEGUN, first_queued};
+use crate::store::postgres::connection::{ADMISSION, lock};
+use crate::store::postgres::database::PostgresStore;
+use crate::store::postgres::sql::claim::{claimed, push_lease_until};
+use crate::store::postgres::sql::rows::{count, push_list, read_count, read_flag, read_id};
+use crate::store::{ClaimKind, ClaimRequest, Cluster, Result};
 
 pub(crate) use sqlx::{Row, query, query_scalar};
 

@@ -4,12 +4,12 @@ use sqlx::postgres::PgConnection;
 use sqlx::query_scalar;
 use sqlx::{AssertSqlSafe, Connection};
 
-use crate::jobs::error::JobsError;
-use crate::jobs::store::Result;
-use crate::jobs::store::portion::{Portion, TABLES, Values};
-use crate::jobs::store::postgres::connection::{ADMISSION, lock};
-use crate::jobs::store::postgres::database::PostgresStore;
-use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::error::JobsError;
+use crate::store::Result;
+use crate::store::portion::{Portion, TABLES, Values};
+use crate::store::postgres::connection::{ADMISSION, lock};
+use crate::store::postgres::database::PostgresStore;
+use crate::store::sqlite::database::SqliteStore;
 
 /// What nodes may have made before: rows that are there stay as they are.
 const ONCE: [&str; 3] = ["tombstones", "api_keys", "profiles"];

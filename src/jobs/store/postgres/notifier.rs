@@ -8,8 +8,8 @@ use tokio::sync::mpsc;
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use crate::jobs::store::postgres::answer::in_time;
-use crate::jobs::store::{Notification, Result};
+use crate::store::postgres::answer::in_time;
+use crate::store::{Notification, Result};
 
 /// The channel of all nodes.
 const CHANNEL: &str = "railhead";

@@ -8,8 +8,8 @@ use sqlx::PgConnection;
 use sqlx::postgres::PgPool;
 use sqlx::{query, query_scalar};
 
-use crate::jobs::error::JobsError;
-use crate::jobs::store::postgres::connection::{self, connect, lock};
+use crate::error::JobsError;
+use crate::store::postgres::connection::{self, connect, lock};
 
 /// The statements that make an empty schema a job table of form 1.
 const SCHEMA: &str = include_str!("schema.sql");

@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use sqlx::postgres::{PgConnectOptions, PgSslMode};
 
-use crate::jobs::error::JobsError;
+use crate::error::JobsError;
 
 /// Parameters of the query that are understood; `options[…]` are as well.
 const KNOWN: [&str; 12] = [

@@ -17,9 +17,9 @@ use super::rows::{
     read_json, read_kind, read_small, read_state, to_json,
 };
 use super::submit::{Places, insert_jobs};
-use crate::jobs::error::StoreError;
-use crate::jobs::model::{Batch, BatchItem, ItemResult, Kind, RunRecord, State, created_at};
-use crate::jobs::store::{
+use crate::error::StoreError;
+use crate::model::{Batch, BatchItem, ItemResult, Kind, RunRecord, State, created_at};
+use crate::store::{
     BatchBegun, Batches, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Refusal, Result,
     Total, first_id_at,
 };

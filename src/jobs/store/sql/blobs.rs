@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query_scalar};
 use super::rows::{count, fence, push_list, read_blob_ids, read_id, read_small, read_state};
-use crate::jobs::store::{Claim, Orphans, Result, ResultKeys, StoredResult};
+use crate::store::{Claim, Orphans, Result, ResultKeys, StoredResult};
 
 /// Values bound in one statement; far below the bound of SQLite.
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;

@@ -14,9 +14,9 @@ use super::rows::{
     count, fence, push_list, read_blob_ids, read_cache_key, read_count, read_flag, read_id,
     read_kind, read_move, read_optional_id, read_small,
 };
-use crate::jobs::error::StoreError;
-use crate::jobs::model::{Queue, State};
-use crate::jobs::store::{
+use crate::error::StoreError;
+use crate::model::{Queue, State};
+use crate::store::{
     Claim, ClaimRequest, ClaimedCase, Claims, Lease, NewSlice, ReleaseReason, Renewal, Result,
     SliceRecord, StoredCase, StoredResult,
 };

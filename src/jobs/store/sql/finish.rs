@@ -9,8 +9,8 @@ use uuid::Uuid;
 use super::blobs::{drop_slices_of_ended, leave_to_collector, release_blobs};
 use super::engine::{self, DbConnection, DbRow, QueryBuilder, SqlStore};
 use super::rows::{fence, read_cache_key, read_id, read_move, read_optional_id, to_json};
-use crate::jobs::model::State;
-use crate::jobs::store::{CacheKey, Claim, Ending, Ends, NewJob, Result, StoredResult};
+use crate::model::State;
+use crate::store::{CacheKey, Claim, Ending, Ends, NewJob, Result, StoredResult};
 
 /// One seek in the index, however many jobs have the same key.
 pub(crate) const SOURCE: &str =

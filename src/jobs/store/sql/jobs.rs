@@ -12,8 +12,8 @@ use super::rows::{
     GET, job_columns, read_blob_id, read_count, read_flag, read_id, read_job, read_kind,
     read_optional_id, read_small,
 };
-use crate::jobs::model::{Job, State};
-use crate::jobs::store::{
+use crate::model::{Job, State};
+use crate::store::{
     Change, ClientJobs, Deleted, Filter, Page, Result, ResultRef, StoredCase, StoredResult, Total,
 };
 

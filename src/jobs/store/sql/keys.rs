@@ -6,9 +6,9 @@ use railhead_macros::repeat_conflicts;
 
 use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{read_count, read_flag, read_json, to_json};
-use crate::jobs::error::StoreError;
-use crate::jobs::model::Key;
-use crate::jobs::store::{
+use crate::error::StoreError;
+use crate::model::Key;
+use crate::store::{
     KeyStore, Page, ProfileCursor, ProfileEntry, ProfileKept, Profiles, Result, StoredProfile,
     Total,
 };

@@ -1,13 +1,13 @@
-//! Rows of the job table as the words of this room, and back.
+//! Rows of the job table as the types of [`model`](crate::model), and back.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use uuid::Uuid;
 
 use super::engine::{DbRow, QueryBuilder, Row};
-use crate::jobs::error::StoreError;
-use crate::jobs::model::{Job, Kind, Priority, State};
-use crate::jobs::store::{CacheKey, Claim, Result};
+use crate::error::StoreError;
+use crate::model::{Job, Kind, Priority, State};
+use crate::store::{CacheKey, Claim, Result};
 
 /// The columns a [`Job`] is read from.
 macro_rules! job_columns {

@@ -10,9 +10,9 @@ use uuid::Uuid;
 use super::engine::{self, DbConnection, DbPool, QueryBuilder, Row, SqlStore, query};
 use super::finish::end_with_sources;
 use super::rows::{GET, count, job_columns, push_list, read_count, read_id, read_job, to_json};
-use crate::jobs::error::StoreError;
-use crate::jobs::model::{Job, State};
-use crate::jobs::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result, SubmitJobs};
+use crate::error::StoreError;
+use crate::model::{Job, State};
+use crate::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result, SubmitJobs};
 
 /// Places still free, as one transaction has read them and takes them.
 pub(crate) struct Places {

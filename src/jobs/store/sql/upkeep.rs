@@ -9,8 +9,8 @@ use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, QueryBuilder, SqlStore, query, query_scalar};
 use super::rows::{push_list, read_blob_ids, read_count, read_id, read_move, read_state, to_json};
 use super::submit::stored;
-use crate::jobs::model::{Failure, Job, State};
-use crate::jobs::store::{
+use crate::model::{Failure, Job, State};
+use crate::store::{
     Claims, Cluster, Moment, Overdue, QueueAhead, Reap, Result, RetentionRule, Stats, Store,
     Upkeep, Usage, first_id_at,
 };

@@ -13,9 +13,9 @@ use rusqlite::{ErrorCode, Statement, ToSql};
 use tokio::runtime::{Handle, RuntimeFlavor};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use crate::jobs::error::{StorageFault, StoreError};
-use crate::jobs::store::Result;
-use crate::jobs::sync::lock;
+use crate::error::{StorageFault, StoreError};
+use crate::store::Result;
+use crate::sync::lock;
 
 /// How long a statement waits for a lock that another process holds.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(10);
@@ -592,7 +592,7 @@ impl Separated<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::jobs::store::sqlite::database::SqliteStore;
+    use crate::store::sqlite::database::SqliteStore;
 
     async fn bury(transaction: &mut Transaction, id: &str) -> Result<Done> {
         let insert = query("INSERT INTO tombstones (id, tenant, gone_at) VALUES ($2, $1, 0)");

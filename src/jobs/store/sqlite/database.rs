@@ -11,11 +11,11 @@ use std::time::Duration;
 
 use rusqlite::OpenFlags;
 
-use crate::jobs::error::JobsError;
-use crate::jobs::store::Result;
-use crate::jobs::store::sqlite::connection::{Pool, query, query_scalar};
-use crate::jobs::store::sqlite::schema::{mark, migrate, require};
-use crate::jobs::store::sqlite::sql::submit::GroupCommit;
+use crate::error::JobsError;
+use crate::store::Result;
+use crate::store::sqlite::connection::{Pool, query, query_scalar};
+use crate::store::sqlite::schema::{mark, migrate, require};
+use crate::store::sqlite::sql::submit::GroupCommit;
 
 /// The write-ahead log is cut to this size when it was larger for a while.
 const LOG_BYTES: i64 = 64 << 20;

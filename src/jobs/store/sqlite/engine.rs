@@ -5,14 +5,14 @@ use std::path::Path;
 
 use uuid::Uuid;
 
-use crate::jobs::model::Queue;
-use crate::jobs::store::sqlite::connection::{Query, Transaction};
-use crate::jobs::store::sqlite::database::SqliteStore;
-use crate::jobs::store::sqlite::sql::claim::{claimed, peek};
-use crate::jobs::store::sqlite::sql::rows::count;
-use crate::jobs::store::{ClaimKind, ClaimRequest, Cluster, Result};
+use crate::model::Queue;
+use crate::store::sqlite::connection::{Query, Transaction};
+use crate::store::sqlite::database::SqliteStore;
+use crate::store::sqlite::sql::claim::{claimed, peek};
+use crate::store::sqlite::sql::rows::count;
+use crate::store::{ClaimKind, ClaimRequest, Cluster, Result};
 
-pub(crate) use crate::jobs::store::sqlite::connection::{
+pub(crate) use crate::store::sqlite::connection::{
     Connection as DbConnection, Pool as DbPool, QueryBuilder, Row, SqliteRow as DbRow, query,
     query_scalar,
 };

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use tokio::sync::mpsc;
 
-use crate::jobs::error::StoreError;
-use crate::jobs::store::Result;
-use crate::jobs::store::portion::{Portion, Values};
-use crate::jobs::store::sqlite::connection::{Row, SqliteRow, query, query_scalar};
-use crate::jobs::store::sqlite::database::SqliteStore;
+use crate::error::StoreError;
+use crate::store::Result;
+use crate::store::portion::{Portion, Values};
+use crate::store::sqlite::connection::{Row, SqliteRow, query, query_scalar};
+use crate::store::sqlite::database::SqliteStore;
 
 /// A portion ends with this row, or once its bytes are so many.
 const ROWS_MAX: usize = 500;

@@ -19,17 +19,17 @@ mod plans {
     use tempfile::TempDir;
     use uuid::Uuid;
 
-    use crate::jobs::model::{Kind, State};
-    use crate::jobs::store::sqlite::connection::{Row, query};
-    use crate::jobs::store::sqlite::database::SqliteStore;
-    use crate::jobs::store::sqlite::engine::{CLAIM_BEGUN, CLAIM_NEW};
-    use crate::jobs::store::sqlite::sql::claim::{NOTES, QUEUES, RESULTS};
-    use crate::jobs::store::sqlite::sql::finish::SOURCE;
-    use crate::jobs::store::sqlite::sql::upkeep::{
+    use crate::model::{Kind, State};
+    use crate::store::sqlite::connection::{Row, query};
+    use crate::store::sqlite::database::SqliteStore;
+    use crate::store::sqlite::engine::{CLAIM_BEGUN, CLAIM_NEW};
+    use crate::store::sqlite::sql::claim::{NOTES, QUEUES, RESULTS};
+    use crate::store::sqlite::sql::finish::SOURCE;
+    use crate::store::sqlite::sql::upkeep::{
         BEFORE, COUNT, EXPIRED, FAIL_LATE, LATE, OLDEST, REAP, REAP_BYSTANDERS, RESULT_BYTES,
     };
-    use crate::jobs::store::sqlite::sql::{batches, jobs};
-    use crate::jobs::store::{Filter, Membership};
+    use crate::store::sqlite::sql::{batches, jobs};
+    use crate::store::{Filter, Membership};
 
     /// A job table in a folder of its own.
     struct Opened(

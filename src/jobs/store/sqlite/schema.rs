@@ -4,9 +4,9 @@
 //! `schema.sql` is its first form that later ones go on with. Every later one is a step, which is one transaction: a process that dies
 //! between two steps leaves a table that the next start brings forward.
 
-use crate::jobs::error::JobsError;
-use crate::jobs::store::Result;
-use crate::jobs::store::sqlite::connection::{Connection, Pool, query, query_scalar};
+use crate::error::JobsError;
+use crate::store::Result;
+use crate::store::sqlite::connection::{Connection, Pool, query, query_scalar};
 
 /// The statements that make an empty file a job table of the first form.
 const SCHEMA: &str = include_str!("schema.sql");
@@ -89,7 +89,7 @@ pub(crate) async fn mark(writer: &Pool) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use crate::jobs::store::sqlite::database::SqliteStore;
+    use crate::store::sqlite::database::SqliteStore;
 
     fn write(file: &std::path::Path, statement: &str) {
         let connection = rusqlite::Connection::open(file).unwrap();

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::contact::friction::velocity_weakening::Slipping;
+use crate::friction::velocity_weakening::Slipping;
 
 /// The state of one Newton step: which cells slip, and in which direction.
 #[derive(Debug, Default)]

@@ -6,24 +6,18 @@
 //! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes). Where the bound falls with the slip, Π is the resolvent
 //! of that law: see [`FallingRow`].
 
-use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::gmres::LinearSystem;
-use crate::contact::numerics::simd::length;
-use crate::contact::rolling::answer::Work;
-use crate::contact::rolling::methods::boundary_element::linearisation::{
-    FallingRow, Linearisation,
-};
-use crate::contact::rolling::methods::boundary_element::preconditioner::{OwnBlocks, StripFactors};
-use crate::contact::rolling::methods::boundary_element::task::{
-    Convergence, NewtonTask, STEPS_MAX,
-};
-use crate::contact::rolling::methods::boundary_element::workspace::{
-    NewtonWorkspace, StepVectors, zeroed,
-};
-use crate::contact::rolling::slip_equations::{SlipEquations, SlipScratch};
-use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::friction::velocity_weakening::Softening;
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::gmres::LinearSystem;
+use crate::numerics::simd::length;
+use crate::rolling::answer::Work;
+use crate::rolling::methods::boundary_element::linearisation::{FallingRow, Linearisation};
+use crate::rolling::methods::boundary_element::preconditioner::{OwnBlocks, StripFactors};
+use crate::rolling::methods::boundary_element::task::{Convergence, NewtonTask, STEPS_MAX};
+use crate::rolling::methods::boundary_element::workspace::{NewtonWorkspace, StepVectors, zeroed};
+use crate::rolling::slip_equations::{SlipEquations, SlipScratch};
+use crate::rolling::slip_rules::Rule;
+use crate::rolling::strip_mesh::StripMesh;
 
 // Sensitivities of the numbers below: each changed alone, on the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
 // targets 0.005 and 0.001, and on 12 sweeps of 9 motions. No change made a solve fail or moved an error beyond its scatter.

@@ -4,12 +4,12 @@
 
 use std::ops::Range;
 
-use crate::contact::numerics::lu;
-use crate::contact::rolling::methods::boundary_element::linearisation::{
+use crate::numerics::lu;
+use crate::rolling::methods::boundary_element::linearisation::{
     FallingRow, Linearisation, turn_rows,
 };
-use crate::contact::rolling::methods::boundary_element::strip_blocks::StripBlocks;
-use crate::contact::rolling::slip_equations::SlipEquations;
+use crate::rolling::methods::boundary_element::strip_blocks::StripBlocks;
+use crate::rolling::slip_equations::SlipEquations;
 
 /// A segment in which something slips may have a block for each axis, like one where all sticks, if the tangents of its cells are no farther
 /// from the axes than this (sine of the angle); what such blocks leave out is left to GMRES. With such blocks in all iterations, the 62 Hertz

@@ -2,22 +2,22 @@
 
 use std::borrow::Cow;
 
-use crate::contact::friction::path_dependent::PathDependentFriction;
-use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::half_space::strip_operator::operator::StripOperator;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::simd::length;
-use crate::contact::rolling::answer::{LevelFailure, Work};
-use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::{
+use crate::friction::path_dependent::PathDependentFriction;
+use crate::friction::velocity_weakening::Softening;
+use crate::half_space::strip_operator::kind::Parity;
+use crate::half_space::strip_operator::operator::StripOperator;
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::simd::length;
+use crate::rolling::answer::{LevelFailure, Work};
+use crate::rolling::methods::boundary_element::newton::Newton;
+use crate::rolling::methods::boundary_element::task::{
     Convergence, LevelTask, NewtonTask, STEPS_MAX,
 };
-use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::slip_equations::{SlipEquations, SlipSource};
-use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::Motion;
+use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::rolling::slip_equations::{SlipEquations, SlipSource};
+use crate::rolling::slip_rules::Rule;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::Motion;
 
 /// Forces of two solutions that differ by no more than this part of the friction limit are the same: ten times what the iteration leaves.
 const SAME_SOLUTION: f64 = 4e-3;

@@ -4,15 +4,15 @@
 //! from the three-point rule ([`smooth_slips`]); their directions are those of the tractions, as Coulomb's law demands. The three-point
 //! rule is also the start where the given one fails, and it determines bounds that depend on the slip.
 
-use crate::contact::half_space::strip_operator::kind::Parity;
-use crate::contact::monitor::Monitor;
-use crate::contact::remark::list::Remark;
-use crate::contact::rolling::answer::Skip;
-use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, LevelOutcome, project_on_bound};
-use crate::contact::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
-use crate::contact::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask, STEPS_MAX};
-use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::strip_mesh::StripMesh;
+use crate::half_space::strip_operator::kind::Parity;
+use crate::monitor::Monitor;
+use crate::remark::list::Remark;
+use crate::rolling::answer::Skip;
+use crate::rolling::answer::{LevelAnswer, LevelFailure, LevelOutcome, project_on_bound};
+use crate::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
+use crate::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask, STEPS_MAX};
+use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::rolling::strip_mesh::StripMesh;
 
 /// Solves one motion on one level, from a start or from zero tractions.
 ///

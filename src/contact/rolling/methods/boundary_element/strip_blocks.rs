@@ -2,7 +2,7 @@
 
 use pulp::NullaryFnOnce;
 
-use crate::contact::numerics::simd;
+use crate::numerics::simd;
 
 /// Factored blocks of all segments.
 #[derive(Debug, Default)]

@@ -1,11 +1,11 @@
 //! What a level and the iteration on it are asked, and how the iteration ended.
 
-use crate::contact::friction::path_dependent::PathDependentFriction;
-use crate::contact::friction::velocity_weakening::Softening;
-use crate::contact::rolling::answer::{LevelAnswer, LevelOutcome};
-use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::Motion;
+use crate::friction::path_dependent::PathDependentFriction;
+use crate::friction::velocity_weakening::Softening;
+use crate::rolling::answer::{LevelAnswer, LevelOutcome};
+use crate::rolling::methods::full_slip;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::Motion;
 
 /// One motion on one level.
 #[derive(Debug, Clone, Copy)]

@@ -2,10 +2,10 @@
 
 use std::cell::Cell;
 
-use crate::contact::numerics::gmres::Gmres;
-use crate::contact::rolling::methods::boundary_element::linearisation::Linearisation;
-use crate::contact::rolling::methods::boundary_element::preconditioner::StripFactors;
-use crate::contact::rolling::slip_equations::SlipScratch;
+use crate::numerics::gmres::Gmres;
+use crate::rolling::methods::boundary_element::linearisation::Linearisation;
+use crate::rolling::methods::boundary_element::preconditioner::StripFactors;
+use crate::rolling::slip_equations::SlipScratch;
 
 /// What the iteration writes to. It fits equations of any size and grows to the largest; a second solve of the same size
 /// allocates nothing. Nothing in it but [`slip`](Self::slip) means anything between two calls.

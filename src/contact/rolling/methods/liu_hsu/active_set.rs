@@ -4,15 +4,13 @@
 
 use faer::{Mat, MatMut};
 
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::lu;
-use crate::contact::numerics::roots::ROUNDING;
-use crate::contact::rolling::methods::boundary_element::task::STEPS_MAX;
-use crate::contact::rolling::methods::liu_hsu::stick_block::{
-    DenseProblem, SlipSystem, both_components,
-};
-use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::task::Motion;
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::lu;
+use crate::numerics::roots::ROUNDING;
+use crate::rolling::methods::boundary_element::task::STEPS_MAX;
+use crate::rolling::methods::liu_hsu::stick_block::{DenseProblem, SlipSystem, both_components};
+use crate::rolling::slip_rules::Rule;
+use crate::rolling::task::Motion;
 
 /// In given tractions, a cell counts as slipping if its traction is less than its bound by at most this share.
 const START_MARGIN: f64 = 1e-6;
@@ -281,7 +279,7 @@ pub enum InitialGuess {
     /// rigid pole `(−ν_y/φ, ν_x/φ)` this would equal guess 1; the pole of the elastic problem differs from it.
     SpinPole([f64; 2]),
     /// Along the tractions of the previous division, see the third run in
-    /// [`liu_hsu`](crate::contact::rolling::methods::liu_hsu) (not in the paper).
+    /// [`liu_hsu`](crate::rolling::methods::liu_hsu) (not in the paper).
     Continued,
 }
 

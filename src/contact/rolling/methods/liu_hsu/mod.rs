@@ -2,7 +2,7 @@
 //!
 //! Source: "Non-Hertzian rolling contact stress analysis" (eq. 6 to 15; "the paper" below), after Liu and Paul. It is
 //! included for comparison with the paper: it solves the same discrete equations as
-//! [`boundary_element`](crate::contact::rolling::methods::boundary_element), with dense matrices and a smaller domain of
+//! [`boundary_element`](crate::rolling::methods::boundary_element), with dense matrices and a smaller domain of
 //! convergence. The steps, as in §4 and §5 of the paper:
 //!
 //! 1. All cells stick; their tractions follow from eq. 11.
@@ -12,14 +12,14 @@
 //!    (eq. 8 and 9, [`solve`]) from an initial guess (eq. 14 or 15, [`active_set`]). Steps 2 and 3 are repeated
 //!    until no cell changes.
 //! 4. The first run uses guess 1. If it fails, a solution on a coarse mesh with guess 1 gives the spin pole
-//!    ([`vortex`](crate::contact::rolling::methods::liu_hsu::solve)) for guess 2.
+//!    ([`vortex`](crate::rolling::methods::liu_hsu::solve)) for guess 2.
 //!
 //! # What the paper leaves open
 //!
 //! | question | here |
 //! |---|---|
-//! | eq. 6 sums slip along the strip, eq. 12 needs slip itself | rows are differenced along the strip: the map is that of [`Equations`](crate::contact::rolling::slip_equations::SlipEquations) |
-//! | weight of the own cell in eq. 6 | one half, from the centre to the side: [`Rule::Trapezoid`](crate::contact::rolling::slip_rules::Rule::Trapezoid); any other rule can be used |
+//! | eq. 6 sums slip along the strip, eq. 12 needs slip itself | rows are differenced along the strip: the map is that of [`Equations`](crate::rolling::slip_equations::SlipEquations) |
+//! | weight of the own cell in eq. 6 | one half, from the centre to the side: [`Rule::Trapezoid`](crate::rolling::slip_rules::Rule::Trapezoid); any other rule can be used |
 //! | `x_U`, "the closest boundary" | the leading edge for every cell; with a stick/slip boundary the equations change with the zones, and some have two solutions or none |
 //! | when a stick cell slips | T reaches `μp (1 + 1e-9)` |
 //! | when a slip cell sticks | `s·T < 0`, in the same pass |
@@ -35,9 +35,9 @@
 //!
 //! The paper says always. Measured, that is true only of the upwind rule without spin. Most failures are divisions that
 //! repeat, because Newton–Raphson converges to a root of eq. 9 at which some tractions oppose their slips. If both guesses
-//! fail, a third run follows, which is not in the paper ([`Guess::Continued`](crate::contact::rolling::methods::liu_hsu::active_set::InitialGuess::Continued)): tractions start from those of the
+//! fail, a third run follows, which is not in the paper ([`Guess::Continued`](crate::rolling::methods::liu_hsu::active_set::InitialGuess::Continued)): tractions start from those of the
 //! previous division and keep their magnitudes, and where a root has tractions that oppose their slips, the iteration is
-//! repeated with these reversed. Rules of second order start the third run from an upwind solution ([`solve_by_upwind`](crate::contact::rolling::methods::liu_hsu::solve::solve_by_upwind)). The table
+//! repeated with these reversed. Rules of second order start the third run from an upwind solution ([`solve_by_upwind`](crate::rolling::methods::liu_hsu::solve::solve_by_upwind)). The table
 //! counts how many of 109 motions converge (normalised creepage 0 to 3 in four directions, spin 0 to 20). The pole of guess 2
 //! comes from 25 coarse cells; without spin guess 1 stands in its place. `cargo bench --bench convergence_domain` prints more.
 //!

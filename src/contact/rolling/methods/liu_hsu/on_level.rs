@@ -1,17 +1,17 @@
 //! The method applied to one mesh level of a case.
 
-use crate::contact::half_space::strip_operator::operator::StripOperator;
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
-use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
-use crate::contact::rolling::methods::full_slip;
-use crate::contact::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
-use crate::contact::rolling::methods::liu_hsu::stick_block::DenseTask;
-use crate::contact::rolling::slip_equations::SlipEquations;
-use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::strip_mesh::StripMesh;
-use crate::contact::rolling::task::Motion;
+use crate::half_space::strip_operator::operator::StripOperator;
+use crate::monitor::{Monitor, Stop};
+use crate::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
+use crate::rolling::methods::boundary_element::newton::Newton;
+use crate::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
+use crate::rolling::methods::full_slip;
+use crate::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
+use crate::rolling::methods::liu_hsu::stick_block::DenseTask;
+use crate::rolling::slip_equations::SlipEquations;
+use crate::rolling::slip_rules::Rule;
+use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::task::Motion;
 
 /// Solves one motion (about the origin of the case) with the trapezoid rule. The spin pole comes from the level `coarse`;
 /// without it, guess 2 is skipped.

@@ -1,16 +1,16 @@
 //! The attempts in order: the guesses of the paper, then a start from an upwind solution. The outcome of each is kept.
 
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::simd::length;
-use crate::contact::rolling::methods::boundary_element::newton::Newton;
-use crate::contact::rolling::methods::boundary_element::task::Convergence;
-use crate::contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
-use crate::contact::rolling::methods::liu_hsu::active_set;
-use crate::contact::rolling::methods::liu_hsu::active_set::{
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::simd::length;
+use crate::rolling::methods::boundary_element::newton::Newton;
+use crate::rolling::methods::boundary_element::task::Convergence;
+use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
+use crate::rolling::methods::liu_hsu::active_set;
+use crate::rolling::methods::liu_hsu::active_set::{
     InitialGuess, ZonesRun, ZonesTermination, Zoning,
 };
-use crate::contact::rolling::methods::liu_hsu::stick_block::{DenseProblem, DenseTask};
-use crate::contact::rolling::slip_rules::Rule;
+use crate::rolling::methods::liu_hsu::stick_block::{DenseProblem, DenseTask};
+use crate::rolling::slip_rules::Rule;
 
 /// The results of a solve besides the tractions.
 #[derive(Debug, Clone, PartialEq)]

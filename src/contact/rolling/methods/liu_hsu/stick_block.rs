@@ -3,12 +3,12 @@
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 
-use crate::contact::monitor::{Monitor, Stop};
-use crate::contact::numerics::lu;
-use crate::contact::rolling::methods::boundary_element::task::NewtonTask;
-use crate::contact::rolling::slip_equations::SlipEquations;
-use crate::contact::rolling::slip_rules::Rule;
-use crate::contact::rolling::task::Motion;
+use crate::monitor::{Monitor, Stop};
+use crate::numerics::lu;
+use crate::rolling::methods::boundary_element::task::NewtonTask;
+use crate::rolling::slip_equations::SlipEquations;
+use crate::rolling::slip_rules::Rule;
+use crate::rolling::task::Motion;
 
 /// The discrete problem as dense arrays over the cells without padding, x components before y components.
 #[derive(Debug)]

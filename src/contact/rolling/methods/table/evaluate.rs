@@ -4,11 +4,9 @@
 
 use pulp::{Simd, WithSimd};
 
-use crate::contact::numerics::simd;
-use crate::contact::rolling::methods::table::shape_coefficients::{
-    ShapeCoefficients, poisson_weights,
-};
-use crate::contact::rolling::methods::table::spline::{
+use crate::numerics::simd;
+use crate::rolling::methods::table::shape_coefficients::{ShapeCoefficients, poisson_weights};
+use crate::rolling::methods::table::spline::{
     Axis, DIRECTION_COEFFICIENTS, DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLE_COEFFICIENTS, POLES,
     RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, Shape, Weights, cell, coefficients, ln_ratio_max, sigma,
     spin_factor,

@@ -8,8 +8,8 @@ use std::sync::LazyLock;
 
 use serde_json::{Value, json};
 
-use crate::contact::rolling::methods::table::evaluate::{CreepTable, SIZE_ROW};
-use crate::contact::rolling::methods::table::spline::{
+use crate::rolling::methods::table::evaluate::{CreepTable, SIZE_ROW};
+use crate::rolling::methods::table::spline::{
     CELLS, DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, ROW, SIZES, VALUES,
 };
 

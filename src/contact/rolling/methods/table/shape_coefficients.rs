@@ -1,8 +1,8 @@
 //! Kalker's coefficients as splines in ln(a/b), for many ellipses in little time.
 
-use crate::contact::numerics::interpolation;
-use crate::contact::rolling::linear_theory::{POISSON_RATIOS, coefficients, spin_coefficient};
-use crate::contact::rolling::methods::table::spline::{Axis, free_coefficients, ln_ratio_max};
+use crate::numerics::interpolation;
+use crate::rolling::linear_theory::{POISSON_RATIOS, coefficients, spin_coefficient};
+use crate::rolling::methods::table::spline::{Axis, free_coefficients, ln_ratio_max};
 
 /// Nodes in ln(a/b): closer than those of the tables in `linear_theory`, so that its interpolation is met to 1e-5.
 const NODES: u8 = 57;

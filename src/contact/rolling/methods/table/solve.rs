@@ -2,18 +2,18 @@
 
 use std::ops::RangeInclusive;
 
-use crate::contact::error::SolveError;
-use crate::contact::friction::law::FrictionLaw;
-use crate::contact::friction::path_dependent::Interface;
-use crate::contact::half_space::unlike_bodies::Elasticity;
-use crate::contact::method::Method;
-use crate::contact::monitor::Monitor;
-use crate::contact::remark::kind::Rounded;
-use crate::contact::rolling::answer::{MotionAnswer, PatchGradients, Resultants};
-use crate::contact::rolling::load_ellipse::LoadEllipse;
-use crate::contact::rolling::methods::table::evaluate::Creep;
-use crate::contact::rolling::methods::table::file::table;
-use crate::contact::rolling::task::{Motion, RollingTask};
+use crate::error::SolveError;
+use crate::friction::law::FrictionLaw;
+use crate::friction::path_dependent::Interface;
+use crate::half_space::unlike_bodies::Elasticity;
+use crate::method::Method;
+use crate::monitor::Monitor;
+use crate::remark::kind::Rounded;
+use crate::rolling::answer::{MotionAnswer, PatchGradients, Resultants};
+use crate::rolling::load_ellipse::LoadEllipse;
+use crate::rolling::methods::table::evaluate::Creep;
+use crate::rolling::methods::table::file::table;
+use crate::rolling::task::{Motion, RollingTask};
 
 /// a/b that the table covers.
 pub const RATIO_RANGE: RangeInclusive<f64> = 0.1..=10.0;

@@ -19,8 +19,8 @@
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 use std::ops::Range;
 
-use crate::contact::numerics::lu::inverse;
-use crate::contact::rolling::methods::table::spline::Mirror::{Even, Odd};
+use crate::numerics::lu::inverse;
+use crate::rolling::methods::table::spline::Mirror::{Even, Odd};
 
 /// Functions in the table: F_x, F_y, M_z and the share that sticks.
 pub const OUTPUTS: usize = 4;
@@ -643,7 +643,7 @@ impl Shape {
 #[cfg(test)]
 mod coordinates_tests {
     use super::*;
-    use crate::contact::rolling::linear_theory::coefficients;
+    use crate::rolling::linear_theory::coefficients;
 
     #[test]
     fn angles_of_a_creepage_are_those_it_was_made_of() {

@@ -1,5 +1,4 @@
-//! What may a client ask, and how is it answered? Handlers translate: they read a request, call [`Jobs`] and answer. Nothing is
-//! computed here.
+//! The HTTP API of the service. Handlers read a request, call [`Jobs`] and answer.
 //!
 //! The way of a request:
 //!
@@ -18,6 +17,10 @@
 //! 6. The answer: a type of [`dto`] as JSON, or a form of [`render`].
 //! 7. [`page`] answers `/` and the files of the page, which needs no key and asks the same API.
 //! 8. Whatever fails becomes a [`problem`] with a kind, a status and what to do.
+
+#![warn(unreachable_pub)]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 mod contract;
 mod dto;
@@ -43,27 +46,27 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use crate::http::contract::Document;
-use crate::http::extract::{accept, query};
-use crate::http::layers::metrics::{self, Metrics};
-use crate::http::layers::{admission, auth, client_address, etag, request_log, response};
-use crate::http::problem::{ApiError, ProblemKind};
-use crate::http::routes::{
+use crate::contract::Document;
+use crate::extract::{accept, query};
+use crate::layers::metrics::{self, Metrics};
+use crate::layers::{admission, auth, client_address, etag, request_log, response};
+use crate::problem::{ApiError, ProblemKind};
+use crate::routes::{
     batches, cases, evaluate, evolutions, fields, jobs, lists, plots, profiles, results, runs,
     service, work,
 };
-use crate::http::server::drain_body;
-use crate::http::state::AppState;
-use crate::jobs::Jobs;
-use crate::jobs::model::Kind;
+use crate::server::drain_body;
+use crate::state::AppState;
+use railhead_jobs::Jobs;
+use railhead_jobs::model::Kind;
 
 #[cfg(feature = "otlp")]
-use crate::http::layers::otel;
+use crate::layers::otel;
 
-pub use crate::http::layers::response::allow_origins;
-pub use crate::http::options::{AddressRange, HttpOptions};
-pub use crate::http::server::connections::Peer;
-pub use crate::http::server::serve;
+pub use crate::layers::response::allow_origins;
+pub use crate::options::{AddressRange, HttpOptions};
+pub use crate::server::connections::Peer;
+pub use crate::server::serve;
 
 /// The contract as JSON text, ending with a line break; the same as `api/openapi.json`.
 #[must_use]

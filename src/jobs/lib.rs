@@ -1,4 +1,4 @@
-//! Who solves what, when, and what became of it? [`Jobs`] is all that the outside may call.
+//! Queue, workers and stored results of the service. [`Jobs`] is the interface for other crates.
 //!
 //! # The way of a job
 //!
@@ -32,9 +32,13 @@
 //!
 //! # The folders
 //!
-//! Each uses only those before it: [`model`] (the words of the room), [`codec`] (results, fields and tables as bytes),
+//! Each uses only those before it: [`model`] (jobs, batches, keys and submissions), [`codec`] (results, fields and tables as bytes),
 //! [`store`] (the job table), [`result_place`] (where results lie), [`attempts`] (one attempt at a job), [`keys`],
 //! [`maintenance`], [`batch`], [`run`] (batches of rows) and [`worker`]. [`handle`] with [`Jobs`] stands behind `attempts`.
+
+#![warn(unreachable_pub)]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+#![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod attempts;
 pub mod backup;
@@ -76,7 +80,7 @@ pub mod storage_fault;
 pub mod storage_health;
 pub mod store;
 pub mod submit;
-pub(crate) mod sync;
+pub mod sync;
 #[cfg(feature = "otlp")]
 pub mod trace;
 #[cfg(not(feature = "otlp"))]
@@ -85,9 +89,9 @@ pub mod trace;
 pub mod work;
 pub mod worker;
 
-pub use crate::jobs::error::JobsError;
-pub use crate::jobs::error::StorageFault;
-pub use crate::jobs::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
-pub use crate::jobs::model::{Failure, FailureKind, Job, QueuePlace, State};
-pub use crate::jobs::options::Options;
-pub use crate::jobs::store::{Filter, Membership, Page, Total};
+pub use crate::error::JobsError;
+pub use crate::error::StorageFault;
+pub use crate::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
+pub use crate::model::{Failure, FailureKind, Job, QueuePlace, State};
+pub use crate::options::Options;
+pub use crate::store::{Filter, Membership, Page, Total};
