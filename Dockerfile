@@ -7,12 +7,13 @@ WORKDIR /src
 # The dependencies are a layer of their own, compiled for an empty program: a change in src does not build them again.
 COPY Cargo.toml Cargo.lock ./
 COPY src/contact/Cargo.toml src/contact/
+COPY src/tables/Cargo.toml src/tables/
 COPY src/jobs/Cargo.toml src/jobs/
 COPY src/http/Cargo.toml src/http/
 COPY src/macros src/macros
 COPY benches/Cargo.toml benches/
 RUN echo 'fn main() {}' > src/main.rs \
-    && touch src/lib.rs src/contact/lib.rs src/jobs/lib.rs src/http/lib.rs \
+    && touch src/lib.rs src/contact/lib.rs src/tables/lib.rs src/jobs/lib.rs src/http/lib.rs \
     && cargo build --profile image --features cluster,otlp,gs,az --locked --bin railhead
 COPY api ./api
 COPY src ./src

@@ -1,10 +1,11 @@
 //! railhead: a rolling-contact stress service.
 //!
-//! Four crates, each of which uses only those before it:
+//! Five crates, each of which uses only those before it:
 //!
 //! | crate | responsibility |
 //! |---|---|
 //! | [`contact`] | the physics: synchronous arithmetic without clock, files or network |
+//! | [`tables`] | columns in and out |
 //! | [`jobs`] | queue, workers, stored results |
 //! | [`http`] | requests and responses |
 //! | this one | [`cli`]: commands and settings; [`telemetry`] writes the log, [`otlp`] sends spans |
@@ -27,3 +28,4 @@ pub mod telemetry;
 pub use railhead_contact as contact;
 pub use railhead_http as http;
 pub use railhead_jobs as jobs;
+pub use railhead_tables as tables;

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::time::Instant;
 
-use railhead::jobs::codec::arrow::ArrowWriter;
-use railhead::jobs::codec::table::{RowTable, TableColumn};
+use railhead::tables::arrow::ArrowWriter;
+use railhead::tables::table::{RowTable, TableColumn};
 use reqwest::Method;
 use serde_json::{Value, json};
 

@@ -7,8 +7,8 @@ use railhead::contact::geometry::formats::{self, Format};
 use railhead::contact::geometry::profile::{Body, Profile, Reading};
 use railhead::http::extract::batch::{Add, columns_of, read_elements, read_lines, row_of};
 use railhead::http::extract::json::read_strict;
-use railhead::http::extract::tables::CsvRows;
 use railhead::jobs::batch::upload::fill;
+use railhead::tables::text::CsvRows;
 use serde_json::{Value, json};
 
 /// A case in small, so that a table can fill every kind of member.

@@ -16,9 +16,10 @@ use railhead_contact::solution::words::answer::{
     ErrorEstimate, HistoryPoint, Origin, Solution, Total, Zone,
 };
 use railhead_contact::solution::words::damage::ProfileUncertainty;
-use railhead_jobs::codec::table::TableKind;
 use railhead_jobs::model::{Batch, Job, Kind, Priority, QueuePlace, State as JobState};
-use railhead_jobs::run::model::{Run, RunColumn};
+use railhead_jobs::run::model::Run;
+use railhead_tables::table::TableKind;
+use railhead_tables::titles::TitledColumn;
 
 /// A job. Times are RFC 3339 in UTC with milliseconds.
 #[derive(Debug, Serialize, ToSchema)]
@@ -410,7 +411,7 @@ impl From<Run> for RunAnswer {
     fn from(run: Run) -> Self {
         let state = run.state();
         let chunks = &run.chunks;
-        let sent = |column: &RunColumn| SentColumn {
+        let sent = |column: &TitledColumn| SentColumn {
             name: column.name.clone(),
             pointer: column.pointer.clone(),
             factor: column.factor,

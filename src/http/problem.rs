@@ -14,9 +14,11 @@ use utoipa::openapi::schema::Type;
 use utoipa::openapi::{ContentBuilder, HeaderBuilder, ObjectBuilder, Ref, RefOr, ResponseBuilder};
 
 use railhead_contact::error::{CaseError, Fault as CaseFault, FaultCode};
+use railhead_contact::evaluate::varied::column_pointer;
 use railhead_jobs::StorageFault;
 use railhead_jobs::error::JobsError;
 use railhead_jobs::model::{Failure, FailureKind, Job, Kind, State};
+use railhead_tables::error::TableError;
 
 /// Declares the kinds of problems once: name, status, slug, title, meaning.
 macro_rules! kinds {
@@ -516,6 +518,11 @@ impl ApiError {
     }
 }
 
+/// A refusal of a table.
+pub(crate) fn faulty(detail: impl Into<String>) -> ApiError {
+    ApiError::new(ProblemKind::FaultyTable, detail)
+}
+
 impl From<CaseError> for ApiError {
     fn from(CaseError(faults): CaseError) -> Self {
         let detail = match faults.as_slice() {
@@ -534,6 +541,22 @@ impl From<CaseError> for ApiError {
         };
         let faults = faults.into_iter().take(FAULTS_LISTED).map(Fault::from);
         ApiError::listing(ProblemKind::FaultyCase, detail, faults.collect())
+    }
+}
+
+impl From<TableError> for ApiError {
+    fn from(error: TableError) -> Self {
+        match error {
+            TableError::Faulty { detail, columns } => {
+                let faults = columns.into_iter().map(|(title, detail)| Fault {
+                    pointer: Some(column_pointer(&title)),
+                    ..Fault::invalid(detail)
+                });
+                ApiError::listing(ProblemKind::FaultyTable, detail, faults.collect())
+            }
+            TableError::TooLarge(detail) => ApiError::new(ProblemKind::BodyTooLarge, detail),
+            TableError::Source(error) => ApiError::internal(&error),
+        }
     }
 }
 

@@ -32,7 +32,7 @@
 //!
 //! # The folders
 //!
-//! Each uses only those before it: [`model`] (jobs, batches, keys and submissions), [`codec`] (results, fields and tables as bytes),
+//! Each uses only those before it: [`model`] (jobs, batches, keys and submissions), [`codec`] (results and fields as bytes),
 //! [`store`] (the job table), [`result_place`] (where results lie), [`attempts`] (one attempt at a job), [`keys`],
 //! [`maintenance`], [`batch`], [`run`] (batches of rows) and [`worker`]. [`handle`] with [`Jobs`] stands behind `attempts`.
 

@@ -1,7 +1,7 @@
 //! Columns of tables that come in and go out: titles, units, bounds, texts, damage.
 
-use railhead::jobs::codec::parquet::encode;
-use railhead::jobs::codec::table::{COLUMNS_MAX, RowTable, TableColumn};
+use railhead::tables::parquet::encode;
+use railhead::tables::table::{COLUMNS_MAX, RowTable, TableColumn};
 use serde_json::{Value, json};
 
 use crate::csv_table::Csv;

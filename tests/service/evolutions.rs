@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use railhead::jobs::codec::parquet::TableReader;
+use railhead::tables::parquet::TableReader;
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;

@@ -1,8 +1,8 @@
 //! Runs: many rows over one case, as one piece of work.
 
-use railhead::jobs::codec::arrow::read;
-use railhead::jobs::codec::parquet::TableReader;
-use railhead::jobs::codec::table::{RowTable, TableColumn};
+use railhead::tables::arrow::read;
+use railhead::tables::parquet::TableReader;
+use railhead::tables::table::{RowTable, TableColumn};
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;

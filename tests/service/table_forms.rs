@@ -3,9 +3,9 @@
 use std::io::Cursor;
 
 use axum::body::Bytes;
-use railhead::jobs::codec::arrow::{ArrowWriter, read};
-use railhead::jobs::codec::parquet::{TableReader, encode};
-use railhead::jobs::codec::table::{RowTable, TableColumn};
+use railhead::tables::arrow::{ArrowWriter, read};
+use railhead::tables::parquet::{TableReader, encode};
+use railhead::tables::table::{RowTable, TableColumn};
 use reqwest::Body;
 use serde_json::{Value, json};
 

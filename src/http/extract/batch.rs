@@ -13,20 +13,20 @@ use serde_json::error::Category;
 use serde_json::value::RawValue;
 use serde_json::{Deserializer, Value};
 
-use crate::extract::json::{essence, not_json, read_strict, unlike_json, weigh_case, without_mark};
+use crate::extract::json::{essence, not_json, read_strict, unlike_json, weigh_case};
 use crate::extract::query::DEADLINE_MAX_SECONDS;
 use crate::extract::rows::{Table, read_spooled};
-use crate::extract::tables::{Chunk, CsvRows, TableForm, TableRows, TableSource, Title};
-use crate::extract::titles::{Place, faulty, is_text, number, place, question, short_names};
 use crate::limits::{Memory, Pace};
 use crate::options::HttpOptions;
-use crate::problem::{ApiError, ProblemKind, Result};
+use crate::problem::{ApiError, ProblemKind, Result, faulty};
 use railhead_contact::error::Fault;
 use railhead_contact::evaluate::varied::{Values, members};
 use railhead_jobs::Jobs;
 use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
-use railhead_jobs::run::model::converted;
+use railhead_tables::read::{Chunk, TableForm, TableRows, TableSource, Title};
+use railhead_tables::text::{CsvRows, StringRecord, without_mark};
+use railhead_tables::titles::{Place, converted, is_text, number, place, question, short_names};
 
 /// Takes a case with the number of its line, if it has one.
 pub type Add<'a> = &'a mut dyn FnMut(Option<u64>, &[u8]) -> Result<()>;
@@ -347,7 +347,7 @@ fn column(title: &str, unit: Option<&str>) -> Result<TemplateColumn, String> {
 ///
 /// # Errors
 /// It has another number of fields, or a value of an option is not allowed.
-pub fn row_of(columns: &[TemplateColumn], decimal_comma: bool, record: &csv::StringRecord) -> Row {
+pub fn row_of(columns: &[TemplateColumn], decimal_comma: bool, record: &StringRecord) -> Row {
     if record.len() != columns.len() {
         return Err(format!(
             "the line has {} fields, the header has {}",
@@ -498,9 +498,8 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::extract::tables::CsvRows;
     use railhead_jobs::batch::upload::fill;
-    use railhead_jobs::codec::table::COLUMNS_MAX;
+    use railhead_tables::table::COLUMNS_MAX;
 
     fn cut(array: bool, text: &str) -> Result<Vec<(Option<u64>, String)>> {
         let mut out = Vec::new();

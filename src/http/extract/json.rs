@@ -130,13 +130,6 @@ pub fn not_json(unlike: Option<&str>, error: &serde_json::Error) -> ApiError {
     }
 }
 
-/// The text of a line without the byte order mark that the first one may begin with.
-#[must_use]
-pub fn without_mark(text: &[u8], line: u64) -> &[u8] {
-    let rest = text.strip_prefix(b"\xef\xbb\xbf").filter(|_| line == 1);
-    rest.unwrap_or(text)
-}
-
 /// What is wrong with a text that does not even begin like JSON.
 #[must_use]
 pub fn unlike_json(text: &[u8]) -> Option<&'static str> {

@@ -6,5 +6,3 @@ pub mod caller;
 pub mod json;
 pub mod query;
 pub mod rows;
-pub mod tables;
-pub mod titles;

@@ -23,17 +23,16 @@ use crate::extract::json::{
     BodyReader, Strict, UnexpectedPart, essence, not_json, read_json, require_utf8, unlike_json,
     unreadable, weigh_case,
 };
-use crate::extract::tables::{TableForm, TableRows, TableSource, unsupported};
-use crate::extract::titles::{NamedColumns, faulty, require_few};
 use crate::limits::{Memory, Pace, Permit};
 use crate::options::HttpOptions;
-use crate::problem::{ApiError, ProblemKind, Result};
+use crate::problem::{ApiError, ProblemKind, Result, faulty};
 use railhead_contact::case::words::solver::Case;
 use railhead_contact::evaluate::varied::Values;
 use railhead_jobs::Jobs;
-use railhead_jobs::codec::table::COLUMNS_MAX;
 use railhead_jobs::run::draft::RunDraft;
-use railhead_jobs::run::model::RunColumn;
+use railhead_tables::read::{TableForm, TableRows, TableSource};
+use railhead_tables::table::COLUMNS_MAX;
+use railhead_tables::titles::{NamedColumns, TitledColumn, require_few};
 
 /// The bytes that a request's body may have, or has as far as it says.
 #[must_use]
@@ -75,7 +74,7 @@ pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes>
 pub fn read_json_columns(
     text: &[u8],
     named: &NamedColumns,
-) -> Result<(Value, Vec<RunColumn>, Vec<Values>)> {
+) -> Result<(Value, Vec<TitledColumn>, Vec<Values>)> {
     let read: RowsBody =
         serde_json::from_slice(text).map_err(|error| not_json(unlike_json(text), &error))?;
     require_few(read.columns.count)?;
@@ -506,6 +505,17 @@ pub async fn read_spooled<T: Send + 'static>(
         read(file, pace)
     });
     read.await
+}
+
+/// The fault of a body that is neither JSON nor a table.
+pub(crate) fn unsupported(essence: &str, json: &str) -> ApiError {
+    ApiError::new(
+        ProblemKind::UnsupportedMediaType,
+        format!(
+            "the content type is `{essence}`; send {json}, or {}",
+            TableForm::ALLOWED
+        ),
+    )
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@ use std::ops::Range;
 use crate::render::forces::Forces;
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
-use railhead_jobs::codec::table::{RowTable, TableColumn, TableKind};
 use railhead_jobs::model::BatchItem;
+use railhead_tables::table::{RowTable, TableColumn, TableKind};
 
 /// How the value of a column is found.
 #[derive(Debug, Clone, Copy)]

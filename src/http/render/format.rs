@@ -4,6 +4,7 @@ use axum::body::Body;
 use axum::http::{HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Response};
 use railhead_macros::Named;
+use railhead_tables::read::TableForm;
 
 /// A form in which something can be answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
@@ -31,6 +32,16 @@ pub enum Format {
 }
 
 impl Format {
+    /// As the form of a table; NDJSON for what is none.
+    pub(crate) fn table(self) -> TableForm {
+        match self {
+            Format::Csv => TableForm::Csv,
+            Format::Arrow => TableForm::Arrow,
+            Format::Parquet => TableForm::Parquet,
+            _ => TableForm::Ndjson,
+        }
+    }
+
     /// The content type of the answer.
     #[must_use]
     pub fn media_type(self) -> &'static str {

@@ -1,10 +1,8 @@
-//! The forms of an answer other than JSON; one format is one file.
+//! The forms of an answer other than JSON.
 
 pub(super) mod batch_table;
-pub(super) mod csv;
 pub(super) mod forces;
 pub(super) mod format;
-pub(super) mod npz;
 pub(super) mod picture;
 pub(super) mod pieces;
 pub(super) mod resultants;
@@ -12,4 +10,3 @@ pub(super) mod row_tables;
 pub(super) mod shape;
 pub(super) mod stresses;
 pub(super) mod table;
-pub(super) mod vtk;

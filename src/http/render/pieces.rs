@@ -5,8 +5,8 @@ use std::convert::Infallible;
 use axum::body::{Body, Bytes};
 use futures_util::stream;
 
-use crate::render::csv;
-use crate::render::table::{Rows, Table};
+use railhead_tables::cells::{CellRows, CellTable};
+use railhead_tables::csv;
 
 /// Pieces are at least this large, but for the last one.
 const PIECE_BYTES: usize = 32 << 10;
@@ -14,11 +14,11 @@ const PIECE_BYTES: usize = 32 << 10;
 const ROWS: usize = 256;
 
 /// The table as CSV. Zones are words; what lies outside the patch is empty.
-pub(crate) fn csv_body(table: Table) -> Body {
+pub(crate) fn csv_body(table: CellTable) -> Body {
     let names = table.names();
     let columns = names.len();
-    let lines = (0..table.len()).step_by(ROWS).map(move |start| {
-        let rows = start..(start + ROWS).min(table.len());
+    let lines = (0..table.row_count()).step_by(ROWS).map(move |start| {
+        let rows = start..(start + ROWS).min(table.row_count());
         csv::lines(columns, rows, |out, column, row| {
             table.write(out, column, table.index(column, row), ["", ""]);
         })
@@ -27,17 +27,17 @@ pub(crate) fn csv_body(table: Table) -> Body {
 }
 
 /// The table as the JSON of a field: members written before (`"patch":0,…`), then per cell inside `cells`, or on a grid.
-pub(crate) fn json_body(table: Table, members: &str) -> Body {
+pub(crate) fn json_body(table: CellTable, members: &str) -> Body {
     let (open, close, axes) = match &table.rows {
-        Rows::Cells => (",\"cells\":{", "}}", Vec::new()),
-        Rows::Grid { x_mm, y_mm } => (",", "}", vec![x_mm.len(), y_mm.len()]),
+        CellRows::Cells => (",\"cells\":{", "}}", Vec::new()),
+        CellRows::Grid { x_mm, y_mm } => (",", "}", vec![x_mm.len(), y_mm.len()]),
     };
     let columns = table.names().into_iter().enumerate();
     let columns = columns.map(|(place, name)| match axes.get(place) {
         Some(count) => JsonColumn::new(name, *count),
         None => JsonColumn {
             inner: axes.first().copied(),
-            ..JsonColumn::new(name, table.len())
+            ..JsonColumn::new(name, table.row_count())
         },
     });
     let columns = columns.collect();
@@ -135,10 +135,11 @@ mod tests {
     use serde_json::{Value, json};
 
     use super::*;
-    use crate::render::csv::Precision;
-    use crate::render::table::{ArrayData, TableColumn};
+    use crate::render::table::cell_table;
     use railhead_contact::case::words::solver::Output;
     use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
+    use railhead_tables::cells::{CellColumn, CellData};
+    use railhead_tables::csv::Precision;
 
     async fn text(body: Body) -> String {
         let bytes = body.collect().await.unwrap().to_bytes();
@@ -150,19 +151,19 @@ mod tests {
         (1..=count).map(|number| 1.0 / number as f64).collect()
     }
 
-    fn column(name: &'static str, data: ArrayData) -> TableColumn {
-        TableColumn { name, data }
+    fn column(name: &'static str, data: CellData) -> CellColumn {
+        CellColumn { name, data }
     }
 
-    fn on_grid(x_mm: Vec<f64>, y_mm: Vec<f64>, columns: Vec<TableColumn>) -> Table {
-        Table {
-            rows: Rows::Grid { x_mm, y_mm },
+    fn on_grid(x_mm: Vec<f64>, y_mm: Vec<f64>, columns: Vec<CellColumn>) -> CellTable {
+        CellTable {
+            rows: CellRows::Grid { x_mm, y_mm },
             columns,
             precision: Precision::Double,
         }
     }
 
-    async fn read(table: Table) -> Value {
+    async fn read(table: CellTable) -> Value {
         serde_json::from_str(&text(json_body(table, "\"patch\":1")).await).unwrap()
     }
 
@@ -187,7 +188,7 @@ mod tests {
                 "x_mm": cells.x_mm, "y_mm": cells.y_mm, "dx_mm": cells.dx_mm, "dy_mm": cells.dy_mm, "strip": cells.strip,
                 "zone": values.zone, "slip_x": values.slip_x,
             } });
-            let table = Table::of(&[Output::Zones, Output::Slip], None, cells, values);
+            let table = cell_table(&[Output::Zones, Output::Slip], None, cells, values);
             assert_eq!(read(table).await, whole);
         }
         let row = [0.1, f64::NAN, -3e-300];
@@ -196,8 +197,8 @@ mod tests {
             numbers(3),
             numbers(700),
             vec![
-                column("zone", ArrayData::Zones(zones.repeat(700))),
-                column("pressure_mpa", ArrayData::Numbers(row.repeat(700))),
+                column("zone", CellData::Zones(zones.repeat(700))),
+                column("pressure_mpa", CellData::Numbers(row.repeat(700))),
             ],
         );
         let whole = json!({
@@ -209,7 +210,7 @@ mod tests {
 
     #[tokio::test]
     async fn single_precision_is_the_nearest_number_of_32_bits() {
-        let pressure = column("pressure_mpa", ArrayData::Numbers(vec![1e9 + 1.0]));
+        let pressure = column("pressure_mpa", CellData::Numbers(vec![1e9 + 1.0]));
         let mut table = on_grid(vec![1.0 / 3.0], vec![1e-300], vec![pressure]);
         table.precision = Precision::Single;
         let csv = text(csv_body(table.clone())).await;
@@ -221,7 +222,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_table_has_one_line_per_row_after_its_head() {
-        let pressure = ArrayData::Numbers([1.5, f64::NAN].repeat(400));
+        let pressure = CellData::Numbers([1.5, f64::NAN].repeat(400));
         let pressure = vec![column("pressure_mpa", pressure)];
         let text = text(csv_body(on_grid(numbers(2), numbers(400), pressure))).await;
         let lines: Vec<&str> = text.lines().collect();

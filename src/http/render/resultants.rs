@@ -3,7 +3,7 @@
 use crate::dto::{Resultants, Sum};
 use crate::render::forces::Forces;
 use railhead_contact::solution::words::answer::HistoryPoint;
-use railhead_jobs::codec::table::{RowTable, TableColumn};
+use railhead_tables::table::{RowTable, TableColumn};
 
 type OfHistory = fn(&HistoryPoint) -> Option<f64>;
 

@@ -1,23 +1,17 @@
 //! Tables of rows as CSV, NDJSON, an Arrow stream or a Parquet file, piece by piece.
 
-use std::error::Error;
-use std::fmt::Write;
 use std::ops::Range;
 
 use axum::body::{Body, Bytes};
 use futures_util::stream::{Stream, StreamExt, TryStreamExt, iter, try_unfold};
 
-use crate::render::csv::{self, Precision, text_field, write_number};
 use crate::render::format::Format;
 use crate::render::pieces::{JsonColumn, body, json_columns};
 use railhead_contact::evaluate::answer::RowsAnswer;
-use railhead_jobs::codec::arrow::ArrowWriter;
-use railhead_jobs::codec::parquet::TableWriter;
-use railhead_jobs::codec::table::{RowTable, TableColumn, TableKind};
 use railhead_jobs::sync::blocking;
-
-/// Why a table cannot be written.
-pub(crate) type WriteError = Box<dyn Error + Send + Sync>;
+use railhead_tables::csv::{Precision, write_number};
+use railhead_tables::table::{RowTable, TableColumn, TableKind};
+use railhead_tables::write::{RowWriter, WriteError};
 
 /// Some rows of a table.
 pub(crate) enum Piece {
@@ -27,160 +21,35 @@ pub(crate) enum Piece {
     Table(RowTable),
 }
 
-/// Writes tables with the same columns, one after the other.
-pub(crate) enum RowWriter {
-    /// A line with the names of the columns, then one for each row.
-    Csv(Vec<String>),
-    /// An object for each row.
-    Ndjson,
-    /// A stream of batches of records.
-    Arrow(Box<ArrowWriter<Vec<u8>>>),
-    /// One file, a group of rows for each table.
-    Parquet(Box<TableWriter<Vec<u8>>>),
-}
-
-impl RowWriter {
-    /// Writes tables of these columns as CSV, an Arrow stream or a Parquet file, and as NDJSON in any other form.
-    ///
-    /// # Errors
-    /// The stream or the file cannot be begun.
-    pub(crate) fn new(
-        format: Format,
-        columns: &[(String, TableKind)],
-    ) -> Result<RowWriter, WriteError> {
-        Ok(match format {
-            Format::Csv => RowWriter::Csv(columns.iter().map(|(name, _)| name.clone()).collect()),
-            Format::Arrow => RowWriter::Arrow(Box::new(ArrowWriter::new(Vec::new(), columns)?)),
-            Format::Parquet => RowWriter::Parquet(Box::new(TableWriter::new(Vec::new(), columns)?)),
-            _ => RowWriter::Ndjson,
-        })
-    }
-
-    /// A table that is written as a whole.
-    ///
-    /// # Errors
-    /// It cannot be written.
-    pub(crate) fn whole(format: Format, table: RowTable) -> Result<Vec<u8>, WriteError> {
-        let mut writer = RowWriter::new(format, &table.kinds())?;
-        Ok([writer.head()?, writer.write(table)?, writer.finish()?].concat())
-    }
-
-    /// Writes tables of these columns piece by piece as they come, with the text before and after them.
-    ///
-    /// # Errors
-    /// The stream or the file cannot be begun.
-    pub(crate) fn stream<P: Stream<Item = Result<Piece, WriteError>> + Send>(
-        format: Format,
-        columns: &[(String, TableKind)],
-        pieces: P,
-    ) -> Result<impl Stream<Item = Result<Bytes, WriteError>> + Send + use<P>, WriteError> {
-        let mut writer = RowWriter::new(format, columns)?;
-        let head = Bytes::from(writer.head()?);
-        let state = Some((Box::pin(pieces), writer));
-        let text = try_unfold(state, async |state| {
-            let Some((mut pieces, mut writer)) = state else {
-                return Ok(None);
-            };
-            let text = match pieces.try_next().await? {
-                Some(Piece::Text(text)) => text,
-                Some(Piece::Table(table)) => {
-                    let written = blocking(move || (writer.write(table), writer));
-                    let (text, back) = written.await?;
-                    writer = back;
-                    text?.into()
-                }
-                None => return Ok(Some((writer.finish()?.into(), None))),
-            };
-            Ok(Some((text, Some((pieces, writer)))))
-        });
-        Ok(iter([Ok(head)]).chain(text))
-    }
-
-    /// What comes before the first table.
-    ///
-    /// # Errors
-    /// It cannot be written.
-    pub(crate) fn head(&mut self) -> Result<Vec<u8>, WriteError> {
-        match self {
-            RowWriter::Csv(names) => Ok(csv::head(names.iter().map(String::as_str))?),
-            _ => Ok(Vec::new()),
-        }
-    }
-
-    /// One more table.
-    ///
-    /// # Errors
-    /// It cannot be written.
-    pub(crate) fn write(&mut self, table: RowTable) -> Result<Vec<u8>, WriteError> {
-        match self {
-            RowWriter::Csv(_) => Ok(csv_lines(&table)?),
-            RowWriter::Ndjson => Ok(json_lines(&table)?.into_bytes()),
-            RowWriter::Arrow(writer) => {
-                writer.write(table)?;
-                Ok(std::mem::take(writer.inner_mut()))
+/// Writes tables of these columns piece by piece as they come, with the text before and after them.
+///
+/// # Errors
+/// The stream or the file cannot be begun.
+pub(crate) fn stream<P: Stream<Item = Result<Piece, WriteError>> + Send>(
+    format: Format,
+    columns: &[(String, TableKind)],
+    pieces: P,
+) -> Result<impl Stream<Item = Result<Bytes, WriteError>> + Send + use<P>, WriteError> {
+    let mut writer = RowWriter::new(format.table(), columns)?;
+    let head = Bytes::from(writer.head()?);
+    let state = Some((Box::pin(pieces), writer));
+    let text = try_unfold(state, async |state| {
+        let Some((mut pieces, mut writer)) = state else {
+            return Ok(None);
+        };
+        let text = match pieces.try_next().await? {
+            Some(Piece::Text(text)) => text,
+            Some(Piece::Table(table)) => {
+                let written = blocking(move || (writer.write(table), writer));
+                let (text, back) = written.await?;
+                writer = back;
+                text?.into()
             }
-            RowWriter::Parquet(writer) => {
-                writer.write(&table)?;
-                Ok(std::mem::take(writer.inner_mut()))
-            }
-        }
-    }
-
-    /// What comes after the last table.
-    ///
-    /// # Errors
-    /// It cannot be written.
-    pub(crate) fn finish(&mut self) -> Result<Vec<u8>, WriteError> {
-        match self {
-            RowWriter::Csv(_) | RowWriter::Ndjson => Ok(Vec::new()),
-            RowWriter::Arrow(writer) => {
-                writer.finish()?;
-                Ok(std::mem::take(writer.inner_mut()))
-            }
-            RowWriter::Parquet(writer) => {
-                writer.finish()?;
-                Ok(std::mem::take(writer.inner_mut()))
-            }
-        }
-    }
-}
-
-fn csv_lines(table: &RowTable) -> Result<Vec<u8>, WriteError> {
-    let columns = &table.columns;
-    let lines = csv::lines(
-        columns.len(),
-        0..table.row_count(),
-        |out, column, row| match &columns[column].1 {
-            TableColumn::Integers(values) => *out += &values[row].to_string(),
-            TableColumn::Numbers(values) => write_number(out, values[row], Precision::Double, ""),
-            TableColumn::Texts(values) => {
-                *out += &text_field(values[row].as_deref().unwrap_or_default());
-            }
-        },
-    );
-    Ok(lines?)
-}
-
-fn json_lines(table: &RowTable) -> Result<String, WriteError> {
-    let names = table.columns.iter();
-    let names = names.map(|(name, _)| serde_json::to_string(name));
-    let names: Vec<String> = names.collect::<Result<_, _>>()?;
-    let mut text = String::with_capacity(32 * table.row_count() * names.len());
-    for row in 0..table.row_count() {
-        for (place, (name, (_, column))) in names.iter().zip(&table.columns).enumerate() {
-            let before = if place == 0 { '{' } else { ',' };
-            write!(text, "{before}{name}:")?;
-            match column {
-                TableColumn::Integers(values) => write!(text, "{}", values[row])?,
-                TableColumn::Numbers(values) => {
-                    write_number(&mut text, values[row], Precision::Double, "null");
-                }
-                TableColumn::Texts(values) => text.push_str(&serde_json::to_string(&values[row])?),
-            }
-        }
-        text.push_str("}\n");
-    }
-    Ok(text)
+            None => return Ok(Some((writer.finish()?.into(), None))),
+        };
+        Ok(Some((text, Some((pieces, writer)))))
+    });
+    Ok(iter([Ok(head)]).chain(text))
 }
 
 /// Rows of a batch of Arrow records, or of a group of a Parquet file.
@@ -219,7 +88,7 @@ pub(crate) fn table_body(format: Format, answer: RowsAnswer) -> Result<Body, Wri
         Format::Arrow | Format::Parquet => BATCH_ROWS,
         _ => ROWS,
     };
-    let mut writer = RowWriter::new(format, &columns)?;
+    let mut writer = RowWriter::new(format.table(), &columns)?;
     let head = writer.head()?;
     let starts = (0..rows).step_by(step).map(Some).chain([None]);
     let pieces = starts.map(move |start| {
@@ -308,28 +177,5 @@ mod tests {
                 json!(given.column("force_x_n")[row])
             );
         }
-    }
-
-    #[test]
-    fn lines_quote_what_needs_it_and_leave_gaps() {
-        let table = RowTable {
-            columns: vec![
-                ("row".to_owned(), TableColumn::Integers(vec![3, 4])),
-                ("f".to_owned(), TableColumn::Numbers(vec![f64::NAN, 0.1])),
-                (
-                    "t".to_owned(),
-                    TableColumn::Texts(vec![Some("a, \"b\"".to_owned()), None]),
-                ),
-            ],
-        };
-        let names = [("row".to_owned(), TableKind::Integers)];
-        let mut csv = RowWriter::new(Format::Csv, &names).unwrap();
-        assert_eq!(csv.head().unwrap(), b"row\n");
-        let lines = csv.write(table.clone()).unwrap();
-        assert_eq!(lines, b"3,,\"a, \"\"b\"\"\"\n4,0.1,\n");
-        let lines = RowWriter::Ndjson.write(table).unwrap();
-        let expected =
-            "{\"row\":3,\"f\":null,\"t\":\"a, \\\"b\\\"\"}\n{\"row\":4,\"f\":0.1,\"t\":null}\n";
-        assert_eq!(String::from_utf8(lines).unwrap(), expected);
     }
 }

@@ -1,7 +1,7 @@
 //! Stresses below the surface as a table: one line per point.
 
 use railhead_contact::solution::words::evolution::StressPoint;
-use railhead_jobs::codec::table::{RowTable, TableColumn};
+use railhead_tables::table::{RowTable, TableColumn};
 
 type Column = (&'static str, fn(&StressPoint) -> f64);
 

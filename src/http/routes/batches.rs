@@ -33,10 +33,10 @@ use railhead_contact::solution::words::answer::Solution;
 use railhead_jobs::Jobs;
 use railhead_jobs::batch::control::{Items, OpenedItem, PAGE_BYTES};
 use railhead_jobs::batch::upload::BatchUpload;
-use railhead_jobs::codec::table::RowTable;
 use railhead_jobs::error::JobsError;
 use railhead_jobs::model::{BatchItem, ItemFault, ItemResult, Kind, State as JobState};
 use railhead_jobs::sync::blocking;
+use railhead_tables::table::RowTable;
 
 problems! {
     /// What `POST /v1/batches` can fail with.

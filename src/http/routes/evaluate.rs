@@ -22,13 +22,10 @@ use crate::extract::query::{Parameters, id, query};
 use crate::extract::rows::{
     JSON, TableUpload, declared_bytes, read_body, read_json_columns, separate_table,
 };
-use crate::extract::tables::{TableForm, TableRows, TableSource, too_large};
-use crate::extract::titles::{NamedColumns, faulty};
 use crate::limits::{Memory, Pace, hold_while_sent};
 use crate::options::HttpOptions;
-use crate::problem::{ApiError, ProblemKind, Result, problems};
+use crate::problem::{ApiError, ProblemKind, Result, faulty, problems};
 use crate::render::format::Format;
-use crate::render::npz;
 use crate::render::row_tables::{json_body, table_body};
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::answer::RowsAnswer;
@@ -37,7 +34,10 @@ use railhead_contact::evaluate::varied::VariedColumn;
 use railhead_contact::monitor::{Monitor, Stop};
 use railhead_jobs::Jobs;
 use railhead_jobs::run::draft::ReceivedRows;
-use railhead_jobs::run::model::RunColumn;
+use railhead_tables::error::too_large;
+use railhead_tables::npz;
+use railhead_tables::read::{TableForm, TableRows, TableSource};
+use railhead_tables::titles::{NamedColumns, TitledColumn};
 
 /// The forms of an answer.
 const FORMATS: &[Format] = &[
@@ -264,18 +264,18 @@ fn read_rows(
             return Err(too_many(rows.held(), rows_max));
         }
         if form.packed() && rows.held() * columns * size_of::<f64>() > bytes_max {
-            return Err(too_large(bytes_max));
+            return Err(too_large(bytes_max).into());
         }
     }
     Ok(rows)
 }
 
 /// No rows of these columns, all of which stand for something in the case.
-fn varied_alone(columns: Vec<RunColumn>) -> Result<ReceivedRows> {
+fn varied_alone(columns: Vec<TitledColumn>) -> Result<ReceivedRows> {
     let carried = columns.iter().find(|column| column.pointer.is_none());
     match carried {
         None => Ok(ReceivedRows::new(columns)?),
-        Some(RunColumn { name, .. }) => Err(faulty(format!(
+        Some(TitledColumn { name, .. }) => Err(faulty(format!(
             "the column `{name}` names nothing in the case; only runs copy further columns"
         ))),
     }

@@ -10,11 +10,9 @@ use crate::extract::accept::{choose, one_of};
 use crate::extract::caller::{Caller, JobId, work_id};
 use crate::extract::json::JsonBody;
 use crate::extract::query::{Parameters, count, query, word};
-use crate::extract::titles::{Place, place, question};
 use crate::limits::{Memory, hold_while_sent};
 use crate::problem::{ApiError, ProblemKind, Result};
 use crate::render::format::Format;
-use crate::render::row_tables::RowWriter;
 use crate::routes::jobs::{self, GetProblems, SubmitProblems};
 use crate::routes::results::ResultProblems;
 use crate::routes::submission::{JobAccepted, NamedQuery, Submission, SubmitParameters};
@@ -22,10 +20,12 @@ use railhead_contact::case::words::evolution::{EvolutionWords, WearLosses};
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::varied::column_pointer;
 use railhead_contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
-use railhead_jobs::codec::table::{RowTable, TableColumn};
 use railhead_jobs::model::Kind;
 use railhead_jobs::sync::blocking;
 use railhead_jobs::{Jobs, JobsError};
+use railhead_tables::table::{RowTable, TableColumn};
+use railhead_tables::titles::{Place, place, question};
+use railhead_tables::write::RowWriter;
 
 /// The forms of the tables.
 const TABLES: &[Format] = &[Format::Csv, Format::Ndjson, Format::Arrow, Format::Parquet];
@@ -202,7 +202,8 @@ pub(crate) async fn table(
     let format = choose(&headers, query.format, TABLES)?;
     let made = read(jobs, &memory, id, move |evolution| {
         let table = query.of.unwrap_or(records_table)(evolution);
-        let text = RowWriter::whole(format, table).map_err(|error| ApiError::internal(&error))?;
+        let text =
+            RowWriter::whole(format.table(), table).map_err(|error| ApiError::internal(&error))?;
         Ok(format.answer(&format!("evolution-{id}"), text))
     });
     made.await

@@ -12,16 +12,17 @@ use crate::extract::accept::{choose, one_of};
 use crate::extract::query::{Parameters, Reader, index, query, reader, whole, word};
 use crate::limits::{Rendering, hold_while_sent};
 use crate::problem::{ApiError, Result};
-use crate::render::csv::Precision;
 use crate::render::format::Format;
 use crate::render::pieces::{csv_body, json_body};
-use crate::render::table::{File, Table};
-use crate::render::{npz, vtk};
+use crate::render::table::{File, cell_table};
 use crate::routes::parts::{FieldProblems, PARTS, PartRequest, has, motion_of, not_asked, stored};
 use crate::routes::plots::{PlotOptions, View, WIDTH_DEFAULT, picture};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointFields};
 use railhead_jobs::Jobs;
+use railhead_tables::cells::CellTable;
+use railhead_tables::csv::Precision;
+use railhead_tables::{npz, vtk};
 
 /// Most samples along one axis of a regular grid.
 const GRID_AXIS_MAX: u32 = 1000;
@@ -264,8 +265,8 @@ pub(crate) struct FieldValues {
 
 enum Written {
     /// The text is made from the table when the client takes it.
-    Json(Table, String),
-    Csv(Table),
+    Json(CellTable, String),
+    Csv(CellTable),
     File(Vec<u8>),
 }
 
@@ -302,12 +303,19 @@ impl FieldValues {
         let (patch, point) = (selection.patch, selection.point);
         let with_zones = self.outputs.contains(&Output::Zones);
         let outlines = Outlines::of(&self.cells, &self.values, with_zones);
-        let mut table = Table::of(&self.outputs, selection.grid, self.cells, self.values);
+        let mut table = cell_table(&self.outputs, selection.grid, self.cells, self.values);
         table.precision = selection.precision;
         Ok(match selection.format {
             Format::Csv => Written::Csv(table),
             Format::Npz => {
-                let file = npz::write(&table, &outlines);
+                let zones = [("stick", &outlines.stick), ("slip", &outlines.slip)];
+                let zones = zones.into_iter();
+                let zones = zones.filter_map(|(name, zone)| Some((name, zone.as_ref()?)));
+                let named: Vec<_> = [("patch", &outlines.patch)]
+                    .into_iter()
+                    .chain(zones)
+                    .collect();
+                let file = npz::write(&table, &named);
                 Written::File(file.map_err(|error| ApiError::internal(&error))?)
             }
             Format::Vtk => {

@@ -18,7 +18,6 @@ use crate::layers::etag::{Precondition, tagged};
 use crate::limits::{Memory, Permit, SMALL_BYTES, hold_while_sent};
 use crate::problem::{ApiError, Result, problems};
 use crate::render::format::Format;
-use crate::render::row_tables::RowWriter;
 use crate::render::{resultants, stresses};
 use crate::routes::parts::{FieldProblems, PartRequest, motion_of, not_asked, stored};
 use crate::routes::wait::{Wait, WaitQuery};
@@ -30,7 +29,9 @@ use railhead_contact::solution::words::answer::Solution;
 use railhead_contact::solution::words::damage::{Damage, DamageFiguresUsed};
 use railhead_contact::solution::words::evolution::{PassageSummary, StressPoint};
 use railhead_jobs::Jobs;
-use railhead_jobs::codec::table::RowTable;
+use railhead_tables::read::TableForm;
+use railhead_tables::table::RowTable;
+use railhead_tables::write::RowWriter;
 
 problems! {
     /// What every part of a result can fail with.
@@ -169,7 +170,7 @@ async fn write_resultants(
 }
 
 fn csv(table: RowTable) -> Result<Vec<u8>> {
-    RowWriter::whole(Format::Csv, table).map_err(|error| ApiError::internal(&error))
+    RowWriter::whole(TableForm::Csv, table).map_err(|error| ApiError::internal(&error))
 }
 
 /// What a point takes as text, in bytes.

@@ -18,20 +18,21 @@ use crate::extract::accept::{choose, one_of};
 use crate::extract::caller::{Caller, Credential, RunId, RunRowId};
 use crate::extract::query::{Parameters, Reader, id, query, reader, repeated};
 use crate::extract::rows::{JSON, TableUpload, read_run, separate_table};
-use crate::extract::titles::{NamedColumns, named_column};
 use crate::limits::{Memory, hold_while_sent};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind, Result, problems};
 use crate::render::format::Format;
-use crate::render::row_tables::{Piece, RowWriter, WriteError};
+use crate::render::row_tables::Piece;
 use crate::routes::submission::{NamedQuery, RunAccepted, Submission, SubmitParameters};
 use crate::routes::wait::{Wait, WaitQuery};
 use crate::routes::work::{RESULT_FORMATS, await_end, table_answer};
-use railhead_jobs::codec::table::{RowTable, TableColumn, TableKind};
 use railhead_jobs::model::Kind;
 use railhead_jobs::run::model::Run;
 use railhead_jobs::sync::blocking;
 use railhead_jobs::{Jobs, JobsError};
+use railhead_tables::table::{RowTable, TableColumn, TableKind};
+use railhead_tables::titles::{NamedColumns, named_column};
+use railhead_tables::write::{RowWriter, WriteError};
 
 problems! {
     /// What `POST /v1/runs` can fail with.

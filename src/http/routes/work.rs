@@ -26,13 +26,14 @@ use crate::dto::{BatchAnswer, BatchReceipt, JobAnswer, RunAnswer};
 use crate::extract::caller::{Caller, Credential, revoked, until_revoked, work_id};
 use crate::problem::{ApiError, PlainProblems, ProblemKind, Result, describe};
 use crate::render::format::Format;
-use crate::render::row_tables::{Piece, RowWriter, WriteError};
+use crate::render::row_tables::{Piece, stream};
 use crate::routes::wait::{EventRequest, Wait, WaitQuery, changed, event};
 use crate::state::AppState;
 use railhead_jobs::Jobs;
-use railhead_jobs::codec::table::TableKind;
 use railhead_jobs::model::{Kind, State as JobState};
 use railhead_jobs::work::{Follower, Work};
+use railhead_tables::table::TableKind;
+use railhead_tables::write::WriteError;
 
 /// Every kind of work.
 pub(crate) const KINDS: [Kind; 4] = [Kind::Case, Kind::Cases, Kind::Evolution, Kind::Rows];
@@ -133,7 +134,7 @@ pub(crate) fn table_answer(
     columns: &[(String, TableKind)],
     pieces: impl Stream<Item = Result<Piece, WriteError>> + Send + 'static,
 ) -> Result<Response> {
-    let text = RowWriter::stream(format, columns, pieces);
+    let text = stream(format, columns, pieces);
     let text = text.map_err(|error| ApiError::internal(&error))?;
     let revoked = revoked(jobs, key.map(|Extension(key)| key));
     Ok(format.answer(name, Body::from_stream(until_revoked(text, revoked))))

@@ -4,9 +4,9 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use crate::codec::fields::{Header, PREFIX_BYTES, header_length};
-use crate::codec::parquet;
 use crate::error::{JobsError, Result};
 use railhead_contact::solution::words::answer::PatchFields;
+use railhead_tables::parquet;
 
 /// A result in its stored form.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -7,13 +7,12 @@ use serde_json::Value;
 use uuid::Uuid;
 
 use crate::batch::upload::BatchUpload;
-use crate::codec::table::COLUMNS_MAX;
 use crate::disk_reserve::nameless;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::model::{Kind, WorkOptions};
 use crate::profiles::KnownSections;
-use crate::run::model::{REASON, RunChunk, RunColumn, RunHead};
+use crate::run::model::{REASON, RunChunk, RunHead};
 use crate::submit::microseconds;
 use crate::sync::blocking;
 use railhead_contact::case::words::solver::Output;
@@ -22,6 +21,8 @@ use railhead_contact::evaluate::answer::NumberColumns;
 use railhead_contact::evaluate::many::{ManyTask, expected_seconds};
 use railhead_contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
 use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_tables::table::COLUMNS_MAX;
+use railhead_tables::titles::TitledColumn;
 
 /// Expected solve time of a chunk in s: much longer than a claim takes, shorter than a lease, and soon done again.
 const CHUNK_SECONDS: f64 = 3.0;
@@ -67,7 +68,7 @@ impl Jobs {
     pub fn draft_run(
         &self,
         template: Value,
-        columns: Vec<RunColumn>,
+        columns: Vec<TitledColumn>,
         rows_max: u64,
     ) -> Result<RunDraft> {
         let rows = ReceivedRows::new(columns)?;
@@ -256,7 +257,7 @@ impl RunDraft {
 /// Rows that are being received.
 #[derive(Debug)]
 pub struct ReceivedRows {
-    columns: Vec<RunColumn>,
+    columns: Vec<TitledColumn>,
     /// Rows that are not yet in a chunk, column by column, in the units of the case.
     values: Vec<Values>,
     /// Number of rows received so far, with those already in chunks.
@@ -268,7 +269,7 @@ impl ReceivedRows {
     ///
     /// # Errors
     /// A column is there twice or has a name that it may not have, or there is none that varies the case.
-    pub fn new(columns: Vec<RunColumn>) -> Result<ReceivedRows, CaseError> {
+    pub fn new(columns: Vec<TitledColumn>) -> Result<ReceivedRows, CaseError> {
         let faults = faults_of_columns(&columns);
         if !faults.is_empty() {
             return Err(CaseError(faults));
@@ -327,7 +328,7 @@ impl ReceivedRows {
     /// The columns that vary the case, with their names.
     pub fn into_varied(self) -> impl Iterator<Item = (String, VariedColumn)> {
         let varied = self.columns.into_iter().zip(self.values);
-        varied.filter_map(|(RunColumn { name, pointer, .. }, values)| {
+        varied.filter_map(|(TitledColumn { name, pointer, .. }, values)| {
             let pointer = pointer?;
             Some((name, VariedColumn { pointer, values }))
         })
@@ -386,7 +387,7 @@ fn fields_asked_for(checked: &CheckedCase) -> Option<Fault> {
     Some(Fault::new("/outputs", detail))
 }
 
-fn faults_of_columns(columns: &[RunColumn]) -> Vec<Fault> {
+fn faults_of_columns(columns: &[TitledColumn]) -> Vec<Fault> {
     let mut faults = Vec::new();
     if columns.len() > COLUMNS_MAX {
         let detail = format!(

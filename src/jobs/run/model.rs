@@ -7,65 +7,17 @@ use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::codec::table::{TableColumn, TableKind};
 use crate::error::{JobsError, Result};
 use crate::model::{Batch, RunRecord, State};
 use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use railhead_tables::table::{TableColumn, TableKind};
+use railhead_tables::titles::TitledColumn;
 
 /// The form of heads and chunks that is written.
 const FORM: u32 = 1;
 
 /// The column with the reason why a row has no answer.
 pub const REASON: &str = "reason";
-
-/// A column of the rows of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RunColumn {
-    /// As the client names it, and as it is answered.
-    pub name: String,
-    /// The place in the case that it stands for; a column without one is carried along to the answers.
-    pub pointer: Option<String>,
-    /// What makes a number that was sent one of the case, in its unit.
-    #[serde(default = "unchanged")]
-    pub factor: f64,
-    /// Unit named in its title or in a line of units.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unit: Option<String>,
-    /// It holds texts; otherwise numbers.
-    pub text: bool,
-}
-
-/// A number times the factor of its unit, to 15 digits, so that 64.1 kN are 64100 N.
-#[must_use]
-pub fn converted(number: f64, factor: f64) -> f64 {
-    if factor == 1.0 {
-        return number;
-    }
-    let number = factor * number;
-    format!("{number:.14e}").parse().unwrap_or(number)
-}
-
-/// The factor of a column in the unit of the case.
-fn unchanged() -> f64 {
-    1.0
-}
-
-impl RunColumn {
-    /// A number that was sent, in the unit of the case.
-    #[must_use]
-    pub fn in_case(&self, number: f64) -> f64 {
-        converted(number, self.factor)
-    }
-
-    /// Type of its values.
-    #[must_use]
-    pub fn kind(&self) -> TableKind {
-        match self.text {
-            true => TableKind::Texts,
-            false => TableKind::Numbers,
-        }
-    }
-}
 
 /// The values of a column of rows as a column of a table.
 #[must_use]
@@ -83,7 +35,7 @@ pub struct RunHead {
     /// The case of the first row.
     pub case: Value,
     /// The columns that were sent, in their order.
-    pub columns: Vec<RunColumn>,
+    pub columns: Vec<TitledColumn>,
     /// Names of the columns of numbers of the answers.
     pub numbers: Vec<String>,
     /// Kept cross-sections that rows name.
@@ -116,7 +68,12 @@ struct CommonPart<'a> {
 impl RunHead {
     /// A head of the present form, without rows.
     #[must_use]
-    pub fn new(case: Value, columns: Vec<RunColumn>, numbers: Vec<String>, method: String) -> Self {
+    pub fn new(
+        case: Value,
+        columns: Vec<TitledColumn>,
+        numbers: Vec<String>,
+        method: String,
+    ) -> Self {
         RunHead {
             form: FORM,
             case,
@@ -271,7 +228,7 @@ impl RunChunk {
     ///
     /// # Errors
     /// It is damaged.
-    pub fn read(body: &[u8], columns: &[RunColumn]) -> Result<RunChunk> {
+    pub fn read(body: &[u8], columns: &[TitledColumn]) -> Result<RunChunk> {
         let damaged = |what: String| JobsError::Damaged(format!("rows of a run: {what}"));
         let packed = body.strip_prefix(MAGIC);
         let packed = packed.ok_or_else(|| damaged("not the body of a chunk".to_owned()))?;
@@ -282,7 +239,7 @@ impl RunChunk {
         let cut = || damaged("cut short".to_owned());
         let first_row = number(&mut rest).ok_or_else(cut)?;
         let rows = number(&mut rest).ok_or_else(cut)?;
-        let column = |column: &RunColumn| {
+        let column = |column: &TitledColumn| {
             if !column.text {
                 let values = (0..rows).map(|_| number(&mut rest).map(f64::from_bits));
                 return values.collect::<Option<_>>().map(Values::Numbers);
@@ -392,7 +349,7 @@ mod tests {
 
     #[test]
     fn numbers_in_another_unit_are_converted_to_15_digits() {
-        let column = |factor| RunColumn {
+        let column = |factor| TitledColumn {
             name: "Q [kN]".to_owned(),
             pointer: None,
             factor,
@@ -408,7 +365,7 @@ mod tests {
 
     #[test]
     fn a_chunk_comes_back_as_it_was_and_a_broken_one_is_refused() {
-        let column = |text| RunColumn {
+        let column = |text| TitledColumn {
             factor: 1.0,
             unit: None,
             name: "c".to_owned(),

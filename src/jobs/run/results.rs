@@ -3,14 +3,14 @@ use bytes::Bytes;
 use serde_json::Value;
 use uuid::Uuid;
 
-use crate::codec::parquet::TableReader;
-use crate::codec::table::{RowTable, TableColumn};
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::model::{BatchItem, State};
 use crate::run::model::{Run, RunChunk, RunHead, parted, table_column};
 use crate::sync::blocking;
 use railhead_contact::evaluate::varied::case_of_row;
+use railhead_tables::parquet::TableReader;
+use railhead_tables::table::{RowTable, TableColumn};
 
 impl Jobs {
     /// The case that a row of a run stands for, and its answer as a table of one row if it is there.

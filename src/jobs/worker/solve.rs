@@ -14,9 +14,7 @@ use crate::attempts::attempt::{
 };
 use crate::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Work};
 use crate::codec::encode::encode;
-use crate::codec::parquet;
 use crate::codec::result::EncodedResult;
-use crate::codec::table::{RowTable, TableColumn};
 use crate::error::{JobsError, Result};
 use crate::job_trace::JobTrace;
 use crate::model::{Failure, FailureKind, Kind, Queue};
@@ -31,6 +29,8 @@ use railhead_contact::evaluate::many::{ManyTask, solve_many};
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::solution::words::answer::{Fields, PatchFields, Solution};
+use railhead_tables::parquet;
+use railhead_tables::table::{RowTable, TableColumn};
 
 /// Does the work; a panic becomes a failure and the thread stays usable.
 pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Work) -> Outcome {

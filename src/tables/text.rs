@@ -4,11 +4,13 @@ use std::io::{self, BufRead, Chain, Cursor, Read};
 
 use serde_json::{Map, Value};
 
-use crate::extract::json::without_mark;
-use crate::extract::tables::{Chunk, Title};
-use crate::extract::titles::{delimiter, faulty, is_line_of_units, is_text, number, require_few};
-use crate::problem::{ApiError, Result};
 use railhead_contact::evaluate::varied::Values;
+
+pub use csv::StringRecord;
+
+use crate::error::{Result, TableError, faulty};
+use crate::read::{Chunk, Title};
+use crate::titles::{delimiter, is_line_of_units, is_text, number, require_few};
 
 /// Rows that are read at once.
 const ROWS: usize = 8192;
@@ -46,7 +48,7 @@ pub struct CsvRows<R: Read> {
     /// The titles of the columns.
     pub titles: Vec<Title>,
     /// The next row, if there is one.
-    record: Option<csv::StringRecord>,
+    record: Option<StringRecord>,
 }
 
 impl<R: BufRead> CsvRows<R> {
@@ -58,7 +60,7 @@ impl<R: BufRead> CsvRows<R> {
         let mut first = Vec::new();
         let read = (&mut source).take(LINE_BYTES_MAX);
         let read = { read }.read_until(b'\n', &mut first);
-        read.map_err(|error| ApiError::internal(&error))?;
+        read?;
         if first.starts_with(b"\xff\xfe") || first.starts_with(b"\xfe\xff") {
             return Err(faulty("the table is UTF-16, not UTF-8; send it as UTF-8"));
         }
@@ -90,7 +92,7 @@ impl<R: BufRead> CsvRows<R> {
             reader,
             decimal_comma: delimiter != b',',
             titles: Vec::new(),
-            record: Some(csv::StringRecord::new()),
+            record: Some(StringRecord::new()),
         };
         rows.advance()?;
         let units = rows.record.clone().filter(|units| {
@@ -158,7 +160,7 @@ impl<R: BufRead> CsvRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub fn record(&mut self) -> Result<Option<(u64, csv::StringRecord)>> {
+    pub fn record(&mut self) -> Result<Option<(u64, StringRecord)>> {
         let Some(record) = self.record.clone() else {
             return Ok(None);
         };
@@ -183,7 +185,7 @@ impl<R: BufRead> CsvRows<R> {
     }
 
     /// Number of the line on which the record begins that was read last.
-    fn line(&self, record: &csv::StringRecord) -> u64 {
+    fn line(&self, record: &StringRecord) -> u64 {
         let inside = record.as_slice().bytes().filter(|byte| *byte == b'\n');
         let after = self.reader.position().line();
         after.saturating_sub(1 + inside.count() as u64)
@@ -191,7 +193,7 @@ impl<R: BufRead> CsvRows<R> {
 }
 
 /// The refusal of a CSV table that cannot be read.
-fn unread(error: &csv::Error) -> ApiError {
+fn unread(error: &csv::Error) -> TableError {
     faulty(match error.kind() {
         csv::ErrorKind::Utf8 { pos, .. } => {
             let line = pos.as_ref().map_or(1, csv::Position::line);
@@ -201,8 +203,15 @@ fn unread(error: &csv::Error) -> ApiError {
     })
 }
 
+/// The text of a line without the byte order mark that the first one may begin with.
+#[must_use]
+pub fn without_mark(text: &[u8], line: u64) -> &[u8] {
+    let rest = text.strip_prefix(b"\xef\xbb\xbf").filter(|_| line == 1);
+    rest.unwrap_or(text)
+}
+
 /// Rows as JSON objects, one in a line.
-pub(super) struct JsonRows<R: BufRead> {
+pub(crate) struct JsonRows<R: BufRead> {
     source: R,
     line: u64,
     /// The titles of the columns: the members of the first row.
@@ -215,7 +224,7 @@ impl<R: BufRead> JsonRows<R> {
     ///
     /// # Errors
     /// `faulty-table`
-    pub(super) fn new(source: R) -> Result<JsonRows<R>> {
+    pub(crate) fn new(source: R) -> Result<JsonRows<R>> {
         let mut rows = JsonRows {
             source,
             line: 0,
@@ -275,7 +284,7 @@ impl<R: BufRead> JsonRows<R> {
             let mut text = Vec::new();
             let mut line = (&mut self.source).take(LINE_BYTES_MAX);
             let read = line.read_until(b'\n', &mut text);
-            let read = read.map_err(|error| ApiError::internal(&error))?;
+            let read = read?;
             self.line += 1;
             if read == 0 {
                 self.row = None;
@@ -291,7 +300,7 @@ impl<R: BufRead> JsonRows<R> {
         }
     }
 
-    fn wrong(&self, detail: &str) -> ApiError {
+    fn wrong(&self, detail: &str) -> TableError {
         faulty(format!("line {}: {detail}", self.line))
     }
 }
@@ -330,11 +339,11 @@ fn there(chunk: Chunk) -> Option<Chunk> {
 mod tests {
     use std::io::BufReader;
 
-    use axum::body::Bytes;
+    use bytes::Bytes;
 
     use super::*;
-    use crate::extract::tables::{TableForm, TableRows, TableSource};
-    use crate::extract::titles::NamedColumns;
+    use crate::read::{TableForm, TableRows, TableSource};
+    use crate::titles::NamedColumns;
 
     fn rows(form: TableForm, text: &'static str) -> Result<TableRows> {
         let source = TableSource::Memory(Bytes::from_static(text.as_bytes()));

@@ -13,8 +13,8 @@ use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_ipc::writer::StreamWriter;
 use arrow_schema::{ArrowError, DataType, Field, Schema};
 
-use crate::codec::table::{COLUMNS_MAX, RowTable, TableColumn, TableKind};
-use crate::codec::{DAMAGED, guarded};
+use crate::table::{COLUMNS_MAX, RowTable, TableColumn, TableKind};
+use crate::{DAMAGED, guarded};
 
 /// The bytes that a file begins with; a stream begins otherwise.
 const FILE_MAGIC: &[u8] = b"ARROW1";

@@ -16,8 +16,8 @@ use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
-use crate::codec::table::{RowTable, TableColumn, TableKind};
-use crate::codec::{DAMAGED, guarded};
+use crate::table::{RowTable, TableColumn, TableKind};
+use crate::{DAMAGED, guarded};
 
 /// Rows of one group that are read at most; writers make groups of 10⁵ or 10⁶ rows.
 const GROUP_ROWS_MAX: usize = 1 << 21;

@@ -4,7 +4,7 @@
 //! points with the values as point data, NaN outside the patch. Pairs such as `traction_x_mpa`, `traction_y_mpa` come as
 //! one vector `traction_mpa` (z is 0), ready for glyphs; zones are 0 stick, 1 slip, -1 outside.
 
-use crate::render::table::{ArrayData, PLACES, Rows, Table, zone_code};
+use crate::cells::{CellData, CellRows, CellTable, PLACES, zone_code};
 
 /// Longest title that the format allows, its line break not counted.
 const TITLE_MAX: usize = 255;
@@ -18,7 +18,7 @@ const VECTORS: [(&str, &str, &str); 2] = [
 
 /// Writes a table under a title; what is not printable ASCII in the title becomes `?`.
 #[must_use]
-pub(crate) fn write(table: &Table, title: &str) -> Vec<u8> {
+pub fn write(table: &CellTable, title: &str) -> Vec<u8> {
     let mut out = Vec::new();
     line(&mut out, "# vtk DataFile Version 3.0");
     let title = title.chars().take(TITLE_MAX);
@@ -32,12 +32,12 @@ pub(crate) fn write(table: &Table, title: &str) -> Vec<u8> {
     line(&mut out, &title.map(plain).collect::<String>());
     line(&mut out, "BINARY");
     match &table.rows {
-        Rows::Cells => {
+        CellRows::Cells => {
             let places = PLACES.map(|name| table.numbers(name).unwrap_or_default());
             write_quads(&mut out, places);
-            line(&mut out, &format!("CELL_DATA {}", table.len()));
+            line(&mut out, &format!("CELL_DATA {}", table.row_count()));
         }
-        Rows::Grid { x_mm, y_mm } => {
+        CellRows::Grid { x_mm, y_mm } => {
             write_points(&mut out, x_mm, y_mm);
             line(&mut out, &format!("POINT_DATA {}", x_mm.len() * y_mm.len()));
         }
@@ -80,11 +80,11 @@ fn write_points(out: &mut Vec<u8>, x: &[f64], y: &[f64]) {
     line(out, &format!("SPACING {:?} {:?} 1", step(x), step(y)));
 }
 
-fn write_values(out: &mut Vec<u8>, table: &Table) {
+fn write_values(out: &mut Vec<u8>, table: &CellTable) {
     let columns = table.columns.iter();
     for column in columns.filter(|column| !PLACES.contains(&column.name)) {
         match &column.data {
-            ArrayData::Integers(values) => {
+            CellData::Integers(values) => {
                 line(out, &format!("SCALARS {} int 1", column.name));
                 line(out, "LOOKUP_TABLE default");
                 let values = values.iter();
@@ -93,12 +93,12 @@ fn write_values(out: &mut Vec<u8>, table: &Table) {
                     values.map(|value| i32::try_from(*value).unwrap_or(i32::MAX)),
                 );
             }
-            ArrayData::Zones(zones) => {
+            CellData::Zones(zones) => {
                 line(out, &format!("SCALARS {} int 1", column.name));
                 line(out, "LOOKUP_TABLE default");
                 integers(out, zones.iter().map(|zone| zone_code(*zone).into()));
             }
-            ArrayData::Numbers(values) => {
+            CellData::Numbers(values) => {
                 let vector = VECTORS
                     .iter()
                     .find(|(x, y, _)| [*x, *y].contains(&column.name));

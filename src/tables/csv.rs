@@ -10,7 +10,7 @@ use utoipa::ToSchema;
 /// How exactly numbers are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Precision {
+pub enum Precision {
     /// As they were computed: 64 bits.
     #[default]
     Double,
@@ -22,7 +22,7 @@ pub(crate) enum Precision {
 ///
 /// # Errors
 /// Never, as memory takes all that is written.
-pub(crate) fn head<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Vec<u8>, csv::Error> {
+pub fn head<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
     out.write_record(names.into_iter().map(|name| text_field(name).into_owned()))?;
     finish(out)
@@ -32,7 +32,7 @@ pub(crate) fn head<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Vec<u
 ///
 /// # Errors
 /// Never, as memory takes all that is written.
-pub(crate) fn lines(
+pub fn lines(
     columns: usize,
     rows: Range<usize>,
     write: impl Fn(&mut String, usize, usize),
@@ -53,7 +53,7 @@ pub(crate) fn lines(
 /// A text of a client as a field of a table. Spreadsheets run a text that begins like a formula, even behind blanks, tabs or line breaks; a
 /// leading apostrophe marks it as text. Numbers are written as they are.
 #[must_use]
-pub(crate) fn text_field(text: &str) -> Cow<'_, str> {
+pub fn text_field(text: &str) -> Cow<'_, str> {
     let begin = text.trim_start_matches(|mark: char| mark.is_whitespace() || mark.is_control());
     // Spreadsheets take the wide forms for the same signs.
     let formula = begin.starts_with(['=', '+', '-', '@', '＝', '＋', '－', '＠']);
@@ -82,12 +82,12 @@ fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
 /// The nearest number of 32 bits; NaN stays NaN.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "that is what is asked for")]
-pub(crate) fn single(value: f64) -> f32 {
+pub fn single(value: f64) -> f32 {
     value as f32
 }
 
 /// Writes the shortest digits that are read as the same number, or `none` where there is none.
-pub(crate) fn write_number(text: &mut String, number: f64, precision: Precision, none: &str) {
+pub fn write_number(text: &mut String, number: f64, precision: Precision, none: &str) {
     // Writing to a string does not fail.
     let _ = match precision {
         _ if !number.is_finite() => write!(text, "{none}"),

@@ -1,25 +1,20 @@
 //! Tables of rows in every form that requests send them in: runs, batches and evaluations read them here.
 
-mod npz;
-mod text;
-
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};
 
-use axum::body::Bytes;
-
-use self::npz::read_arrays;
-use self::text::JsonRows;
-use crate::extract::titles::{NamedColumns, Titled, faulty, require_few};
-use crate::problem::{ApiError, ProblemKind, Result};
+use bytes::Bytes;
+use parquet::errors::Result as ParquetResult;
+use parquet::file::reader::ChunkReader;
 use railhead_contact::evaluate::varied::Values;
-use railhead_jobs::codec::arrow;
-use railhead_jobs::codec::parquet::TableReader;
-use railhead_jobs::codec::table::{RowTable, TableColumn, TableKind};
-use railhead_jobs::run::model::RunColumn;
 
-pub use self::npz::too_large;
-pub use self::text::CsvRows;
+use crate::arrow;
+use crate::error::{Result, faulty, too_large};
+use crate::npz::read_arrays;
+use crate::parquet::TableReader;
+use crate::table::{RowTable, TableColumn, TableKind};
+use crate::text::{CsvRows, JsonRows};
+use crate::titles::{NamedColumns, Titled, TitledColumn, require_few};
 
 /// Largest group of rows of a Parquet file, unpacked, in bytes.
 const GROUP_BYTES_MAX: i64 = 1 << 28;
@@ -69,17 +64,6 @@ impl TableForm {
     pub fn packed(self) -> bool {
         matches!(self, TableForm::Parquet | TableForm::Npz)
     }
-}
-
-/// The fault of a body that is neither JSON nor a table.
-pub fn unsupported(essence: &str, json: &str) -> ApiError {
-    ApiError::new(
-        ProblemKind::UnsupportedMediaType,
-        format!(
-            "the content type is `{essence}`; send {json}, or {}",
-            TableForm::ALLOWED
-        ),
-    )
 }
 
 /// The bytes of a table.
@@ -177,7 +161,7 @@ impl TableRows {
     ///
     /// # Errors
     /// See [`NamedColumns::columns`].
-    pub fn named(&self, named: &NamedColumns) -> Result<Vec<RunColumn>> {
+    pub fn named(&self, named: &NamedColumns) -> Result<Vec<TitledColumn>> {
         let titles = self.titles.iter();
         named.columns(
             titles.map(|title| -> Titled<'_> { (&title.name, title.unit.as_deref(), title.text) }),
@@ -226,8 +210,8 @@ fn npz_table(source: impl Read, bytes_max: usize) -> Result<RowTable> {
 }
 
 /// The groups of rows of a Parquet file.
-fn groups<R: parquet::file::reader::ChunkReader + 'static>(
-    reader: parquet::errors::Result<TableReader<R>>,
+fn groups<R: ChunkReader + 'static>(
+    reader: ParquetResult<TableReader<R>>,
 ) -> Result<impl Iterator<Item = Result<RowTable>>> {
     let damaged = |error| faulty(format!("the Parquet file cannot be read: {error}"));
     let reader = reader.map_err(damaged)?;

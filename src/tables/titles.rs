@@ -5,10 +5,10 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
 
-use crate::problem::{ApiError, Fault, ProblemKind, Result};
-use railhead_contact::evaluate::varied::column_pointer;
-use railhead_jobs::codec::table::COLUMNS_MAX;
-use railhead_jobs::run::model::RunColumn;
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Result, TableError, faulty};
+use crate::table::{COLUMNS_MAX, TableKind};
 
 /// Faulty columns and recognised columns that the sentence of a refusal names; `errors` has all faulty ones.
 const NAMED_MAX: usize = 20;
@@ -16,11 +16,6 @@ const NAMED_MAX: usize = 20;
 const MISSPELT_LETTERS: usize = 2;
 /// Shortest name that a misspelt title is compared with.
 const MISSPELT_LENGTH: usize = 5;
-
-/// A refusal of a table.
-pub fn faulty(detail: impl Into<String>) -> ApiError {
-    ApiError::new(ProblemKind::FaultyTable, detail)
-}
 
 /// The refusal of a table with this many columns, if they are too many.
 ///
@@ -32,6 +27,55 @@ pub fn require_few(columns: usize) -> Result<()> {
         true => Err(faulty(format!(
             "the table has {columns} columns; allowed: at most {COLUMNS_MAX}"
         ))),
+    }
+}
+
+/// A column of a table by its title.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TitledColumn {
+    /// As the client names it, and as it is answered.
+    pub name: String,
+    /// The place in the case that it stands for; a column without one is carried along to the answers.
+    pub pointer: Option<String>,
+    /// What makes a number that was sent one of the case, in its unit.
+    #[serde(default = "unchanged")]
+    pub factor: f64,
+    /// Unit named in its title or in a line of units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+    /// It holds texts; otherwise numbers.
+    pub text: bool,
+}
+
+/// A number times the factor of its unit, to 15 digits, so that 64.1 kN are 64100 N.
+#[must_use]
+pub fn converted(number: f64, factor: f64) -> f64 {
+    if factor == 1.0 {
+        return number;
+    }
+    let number = factor * number;
+    format!("{number:.14e}").parse().unwrap_or(number)
+}
+
+/// The factor of a column in the unit of the case.
+fn unchanged() -> f64 {
+    1.0
+}
+
+impl TitledColumn {
+    /// A number that was sent, in the unit of the case.
+    #[must_use]
+    pub fn in_case(&self, number: f64) -> f64 {
+        converted(number, self.factor)
+    }
+
+    /// Type of its values.
+    #[must_use]
+    pub fn kind(&self) -> TableKind {
+        match self.text {
+            true => TableKind::Texts,
+            false => TableKind::Numbers,
+        }
     }
 }
 
@@ -451,7 +495,10 @@ impl NamedColumns {
     /// # Errors
     /// `faulty-table` with every column at fault: a title is not known, or it names a quantity with a unit that it does not have, or without
     /// one; or there are too many columns; or the client named a column twice, or one that is not there.
-    pub fn columns<'a>(&self, titles: impl Iterator<Item = Titled<'a>>) -> Result<Vec<RunColumn>> {
+    pub fn columns<'a>(
+        &self,
+        titles: impl Iterator<Item = Titled<'a>>,
+    ) -> Result<Vec<TitledColumn>> {
         let titles: Vec<Titled<'_>> = titles.take(COLUMNS_MAX + 1).collect();
         if titles.len() > COLUMNS_MAX {
             return Err(faulty(format!(
@@ -475,7 +522,7 @@ impl NamedColumns {
                 missing.remove(name);
             }
             match place_of(title, below, found.map(|(_, what)| *what)) {
-                Ok(place) => columns.push(RunColumn {
+                Ok(place) => columns.push(TitledColumn {
                     name: title.to_owned(),
                     factor: place.as_ref().map_or(1.0, |place| place.factor),
                     pointer: place.map(|place| place.pointer),
@@ -572,7 +619,10 @@ fn unit_of<'a>(title: &'a str, below: Option<&'a str>) -> Option<&'a str> {
 }
 
 /// The refusal of a table with faulty columns; also says what the others were taken for.
-fn refusal<'a>(faults: impl Iterator<Item = (&'a str, String)>, good: &[RunColumn]) -> ApiError {
+fn refusal<'a>(
+    faults: impl Iterator<Item = (&'a str, String)>,
+    good: &[TitledColumn],
+) -> TableError {
     let faults: Vec<(&str, String)> = faults
         .map(|(title, detail)| (title, format!("column `{title}`: {detail}")))
         .collect();
@@ -597,11 +647,13 @@ fn refusal<'a>(faults: impl Iterator<Item = (&'a str, String)>, good: &[RunColum
     if !recognised.is_empty() {
         parts.push(format!("recognised: {}", recognised.join(", ")));
     }
-    let errors = faults.into_iter().map(|(title, detail)| Fault {
-        pointer: Some(column_pointer(title)),
-        ..Fault::invalid(detail)
-    });
-    ApiError::listing(ProblemKind::FaultyTable, parts.join("; "), errors.collect())
+    let columns = faults.into_iter();
+    TableError::Faulty {
+        detail: parts.join("; "),
+        columns: columns
+            .map(|(title, detail)| (title.to_owned(), detail))
+            .collect(),
+    }
 }
 
 /// Reads `TITLE:NAME` of the query; the title may contain colons.

@@ -1,0 +1,167 @@
+//! Tables of rows in the forms that clients ask for, piece by piece.
+
+use std::error::Error;
+use std::fmt::Write;
+
+use crate::arrow::ArrowWriter;
+use crate::csv::{self, Precision, text_field, write_number};
+use crate::parquet::TableWriter;
+use crate::read::TableForm;
+use crate::table::{RowTable, TableColumn, TableKind};
+
+/// Why a table cannot be written.
+pub type WriteError = Box<dyn Error + Send + Sync>;
+
+/// Writes tables with the same columns, one after the other.
+pub enum RowWriter {
+    /// A line with the names of the columns, then one for each row.
+    Csv(Vec<String>),
+    /// An object for each row.
+    Ndjson,
+    /// A stream of batches of records.
+    Arrow(Box<ArrowWriter<Vec<u8>>>),
+    /// One file, a group of rows for each table.
+    Parquet(Box<TableWriter<Vec<u8>>>),
+}
+
+impl RowWriter {
+    /// Writes tables of these columns as CSV, an Arrow stream or a Parquet file, and as NDJSON in any other form.
+    ///
+    /// # Errors
+    /// The stream or the file cannot be begun.
+    pub fn new(form: TableForm, columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
+        Ok(match form {
+            TableForm::Csv => {
+                RowWriter::Csv(columns.iter().map(|(name, _)| name.clone()).collect())
+            }
+            TableForm::Arrow => RowWriter::Arrow(Box::new(ArrowWriter::new(Vec::new(), columns)?)),
+            TableForm::Parquet => {
+                RowWriter::Parquet(Box::new(TableWriter::new(Vec::new(), columns)?))
+            }
+            _ => RowWriter::Ndjson,
+        })
+    }
+
+    /// A table that is written as a whole.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn whole(form: TableForm, table: RowTable) -> Result<Vec<u8>, WriteError> {
+        let mut writer = RowWriter::new(form, &table.kinds())?;
+        Ok([writer.head()?, writer.write(table)?, writer.finish()?].concat())
+    }
+
+    /// What comes before the first table.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn head(&mut self) -> Result<Vec<u8>, WriteError> {
+        match self {
+            RowWriter::Csv(names) => Ok(csv::head(names.iter().map(String::as_str))?),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// One more table.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write(&mut self, table: RowTable) -> Result<Vec<u8>, WriteError> {
+        match self {
+            RowWriter::Csv(_) => Ok(csv_lines(&table)?),
+            RowWriter::Ndjson => Ok(json_lines(&table)?.into_bytes()),
+            RowWriter::Arrow(writer) => {
+                writer.write(table)?;
+                Ok(std::mem::take(writer.inner_mut()))
+            }
+            RowWriter::Parquet(writer) => {
+                writer.write(&table)?;
+                Ok(std::mem::take(writer.inner_mut()))
+            }
+        }
+    }
+
+    /// What comes after the last table.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(&mut self) -> Result<Vec<u8>, WriteError> {
+        match self {
+            RowWriter::Csv(_) | RowWriter::Ndjson => Ok(Vec::new()),
+            RowWriter::Arrow(writer) => {
+                writer.finish()?;
+                Ok(std::mem::take(writer.inner_mut()))
+            }
+            RowWriter::Parquet(writer) => {
+                writer.finish()?;
+                Ok(std::mem::take(writer.inner_mut()))
+            }
+        }
+    }
+}
+
+fn csv_lines(table: &RowTable) -> Result<Vec<u8>, WriteError> {
+    let columns = &table.columns;
+    let lines = csv::lines(
+        columns.len(),
+        0..table.row_count(),
+        |out, column, row| match &columns[column].1 {
+            TableColumn::Integers(values) => *out += &values[row].to_string(),
+            TableColumn::Numbers(values) => write_number(out, values[row], Precision::Double, ""),
+            TableColumn::Texts(values) => {
+                *out += &text_field(values[row].as_deref().unwrap_or_default());
+            }
+        },
+    );
+    Ok(lines?)
+}
+
+fn json_lines(table: &RowTable) -> Result<String, WriteError> {
+    let names = table.columns.iter();
+    let names = names.map(|(name, _)| serde_json::to_string(name));
+    let names: Vec<String> = names.collect::<Result<_, _>>()?;
+    let mut text = String::with_capacity(32 * table.row_count() * names.len());
+    for row in 0..table.row_count() {
+        for (place, (name, (_, column))) in names.iter().zip(&table.columns).enumerate() {
+            let before = if place == 0 { '{' } else { ',' };
+            write!(text, "{before}{name}:")?;
+            match column {
+                TableColumn::Integers(values) => write!(text, "{}", values[row])?,
+                TableColumn::Numbers(values) => {
+                    write_number(&mut text, values[row], Precision::Double, "null");
+                }
+                TableColumn::Texts(values) => text.push_str(&serde_json::to_string(&values[row])?),
+            }
+        }
+        text.push_str("}\n");
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_quote_what_needs_it_and_leave_gaps() {
+        let table = RowTable {
+            columns: vec![
+                ("row".to_owned(), TableColumn::Integers(vec![3, 4])),
+                ("f".to_owned(), TableColumn::Numbers(vec![f64::NAN, 0.1])),
+                (
+                    "t".to_owned(),
+                    TableColumn::Texts(vec![Some("a, \"b\"".to_owned()), None]),
+                ),
+            ],
+        };
+        let names = [("row".to_owned(), TableKind::Integers)];
+        let mut csv = RowWriter::new(TableForm::Csv, &names).unwrap();
+        assert_eq!(csv.head().unwrap(), b"row\n");
+        let lines = csv.write(table.clone()).unwrap();
+        assert_eq!(lines, b"3,,\"a, \"\"b\"\"\"\n4,0.1,\n");
+        let lines = RowWriter::Ndjson.write(table).unwrap();
+        let expected =
+            "{\"row\":3,\"f\":null,\"t\":\"a, \\\"b\\\"\"}\n{\"row\":4,\"f\":0.1,\"t\":null}\n";
+        assert_eq!(String::from_utf8(lines).unwrap(), expected);
+    }
+}
