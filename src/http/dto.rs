@@ -532,7 +532,7 @@ pub(crate) struct Resultants {
 pub(crate) struct PatchResultants {
     /// Index of the patch, from 0.
     pub patch: usize,
-    /// Normal force in N.
+    /// Normal force in N under the first motion.
     pub normal_force_n: f64,
     /// One entry per motion, or only the requested one.
     pub points: Vec<PointResultants>,
@@ -541,10 +541,12 @@ pub(crate) struct PatchResultants {
 /// Forces and moment on the lower body, for one patch and one motion.
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct PointResultants {
-    /// Index of the motion, from 0.
+    /// Index of the motion or of the position of the wheelset, from 0.
     pub point: usize,
     /// The motion.
     pub motion: MotionWords,
+    /// Normal force in N.
+    pub normal_force_n: f64,
     /// Longitudinal force in N.
     pub force_x_n: f64,
     /// Lateral force in N.
@@ -577,45 +579,42 @@ impl Resultants {
         point: Option<usize>,
         patch: Option<usize>,
     ) -> Resultants {
-        let chosen =
-            |choice: Option<usize>, index: usize| choice.is_none_or(|choice| choice == index);
-        let patches = solution.patches.into_iter().enumerate();
-        let patches = patches
-            .filter(|(index, _)| chosen(patch, *index))
-            .map(|(number, patch)| {
-                let points = patch
-                    .points
-                    .into_iter()
-                    .enumerate()
-                    .filter(|(index, _)| chosen(point, *index));
-                PatchResultants {
-                    patch: number,
-                    normal_force_n: patch.normal_force_n,
-                    points: points
-                        .map(|(number, point)| PointResultants {
-                            point: number,
-                            motion: point.motion,
-                            force_x_n: point.force_x_n,
-                            force_y_n: point.force_y_n,
-                            moment_z_n_mm: point.moment_z_n_mm,
-                            error_estimate: point.error_estimate,
-                            profile_uncertainty: point.profile_uncertainty.map(Box::new),
-                            friction_power_n: point.friction_power_n,
-                            friction_power_without_spin_n: point.friction_power_without_spin_n,
-                            saturated: point.saturated,
-                            history: point.history.map(Box::new),
-                        })
-                        .collect(),
+        let motions = point.map_or(0..solution.total.len(), |point| point..point + 1);
+        let mut patches: Vec<PatchResultants> = Vec::new();
+        for number in motions.clone() {
+            for part in solution.at(number) {
+                if patch.is_some_and(|patch| patch != part.number) {
+                    continue;
                 }
-            });
-        let patches = patches.collect();
-        let total = solution.total.into_iter().enumerate();
+                let known = patches.iter().position(|patch| patch.patch == part.number);
+                let place = known.unwrap_or_else(|| {
+                    patches.push(PatchResultants {
+                        patch: part.number,
+                        normal_force_n: part.patch.normal_force_n,
+                        points: Vec::new(),
+                    });
+                    patches.len() - 1
+                });
+                let of = part.point;
+                patches[place].points.push(PointResultants {
+                    point: number,
+                    motion: of.motion,
+                    normal_force_n: part.region.normal_force_n,
+                    force_x_n: of.force_x_n,
+                    force_y_n: of.force_y_n,
+                    moment_z_n_mm: of.moment_z_n_mm,
+                    error_estimate: of.error_estimate,
+                    profile_uncertainty: of.profile_uncertainty.map(Box::new),
+                    friction_power_n: of.friction_power_n,
+                    friction_power_without_spin_n: of.friction_power_without_spin_n,
+                    saturated: of.saturated,
+                    history: of.history.map(Box::new),
+                });
+            }
+        }
         Resultants {
             patches,
-            total: total
-                .filter(|(index, _)| chosen(point, *index))
-                .map(|(_, total)| total)
-                .collect(),
+            total: solution.total[motions].to_vec(),
             origin: solution.origin,
         }
     }
@@ -638,37 +637,27 @@ pub(crate) struct Sum {
     pub history: Option<HistoryPoint>,
 }
 
-/// Sums over all patches for each motion, of what `total` does not have.
+/// Sums over all patches of a motion, of what `total` does not have; nothing if it has no patches.
 #[must_use]
-pub(crate) fn sums(solution: &Solution) -> Vec<Sum> {
-    let load = solution.patches.iter().map(|patch| patch.normal_force_n);
-    let normal_force_n = load.sum();
-    let motions = solution
-        .patches
-        .first()
-        .map_or(&[][..], |patch| &patch.points);
-    let points = motions.iter().enumerate().map(|(number, first)| {
-        let parts = || {
-            let patches = solution.patches.iter();
-            patches.filter_map(move |patch| patch.points.get(number))
-        };
-        Sum {
-            motion: first.motion,
-            normal_force_n,
-            friction_power_n: parts().map(|part| part.friction_power_n).sum(),
-            friction_power_without_spin_n: parts()
-                .map(|part| part.friction_power_without_spin_n)
+pub(crate) fn sum(solution: &Solution, motion: usize) -> Option<Sum> {
+    let parts = || solution.at(motion);
+    let points = || parts().map(|part| part.point);
+    let first = points().next()?;
+    Some(Sum {
+        motion: first.motion,
+        normal_force_n: parts().map(|part| part.region.normal_force_n).sum(),
+        friction_power_n: points().map(|point| point.friction_power_n).sum(),
+        friction_power_without_spin_n: points()
+            .map(|point| point.friction_power_without_spin_n)
+            .sum(),
+        saturated: points().any(|point| point.saturated),
+        history: first.history.map(|history| HistoryPoint {
+            dissipated_n_mm: points()
+                .filter_map(|point| Some(point.history?.dissipated_n_mm))
                 .sum(),
-            saturated: parts().any(|part| part.saturated),
-            history: first.history.map(|history| HistoryPoint {
-                dissipated_n_mm: parts()
-                    .filter_map(|part| Some(part.history?.dissipated_n_mm))
-                    .sum(),
-                ..history
-            }),
-        }
-    });
-    points.collect()
+            ..history
+        }),
+    })
 }
 
 /// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
-    UInt8Type, UInt16Type, UInt32Type,
+    UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow_ipc::reader::{FileReader, StreamReader};
@@ -111,7 +111,14 @@ pub fn read<R: Read + Seek + Send + 'static>(
     let mut batches = Some(batches);
     Ok(std::iter::from_fn(move || {
         let mut reader = batches.take()?;
-        let next = guarded(|| reader.next().map(|batch| table(&batch?)));
+        let next = guarded(|| {
+            Some(
+                reader
+                    .next()?
+                    .map_err(explained)
+                    .and_then(|batch| table(&batch)),
+            )
+        });
         let next = next.unwrap_or_else(|| Some(Err(damaged())));
         if matches!(next, Some(Ok(_))) {
             batches = Some(reader);
@@ -122,6 +129,16 @@ pub fn read<R: Read + Seek + Send + 'static>(
 
 /// Batches of records under way.
 type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send>;
+
+/// An error of the library, in words for the writer of the table.
+fn explained(error: ArrowError) -> ArrowError {
+    match error.to_string().contains("decompression requires") {
+        true => ArrowError::IpcError(
+            "its buffers are compressed; write them without compression, or as Parquet".to_owned(),
+        ),
+        false => error,
+    }
+}
 
 fn table(batch: &RecordBatch) -> Result<RowTable, ArrowError> {
     let fields = batch.schema();
@@ -154,12 +171,23 @@ fn column(field: &Field, array: &ArrayRef) -> Result<TableColumn, ArrowError> {
         DataType::Int32 => numbers::<Int32Type>(array, f64::from),
         DataType::Int16 => numbers::<Int16Type>(array, f64::from),
         DataType::Int8 => numbers::<Int8Type>(array, f64::from),
+        DataType::UInt64 => numbers::<UInt64Type>(array, |value| value as f64),
         DataType::UInt32 => numbers::<UInt32Type>(array, f64::from),
         DataType::UInt16 => numbers::<UInt16Type>(array, f64::from),
         DataType::UInt8 => numbers::<UInt8Type>(array, f64::from),
         DataType::Utf8 => texts(array.as_string::<i32>().iter()),
         DataType::LargeUtf8 => texts(array.as_string::<i64>().iter()),
         DataType::Utf8View => texts(array.as_string_view().iter()),
+        DataType::Dictionary(_, of) if of.is_string() => {
+            let words = array.as_any_dictionary();
+            let TableColumn::Texts(texts) = column(field, words.values())? else {
+                unreachable!("strings are texts")
+            };
+            let keys = words.normalized_keys().into_iter().enumerate();
+            let text =
+                |(row, key): (usize, usize)| array.is_valid(row).then(|| texts[key].clone())?;
+            TableColumn::Texts(keys.map(text).collect::<Vec<Option<String>>>())
+        }
         other => {
             let detail = format!(
                 "the column `{}` is of type {other}; numbers and texts are read",

@@ -1,20 +1,23 @@
 //! Tables of rows as Parquet: how the rows of a run are stored, and how clients may send them.
 //!
-//! Flat columns, uncompressed or packed with Snappy. Numbers and texts that a row does not have are null.
+//! Flat columns. Numbers and texts that a row does not have are null.
 
 use std::io::Write;
 use std::sync::Arc;
 
-use parquet::basic::{Compression, CompressionCodec, ConvertedType, Repetition, Type as Physical};
+use parquet::basic::{
+    Compression, CompressionCodec, ConvertedType, LogicalType, Repetition, Type as Physical,
+};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{
-    ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int32Type, Int64Type,
+    ByteArray, ByteArrayType, DataType, DoubleType, FixedLenByteArrayType, FloatType, Int32Type,
+    Int64Type,
 };
 use parquet::errors::{ParquetError, Result};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::types::Type;
+use parquet::schema::types::{ColumnDescriptor, Type};
 
 use crate::table::{RowTable, TableColumn, TableKind};
 use crate::{DAMAGED, guarded};
@@ -27,7 +30,13 @@ const GROUP_VALUES_MAX: usize = 1 << 24;
 const TEXT_BYTES_MAX: usize = 1 << 27;
 
 /// The codecs of columns that are read.
-const CODECS: [CompressionCodec; 2] = [CompressionCodec::UNCOMPRESSED, CompressionCodec::SNAPPY];
+const CODECS: [CompressionCodec; 5] = [
+    CompressionCodec::UNCOMPRESSED,
+    CompressionCodec::SNAPPY,
+    CompressionCodec::GZIP,
+    CompressionCodec::ZSTD,
+    CompressionCodec::LZ4_RAW,
+];
 
 /// The bytes that a file begins and ends with.
 pub const MAGIC: &[u8] = b"PAR1";
@@ -207,16 +216,35 @@ impl<R: ChunkReader + 'static> TableReader<R> {
             }
             let codec = group.metadata().column(place).compression_codec();
             if !CODECS.contains(&codec) {
-                let [none, snappy] = CODECS;
-                let detail = format!(
-                    "the column `{name}` is compressed with {codec}; allowed: {none}, {snappy}"
-                );
+                let allowed = CODECS.map(|codec| codec.to_string()).join(", ");
+                let detail =
+                    format!("the column `{name}` is compressed with {codec}; allowed: {allowed}");
                 return Err(ParquetError::General(detail));
             }
+            let meaning = Meaning::of(&group.metadata().column(place).column_descr_ptr())?;
             let column = match group.get_column_reader(place)? {
-                ColumnReader::Int64ColumnReader(reader) => integers(reader, rows)?,
+                ColumnReader::Int64ColumnReader(reader) => match meaning {
+                    Meaning::Plain => integers(reader, rows)?,
+                    meaning => {
+                        let values = read::<Int64Type>(reader, rows)?;
+                        numbers(values, |value| meaning.number(value.into(), 64))
+                    }
+                },
                 ColumnReader::Int32ColumnReader(reader) => {
-                    numbers(read::<Int32Type>(reader, rows)?, f64::from)
+                    let values = read::<Int32Type>(reader, rows)?;
+                    numbers(values, |value| meaning.number(value.into(), 32))
+                }
+                ColumnReader::FixedLenByteArrayColumnReader(reader)
+                    if matches!(meaning, Meaning::Decimal(_)) =>
+                {
+                    let values = read::<FixedLenByteArrayType>(reader, rows)?;
+                    numbers(values, |value| meaning.decimal(value.data()))
+                }
+                ColumnReader::ByteArrayColumnReader(reader)
+                    if matches!(meaning, Meaning::Decimal(_)) =>
+                {
+                    let values = read::<ByteArrayType>(reader, rows)?;
+                    numbers(values, |value| meaning.decimal(value.data()))
                 }
                 ColumnReader::FloatColumnReader(reader) => {
                     numbers(read::<FloatType>(reader, rows)?, f64::from)
@@ -237,6 +265,73 @@ impl<R: ChunkReader + 'static> TableReader<R> {
             columns.push((name, column));
         }
         Ok(RowTable { columns })
+    }
+}
+
+/// What the stored values of a column stand for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Meaning {
+    /// The values themselves.
+    Plain,
+    /// Integers without a sign.
+    Unsigned,
+    /// Integers, divided by this power of ten.
+    Decimal(i32),
+}
+
+impl Meaning {
+    /// By the logical type of a column.
+    ///
+    /// # Errors
+    /// It holds dates or times, which are no numbers of a case.
+    fn of(column: &ColumnDescriptor) -> Result<Meaning> {
+        use ConvertedType as Old;
+        let logical = column.logical_type_ref();
+        match (logical, column.converted_type()) {
+            (Some(LogicalType::Decimal(_)), _) | (_, Old::DECIMAL) => {
+                Ok(Meaning::Decimal(column.type_scale()))
+            }
+            (_, Old::UINT_8 | Old::UINT_16 | Old::UINT_32 | Old::UINT_64) => Ok(Meaning::Unsigned),
+            (Some(LogicalType::Integer(integer)), _) if !integer.is_signed => Ok(Meaning::Unsigned),
+            (Some(LogicalType::Date | LogicalType::Time(_) | LogicalType::Timestamp(_)), _)
+            | (
+                _,
+                Old::DATE
+                | Old::TIME_MILLIS
+                | Old::TIME_MICROS
+                | Old::TIMESTAMP_MILLIS
+                | Old::TIMESTAMP_MICROS,
+            ) => {
+                let detail = format!(
+                    "the column `{}` holds dates or times; write them as texts or as numbers",
+                    column.path().string()
+                );
+                Err(ParquetError::General(detail))
+            }
+            _ => Ok(Meaning::Plain),
+        }
+    }
+
+    /// The number of a stored integer of so many bits.
+    #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+    fn number(self, stored: i128, bits: u32) -> f64 {
+        match self {
+            Meaning::Plain => stored as f64,
+            Meaning::Unsigned => stored.rem_euclid(1 << bits) as f64,
+            Meaning::Decimal(scale) => stored as f64 / 10_f64.powi(scale),
+        }
+    }
+
+    /// The number of a decimal in two's complement, the largest byte first.
+    fn decimal(self, bytes: &[u8]) -> f64 {
+        let Some(first) = bytes.first().filter(|_| bytes.len() <= size_of::<i128>()) else {
+            return f64::NAN;
+        };
+        let start = if *first < 0x80 { 0 } else { -1 };
+        let stored = bytes
+            .iter()
+            .fold(start, |sum: i128, byte| (sum << 8) | i128::from(*byte));
+        self.number(stored, 128)
     }
 }
 
@@ -305,6 +400,8 @@ fn texts(reader: ColumnReaderImpl<ByteArrayType>, rows: usize) -> Result<TableCo
 #[cfg(test)]
 mod tests {
     use bytes::Bytes;
+    use parquet::basic::{GzipLevel, TimeUnit, ZstdLevel};
+    use parquet::schema::types::PrimitiveTypeBuilder;
 
     use super::*;
 
@@ -334,6 +431,89 @@ mod tests {
         assert_eq!(format!("{read:?}"), format!("{:?}", table()));
         let one = reader.read(0, |name| name == "row").unwrap();
         assert_eq!(one.columns, table().columns[..1]);
+    }
+
+    /// A file with one column of this physical type, made by the library.
+    fn column<T: DataType>(
+        kind: Physical,
+        with: impl FnOnce(PrimitiveTypeBuilder<'static>) -> PrimitiveTypeBuilder<'static>,
+        codec: Compression,
+        values: &[T::T],
+    ) -> Result<TableColumn> {
+        let field = with(Type::primitive_type_builder("x", kind));
+        let field = field.with_repetition(Repetition::REQUIRED).build()?;
+        let schema = Type::group_type_builder("rows").with_fields(vec![Arc::new(field)]);
+        let mut file = Vec::new();
+        let properties = WriterProperties::builder().set_compression(codec).build();
+        let mut writer =
+            SerializedFileWriter::new(&mut file, Arc::new(schema.build()?), Arc::new(properties))?;
+        let mut group = writer.next_row_group()?;
+        let mut column = group.next_column()?.expect("one column");
+        column.typed::<T>().write_batch(values, None, None)?;
+        column.close()?;
+        group.close()?;
+        writer.close()?;
+        let table = TableReader::new(Bytes::from(file))?.read(0, |_| true)?;
+        Ok(table.columns[0].1.clone())
+    }
+
+    #[test]
+    fn logical_types_are_the_numbers_that_they_mean() {
+        use ConvertedType as Old;
+        let plain = Compression::UNCOMPRESSED;
+        let decimal = |field: PrimitiveTypeBuilder<'static>| {
+            let field = field.with_converted_type(Old::DECIMAL);
+            field.with_precision(9).with_scale(3)
+        };
+        let read = column::<Int32Type>(Physical::INT32, decimal, plain, &[1, -80_000]);
+        assert_eq!(read.unwrap(), TableColumn::Numbers(vec![0.001, -80.0]));
+        let read = column::<Int64Type>(Physical::INT64, decimal, plain, &[2500]);
+        assert_eq!(read.unwrap(), TableColumn::Numbers(vec![2.5]));
+        let bytes = [vec![0x01, 0xf4], vec![0xff, 0xff, 0xfe]].map(ByteArray::from);
+        let read = column::<ByteArrayType>(Physical::BYTE_ARRAY, decimal, plain, &bytes);
+        assert_eq!(read.unwrap(), TableColumn::Numbers(vec![0.5, -0.002]));
+        let unsigned =
+            |field: PrimitiveTypeBuilder<'static>| field.with_converted_type(Old::UINT_32);
+        let read = column::<Int32Type>(Physical::INT32, unsigned, plain, &[-1_294_967_296]);
+        assert_eq!(read.unwrap(), TableColumn::Numbers(vec![3e9]));
+        let unsigned =
+            |field: PrimitiveTypeBuilder<'static>| field.with_converted_type(Old::UINT_64);
+        let read = column::<Int64Type>(Physical::INT64, unsigned, plain, &[-1]);
+        assert_eq!(read.unwrap(), TableColumn::Numbers(vec![2_f64.powi(64)]));
+        for time in [
+            LogicalType::Date,
+            LogicalType::timestamp(true, TimeUnit::NANOS),
+        ] {
+            let kind = match time {
+                LogicalType::Date => Physical::INT32,
+                _ => Physical::INT64,
+            };
+            let with = |field: PrimitiveTypeBuilder<'static>| field.with_logical_type(Some(time));
+            let read = match kind {
+                Physical::INT32 => column::<Int32Type>(kind, with, plain, &[20_000]),
+                _ => column::<Int64Type>(kind, with, plain, &[1 << 60]),
+            };
+            let told = read.unwrap_err().to_string();
+            assert!(told.contains("`x` holds dates or times"), "{told}");
+        }
+    }
+
+    #[test]
+    fn files_are_read_with_every_codec_that_is_allowed() {
+        for codec in [
+            Compression::UNCOMPRESSED,
+            Compression::SNAPPY,
+            Compression::GZIP(GzipLevel::default()),
+            Compression::ZSTD(ZstdLevel::default()),
+            Compression::LZ4_RAW,
+        ] {
+            let read = column::<DoubleType>(Physical::DOUBLE, |field| field, codec, &[0.5; 100]);
+            assert_eq!(
+                read.unwrap(),
+                TableColumn::Numbers(vec![0.5; 100]),
+                "{codec}"
+            );
+        }
     }
 
     #[test]

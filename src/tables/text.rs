@@ -1,5 +1,6 @@
-//! Rows as CSV and NDJSON, some lines at a time. What a column holds, numbers or texts, is decided by the first row.
+//! Rows as CSV and NDJSON, some lines at a time. The first value of a column decides whether it holds numbers or texts.
 
+use std::collections::VecDeque;
 use std::io::{self, BufRead, Chain, Cursor, Read};
 
 use serde_json::{Map, Value};
@@ -47,8 +48,10 @@ pub struct CsvRows<R: Read> {
     pub decimal_comma: bool,
     /// The titles of the columns.
     pub titles: Vec<Title>,
-    /// The next row, if there is one.
-    record: Option<StringRecord>,
+    /// The next row and its line, if there is one.
+    record: Option<(u64, StringRecord)>,
+    /// Rows after it that were read to find the first values of columns.
+    ahead: VecDeque<(u64, StringRecord)>,
 }
 
 impl<R: BufRead> CsvRows<R> {
@@ -92,10 +95,12 @@ impl<R: BufRead> CsvRows<R> {
             reader,
             decimal_comma: delimiter != b',',
             titles: Vec::new(),
-            record: Some(StringRecord::new()),
+            record: Some((0, StringRecord::new())),
+            ahead: VecDeque::new(),
         };
         rows.advance()?;
-        let units = rows.record.clone().filter(|units| {
+        let second = rows.record.as_ref().map(|(_, record)| record.clone());
+        let units = second.filter(|units| {
             // Texts have no units.
             let said = |(title, unit): (&String, &str)| !is_text(title) && !unit.is_empty();
             units.len() == titles.len()
@@ -106,38 +111,59 @@ impl<R: BufRead> CsvRows<R> {
             rows.advance()?;
         }
         let unit = |place: usize| units.as_ref().and_then(|units| units.get(place));
-        let first = rows.record.as_ref();
-        let text = |place: usize| {
-            let field = first.and_then(|record| record.get(place)).unwrap_or("");
-            !field.is_empty() && number(field, rows.decimal_comma).is_none()
-        };
+        let texts = rows.texts(titles.len(), record_max)?;
         let titles = titles.into_iter().enumerate().map(|(place, name)| Title {
             name,
             unit: unit(place).map(str::to_owned),
-            text: text(place),
+            text: texts[place],
         });
         rows.titles = titles.collect();
         Ok(rows)
+    }
+
+    /// Whether the first value of each column is a text. Reads ahead while columns are empty, at most [`ROWS`] rows and about so many bytes.
+    fn texts(&mut self, columns: usize, bytes_max: usize) -> Result<Vec<bool>> {
+        let mut texts = vec![None; columns];
+        let mut look = |record: &StringRecord| {
+            for (field, text) in record.iter().zip(&mut texts) {
+                if text.is_none() && !field.is_empty() {
+                    *text = Some(number(field, self.decimal_comma).is_none());
+                }
+            }
+            texts.iter().any(Option::is_none)
+        };
+        let mut open = self.record.as_ref().is_some_and(|(_, record)| look(record));
+        let mut bytes = 0;
+        while open && self.ahead.len() < ROWS && bytes < bytes_max {
+            let mut record = StringRecord::new();
+            let Some(line) = next_record(&mut self.reader, &mut record)? else {
+                break;
+            };
+            open = look(&record);
+            bytes += record.as_slice().len();
+            self.ahead.push_back((line, record));
+        }
+        Ok(texts.into_iter().map(Option::unwrap_or_default).collect())
     }
 
     /// Some more rows, none at the end.
     fn read(&mut self) -> Result<Chunk> {
         let mut values = empty(&self.titles);
         for _ in 0..ROWS {
-            let Some(record) = &self.record else { break };
+            let Some((line, record)) = &self.record else {
+                break;
+            };
             if record.len() != self.titles.len() {
                 return Err(faulty(format!(
-                    "line {} has {} fields, the header has {}",
-                    self.line(record),
+                    "line {line} has {} fields, the header has {}",
                     record.len(),
                     self.titles.len()
                 )));
             }
             for ((field, column), values) in record.iter().zip(&self.titles).zip(&mut values) {
                 let wrong = || {
-                    let line = self.line(record);
                     faulty(format!(
-                        "line {line}, column `{}`: `{field}` is not a number; the first row has a number in this column",
+                        "line {line}, column `{}`: `{field}` is not a number; the first value of this column is a number",
                         column.name
                     ))
                 };
@@ -161,34 +187,42 @@ impl<R: BufRead> CsvRows<R> {
     /// # Errors
     /// `faulty-table`
     pub fn record(&mut self) -> Result<Option<(u64, StringRecord)>> {
-        let Some(record) = self.record.clone() else {
-            return Ok(None);
-        };
-        let line = self.line(&record);
+        let next = self.record.clone();
         self.advance()?;
-        Ok(Some((line, record)))
+        Ok(next)
     }
 
-    /// Reads the next record that is no blank line.
+    /// Goes on to the next record.
     fn advance(&mut self) -> Result<()> {
-        while let Some(record) = &mut self.record {
-            let source = self.reader.get_mut();
-            source.left = source.max;
-            let more = self.reader.read_record(record);
-            if !more.map_err(|error| unread(&error))? {
-                self.record = None;
-            } else if record.len() > 1 || record.get(0) != Some("") {
-                break;
+        if let Some(next) = self.ahead.pop_front() {
+            self.record = Some(next);
+        } else if let Some((line, record)) = &mut self.record {
+            match next_record(&mut self.reader, record)? {
+                Some(next) => *line = next,
+                None => self.record = None,
             }
         }
         Ok(())
     }
+}
 
-    /// Number of the line on which the record begins that was read last.
-    fn line(&self, record: &StringRecord) -> u64 {
-        let inside = record.as_slice().bytes().filter(|byte| *byte == b'\n');
-        let after = self.reader.position().line();
-        after.saturating_sub(1 + inside.count() as u64)
+/// Reads the next record that is no blank line, and the number of the line on which it begins.
+fn next_record<R: Read>(
+    reader: &mut csv::Reader<Bounded<Ended<R>>>,
+    record: &mut StringRecord,
+) -> Result<Option<u64>> {
+    loop {
+        let source = reader.get_mut();
+        source.left = source.max;
+        let more = reader.read_record(record);
+        if !more.map_err(|error| unread(&error))? {
+            return Ok(None);
+        }
+        if record.len() > 1 || record.get(0) != Some("") {
+            let inside = record.as_slice().bytes().filter(|byte| *byte == b'\n');
+            let after = reader.position().line();
+            return Ok(Some(after.saturating_sub(1 + inside.count() as u64)));
+        }
     }
 }
 
@@ -210,13 +244,21 @@ pub fn without_mark(text: &[u8], line: u64) -> &[u8] {
     rest.unwrap_or(text)
 }
 
+/// A row by the titles of its columns.
+type JsonRow = Map<String, Value>;
+
 /// Rows as JSON objects, one in a line.
 pub(crate) struct JsonRows<R: BufRead> {
     source: R,
+    /// Lines that were read.
+    lines: u64,
+    /// The line of the next row.
     line: u64,
     /// The titles of the columns: the members of the first row.
     pub titles: Vec<Title>,
-    row: Option<Map<String, Value>>,
+    row: Option<JsonRow>,
+    /// Rows after it that were read to find the first values of columns.
+    ahead: VecDeque<(u64, JsonRow)>,
 }
 
 impl<R: BufRead> JsonRows<R> {
@@ -227,19 +269,40 @@ impl<R: BufRead> JsonRows<R> {
     pub(crate) fn new(source: R) -> Result<JsonRows<R>> {
         let mut rows = JsonRows {
             source,
+            lines: 0,
             line: 0,
             titles: Vec::new(),
             row: None,
+            ahead: VecDeque::new(),
         };
         rows.advance()?;
         let members = rows.row.iter().flatten();
-        let titles = members.map(|(name, value)| Title {
-            name: name.clone(),
+        let names: Vec<String> = members.map(|(name, _)| name.clone()).collect();
+        require_few(names.len())?;
+        let mut texts = vec![None; names.len()];
+        let mut look = |row: &JsonRow| {
+            for (name, text) in names.iter().zip(&mut texts) {
+                let value = row.get(name).filter(|value| !value.is_null());
+                *text = text.or(value.map(Value::is_string));
+            }
+            texts.iter().any(Option::is_none)
+        };
+        let mut open = rows.row.as_ref().is_some_and(&mut look);
+        let mut bytes = 0;
+        while open && rows.ahead.len() < ROWS && bytes < LINE_BYTES_MAX {
+            let Some((line, row, length)) = rows.fetch()? else {
+                break;
+            };
+            open = look(&row);
+            bytes += length;
+            rows.ahead.push_back((line, row));
+        }
+        let titles = names.into_iter().zip(texts).map(|(name, text)| Title {
+            name,
             unit: None,
-            text: value.is_string(),
+            text: text.unwrap_or_default(),
         });
         rows.titles = titles.collect();
-        require_few(rows.titles.len())?;
         Ok(rows)
     }
 
@@ -260,7 +323,7 @@ impl<R: BufRead> JsonRows<R> {
                     }
                     (_, Some(value)) => {
                         return Err(self.wrong(&format!(
-                            "`{}` is {value}, which has another type than in the first row",
+                            "`{}` is {value}, which has another type than the first value of this column",
                             column.name
                         )));
                     }
@@ -278,25 +341,35 @@ impl<R: BufRead> JsonRows<R> {
         Ok(values)
     }
 
-    /// Reads the next line that is not blank.
+    /// Goes on to the next row.
     fn advance(&mut self) -> Result<()> {
+        let next = match self.ahead.pop_front() {
+            Some(next) => Some(next),
+            None => self.fetch()?.map(|(line, row, _)| (line, row)),
+        };
+        let (line, row) = next.unzip();
+        self.line = line.unwrap_or(self.line);
+        self.row = row;
+        Ok(())
+    }
+
+    /// Reads the next line that is not blank: its number, its row and its length.
+    fn fetch(&mut self) -> Result<Option<(u64, JsonRow, u64)>> {
         loop {
             let mut text = Vec::new();
             let mut line = (&mut self.source).take(LINE_BYTES_MAX);
-            let read = line.read_until(b'\n', &mut text);
-            let read = read?;
-            self.line += 1;
+            let read = line.read_until(b'\n', &mut text)?;
+            self.lines += 1;
             if read == 0 {
-                self.row = None;
-                return Ok(());
+                return Ok(None);
             }
-            let text = without_mark(&text, self.line);
-            if text.iter().all(u8::is_ascii_whitespace) {
+            let row = without_mark(&text, self.lines);
+            if row.iter().all(u8::is_ascii_whitespace) {
                 continue;
             }
-            let row = serde_json::from_slice(text);
-            self.row = Some(row.map_err(|error| self.wrong(&error.to_string()))?);
-            return Ok(());
+            let row = serde_json::from_slice(row);
+            let row = row.map_err(|error| faulty(format!("line {}: {error}", self.lines)))?;
+            return Ok(Some((self.lines, row, read as u64)));
         }
     }
 
@@ -403,6 +476,32 @@ mod tests {
     }
 
     #[test]
+    fn the_first_value_of_a_column_decides_its_type() {
+        let csv = "remark,s,creepage_x\n,,0.1\n\n,7,0.2\nb,8,\n";
+        let json = "{\"remark\":null,\"s\":null,\"creepage_x\":0.1}\n{\"remark\":null,\"s\":7,\"creepage_x\":0.2}\n\
+                    {\"remark\":\"b\",\"s\":8,\"creepage_x\":null}";
+        for (form, text) in [(TableForm::Csv, csv), (TableForm::Ndjson, json)] {
+            let mut rows = rows(form, text).unwrap();
+            let texts = rows.titles.iter().map(|title| (&*title.name, title.text));
+            let mut texts: Vec<_> = texts.collect();
+            texts.sort_unstable();
+            assert_eq!(
+                texts,
+                [("creepage_x", false), ("remark", true), ("s", false)]
+            );
+            let place = rows.titles.iter().position(|title| title.name == "remark");
+            let values = rows.next().unwrap().unwrap();
+            let remark = Values::Texts(vec![None, None, Some("b".to_owned())]);
+            assert_eq!(values[place.unwrap()], remark);
+        }
+        let csv = rows(TableForm::Csv, "s,remark\n1,\n2,\nx,a\n")
+            .unwrap()
+            .next();
+        let told = csv.unwrap().unwrap_err().to_string();
+        assert!(told.contains("line 4, column `s`"), "{told}");
+    }
+
+    #[test]
     fn an_empty_first_row_is_a_row() {
         let mut rows = rows(TableForm::Csv, "km,creepage_x\n,\n2,3\n").unwrap();
         assert_eq!(rows.next().unwrap().unwrap()[0].len(), 2);
@@ -425,7 +524,7 @@ mod tests {
                 ["line 6", "creepage_x"],
             ),
             (json("{\"s\":1}\n{\"b\":1}"), ["line 2", "`s`"]),
-            (json("{\"s\":1}\n{\"s\":\"x\"}"), ["line 2", "kind"]),
+            (json("{\"s\":1}\n{\"s\":\"x\"}"), ["line 2", "type"]),
             (json("{\"s\":1}\n{\"s\":1,\"b\":2}"), ["line 2", "`b`"]),
             (json("{\"s\":1}\nnothing"), ["line 2", "expected"]),
         ] {

@@ -100,7 +100,7 @@ units! {
     CURVATURE "1/m": "1/mm" "per_mm" 1.0, "1/m" "per_m" 1e-3, "rad/mm" "rad_per_mm" 1.0, "rad/m" "rad_per_m" 1e-3;
     ANGLE "mrad": "rad" "rad" 1.0, "mrad" "mrad" 1e-3, "deg" "deg" (PI / 180.0), "°" "degrees" (PI / 180.0);
     SPEED "km/h": "mm/s" "mm_per_s" 1.0, "m/s" "m_per_s" 1e3, "km/h" "km_per_h" (1e3 / 3.6);
-    RATIO "-": "-" "" 1.0, "1" "" 1.0, "%" "percent" 1e-2, "‰" "permille" 1e-3;
+    RATIO "-": "-" "" 1.0, "1" "" 1.0, "%" "percent" 1e-2, "pct" "pct" 1e-2, "‰" "permille" 1e-3;
     PRESSURE "MPa": "MPa" "mpa" 1.0, "N/mm²" "n_per_mm2" 1.0;
     TORQUE "N·mm": "N·mm" "n_mm" 1.0, "Nmm" "n_mm" 1.0, "N mm" "n_mm" 1.0;
     ANGULAR_SPEED "rad/s": "rad/s" "rad_per_s" 1.0, "1/s" "per_s" 1.0;
@@ -482,9 +482,10 @@ pub fn question(title: &str, below: Option<&str>) -> String {
     }
 }
 
-/// Columns that a client named: the title of each, and its name here; columns without one are carried along.
+/// Columns that a client named in the query: the title of each, and its name here; columns without one are carried along. Nothing for a route
+/// whose query names no columns.
 #[derive(Debug, Clone, Default)]
-pub struct NamedColumns(pub Vec<(String, String)>);
+pub struct NamedColumns(pub Option<Vec<(String, String)>>);
 
 /// The title of a column, its unit in a line of units, and whether it holds texts.
 pub type Titled<'a> = (&'a str, Option<&'a str>, bool);
@@ -506,7 +507,7 @@ impl NamedColumns {
             )));
         }
         let mut named = HashMap::new();
-        for (title, what) in &self.0 {
+        for (title, what) in self.0.iter().flatten() {
             if named.insert(title.as_str(), what.as_str()).is_some() {
                 return Err(faulty(format!("`{title}` is named twice in the query")));
             }
@@ -521,7 +522,8 @@ impl NamedColumns {
             if let Some((name, _)) = found {
                 missing.remove(name);
             }
-            match place_of(title, below, found.map(|(_, what)| *what)) {
+            let named = found.map(|(_, what)| *what);
+            match place_of(title, below, named, self.0.is_some()) {
                 Ok(place) => columns.push(TitledColumn {
                     name: title.to_owned(),
                     factor: place.as_ref().map_or(1.0, |place| place.factor),
@@ -537,6 +539,7 @@ impl NamedColumns {
         if let Some(title) = self
             .0
             .iter()
+            .flatten()
             .map(|(title, _)| title)
             .find(|title| missing.contains(title.as_str()))
         {
@@ -557,13 +560,18 @@ impl NamedColumns {
     }
 }
 
-/// What a column of a run is: a place in the case, or nothing if it is carried along. `named` is what the client says of it.
+/// What a column is: a place in the case, or nothing if it is carried along. `named` is what the client says of it, `in_query` whether the
+/// query may say so.
 fn place_of(
     title: &str,
     below: Option<&str>,
     named: Option<&str>,
+    in_query: bool,
 ) -> Result<Option<Place>, String> {
-    let carry = format!("`?carry={title}` copies it to the results");
+    let carry = match in_query {
+        true => format!("`?carry={title}` copies it to the results"),
+        false => "leave it out if it is none".to_owned(),
+    };
     match named {
         Some("") => Ok(None),
         // Rows are no jobs that have a name.
@@ -587,17 +595,22 @@ fn place_of(
             Some(place) => Ok(Some(place)),
             None if is_carried(title, below) => Ok(None),
             None => {
-                let asked = question(title, below);
+                let asked = match question(title, below) {
+                    asked if asked.is_empty() => "if it is a quantity of the case,".to_owned(),
+                    asked => asked,
+                };
                 let example = suggested(title, below).into_iter().next();
                 let example = example.unwrap_or_else(|| "creepage_x [%]".to_owned());
-                Err(format!(
-                    "is not known; {asked}{} `?column={title}:{example}` gives its meaning, and {carry}",
-                    if asked.is_empty() {
-                        "if it is a quantity of the case,"
-                    } else {
-                        ""
-                    }
-                ))
+                let unit = unit_of(title, below);
+                Err(match unit {
+                    Some(unit) if parted(&example).1 != Some(unit) => format!(
+                        "is not known; {asked} convert it, since `{unit}` is not a unit of this quantity; {carry}"
+                    ),
+                    _ if in_query => format!(
+                        "is not known; {asked} `?column={title}:{example}` gives its meaning, and {carry}"
+                    ),
+                    _ => format!("is not known; {asked} write its title as `{example}`; {carry}"),
+                })
             }
         },
     }
@@ -769,7 +782,8 @@ mod tests {
     use super::*;
 
     fn read(title: &str, unit: Option<&str>) -> Result<Option<(String, f64)>, String> {
-        let columns = NamedColumns::default().columns([(title, unit, false)].into_iter());
+        let named = NamedColumns(Some(Vec::new()));
+        let columns = named.columns([(title, unit, false)].into_iter());
         let column = columns.map_err(|error| format!("{error:?}"))?.remove(0);
         Ok(column.pointer.map(|pointer| (pointer, column.factor)))
     }
@@ -863,6 +877,12 @@ mod tests {
             ("curvature", None, &["?carry=curvature"]),
             ("speed_limit", None, &["?carry=speed_limit"]),
             ("rolling_noise", None, &["?carry=rolling_noise"]),
+            ("creepage_x [ppm]", None, &["`ppm`"]),
+            (
+                "Q_left [MN]",
+                None,
+                &["normal_force [kN]", "convert it", "`MN`"],
+            ),
         ] {
             let refused = read(title, unit).expect_err(title);
             assert!(refused.contains(&format!("`{title}`")), "{refused}");
@@ -870,6 +890,20 @@ mod tests {
                 assert!(refused.contains(word), "{title} {word}: {refused}");
             }
         }
+    }
+
+    #[test]
+    fn advice_names_parameters_only_where_the_query_has_them() {
+        let columns = NamedColumns::default().columns([("nu_x", None, false)].into_iter());
+        let refused = columns.unwrap_err().to_string();
+        assert!(
+            refused.contains("write its title as `creepage_x [-]`"),
+            "{refused}"
+        );
+        assert!(
+            !refused.contains("?column") && !refused.contains("?carry"),
+            "{refused}"
+        );
     }
 
     #[test]
@@ -898,7 +932,8 @@ mod tests {
             "spin:",
             "t:x:/motion/creepage_x",
         ];
-        let named = NamedColumns(named.iter().filter_map(|text| named_column(text)).collect());
+        let named = named.iter().filter_map(|text| named_column(text));
+        let named = NamedColumns(Some(named.collect()));
         let titles = [
             ("Q.left", None, false),
             ("Q.right", Some("[kN]"), false),
@@ -922,7 +957,8 @@ mod tests {
         assert_eq!(found, expected);
         let of = |named: &[&str]| {
             let named = named.iter().filter_map(|text| named_column(text));
-            let columns = NamedColumns(named.collect()).columns([("a", None, false)].into_iter());
+            let named = NamedColumns(Some(named.collect()));
+            let columns = named.columns([("a", None, false)].into_iter());
             format!("{:?}", columns.expect_err("a refusal"))
         };
         assert!(of(&["a:load"]).contains("not a place in a case"));

@@ -77,6 +77,112 @@ async fn columns_are_those_asked_for_and_say_what_the_result_says() {
     assert!(rows[2][8].contains("time"), "{}", rows[2][8]);
 }
 
+/// Load, area and force along x of each patch, motion by motion, or position by position.
+fn by_point(result: &Value) -> Vec<Vec<[f64; 3]>> {
+    let mut found = vec![Vec::new(); 3];
+    let positions = result["wheelset"]["positions"].as_array();
+    for (patch_number, patch) in result["patches"].as_array().unwrap().iter().enumerate() {
+        let holds = |wheel: &Value| {
+            let patches = wheel["patches"].as_array().unwrap();
+            patches.contains(&json!(patch_number))
+        };
+        let position = positions.and_then(|positions| {
+            let of = |at: &Value| holds(&at["left"]) || holds(&at["right"]);
+            positions.iter().position(of)
+        });
+        for (place, point) in patch["points"].as_array().unwrap().iter().enumerate() {
+            let region = Some(&point["region"]).filter(|region| !region.is_null());
+            let region = region.unwrap_or(patch);
+            found[position.unwrap_or(place)].push([
+                number(&region["normal_force_n"]),
+                number(&region["area_mm2"]),
+                number(&point["force_x_n"]),
+            ]);
+        }
+    }
+    found
+}
+
+/// Motions that change the pressure, and positions of a wheelset, have loads of their own in every table.
+#[tokio::test]
+async fn each_motion_and_each_position_has_its_own_load() {
+    let server = Server::start().await;
+    let mut wheelset = case("wheelset", "positions", "1");
+    wheelset["contact"]["lateral_shift_mm"] = json!({ "values": [-6.0, 0.0, 3.0] });
+    let mut pressed = case("wheel-rail", "motions", "2");
+    pressed["motion"] =
+        json!([{ "creepage_y": -0.01 }, { "creepage_y": 0.0 }, { "creepage_y": 0.01 }]);
+    pressed["contact"]["lateral_shift_mm"] = json!(7.0);
+    let (path, lines) = solved(&server, &[wheelset, pressed]).await;
+    let columns = "index,point,normal_force_n,area_mm2,force_x_n";
+    let batch = table(&server, &format!("{path}?format=csv&columns={columns}")).await;
+    let by_patch = table(
+        &server,
+        &format!("{path}?format=csv&columns={columns},patch"),
+    )
+    .await;
+    for (index, line) in lines.iter().enumerate() {
+        let expected = by_point(&line["result"]);
+        let rows = |table: &Csv| -> Vec<Vec<f64>> {
+            let own = table.rows.iter().filter(|row| row[0] == index.to_string());
+            own.map(|row| {
+                row.iter()
+                    .map(|field| field.parse().expect("a number"))
+                    .collect()
+            })
+            .collect()
+        };
+        let sums = expected
+            .iter()
+            .map(|parts| parts.iter().map(|part| part[0]).sum::<f64>());
+        let sums: Vec<f64> = sums.collect();
+        let found = rows(&batch);
+        assert_eq!(found.len(), 3);
+        for (row, sum) in found.iter().zip(&sums) {
+            assert!((row[2] - sum).abs() <= 1e-12 * sum, "{row:?} {sum}");
+        }
+        let distinct = sums
+            .windows(2)
+            .all(|pair| (pair[0] - pair[1]).abs() > 1e-3 * pair[0]);
+        assert!(distinct, "{sums:?}");
+        let single: Vec<Vec<f64>> = rows(&by_patch);
+        let each = expected.iter().flatten();
+        assert_eq!(single.len(), each.clone().count());
+        for (row, part) in single.iter().zip(each) {
+            assert_eq!(row[2..5], part[..], "{row:?}");
+        }
+        let id = line["id"].as_str().expect("an id");
+        let job = format!("/v1/jobs/{id}/resultants");
+        let csv = table(&server, &format!("{job}?format=csv")).await;
+        let place = |name: &str| {
+            csv.head
+                .iter()
+                .position(|head| head == name)
+                .expect("a column")
+        };
+        let totals = csv.rows.iter().filter(|row| row[place("patch")] == "total");
+        let totals: Vec<f64> = totals
+            .map(|row| row[place("normal_force_n")].parse().unwrap())
+            .collect();
+        assert_eq!(totals.len(), 3);
+        for (total, sum) in totals.iter().zip(&sums) {
+            assert!((total - sum).abs() <= 1e-12 * sum, "{totals:?} {sums:?}");
+        }
+        let second = server.get(&format!("{job}?point=1")).await.json;
+        let patches = second["patches"].as_array().expect("patches");
+        assert_eq!(patches.len(), expected[1].len());
+        for (patch, part) in patches.iter().zip(&expected[1]) {
+            assert_eq!(
+                (
+                    number(&patch["points"][0]["normal_force_n"]),
+                    patch["points"][0]["point"].as_i64()
+                ),
+                (part[0], Some(1))
+            );
+        }
+    }
+}
+
 #[tokio::test]
 async fn without_columns_there_are_the_usual_ones_and_unknown_ones_are_refused() {
     let server = Server::start().await;

@@ -183,11 +183,11 @@ async fn a_codec_that_is_not_read_is_named_with_those_that_are() {
     let server = Server::idle().await;
     let template = kept_template(&server).await;
     let mut file = encode(&one_row(&["creepage_x".to_owned()])).expect("a file");
-    // The codec of a column is the field after its name, twice its number: 1 for SNAPPY, 6 for ZSTD.
+    // The codec of a column is the field after its name, twice its number: 1 for SNAPPY, 4 for BROTLI.
     let codec = b"creepage_x\x15\x02";
     let place = file.windows(codec.len()).rposition(|bytes| bytes == codec);
-    file[place.expect("the codec") + codec.len() - 1] = 12;
+    file[place.expect("the codec") + codec.len() - 1] = 8;
     let refused = send_rows(&server, &template, PARQUET, file).await;
-    let said = "the column `creepage_x` is compressed with ZSTD; allowed: UNCOMPRESSED, SNAPPY";
+    let said = "the column `creepage_x` is compressed with BROTLI; allowed: UNCOMPRESSED, SNAPPY, GZIP, ZSTD, LZ4_RAW";
     assert_problem(&refused, 422, "faulty-table", said);
 }

@@ -62,7 +62,11 @@ impl Values {
     pub fn value(&self, row: usize) -> Value {
         match self {
             Values::Numbers(numbers) => Value::from(numbers[row]),
-            Values::Texts(texts) => Value::from(texts[row].as_deref()),
+            Values::Texts(texts) => match texts[row].as_deref() {
+                Some("true") => Value::Bool(true),
+                Some("false") => Value::Bool(false),
+                text => Value::from(text),
+            },
         }
     }
 

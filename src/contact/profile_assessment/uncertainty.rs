@@ -222,6 +222,18 @@ impl Open {
     }
 }
 
+impl ProfileUncertainty {
+    /// Of a motion with these shares of the load and of the largest pressure that it was found for.
+    fn in_proportion(self, [load, pressure]: [f64; 2]) -> ProfileUncertainty {
+        ProfileUncertainty {
+            force_x_n: self.force_x_n * load,
+            force_y_n: self.force_y_n * load,
+            pressure_max_mpa: self.pressure_max_mpa * pressure,
+        }
+    }
+}
+
+/// Writes the uncertainties of the first motion, and those of the others in proportion to their loads and pressures.
 fn write(
     friction: f64,
     chosen: &[usize],
@@ -260,14 +272,25 @@ fn write(
             of_all.widen(force, pressure);
         }
     }
-    let limit: f64 = solution
+    let first: f64 = solution
         .patches
         .iter()
-        .map(|patch| friction * patch.normal_force_n)
+        .map(|patch| patch.normal_force_n)
         .sum();
-    let reported = of_all.report(limit, largest(solution));
-    for total in &mut solution.total {
-        total.profile_uncertainty = Some(reported);
+    let reported = of_all.report(friction * first, largest(solution));
+    let shares: Vec<[f64; 2]> = (0..solution.total.len())
+        .map(|motion| {
+            let regions = || solution.at(motion).map(|part| part.region);
+            let load: f64 = regions().map(|region| region.normal_force_n).sum();
+            let pressure = regions().map(|region| region.pressure_max_mpa);
+            [
+                load / first,
+                pressure.fold(0.0, f64::max) / largest(solution),
+            ]
+        })
+        .collect();
+    for (total, share) in solution.total.iter_mut().zip(shares) {
+        total.profile_uncertainty = Some(reported.in_proportion(share));
     }
     let mut changes = Vec::with_capacity(of_patches.len());
     for (patch, open) in solution.patches.iter_mut().zip(of_patches) {
@@ -283,7 +306,13 @@ fn write(
         let open = open.all;
         let reported = open.report(friction * patch.normal_force_n, patch.pressure_max_mpa);
         for point in &mut patch.points {
-            point.profile_uncertainty = Some(reported);
+            let share = point.region.as_deref().map_or([1.0; 2], |region| {
+                [
+                    region.normal_force_n / patch.normal_force_n,
+                    region.pressure_max_mpa / patch.pressure_max_mpa,
+                ]
+            });
+            point.profile_uncertainty = Some(reported.in_proportion(share));
         }
     }
     changes

@@ -326,9 +326,12 @@ fn column(title: &str, unit: Option<&str>) -> Result<TemplateColumn, String> {
             Some(Place { pointer, factor }) => (members(&pointer), factor),
             None => {
                 return Err(format!(
-                    "`{title}` names no column; {} allowed: {}, a quantity with its unit such as `normal_force [kN]`, `priority`, `deadline_s`, \
+                    "`{title}` names no column; {}allowed: {}, a quantity with its unit such as `normal_force [kN]`, `priority`, `deadline_s`, \
                      `label:KEY`, which carries a column along, or a JSON pointer such as `/load/normal_force_n`",
-                    question(title, unit),
+                    match question(title, unit) {
+                        asked if asked.is_empty() => asked,
+                        asked => asked + " ",
+                    },
                     short_names()
                 ));
             }

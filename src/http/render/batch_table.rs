@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use crate::render::forces::Forces;
-use railhead_contact::remark::entry::RemarkEntry;
-use railhead_contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
+use railhead_contact::solution::words::answer::{PatchPoint, PointSolution, Solution};
 use railhead_jobs::model::BatchItem;
 use railhead_tables::table::{RowTable, TableColumn, TableKind};
 
@@ -37,35 +36,35 @@ const COLUMNS: [(&str, Of); 43] = columns! {
     "creepage_x" Number |line| line.force("creepage_x");
     "creepage_y" Number |line| line.force("creepage_y");
     "spin_per_mm" Number |line| line.force("spin_per_mm");
-    "normal_force_n" Number |line| line.sum(|patch, _| Some(patch.normal_force_n));
+    "normal_force_n" Number |line| line.sum(|part| Some(part.region.normal_force_n));
     "force_x_n" Number |line| line.force("force_x_n");
     "force_y_n" Number |line| line.force("force_y_n");
     "moment_z_n_mm" Number |line| line.force("moment_z_n_mm");
     "error_force_x_n" Number |line| line.force("error_force_x_n");
     "error_force_y_n" Number |line| line.force("error_force_y_n");
     "error_moment_z_n_mm" Number |line| line.force("error_moment_z_n_mm");
-    "friction_power_n" Number |line| line.sum(|_, point| Some(point.friction_power_n));
-    "area_mm2" Number |line| line.sum(|patch, _| Some(patch.area_mm2));
-    "pressure_max_mpa" Number |line| line.largest(|patch, _| Some(patch.pressure_max_mpa));
+    "friction_power_n" Number |line| line.sum(|part| Some(part.point.friction_power_n));
+    "area_mm2" Number |line| line.sum(|part| Some(part.region.area_mm2));
+    "pressure_max_mpa" Number |line| line.largest(|part| Some(part.region.pressure_max_mpa));
     "target_met" Text |line| line.verdict(|point| point.target_met, false);
-    "remarks" Text |line| Some(codes(&line.solution?.remarks, line.point, line.patch));
+    "remarks" Text |line| line.solution.map(|_| line.codes());
     "error" Text |line| Some(line.error.to_owned()).filter(|error| !error.is_empty());
     "patch" Place |line| line.patch.unwrap_or(0) as i64;
     "cached" Text |line| Some(line.item.job.cached.to_string());
     "friction_coefficient" Number |line| Some(line.solution?.asked.as_ref()?.friction_coefficient);
-    "friction_limit_n" Number |line| line.sum(|patch, _| patch.friction_limit_n);
-    "friction_power_without_spin_n" Number |line| line.sum(|_, point| Some(point.friction_power_without_spin_n));
-    "traction_max_mpa" Number |line| line.largest(|_, point| point.traction_max_mpa);
-    "stick_share" Number |line| { Some(line.sum(|_, point| point.stick_area_mm2)? / line.sum(|patch, _| Some(patch.area_mm2))?) };
+    "friction_limit_n" Number |line| line.sum(|part| part.region.friction_limit_n);
+    "friction_power_without_spin_n" Number |line| line.sum(|part| Some(part.point.friction_power_without_spin_n));
+    "traction_max_mpa" Number |line| line.largest(|part| part.point.traction_max_mpa);
+    "stick_share" Number |line| { Some(line.sum(|part| part.point.stick_area_mm2)? / line.sum(|part| Some(part.region.area_mm2))?) };
     "saturated" Text |line| line.verdict(|point| Some(point.saturated), true);
-    "contact_angle_rad" Number |line| line.of_one(|patch, _| Some(patch.position?.contact_angle_rad));
-    "rolling_radius_mm" Number |line| line.of_one(|patch, _| Some(patch.position?.rolling_radius_mm));
-    "track_y_mm" Number |line| line.of_one(|patch, _| Some(patch.position?.track_mm[1]));
-    "track_z_mm" Number |line| line.of_one(|patch, _| Some(patch.position?.track_mm[2]));
-    "force_track_y_n" Number |line| line.of_one(|_, point| Some(point.force_track_n?[1]));
-    "force_track_z_n" Number |line| line.of_one(|_, point| Some(point.force_track_n?[2]));
-    "semi_axis_x_mm" Number |line| line.of_one(|patch, _| Some(patch.semi_axes_mm?[0]));
-    "semi_axis_y_mm" Number |line| line.of_one(|patch, _| Some(patch.semi_axes_mm?[1]));
+    "contact_angle_rad" Number |line| line.of_one(|part| Some(part.patch.position?.contact_angle_rad));
+    "rolling_radius_mm" Number |line| line.of_one(|part| Some(part.patch.position?.rolling_radius_mm));
+    "track_y_mm" Number |line| line.of_one(|part| Some(part.patch.position?.track_mm[1]));
+    "track_z_mm" Number |line| line.of_one(|part| Some(part.patch.position?.track_mm[2]));
+    "force_track_y_n" Number |line| line.of_one(|part| Some(part.point.force_track_n?[1]));
+    "force_track_z_n" Number |line| line.of_one(|part| Some(part.point.force_track_n?[2]));
+    "semi_axis_x_mm" Number |line| line.of_one(|part| Some(part.patch.semi_axes_mm?[0]));
+    "semi_axis_y_mm" Number |line| line.of_one(|part| Some(part.patch.semi_axes_mm?[1]));
     "wheel_lowering_mm" Number |line| line.solution?.wheel_lowering_mm;
     "usfd_depth_nm" Number |line| line.worst(|point| Some(point.damage.as_deref()?.usfd_wear?.depth_nm.value));
     "archard_depth_nm" Number |line| line.worst(|point| Some(point.damage.as_deref()?.archard_wear?.depth_nm.value));
@@ -164,7 +163,7 @@ impl Columns {
         let by_patch = self.0.iter().any(|(name, _)| name == "patch");
         for point in points {
             let patches: Vec<_> = match by_patch {
-                true => (0..solution.patches.len()).map(Some).collect(),
+                true => solution.at(point).map(|part| Some(part.number)).collect(),
                 false => vec![None],
             };
             for patch in patches {
@@ -207,21 +206,22 @@ struct TableLine<'a> {
     error: &'a str,
 }
 
-/// A number of a patch and of the motion of the line on it.
-type OfPart = fn(&PatchSolution, &PointSolution) -> Option<f64>;
+/// A number of a patch under the motion of the line.
+type OfPart = fn(&PatchPoint<'_>) -> Option<f64>;
 
 impl TableLine<'_> {
-    /// The patches of the line, each with the motion of the line.
-    fn parts(&self) -> impl Iterator<Item = (&PatchSolution, &PointSolution)> + Clone {
-        let patches = self.solution.into_iter().flat_map(|found| &found.patches);
-        let own = patches.enumerate();
-        let own = own.filter(|(place, _)| self.patch.is_none_or(|patch| patch == *place));
-        own.filter_map(|(_, patch)| Some((patch, patch.points.get(self.point)?)))
+    /// The patches of the line under its motion.
+    fn parts(&self) -> impl Iterator<Item = PatchPoint<'_>> + Clone {
+        let parts = self
+            .solution
+            .into_iter()
+            .flat_map(|found| found.at(self.point));
+        parts.filter(|part| self.patch.is_none_or(|patch| patch == part.number))
     }
 
     /// True if it is of all patches, or of any of them; nothing where it is not told.
     fn verdict(&self, of: fn(&PointSolution) -> Option<bool>, any: bool) -> Option<String> {
-        let mut told = self.parts().filter_map(|(_, point)| of(point)).peekable();
+        let mut told = self.parts().filter_map(|part| of(part.point)).peekable();
         told.peek()?;
         let verdict = match any {
             true => told.any(|verdict| verdict),
@@ -232,30 +232,30 @@ impl TableLine<'_> {
 
     fn sum(&self, of: OfPart) -> Option<f64> {
         self.solution?;
-        self.parts().map(|(patch, point)| of(patch, point)).sum()
+        self.parts().map(|part| of(&part)).sum()
     }
 
     fn largest(&self, of: OfPart) -> Option<f64> {
-        let values = self.parts().filter_map(|(patch, point)| of(patch, point));
+        let values = self.parts().filter_map(|part| of(&part));
         values.reduce(f64::max)
     }
 
     /// The largest, if every patch has one.
     fn worst(&self, of: fn(&PointSolution) -> Option<f64>) -> Option<f64> {
-        let values = self.parts().map(|(_, point)| of(point));
+        let values = self.parts().map(|part| of(part.point));
         values.reduce(|a, b| Some(a?.max(b?))).flatten()
     }
 
     /// Of a single patch; nothing for several patches together.
     fn of_one(&self, of: OfPart) -> Option<f64> {
-        let (patch, point) = self.parts().next()?;
-        let single = self.patch.is_some() || self.solution?.patches.len() == 1;
-        of(patch, point).filter(|_| single)
+        let mut parts = self.parts();
+        let part = parts.next()?;
+        of(&part).filter(|_| parts.next().is_none())
     }
 
     /// Motion, forces and their errors.
     fn force(&self, name: &str) -> Option<f64> {
-        let first = self.parts().next().map(|(_, point)| point);
+        let first = self.parts().next().map(|part| part.point);
         let motion = first.map(|point| point.motion);
         let forces = match self.patch {
             None => Forces::of_total(motion, self.solution?.total.get(self.point)?),
@@ -270,16 +270,18 @@ impl TableLine<'_> {
         };
         forces.number(name)
     }
-}
 
-/// The codes of the remarks that hold for a motion, and for a patch if one is given, each once.
-fn codes(remarks: &[RemarkEntry], point: usize, patch: Option<usize>) -> String {
-    let mut codes: Vec<&str> = Vec::new();
-    for remark in remarks.iter().filter(|remark| remark.holds_at(point)) {
-        let elsewhere = patch.is_some() && remark.patch.is_some() && remark.patch != patch;
-        if !elsewhere && !codes.contains(&&*remark.code) {
-            codes.push(&remark.code);
+    /// The codes of the remarks that hold for the line, each once.
+    fn codes(&self) -> String {
+        let mut codes: Vec<&str> = Vec::new();
+        for remark in self.solution.into_iter().flat_map(|found| &found.remarks) {
+            let here = remark
+                .patch
+                .is_none_or(|patch| self.parts().any(|part| part.number == patch));
+            if here && remark.holds_at(self.point) && !codes.contains(&&*remark.code) {
+                codes.push(&remark.code);
+            }
         }
+        codes.join(" ")
     }
-    codes.join(" ")
 }

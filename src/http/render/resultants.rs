@@ -23,15 +23,15 @@ const HISTORY: [(&str, OfHistory); 9] = [
 /// Name of the patch, number of the motion, and the sums and forces of the line.
 type Line = (String, usize, Sum, Forces);
 
-/// One line per patch and motion, then one per motion with the sums over all patches.
+/// One line per patch and motion, then one per motion with the sums over all patches. `first` is the motion of the first total.
 #[must_use]
-pub(crate) fn table(resultants: &Resultants, sums: &[Sum]) -> RowTable {
+pub(crate) fn table(resultants: &Resultants, first: usize, sums: &[Option<Sum>]) -> RowTable {
     let mut lines: Vec<Line> = Vec::new();
     for patch in &resultants.patches {
         for point in &patch.points {
             let sum = Sum {
                 motion: point.motion,
-                normal_force_n: patch.normal_force_n,
+                normal_force_n: point.normal_force_n,
                 friction_power_n: point.friction_power_n,
                 friction_power_without_spin_n: point.friction_power_without_spin_n,
                 saturated: point.saturated,
@@ -45,12 +45,10 @@ pub(crate) fn table(resultants: &Resultants, sums: &[Sum]) -> RowTable {
             lines.push((patch.patch.to_string(), point.point, sum, forces));
         }
     }
-    // The numbers of the motions are those of any patch.
-    let points = resultants.patches.first().map(|patch| &patch.points);
-    for (point, total) in points.into_iter().flatten().zip(&resultants.total) {
-        if let Some(sum) = sums.get(point.point) {
+    for (motion, total) in (first..).zip(&resultants.total) {
+        if let Some(sum) = sums.get(motion).copied().flatten() {
             let forces = Forces::of_total(Some(sum.motion), total);
-            lines.push(("total".to_owned(), point.point, *sum, forces));
+            lines.push(("total".to_owned(), motion, sum, forces));
         }
     }
     let text = |of: &dyn Fn(&Line) -> String| {
@@ -79,7 +77,7 @@ pub(crate) fn table(resultants: &Resultants, sums: &[Sum]) -> RowTable {
         ("friction_power_without_spin_n", without_spin),
         ("saturated", text(&|(.., sum, _)| sum.saturated.to_string())),
     ]);
-    if sums.first().is_some_and(|sum| sum.history.is_some()) {
+    if sums.iter().flatten().any(|sum| sum.history.is_some()) {
         columns.extend(HISTORY.map(|(name, of)| {
             let of_line = |(.., sum, _): &Line| of(sum.history.as_ref()?);
             (name, number(&of_line))
@@ -108,6 +106,7 @@ mod tests {
                 creepage_y: 0.0,
                 spin_per_mm: 1e-9,
             },
+            normal_force_n: 0.1,
             force_x_n: 1.0 / (1 + point) as f64,
             force_y_n: -0.1,
             moment_z_n_mm: 1e-300,
@@ -146,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_table_has_a_line_per_patch_and_motion_and_one_per_motion_in_sum() {
-        for (patches, points) in [(0, 0), (1, 1), (2, 64), (3, 129)] {
+        for (patches, points) in [(1, 1), (2, 64), (3, 129)] {
             let sum = Sum {
                 motion: resultants(1, 1).patches[0].points[0].motion,
                 normal_force_n: 1.0,
@@ -155,9 +154,9 @@ mod tests {
                 saturated: false,
                 history: None,
             };
-            let lines = table(&resultants(patches, points), &vec![sum; points]).row_count();
-            let totals = if patches == 0 { 0 } else { points };
-            assert_eq!(lines, patches * points + totals);
+            let lines =
+                table(&resultants(patches, points), 0, &vec![Some(sum); points]).row_count();
+            assert_eq!(lines, patches * points + points);
         }
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::dto::{JobResult, Resultants, sums};
+use crate::dto::{JobResult, Resultants, sum};
 use crate::extract::accept::{choose, one_of};
 use crate::extract::caller::{Caller, JobId};
 use crate::extract::query::{Parameters, index, query, require_index};
@@ -157,10 +157,12 @@ async fn write_resultants(
         drop(text);
         require_index("point", point, solution.total.len())?;
         require_index("patch", patch, solution.patches.len())?;
-        let sums = sums(&solution);
+        let sums: Vec<_> = (0..solution.total.len())
+            .map(|motion| sum(&solution, motion))
+            .collect();
         let resultants = Resultants::select(solution, point, patch);
         match format {
-            Format::Csv => csv(resultants::table(&resultants, &sums)),
+            Format::Csv => csv(resultants::table(&resultants, point.unwrap_or(0), &sums)),
             _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error)),
         }
     };

@@ -99,7 +99,7 @@ pub(crate) async fn submit(
     let carried = run.carry.unwrap_or_default().into_iter();
     let named = run.column.unwrap_or_default().into_iter();
     let named = named.chain(carried.map(|title| (title, String::new())));
-    let read = (table, NamedColumns(named.collect()));
+    let read = (table, NamedColumns(Some(named.collect())));
     let draft = read_run(state, read, request).await?;
     let (id, replayed) = jobs.submit_run(draft, work).await?;
     let run = jobs.of_kind(Kind::Rows).work(id).await?;
@@ -210,7 +210,13 @@ pub(crate) async fn results(
         move |error| tracing::error!(%error, run = %id, "answers of a run cannot be read"),
     );
     let pieces = stream::iter(first.map(Ok)).chain(rest);
-    let pieces = pieces.map_ok(Piece::Table).map_err(WriteError::from);
+    let order: Vec<String> = columns.iter().map(|(name, _)| name.clone()).collect();
+    let pieces = pieces.map_ok(move |mut table| {
+        let place = |name: &str| order.iter().position(|known| known == name);
+        table.columns.sort_by_key(|(name, _)| place(name));
+        Piece::Table(table)
+    });
+    let pieces = pieces.map_err(WriteError::from);
     let form = (format, &*format!("run-{id}"));
     let response = table_answer((jobs, key), form, &columns, pieces)?;
     Ok(hold_while_sent(wait.tell_applied(response), share))
@@ -232,7 +238,7 @@ fn require_ended(run: &Run) -> Result<()> {
     }
 }
 
-/// The columns that are wanted, in the order of the answers.
+/// The columns that are wanted, in their order; without any, all of them.
 fn selected(run: &Run, wanted: Option<Vec<String>>) -> Result<Vec<(String, TableKind)>> {
     let mut columns = run.head.answers();
     let Some(wanted) = wanted else {
@@ -251,7 +257,9 @@ fn selected(run: &Run, wanted: Option<Vec<String>>) -> Result<Vec<(String, Table
             ),
         ));
     }
-    columns.retain(|(name, _)| wanted.contains(name));
+    let place = |name: &str| wanted.iter().position(|wanted| wanted == name);
+    columns.retain(|(name, _)| place(name).is_some());
+    columns.sort_by_key(|(name, _)| place(name));
     Ok(columns)
 }
 

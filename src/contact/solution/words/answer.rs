@@ -151,8 +151,60 @@ pub struct CombinedMaterial {
     pub difference_parameter: f64,
 }
 
-/// One contact patch with its results for every motion. For several motions of bodies with different materials, its values are those of the
-/// first motion; every point has its own in `region`.
+/// A patch under one motion, or at one position of a wheelset.
+#[derive(Debug, Clone, Copy)]
+pub struct PatchPoint<'a> {
+    /// Index of the patch.
+    pub number: usize,
+    /// The patch.
+    pub patch: &'a PatchSolution,
+    /// Its results under the motion.
+    pub point: &'a PointSolution,
+    /// Its region and pressure under the motion.
+    pub region: MotionRegion,
+}
+
+impl Solution {
+    /// The position of the wheelset to which a patch belongs; nothing in other cases.
+    #[must_use]
+    pub fn position_of(&self, patch: usize) -> Option<usize> {
+        let positions = self.wheelset.as_deref()?.positions.iter();
+        let mut wheels = positions.map(|position| [&position.left, &position.right]);
+        wheels.position(|both| both.iter().any(|wheel| wheel.patches.contains(&patch)))
+    }
+
+    /// The patches under a motion, or at a position of a wheelset; each position has patches of its own.
+    pub fn at(&self, motion: usize) -> impl Iterator<Item = PatchPoint<'_>> + Clone {
+        let patches = self.patches.iter().enumerate();
+        patches.filter_map(move |(number, patch)| {
+            let point = match self.position_of(number) {
+                None => patch.points.get(motion),
+                Some(position) => patch.points.first().filter(|_| position == motion),
+            };
+            let point = point?;
+            let region = match point.region.as_deref() {
+                Some(region) => *region,
+                None => MotionRegion {
+                    normal_force_n: patch.normal_force_n,
+                    friction_limit_n: patch.friction_limit_n,
+                    approach_mm: patch.approach_mm,
+                    area_mm2: patch.area_mm2,
+                    pressure_max_mpa: patch.pressure_max_mpa,
+                    extent_mm: patch.extent_mm,
+                },
+            };
+            Some(PatchPoint {
+                number,
+                patch,
+                point,
+                region,
+            })
+        })
+    }
+}
+
+/// One contact patch with its results for every motion. Where motions change region and pressure, its values are those of the first motion;
+/// every point has its own in `region`.
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PatchSolution {
@@ -263,7 +315,7 @@ pub struct PointSolution {
     pub damage: Option<Box<Damage>>,
     /// Summary of the temperatures; only with the output `temperature`.
     pub temperature: Option<TemperatureSummary>,
-    /// Region and pressure under this motion; only for several motions of bodies with different materials, whose tractions change both.
+    /// Region and pressure under this motion; only where several motions change them: bodies with different materials, wheels on a rail.
     pub region: Option<Box<MotionRegion>>,
 }
 
