@@ -103,7 +103,7 @@ pub fn table(data: &[u8]) {
     };
     let template = template();
     while let Ok(Some((_, record))) = rows.record() {
-        match row_of(&columns, rows.decimal_comma, &record) {
+        match row_of(&columns, &mut rows.decimals, &record) {
             Ok(row) => {
                 if let Ok(filled) = fill(&template, &row.cells) {
                     check(&filled);

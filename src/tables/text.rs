@@ -11,7 +11,7 @@ pub use csv::StringRecord;
 
 use crate::error::{Result, TableError, faulty};
 use crate::read::{Chunk, Title};
-use crate::titles::{delimiter, is_line_of_units, is_text, number, require_few};
+use crate::titles::{Decimals, delimiter, is_line_of_units, is_text, number, require_few};
 
 /// Rows that are read at once.
 const ROWS: usize = 8192;
@@ -44,8 +44,8 @@ impl<R: Read> Read for Bounded<R> {
 /// the units.
 pub struct CsvRows<R: Read> {
     reader: csv::Reader<Bounded<Ended<R>>>,
-    /// Commas may stand in numbers.
-    pub decimal_comma: bool,
+    /// The decimal mark of its numbers.
+    pub decimals: Decimals,
     /// The titles of the columns.
     pub titles: Vec<Title>,
     /// The next row and its line, if there is one.
@@ -93,7 +93,7 @@ impl<R: BufRead> CsvRows<R> {
             .collect();
         let mut rows = CsvRows {
             reader,
-            decimal_comma: delimiter != b',',
+            decimals: Decimals::of(delimiter),
             titles: Vec::new(),
             record: Some((0, StringRecord::new())),
             ahead: VecDeque::new(),
@@ -127,7 +127,7 @@ impl<R: BufRead> CsvRows<R> {
         let mut look = |record: &StringRecord| {
             for (field, text) in record.iter().zip(&mut texts) {
                 if text.is_none() && !field.is_empty() {
-                    *text = Some(number(field, self.decimal_comma).is_none());
+                    *text = Some(number(field, self.decimals.comma).is_none());
                 }
             }
             texts.iter().any(Option::is_none)
@@ -173,7 +173,11 @@ impl<R: BufRead> CsvRows<R> {
                     }
                     Values::Numbers(numbers) if field.is_empty() => numbers.push(f64::NAN),
                     Values::Numbers(numbers) => {
-                        numbers.push(number(field, self.decimal_comma).ok_or_else(wrong)?);
+                        let number = self.decimals.number(field);
+                        let number = number.map_err(|detail| {
+                            faulty(format!("line {line}, column `{}`: {detail}", column.name))
+                        })?;
+                        numbers.push(number.ok_or_else(wrong)?);
                     }
                 }
             }
@@ -499,6 +503,19 @@ mod tests {
             .next();
         let told = csv.unwrap().unwrap_err().to_string();
         assert!(told.contains("line 4, column `s`"), "{told}");
+    }
+
+    #[test]
+    fn numbers_with_separators_of_thousands_are_refused() {
+        for text in [
+            "normal_force_n;creepage_x\n80.000;0,001\n",
+            "normal_force_n\tcreepage_x\n80,000\t0.001\n",
+            "normal_force_n;creepage_x\n80000;0,001\n80.000;0,001\n",
+        ] {
+            let read = rows(TableForm::Csv, text).unwrap().next().unwrap();
+            let told = read.unwrap_err().to_string();
+            assert!(told.contains("thousands"), "{told}");
+        }
     }
 
     #[test]

@@ -717,6 +717,45 @@ pub fn delimiter(header: &[u8]) -> u8 {
     found.unwrap_or(b',')
 }
 
+/// The decimal mark of a table.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Decimals {
+    /// Commas may stand in numbers.
+    pub comma: bool,
+    /// The mark of the first number that has one.
+    seen: Option<char>,
+}
+
+impl Decimals {
+    /// Of a table whose fields are parted by this mark.
+    #[must_use]
+    pub fn of(delimiter: u8) -> Decimals {
+        Decimals {
+            comma: delimiter != b',',
+            seen: None,
+        }
+    }
+
+    /// Reads a number; nothing if the field is none.
+    ///
+    /// # Errors
+    /// It has another decimal mark than the numbers before it, as separators of thousands make it look.
+    pub fn number(&mut self, field: &str) -> Result<Option<f64>, String> {
+        let Some(number) = number(field, self.comma) else {
+            return Ok(None);
+        };
+        if let Some(mark) = field.chars().find(|mark| [',', '.'].contains(mark)) {
+            let seen = *self.seen.get_or_insert(mark);
+            if seen != mark {
+                return Err(format!(
+                    "`{field}` has a `{mark}`, and a number before it a `{seen}` as its decimal mark; use one mark, and none between thousands"
+                ));
+            }
+        }
+        Ok(Some(number))
+    }
+}
+
 /// A number, with a comma in place of its point where one may be.
 #[must_use]
 pub fn number(field: &str, decimal_comma: bool) -> Option<f64> {

@@ -26,7 +26,7 @@ use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
 use railhead_tables::read::{Chunk, TableForm, TableRows, TableSource, Title};
 use railhead_tables::text::{CsvRows, StringRecord, without_mark};
-use railhead_tables::titles::{Place, converted, is_text, number, place, question, short_names};
+use railhead_tables::titles::{Decimals, Place, converted, is_text, place, question, short_names};
 
 /// Takes a case with the number of its line, if it has one.
 pub type Add<'a> = &'a mut dyn FnMut(Option<u64>, &[u8]) -> Result<()>;
@@ -349,8 +349,8 @@ fn column(title: &str, unit: Option<&str>) -> Result<TemplateColumn, String> {
 /// What a record of CSV puts into the template.
 ///
 /// # Errors
-/// It has another number of fields, or a value of an option is not allowed.
-pub fn row_of(columns: &[TemplateColumn], decimal_comma: bool, record: &StringRecord) -> Row {
+/// It has another number of fields, numbers with another decimal mark than those before, or a value of an option is not allowed.
+pub fn row_of(columns: &[TemplateColumn], decimals: &mut Decimals, record: &StringRecord) -> Row {
     if record.len() != columns.len() {
         return Err(format!(
             "the line has {} fields, the header has {}",
@@ -365,7 +365,8 @@ pub fn row_of(columns: &[TemplateColumn], decimal_comma: bool, record: &StringRe
         }
         let value = match column.text {
             true => Value::from(field),
-            false => read_value(field, column.factor, decimal_comma),
+            false => read_value(field, column.factor, decimals)
+                .map_err(|detail| format!("column `{}`: {detail}", column.title))?,
         };
         column.put(value, &mut row)?;
     }
@@ -373,8 +374,8 @@ pub fn row_of(columns: &[TemplateColumn], decimal_comma: bool, record: &StringRe
 }
 
 /// A number in the unit of the case, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.
-fn read_value(field: &str, factor: f64, decimal_comma: bool) -> Value {
-    let number = number(field, decimal_comma).filter(|number| number.is_finite());
+fn read_value(field: &str, factor: f64, decimals: &mut Decimals) -> Result<Value, String> {
+    let number = decimals.number(field)?.filter(|number| number.is_finite());
     // JSON numbers have no plus sign. Whole numbers stay whole.
     let text = number.map_or(field, |_| field.trim_start_matches('+'));
     let value = match (serde_json::from_str(text), number) {
@@ -382,10 +383,10 @@ fn read_value(field: &str, factor: f64, decimal_comma: bool) -> Value {
         (_, Some(number)) => Value::from(number),
         _ => Value::from(field),
     };
-    match value.as_f64() {
+    Ok(match value.as_f64() {
         Some(number) if factor != 1.0 => Value::from(converted(number, factor)),
         _ => value,
-    }
+    })
 }
 
 /// Reads and checks the body once it has arrived: a table, or cases one after the other.
@@ -444,7 +445,7 @@ fn read_rows(
         let columns = columns_of(&rows.titles)?;
         while let Some((line, record)) = rows.record()? {
             pace.step()?;
-            let row = row_of(&columns, rows.decimal_comma, &record).map_err(told);
+            let row = row_of(&columns, &mut rows.decimals, &record).map_err(told);
             draft.add_row(Some(line), record.as_slice().as_bytes(), row)?;
             require_count(&draft, options)?;
         }
@@ -583,7 +584,7 @@ mod tests {
         let columns = columns_of(&table.titles)?;
         let mut rows = Vec::new();
         while let Some((_, record)) = table.record()? {
-            rows.push(row_of(&columns, table.decimal_comma, &record));
+            rows.push(row_of(&columns, &mut table.decimals, &record));
         }
         Ok(rows)
     }
