@@ -29,11 +29,10 @@ const GROUP_VALUES_MAX: usize = 1 << 24;
 /// Bytes of the texts of one column of a group at most.
 const TEXT_BYTES_MAX: usize = 1 << 27;
 
-/// The codecs of columns that are read.
-const CODECS: [CompressionCodec; 5] = [
+/// The codecs of columns that are read. Those of GZIP and Brotli have no bound for what a page unpacks to.
+const CODECS: [CompressionCodec; 4] = [
     CompressionCodec::UNCOMPRESSED,
     CompressionCodec::SNAPPY,
-    CompressionCodec::GZIP,
     CompressionCodec::ZSTD,
     CompressionCodec::LZ4_RAW,
 ];
@@ -400,7 +399,7 @@ fn texts(reader: ColumnReaderImpl<ByteArrayType>, rows: usize) -> Result<TableCo
 #[cfg(test)]
 mod tests {
     use bytes::Bytes;
-    use parquet::basic::{GzipLevel, TimeUnit, ZstdLevel};
+    use parquet::basic::{TimeUnit, ZstdLevel};
     use parquet::schema::types::PrimitiveTypeBuilder;
 
     use super::*;
@@ -503,7 +502,6 @@ mod tests {
         for codec in [
             Compression::UNCOMPRESSED,
             Compression::SNAPPY,
-            Compression::GZIP(GzipLevel::default()),
             Compression::ZSTD(ZstdLevel::default()),
             Compression::LZ4_RAW,
         ] {
