@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use railhead::contact::case::solver::Limits;
+use railhead::contact::check;
 use railhead::contact::monitor::Unmonitored;
 use railhead::jobs::engine::Engine;
 use serde_json::{Value, json};
@@ -77,7 +78,7 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
 
 /// As a worker does it, operators kept by the process included.
 fn solve_one(engine: &Engine, case: &Value) {
-    let problem = (engine.check)(case, &Limits::default()).expect("a case");
+    let problem = check(case, &Limits::default()).expect("a case");
     for slice in (engine.slices)(&problem) {
         (engine.solve)(&problem, slice, &Unmonitored).expect("a solution");
     }

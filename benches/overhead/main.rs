@@ -11,6 +11,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use railhead::contact::case::solver::Limits;
+use railhead::contact::check;
 use railhead::contact::monitor::Unmonitored;
 use railhead::jobs::engine::Engine;
 use serde_json::{Value, json};
@@ -176,7 +177,7 @@ fn batch(service: &Service, connection: &mut Connection) {
     let cases: Vec<Value> = (0..CASES).map(|number| small(10_000 + number)).collect();
     let engine = Engine::contact();
     let solves = cases.iter().take(200).map(|case| {
-        let checked = (engine.check)(case, &Limits::default()).expect("a case");
+        let checked = check(case, &Limits::default()).expect("a case");
         seconds_of(|| engine.solve_whole(&checked, &Unmonitored)).0
     });
     let solve = median(solves.collect());
@@ -250,7 +251,7 @@ fn steps(connection: &mut Connection) {
     let engine = Engine::contact();
     let solves = (0..STEPS).map(|step| {
         case["load"]["vertical_force_n"] = json!(load(step));
-        let checked = (engine.check)(&case, &Limits::default()).expect("a case");
+        let checked = check(&case, &Limits::default()).expect("a case");
         seconds_of(|| engine.solve_whole(&checked, &Unmonitored)).0 * 1e3
     });
     let solve = median(solves.collect());

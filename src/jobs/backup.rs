@@ -8,6 +8,7 @@ use std::path::Path;
 use crate::disk_reserve::make_private_folder;
 use crate::error::{JobsError, Result};
 use crate::open_store::table_file;
+use crate::store::Store;
 use crate::store::sqlite::database::SqliteStore;
 use crate::sync::blocking;
 

@@ -151,27 +151,12 @@ impl Blobs {
         if &*last != b"}" {
             return Err(damaged());
         }
-        let rest = GetOptions {
-            range: Some((READ_AT_ONCE..open).into()),
+        let whole = GetOptions {
+            range: Some((0..open).into()),
             ..GetOptions::default()
         };
-        let objects = self.objects.clone();
-        let rest = stream::once(async move {
-            let rest = objects.get_opts(&path, rest).await?;
-            Ok::<_, object_store::Error>(rest.into_stream())
-        });
-        let pieces = found.into_stream().chain(rest.try_flatten());
+        let pieces = self.objects.get_opts(&path, whole).await?.into_stream();
         Ok((bytes, pieces.map_err(JobsError::from).boxed()))
-    }
-
-    /// Size of a stored solution.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub async fn solution_bytes(&self, folder: &str) -> Result<usize> {
-        let path = Path::from(folder).join(SOLUTION);
-        let about = self.objects.head(&path).await?;
-        Ok(usize::try_from(about.size).unwrap_or(usize::MAX))
     }
 
     /// Reads a whole stored result.

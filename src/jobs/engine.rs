@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use railhead_contact as contact;
 use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::check_with;
 use railhead_contact::error::{CaseError, SolveError};
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
@@ -16,11 +16,8 @@ use railhead_contact::slices::slices;
 use railhead_contact::solution::words::answer::{Fields, Solution};
 use railhead_contact::solve_slice;
 
-/// Checks a case against limits.
-pub type Check = dyn Fn(&Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;
-
-/// Checks one of many cases; cross-sections that were read for the case before are not read again.
-pub type CheckNext =
+/// Checks a case against limits, with pairs of cross-sections that were read before.
+pub type Check =
     dyn Fn(&KnownPair, &Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;
 
 /// Where a checked case is cut: ranges of motions, one after the other.
@@ -36,8 +33,6 @@ pub type Solve = dyn Fn(&CheckedCase, Range<usize>, &dyn Monitor) -> Result<(Sol
 pub struct Engine {
     /// The first step, done at submission and again before solving.
     pub check: Arc<Check>,
-    /// The same for rows of a table.
-    pub check_next: Arc<CheckNext>,
     /// Where the second step is cut, by the case alone.
     pub slices: Arc<Slices>,
     /// The second step, done on a solver thread, slice by slice.
@@ -60,17 +55,14 @@ impl Engine {
     pub fn with_operators(operators: OperatorStore) -> Engine {
         let operators = Arc::new(operators);
         let store = Arc::clone(&operators);
-        let known = Arc::new(KnownPair::default());
-        let pairs = Arc::clone(&known);
         Engine {
-            check: Arc::new(move |case, limits| contact::check_with(&pairs, case, limits)),
-            check_next: Arc::new(contact::check_with),
+            check: Arc::new(check_with),
             slices: Arc::new(slices),
             solve: Arc::new(move |checked, slice, monitor| {
                 solve_slice(&store, checked, slice, monitor)
             }),
             operators,
-            known,
+            known: Arc::default(),
         }
     }
 

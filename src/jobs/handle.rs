@@ -73,8 +73,7 @@ impl Jobs {
     /// # Errors
     /// Every fault of the case.
     pub fn check(&self, case: &Value) -> Result<CheckedCase, CaseError> {
-        let limits = &self.shared.options.limits;
-        (self.shared.engine.check)(case, limits)
+        self.check_next(self.known_pairs(), case)
     }
 
     /// As [`Jobs::check`], for one of many cases.
@@ -86,7 +85,7 @@ impl Jobs {
         known: &KnownPair,
         case: &Value,
     ) -> Result<CheckedCase, CaseError> {
-        (self.shared.engine.check_next)(known, case, &self.shared.options.limits)
+        (self.shared.engine.check)(known, case, &self.shared.options.limits)
     }
 
     /// Pairs of cross-sections that were read before.

@@ -52,11 +52,6 @@ pub mod error;
 pub mod expiry;
 pub mod handle;
 pub mod idempotency;
-#[cfg(feature = "otlp")]
-pub mod job_trace;
-#[cfg(not(feature = "otlp"))]
-#[path = "no_job_trace.rs"]
-pub mod job_trace;
 pub mod keys;
 pub mod lifecycle;
 pub mod maintenance;

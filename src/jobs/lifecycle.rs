@@ -15,7 +15,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Uuid};
 
-use crate::attempts::attempt::{AllLeases, RunningAttempts};
+use crate::attempts::attempt::AllLeases;
 use crate::attempts::fair_scheduler::FairScheduler;
 use crate::blobs::Blobs;
 use crate::clock::ClockSteps;
@@ -23,7 +23,7 @@ use crate::disk_reserve::{self, make_private_folder};
 use crate::engine::Engine;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
-use crate::maintenance::{self, nodes};
+use crate::maintenance;
 use crate::metrics::Metrics;
 use crate::model::{ANONYMOUS, Kind};
 use crate::open_store::{note_closed, open_for_service};
@@ -89,7 +89,6 @@ impl Jobs {
                 blobs,
                 wake: Notify::new(),
                 ended,
-                running: RunningAttempts::default(),
                 leases: AllLeases::default(),
                 heartbeat: OnceLock::new(),
                 draining: CancellationToken::new(),
@@ -103,8 +102,7 @@ impl Jobs {
                 staged: StagedBytes::default(),
                 batches: Mutex::new(unfinished_batches),
                 turns: FairScheduler::default(),
-                recent_batches: RecentReads::default(),
-                recent_jobs: RecentReads::default(),
+                recent: RecentReads::default(),
                 leaps: ClockSteps::default(),
                 suspect: Arc::default(),
                 long_solves: AtomicUsize::new(0),
@@ -151,13 +149,7 @@ impl Jobs {
                 .spawn(move || runtime.block_on(runs))
                 .map_err(JobsError::Thread)?;
         }
-        let (tasks, shared) = (&self.shared.tasks, || self.shared.clone());
-        tasks.spawn(maintenance::reap_expired(shared()));
-        tasks.spawn(maintenance::sweep_orphans(shared()));
-        tasks.spawn(maintenance::recover(shared()));
-        tasks.spawn(maintenance::expire_jobs(shared()));
-        tasks.spawn(maintenance::watch_deadlines(shared()));
-        nodes::start(&self.shared);
+        maintenance::start(&self.shared);
         Ok(())
     }
 

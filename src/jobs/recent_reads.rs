@@ -8,10 +8,11 @@ use std::time::Duration;
 use tokio::time::Instant;
 use uuid::Uuid;
 
+use crate::model::Kind;
 use crate::sync::lock;
 
-/// Whose thing, and which.
-type OwnedId = (Arc<str>, Uuid);
+/// Whose work, of which kind, and which.
+type OwnedId = (Arc<str>, Kind, Uuid);
 type SharedRead<T> = Arc<tokio::sync::Mutex<Option<(Instant, T)>>>;
 
 /// The last reads of what clients follow.
@@ -33,8 +34,7 @@ impl<T: Clone> RecentReads<T> {
     /// What a read finds, or found not longer than `age` ago. While one caller reads, the others wait for its answer.
     pub(crate) async fn at<E>(
         &self,
-        tenant: &Arc<str>,
-        id: Uuid,
+        id: OwnedId,
         age: Duration,
         read: impl Future<Output = Result<T, E>>,
     ) -> Result<T, E> {
@@ -43,7 +43,7 @@ impl<T: Clone> RecentReads<T> {
         }
         let last = {
             let mut all = lock(&self.0);
-            Arc::clone(all.entry((tenant.clone(), id)).or_default())
+            Arc::clone(all.entry(id).or_default())
         };
         let mut seen = last.lock().await;
         if let Some((when, found)) = seen.as_ref()
@@ -93,7 +93,7 @@ mod tests {
                         tokio::time::sleep(Duration::from_millis(5)).await;
                         Ok::<_, ()>(asked.fetch_add(1, Ordering::SeqCst) + 1)
                     };
-                    reads.at(&tenant, id, age, read).await
+                    reads.at((tenant, Kind::Case, id), age, read).await
                 })
             });
             for found in all.collect::<Vec<_>>() {
@@ -107,10 +107,14 @@ mod tests {
         }
         // A failed read is the answer of its caller alone, and what is not followed is forgotten.
         let failed = reads
-            .at(&tenant, id, age, async { Err::<u64, _>("away") })
+            .at((tenant.clone(), Kind::Case, id), age, async {
+                Err::<u64, _>("away")
+            })
             .await;
         assert_eq!(failed, Err("away"));
-        let other = reads.at(&tenant, Uuid::now_v7(), age, async { Ok::<_, ()>(7) });
+        let other = reads.at((tenant, Kind::Case, Uuid::now_v7()), age, async {
+            Ok::<_, ()>(7)
+        });
         assert_eq!(other.await, Ok(7));
         tokio::time::sleep(5 * age).await;
         reads.forget(age);

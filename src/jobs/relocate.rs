@@ -12,7 +12,7 @@ use crate::result_place::settle::settle;
 use crate::result_place::url::ResultsPlace;
 use crate::store::postgres::database::PostgresStore;
 use crate::store::sqlite::database::SqliteStore;
-use crate::store::{Reap, Upkeep};
+use crate::store::{Reap, Store, Upkeep};
 
 /// What the job table is called once its rows are elsewhere, so that no service starts on it.
 const MOVED: &str = "jobs.db.moved";

@@ -1,8 +1,8 @@
 //! What is kept of a job besides its row: the case, the solution, the fields.
 
 use bytes::Bytes;
-use futures_util::StreamExt;
 use futures_util::stream::{self, BoxStream};
+use futures_util::{StreamExt, TryStreamExt};
 use uuid::Uuid;
 
 use crate::error::{JobsError, Result};
@@ -30,6 +30,21 @@ pub struct ResultStream {
     pub outputs: Vec<Output>,
 }
 
+impl ResultStream {
+    /// The whole text.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub async fn text(mut self) -> Result<Bytes> {
+        let mut text = Vec::with_capacity(self.bytes);
+        while let Some(piece) = self.open_solution.try_next().await? {
+            text.extend_from_slice(&piece);
+        }
+        text.push(b'}');
+        Ok(text.into())
+    }
+}
+
 impl Jobs {
     /// The case of a job as submitted, as JSON text.
     ///
@@ -52,7 +67,7 @@ impl Jobs {
     /// # Errors
     /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
     pub async fn solution(&self, id: Uuid) -> Result<Solution> {
-        let text = self.answer(id).await?;
+        let text = self.open_answer(id).await?.text().await?;
         let damaged = |error| JobsError::Damaged(format!("solution of job {id}: {error}"));
         let large = text.len() >= LARGE_BYTES;
         let read = move || serde_json::from_slice(&text);
@@ -63,43 +78,14 @@ impl Jobs {
         solution.map_err(|error: serde_json::Error| damaged(error))
     }
 
-    /// Size of the answer of a succeeded job as it is stored, without fields.
-    ///
-    /// # Errors
-    /// As [`Jobs::solution`].
-    pub async fn answer_bytes(&self, id: Uuid) -> Result<usize> {
-        let (_, stored) = self.stored(id).await?;
-        match &stored.result {
-            StoredResult::Blob(key, _) => {
-                let size = self.shared.blobs.solution_bytes(key).await;
-                self.unless_gone(id, size).await
-            }
-            StoredResult::Inline(result) => Ok(result.solution.len()),
-        }
-    }
-
-    /// The answer of a succeeded job as it is stored.
-    ///
-    /// # Errors
-    /// As [`Jobs::solution`].
-    pub async fn answer(&self, id: Uuid) -> Result<Bytes> {
-        let (_, stored) = self.stored(id).await?;
-        match stored.result {
-            StoredResult::Blob(key, _) => {
-                let text = self.shared.blobs.solution(&key).await;
-                self.unless_gone(id, text).await
-            }
-            StoredResult::Inline(result) => Ok(result.solution),
-        }
-    }
-
-    /// As [`Jobs::answer`], read piece by piece: a client that does not take it holds no memory for it.
+    /// The answer of a succeeded job, read piece by piece: a client that does not take it holds no memory for it.
     ///
     /// # Errors
     /// As [`Jobs::solution`].
     pub async fn open_answer(&self, id: Uuid) -> Result<ResultStream> {
         let (job, stored) = self.stored(id).await?;
-        let outputs = outputs_of(id, &stored)?;
+        let outputs = serde_json::from_str(&stored.outputs)
+            .map_err(|error| JobsError::Damaged(format!("outputs of job {id}: {error}")))?;
         let (bytes, held_bytes, open_solution) = match &stored.result {
             StoredResult::Blob(key, _) => {
                 let opened = self.shared.blobs.open_solution(key).await;
@@ -124,15 +110,6 @@ impl Jobs {
             cached: job.cached,
             outputs,
         })
-    }
-
-    /// The outputs that the case of a succeeded job asked for.
-    ///
-    /// # Errors
-    /// As [`Jobs::solution`].
-    pub async fn outputs(&self, id: Uuid) -> Result<Vec<Output>> {
-        let (_, stored) = self.stored(id).await?;
-        outputs_of(id, &stored)
     }
 
     /// The cells of one patch with the values of every motion; reads no other patch.
@@ -204,9 +181,4 @@ impl Jobs {
             None => Err(JobsError::NotReady(job.state)),
         }
     }
-}
-
-fn outputs_of(id: Uuid, stored: &ResultRef) -> Result<Vec<Output>> {
-    serde_json::from_str(&stored.outputs)
-        .map_err(|error| JobsError::Damaged(format!("outputs of job {id}: {error}")))
 }

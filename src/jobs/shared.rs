@@ -12,19 +12,20 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Timestamp, Uuid};
 
-use crate::attempts::attempt::{AllLeases, RunningAttempts};
+use crate::attempts::attempt::AllLeases;
 use crate::attempts::fair_scheduler::FairScheduler;
 use crate::blobs::Blobs;
 use crate::clock::{ClockStep, ClockSteps};
 use crate::engine::Engine;
 use crate::metrics::Metrics;
-use crate::model::{Batch, Job, Trusted};
+use crate::model::Trusted;
 use crate::options::Options;
 use crate::recent_reads::RecentReads;
 use crate::staged_bytes::StagedBytes;
 use crate::storage_fault::StorageFaults;
 use crate::store::{Lease, Node, Notification, Store};
 use crate::sync::lock;
+use crate::work::Work;
 
 /// How often a waiting caller reads again although nothing was announced.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);
@@ -46,8 +47,6 @@ pub(crate) struct Shared {
     pub(crate) wake: Notify,
     /// Announces ended jobs; a hint only, waiting callers also poll.
     pub(crate) ended: broadcast::Sender<Uuid>,
-    /// The attempts of this process.
-    pub(crate) running: RunningAttempts,
     /// The leases that this process holds, and its heartbeat once there was one.
     pub(crate) leases: AllLeases,
     pub(crate) heartbeat: OnceLock<()>,
@@ -68,9 +67,8 @@ pub(crate) struct Shared {
     pub(crate) staged: StagedBytes,
     /// Batches that are being received or filled, and those that are to be removed.
     pub(crate) batches: Mutex<UnfinishedBatches>,
-    /// Batches and jobs that clients follow, as they were a moment ago.
-    pub(crate) recent_batches: RecentReads<Option<Batch>>,
-    pub(crate) recent_jobs: RecentReads<Option<Job>>,
+    /// What clients follow, as it was a moment ago.
+    pub(crate) recent: RecentReads<Option<Work>>,
     /// Steps of the wall clock.
     pub(crate) leaps: ClockSteps,
     /// Whose turn it is.

@@ -1,11 +1,11 @@
-//! What makes spans: of a request, of a submission, and of what has passed already.
+//! What makes spans: of a request, and of the life of one job: `submit`, `queue`, `solve`, `store`.
 //!
 //! A job may be solved by another process than the one that took it, so its trace travels with its row, as a W3C
 //! `traceparent`. Where nobody collects spans there is no [`Tracer`], and nothing is made, stored or measured.
 
 use std::collections::HashMap;
 use std::sync::Arc;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 pub(crate) use opentelemetry::KeyValue;
 
@@ -14,16 +14,22 @@ use opentelemetry::global::{BoxedTracer, ObjectSafeTracer};
 use opentelemetry::propagation::TextMapPropagator;
 use opentelemetry::trace::{Span, SpanKind, Status, TraceContextExt, Tracer as _};
 use opentelemetry_sdk::propagation::TraceContextPropagator;
+use uuid::Uuid;
 
+use crate::attempts::slices::Outcome;
 use crate::error::Result;
+use crate::handle::Jobs;
+use crate::model::created_at;
+use crate::shared::Shared;
+use crate::store::Claim;
 
-pub(crate) const TRACEPARENT: &str = "traceparent";
+const TRACEPARENT: &str = "traceparent";
 
 const TRACESTATE: &str = "tracestate";
 
 /// Makes spans for those who collect them; clones share it.
 #[derive(Debug, Clone)]
-pub struct Tracer(pub(crate) Arc<BoxedTracer>);
+pub struct Tracer(Arc<BoxedTracer>);
 
 impl Tracer {
     /// Spans go where this tracer of OpenTelemetry sends them.
@@ -52,28 +58,10 @@ impl Tracer {
         let span = span.start_with_context(&*self.0, &parent);
         parent.with_span(span)
     }
-
-    /// Writes down a span that is over.
-    pub(crate) fn past(
-        &self,
-        name: &'static str,
-        parent: &Context,
-        [from, to]: [SystemTime; 2],
-        attributes: Vec<KeyValue>,
-        fault: Option<String>,
-    ) {
-        let span = self.0.span_builder(name).with_start_time(from);
-        let span = span.with_attributes(attributes);
-        let mut span = span.start_with_context(&*self.0, parent);
-        if let Some(fault) = fault {
-            span.set_status(Status::error(fault));
-        }
-        span.end_with_timestamp(to);
-    }
 }
 
 /// The span of a submission; without a tracer it is none.
-pub(crate) struct SubmitSpan(pub(crate) Option<Context>);
+pub(crate) struct SubmitSpan(Option<Context>);
 
 impl SubmitSpan {
     /// What is written to the rows of the jobs; `None` if the trace is not collected.
@@ -102,5 +90,110 @@ impl SubmitSpan {
             span.end();
         }
         submitted
+    }
+}
+
+impl Jobs {
+    /// What makes the spans, if they are collected.
+    #[must_use]
+    pub fn tracer(&self) -> Option<&Tracer> {
+        self.shared.options.tracer.as_ref()
+    }
+
+    /// Begins the span of a submission, inside the span of the request.
+    pub(crate) fn submit_span(&self) -> SubmitSpan {
+        SubmitSpan(self.tracer().map(|tracer| {
+            let parent = Context::current();
+            let span = tracer.0.start_with_context("submit", &parent);
+            parent.with_span(span)
+        }))
+    }
+}
+
+impl Shared {
+    /// The trace to which an attempt at a job belongs, if it is collected.
+    pub(crate) fn job_trace(&self, claim: &Claim) -> Option<JobTrace> {
+        let tracer = self.options.tracer.clone()?;
+        let traceparent = claim.traceparent.clone()?;
+        let headers = HashMap::from([(TRACEPARENT.to_owned(), traceparent)]);
+        Some(JobTrace {
+            parent: TraceContextPropagator::new().extract_with_context(&Context::new(), &headers),
+            tracer,
+            job: claim.id,
+            attempt: claim.attempt,
+            method: claim.method.clone(),
+        })
+    }
+}
+
+/// An attempt at a job whose trace is collected.
+#[derive(Debug, Clone)]
+pub(crate) struct JobTrace {
+    tracer: Tracer,
+    parent: Context,
+    job: Uuid,
+    attempt: u32,
+    method: String,
+}
+
+impl JobTrace {
+    /// Solves a case and writes down how long it had waited and how long it took.
+    pub(crate) fn solving(
+        traced: Option<&JobTrace>,
+        comes_from_queue: bool,
+        solve: impl FnOnce() -> Outcome,
+    ) -> Outcome {
+        let Some(traced) = traced else {
+            return solve();
+        };
+        let from = SystemTime::now();
+        if comes_from_queue {
+            traced.waited_until(from);
+        }
+        let outcome = solve();
+        let fault = match &outcome {
+            Outcome::Solved { .. } | Outcome::Slice { .. } => None,
+            Outcome::Unsolved { error, .. } => Some(error.to_string()),
+            Outcome::Refused(error) => Some(error.to_string()),
+            Outcome::Broken(failure) => Some(failure.detail.clone()),
+            Outcome::Abandoned => Some("the solver did not stop".to_owned()),
+        };
+        let method = KeyValue::new("railhead.method", traced.method.clone());
+        traced.past("solve", [from, SystemTime::now()], vec![method], fault);
+        outcome
+    }
+
+    /// Writes down how long a job has waited.
+    pub(crate) fn waited_until(&self, end: SystemTime) {
+        let queued = Duration::from_millis(created_at(self.job).unsigned_abs());
+        // The clock may have been set back since.
+        let queued = (UNIX_EPOCH + queued).min(end);
+        self.past("queue", [queued, end], Vec::new(), None);
+    }
+
+    /// Writes down how long the end of a job took to store, and what it was.
+    pub(crate) fn stored(&self, from: SystemTime, end: &'static str) {
+        let end = KeyValue::new("railhead.job.state", end);
+        self.past("store", [from, SystemTime::now()], vec![end], None);
+    }
+
+    /// Writes down a span that is over.
+    fn past(
+        &self,
+        name: &'static str,
+        [from, to]: [SystemTime; 2],
+        mut attributes: Vec<KeyValue>,
+        fault: Option<String>,
+    ) {
+        let attempt = i64::from(self.attempt);
+        attributes.push(KeyValue::new("railhead.job.id", self.job.to_string()));
+        attributes.push(KeyValue::new("railhead.job.attempt", attempt));
+        let span = self.tracer.0.span_builder(name).with_start_time(from);
+        let span = span.with_attributes(attributes);
+        let mut span = span.start_with_context(&*self.tracer.0, &self.parent);
+        if let Some(fault) = fault {
+            span.set_status(Status::error(fault));
+        }
+        span.end_with_timestamp(to);
     }
 }

@@ -8,7 +8,7 @@ use uuid::Uuid;
 
 use crate::attempts::attempt::StopReason;
 use crate::batch::control::DELETED_AT_ONCE;
-use crate::error::{JobsError, Result};
+use crate::error::{JobsError, Result, StoreError};
 use crate::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
 use crate::model::{Batch, Job, Kind, Labels, QueuePlace, State};
 use crate::run::model::{Run, RunHead};
@@ -118,19 +118,14 @@ impl Jobs {
     /// Work as it is stored, or was not longer than `age` ago: one read serves all who follow it. A run is a batch here.
     async fn read(&self, id: Uuid, age: Duration) -> Result<Work> {
         let (shared, tenant) = (&self.shared, &self.tenant);
-        let found = match self.kind {
-            Kind::Case | Kind::Evolution => {
-                let read = shared.store.job(tenant, id);
-                let job = shared.recent_jobs.at(tenant, id, age, read);
-                job.await?.map(Work::from)
-            }
-            kind => {
-                let read = shared.store.batch(tenant, kind, id);
-                let batch = shared.recent_batches.at(tenant, id, age, read);
-                batch.await?.map(Work::from)
-            }
+        let read = async {
+            Ok::<_, StoreError>(match self.kind {
+                Kind::Case | Kind::Evolution => shared.store.job(tenant, id).await?.map(Work::from),
+                kind => shared.store.batch(tenant, kind, id).await?.map(Work::from),
+            })
         };
-        match found {
+        let owned = (tenant.clone(), self.kind, id);
+        match shared.recent.at(owned, age, read).await? {
             Some(work) if work.kind() != self.kind || !self.sees(work.labels()) => {
                 Err(JobsError::NotFound(self.kind))
             }
@@ -357,10 +352,8 @@ impl Jobs {
         if state.ended() {
             shared.metrics.ended(state, 1);
             shared.announce(job);
-        } else if let Some(control) = shared.running.get(job) {
-            // A worker that lists its attempt later reads the request from the store.
-            control.stop(StopReason::Cancel);
-        } else {
+        } else if !shared.leases.stop(job, StopReason::Cancel) {
+            // A worker that claims the job later reads the request from the store.
             shared.publish(Notification::Cancel(job));
         }
     }

@@ -53,7 +53,7 @@ async fn results_without_a_job_are_swept_at_the_start() {
 }
 
 #[tokio::test]
-async fn a_result_of_an_earlier_attempt_is_swept_although_its_job_runs_again_when_it_is_found() {
+async fn a_result_of_an_earlier_attempt_is_swept_once_its_job_no_longer_runs() {
     let lab = Lab::idle(|options| options.small_result_max_bytes = 0).await;
     let kept = lab.submit(case("kept")).await;
     let mut worker = lab.jobs.worker("w").unwrap();
@@ -69,14 +69,13 @@ async fn a_result_of_an_earlier_attempt_is_swept_although_its_job_runs_again_whe
     let earlier = copied(&kept_file, kept, again);
     let name = earlier.parent().unwrap().with_file_name("99");
     std::fs::rename(earlier.parent().unwrap(), &name).unwrap();
-    lab.jobs.start().unwrap();
-    tokio::time::sleep(Duration::from_millis(200)).await;
-    assert!(name.exists(), "it could be the running attempt's");
+    let swept = async || lab.jobs.sweep_results().await.unwrap();
+    assert_eq!(swept().await, 0, "it could be the running attempt's");
 
     lab.gate.set_open(true);
     attempt.await.unwrap().unwrap();
-    until_gone(&name.join("solution.json")).await;
+    assert_eq!(swept().await, 1);
+    assert!(!name.exists());
     assert_eq!(lab.get(again).await.state, State::Succeeded);
-    lab.jobs.shutdown(Duration::from_secs(10)).await;
     assert!(kept_file.exists());
 }

@@ -46,9 +46,9 @@ async fn a_result_is_read_without_a_look_at_the_case() {
     let checks = Arc::new(AtomicUsize::new(0));
     let counter = checks.clone();
     let mut setup = Setup::new();
-    setup.recipe.check = Arc::new(move |case, limits| {
+    setup.recipe.check = Arc::new(move |known, case, limits| {
         counter.fetch_add(1, Ordering::SeqCst);
-        railhead::contact::check(case, limits)
+        railhead::contact::check_with(known, case, limits)
     });
     let server = setup.start().await;
     let mut case = example("spin.case.json");

@@ -2,7 +2,7 @@
 
 use bytes::Bytes;
 use railhead::jobs::State;
-use railhead::jobs::store::{Deleted, Ending, Filter, Lease, NewJob, Orphans, ReleaseReason};
+use railhead::jobs::store::{Deleted, Ending, Filter, Lease, NewJob, ReleaseReason};
 use uuid::Uuid;
 
 use crate::store::*;
@@ -114,7 +114,7 @@ async fn of_no_jobs_nothing_is_asked(kind: StoreKind) {
     assert!(store.finish(&[], 1).await.unwrap().is_empty());
     let why = ReleaseReason::NotBegun;
     assert!(store.release(&[], why, 1).await.unwrap().is_empty());
-    assert_eq!(store.orphans(&[]).await.unwrap(), Orphans::default());
+    assert!(store.orphans(&[]).await.unwrap().is_empty());
     assert!(store.cached(&[]).await.unwrap().is_empty());
     assert!(table.finish(&claim, &success(), 1).await.is_some());
 }

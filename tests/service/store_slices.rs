@@ -91,8 +91,7 @@ async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attemp
         store
             .orphans(&[(Uuid::now_v7(), "a".into()), (Uuid::now_v7(), "b".into())])
             .await
-            .unwrap()
-            .certain,
+            .unwrap(),
         ["a"]
     );
 }

@@ -154,8 +154,9 @@ pub(crate) async fn result(
     State(memory): State<Memory>,
 ) -> Result<Response> {
     let jobs = jobs.of_kind(Kind::Evolution);
-    let share = memory.ready_answer(jobs.tenant(), jobs.answer_bytes(id).await?)?;
-    let text = jobs.answer(id).await?;
+    let answer = jobs.open_answer(id).await?;
+    let share = memory.ready_answer(jobs.tenant(), answer.bytes)?;
+    let text = answer.text().await?;
     let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
     Ok(hold_while_sent((head, text).into_response(), share))
 }
@@ -288,8 +289,9 @@ async fn read(
 ) -> Result<Response> {
     let jobs = jobs.of_kind(Kind::Evolution);
     // Once as text, and about as much as numbers.
-    let share = memory.ready_answer(jobs.tenant(), 2 * jobs.answer_bytes(id).await?)?;
-    let text = jobs.answer(id).await?;
+    let answer = jobs.open_answer(id).await?;
+    let share = memory.ready_answer(jobs.tenant(), 2 * answer.bytes)?;
+    let text = answer.text().await?;
     let made = blocking(move || {
         let read = serde_json::from_slice(&text);
         make(&read.map_err(|error| ApiError::internal(&error))?)

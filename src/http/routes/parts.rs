@@ -158,8 +158,9 @@ pub(crate) fn has(cells: &PatchCells, values: &PointFields, output: Output) -> b
 /// Always: `output-not-asked`, or what went wrong while finding out.
 pub(crate) async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T> {
     let asked: Vec<String> = jobs
-        .outputs(id)
+        .open_answer(id)
         .await?
+        .outputs
         .into_iter()
         .map(|output| format!("`{}`", output.name()))
         .collect();

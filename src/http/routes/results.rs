@@ -149,8 +149,9 @@ async fn write_resultants(
 ) -> Result<Response> {
     let (jobs, id) = (&request.jobs, request.id);
     // The stored text is read whole and cut to what was asked for.
-    let turn = request.rendering(2 * jobs.answer_bytes(id).await?).await?;
-    let text = jobs.answer(id).await?;
+    let answer = jobs.open_answer(id).await?;
+    let turn = request.rendering(2 * answer.bytes).await?;
+    let text = answer.text().await?;
     let read = move || {
         let solution: Solution =
             serde_json::from_slice(&text).map_err(|error| ApiError::internal(&error))?;

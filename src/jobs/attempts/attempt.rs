@@ -245,57 +245,6 @@ impl Monitor for AttemptControl {
     }
 }
 
-/// The attempts of this process; clones share them.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct RunningAttempts(Arc<Mutex<HashMap<Uuid, Arc<AttemptControl>>>>);
-
-/// An entry in the list of running attempts, as long as it lives.
-#[derive(Debug)]
-pub(crate) struct RunningEntry {
-    attempts: RunningAttempts,
-    id: Uuid,
-    control: Arc<AttemptControl>,
-}
-
-impl RunningAttempts {
-    /// Lists an attempt at a job until the entry is dropped.
-    pub(crate) fn enter(&self, id: Uuid, control: &Arc<AttemptControl>) -> RunningEntry {
-        self.lock().insert(id, control.clone());
-        RunningEntry {
-            attempts: self.clone(),
-            id,
-            control: control.clone(),
-        }
-    }
-
-    /// The attempt at a job, if this process makes one.
-    pub(crate) fn get(&self, id: Uuid) -> Option<Arc<AttemptControl>> {
-        self.lock().get(&id).cloned()
-    }
-
-    /// The jobs of all attempts.
-    pub(crate) fn ids(&self) -> Vec<Uuid> {
-        self.lock().keys().copied().collect()
-    }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<Uuid, Arc<AttemptControl>>> {
-        lock(&self.0)
-    }
-}
-
-impl Drop for RunningEntry {
-    fn drop(&mut self) {
-        let mut attempts = self.attempts.lock();
-        // Another worker may have taken the job over meanwhile; its entry stays.
-        if attempts
-            .get(&self.id)
-            .is_some_and(|control| Arc::ptr_eq(control, &self.control))
-        {
-            attempts.remove(&self.id);
-        }
-    }
-}
-
 /// The leases of an attempt. They are no longer renewed once this is dropped.
 #[derive(Debug)]
 pub(crate) struct GroupLease(pub(crate) Arc<HeldLeases>);
@@ -315,7 +264,7 @@ pub(crate) struct HeldLeases {
     pub(crate) lost: CancellationToken,
 }
 
-/// All leases that this process holds, for its heartbeat.
+/// All leases that this process holds, with the jobs that it works on.
 #[derive(Debug, Default)]
 pub(crate) struct AllLeases(Mutex<Vec<Weak<HeldLeases>>>);
 
@@ -330,6 +279,28 @@ impl AllLeases {
         let mut all = self.lock();
         all.retain(|held| held.strong_count() > 0);
         all.iter().filter_map(Weak::upgrade).collect()
+    }
+
+    /// The jobs that are held.
+    pub(crate) fn ids(&self) -> Vec<Uuid> {
+        let held = self.held();
+        let ids = held.iter().flat_map(|held| {
+            let leases = held.leases();
+            leases.iter().map(|(claim, _)| claim.id).collect::<Vec<_>>()
+        });
+        ids.collect()
+    }
+
+    /// Tells the solver of a job to stop; `false` if this process does not work on it.
+    pub(crate) fn stop(&self, id: Uuid, reason: StopReason) -> bool {
+        let mut found = false;
+        for held in self.held() {
+            for (_, control) in held.leases().iter().filter(|(claim, _)| claim.id == id) {
+                control.stop(reason);
+                found = true;
+            }
+        }
+        found
     }
 
     fn lock(&self) -> MutexGuard<'_, Vec<Weak<HeldLeases>>> {
@@ -405,7 +376,6 @@ pub(crate) struct Member {
     pub(crate) case: Option<ClaimedCase>,
     /// What it goes on with, once it is known.
     pub(crate) sliced: Option<Box<SlicedWork>>,
-    pub(crate) _listed: RunningEntry,
 }
 
 /// Where a claimed job stands.
@@ -633,16 +603,12 @@ mod tests {
             suspect: false,
             slices: 0,
         };
-        let member = |claim: Claim| {
-            let control = Arc::new(AttemptControl::default());
-            Member {
-                _listed: RunningAttempts::default().enter(claim.id, &control),
-                claim,
-                control,
-                phase: Phase::Solving,
-                case: None,
-                sliced: None,
-            }
+        let member = |claim: Claim| Member {
+            claim,
+            control: Arc::default(),
+            phase: Phase::Solving,
+            case: None,
+            sliced: None,
         };
         Attempt {
             queue: Queue {

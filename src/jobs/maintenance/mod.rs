@@ -3,6 +3,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures_util::TryStreamExt;
+use tokio::time::MissedTickBehavior;
 use uuid::Uuid;
 
 use crate::attempts::attempt::StopReason;
@@ -13,14 +14,51 @@ use crate::model::{FailureKind, Job, State, too_late};
 use crate::shared::{Shared, heartbeat};
 use crate::storage_fault::StoragePlace;
 use crate::store::{Moment, Reap, RetentionRule};
+use crate::sync::blocking;
 
 pub mod nodes;
 
+/// Starts all of this.
+pub(crate) fn start(shared: &Arc<Shared>) {
+    let (longest, shortest) = SWEEP_EVERY;
+    let retention = shared.options.retention.unwrap_or(longest);
+    let sweep_every = (retention / 10).clamp(shortest, longest);
+    every(shared, SWEEP_RESULTS_EVERY, sweep_orphans);
+    every(shared, RECOVER_EVERY, recover);
+    every(shared, RESERVE_EVERY, keep_reserve);
+    every(shared, sweep_every, expire_jobs);
+    every(shared, DEADLINE_INTERVAL, watch_deadlines);
+    shared.tasks.spawn(reap_expired(shared.clone()));
+    if shared.store.cluster().is_some() {
+        nodes::start(shared);
+    }
+}
+
+/// Does this at once, and again each time the interval has passed, until the service drains.
+fn every<F>(
+    shared: &Arc<Shared>,
+    interval: Duration,
+    work: impl Fn(Arc<Shared>) -> F + Send + Sync + 'static,
+) where
+    F: Future<Output = ()> + Send,
+{
+    let mut beat = tokio::time::interval(interval);
+    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let shared = shared.clone();
+    let draining = shared.draining.clone();
+    shared.tasks.clone().spawn(async move {
+        let working = async {
+            loop {
+                beat.tick().await;
+                work(shared.clone()).await;
+            }
+        };
+        draining.run_until_cancelled(working).await
+    });
+}
+
 /// Results checked in one call by the sweep for orphans.
 const SWEEP_CHUNK: usize = 500;
-
-/// Time between two looks at results whose jobs were running.
-const UNDECIDED_EVERY: Duration = Duration::from_secs(1);
 
 /// Results taken from the outbox at once.
 const COLLECT_CHUNK: u32 = 500;
@@ -53,64 +91,65 @@ impl Shared {
     }
 }
 
-/// Removes results that no job refers to and that are not on their way to one: what a process left behind that was
-/// killed between the two. Runs once, beside everything else, and ends when the last job has ended that was running meanwhile and
-/// has such a result.
-pub(crate) async fn sweep_orphans(shared: Arc<Shared>) {
-    if shared.store.cluster().is_some() {
-        // There may be very many, and other nodes: the database looks for them itself, once in a while.
-        return;
-    }
-    let draining = &shared.draining;
-    match draining.run_until_cancelled(sweep_results(&shared)).await {
-        Some(Ok(0)) | None => {}
-        Some(Ok(removed)) => tracing::info!(removed, "orphaned results removed"),
-        Some(Err(error)) => tracing::warn!(%error, "orphaned results could not be swept"),
+/// Time between two sweeps of an embedded table.
+const SWEEP_RESULTS_EVERY: Duration = Duration::from_secs(24 * 3600);
+
+/// Removes results that no job refers to: what a process left behind that was killed between the write of a result and the end of its
+/// job. The nodes of a database do so together.
+async fn sweep_orphans(shared: Arc<Shared>) {
+    if shared.store.cluster().is_none() {
+        note_swept(shared.sweep_results().await);
     }
 }
 
-async fn sweep_results(shared: &Shared) -> Result<usize> {
-    shared.collect_blobs().await;
-    let (mut removed, mut undecided) = (0, Vec::new());
-    for month in shared.blobs.months().await? {
-        for some in shared.blobs.keys(&month).await?.chunks(SWEEP_CHUNK) {
-            let orphans = shared.store.orphans(some).await?;
-            undecided.extend(orphans.undecided);
-            removed += remove(shared, &orphans.certain).await?;
-        }
+/// Notes the end of a sweep of results.
+fn note_swept(removed: Result<u64>) {
+    match removed {
+        Ok(0) => {}
+        Ok(removed) => tracing::info!(removed, "results without a job removed"),
+        Err(error) => tracing::warn!(%error, "results without a job could not be swept"),
     }
-    // A job whose process was killed may have been claimed anew before its earlier result was looked at.
-    while !undecided.is_empty() {
-        tokio::time::sleep(UNDECIDED_EVERY).await;
-        let orphans = shared.store.orphans(&undecided).await?;
-        undecided = orphans.undecided;
-        removed += remove(shared, &orphans.certain).await?;
-    }
-    Ok(removed)
-}
-
-async fn remove(shared: &Shared, keys: &[String]) -> Result<usize> {
-    for key in keys {
-        shared.blobs.remove(key).await?;
-    }
-    Ok(keys.len())
 }
 
 /// Results written less long ago may be on their way to their job, in ms.
 const YOUNG: i64 = 24 * 3600 * 1000;
 
 impl Jobs {
-    /// Removes results outside the database that no job refers to and that were written more than a day ago; returns their number.
-    /// The nodes of a database do so by themselves, one of them once a day.
+    /// Removes results outside the table that no job refers to; returns their number. Where several nodes share a database, only results
+    /// that were written more than a day ago. A running service does this by itself, once a day.
     ///
     /// # Errors
     /// The database or the place of the results failed; the next sweep will go on.
-    pub async fn sweep_old_results(&self) -> Result<u64> {
-        self.shared.sweep_old_results().await
+    pub async fn sweep_results(&self) -> Result<u64> {
+        match self.shared.store.cluster() {
+            Some(_) => self.shared.sweep_old_results().await,
+            None => self.shared.sweep_results().await,
+        }
     }
 }
 
 impl Shared {
+    /// Removes the results of an embedded table that no job refers to; returns their number.
+    async fn sweep_results(&self) -> Result<u64> {
+        self.collect_blobs().await;
+        let mut removed = 0;
+        for month in self.blobs.months().await? {
+            for some in self.blobs.keys(&month).await?.chunks(SWEEP_CHUNK) {
+                removed += self.remove_orphans(some).await?;
+            }
+        }
+        Ok(removed)
+    }
+
+    async fn remove_orphans(&self, results: &[(Uuid, String)]) -> Result<u64> {
+        let orphans = self.store.orphans(results).await?;
+        for key in &orphans {
+            self.blobs.remove(key).await?;
+            self.metrics.results_swept.inc();
+        }
+        Ok(orphans.len() as u64)
+    }
+
     /// Removes results outside the database that no job refers to and that were written more than a day ago; returns their number.
     /// Several nodes may do so at once.
     pub(crate) async fn sweep_old_results(&self) -> Result<u64> {
@@ -127,11 +166,7 @@ impl Shared {
                 some.push((job, key));
             }
             if some.len() >= SWEEP_CHUNK || last {
-                for key in self.store.orphans(&some).await?.certain {
-                    self.blobs.remove(&key).await?;
-                    self.metrics.results_swept.inc();
-                    removed += 1;
-                }
+                removed += self.remove_orphans(&some).await?;
                 some.clear();
             }
             if last {
@@ -144,15 +179,10 @@ impl Shared {
 /// Time between two checks for jobs whose deadline has passed.
 const DEADLINE_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Ends jobs whose deadline has passed, once a second until the service drains: queued ones at once, running ones at
-/// the next tick of their solvers.
-pub(crate) async fn watch_deadlines(shared: Arc<Shared>) {
-    let mut beat = tokio::time::interval(DEADLINE_INTERVAL);
-    let draining = shared.draining.clone();
-    while draining.run_until_cancelled(beat.tick()).await.is_some() {
-        if let Err(error) = enforce_deadlines(&shared).await {
-            tracing::warn!(%error, "deadlines could not be checked");
-        }
+/// Ends jobs whose deadline has passed: queued ones at once, running ones at the next tick of their solvers.
+async fn watch_deadlines(shared: Arc<Shared>) {
+    if let Err(error) = enforce_deadlines(&shared).await {
+        tracing::warn!(%error, "deadlines could not be checked");
     }
 }
 
@@ -173,7 +203,7 @@ async fn enforce_deadlines(shared: &Shared) -> Result<()> {
         }
         if overdue.ended.is_empty() {
             for id in overdue.running {
-                stop(shared, id);
+                shared.leases.stop(id, StopReason::Deadline);
             }
             break;
         }
@@ -181,16 +211,10 @@ async fn enforce_deadlines(shared: &Shared) -> Result<()> {
     Ok(())
 }
 
-fn stop(shared: &Shared, id: Uuid) {
-    if let Some(control) = shared.running.get(id) {
-        control.stop(StopReason::Deadline);
-    }
-}
-
 /// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
-pub(crate) async fn reap_expired(shared: Arc<Shared>) {
+async fn reap_expired(shared: Arc<Shared>) {
     let mut beat = tokio::time::interval(heartbeat(&shared));
-    beat.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let recovered = shared.recovered.wait();
     let _ = shared.draining.run_until_cancelled(recovered).await;
     let mut quiet_until = i64::MIN;
@@ -251,33 +275,27 @@ const RESERVE_EVERY: Duration = Duration::from_secs(60);
 
 /// Takes back what a dead process left, and removes what is left of batches that were given up, again and again for as
 /// long as the disk does not allow it.
-pub(crate) async fn recover(shared: Arc<Shared>) {
-    let mut beat = tokio::time::interval(RECOVER_EVERY);
-    let mut reserved = tokio::time::Instant::now();
-    while shared
-        .draining
-        .run_until_cancelled(beat.tick())
-        .await
-        .is_some()
+async fn recover(shared: Arc<Shared>) {
+    if shared.recovered.get().is_none()
+        && let Err(error) = shared.recover().await
     {
-        if shared.recovered.get().is_none()
-            && let Err(error) = shared.recover().await
-        {
-            tracing::warn!(%error, "jobs of a dead process cannot be returned to the queue yet");
-        }
-        if !shared.unfinished_batches().abandoned.is_empty() {
-            shared.drop_abandoned().await;
-        }
-        if shared.storage.any() {
-            // The outcome is noted; what fails is tried again at the next time.
-            let tried = shared.require_storage();
-            let _ = shared.draining.run_until_cancelled(tried).await;
-        } else if reserved.elapsed() >= RESERVE_EVERY {
-            reserved = tokio::time::Instant::now();
-            let data_dir = shared.options.data_dir.clone();
-            // It is tried again at the next time.
-            let _ = tokio::task::spawn_blocking(move || disk_reserve::keep(&data_dir)).await;
-        }
+        tracing::warn!(%error, "jobs of a dead process cannot be returned to the queue yet");
+    }
+    if !shared.unfinished_batches().abandoned.is_empty() {
+        shared.drop_abandoned().await;
+    }
+    if shared.storage.any() {
+        // The outcome is noted; what fails is tried again at the next time.
+        let _ = shared.require_storage().await;
+    }
+}
+
+/// Keeps the disk reserve.
+async fn keep_reserve(shared: Arc<Shared>) {
+    if !shared.storage.any() {
+        let data_dir = shared.options.data_dir.clone();
+        // It is tried again at the next time.
+        let _ = blocking(move || disk_reserve::keep(&data_dir)).await;
     }
 }
 
@@ -378,18 +396,11 @@ impl Shared {
     }
 }
 
-/// Sweeps until the service drains.
-pub(crate) async fn expire_jobs(shared: Arc<Shared>) {
-    let (longest, shortest) = SWEEP_EVERY;
-    let retention = shared.options.retention.unwrap_or(longest);
-    let mut beat = tokio::time::interval((retention / 10).clamp(shortest, longest));
-    let draining = shared.draining.clone();
-    while draining.run_until_cancelled(beat.tick()).await.is_some() {
-        match draining.run_until_cancelled(shared.sweep_expired()).await {
-            Some(Ok(0)) | None => {}
-            Some(Ok(removed)) => tracing::info!(removed, "expired jobs removed"),
-            Some(Err(error)) => tracing::warn!(%error, "expired jobs could not be removed"),
-        }
+async fn expire_jobs(shared: Arc<Shared>) {
+    match shared.sweep_expired().await {
+        Ok(0) => {}
+        Ok(removed) => tracing::info!(removed, "expired jobs removed"),
+        Err(error) => tracing::warn!(%error, "expired jobs could not be removed"),
     }
 }
 

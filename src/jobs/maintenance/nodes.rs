@@ -10,6 +10,7 @@ use uuid::Uuid;
 
 use crate::attempts::attempt::StopReason;
 use crate::error::JobsError;
+use crate::maintenance::{every, note_swept};
 use crate::shared::Shared;
 use crate::store::{Cluster, ClusterView, Notification, Result};
 
@@ -37,17 +38,13 @@ const OFFSET_MIN: i64 = 250;
 /// A clock that is off by so much is worth a line in the log, in ms.
 const OFFSET_TOLD: i64 = 1000;
 
-/// Starts all of this, if the store is one that several processes use.
-pub(crate) fn start(shared: &Arc<Shared>) {
-    if shared.store.cluster().is_none() {
-        return;
-    }
-    let tasks = &shared.tasks;
-    tasks.spawn(beat(shared.clone()));
-    tasks.spawn(watch_cancellations(shared.clone()));
-    tasks.spawn(fold(shared.clone()));
-    tasks.spawn(sweep(shared.clone()));
-    tasks.spawn(listen(shared.clone()));
+/// Starts all of this.
+pub(super) fn start(shared: &Arc<Shared>) {
+    every(shared, BEAT_EVERY, beat);
+    every(shared, FOLD_EVERY, fold);
+    every(shared, SWEEP_EVERY, sweep);
+    shared.tasks.spawn(watch_cancellations(shared.clone()));
+    shared.tasks.spawn(listen(shared.clone()));
 }
 
 impl Shared {
@@ -88,32 +85,19 @@ impl Shared {
         match notification {
             Notification::Work => self.wake_here(),
             Notification::Ended(id) => self.announce_here(id),
-            Notification::Cancel(id) => self.stop_here(id),
-        }
-    }
-
-    fn stop_here(&self, id: Uuid) {
-        if let Some(control) = self.running.get(id) {
-            control.stop(StopReason::Cancel);
+            Notification::Cancel(id) => drop(self.leases.stop(id, StopReason::Cancel)),
         }
     }
 }
 
 async fn beat(shared: Arc<Shared>) {
-    let mut beat = interval(BEAT_EVERY);
-    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let draining = shared.draining.clone();
-    while draining.run_until_cancelled(beat.tick()).await.is_some() {
-        let Some(cluster) = shared.store.cluster() else {
-            return;
-        };
-        if let Err(error) = shared.show_node(cluster).await {
-            tracing::warn!(%error, "the heartbeat of this node failed");
-            continue;
-        }
-        if let Err(error) = keep_batches(&shared, cluster).await {
-            tracing::warn!(%error, "batches that are being filled could not be kept");
-        }
+    let Some(cluster) = shared.store.cluster() else {
+        return;
+    };
+    if let Err(error) = shared.show_node(cluster).await {
+        tracing::warn!(%error, "the heartbeat of this node failed");
+    } else if let Err(error) = keep_batches(&shared, cluster).await {
+        tracing::warn!(%error, "batches that are being filled could not be kept");
     }
 }
 
@@ -143,50 +127,34 @@ async fn watch_cancellations(shared: Arc<Shared>) {
             .run_until_cancelled(beat.tick())
             .await
             .is_none()
-            || shared.draining.is_cancelled() && shared.running.ids().is_empty()
+            || shared.draining.is_cancelled() && shared.leases.ids().is_empty()
         {
             return;
         }
-        let running = shared.running.ids();
+        let running = shared.leases.ids();
         let Some(cluster) = shared.store.cluster().filter(|_| !running.is_empty()) else {
             continue;
         };
         match cluster.cancel_requests(&running).await {
-            Ok(ids) => ids.into_iter().for_each(|id| shared.stop_here(id)),
+            Ok(ids) => ids.into_iter().for_each(|id| {
+                shared.leases.stop(id, StopReason::Cancel);
+            }),
             Err(error) => tracing::debug!(%error, "cancellations could not be read"),
         }
     }
 }
 
 async fn fold(shared: Arc<Shared>) {
-    let mut beat = interval(FOLD_EVERY);
-    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let draining = shared.draining.clone();
-    while draining.run_until_cancelled(beat.tick()).await.is_some() {
-        let Some(cluster) = shared.store.cluster() else {
-            return;
-        };
-        if let Err(error) = cluster.fold_counts().await {
-            tracing::debug!(%error, "counts could not be added up");
-        }
+    if let Some(cluster) = shared.store.cluster()
+        && let Err(error) = cluster.fold_counts().await
+    {
+        tracing::debug!(%error, "counts could not be added up");
     }
 }
 
 async fn sweep(shared: Arc<Shared>) {
-    let mut beat = interval(SWEEP_EVERY);
-    beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    // The first one comes at once; a start has other things to do.
-    beat.reset();
-    let draining = shared.draining.clone();
-    while draining.run_until_cancelled(beat.tick()).await.is_some() {
-        let Some(cluster) = shared.store.cluster() else {
-            return;
-        };
-        match sweep_once(&shared, cluster).await {
-            Ok(0) => {}
-            Ok(removed) => tracing::info!(removed, "results without a job removed"),
-            Err(error) => tracing::warn!(%error, "results without a job could not be swept"),
-        }
+    if let Some(cluster) = shared.store.cluster() {
+        note_swept(sweep_once(&shared, cluster).await);
     }
 }
 

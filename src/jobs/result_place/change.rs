@@ -9,7 +9,7 @@ use crate::metrics::StoreRequests;
 use crate::result_place::settle::{IN_DATABASE, decide, mark, marker, on_this_machine_alone};
 use crate::result_place::url::{ResultsPlace, ResultsUrl};
 use crate::store::postgres::database::PostgresStore;
-use crate::store::{Cluster, Deployment};
+use crate::store::{Cluster, Deployment, Store};
 
 /// Results that are copied at once: each waits for its requests most of the time. Chosen by judgement, below the usual 10 connections to
 /// the database.

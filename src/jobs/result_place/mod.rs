@@ -19,7 +19,10 @@ use crate::error::Result;
 #[cfg(feature = "cluster")]
 use crate::result_place::url::ResultsPlace;
 #[cfg(feature = "cluster")]
-use crate::store::postgres::{database::PostgresStore, doctor::Finding};
+use crate::store::{
+    Store,
+    postgres::{database::PostgresStore, doctor::Finding},
+};
 
 /// Examines the place of the results of a database.
 ///

@@ -179,8 +179,8 @@ impl Worker {
 }
 
 impl Worker {
-    /// Reads the cases of the claimed jobs, and ends those whose result has been there since they were queued. To be called once the attempt
-    /// is listed: a cancellation is then either read here or finds the control of the attempt.
+    /// Reads the cases of the claimed jobs, and ends those whose result has been there since they were queued. To be called once the
+    /// leases are kept: a cancellation is then either read here or finds the control of the job.
     pub(crate) async fn read_cases(
         &self,
         attempt: &mut Attempt,

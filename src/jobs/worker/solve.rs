@@ -16,12 +16,12 @@ use crate::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Work};
 use crate::codec::encode::encode;
 use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
-use crate::job_trace::JobTrace;
 use crate::model::{Failure, FailureKind, Kind, Queue};
 use crate::run::model::{REASON, RunChunk, RunHead, parted};
 use crate::shared::Shared;
 use crate::store::{Claim, SliceRecord, StoredCase};
 use crate::sync::lock;
+use crate::trace::JobTrace;
 use crate::worker::{evolution, heartbeat};
 use railhead_contact::error::SolveError;
 use railhead_contact::evaluate::answer::ManyAnswer;
@@ -67,7 +67,7 @@ fn check_and_solve(
     if stored.kind == Kind::Evolution {
         return evolution::begin(shared, control, &case, notes);
     }
-    let mut checked = (shared.engine.check)(&case, &shared.options.limits)?;
+    let mut checked = (shared.engine.check)(&shared.engine.known, &case, &shared.options.limits)?;
     let limit = shared.options.time_limit;
     checked.run.time_limit = Some(checked.run.time_limit.map_or(limit, |time| time.min(limit)));
     let slices = (shared.engine.slices)(&checked);
@@ -275,7 +275,7 @@ fn table(
 /// A group that takes longer hands back what it has not begun.
 const GROUP_TIME: Duration = Duration::from_millis(400);
 
-/// Lists claimed jobs as running and keeps their leases from now on.
+/// Keeps the leases of claimed jobs from now on.
 pub(crate) fn take_up(
     shared: &Arc<Shared>,
     queue: Queue,
@@ -285,16 +285,12 @@ pub(crate) fn take_up(
     let was_begun = claims.iter().any(|claim| claim.slices > 0);
     let members: Vec<Member> = claims
         .into_iter()
-        .map(|claim| {
-            let control = Arc::new(AttemptControl::default());
-            Member {
-                _listed: shared.running.enter(claim.id, &control),
-                claim,
-                control,
-                phase: Phase::Solving,
-                case: None,
-                sliced: None,
-            }
+        .map(|claim| Member {
+            claim,
+            control: Arc::default(),
+            phase: Phase::Solving,
+            case: None,
+            sliced: None,
         })
         .collect();
     let held = members

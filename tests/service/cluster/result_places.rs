@@ -124,7 +124,7 @@ async fn only_old_results_that_no_job_refers_to_are_swept() {
         }
     }
     let jobs = Jobs::open(options()).await.unwrap();
-    assert_eq!(jobs.sweep_old_results().await.unwrap(), 1);
+    assert_eq!(jobs.sweep_results().await.unwrap(), 1);
     assert!(!old.exists() && young.exists());
     // The marker and the result of the job are still there.
     assert!(kept > 2);

@@ -4,7 +4,7 @@ use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::Queue;
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::{
-    ClaimRequest, Claims, Ending, Ends, Lease, ReleaseReason, StoredResult,
+    ClaimRequest, Claims, Ending, Ends, Lease, ReleaseReason, Store, StoredResult,
 };
 use sqlx::{Connection, PgConnection};
 

@@ -13,7 +13,7 @@ use sqlx::postgres::{PgConnection, PgRow};
 use sqlx::query;
 
 use crate::model::Queue;
-use crate::store::postgres::sql::claim::peek;
+use crate::store::postgres::sql::claim::{PEEK, first_queued};
 use crate::store::postgres::sql::rows::count;
 use crate::store::{ClaimRequest, Result};
 use crate::sync::lock;
@@ -56,13 +56,6 @@ const PEEK_FROM: &str = concat!(
     peek_of!("2", "$7"),
     ") AS queued LIMIT $2"
 );
-
-/// The jobs of a queue that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
-/// left to whoever ends them, jobs of a batch that is not acknowledged to whoever fills it.
-const PEEK: &str = peek!("slices = 0", "$2", "$6");
-
-/// Like `PEEK`, for jobs of which some slices are solved.
-pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0", "$2", "$6");
 
 /// Where the claims of a long queue began, in each rank; empty: at its start. The time is that of the last one from the start.
 type Places = (Instant, [String; RANKS]);
@@ -108,7 +101,7 @@ impl ClaimMemory {
                 return Ok(found);
             }
         }
-        let found = first_queued(connection, PEEK, request, count(request.jobs)).await?;
+        let found = first_queued(connection, PEEK, request, request.jobs).await?;
         self.remember(request, &found, Instant::now())?;
         Ok(found)
     }
@@ -149,20 +142,4 @@ impl ClaimMemory {
     pub(crate) fn remember_queues(&self, queues: &[(Queue, u64)]) {
         self.known().queues = Some((Instant::now(), queues.to_vec()));
     }
-}
-
-/// The first jobs of a queue, found by a statement from its start.
-pub(crate) async fn first_queued(
-    connection: &mut PgConnection,
-    peek: &'static str,
-    request: &ClaimRequest<'_>,
-    most: i64,
-) -> Result<Vec<PgRow>> {
-    let rows = sql!(fetch_all, connection,
-        peek;
-        &*request.queue.tenant, most, request.late_before,
-        request.each_slice_us.map_or(i64::MAX, count), request.queue.kind.name(),
-        i64::from(request.suspects)
-    )?;
-    Ok(rows)
 }

@@ -3,7 +3,6 @@
 use std::fmt;
 
 use sqlx::postgres::{PgConnectOptions, PgPool};
-use sqlx::query;
 
 use crate::error::JobsError;
 use crate::store::postgres::claim_memory::ClaimMemory;
@@ -74,20 +73,5 @@ impl PostgresStore {
             given_clock: true,
             ..self
         }
-    }
-
-    /// Closes every connection.
-    pub async fn close(&self) {
-        self.writer.close().await;
-    }
-
-    /// A round trip; with `write` it writes a value that nobody reads.
-    pub(crate) async fn ready(&self, write: bool) -> Result<()> {
-        let statement = match write {
-            true => "UPDATE deployment SET touched = touched + 1",
-            false => "SELECT 1 FROM deployment",
-        };
-        sql!(execute, &self.writer, statement)?;
-        Ok(())
     }
 }

@@ -1,6 +1,8 @@
 //! PostgreSQL as the shared statements see it.
 
+use async_trait::async_trait;
 use futures_util::TryStreamExt;
+use railhead_macros::repeat_conflicts;
 use sqlx::Transaction;
 use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow, Postgres};
 use sqlx::query::Query;
@@ -9,12 +11,10 @@ use uuid::Uuid;
 use crate::error::StoreError;
 use crate::model::Queue;
 use crate::store::postgres::answer::in_time;
-use crate::store::postgres::claim_memory::{PEEK_BEGUN, first_queued};
 use crate::store::postgres::connection::{ADMISSION, lock};
 use crate::store::postgres::database::PostgresStore;
-use crate::store::postgres::sql::claim::{claimed, push_lease_until};
-use crate::store::postgres::sql::rows::{count, push_list, read_count, read_flag, read_id};
-use crate::store::{ClaimKind, ClaimRequest, Cluster, Result};
+use crate::store::postgres::engine;
+use crate::store::{ClaimRequest, Cluster, Result, Store};
 
 pub(crate) use sqlx::{Row, query, query_scalar};
 
@@ -37,6 +37,11 @@ const REPEATED: u32 = 4;
 /// Begins a transaction.
 pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>> {
     Ok(pool.begin().await?)
+}
+
+/// Begins a transaction that claims.
+pub(crate) async fn begin_claim(pool: &DbPool) -> Result<Transaction<'static, Db>> {
+    begin(pool).await
 }
 
 /// Passes each row of a statement on until `row` returns `false`.
@@ -94,47 +99,18 @@ impl PostgresStore {
         Ok(ids)
     }
 
-    /// Claims the next jobs of a queue; rows with the columns of `claimed`.
-    pub(crate) async fn claim_next(
+    /// The first new jobs of a queue, locked.
+    pub(crate) async fn first_new(
         &self,
+        connection: &mut DbConnection,
         request: &ClaimRequest<'_>,
-        token: i64,
     ) -> Result<Vec<DbRow>> {
-        let mut transaction = begin(&self.writer).await?;
-        let queued = match request.kind {
-            ClaimKind::New => self.claim_memory.peek(&mut transaction, request).await?,
-            ClaimKind::Begun => first_queued(&mut transaction, PEEK_BEGUN, request, 1).await?,
-        };
-        if queued.is_empty() {
-            return Ok(Vec::new());
-        }
-        let ids = choose(&queued, request)?;
-        let mut update = QueryBuilder::new(
-            "UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = ",
-        );
-        update.push_bind(token).push(", lease_until = ");
-        push_lease_until(&mut update, self, request.lease);
-        update.push(", worker = ").push_bind(request.worker);
-        update.push(", started_at = ").push_bind(request.now);
-        update.push(", updated_at = ").push_bind(request.now);
-        update.push(", group_size = ");
-        update.push_bind(count(ids.len()));
-        update.push(", progress = done, version = version + 1 WHERE state = 'queued' AND id IN (");
-        push_list(&mut update, &ids);
-        update.push(concat!(") RETURNING ", claimed!()));
-        let rows = update.build().fetch_all(&mut *transaction).await?;
-        transaction.commit().await?;
-        Ok(rows)
+        self.claim_memory.peek(connection, request).await
     }
 
     /// The present by which leases are judged: none, so that the database's clock is asked; in tests the one that is given.
     pub(crate) fn lease_now(&self, now: i64) -> Option<i64> {
         self.given_clock.then_some(now)
-    }
-
-    /// Any number of processes use it.
-    pub(crate) fn as_cluster(&self) -> Option<&dyn Cluster> {
-        Some(self)
     }
 
     /// The queues with jobs in them, if they were read a moment ago and one is long.
@@ -158,9 +134,31 @@ impl PostgresStore {
         )?;
         Ok(u64::try_from(bytes).unwrap_or(0))
     }
+}
+
+#[repeat_conflicts]
+#[async_trait]
+impl Store for PostgresStore {
+    async fn ready(&self, write: bool) -> Result<()> {
+        let statement = match write {
+            true => "UPDATE deployment SET touched = touched + 1",
+            false => "SELECT 1 FROM deployment",
+        };
+        sql!(execute, &self.writer, statement)?;
+        Ok(())
+    }
+
+    fn cluster(&self) -> Option<&dyn Cluster> {
+        Some(self)
+    }
+
+    #[once]
+    async fn close(&self) {
+        self.writer.close().await;
+    }
 
     /// The server gives space back by itself.
-    pub(crate) async fn compact(&self, _: i64, _: u32) -> Result<bool> {
+    async fn compact(&self, _: i64, _: u32) -> Result<bool> {
         Ok(false)
     }
 }
@@ -187,22 +185,4 @@ fn gave_way(error: &StoreError) -> bool {
     let cause = cause.downcast_ref::<sqlx::Error>();
     let code = cause.and_then(|cause| cause.as_database_error()?.code());
     code.is_some_and(|code| [SERIALIZATION, DEADLOCK, FOREIGN_KEY].contains(&&*code))
-}
-
-/// The ids of the next group: the first of the queued jobs together with those behind it that are small enough.
-fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>> {
-    let mut ids = Vec::with_capacity(queued.len());
-    let mut cost_us = 0;
-    for row in queued {
-        let suspect = read_flag(row, "suspect")?;
-        cost_us += read_count(row, "cost_us")?;
-        if !ids.is_empty() && (suspect || cost_us > request.cost_us) {
-            break;
-        }
-        ids.push(read_id(row)?);
-        if suspect {
-            break;
-        }
-    }
-    Ok(ids)
 }

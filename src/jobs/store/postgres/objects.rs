@@ -41,7 +41,14 @@ impl PgObjects {
         )
         .map_err(failed)?;
         match size {
-            Some(size) => Ok(meta(location.clone(), size)),
+            Some(size) => Ok(ObjectMeta {
+                location: location.clone(),
+                // Nobody asks for it.
+                last_modified: Default::default(),
+                size: size.unsigned_abs(),
+                e_tag: None,
+                version: None,
+            }),
             None => Err(missing(location)),
         }
     }
@@ -157,64 +164,17 @@ impl ObjectStore for PgObjects {
             .boxed()
     }
 
-    fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
-        let (pool, (from, to)) = (self.pool.clone(), bounds(prefix));
-        let listed = async move {
-            let rows: Vec<(String, i64)> = sqlx::query_as(
-                "SELECT path, size FROM objects WHERE path >= $1 AND path < $2 AND number = 0 ORDER BY path",
-            )
-            .bind(from)
-            .bind(to)
-            .fetch_all(&pool)
-            .await
-            .map_err(failed)?;
-            let metas = rows
-                .into_iter()
-                .map(|(path, size)| Ok(meta(Path::from(path), size)));
-            Ok::<_, Error>(stream::iter(metas))
-        };
-        stream::once(listed).try_flatten().boxed()
+    /// Results in the database are found by its tables.
+    fn list(&self, _: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
+        stream::once(async { Err(not_done("list")) }).boxed()
     }
 
-    /// Only the folders are told, which is what results are looked for by.
-    async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
-        let (from, to) = bounds(prefix);
-        let names: Vec<String> = sql!(scalar fetch_all, &self.pool,
-            "SELECT DISTINCT split_part(substr(path, length($1) + 1), '/', 1) FROM objects \
-             WHERE path >= $1 AND path < $2 AND number = 0 AND strpos(substr(path, length($1) + 1), '/') > 0 ORDER BY 1";
-            &from, to
-        )
-        .map_err(failed)?;
-        let folders = names.iter().map(|name| Path::from(format!("{from}{name}")));
-        Ok(ListResult {
-            common_prefixes: folders.collect(),
-            objects: Vec::new(),
-            extensions: Default::default(),
-        })
+    async fn list_with_delimiter(&self, _: Option<&Path>) -> Result<ListResult> {
+        Err(not_done("list_with_delimiter"))
     }
 
     async fn copy_opts(&self, _: &Path, _: &Path, _: CopyOptions) -> Result<()> {
         Err(not_done("copy"))
-    }
-}
-
-/// Paths below a folder are those from the first text on and before the second.
-fn bounds(prefix: Option<&Path>) -> (String, String) {
-    match prefix.map(Path::as_ref).filter(|prefix| !prefix.is_empty()) {
-        // The character after the slash.
-        Some(prefix) => (format!("{prefix}/"), format!("{prefix}0")),
-        None => (String::new(), "\u{10ffff}".to_owned()),
-    }
-}
-
-fn meta(location: Path, size: i64) -> ObjectMeta {
-    ObjectMeta {
-        location,
-        // Nobody asks for it.
-        last_modified: Default::default(),
-        size: size.unsigned_abs(),
-        e_tag: None,
-        version: None,
     }
 }
 

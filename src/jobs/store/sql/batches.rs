@@ -13,8 +13,8 @@ use uuid::Uuid;
 use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{
-    count, job_columns, push_list, read_blob_ids, read_count, read_flag, read_id, read_job,
-    read_json, read_kind, read_small, read_state, to_json,
+    count, job_columns, push_list, push_name, read_blob_ids, read_count, read_flag, read_id,
+    read_job, read_json, read_kind, read_small, read_state, to_json,
 };
 use super::submit::{Places, insert_jobs};
 use crate::error::StoreError;
@@ -488,14 +488,7 @@ fn push_page(
     if let Some(before) = [before, after].into_iter().flatten().min() {
         query.push(" AND id < ").push_bind(before.to_string());
     }
-    if let Some(name) = &filter.name {
-        query.push(concat!(
-            " AND ",
-            place_in!(),
-            "(lower(COALESCE(name, '')), "
-        ));
-        query.push_bind(name.to_ascii_lowercase()).push(") > 0");
-    }
+    push_name(query, filter.name.as_ref());
     for (key, value) in &filter.labels {
         query.push(concat!(
             " AND EXISTS (SELECT 1 FROM ",

@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query_scalar};
 use super::rows::{count, fence, push_list, read_blob_ids, read_id, read_small, read_state};
-use crate::store::{Claim, Orphans, Result, ResultKeys, StoredResult};
+use crate::store::{Claim, Result, ResultKeys, StoredResult};
 
 /// Values bound in one statement; far below the bound of SQLite.
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;
@@ -154,8 +154,8 @@ impl ResultKeys for SqlStore {
         leave_to_collector(&mut connection, &[key.to_owned()]).await
     }
 
-    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Orphans> {
-        let mut orphans = Orphans::default();
+    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Vec<String>> {
+        let mut orphans = Vec::new();
         for some in results.chunks(VALUES_PER_STATEMENT) {
             // In this order: what a running job has written is known by its key before the job no longer runs.
             let running = self.running(some).await?;
@@ -165,13 +165,10 @@ impl ResultKeys for SqlStore {
             let known = query.build().fetch_all(&self.readers).await?;
             let known = known.iter().map(|row| row.try_get("key"));
             let known: HashSet<String> = known.collect::<Result<_, _>>()?;
-            for result in some.iter().filter(|(_, key)| !known.contains(key)) {
-                if running.contains(&result.0) {
-                    orphans.undecided.push(result.clone());
-                } else {
-                    orphans.certain.push(result.1.clone());
-                }
-            }
+            let lost = some
+                .iter()
+                .filter(|(id, key)| !known.contains(key) && !running.contains(id));
+            orphans.extend(lost.map(|(_, key)| key.clone()));
         }
         Ok(orphans)
     }

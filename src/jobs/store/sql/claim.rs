@@ -9,7 +9,7 @@ use railhead_macros::repeat_conflicts;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
+use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{
     count, fence, push_list, read_blob_ids, read_cache_key, read_count, read_flag, read_id,
     read_kind, read_move, read_optional_id, read_small,
@@ -17,35 +17,34 @@ use super::rows::{
 use crate::error::StoreError;
 use crate::model::{Queue, State};
 use crate::store::{
-    Claim, ClaimRequest, ClaimedCase, Claims, Lease, NewSlice, ReleaseReason, Renewal, Result,
-    SliceRecord, StoredCase, StoredResult,
+    Claim, ClaimKind, ClaimRequest, ClaimedCase, Claims, Lease, NewSlice, ReleaseReason, Renewal,
+    Result, SliceRecord, StoredCase, StoredResult,
 };
 
-/// Selects the first jobs of the queue $1 and $5, at most `$most`; suspects if `$suspects` is 1.
+/// Selects the first jobs of the queue $1 and $5, at most $2; suspects if $6 is 1.
 macro_rules! peek {
-    ($begun:literal, $most:literal, $suspects:literal) => {
+    ($begun:literal) => {
         concat!(
             "SELECT id, suspect, cost_us, rank FROM jobs \
-             WHERE state = 'queued' AND tenant = $1 AND kind = $5 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND suspect <= ", $suspects, " AND ",
+             WHERE state = 'queued' AND tenant = $1 AND kind = $5 AND (deadline IS NULL OR deadline > $3) AND slice_us <= $4 AND suspect <= $6 AND ",
             $begun,
             " AND (batch_id IS NULL OR batch_id NOT IN (SELECT id FROM batches WHERE complete = 0 AND tenant = $1)) \
-             ORDER BY rank, id LIMIT ",
-            $most,
+             ORDER BY rank, id LIMIT $2",
             skip_locked!()
         )
     };
 }
 
-pub(crate) use peek;
+/// The jobs of a queue that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
+/// left to whoever ends them, jobs of a batch that is not acknowledged to whoever fills it.
+pub(crate) const PEEK: &str = peek!("slices = 0");
+
+/// Like `PEEK`, for jobs of which some slices are solved.
+pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0");
 
 /// The columns that a [`Claim`] is read from.
-macro_rules! claimed {
-    () => {
-        "id, rank, attempt, lease_token, method, traceparent, suspect, slices, \
-         CASE WHEN bypass_cache = 1 THEN NULL ELSE cache_key END AS cache_key"
-    };
-}
-pub(crate) use claimed;
+const CLAIMED: &str = "id, rank, attempt, lease_token, method, traceparent, suspect, slices, \
+     CASE WHEN bypass_cache = 1 THEN NULL ELSE cache_key END AS cache_key";
 
 /// Queues with jobs in them.
 pub(crate) const QUEUES: &str = "SELECT tenant, kind, CAST(SUM(number) AS bigint) AS waiting FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0 ORDER BY tenant, kind";
@@ -286,7 +285,7 @@ fn new_token() -> Result<i64> {
 }
 
 /// Writes when a lease that begins now runs out.
-pub(crate) fn push_lease_until(query: &mut QueryBuilder, store: &SqlStore, lease: Lease) {
+fn push_lease_until(query: &mut QueryBuilder, store: &SqlStore, lease: Lease) {
     query.push(engine::LEASE_NOW.0);
     query.push_bind(store.lease_now(lease.now));
     query.push(engine::LEASE_NOW.1).push(" + ");
@@ -306,7 +305,74 @@ fn read_claim(row: &DbRow) -> Result<Claim> {
     })
 }
 
+/// The first jobs of a queue, found by a statement from its start.
+pub(crate) async fn first_queued(
+    connection: &mut DbConnection,
+    peek: &'static str,
+    request: &ClaimRequest<'_>,
+    most: usize,
+) -> Result<Vec<DbRow>> {
+    let rows = sql!(fetch_all, connection,
+        peek;
+        &*request.queue.tenant, count(most), request.late_before,
+        request.each_slice_us.map_or(i64::MAX, count), request.queue.kind.name(),
+        i64::from(request.suspects)
+    )?;
+    Ok(rows)
+}
+
+/// The ids of the next group: the first of the queued jobs together with those behind it that are small enough.
+fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>> {
+    let mut ids = Vec::with_capacity(queued.len());
+    let mut cost_us = 0;
+    for row in queued {
+        let suspect = read_flag(row, "suspect")?;
+        cost_us += read_count(row, "cost_us")?;
+        if !ids.is_empty() && (suspect || cost_us > request.cost_us) {
+            break;
+        }
+        ids.push(read_id(row)?);
+        if suspect {
+            break;
+        }
+    }
+    Ok(ids)
+}
+
 impl SqlStore {
+    /// Claims the next jobs of a queue; rows with the columns of `CLAIMED`.
+    async fn claim_next(&self, request: &ClaimRequest<'_>, token: i64) -> Result<Vec<DbRow>> {
+        let mut transaction = engine::begin_claim(&self.writer).await?;
+        let queued = match request.kind {
+            ClaimKind::New => self.first_new(&mut transaction, request).await?,
+            ClaimKind::Begun => first_queued(&mut transaction, PEEK_BEGUN, request, 1).await?,
+        };
+        if queued.is_empty() {
+            return Ok(Vec::new());
+        }
+        let ids = choose(&queued, request)?;
+        let mut update = QueryBuilder::new(
+            "UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = ",
+        );
+        update.push_bind(token).push(", lease_until = ");
+        push_lease_until(&mut update, self, request.lease);
+        update.push(", worker = ").push_bind(request.worker);
+        update.push(", started_at = ").push_bind(request.now);
+        update.push(", updated_at = ").push_bind(request.now);
+        update.push(", group_size = ");
+        update.push_bind(count(ids.len()));
+        update.push(concat!(
+            ", progress = done, version = version + 1 WHERE ",
+            bare!("state"),
+            " = 'queued' AND id IN ("
+        ));
+        push_list(&mut update, &ids);
+        update.push(") RETURNING ").push(CLAIMED);
+        let rows = update.build().fetch_all(&mut *transaction).await?;
+        transaction.commit().await?;
+        Ok(rows)
+    }
+
     /// The template of a batch, and the head of a run.
     async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>> {
         let row = sql!(fetch_optional, &self.readers,

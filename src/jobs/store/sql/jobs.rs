@@ -9,7 +9,7 @@ use uuid::Uuid;
 use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{
-    GET, job_columns, read_blob_id, read_count, read_flag, read_id, read_job, read_kind,
+    GET, job_columns, push_name, read_blob_id, read_count, read_flag, read_id, read_job, read_kind,
     read_optional_id, read_small,
 };
 use crate::model::{Job, State};
@@ -245,14 +245,7 @@ pub(crate) fn page_query(
     if let Some(time) = filter.updated_after {
         query.push(" AND updated_at >= ").push_bind(time);
     }
-    if let Some(name) = &filter.name {
-        query.push(concat!(
-            " AND ",
-            place_in!(),
-            "(lower(COALESCE(name, '')), "
-        ));
-        query.push_bind(name.to_ascii_lowercase()).push(") > 0");
-    }
+    push_name(&mut query, filter.name.as_ref());
     for (key, value) in filter.labels.iter().skip(1) {
         query.push(" AND EXISTS (SELECT 1 FROM job_labels WHERE of_tenant = ");
         query.push_bind(tenant.to_owned()).push(" AND key = ");

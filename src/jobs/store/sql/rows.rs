@@ -138,6 +138,17 @@ pub(crate) fn push_list(query: &mut QueryBuilder, ids: &[Uuid]) {
     }
 }
 
+/// Restricts a list to entries whose column `name` contains a text.
+pub(crate) fn push_name(query: &mut QueryBuilder, name: Option<&String>) {
+    let Some(name) = name else { return };
+    query.push(concat!(
+        " AND ",
+        place_in!(),
+        "(lower(COALESCE(name, '')), "
+    ));
+    query.push_bind(name.to_ascii_lowercase()).push(") > 0");
+}
+
 /// A count in the form the database takes.
 pub(crate) fn count(number: impl TryInto<i64>) -> i64 {
     number.try_into().unwrap_or(i64::MAX)

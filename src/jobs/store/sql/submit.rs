@@ -9,9 +9,9 @@ use uuid::Uuid;
 
 use super::engine::{self, DbConnection, DbPool, QueryBuilder, Row, SqlStore, query};
 use super::finish::end_with_sources;
-use super::rows::{GET, count, job_columns, push_list, read_count, read_id, read_job, to_json};
+use super::rows::{count, job_columns, push_list, read_count, read_id, read_job, to_json};
 use crate::error::StoreError;
-use crate::model::{Job, State};
+use crate::model::Job;
 use crate::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result, SubmitJobs};
 
 /// Places still free, as one transaction has read them and takes them.
@@ -312,20 +312,17 @@ async fn store_together(
         transaction.commit().await?;
         return answers(jobs, known);
     }
-    let ended = insert_jobs(&mut transaction, None, &added).await?;
-    for (_, job) in added {
+    insert_jobs(&mut transaction, None, &added).await?;
+    for (_, job) in &added {
         if let Some((key, digest)) = &job.idempotency {
             sql!(execute, &mut *transaction,
                 "INSERT INTO idempotency_keys (of_tenant, key, digest, job_id) VALUES ($1, $2, $3, $4)";
                 &*job.tenant, key, digest.as_slice(), job.id.to_string()
             )?;
         }
-        let as_it_is = if ended.contains(&job.id) {
-            read_back(&mut transaction, job).await?
-        } else {
-            queued(job)
-        };
-        known.insert(job.id, Enqueued::Created(as_it_is));
+    }
+    for job in read_back(&mut transaction, &added).await? {
+        known.insert(job.id, Enqueued::Created(job));
     }
     transaction.commit().await?;
     answers(jobs, known)
@@ -359,36 +356,27 @@ pub(crate) async fn by_key(
     }))
 }
 
-async fn read_back(connection: &mut DbConnection, job: &NewJob) -> Result<Job> {
-    let row = sql!(fetch_one, connection, GET; job.id.to_string(), &*job.tenant)?;
-    read_job(&row)
-}
-
-/// A job as its row is right after it was added.
-fn queued(new: &NewJob) -> Job {
-    Job {
-        id: new.id,
-        tenant: new.tenant.to_string(),
-        kind: new.kind,
-        state: State::Queued,
-        name: new.name.clone(),
-        labels: new.labels.clone(),
-        batch_id: None,
-        priority: new.options.priority,
-        created_at: new.created_at,
-        updated_at: new.created_at,
-        started_at: None,
-        ended_at: None,
-        deadline: new.deadline(),
-        expires_at: None,
-        attempt: 0,
-        progress: 0.0,
-        remarks: Vec::new(),
-        failure: None,
-        cached: false,
-        version: 1,
-        queue: None,
+/// The jobs that were added, as they are.
+async fn read_back(
+    connection: &mut DbConnection,
+    added: &[(Option<u32>, &NewJob)],
+) -> Result<Vec<Job>> {
+    let ids: Vec<Uuid> = added.iter().map(|(_, job)| job.id).collect();
+    let tenants: HashSet<&str> = added.iter().map(|(_, job)| &*job.tenant).collect();
+    let mut query = QueryBuilder::new(concat!(
+        "SELECT ",
+        job_columns!(),
+        " FROM jobs WHERE id IN ("
+    ));
+    push_list(&mut query, &ids);
+    query.push(concat!(") AND ", bare!("tenant"), " IN ("));
+    let mut list = query.separated(", ");
+    for tenant in tenants {
+        list.push_bind(tenant.to_owned());
     }
+    query.push(")");
+    let rows = query.build().fetch_all(connection).await?;
+    rows.iter().map(read_job).collect()
 }
 
 #[repeat_conflicts]

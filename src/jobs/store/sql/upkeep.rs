@@ -11,8 +11,8 @@ use super::rows::{push_list, read_blob_ids, read_count, read_id, read_move, read
 use super::submit::stored;
 use crate::model::{Failure, Job, State};
 use crate::store::{
-    Claims, Cluster, Moment, Overdue, QueueAhead, Reap, Result, RetentionRule, Stats, Store,
-    Upkeep, Usage, first_id_at,
+    Claims, Moment, Overdue, QueueAhead, Reap, Result, RetentionRule, Stats, Upkeep, Usage,
+    first_id_at,
 };
 
 /// Those whose lease has run out: a job that was claimed alone counts the attempt; those of a group do not, and come alone next
@@ -260,22 +260,3 @@ pub(crate) const RESULT_BYTES: &str =
 /// Jobs of the tenant before one of this rank and id, and their expected µs; no further than the limit.
 pub(crate) const BEFORE: &str = "SELECT COUNT(*) AS jobs, CAST(COALESCE(SUM(cost_us), 0) AS bigint) AS cost_us FROM (SELECT cost_us FROM jobs \
      WHERE state = 'queued' AND tenant = $1 AND kind = 'case' AND (rank, id) < ($2, $3) LIMIT $4) AS before";
-
-#[async_trait]
-impl Store for SqlStore {
-    async fn ready(&self, write: bool) -> Result<()> {
-        engine::again(|| self.ready(write)).await
-    }
-
-    fn cluster(&self) -> Option<&dyn Cluster> {
-        self.as_cluster()
-    }
-
-    async fn close(&self) {
-        self.close().await;
-    }
-
-    async fn compact(&self, spare: i64, step: u32) -> Result<bool> {
-        engine::again(|| self.compact(spare, step)).await
-    }
-}

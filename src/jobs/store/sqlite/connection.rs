@@ -88,12 +88,7 @@ impl Pool {
 
     /// Begins a transaction that writes. One that reads first and then turns into a writer would fail at once beside another.
     pub(crate) async fn begin(&self) -> Result<Transaction> {
-        let mut connection = self.acquire().await?;
-        unlocked(&mut connection, |connection| {
-            connection.execute_batch("BEGIN IMMEDIATE")
-        })
-        .await?;
-        Ok(Transaction(connection))
+        begin(self.acquire().await?).await
     }
 
     /// As [`Pool::begin`], for what may be lost in a power cut, though not with the process: the commit does not wait for the disk.
@@ -101,11 +96,7 @@ impl Pool {
         let mut connection = self.acquire().await?;
         connection.batch(RELAX)?;
         connection.relaxed = true;
-        unlocked(&mut connection, |connection| {
-            connection.execute_batch("BEGIN IMMEDIATE")
-        })
-        .await?;
-        Ok(Transaction(connection))
+        begin(connection).await
     }
 
     /// Closes every connection, once those that are in use are given back.
@@ -115,6 +106,14 @@ impl Pool {
         let connections = std::mem::take(&mut *lock(&self.0.connections));
         blocking(|| drop(connections));
     }
+}
+
+async fn begin(mut connection: Pooled) -> Result<Transaction> {
+    unlocked(&mut connection, |connection| {
+        connection.execute_batch("BEGIN IMMEDIATE")
+    })
+    .await?;
+    Ok(Transaction(connection))
 }
 
 impl Shared {
@@ -592,6 +591,7 @@ impl Separated<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::Store;
     use crate::store::sqlite::database::SqliteStore;
 
     async fn bury(transaction: &mut Transaction, id: &str) -> Result<Done> {

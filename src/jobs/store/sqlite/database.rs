@@ -14,7 +14,7 @@ use rusqlite::OpenFlags;
 use crate::error::JobsError;
 use crate::store::Result;
 use crate::store::sqlite::connection::{Pool, query, query_scalar};
-use crate::store::sqlite::schema::{mark, migrate, require};
+use crate::store::sqlite::schema::{migrate, require};
 use crate::store::sqlite::sql::submit::GroupCommit;
 
 /// The write-ahead log is cut to this size when it was larger for a while.
@@ -73,12 +73,6 @@ impl SqliteStore {
         })
     }
 
-    /// Closes every connection; the write-ahead log is folded into the database.
-    pub async fn close(&self) {
-        self.readers.close().await;
-        self.writer.close().await;
-    }
-
     /// Checks the whole file for damage.
     ///
     /// # Errors
@@ -98,15 +92,6 @@ impl SqliteStore {
     pub async fn copy_into(&self, file: &Path) -> Result<(), JobsError> {
         make_private(file)?;
         sql!(execute, &self.writer, "VACUUM INTO $1"; file.to_string_lossy())?;
-        Ok(())
-    }
-
-    /// A round trip; with `write` it writes a page that stays as it was.
-    pub(crate) async fn ready(&self, write: bool) -> Result<()> {
-        if write {
-            return mark(&self.writer).await;
-        }
-        sql!(fetch_optional, &self.readers, "SELECT 1 FROM jobs LIMIT 1")?;
         Ok(())
     }
 }

@@ -3,14 +3,15 @@
 use std::ffi::OsString;
 use std::path::Path;
 
+use async_trait::async_trait;
 use uuid::Uuid;
 
 use crate::model::Queue;
 use crate::store::sqlite::connection::{Query, Transaction};
 use crate::store::sqlite::database::SqliteStore;
-use crate::store::sqlite::sql::claim::{claimed, peek};
-use crate::store::sqlite::sql::rows::count;
-use crate::store::{ClaimKind, ClaimRequest, Cluster, Result};
+use crate::store::sqlite::schema::mark;
+use crate::store::sqlite::sql::claim::{PEEK, first_queued};
+use crate::store::{ClaimRequest, Cluster, Result, Store};
 
 pub(crate) use crate::store::sqlite::connection::{
     Connection as DbConnection, Pool as DbPool, QueryBuilder, Row, SqliteRow as DbRow, query,
@@ -22,32 +23,14 @@ pub(crate) type SqlStore = SqliteStore;
 /// What stands before and behind the present by which leases are judged, a value.
 pub(crate) const LEASE_NOW: (&str, &str) = ("", "");
 
-macro_rules! claim {
-    ($begun:literal, $most:literal) => {
-        concat!(
-            "WITH queued AS MATERIALIZED (",
-            peek!($begun, $most, "$11"),
-            "), placed AS (SELECT id, ROW_NUMBER() OVER in_order AS place, SUM(cost_us) OVER in_order AS cost_us, \
-                 SUM(suspect) OVER in_order AS suspects FROM queued WINDOW in_order AS (ORDER BY rank, id)), \
-             chosen AS MATERIALIZED (SELECT id FROM placed WHERE place = 1 OR (cost_us <= $6 AND suspects = 0)) \
-             UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = $7, lease_until = $8, worker = $9, \
-             started_at = $10, updated_at = $10, group_size = (SELECT COUNT(*) FROM chosen), \
-             progress = done, version = version + 1 \
-             WHERE id IN (SELECT id FROM chosen) RETURNING ",
-            claimed!()
-        )
-    };
-}
-
-/// Claims the first new jobs of a queue.
-pub(crate) const CLAIM_NEW: &str = claim!("slices = 0", "$2");
-
-/// Claims the first job of a queue of which some slices are solved.
-pub(crate) const CLAIM_BEGUN: &str = claim!("slices > 0", "1");
-
 /// Begins a transaction that writes.
 pub(crate) async fn begin(writer: &DbPool) -> Result<Transaction> {
     writer.begin().await
+}
+
+/// Begins a transaction that claims: a claim that a power cut undoes leaves its jobs in the queue.
+pub(crate) async fn begin_claim(writer: &DbPool) -> Result<Transaction> {
+    writer.begin_relaxed().await
 }
 
 /// Passes each row of a statement on until `row` returns `false`.
@@ -93,27 +76,13 @@ impl SqliteStore {
         Ok((last + 1..).take(number).collect())
     }
 
-    /// Claims the next jobs of a queue; rows with the columns of `claimed`.
-    pub(crate) async fn claim_next(
+    /// The first new jobs of a queue.
+    pub(crate) async fn first_new(
         &self,
+        connection: &mut DbConnection,
         request: &ClaimRequest<'_>,
-        token: i64,
     ) -> Result<Vec<DbRow>> {
-        let claim = match request.kind {
-            ClaimKind::New => CLAIM_NEW,
-            ClaimKind::Begun => CLAIM_BEGUN,
-        };
-        // A claim that a power cut undoes leaves its jobs in the queue.
-        let mut transaction = self.writer.begin_relaxed().await?;
-        let rows = sql!(fetch_all, &mut *transaction,
-            claim;
-            &*request.queue.tenant, count(request.jobs), request.late_before,
-            request.each_slice_us.map_or(i64::MAX, count), request.queue.kind.name(),
-            count(request.cost_us), token, request.lease.now.saturating_add(request.lease.ms),
-            request.worker, request.now, i64::from(request.suspects)
-        )?;
-        transaction.commit().await?;
-        Ok(rows)
+        first_queued(connection, PEEK, request, request.jobs).await
     }
 
     /// The present by which leases are judged: that of the one process.
@@ -131,23 +100,35 @@ impl SqliteStore {
     /// Every claim walks the queue from its start.
     pub(crate) fn requeued(&self) {}
 
-    /// One process at a time uses it.
-    pub(crate) fn as_cluster(&self) -> Option<&dyn Cluster> {
-        None
-    }
-
     /// Size of the file and its write-ahead log.
     pub(crate) async fn database_bytes(&self) -> Result<u64> {
         let mut log = OsString::from(self.file.as_os_str());
         log.push("-wal");
         Ok(size(&self.file).await + size(Path::new(&log)).await)
     }
+}
 
-    /// Gives at most `step` free pages of the file back, if there are more than `spare`; says whether it did.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub(crate) async fn compact(&self, spare: i64, step: u32) -> Result<bool> {
+#[async_trait]
+impl Store for SqliteStore {
+    async fn ready(&self, write: bool) -> Result<()> {
+        if write {
+            return mark(&self.writer).await;
+        }
+        sql!(fetch_optional, &self.readers, "SELECT 1 FROM jobs LIMIT 1")?;
+        Ok(())
+    }
+
+    fn cluster(&self) -> Option<&dyn Cluster> {
+        None
+    }
+
+    /// The write-ahead log is folded into the database.
+    async fn close(&self) {
+        self.readers.close().await;
+        self.writer.close().await;
+    }
+
+    async fn compact(&self, spare: i64, step: u32) -> Result<bool> {
         let free: i64 = sql!(scalar fetch_one, &self.readers, "PRAGMA freelist_count")?;
         if free <= spare {
             return Ok(false);

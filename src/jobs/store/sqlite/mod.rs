@@ -22,8 +22,7 @@ mod plans {
     use crate::model::{Kind, State};
     use crate::store::sqlite::connection::{Row, query};
     use crate::store::sqlite::database::SqliteStore;
-    use crate::store::sqlite::engine::{CLAIM_BEGUN, CLAIM_NEW};
-    use crate::store::sqlite::sql::claim::{NOTES, QUEUES, RESULTS};
+    use crate::store::sqlite::sql::claim::{NOTES, PEEK, PEEK_BEGUN, QUEUES, RESULTS};
     use crate::store::sqlite::sql::finish::SOURCE;
     use crate::store::sqlite::sql::upkeep::{
         BEFORE, COUNT, EXPIRED, FAIL_LATE, LATE, OLDEST, REAP, REAP_BYSTANDERS, RESULT_BYTES,
@@ -126,8 +125,8 @@ mod plans {
         let bystanders = REAP_BYSTANDERS;
         for (statement, seek) in [
             (QUEUES, "PRIMARY KEY (state=?"),
-            (CLAIM_NEW, "jobs_queued (tenant=? AND kind=?"),
-            (CLAIM_BEGUN, "jobs_begun (tenant=? AND kind=?"),
+            (PEEK, "jobs_queued (tenant=? AND kind=?"),
+            (PEEK_BEGUN, "jobs_begun (tenant=? AND kind=?"),
             (REAP, "jobs_by_state (state=?"),
             (bystanders, "jobs_by_state (state=?"),
         ] {

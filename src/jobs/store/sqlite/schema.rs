@@ -89,6 +89,7 @@ pub(crate) async fn mark(writer: &Pool) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use crate::store::Store;
     use crate::store::sqlite::database::SqliteStore;
 
     fn write(file: &std::path::Path, statement: &str) {
