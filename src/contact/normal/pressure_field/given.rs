@@ -22,6 +22,9 @@ use crate::remark::list::Remark;
 /// With at least this many intervals per chord, three Gauss points per interval are enough: the error stays below 1e-9 of the mean
 /// pressure for Hertz's pressure.
 const INTERVALS_MANY: f64 = 24.0;
+/// Shortest chord over the length of its patch. A line that only touches an edge has shorter ones. They carry a millionth of the load of a line, and their
+/// cells are too small for an operator in single precision.
+const CHORD_LEAST: f64 = 1e-3;
 
 /// The samples of the four rows about a line along x.
 struct RowsAbout<'a> {
@@ -165,7 +168,7 @@ impl GridPressure {
     }
 
     /// Adds the chords of one patch on the given strips, each `(y, dy)` with its mid-line at y; they get the number `patch`. A strip that misses
-    /// the patch has none; one that crosses a hollow or curved patch may have several, in order of x.
+    /// the patch, or only touches its edge, has none; one that crosses a hollow or curved patch may have several, in order of x.
     pub fn add_chords(
         &self,
         label: usize,
@@ -178,7 +181,7 @@ impl GridPressure {
             self.each_segment(label, y, |left, right| {
                 // Rough data may extend slightly farther between the lines from which the extent was measured.
                 let (left, right) = (left.max(x_min), right.min(x_max));
-                if right > left {
+                if right - left > CHORD_LEAST * (x_max - x_min) {
                     chords.push(Chord {
                         patch,
                         strip,

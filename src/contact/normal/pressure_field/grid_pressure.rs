@@ -525,6 +525,38 @@ mod moments_tests {
         assert!((all[1] - mean).abs() < 1e-9, "{all:?} {mean}");
     }
 
+    /// Of a head of radius 2 with an ear of radius 0.8, whose top is at y = 1.8.
+    #[test]
+    fn a_line_that_touches_the_edge_of_a_patch_has_no_tiny_chord() {
+        let axis: Vec<f64> = (-30..=30).map(|k| 0.1 * f64::from(k)).collect();
+        let inside = |x: f64, y: f64| {
+            let head = 4.0 - (x - 0.5).powi(2) - y.powi(2);
+            let ear = 0.64 - (x + 1.2).powi(2) - (y - 1.0).powi(2);
+            head.max(ear).max(0.0)
+        };
+        let row = |y: &f64| axis.iter().map(|x| inside(*x, *y).sqrt()).collect();
+        let rows: Vec<Vec<f64>> = axis.iter().map(row).collect();
+        let field = GridPressure::new(&axis, &axis, &rows).unwrap().0;
+        let chords = |y: f64| {
+            let mut chords = Vec::new();
+            field.add_chords(0, &[(y, 0.1)], 0, &mut chords);
+            chords
+        };
+        let (mut one, mut two) = (1.85, 1.72);
+        assert_eq!((chords(one).len(), chords(two).len()), (1, 2));
+        for _ in 0..60 {
+            let middle = 0.5 * (one + two);
+            match chords(middle).len() {
+                1 => one = middle,
+                _ => two = middle,
+            }
+        }
+        let [x_min, x_max, ..] = field.patches()[0].extent;
+        for Chord { left, right, .. } in chords(two) {
+            assert!(right - left > 1e-3 * (x_max - x_min), "{left} {right}");
+        }
+    }
+
     #[test]
     fn moving_changes_coordinates_only() {
         let field = two_bumps();

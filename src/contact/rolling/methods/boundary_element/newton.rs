@@ -157,7 +157,8 @@ impl<'a> Newton<'a> {
                 report.converged = true;
                 break;
             }
-            if report.iterations == law.steps_max {
+            // No step leads back from an iterate that is no number.
+            if report.iterations == law.steps_max || report.residual.is_nan() {
                 break;
             }
             recent[report.iterations as usize % 3] = report.residual;
