@@ -52,8 +52,6 @@ macro_rules! values {
 }
 
 #[cfg(feature = "cluster")]
-pub(crate) mod portion;
-#[cfg(feature = "cluster")]
 pub mod postgres;
 mod sql_errors;
 pub mod sqlite;

@@ -6,10 +6,26 @@ use sqlx::{AssertSqlSafe, Connection};
 
 use crate::error::JobsError;
 use crate::store::Result;
-use crate::store::portion::{Portion, TABLES, Values};
 use crate::store::postgres::connection::{ADMISSION, lock};
 use crate::store::postgres::database::PostgresStore;
 use crate::store::sqlite::database::SqliteStore;
+
+/// The tables that are moved, those first that others refer to. What a database counts itself is counted anew.
+const TABLES: [&str; 13] = [
+    "templates",
+    "batches",
+    "blobs",
+    "jobs",
+    "cases",
+    "job_labels",
+    "job_slices",
+    "blob_outbox",
+    "batch_keys",
+    "idempotency_keys",
+    "tombstones",
+    "api_keys",
+    "profiles",
+];
 
 /// What nodes may have made before: rows that are there stay as they are.
 const ONCE: [&str; 3] = ["tombstones", "api_keys", "profiles"];
@@ -41,12 +57,17 @@ impl PostgresStore {
         require_empty(&mut transaction).await?;
         let mut moved = Vec::new();
         for table in TABLES {
-            let (mut rows, mut portions) = (0, from.portions(table));
-            while let Some(portion) = portions.recv().await {
-                let portion = portion?;
-                rows += portion.rows;
-                insert(&mut transaction, table, portion).await?;
+            let columns = from.columns(table).await?;
+            let insert = insertion(table, &columns);
+            let (mut portions, reading) = from.portions(table, &columns).await?;
+            let mut rows = 0;
+            while let Some((number, portion)) = portions.recv().await {
+                rows += number;
+                let insert = sqlx::query(AssertSqlSafe(insert.clone())).bind(portion);
+                insert.execute(&mut *transaction).await?;
             }
+            let read = reading.await;
+            read.map_err(|error| JobsError::Damaged(error.to_string()))??;
             moved.push((table, rows));
         }
         sqlx::raw_sql(
@@ -67,37 +88,28 @@ async fn require_empty(connection: &mut PgConnection) -> Result<(), JobsError> {
     }
 }
 
-async fn insert(connection: &mut PgConnection, table: &str, portion: Portion) -> Result<()> {
-    let (mut names, mut arrays) = (Vec::new(), Vec::new());
-    for (place, (name, values)) in portion.columns.iter().enumerate() {
-        let kind = match values {
-            Values::Text(_) => "text",
-            Values::Integer(_) => "bigint",
-            Values::Real(_) => "double precision",
-            Values::Bytes(_) => "bytea",
+/// The statement that inserts a portion of a table, its parameter.
+fn insertion(table: &str, columns: &[(String, String)]) -> String {
+    let (mut names, mut values, mut types) = (Vec::new(), Vec::new(), Vec::new());
+    for (name, kind) in columns {
+        let (value, kind) = match kind.as_str() {
+            "INTEGER" => (format!("\"{name}\""), "bigint"),
+            "REAL" => (format!("\"{name}\""), "double precision"),
+            "BLOB" => (format!("decode(\"{name}\", 'hex')"), "text"),
+            _ => (format!("\"{name}\""), "text"),
         };
         names.push(format!("\"{name}\""));
-        arrays.push(format!("CAST(${} AS {kind}[])", place + 1));
+        values.push(value);
+        types.push(format!("\"{name}\" {kind}"));
     }
-    let statement = format!(
-        "INSERT INTO {table} ({}) SELECT * FROM unnest({}){}",
+    let known = match ONCE.contains(&table) {
+        true => "ON CONFLICT DO NOTHING",
+        false => "",
+    };
+    format!(
+        "INSERT INTO {table} ({}) SELECT {} FROM json_to_recordset(CAST($1 AS json)) AS moved ({}) {known}",
         names.join(", "),
-        arrays.join(", "),
-        if ONCE.contains(&table) {
-            " ON CONFLICT DO NOTHING"
-        } else {
-            ""
-        },
-    );
-    let mut insert = sqlx::query(AssertSqlSafe(statement));
-    for (_, values) in portion.columns {
-        insert = match values {
-            Values::Text(values) => insert.bind(values),
-            Values::Integer(values) => insert.bind(values),
-            Values::Real(values) => insert.bind(values),
-            Values::Bytes(values) => insert.bind(values),
-        };
-    }
-    insert.execute(connection).await?;
-    Ok(())
+        values.join(", "),
+        types.join(", "),
+    )
 }
