@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use anyhow::Context;
 use axum::http::Uri;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
-use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::filter::Targets;
 use tracing_subscriber::fmt::format::FmtSpan;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
@@ -48,11 +48,7 @@ pub fn start(format: LogFormat, filter: &str) -> anyhow::Result<WorkerGuard> {
     let renamed = renamed.fold(filter.to_owned(), |filter, name| {
         filter.replace(&format!("railhead::{name}"), &format!("railhead_{name}"))
     });
-    let mut targets: Targets = renamed.parse().context("--log")?;
-    // The renderer of pictures warns when a client's text has characters that the font lacks; operators need not know.
-    if !filter.contains("usvg") {
-        targets = targets.with_target("usvg", LevelFilter::ERROR);
-    }
+    let targets: Targets = renamed.parse().context("--log")?;
     let (writer, guard) = NonBlockingBuilder::default()
         .lossy(true)
         .buffered_lines_limit(LINES_WAITING)

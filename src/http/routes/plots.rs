@@ -17,6 +17,7 @@ use crate::render::picture::profile_view::{self, ProfileView, ProfileViewPatch};
 use crate::render::picture::raster;
 use crate::render::picture::scene::Scene;
 use crate::render::picture::section::{self, Sections};
+use crate::render::picture::svg::Svg;
 use crate::render::table::File;
 use crate::routes::parts::{FieldProblems, PartRequest, motion_of, stored};
 use railhead_contact::case::words::solver::Output;
@@ -99,11 +100,6 @@ pub(crate) fn short(value: f64) -> String {
         "0".to_owned()
     } else if (1e-3..1e4).contains(&size) {
         let digits = (3.0 - size.log10().floor()).clamp(0.0, 6.0);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "from 0 to 6"
-        )]
         let text = format!("{value:.*}", digits as usize);
         if text.contains('.') {
             text.trim_end_matches('0').trim_end_matches('.').to_owned()
@@ -122,7 +118,7 @@ pub(crate) fn short(value: f64) -> String {
 }
 
 /// Draws when its turn has come.
-pub(crate) type Drawing = Box<dyn FnOnce(u32) -> Result<String> + Send>;
+pub(crate) type Drawing = Box<dyn FnOnce(u32) -> Result<Svg> + Send>;
 
 /// What draws this view.
 ///
@@ -461,7 +457,7 @@ pub(crate) async fn picture(
             Format::Png => {
                 raster::png(&svg, wish.width).map_err(|error| ApiError::internal(&error))
             }
-            _ => Ok(svg.into_bytes()),
+            _ => Ok(svg.finish().into_bytes()),
         }
     };
     let (body, share) = rendering.run(draw, Vec::len).await?;

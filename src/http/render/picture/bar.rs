@@ -1,17 +1,15 @@
 //! The scale of a heat map.
 
-use crate::render::picture::chart::label;
+use crate::render::picture::chart::{Chart, exponent, label, ticks};
 use crate::render::picture::colour::{VIRIDIS_PLACES, at};
-use crate::render::picture::frame::{Frame, exponent, ticks};
 use crate::render::picture::scene::Heat;
 use crate::render::picture::svg::{Anchor, Svg, px};
 
 /// The scale of the heat map, between two values.
-pub(super) fn colour_bar(svg: &mut Svg, frame: &Frame, heat: &Heat, [low, high]: [f64; 2]) {
-    let [left, y, width, height] = frame.area;
+pub(super) fn colour_bar(svg: &mut Svg, chart: &Chart, heat: &Heat, [low, high]: [f64; 2]) {
+    let [left, y, width, height] = chart.area;
     let x = left + width + 26.0;
     svg.raw("<linearGradient id=\"scale\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">");
-    #[expect(clippy::cast_precision_loss, reason = "a few places")]
     for place in 0..VIRIDIS_PLACES {
         let share = place as f64 / (VIRIDIS_PLACES - 1) as f64;
         let (offset, colour) = (px(share), at(share));

@@ -1,34 +1,23 @@
-//! Axes that have a scale each, for curves and sections; a patch alone has the same along both.
+//! Where things stand in a picture: axes that have a scale each, or the same, with round numbers at their ticks.
 
-use crate::render::picture::frame::{WIDTH, ticks};
 use crate::render::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
 
+/// Width of a picture in its own units.
+pub(super) const WIDTH: f64 = 800.0;
+/// Left border, top border and width of the plotting area of a patch.
+const PATCH_AREA: [f64; 3] = [78.0, 96.0, 560.0];
+/// Limits of its height.
+const PATCH_HEIGHT: [f64; 2] = [220.0, 520.0];
+/// Room below it.
+const BELOW: f64 = 88.0;
+/// Share of the patch left free around it.
+const MARGIN: f64 = 0.06;
+/// Room around the patch in a picture without axes.
+const ALONE_MARGIN: f64 = 2.0;
 /// Characters of a title that fit.
 const TITLE_MAX: usize = 74;
 /// Distance of the ticks of an axis, about.
 const TICK_SPACING: [f64; 2] = [90.0, 55.0];
-
-/// Thin lines across the area at these places.
-pub(super) fn grid_lines(
-    svg: &mut Svg,
-    [left, top, width, height]: [f64; 4],
-    xs: impl Iterator<Item = f64>,
-    ys: impl Iterator<Item = f64>,
-) {
-    let upright = xs.map(|x| format!("M{} {}v{}", px(x), px(top), px(height)));
-    let level = ys.map(|y| format!("M{} {}h{}", px(left), px(y), px(width)));
-    let data: String = upright.chain(level).collect();
-    svg.path(&data, "fill=\"none\" stroke=\"#e6e6e6\"");
-}
-
-/// The border of the area.
-pub(super) fn border(svg: &mut Svg, area: [f64; 4]) {
-    let [x, y, width, height] = area.map(px);
-    svg.element(
-        "rect",
-        &format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" fill=\"none\" stroke=\"#333\""),
-    );
-}
 
 /// Maps numbers to the plotting area; the second of a pair may be the smaller one.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +31,58 @@ pub(super) struct Chart {
 }
 
 impl Chart {
+    /// Shows a box `[x_min, x_max, y_min, y_max]` with a margin around it, at the same scale along both axes.
+    #[must_use]
+    pub(super) fn around(shown: [f64; 4]) -> Chart {
+        Chart::fitted(shown, MARGIN, PATCH_AREA, PATCH_HEIGHT)
+    }
+
+    /// Shows a box alone, `width` units wide, without room for axes.
+    #[must_use]
+    pub(super) fn alone(shown: [f64; 4], width: f64) -> Chart {
+        let inner = width - 2.0 * ALONE_MARGIN;
+        let place = [ALONE_MARGIN, ALONE_MARGIN, inner];
+        Chart::fitted(shown, 0.0, place, [0.25 * inner, 1.5 * inner])
+    }
+
+    /// Shows a box with a share of it as margin, in an area whose height follows within limits.
+    fn fitted(
+        [x0, x1, y0, y1]: [f64; 4],
+        margin: f64,
+        [left, top, width]: [f64; 3],
+        [lowest, highest]: [f64; 2],
+    ) -> Chart {
+        let wide = ((x1 - x0) * (1.0 + 2.0 * margin)).max(f64::MIN_POSITIVE);
+        let high = ((y1 - y0) * (1.0 + 2.0 * margin)).max(f64::MIN_POSITIVE);
+        let height = (width * high / wide).clamp(lowest, highest);
+        let scale = (width / wide).min(height / high);
+        let (half_x, half_y) = (0.5 * width / scale, 0.5 * height / scale);
+        let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
+        Chart {
+            area: [left, top, width, height],
+            x: [x - half_x, x + half_x],
+            y: [y - half_y, y + half_y],
+        }
+    }
+
+    /// Height of a picture without axes.
+    #[must_use]
+    pub(super) fn height_alone(&self) -> f64 {
+        self.area[3] + 2.0 * ALONE_MARGIN
+    }
+
+    /// Height of the picture of a patch.
+    #[must_use]
+    pub(super) fn height(&self) -> f64 {
+        self.area[1] + self.area[3] + BELOW
+    }
+
+    /// Units of the picture per unit of the first axis.
+    #[must_use]
+    pub(super) fn scale(&self) -> f64 {
+        self.area[2] / (self.x[1] - self.x[0])
+    }
+
     /// A place in the picture.
     pub(super) fn at(&self, x: f64, y: f64) -> (f64, f64) {
         let share = |value: f64, [from, to]: [f64; 2]| (value - from) / (to - from);
@@ -52,38 +93,40 @@ impl Chart {
         )
     }
 
-    /// Lines at the ticks, below what is drawn.
+    /// Thin lines at the ticks, below what is drawn.
     pub(super) fn grid(&self, svg: &mut Svg) {
-        let xs = self.ticks(0).0.into_iter();
-        let ys = self.ticks(1).0.into_iter();
-        grid_lines(
-            svg,
-            self.area,
-            xs.map(|tick| self.at(tick, self.y[0]).0),
-            ys.map(|tick| self.at(self.x[0], tick).1),
-        );
+        let [left, top, width, height] = self.area;
+        let upright = self.ticks(0).0.into_iter().map(|tick| {
+            let x = self.at(tick, self.y[0]).0;
+            format!("M{} {}v{}", px(x), px(top), px(height))
+        });
+        let level = self.ticks(1).0.into_iter().map(|tick| {
+            let y = self.at(self.x[0], tick).1;
+            format!("M{} {}h{}", px(left), px(y), px(width))
+        });
+        let data: String = upright.chain(level).collect();
+        svg.path(&data, "fill=\"none\" stroke=\"#e6e6e6\"");
     }
 
-    /// Frame, numbers and names, above what is drawn.
+    /// Border, numbers and names, above what is drawn.
     pub(super) fn axes(&self, svg: &mut Svg, [x_name, y_name]: [&str; 2]) {
         let [left, top, width, height] = self.area;
-        border(svg, self.area);
+        let [x, y, w, h] = self.area.map(px);
+        svg.element(
+            "rect",
+            &format!(
+                "x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"#333\""
+            ),
+        );
         let (values, digits) = self.ticks(0);
         for tick in values {
-            let at = self.at(tick, self.y[0]).0;
-            let number = label(tick, digits);
-            svg.text((at, top + height + 18.0), 12.0, Anchor::Middle, "", &number);
+            let at = (self.at(tick, self.y[0]).0, top + height + 18.0);
+            svg.text(at, 12.0, Anchor::Middle, "", &label(tick, digits));
         }
         let (values, digits) = self.ticks(1);
         for tick in values {
-            let at = self.at(self.x[0], tick).1;
-            svg.text(
-                (left - 7.0, at + 4.0),
-                12.0,
-                Anchor::End,
-                "",
-                &label(tick, digits),
-            );
+            let at = (left - 7.0, self.at(self.x[0], tick).1 + 4.0);
+            svg.text(at, 12.0, Anchor::End, "", &label(tick, digits));
         }
         let middle = (left + 0.5 * width, top + height + 38.0);
         svg.text(middle, 13.0, Anchor::Middle, "", x_name);
@@ -144,6 +187,41 @@ pub(super) fn label(value: f64, digits: usize) -> String {
     text.replace('-', "−")
 }
 
+/// Round numbers within `from..=to`, about `wanted` of them, with the digits after the point that they need.
+#[must_use]
+pub(super) fn ticks(from: f64, to: f64, wanted: f64) -> (Vec<f64>, usize) {
+    let rough = (to - from) / wanted.max(1.0);
+    if !(rough.is_finite() && rough > 0.0) {
+        return (Vec::new(), 0);
+    }
+    let decade = rough.log10().floor();
+    let unit = 10f64.powf(decade);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|factor| factor * unit)
+        .find(|step| *step >= rough * 0.999)
+        .unwrap_or(10.0 * unit);
+    let mut values = Vec::new();
+    let mut number = (from / step - 1e-9).ceil();
+    // The count is bounded by the choice of the step.
+    while number * step <= to + 1e-9 * step && values.len() < 100 {
+        values.push(number * step);
+        number += 1.0;
+    }
+    let digits = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
+    (values, digits)
+}
+
+/// The power of ten, a multiple of 3, that brings `largest` to a number easy to read; 0 for ordinary numbers.
+#[must_use]
+pub(super) fn exponent(largest: f64) -> i32 {
+    if !(largest.is_finite() && largest > 0.0) || (0.1..100_000.0).contains(&largest) {
+        return 0;
+    }
+    let decade = largest.log10().floor() as i32;
+    decade.div_euclid(3) * 3
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -161,6 +239,57 @@ mod tests {
             let [low, high] = roomy(values.iter().copied());
             assert!(low < high);
             assert!(values.iter().all(|value| (low..high).contains(value)));
+        }
+    }
+
+    #[test]
+    fn both_axes_have_one_scale_and_the_box_is_inside() {
+        for shape in [
+            [-8.0, 8.0, -4.0, 4.0],
+            [0.0, 1.0, 0.0, 50.0],
+            [-20.0, 20.0, 1.0, 1.5],
+        ] {
+            let chart = Chart::around(shape);
+            let (left, bottom) = chart.at(shape[0], shape[2]);
+            let (right, top) = chart.at(shape[1], shape[3]);
+            let ratio = (right - left) / (bottom - top);
+            let expected = (shape[1] - shape[0]) / (shape[3] - shape[2]);
+            assert!((ratio - expected).abs() < 1e-9 * expected, "{shape:?}");
+            let [x, y, width, height] = chart.area;
+            assert!(left >= x && right <= x + width, "{shape:?}");
+            assert!(top >= y && bottom <= y + height, "{shape:?}");
+        }
+    }
+
+    #[test]
+    fn ticks_are_round_and_within_the_limits() {
+        assert_eq!(ticks(-8.5, 8.5, 8.0), (vec![-5.0, 0.0, 5.0], 0));
+        assert_eq!(ticks(0.0, 1.0, 5.0).1, 1);
+        for (from, to) in [(0.0, 368.0), (-0.003, 0.0017), (12.0, 12.5), (0.0, 1e-9)] {
+            let (values, _) = ticks(from, to, 6.0);
+            let slack = 1e-6 * (to - from);
+            assert!((3..=13).contains(&values.len()), "{values:?}");
+            assert!(
+                values
+                    .iter()
+                    .all(|value| (from - slack..=to + slack).contains(value))
+            );
+        }
+        assert_eq!(ticks(1.0, 1.0, 5.0).0, Vec::<f64>::new());
+        assert_eq!(ticks(0.0, f64::NAN, 5.0).0, Vec::<f64>::new());
+    }
+
+    #[test]
+    fn powers_of_ten_are_multiples_of_three() {
+        for (value, power) in [
+            (368.0, 0),
+            (0.002, -3),
+            (3e-5, -6),
+            (2e6, 6),
+            (0.0, 0),
+            (0.5, 0),
+        ] {
+            assert_eq!(exponent(value), power, "{value}");
         }
     }
 }

@@ -24,50 +24,26 @@ const VIRIDIS: [[u8; 3]; VIRIDIS_PLACES] = [
     [253, 231, 37],
 ];
 
-/// Steps of the ramp.
-pub(super) const LEVELS: usize = 128;
-
 /// Cells that stick.
 pub(super) const STICK: &str = "#31688e";
 /// Cells that slip; much lighter, so that both are told apart without colour.
 pub(super) const SLIP: &str = "#fde725";
 
-/// The step of a value from 0 to 1; what lies outside is brought to the ends, NaN to 0.
+/// The colour at a share of the ramp from 0 to 1, as `#rrggbb`; what lies outside is brought to the ends.
 #[must_use]
-pub(super) fn level(value: f64) -> usize {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
-        reason = "clamped to the steps of the ramp; a NaN becomes 0"
-    )]
-    {
-        ((value.clamp(0.0, 1.0) * LEVELS as f64) as usize).min(LEVELS - 1)
-    }
-}
-
-/// The colour of a step as `#rrggbb`.
-#[must_use]
-pub(super) fn ramp(level: usize) -> String {
-    let [r, g, b] = rgb(level);
+pub(super) fn at(share: f64) -> String {
+    let [r, g, b] = rgb(share);
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// The colour at a share of the ramp from 0 to 1, as `#rrggbb`.
-#[must_use]
-pub(super) fn at(share: f64) -> String {
-    ramp(level(share))
-}
-
-fn rgb(level: usize) -> [u8; 3] {
-    // Hundredths of the way between two places keep this in whole numbers.
-    let spans = VIRIDIS.len() - 1;
-    let place = level.min(LEVELS - 1) * spans * 100 / (LEVELS - 1);
-    let (span, share) = (place / 100, place % 100);
-    let (from, to) = (VIRIDIS[span], VIRIDIS[(span + 1).min(spans)]);
+fn rgb(share: f64) -> [u8; 3] {
+    let last = VIRIDIS_PLACES - 1;
+    let place = share.clamp(0.0, 1.0) * last as f64;
+    let span = (place as usize).min(last - 1);
+    let share = place - span as f64;
     std::array::from_fn(|part| {
-        let mixed = usize::from(from[part]) * (100 - share) + usize::from(to[part]) * share;
-        u8::try_from((mixed + 50) / 100).unwrap_or(u8::MAX)
+        let [from, to] = [VIRIDIS[span][part], VIRIDIS[span + 1][part]].map(f64::from);
+        (from + share * (to - from)).round() as u8
     })
 }
 
@@ -95,11 +71,12 @@ mod tests {
 
     #[test]
     fn lightness_rises_evenly_along_the_ramp() {
-        let lights: Vec<f64> = (0..LEVELS).map(|level| lightness(rgb(level))).collect();
-        let (first, last) = (lights[0], lights[LEVELS - 1]);
+        let shares = (0..=128).map(|step| f64::from(step) / 128.0);
+        let lights: Vec<f64> = shares.map(|share| lightness(rgb(share))).collect();
+        let (first, last) = (lights[0], lights[128]);
         assert!(first < 20.0 && last > 88.0, "from {first} to {last}");
         for (level, light) in lights.iter().enumerate() {
-            let even = first + (last - first) * level as f64 / (LEVELS - 1) as f64;
+            let even = first + (last - first) * level as f64 / 128.0;
             assert!(
                 (light - even).abs() < 2.0,
                 "step {level}: {light}, not {even}"
@@ -110,12 +87,13 @@ mod tests {
 
     #[test]
     fn values_are_brought_onto_the_ramp() {
-        assert_eq!(
-            (level(0.0), level(1.0), level(-3.0), level(7.0)),
-            (0, 127, 0, 127)
-        );
-        assert_eq!(level(f64::NAN), 0);
-        assert_eq!(ramp(0), "#440154");
-        assert_eq!(ramp(LEVELS - 1), "#fde725");
+        for (share, colour) in [
+            (0.0, "#440154"),
+            (1.0, "#fde725"),
+            (-3.0, "#440154"),
+            (7.0, "#fde725"),
+        ] {
+            assert_eq!(at(share), colour, "{share}");
+        }
     }
 }

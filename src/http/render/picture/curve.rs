@@ -2,8 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::render::picture::chart::{Chart, open, roomy};
-use crate::render::picture::frame::WIDTH;
+use crate::render::picture::chart::{Chart, WIDTH, open, roomy};
 use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 
 /// Height of the picture in its own units.
@@ -48,7 +47,7 @@ pub(crate) struct CurveLine {
 
 /// Draws a creep curve as SVG, `width` pixels wide.
 #[must_use]
-pub(crate) fn draw(curve: &Curve, width: u32) -> String {
+pub(crate) fn draw(curve: &Curve, width: u32) -> Svg {
     let mut order: Vec<usize> = (0..curve.x.len()).collect();
     order.sort_by(|a, b| curve.x[*a].total_cmp(&curve.x[*b]));
     let reach = curve.lines.iter().flat_map(|line| {
@@ -90,7 +89,7 @@ pub(crate) fn draw(curve: &Curve, width: u32) -> String {
     chart.axes(&mut svg, [&curve.x_name, "force in N"]);
     legend(&mut svg, curve);
     svg.raw("</svg>\n");
-    svg.finish()
+    svg
 }
 
 fn draw_line(

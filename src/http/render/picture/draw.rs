@@ -1,8 +1,7 @@
 //! Draws a scene as SVG: heat map or zones, the border of the stick zone, arrows, axes in mm and a scale; or small, the patch alone.
 
 use crate::render::picture::bar::colour_bar;
-use crate::render::picture::chart::open;
-use crate::render::picture::frame::{Frame, WIDTH};
+use crate::render::picture::chart::{Chart, WIDTH, open};
 use crate::render::picture::layers;
 use crate::render::picture::map::Ground;
 use crate::render::picture::scene::{Scene, heat};
@@ -20,7 +19,7 @@ const TOLERANCE: f64 = 0.2;
 
 /// Draws a scene as SVG, `width` pixels wide.
 #[must_use]
-pub(crate) fn draw(scene: &Scene, width: u32) -> String {
+pub(crate) fn draw(scene: &Scene, width: u32) -> Svg {
     if width < ALONE_BELOW {
         return draw_alone(scene, width);
     }
@@ -29,48 +28,49 @@ pub(crate) fn draw(scene: &Scene, width: u32) -> String {
         BANDS,
         TOLERANCE * (WIDTH / f64::from(width)).max(1.0),
     );
-    let frame = Frame::around(ground.extent());
-    let mut svg = open(&scene.title, &scene.remarks, width, frame.height());
-    layers::grid(&mut svg, &frame);
+    let chart = Chart::around(ground.extent());
+    let mut svg = open(&scene.title, &scene.remarks, width, chart.height());
+    chart.grid(&mut svg);
     match heat(scene) {
         Some(heat) => {
             let range = heat.range(scene.range);
-            ground.heat(&mut svg, &frame, &heat, range);
-            colour_bar(&mut svg, &frame, &heat, range);
+            ground.heat(&mut svg, &chart, &heat, range);
+            colour_bar(&mut svg, &chart, &heat, range);
         }
-        None => ground.zones(&mut svg, &frame),
+        None => ground.zones(&mut svg, &chart),
     }
-    ground.borders(&mut svg, &frame);
+    ground.borders(&mut svg, &chart);
     let arrows = match scene.shown {
         Output::Slip => (&scene.values.slip_x, &scene.values.slip_y),
         Output::Pressure | Output::Temperature => (&None, &None),
         _ => (&scene.values.traction_x_mpa, &scene.values.traction_y_mpa),
     };
     let drawn = match arrows {
-        (Some(x), Some(y)) => layers::arrows(&mut svg, &frame, &scene.fields, x, y),
+        (Some(x), Some(y)) => layers::arrows(&mut svg, &chart, &scene.fields, x, y),
         _ => false,
     };
-    layers::axes(&mut svg, &frame);
-    layers::legend(&mut svg, &frame, scene, drawn);
+    chart.axes(&mut svg, ["x in mm", "y in mm"]);
+    layers::rolling(&mut svg, &chart);
+    layers::legend(&mut svg, &chart, scene, drawn);
     svg.raw("</svg>\n");
-    svg.finish()
+    svg
 }
 
 /// Draws the patch of a scene alone, for lists.
-fn draw_alone(scene: &Scene, width: u32) -> String {
+fn draw_alone(scene: &Scene, width: u32) -> Svg {
     let ground = Ground::of(scene, BANDS_ALONE, 1.5 * TOLERANCE);
-    let frame = Frame::alone(ground.extent(), f64::from(width));
-    let height = px(frame.height_alone());
+    let chart = Chart::alone(ground.extent(), f64::from(width));
+    let height = px(chart.height_alone());
     let mut svg = Svg::default();
     svg.raw(&format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" role=\"img\">\n",
     ));
     svg.raw(&format!("<title>{}</title>\n", escape(&scene.title)));
     match heat(scene) {
-        Some(heat) => ground.heat(&mut svg, &frame, &heat, heat.range(scene.range)),
-        None => ground.zones(&mut svg, &frame),
+        Some(heat) => ground.heat(&mut svg, &chart, &heat, heat.range(scene.range)),
+        None => ground.zones(&mut svg, &chart),
     }
-    ground.border_thin(&mut svg, &frame);
+    ground.border_thin(&mut svg, &chart);
     svg.raw("</svg>\n");
-    svg.finish()
+    svg
 }

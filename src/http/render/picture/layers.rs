@@ -1,10 +1,7 @@
 //! The layers of a picture, from the ground upward.
 
-use std::fmt::Write;
-
-use crate::render::picture::chart::{border, grid_lines, label};
+use crate::render::picture::chart::Chart;
 use crate::render::picture::colour::{SLIP, STICK};
-use crate::render::picture::frame::{Frame, ticks};
 use crate::render::picture::scene::{Scene, extent, zones_present};
 use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 use crate::render::shape::resample::resample;
@@ -17,49 +14,19 @@ const ARROW_SPACING: f64 = 30.0;
 const ARROW_LENGTH: f64 = 27.0;
 /// Arrows shorter than this say nothing and are left out.
 const ARROW_SHORTEST: f64 = 2.0;
-/// Distance of the ticks of an axis, about.
-const TICK_SPACING: f64 = 70.0;
-/// Fewest ticks of an axis, about.
-const TICKS_FEWEST: f64 = 4.0;
-
-/// Thin lines at the ticks.
-pub(super) fn grid(svg: &mut Svg, frame: &Frame) {
-    let [x0, _, y0, _] = frame.shown;
-    let [xs, ys] = frame_ticks(frame).map(|(values, _)| values.into_iter());
-    grid_lines(
-        svg,
-        frame.area,
-        xs.map(|tick| frame.at(tick, y0).0),
-        ys.map(|tick| frame.at(x0, tick).1),
-    );
-}
-
-/// The ticks of both axes with their digits.
-fn frame_ticks(frame: &Frame) -> [(Vec<f64>, usize); 2] {
-    let [_, _, width, height] = frame.area;
-    let [x0, x1, y0, y1] = frame.shown;
-    let wanted = (height / TICK_SPACING).max(TICKS_FEWEST);
-    [ticks(x0, x1, width / TICK_SPACING), ticks(y0, y1, wanted)]
-}
 
 /// Arrows on a regular grid, each beginning at its sample; says whether there was anything to draw.
 pub(super) fn arrows(
     svg: &mut Svg,
-    frame: &Frame,
+    chart: &Chart,
     fields: &PatchCells,
     along: &[f64],
     across: &[f64],
 ) -> bool {
     let shape = extent(fields);
     let count = |length: f64| {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "at most the area divided by the spacing"
-        )]
-        ((length * frame.scale / ARROW_SPACING)
-            .round()
-            .clamp(2.0, 100.0) as usize)
+        let arrows = length * chart.scale() / ARROW_SPACING;
+        arrows.round().clamp(2.0, 100.0) as usize
     };
     let (nx, ny) = (count(shape[1] - shape[0]), count(shape[3] - shape[2]));
     let x = resample(fields, along, nx, ny);
@@ -78,7 +45,7 @@ pub(super) fn arrows(
             // The picture's second axis points downward.
             let arrow = [along, &-across].map(|part| part / longest * ARROW_LENGTH);
             if arrow[0].hypot(arrow[1]) >= ARROW_SHORTEST {
-                data.push_str(&arrow_path(frame.at(x.x_mm[ix], x.y_mm[iy]), arrow));
+                data.push_str(&arrow_path(chart.at(x.x_mm[ix], x.y_mm[iy]), arrow));
             }
         }
     }
@@ -105,60 +72,20 @@ fn arrow_path((x, y): (f64, f64), [dx, dy]: [f64; 2]) -> String {
     shaft + &polyline([stroke(1.0), (tip_x, tip_y), stroke(-1.0)], false)
 }
 
-/// Frame, ticks and names of the axes, and the arrow of the rolling direction.
-pub(super) fn axes(svg: &mut Svg, frame: &Frame) {
-    let [x, y, width, height] = frame.area;
-    let [x0, _, y0, _] = frame.shown;
-    let [(x_ticks, x_digits), (y_ticks, y_digits)] = frame_ticks(frame);
-    border(svg, frame.area);
-    let bottom = y + height;
-    let mut marks = String::new();
-    for tick in x_ticks {
-        let at = frame.at(tick, y0).0;
-        let _ = write!(marks, "M{} {}v5", px(at), px(bottom));
-        svg.text(
-            (at, bottom + 19.0),
-            12.0,
-            Anchor::Middle,
-            "",
-            &label(tick, x_digits),
-        );
-    }
-    for tick in y_ticks {
-        let at = frame.at(x0, tick).1;
-        let _ = write!(marks, "M{} {}h-5", px(x), px(at));
-        svg.text(
-            (x - 9.0, at + 4.0),
-            12.0,
-            Anchor::End,
-            "",
-            &label(tick, y_digits),
-        );
-    }
-    svg.path(&marks, "fill=\"none\" stroke=\"#333\"");
-    let middle = x + 0.5 * width;
-    svg.text((middle, bottom + 39.0), 13.0, Anchor::Middle, "", "x in mm");
-    let centre = y + 0.5 * height;
-    let turned = format!("transform=\"rotate(-90 22 {})\"", px(centre));
-    svg.text((22.0, centre), 13.0, Anchor::Middle, &turned, "y in mm");
-    let end = x + width;
-    svg.text(
-        (end - 52.0, bottom + 39.0),
-        12.0,
-        Anchor::End,
-        "",
-        "rolling",
-    );
-    svg.path(
-        &arrow_path((end - 24.0, bottom + 35.0), [44.0, 0.0]),
-        "fill=\"none\" stroke=\"#111\" stroke-width=\"1.8\"",
-    );
+/// The arrow of the rolling direction.
+pub(super) fn rolling(svg: &mut Svg, chart: &Chart) {
+    let [x, y, width, height] = chart.area;
+    let (end, bottom) = (x + width, y + height);
+    let place = (end - 52.0, bottom + 39.0);
+    svg.text(place, 12.0, Anchor::End, "", "rolling");
+    let arrow = arrow_path((end - 24.0, bottom + 35.0), [44.0, 0.0]);
+    svg.path(&arrow, "fill=\"none\" stroke=\"#111\" stroke-width=\"1.8\"");
 }
 
 /// What lines and arrows mean, below the axes.
-pub(super) fn legend(svg: &mut Svg, frame: &Frame, scene: &Scene, arrows: bool) {
-    let y = frame.area[1] + frame.area[3] + 66.0;
-    let mut x = frame.area[0];
+pub(super) fn legend(svg: &mut Svg, chart: &Chart, scene: &Scene, arrows: bool) {
+    let y = chart.area[1] + chart.area[3] + 66.0;
+    let mut x = chart.area[0];
     let (stick, slip) = zones_present(scene);
     if scene.shown == Output::Zones {
         for (colour, word, present) in [(STICK, "stick", stick), (SLIP, "slip", slip)] {

@@ -1,14 +1,12 @@
 //! The coloured ground of a picture: values or zones inside the border of the patch, and the lines around them.
 
-use std::fmt::Write;
-
+use crate::render::picture::chart::Chart;
 use crate::render::picture::colour::{SLIP, STICK, at};
-use crate::render::picture::frame::Frame;
 use crate::render::picture::scene::{Heat, Scene, extent, zones_present};
-use crate::render::picture::svg::{Svg, curves, polyline, px};
+use crate::render::picture::svg::{Svg, curves, polyline};
 use crate::render::shape::outlines::{outlines, patch_outline};
 use crate::render::shape::sheet::{AtBorder, Sheet};
-use railhead_contact::solution::words::answer::{PatchCells, Zone};
+use railhead_contact::solution::words::answer::Zone;
 
 /// Where and how finely a patch is drawn.
 pub(super) struct Ground<'a> {
@@ -38,21 +36,16 @@ impl<'a> Ground<'a> {
         self.sheet.as_ref().map_or_else(cells, Sheet::extent)
     }
 
-    fn curves(&self, frame: &Frame, loops: Vec<Vec<[f64; 2]>>) -> String {
+    fn curves(&self, chart: &Chart, loops: Vec<Vec<[f64; 2]>>) -> String {
         let placed = loops
             .into_iter()
-            .map(|points| points.into_iter().map(|[x, y]| frame.at(x, y)).collect());
+            .map(|points| points.into_iter().map(|[x, y]| chart.at(x, y)).collect());
         curves(placed, self.tolerance)
     }
 
     /// The band of a value of the scale, from 0.
     fn band(&self, value: f64, [low, high]: [f64; 2]) -> u32 {
         let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "clamped to the bands; a NaN becomes 0"
-        )]
         let band = (share * f64::from(self.bands)) as u32;
         band.min(self.bands - 1)
     }
@@ -62,11 +55,11 @@ impl<'a> Ground<'a> {
     }
 
     /// Values between both ends of a scale; every band lies on those below it, so that there are no seams.
-    pub(super) fn heat(&self, svg: &mut Svg, frame: &Frame, heat: &Heat, range: [f64; 2]) {
+    pub(super) fn heat(&self, svg: &mut Svg, chart: &Chart, heat: &Heat, range: [f64; 2]) {
         let Some(sheet) = &self.sheet else {
             return self.cells(
                 svg,
-                frame,
+                chart,
                 self.bands,
                 |cell| self.band(heat.values[cell], range),
                 |band| self.colour(band),
@@ -81,12 +74,12 @@ impl<'a> Ground<'a> {
         } else {
             lowest
         };
-        let border = self.curves(frame, vec![sheet.border()]);
+        let border = self.curves(chart, vec![sheet.border()]);
         svg.path(&border, &format!("fill=\"{}\"", self.colour(lowest)));
         for band in lowest + 1..=highest {
             let share = f64::from(band) / f64::from(self.bands);
             let level = range[0] + share * (range[1] - range[0]);
-            let data = self.curves(frame, sheet.reaching(&nodes, level));
+            let data = self.curves(chart, sheet.reaching(&nodes, level));
             if !data.is_empty() {
                 svg.path(&data, &format!("fill=\"{}\"", self.colour(band)));
             }
@@ -94,18 +87,18 @@ impl<'a> Ground<'a> {
     }
 
     /// Stick and slip, each in its colour.
-    pub(super) fn zones(&self, svg: &mut Svg, frame: &Frame) {
+    pub(super) fn zones(&self, svg: &mut Svg, chart: &Chart) {
         let Some(zones) = self.scene.values.zone.as_deref() else {
             return;
         };
         let Some((sheet, stick)) = self.smooth_stick() else {
             let of = |cell: usize| u32::from(zones[cell] == Zone::Slip);
             let colour = |zone: u32| [STICK, SLIP][zone as usize].to_owned();
-            return self.cells(svg, frame, 2, of, colour);
+            return self.cells(svg, chart, 2, of, colour);
         };
-        let border = self.curves(frame, vec![sheet.border()]);
+        let border = self.curves(chart, vec![sheet.border()]);
         svg.path(&border, &format!("fill=\"{SLIP}\""));
-        let stick = self.curves(frame, stick);
+        let stick = self.curves(chart, stick);
         svg.path(&stick, &format!("fill=\"{STICK}\" fill-rule=\"evenodd\""));
     }
 
@@ -115,11 +108,11 @@ impl<'a> Ground<'a> {
         Some((sheet, stick))
     }
 
-    /// One rectangle for each run of cells of one class.
+    /// The cells of every class in its colour.
     fn cells(
         &self,
         svg: &mut Svg,
-        frame: &Frame,
+        chart: &Chart,
         classes: u32,
         class: impl Fn(usize) -> u32,
         colour: impl Fn(u32) -> String,
@@ -129,7 +122,7 @@ impl<'a> Ground<'a> {
         // Crisp edges leave no light seams between cells.
         svg.raw("<g shape-rendering=\"crispEdges\">\n");
         for wanted in 0..classes {
-            let data = rectangles(frame, fields, |cell| classed[cell] == wanted);
+            let data = polygons(chart, outlines(fields, Some(&classed), Some(wanted)));
             if !data.is_empty() {
                 svg.path(&data, &format!("fill=\"{}\"", colour(wanted)));
             }
@@ -138,9 +131,9 @@ impl<'a> Ground<'a> {
     }
 
     /// The border of the stick zone as a thin line, for small pictures.
-    pub(super) fn border_thin(&self, svg: &mut Svg, frame: &Frame) {
+    pub(super) fn border_thin(&self, svg: &mut Svg, chart: &Chart) {
         if let Some((_, stick)) = self.smooth_stick() {
-            let stick = self.curves(frame, stick);
+            let stick = self.curves(chart, stick);
             if !stick.is_empty() {
                 svg.path(&stick, "fill=\"none\" stroke=\"#fff\"");
             }
@@ -148,27 +141,21 @@ impl<'a> Ground<'a> {
     }
 
     /// The border of the patch, and of the stick zone where zones are known.
-    pub(super) fn borders(&self, svg: &mut Svg, frame: &Frame) {
+    pub(super) fn borders(&self, svg: &mut Svg, chart: &Chart) {
         let scene = self.scene;
-        let path = |loops: Vec<Vec<[f64; 2]>>| {
-            let data = loops
-                .into_iter()
-                .map(|points| polyline(points.into_iter().map(|[x, y]| frame.at(x, y)), true));
-            data.collect::<String>()
-        };
         let patch = match &self.sheet {
-            Some(sheet) => self.curves(frame, vec![sheet.border()]),
-            None => path(patch_outline(&scene.fields)),
+            Some(sheet) => self.curves(chart, vec![sheet.border()]),
+            None => polygons(chart, patch_outline(&scene.fields)),
         };
         svg.path(&patch, "fill=\"none\" stroke=\"#111\" stroke-width=\"1.2\"");
         if !zones_present(scene).0 {
             return;
         }
         let stick = match self.smooth_stick() {
-            Some((_, stick)) => self.curves(frame, stick),
+            Some((_, stick)) => self.curves(chart, stick),
             None => {
                 let zones = scene.values.zone.as_deref();
-                path(outlines(&scene.fields, zones, Some(Zone::Stick)))
+                polygons(chart, outlines(&scene.fields, zones, Some(Zone::Stick)))
             }
         };
         // White within black shows on every colour of the ramp.
@@ -183,30 +170,10 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// Rectangles of the chosen cells as one path; neighbours along a strip are one.
-fn rectangles(frame: &Frame, fields: &PatchCells, chosen: impl Fn(usize) -> bool) -> String {
-    let mut data = String::new();
-    let mut cell = 0;
-    while cell < fields.x_mm.len() {
-        let first = cell;
-        cell += 1;
-        if !chosen(first) {
-            continue;
-        }
-        let end = |cell: usize| fields.x_mm[cell] + 0.5 * fields.dx_mm[cell];
-        let joins = |cell: usize| {
-            let start = fields.x_mm[cell] - 0.5 * fields.dx_mm[cell];
-            fields.strip[cell] == fields.strip[first]
-                && (start - end(cell - 1)).abs() <= 1e-6 * fields.dx_mm[cell]
-        };
-        while cell < fields.x_mm.len() && chosen(cell) && joins(cell) {
-            cell += 1;
-        }
-        let left = fields.x_mm[first] - 0.5 * fields.dx_mm[first];
-        let dy = fields.dy_mm[first];
-        let (x, y) = frame.at(left, fields.y_mm[first] + 0.5 * dy);
-        let (w, h) = ((end(cell - 1) - left) * frame.scale, dy * frame.scale);
-        let _ = write!(data, "M{} {}h{}v{}h-{}z", px(x), px(y), px(w), px(h), px(w));
-    }
-    data
+/// Closed polygons as one path.
+fn polygons(chart: &Chart, loops: Vec<Vec<[f64; 2]>>) -> String {
+    let data = loops
+        .into_iter()
+        .map(|points| polyline(points.into_iter().map(|[x, y]| chart.at(x, y)), true));
+    data.collect()
 }

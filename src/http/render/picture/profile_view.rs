@@ -1,7 +1,6 @@
 //! Draws a wheel on a rail as they lie in the track, seen along the rolling direction, with the pressure of every patch on the rail.
 
-use crate::render::picture::chart::{Chart, open};
-use crate::render::picture::frame::WIDTH;
+use crate::render::picture::chart::{Chart, WIDTH, open};
 use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 use railhead_contact::solution::words::answer::{PatchCells, PlacedProfiles, Position};
 
@@ -43,7 +42,7 @@ pub(crate) struct ProfileViewPatch {
 
 /// Draws wheel and rail as SVG, `width` pixels wide.
 #[must_use]
-pub(crate) fn draw(view: &ProfileView, width: u32) -> String {
+pub(crate) fn draw(view: &ProfileView, width: u32) -> Svg {
     let rail = &view.placed.rail_mm;
     let ends = rail
         .iter()
@@ -107,7 +106,7 @@ pub(crate) fn draw(view: &ProfileView, width: u32) -> String {
         "rail",
     );
     svg.raw("</svg>\n");
-    svg.finish()
+    svg
 }
 
 /// A cross-section, raised, filled up to a height.

@@ -1,6 +1,6 @@
 //! What a picture shows, and what follows from it: the coloured values, the box around the cells, the zones.
 
-use crate::render::shape::sheet::AtBorder;
+use crate::render::shape::sheet::{AtBorder, bounds};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
@@ -83,22 +83,11 @@ pub(crate) fn heat(scene: &Scene) -> Option<Heat> {
 
 /// Box around the cells in mm.
 pub(crate) fn extent(fields: &PatchCells) -> [f64; 4] {
-    let mut shape = [
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-    ];
-    for cell in 0..fields.x_mm.len() {
+    let shape = bounds((0..fields.x_mm.len()).flat_map(|cell| {
         let (x, y) = (fields.x_mm[cell], fields.y_mm[cell]);
         let (dx, dy) = (0.5 * fields.dx_mm[cell], 0.5 * fields.dy_mm[cell]);
-        shape = [
-            shape[0].min(x - dx),
-            shape[1].max(x + dx),
-            shape[2].min(y - dy),
-            shape[3].max(y + dy),
-        ];
-    }
+        [[x - dx, y - dy], [x + dx, y + dy]]
+    }));
     if shape.iter().all(|value| value.is_finite()) {
         shape
     } else {

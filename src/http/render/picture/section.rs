@@ -1,7 +1,6 @@
 //! Draws the sections of a patch through its largest traction: how large the traction is, and how much friction would carry.
 
-use crate::render::picture::chart::{Chart, open};
-use crate::render::picture::frame::WIDTH;
+use crate::render::picture::chart::{Chart, WIDTH, open};
 use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
@@ -41,7 +40,7 @@ struct SectionLine {
 
 /// Draws sections as SVG, `width` pixels wide.
 #[must_use]
-pub(crate) fn draw(sections: &Sections, width: u32) -> String {
+pub(crate) fn draw(sections: &Sections, width: u32) -> Svg {
     let both = [along(sections), across(sections)];
     let values = both.iter().flat_map(|section| &section.points);
     let largest = values
@@ -74,7 +73,7 @@ pub(crate) fn draw(sections: &Sections, width: u32) -> String {
     }
     legend(&mut svg, sections.friction.is_some());
     svg.raw("</svg>\n");
-    svg.finish()
+    svg
 }
 
 fn draw_section(svg: &mut Svg, chart: &Chart, section: &SectionLine) {
@@ -279,6 +278,6 @@ mod tests {
             );
         }
         assert_eq!(section.points.first().map(|point| point[1]), Some(0.0));
-        assert!(draw(&of, 800).ends_with("</svg>\n"));
+        assert!(draw(&of, 800).finish().ends_with("</svg>\n"));
     }
 }

@@ -7,8 +7,30 @@ pub(super) const FONTS: &str = "DejaVu Sans, Verdana, sans-serif";
 
 /// A drawing in the making.
 #[derive(Debug, Default)]
-pub(super) struct Svg {
-    text: String,
+pub(crate) struct Svg {
+    /// Markup, and the lines of text between it.
+    parts: Vec<Part>,
+}
+
+#[derive(Debug)]
+enum Part {
+    Markup(String),
+    Line(Line),
+}
+
+/// A line of text.
+#[derive(Debug)]
+pub(super) struct Line {
+    /// The place of its anchor.
+    pub at: (f64, f64),
+    /// Size of the font.
+    pub size: f64,
+    /// The end that stands at the place.
+    pub anchor: Anchor,
+    /// Further attributes.
+    pub attributes: String,
+    /// The text.
+    pub text: String,
 }
 
 /// Which end of a text stands at its place.
@@ -36,32 +58,54 @@ impl Svg {
     /// Adds a line of text of the given size; `attributes` is written as it stands, `text` is escaped.
     pub(super) fn text(
         &mut self,
-        (x, y): (f64, f64),
+        at: (f64, f64),
         size: f64,
         anchor: Anchor,
         attributes: &str,
         text: &str,
     ) {
-        let anchor = match anchor {
-            Anchor::Start => "start",
-            Anchor::Middle => "middle",
-            Anchor::End => "end",
-        };
-        let (x, y, text) = (px(x), px(y), escape(text));
-        self.raw(&format!(
-            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" text-anchor=\"{anchor}\" {attributes}>{text}</text>\n"
-        ));
+        self.parts.push(Part::Line(Line {
+            at,
+            size,
+            anchor,
+            attributes: attributes.to_owned(),
+            text: text.to_owned(),
+        }));
     }
 
     /// Adds text that is SVG already.
     pub(super) fn raw(&mut self, text: &str) {
-        self.text.push_str(text);
+        self.parts.push(Part::Markup(text.to_owned()));
     }
 
-    /// The drawing so far.
+    /// The drawing, with its lines of text as elements.
     #[must_use]
-    pub(super) fn finish(self) -> String {
-        self.text
+    pub(crate) fn finish(&self) -> String {
+        self.with_lines(Line::element)
+    }
+
+    /// The drawing, with its lines of text written by `element`.
+    pub(super) fn with_lines(&self, element: impl Fn(&Line) -> String) -> String {
+        let text = |part: &Part| match part {
+            Part::Markup(text) => text.clone(),
+            Part::Line(line) => element(line),
+        };
+        self.parts.iter().map(text).collect()
+    }
+}
+
+impl Line {
+    fn element(&self) -> String {
+        let anchor = match self.anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let ((x, y), size, attributes) = (self.at, self.size, &self.attributes);
+        let (x, y, text) = (px(x), px(y), escape(&self.text));
+        format!(
+            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" text-anchor=\"{anchor}\" {attributes}>{text}</text>\n"
+        )
     }
 }
 
@@ -92,10 +136,6 @@ pub(super) fn polyline(points: impl IntoIterator<Item = (f64, f64)>, closed: boo
 /// Closed curves through points, to a tenth: every point within `tolerance` of a straight line through its neighbours is left out.
 #[must_use]
 pub(super) fn curves(loops: impl IntoIterator<Item = Vec<(f64, f64)>>, tolerance: f64) -> String {
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "places in a picture, in tenths"
-    )]
     let tenths = |(x, y): (f64, f64)| [(10.0 * x).round() as i64, (10.0 * y).round() as i64];
     let mut data = String::new();
     for points in loops {

@@ -14,26 +14,26 @@ use i_overlay::i_shape::int::shape::IntContour;
 use railhead_contact::numerics::interpolation;
 use railhead_contact::solution::words::answer::{PatchCells, Zone};
 
-/// Outlines of the union of the cells of one zone, or of all cells when `which` is `None`, in mm.
+/// Outlines of the union of the cells of one zone or another class, or of all cells when `which` is `None`, in mm.
 ///
 /// The polygons are rectilinear and enclose exactly the cells: their signed areas (holes negative) add up to the
 /// area of the cells. Edges of neighbouring cells that differ by rounding (1e-9 of the cell) count as one. Loops are
-/// sorted by their lowest, then leftmost point and start there. With `which` given and no `zones` there is no outline.
+/// sorted by their lowest, then leftmost point and start there. With `which` given and no `classes` there is no outline.
 ///
 /// # Panics
 /// If the vectors differ in length.
 #[must_use]
-pub(crate) fn outlines(
+pub(crate) fn outlines<T: Copy + PartialEq>(
     fields: &PatchCells,
-    zones: Option<&[Zone]>,
-    which: Option<Zone>,
+    classes: Option<&[T]>,
+    which: Option<T>,
 ) -> Vec<Vec<[f64; 2]>> {
     let n = fields.x_mm.len();
     assert!(
-        zones.is_none_or(|z| z.len() == n),
-        "there must be one zone per cell"
+        classes.is_none_or(|classes| classes.len() == n),
+        "there must be one class per cell"
     );
-    let wanted = |i: usize| which.is_none_or(|zone| zones.is_some_and(|z| z[i] == zone));
+    let wanted = |i: usize| which.is_none_or(|class| classes.is_some_and(|all| all[i] == class));
     let cells: Vec<usize> = (0..n).filter(|&i| wanted(i)).collect();
 
     let x = CellBorders::new(&fields.x_mm, &fields.dx_mm, &cells);
@@ -67,7 +67,7 @@ pub(crate) fn outlines(
 pub(crate) fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
     let strips = Strips::new(fields);
     if !strips.is_simple() {
-        return outlines(fields, None, None);
+        return outlines::<Zone>(fields, None, None);
     }
     let last = strips.segments.len() - 1;
     let (bottom, top) = (&strips.segments[0], &strips.segments[last]);
@@ -410,19 +410,19 @@ mod tests {
         let mut fields = PatchCells::default();
         push_segment(&mut fields, 0, 5.0, 2.0, &[1.0, 4.0]);
         let square = vec![vec![[1.0, 4.0], [4.0, 4.0], [4.0, 6.0], [1.0, 6.0]]];
-        assert_eq!(outlines(&fields, None, None), square);
+        assert_eq!(outlines::<Zone>(&fields, None, None), square);
         assert_eq!(
             patch_outline(&fields).iter().map(|p| area(p)).sum::<f64>(),
             6.0
         );
         assert!(outlines(&fields, Some(&[Zone::Slip]), Some(Zone::Stick)).is_empty());
         assert!(outlines(&fields, None, Some(Zone::Stick)).is_empty());
-        assert!(outlines(&PatchCells::default(), None, None).is_empty());
+        assert!(outlines::<Zone>(&PatchCells::default(), None, None).is_empty());
     }
 
     #[test]
     fn a_hole_is_a_clockwise_loop() {
-        let loops = outlines(&pattern(&["####", "#..#", "####"]), None, None);
+        let loops = outlines::<Zone>(&pattern(&["####", "#..#", "####"]), None, None);
         assert_well_formed(&loops);
         assert_eq!(
             loops.iter().map(|l| area(l)).collect::<Vec<_>>(),
@@ -432,14 +432,14 @@ mod tests {
 
     #[test]
     fn diagonal_cells_and_diagonal_holes_stay_apart() {
-        let loops = outlines(&pattern(&["#.#.", ".#.#", "#.#.", ".#.#"]), None, None);
+        let loops = outlines::<Zone>(&pattern(&["#.#.", ".#.#", "#.#.", ".#.#"]), None, None);
         assert_well_formed(&loops);
         assert_eq!(
             loops.iter().map(|l| area(l)).collect::<Vec<_>>(),
             vec![1.0; 8]
         );
 
-        let loops = outlines(&pattern(&["####", "##.#", "#.##", "####"]), None, None);
+        let loops = outlines::<Zone>(&pattern(&["####", "##.#", "#.##", "####"]), None, None);
         assert_well_formed(&loops);
         assert_eq!(
             loops.iter().map(|l| area(l)).collect::<Vec<_>>(),
@@ -449,7 +449,7 @@ mod tests {
 
     #[test]
     fn a_hole_that_touches_the_outside_in_a_corner_is_still_a_hole() {
-        let loops = outlines(&pattern(&["###", "#.#", "##."]), None, None);
+        let loops = outlines::<Zone>(&pattern(&["###", "#.#", "##."]), None, None);
         assert_well_formed(&loops);
         assert_eq!(
             loops.iter().map(|l| area(l)).collect::<Vec<_>>(),
@@ -467,7 +467,7 @@ mod tests {
         for (k, x) in fields.x_mm.iter_mut().enumerate() {
             *x += 1e-11 * (k as f64 * 7.3).sin();
         }
-        let loops = outlines(&fields, None, None);
+        let loops = outlines::<Zone>(&fields, None, None);
         assert_eq!(loops.len(), 1);
         assert_eq!(loops[0].len(), 4);
         // A real gap, however narrow, stays.
@@ -475,7 +475,7 @@ mod tests {
             *x -= 1e-7;
             *dx -= 1e-7;
         }
-        assert!(outlines(&fields, None, None)[0].len() > 4);
+        assert!(outlines::<Zone>(&fields, None, None)[0].len() > 4);
     }
 
     #[test]
@@ -500,7 +500,10 @@ mod tests {
     #[test]
     fn patch_outline_of_a_patch_with_two_lobes_is_rectilinear() {
         let fields = pattern(&["#.#", "###"]);
-        assert_eq!(patch_outline(&fields), outlines(&fields, None, None));
+        assert_eq!(
+            patch_outline(&fields),
+            outlines::<Zone>(&fields, None, None)
+        );
     }
 
     proptest! {

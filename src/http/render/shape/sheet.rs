@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use super::monotone::monotone;
-use super::outlines::Strips;
+use super::outlines::{StoredSegment, Strips};
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
-/// SheetNodes of the grid along one axis, at least and at most; between them four per cell or strip.
+/// Nodes of the grid along one axis, at least and at most; between them four per cell or strip.
 const NODES: [usize; 2] = [65, 257];
 /// Strips from which on something can be interpolated between them.
 const STRIPS_MIN: usize = 3;
@@ -27,18 +27,10 @@ pub(crate) enum AtBorder {
     Continues,
 }
 
-/// One strip: its cells and where it lies.
-#[derive(Debug, Clone)]
-pub(crate) struct SheetStrip {
-    pub(crate) cells: std::ops::Range<usize>,
-    pub(crate) left: f64,
-    pub(crate) right: f64,
-}
-
 /// A curved grid over a patch.
 #[derive(Debug, Clone)]
 pub(crate) struct Sheet {
-    pub(crate) strips: Vec<SheetStrip>,
+    pub(crate) strips: Vec<StoredSegment>,
     /// Heights of the strips, between those of the lowest and the highest point of the border.
     heights: Vec<f64>,
     /// Shares of the chord at which nodes stand, from 0 to 1.
@@ -47,10 +39,6 @@ pub(crate) struct Sheet {
     rows: Vec<f64>,
     places: Vec<[f64; 2]>,
 }
-
-/// A field at the nodes of a [`Sheet`].
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SheetNodes(pub(crate) Vec<f64>);
 
 impl Sheet {
     /// The grid over a patch; `None` where it has fewer than three strips, or gaps.
@@ -93,13 +81,8 @@ impl Sheet {
                     .map(move |share| [centre + (2.0 * share - 1.0) * half, y])
             })
             .collect();
-        let strips = segments.iter().map(|segment| SheetStrip {
-            cells: segment.cells.clone(),
-            left: segment.left,
-            right: segment.right,
-        });
         Some(Sheet {
-            strips: strips.collect(),
+            strips: found.segments,
             heights,
             shares,
             rows,
@@ -121,21 +104,7 @@ impl Sheet {
     /// Box around the border: x from, x to, y from, y to in mm.
     #[must_use]
     pub(crate) fn extent(&self) -> [f64; 4] {
-        let mut shape = [
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-            f64::INFINITY,
-            f64::NEG_INFINITY,
-        ];
-        for [x, y] in &self.places {
-            shape = [
-                shape[0].min(*x),
-                shape[1].max(*x),
-                shape[2].min(*y),
-                shape[3].max(*y),
-            ];
-        }
-        shape
+        bounds(self.places.iter().copied())
     }
 
     /// Values of cells at the nodes: monotone cubics along every strip and from strip to strip at equal shares of their lengths.
@@ -145,7 +114,7 @@ impl Sheet {
     /// # Panics
     /// If there are fewer values than cells.
     #[must_use]
-    pub(crate) fn nodes(&self, values: &[f64], cells: &PatchCells, edge: AtBorder) -> SheetNodes {
+    pub(crate) fn nodes(&self, values: &[f64], cells: &PatchCells, edge: AtBorder) -> Vec<f64> {
         let strips = self.strips.iter().map(|strip| {
             let width = strip.right - strip.left;
             let inside = strip.cells.clone();
@@ -169,17 +138,17 @@ impl Sheet {
             monotone(&knots, &heights, &self.shares)
         });
         let strips: Vec<Vec<f64>> = strips.collect();
-        let SheetNodes(mut nodes) = self.across(&strips, edge);
+        let mut nodes = self.across(&strips, edge);
         if edge == AtBorder::Vanishes {
             nodes
                 .iter_mut()
                 .for_each(|value| *value = value.max(0.0).sqrt());
         }
-        SheetNodes(nodes)
+        nodes
     }
 
     /// Interpolates across what is known along every strip at the shares of the nodes.
-    pub(crate) fn across(&self, strips: &[Vec<f64>], edge: AtBorder) -> SheetNodes {
+    pub(crate) fn across(&self, strips: &[Vec<f64>], edge: AtBorder) -> Vec<f64> {
         let (columns, last) = (self.shares.len(), strips.len() - 1);
         let mut nodes = vec![0.0; columns * self.rows.len()];
         for column in 0..columns {
@@ -196,25 +165,37 @@ impl Sheet {
                 nodes[row * columns + column] = value;
             }
         }
-        SheetNodes(nodes)
+        nodes
     }
 
     /// Closed curves around where a field reaches a level, counter-clockwise, holes clockwise; they end at the border of the patch.
     #[must_use]
-    pub(crate) fn reaching(&self, nodes: &SheetNodes, level: f64) -> Vec<Vec<[f64; 2]>> {
+    pub(crate) fn reaching(&self, nodes: &[f64], level: f64) -> Vec<Vec<[f64; 2]>> {
         let grid = CurvedGrid {
             columns: self.shares.len(),
-            values: &nodes.0,
+            values: nodes,
             places: &self.places,
         };
         contours(&grid, level)
     }
 }
 
+/// Box around points: x from, x to, y from, y to; from infinity down to infinity below zero if there is none.
+pub(crate) fn bounds(points: impl Iterator<Item = [f64; 2]>) -> [f64; 4] {
+    let none = [
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+    ];
+    points.fold(none, |[left, right, low, high], [x, y]| {
+        [left.min(x), right.max(x), low.min(y), high.max(y)]
+    })
+}
+
 /// Shares from 0 to 1, closer to each other at both ends, where a border is round and a field steep.
 fn crowded(of: usize) -> Vec<f64> {
     let count = (4 * of + 1).clamp(NODES[0], NODES[1]);
-    #[expect(clippy::cast_precision_loss, reason = "a few hundred")]
     let share = |k: usize| 0.5 * (1.0 - (PI * k as f64 / (count - 1) as f64).cos());
     (0..count).map(share).collect()
 }
@@ -411,7 +392,7 @@ struct ZoneChanges {
 
 impl ZoneChanges {
     fn of(
-        strip: &SheetStrip,
+        strip: &StoredSegment,
         cells: &PatchCells,
         zones: &[Zone],
         margins: Option<&BoundMargins>,
@@ -493,7 +474,7 @@ mod tests {
         let values: Vec<f64> = places.map(|(x, y)| pressure([*x, *y])).collect();
         let nodes = sheet.nodes(&values, &cells, AtBorder::Vanishes);
         let largest = values.iter().copied().fold(0.0, f64::max);
-        for (place, value) in sheet.places.iter().zip(&nodes.0) {
+        for (place, value) in sheet.places.iter().zip(&nodes) {
             assert!(*value <= largest + 1e-12, "no overshoot");
             assert!(
                 (value.powi(2) - pressure(*place).powi(2)).abs() < 0.05,
