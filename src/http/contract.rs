@@ -7,16 +7,14 @@ use axum::response::{IntoResponse, Response};
 use serde_json::{Map, Value, json};
 use utoipa::OpenApi;
 use utoipa::openapi::example::ExampleBuilder;
-use utoipa::openapi::path::{ParameterBuilder, ParameterIn};
-use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, Components, Type};
+use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, Components};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
-use utoipa::openapi::{
-    Discriminator, HeaderBuilder, ObjectBuilder, Ref, RefOr, Required, ResponseBuilder, Schema,
-};
+use utoipa::openapi::{Discriminator, Ref, RefOr, ResponseBuilder, Schema};
 use utoipa_axum::router::OpenApiRouter;
 
 use crate::contract;
 use crate::problem::{ProblemBody, ProblemKind, describe, describe_together};
+use crate::routes::work::{header_parameter, text_header};
 
 #[derive(OpenApi)]
 #[openapi(
@@ -49,27 +47,18 @@ pub(super) fn head() -> utoipa::openapi::OpenApi {
 pub(super) fn conditional<S: Clone + Send + Sync + 'static>(
     mut routes: OpenApiRouter<S>,
 ) -> OpenApiRouter<S> {
-    let text = || Some(ObjectBuilder::new().schema_type(Type::String).build());
     for item in routes.get_openapi_mut().paths.paths.values_mut() {
         let Some(operation) = &mut item.get else {
             continue;
         };
-        let given = ParameterBuilder::new()
-            .name("If-None-Match")
-            .parameter_in(ParameterIn::Header)
-            .required(Required::False)
-            .description(Some("Values of `ETag` that the client has stored"))
-            .schema(text());
-        operation
-            .parameters
-            .get_or_insert_default()
-            .push(given.build().into());
+        let about = "Values of `ETag` that the client has stored";
+        let given = header_parameter("If-None-Match", about).build();
+        let parameters = operation.parameters.get_or_insert_default();
+        parameters.push(given.into());
         let responses = &mut operation.responses.responses;
         if let Some(RefOr::T(found)) = responses.get_mut("200") {
-            let tag = HeaderBuilder::new()
-                .schema(text())
-                .description(Some("Digest of the response, for `If-None-Match`"));
-            found.headers.insert("ETag".to_owned(), tag.build().into());
+            let tag = text_header("Digest of the response, for `If-None-Match`");
+            found.headers.insert("ETag".to_owned(), tag.into());
         }
         let unchanged = ResponseBuilder::new()
             .description("The response that the client has stored is still valid");

@@ -247,7 +247,6 @@ pub(crate) struct BatchStates {
 impl From<Batch> for BatchAnswer {
     fn from(batch: Batch) -> Self {
         let (ended, all) = batch.ended();
-        #[expect(clippy::cast_precision_loss, reason = "far fewer jobs than 2^53")]
         let progress = if all == 0 {
             1.0
         } else {

@@ -380,14 +380,17 @@ pub(crate) fn describe_together(kinds: &[ProblemKind]) -> RefOr<utoipa::openapi:
         .description(lines.join("\n\n"))
         .content(PROBLEM_JSON, content);
     if kinds.iter().any(|kind| kind.passes()) {
-        let schema = ObjectBuilder::new().schema_type(Type::Integer);
-        let header = HeaderBuilder::new()
-            .schema(Some(schema))
-            .description(Some("Seconds to wait before trying again."))
-            .build();
+        let header = seconds_header("Seconds to wait before trying again.");
         response = response.header("Retry-After", header);
     }
     response.build().into()
+}
+
+/// A header of an answer, a number of seconds.
+pub(crate) fn seconds_header(about: &str) -> utoipa::openapi::Header {
+    let number = ObjectBuilder::new().schema_type(Type::Integer);
+    let header = HeaderBuilder::new().schema(Some(number));
+    header.description(Some(about)).build()
 }
 
 /// Content type of every failure.

@@ -4,15 +4,16 @@ use std::time::Duration;
 
 use axum::BoxError;
 use axum::body::Bytes;
-use axum::extract::{FromRef, FromRequestParts, Path};
+use axum::extract::{FromRequestParts, Path};
 use axum::http::header;
 use axum::http::request::Parts;
 use futures_util::stream::{Stream, TryStreamExt, try_unfold};
 use uuid::Uuid;
 
-use crate::layers::auth::{Access, bearer, unauthorized};
-use crate::limits::{ConcurrencyLimits, HeldPermits};
+use crate::layers::auth::{bearer, unauthorized};
+use crate::limits::HeldPermits;
 use crate::problem::{ApiError, ProblemKind, Result};
+use crate::state::AppState;
 use railhead_jobs::Jobs;
 use railhead_jobs::model::{ANONYMOUS, Kind, OPERATOR};
 
@@ -76,21 +77,17 @@ pub struct Operator(pub Jobs);
 #[derive(Debug, Clone)]
 pub struct AnyTenant(pub Jobs);
 
-impl<S: Send + Sync> FromRequestParts<S> for Caller
-where
-    Access: FromRef<S>,
-    ConcurrencyLimits: FromRef<S>,
-{
+impl FromRequestParts<AppState> for Caller {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
-        let access = Access::from_ref(state);
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
+        let access = &state.access;
         let (tenant, labels) = match access.key(parts).await? {
             Some(key) => (key.tenant, key.labels),
             None => (ANONYMOUS.into(), Arc::default()),
         };
         if let Some(held) = parts.extensions.get::<HeldPermits>() {
-            held.add(ConcurrencyLimits::from_ref(state).request(&tenant)?);
+            held.add(state.concurrency.request(&tenant)?);
         }
         parts.extensions.insert(Tenant(tenant.clone()));
         let key = parts.headers.get(header::AUTHORIZATION);
@@ -102,14 +99,11 @@ where
     }
 }
 
-impl<S: Send + Sync> FromRequestParts<S> for Operator
-where
-    Access: FromRef<S>,
-{
+impl FromRequestParts<AppState> for Operator {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
-        let access = Access::from_ref(state);
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
+        let access = &state.access;
         match access.key(parts).await? {
             Some(key) if *key.tenant != *OPERATOR => Err(ApiError::new(
                 ProblemKind::Forbidden,
@@ -127,10 +121,10 @@ macro_rules! id {
         #[derive(Debug, Clone, Copy)]
         pub struct $name(pub Uuid);
 
-        impl<S: Send + Sync> FromRequestParts<S> for $name {
+        impl FromRequestParts<AppState> for $name {
             type Rejection = ApiError;
 
-            async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
+            async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
                 read_id(parts, state, Kind::$kind).await.map($name)
             }
         }
@@ -154,10 +148,10 @@ id! {
 #[derive(Debug, Clone, Copy)]
 pub struct RunRowId(pub Uuid, pub u64);
 
-impl<S: Send + Sync> FromRequestParts<S> for RunRowId {
+impl FromRequestParts<AppState> for RunRowId {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
         let path = Path::<(String, String)>::from_request_parts(parts, state).await;
         let Path((id, row)) = path
             .map_err(|rejection| ApiError::new(ProblemKind::RunNotFound, rejection.body_text()))?;
@@ -170,7 +164,7 @@ impl<S: Send + Sync> FromRequestParts<S> for RunRowId {
     }
 }
 
-async fn read_id<S: Send + Sync>(parts: &mut Parts, state: &S, kind: Kind) -> Result<Uuid> {
+async fn read_id(parts: &mut Parts, state: &AppState, kind: Kind) -> Result<Uuid> {
     let path = Path::<String>::from_request_parts(parts, state).await;
     let Path(text) = path
         .map_err(|rejection| ApiError::new(ProblemKind::not_found(kind), rejection.body_text()))?;

@@ -3,7 +3,7 @@ use std::fmt;
 use std::time::Duration;
 
 use axum::body::{Body, BodyDataStream, Bytes, HttpBody};
-use axum::extract::{FromRef, FromRequest, Request};
+use axum::extract::{FromRequest, Request};
 use axum::http::{HeaderMap, header};
 use futures_util::StreamExt;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
@@ -15,6 +15,7 @@ use crate::layers::admission::{PackedLength, too_long};
 use crate::limits::{Memory, MemoryPermit, Permit, SMALL_BYTES};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind, Result};
+use crate::state::AppState;
 use railhead_jobs::sync::blocking;
 
 /// The JSON body of a request. What it means is for others to judge.
@@ -26,22 +27,18 @@ pub struct JsonBody {
     pub room: MemoryPermit,
 }
 
-impl<S> FromRequest<S> for JsonBody
-where
-    S: Send + Sync,
-    HttpOptions: FromRef<S>,
-    Memory: FromRef<S>,
-{
+impl FromRequest<AppState> for JsonBody {
     type Rejection = ApiError;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self> {
-        let options = HttpOptions::from_ref(state);
-        let memory = Memory::from_ref(state);
+    async fn from_request(request: Request, state: &AppState) -> Result<Self> {
+        let AppState {
+            options, memory, ..
+        } = state;
         require_json(request.headers())?;
         let tenant = request.extensions().get::<Tenant>().cloned();
         let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
-        let (bytes, held) = read_whole(request, &memory, &tenant, &options).await?;
-        let weight = weigh_in_turn(&memory, &tenant, &bytes, options.parsed_max_bytes).await?;
+        let (bytes, held) = read_whole(request, memory, &tenant, options).await?;
+        let weight = weigh_in_turn(memory, &tenant, &bytes, options.parsed_max_bytes).await?;
         let share = memory.parsed(&tenant, weight).await?;
         if weight <= SMALL_BYTES {
             let value = read_json(&bytes)?;
@@ -413,7 +410,6 @@ impl BodyReader {
     /// # Errors
     /// It is too large, too slow, or breaks off.
     pub async fn next(&mut self) -> Result<Option<Bytes>> {
-        #[expect(clippy::cast_precision_loss, reason = "far fewer bytes than 2^53")]
         let owed = Duration::from_secs_f64(self.total as f64 / LOWEST_RATE);
         let latest = self.begun + self.timeout + owed;
         let piece = timeout_at(

@@ -330,11 +330,6 @@ impl Query {
 pub fn whole(text: &str, low: u32, high: u32) -> Option<u32> {
     let value: f64 = text.parse().ok()?;
     let within = value.fract() == 0.0 && value >= f64::from(low) && value <= f64::from(high);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "checked to be whole and within the range of u32"
-    )]
     within.then_some(value as u32)
 }
 

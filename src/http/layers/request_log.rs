@@ -1,13 +1,12 @@
 //! The id of a request, and the line that the log has for each.
 use std::time::Duration;
 
-use axum::body::Body;
 use axum::extract::{MatchedPath, Request};
 use axum::http::{HeaderName, HeaderValue};
 use axum::middleware::Next;
 use axum::response::Response;
 use tower_http::classify::{ServerErrorsAsFailures, SharedClassifier};
-use tower_http::trace::{DefaultOnFailure, DefaultOnRequest, MakeSpan, OnResponse, TraceLayer};
+use tower_http::trace::{DefaultOnFailure, DefaultOnRequest, TraceLayer};
 use tracing::{Span, field};
 use uuid::Uuid;
 
@@ -45,68 +44,52 @@ fn fit_for_log(id: &HeaderValue) -> bool {
 }
 
 /// One span per request, closed by one line with status and time.
-pub(crate) fn span_layer()
--> TraceLayer<SharedClassifier<ServerErrorsAsFailures>, RequestSpan, DefaultOnRequest, LogResponse>
-{
+pub(crate) fn span_layer() -> TraceLayer<
+    SharedClassifier<ServerErrorsAsFailures>,
+    fn(&Request) -> Span,
+    DefaultOnRequest,
+    fn(&Response, Duration, &Span),
+> {
     TraceLayer::new_for_http()
-        .make_span_with(RequestSpan)
-        .on_response(LogResponse)
+        .make_span_with(request_span as fn(&Request) -> Span)
+        .on_response(log_response as fn(&Response, Duration, &Span))
         .on_failure(DefaultOnFailure::new().level(tracing::Level::DEBUG))
 }
 
-/// Makes the span of a request.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RequestSpan;
-
-impl MakeSpan<Body> for RequestSpan {
-    fn make_span(&mut self, request: &axum::http::Request<Body>) -> Span {
-        let id = request
-            .headers()
-            .get(&REQUEST_ID)
-            .and_then(|id| id.to_str().ok());
-        let route = request
-            .extensions()
-            .get::<MatchedPath>()
-            .map(MatchedPath::as_str);
-        let span = tracing::info_span!(
-            "request",
-            request_id = id.unwrap_or_default(),
-            method = %request.method(),
-            path = request.uri().path(),
-            route = route.unwrap_or_default(),
-            job = field::Empty,
-            tenant = field::Empty,
-            key = field::Empty,
-            trace_id = field::Empty,
-            client = field::Empty,
-        );
-        if let Some(Peer(client)) = request.extensions().get() {
-            span.record("client", field::display(client));
-        }
-        span
+fn request_span(request: &Request) -> Span {
+    let id = request.headers().get(&REQUEST_ID);
+    let route = request.extensions().get::<MatchedPath>();
+    let span = tracing::info_span!(
+        "request",
+        request_id = id.and_then(|id| id.to_str().ok()).unwrap_or_default(),
+        method = %request.method(),
+        path = request.uri().path(),
+        route = route.map(MatchedPath::as_str).unwrap_or_default(),
+        job = field::Empty,
+        tenant = field::Empty,
+        key = field::Empty,
+        trace_id = field::Empty,
+        client = field::Empty,
+    );
+    if let Some(Peer(client)) = request.extensions().get() {
+        span.record("client", field::display(client));
     }
+    span
 }
 
-/// Writes the line at the end of a request.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LogResponse;
-
-impl OnResponse<Body> for LogResponse {
-    fn on_response(self, response: &Response, latency: Duration, _span: &Span) {
-        let status = response.status().as_u16();
-        let seconds = latency.as_secs_f64();
-        if response.status().is_server_error() {
-            tracing::warn!(status, seconds, "answered");
-        } else {
-            tracing::info!(status, seconds, "answered");
-        }
+fn log_response(response: &Response, latency: Duration, _span: &Span) {
+    let status = response.status().as_u16();
+    let seconds = latency.as_secs_f64();
+    if response.status().is_server_error() {
+        tracing::warn!(status, seconds, "answered");
+    } else {
+        tracing::info!(status, seconds, "answered");
     }
 }
 
 #[cfg(test)]
 mod tests {
     use axum::Router;
-    use axum::body::Body;
     use axum::routing::get;
     use tower::ServiceExt;
 
@@ -123,7 +106,7 @@ mod tests {
         for id in ["", "two words", &"x".repeat(129)] {
             let request = Request::get("/")
                 .header("x-request-id", id)
-                .body(Body::empty())
+                .body(axum::body::Body::empty())
                 .unwrap();
             let response = router().oneshot(request).await.unwrap();
             let answered = response.headers()["x-request-id"].to_str().unwrap();

@@ -137,39 +137,33 @@ query! {
 pub(crate) async fn resultants(request: PartRequest) -> Result<Response> {
     let query = ResultantsQuery::read(&request.uri, &())?;
     let format = choose(&request.headers, query.format, FORMS)?;
-    let answer = write_resultants(&request, query.point, query.patch, format);
-    request.unless_known(format, answer).await
-}
-
-async fn write_resultants(
-    request: &PartRequest,
-    point: Option<usize>,
-    patch: Option<usize>,
-    format: Format,
-) -> Result<Response> {
-    let (jobs, id) = (&request.jobs, request.id);
-    // The stored text is read whole and cut to what was asked for.
-    let answer = jobs.open_answer(id).await?;
-    let turn = request.rendering(2 * answer.bytes).await?;
-    let text = answer.text().await?;
-    let read = move || {
-        let solution: Solution =
-            serde_json::from_slice(&text).map_err(|error| ApiError::internal(&error))?;
-        drop(text);
-        require_index("point", point, solution.total.len())?;
-        require_index("patch", patch, solution.patches.len())?;
-        let sums: Vec<_> = (0..solution.total.len())
-            .map(|motion| sum(&solution, motion))
-            .collect();
-        let resultants = Resultants::select(solution, point, patch);
-        match format {
-            Format::Csv => csv(resultants::table(&resultants, point.unwrap_or(0), &sums)),
-            _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error)),
-        }
+    let (point, patch) = (query.point, query.patch);
+    let answer = async {
+        let (jobs, id) = (&request.jobs, request.id);
+        // The stored text is read whole and cut to what was asked for.
+        let stored = jobs.open_answer(id).await?;
+        let turn = request.rendering(2 * stored.bytes).await?;
+        let text = stored.text().await?;
+        let read = move || {
+            let solution: Solution =
+                serde_json::from_slice(&text).map_err(|error| ApiError::internal(&error))?;
+            drop(text);
+            require_index("point", point, solution.total.len())?;
+            require_index("patch", patch, solution.patches.len())?;
+            let sums: Vec<_> = (0..solution.total.len())
+                .map(|motion| sum(&solution, motion))
+                .collect();
+            let resultants = Resultants::select(solution, point, patch);
+            match format {
+                Format::Csv => csv(resultants::table(&resultants, point.unwrap_or(0), &sums)),
+                _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error)),
+            }
+        };
+        let (body, share) = turn.run(read, Vec::len).await?;
+        let response = format.answer("resultants", body);
+        Ok(hold_while_sent(response, share))
     };
-    let (body, share) = turn.run(read, Vec::len).await?;
-    let response = format.answer("resultants", body);
-    Ok(hold_while_sent(response, share))
+    request.unless_known(format, answer).await
 }
 
 fn csv(table: RowTable) -> Result<Vec<u8>> {
@@ -231,45 +225,38 @@ pub(crate) async fn subsurface(request: PartRequest) -> Result<Response> {
     let query = SubsurfaceQuery::read(&request.uri, &())?;
     let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
     let format = choose(&request.headers, query.format, FORMS)?;
-    let answer = write_stresses(&request, patch, point, format);
-    request.unless_known(format, answer).await
-}
-
-async fn write_stresses(
-    request: &PartRequest,
-    patch: usize,
-    point: usize,
-    format: Format,
-) -> Result<Response> {
-    let (jobs, id) = (&request.jobs, request.id);
-    let output = Output::Subsurface;
-    let (_, values) = stored(jobs, id, [patch, point], &[output]).await?;
-    let solution = jobs.solution(id).await?;
-    let (_, motion) = motion_of(&solution, [patch, point])?;
-    let Some(summary) = motion.subsurface else {
-        return not_asked(jobs, id, output).await;
-    };
-    let kept = values.subsurface.unwrap_or_default();
-    let turn = request.rendering(POINT_BYTES * (kept.len() / STORED + 1));
-    let write = move || {
-        let points = points(&kept);
-        if format == Format::Csv {
-            return csv(stresses::table(&points));
-        }
-        let answer = SubsurfaceAnswer {
-            patch,
-            point,
-            body: summary.body,
-            least_depth_mm: summary.least_depth_mm,
-            points,
-            worst: summary.worst,
-            passage: summary.passage,
+    let answer = async {
+        let (jobs, id) = (&request.jobs, request.id);
+        let output = Output::Subsurface;
+        let (_, values) = stored(jobs, id, [patch, point], &[output]).await?;
+        let solution = jobs.solution(id).await?;
+        let (_, motion) = motion_of(&solution, [patch, point])?;
+        let Some(summary) = motion.subsurface else {
+            return not_asked(jobs, id, output).await;
         };
-        serde_json::to_vec(&answer).map_err(|error| ApiError::internal(&error))
+        let kept = values.subsurface.unwrap_or_default();
+        let turn = request.rendering(POINT_BYTES * (kept.len() / STORED + 1));
+        let write = move || {
+            let points = points(&kept);
+            if format == Format::Csv {
+                return csv(stresses::table(&points));
+            }
+            let answer = SubsurfaceAnswer {
+                patch,
+                point,
+                body: summary.body,
+                least_depth_mm: summary.least_depth_mm,
+                points,
+                worst: summary.worst,
+                passage: summary.passage,
+            };
+            serde_json::to_vec(&answer).map_err(|error| ApiError::internal(&error))
+        };
+        let (text, share) = turn.await?.run(write, Vec::len).await?;
+        let response = format.answer("subsurface", text);
+        Ok(hold_while_sent(response, share))
     };
-    let (text, share) = turn.await?.run(write, Vec::len).await?;
-    let response = format.answer("subsurface", text);
-    Ok(hold_while_sent(response, share))
+    request.unless_known(format, answer).await
 }
 
 query! {
@@ -311,23 +298,21 @@ pub(crate) struct PatchDamage {
 pub(crate) async fn damage(request: PartRequest) -> Result<Response> {
     let query = DamageQuery::read(&request.uri, &())?;
     let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
-    let answer = write_damage(&request, patch, point);
+    let answer = async {
+        let (jobs, id) = (&request.jobs, request.id);
+        let solution = jobs.solution(id).await?;
+        let (_, motion) = motion_of(&solution, [patch, point])?;
+        let damage = motion.damage.as_deref();
+        let (Some(damage), Some(parameters)) = (damage, &solution.damage_parameters) else {
+            return not_asked(jobs, id, Output::Damage).await;
+        };
+        let answer = PatchDamage {
+            patch,
+            point,
+            damage: damage.clone(),
+            parameters: parameters.as_ref().clone(),
+        };
+        Ok(Json(answer).into_response())
+    };
     request.unless_known(Format::Json, answer).await
-}
-
-async fn write_damage(request: &PartRequest, patch: usize, point: usize) -> Result<Response> {
-    let (jobs, id) = (&request.jobs, request.id);
-    let solution = jobs.solution(id).await?;
-    let (_, motion) = motion_of(&solution, [patch, point])?;
-    let damage = motion.damage.as_deref();
-    let (Some(damage), Some(parameters)) = (damage, &solution.damage_parameters) else {
-        return not_asked(jobs, id, Output::Damage).await;
-    };
-    let answer = PatchDamage {
-        patch,
-        point,
-        damage: damage.clone(),
-        parameters: parameters.as_ref().clone(),
-    };
-    Ok(Json(answer).into_response())
 }

@@ -645,7 +645,6 @@ impl Gathered {
             let mut totals = totals_of(names, numbers, percentiles, above);
             match key {
                 SectionKey::Text(text) => totals.value = Some(text),
-                #[expect(clippy::cast_precision_loss, reason = "from a number")]
                 SectionKey::Interval(place) => {
                     totals.from = width.map(|width| place as f64 * width);
                 }
@@ -666,11 +665,9 @@ impl RowSection {
                 return Some(SectionKey::Text(texts[row].clone().unwrap_or_default()));
             }
             TableColumn::Numbers(numbers) => numbers[row],
-            #[expect(clippy::cast_precision_loss, reason = "for an interval")]
             TableColumn::Integers(numbers) => numbers[row] as f64,
         };
         let place = (number / self.width?).floor();
-        #[expect(clippy::cast_possible_truncation, reason = "saturates")]
         (!place.is_nan()).then_some(SectionKey::Interval(place as i64))
     }
 }
@@ -719,17 +716,10 @@ fn column_totals(values: Vec<f64>, percentiles: &[f64], above: &[f64]) -> Column
     let found = |value: f64| (count > 0).then_some(value);
     let min = values.iter().copied().fold(f64::INFINITY, f64::min);
     let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    #[expect(clippy::cast_precision_loss, reason = "a number of rows")]
     let mean = values.iter().sum::<f64>() / count.max(1) as f64;
     let mut sizes: Vec<f64> = values.into_iter().map(f64::abs).collect();
     sizes.sort_unstable_by(f64::total_cmp);
     let percentile = |percent: f64| {
-        #[expect(
-            clippy::cast_precision_loss,
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a place among the rows"
-        )]
         let place = (percent / 100.0 * count as f64).ceil() as usize;
         sizes.get(place.max(1) - 1).copied()
     };

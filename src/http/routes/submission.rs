@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use axum::body::Body;
-use axum::extract::{FromRef, FromRequestParts};
+use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -17,13 +17,13 @@ use crate::extract::caller::Caller;
 use crate::extract::query::{
     LABELS_MAX, Parameters, SubmitQuery, name, new_label, query, repeated,
 };
-use crate::layers::auth::Access;
-use crate::limits::{ConcurrencyLimits, Memory, Permit, hold_while_sent};
-use crate::problem::{ApiError, Fault, Result};
+use crate::limits::{Memory, Permit, hold_while_sent};
+use crate::problem::{ApiError, Fault, Result, seconds_header};
 use crate::render::format::Format;
 use crate::routes::results::result_text;
 use crate::routes::wait::{Wait, WaitQuery};
 use crate::routes::work::{WorkAnswer, header_parameter, prefer, text_header};
+use crate::state::AppState;
 use railhead_jobs::Jobs;
 use railhead_jobs::model::{Kind, Labels, State as JobState, WorkOptions};
 use railhead_jobs::work::Work;
@@ -79,14 +79,10 @@ pub(crate) struct Submission<P> {
 /// How a submission is answered.
 pub(crate) struct Reply(Wait);
 
-impl<S: Send + Sync, P: Parameters<Limits = ()>> FromRequestParts<S> for Submission<P>
-where
-    Access: FromRef<S>,
-    ConcurrencyLimits: FromRef<S>,
-{
+impl<P: Parameters<Limits = ()>> FromRequestParts<AppState> for Submission<P> {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
         let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
         let wait = Wait::from_request_parts(parts, state).await?;
         let idempotency_key = idempotency_key(&parts.headers)?;
@@ -275,12 +271,9 @@ fn accepted_as(schema: &str) -> BTreeMap<String, RefOr<utoipa::openapi::Response
                 text_header("`true` if an earlier request with the same `Idempotency-Key` created this; absent otherwise"),
             )
     };
-    let seconds = ObjectBuilder::new().schema_type(Type::Integer);
-    let again = utoipa::openapi::HeaderBuilder::new()
-        .schema(Some(seconds))
-        .description(Some("Seconds to wait before asking again"));
-    let stored = response("The submission is stored and will be solved")
-        .header("Retry-After", again.build());
+    let again = seconds_header("Seconds to wait before asking again");
+    let stored =
+        response("The submission is stored and will be solved").header("Retry-After", again);
     let ended = response("The work ended within the wait");
     BTreeMap::from([
         ("200".to_owned(), ended.build().into()),

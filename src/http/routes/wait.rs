@@ -2,7 +2,7 @@
 use std::convert::Infallible;
 use std::time::Duration;
 
-use axum::extract::{FromRef, FromRequestParts};
+use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Uri};
 use axum::response::sse::{Event, KeepAlive, Sse};
@@ -13,10 +13,10 @@ use serde::Serialize;
 use crate::extract::accept::choose;
 use crate::extract::caller::{Caller, Credential, Tenant, revoked, revoked_meanwhile};
 use crate::extract::query::{Parameters, Query, query, seconds};
-use crate::layers::auth::Access;
 use crate::limits::{ConcurrencyLimits, HeldPermits, Permit, hold_while_sent};
 use crate::problem::{ApiError, Result};
 use crate::render::format::Format;
+use crate::state::AppState;
 use railhead_jobs::Jobs;
 
 /// Longest wait of one request in s.
@@ -93,14 +93,11 @@ impl Wait {
     }
 }
 
-impl<S: Send + Sync> FromRequestParts<S> for Wait
-where
-    ConcurrencyLimits: FromRef<S>,
-{
+impl FromRequestParts<AppState> for Wait {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
-        let concurrency = ConcurrencyLimits::from_ref(state);
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
+        let concurrency = &state.concurrency;
         let tenant = parts.extensions.get::<Tenant>().cloned();
         let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
         let (seconds, preferred, place) =
@@ -170,20 +167,16 @@ pub(crate) struct EventRequest {
     key: Option<Credential>,
 }
 
-impl<S: Send + Sync> FromRequestParts<S> for EventRequest
-where
-    Access: FromRef<S>,
-    ConcurrencyLimits: FromRef<S>,
-{
+impl FromRequestParts<AppState> for EventRequest {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
         let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
         choose(&parts.headers, None, &[Format::Events])?;
         Ok(EventRequest {
             jobs,
             seen: last_event_id(&parts.headers),
-            concurrency: ConcurrencyLimits::from_ref(state),
+            concurrency: state.concurrency.clone(),
             held: parts.extensions.get().cloned().unwrap_or_default(),
             key: parts.extensions.get().cloned(),
         })
