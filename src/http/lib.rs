@@ -13,7 +13,7 @@
 //!    ([`etag::immutable`], [`etag::revalidate`]).
 //! 4. [`extract`]: the caller (key, tenant, rate), ids, query and body, each read strictly; what it takes is counted by
 //!    [`limits`].
-//! 5. The handler in [`routes`](mod@routes) asks [`Jobs`]. Parts of a result get their tag before any work is done ([`etag::Precondition`]).
+//! 5. The handler in [`routes`](mod@routes) asks [`Jobs`]. Parts of a result get their tag before any work is done ([`etag::tag_of`]).
 //! 6. The answer: a type of [`dto`] as JSON, or a form of [`render`].
 //! 7. [`page`] answers `/` and the files of the page, which needs no key and asks the same API.
 //! 8. Whatever fails becomes a [`problem`] with a kind, a status and what to do.

@@ -17,10 +17,9 @@ use http_body_util::BodyExt;
 use tokio::sync::OnceCell;
 use uuid::Uuid;
 
-use crate::problem::{ApiError, Result};
+use crate::problem::ApiError;
 use crate::render::format::Format;
-use railhead_jobs::Jobs;
-use railhead_jobs::model::State;
+use railhead_jobs::model::{Job, State};
 
 /// For results: they never change, but they can be deleted.
 const IMMUTABLE: HeaderValue = HeaderValue::from_static("private, max-age=3600");
@@ -64,51 +63,33 @@ pub(crate) async fn complete(request: Request, next: Next) -> Response {
     response
 }
 
-/// The tag of a result or a part of it, or the answer if the client has it already.
-#[derive(Debug)]
-pub(crate) enum Precondition {
-    /// The client has it already; this is the answer.
-    NotModified(Response),
-    /// It has to be computed, and gets this tag.
-    Proceed(String),
-}
-
-impl Precondition {
-    /// Compares the tags that a client has with the tag of what it asks for, before anything is loaded or computed. Results never
-    /// change, so job, path, query, format and the program that writes the answer determine the tag. `If-None-Match: *` is left to
-    /// [`immutable`], since only the work itself shows whether there is an answer.
-    ///
-    /// # Errors
-    /// There is no such job.
-    pub(crate) async fn of(
-        jobs: &Jobs,
-        id: Uuid,
-        uri: &Uri,
-        headers: &HeaderMap,
-        format: Format,
-    ) -> Result<Precondition> {
-        let job = jobs.get(id).await?;
-        let query = Pairs::<Vec<(String, String)>>::try_from_uri(uri);
-        let mut query = query.map_or_else(|_| Vec::new(), |Pairs(pairs)| pairs);
-        query.sort();
-        let parts = (id, job.version, uri.path(), query, format.name());
-        let text = format!("{} {parts:?}", program_digest().await);
-        let digest = digest(text.as_bytes());
-        if job.state != State::Succeeded {
-            return Ok(Precondition::Proceed(digest));
-        }
-        let Some(tag) = matching(headers, &digest).filter(|_| !asks_for_any(headers)) else {
-            return Ok(Precondition::Proceed(digest));
-        };
+/// The tag of a result of this job, or of a part of it, and the answer if the client has it already; before anything is loaded or computed.
+///
+/// Results never change, so job, path, query, format and the program that writes the answer determine the tag. `If-None-Match: *` is left
+/// to [`immutable`], since only the work itself shows whether there is an answer.
+pub(crate) async fn tag_of(
+    job: &Job,
+    uri: &Uri,
+    headers: &HeaderMap,
+    format: Format,
+) -> (String, Option<Response>) {
+    let query = Pairs::<Vec<(String, String)>>::try_from_uri(uri);
+    let mut query = query.map_or_else(|_| Vec::new(), |Pairs(pairs)| pairs);
+    query.sort();
+    let parts = (job.id, job.version, uri.path(), query, format.name());
+    let text = format!("{} {parts:?}", program_digest().await);
+    let digest = digest(text.as_bytes());
+    let known = matching(headers, &digest)
+        .filter(|_| job.state == State::Succeeded && !asks_for_any(headers));
+    let unchanged = known.map(|tag| {
         let head = [
             (header::ETAG, tag),
             (header::CACHE_CONTROL, IMMUTABLE),
             (header::VARY, HeaderValue::from_static("Accept")),
         ];
-        Ok(Precondition::NotModified(
-            (StatusCode::NOT_MODIFIED, head).into_response(),
-        ))
-    }
+        (StatusCode::NOT_MODIFIED, head).into_response()
+    });
+    (digest, unchanged)
 }
 
 /// The digest of the program's own file. Every build has another one, so what one build wrote is not taken for what the next one
@@ -171,10 +152,7 @@ async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
         parts.headers.insert(header::ETAG, known);
         return not_modified(parts);
     }
-    if let Ok(tag) = HeaderValue::from_str(&format!("\"{digest}\"")) {
-        parts.headers.insert(header::ETAG, tag);
-    }
-    Response::from_parts(parts, Body::from(body))
+    tagged(&digest, Response::from_parts(parts, Body::from(body)))
 }
 
 fn not_modified(mut parts: Parts) -> Response {

@@ -43,13 +43,15 @@ fn fit_for_log(id: &HeaderValue) -> bool {
         && bytes.iter().all(u8::is_ascii_graphic)
 }
 
-/// One span per request, closed by one line with status and time.
-pub(crate) fn span_layer() -> TraceLayer<
+type SpanLayer = TraceLayer<
     SharedClassifier<ServerErrorsAsFailures>,
     fn(&Request) -> Span,
     DefaultOnRequest,
     fn(&Response, Duration, &Span),
-> {
+>;
+
+/// One span per request, closed by one line with status and time.
+pub(crate) fn span_layer() -> SpanLayer {
     TraceLayer::new_for_http()
         .make_span_with(request_span as fn(&Request) -> Span)
         .on_response(log_response as fn(&Response, Duration, &Span))

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use crate::extract::caller::{Caller, JobId};
 use crate::extract::query::require_index;
-use crate::layers::etag::{Precondition, tagged};
+use crate::layers::etag::{tag_of, tagged};
 use crate::limits::Rendering;
 use crate::problem::{ApiError, ProblemKind, Result, problems};
 use crate::render::format::Format;
@@ -59,9 +59,11 @@ impl PartRequest {
         format: Format,
         answer: impl Future<Output = Result<Response>> + Send,
     ) -> Result<Response> {
-        match Precondition::of(&self.jobs, self.id, &self.uri, &self.headers, format).await? {
-            Precondition::NotModified(unchanged) => Ok(unchanged),
-            Precondition::Proceed(tag) => Ok(tagged(&tag, answer.await?)),
+        let job = self.jobs.get(self.id).await?;
+        let (tag, unchanged) = tag_of(&job, &self.uri, &self.headers, format).await;
+        match unchanged {
+            Some(unchanged) => Ok(unchanged),
+            None => Ok(tagged(&tag, answer.await?)),
         }
     }
 

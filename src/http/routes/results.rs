@@ -1,8 +1,7 @@
 //! `/v1/jobs/{id}/result` and its small parts: forces, stresses below the surface, and damage.
 use axum::Json;
 use axum::body::{Body, Bytes};
-use axum::extract::State;
-use axum::http::{HeaderMap, Uri, header};
+use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use futures_util::{StreamExt, TryStreamExt, stream};
 use railhead_macros::none_is_absent;
@@ -12,9 +11,7 @@ use uuid::Uuid;
 
 use crate::dto::{JobResult, Resultants, sum};
 use crate::extract::accept::{choose, one_of};
-use crate::extract::caller::{Caller, JobId};
 use crate::extract::query::{Parameters, index, query, require_index};
-use crate::layers::etag::{Precondition, tagged};
 use crate::limits::{Memory, Permit, SMALL_BYTES, hold_while_sent};
 use crate::problem::{ApiError, Result, problems};
 use crate::render::format::Format;
@@ -53,23 +50,16 @@ problems! {
         ("Preference-Applied" = String, description = "The wait that was applied, if one was requested")
     )), ResultProblems)
 )]
-pub(crate) async fn result(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
-    wait: Wait,
-    State(memory): State<Memory>,
-    uri: Uri,
-    headers: HeaderMap,
-) -> Result<Response> {
-    await_end(&jobs, id, &wait).await?;
-    let tag = match Precondition::of(&jobs, id, &uri, &headers, Format::Json).await? {
-        Precondition::NotModified(answer) => return Ok(answer),
-        Precondition::Proceed(tag) => tag,
+pub(crate) async fn result(request: PartRequest, wait: Wait) -> Result<Response> {
+    await_end(&request.jobs, request.id, &wait).await?;
+    let answer = async {
+        let (jobs, memory) = (&request.jobs, &request.shared.memory);
+        let (body, share) = result_text(jobs, memory, request.id, ["", ""]).await?;
+        let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
+        let response = wait.tell_applied((head, body).into_response());
+        Ok(hold_while_sent(response, share))
     };
-    let (body, share) = result_text(&jobs, &memory, id, ["", ""]).await?;
-    let head = [(header::CONTENT_TYPE, Format::Json.media_type())];
-    let response = wait.tell_applied((head, body).into_response());
-    Ok(tagged(&tag, hold_while_sent(response, share)))
+    request.unless_known(Format::Json, answer).await
 }
 
 /// The text of the result of a succeeded job between two other texts, and the memory for what is held of it. A large result is
