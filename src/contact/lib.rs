@@ -164,12 +164,8 @@ pub fn check_with(
     case: &Value,
     limits: &Limits,
 ) -> Result<CheckedCase, CaseError> {
-    let (draft, mut faults) = draft::draft(case);
-    if !faults.is_empty() {
-        faults.extend(draft.faults_beside(limits));
-        return Err(CaseError(faults));
-    }
-    CheckedCase::new(&draft.complete().ok_or(CaseError(faults))?, limits, known)
+    let (draft, faults) = draft::draft(case);
+    CheckedCase::new(draft, faults, limits, known)
 }
 
 /// Solves a checked case, slice by slice.

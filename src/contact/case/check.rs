@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::case::checks::{CheckedParts, PartialCase, missing_load, unusual_friction};
+use crate::case::checks::{CheckedParts, missing_load, unusual_friction};
 use crate::case::digest::digest;
+use crate::case::draft::CaseDraft;
 use crate::case::motions::ExpandedMotions;
 use crate::case::solver::{KnownPair, Limits, resolution};
 use crate::case::wheel_task::profile;
@@ -30,30 +31,24 @@ use crate::solution::words::answer::Asked;
 use crate::solution::words::damage::{PairQuality, SectionQuality};
 
 impl CheckedCase {
-    /// Checks a case against the limits and prepares its numbers; profiles that are known are not read again.
+    /// Checks what was read of a case against physics and limits, and prepares its numbers; profiles that are known are not read again.
     ///
     /// # Errors
-    /// Every fault found, each with its JSON pointer.
-    pub fn new(case: &Case, limits: &Limits, known: &KnownPair) -> Result<CheckedCase, CaseError> {
-        let given = PartialCase {
-            material: Some(&case.material),
-            friction: Some(&case.friction),
-            contact: Some(&case.contact),
-            load: case.load.as_ref(),
-            motion: Some(&case.motion),
-            solver: Some(&case.solver),
-            outputs: &case.outputs,
-            subsurface: case.subsurface.as_ref(),
-            damage: case.damage.as_ref(),
-            thermal: case.thermal.as_ref(),
-            known,
-        };
-        let (parts, mut faults) = CheckedParts::check(given, limits);
+    /// The faults of the text, and every fault found, each with its JSON pointer.
+    pub(crate) fn new(
+        draft: CaseDraft,
+        mut faults: Vec<Fault>,
+        limits: &Limits,
+        known: &KnownPair,
+    ) -> Result<CheckedCase, CaseError> {
+        let (parts, found) = CheckedParts::check(draft.given(known), limits);
+        faults.extend(found);
         if faults.is_empty() && parts.task.is_none() {
             faults.push(missing_load());
         }
-        let (true, Some(elasticity), Some((task, remarks)), Some(motions)) = (
+        let (true, Some(case), Some(elasticity), Some((task, remarks)), Some(motions)) = (
             faults.is_empty(),
+            draft.complete(),
             parts.elasticity,
             parts.task,
             parts.motions,
@@ -81,9 +76,9 @@ impl CheckedCase {
             of_case
                 .chain(remarks)
                 .chain(checked_case::of_case(&case.contact, &patches, given))
-                .chain(units::remarks(case, &patches)),
+                .chain(units::remarks(&case, &patches)),
         );
-        let digest = digest(case, &elasticity, &motions, &forces, &speeds);
+        let digest = digest(&case, &elasticity, &motions, &forces, &speeds);
         let problem = Problem {
             elasticity,
             friction: FrictionLaw::new(&case.friction, case.thermal.as_ref()),
@@ -102,15 +97,15 @@ impl CheckedCase {
             wheelset_forces: wheel_task::wheelset_forces(&case.motion),
             checked: Checked::without_faults(),
         };
-        let run = run(case, limits);
+        let run = run(&case, limits);
         let first_order = problem.first_order(&run).map(|r| r.at_pointer("/material"));
         let remarks = merged(remarks.into_iter().chain(first_order));
         Ok(CheckedCase {
             problem,
             run,
             label: Label {
-                name: case.name.clone(),
-                labels: case.labels.clone(),
+                name: case.name,
+                labels: case.labels,
                 digest,
                 asked: Asked {
                     contact: case.contact.name().to_owned(),

@@ -45,19 +45,6 @@ pub(crate) struct PartialCase<'a> {
     pub(crate) known: &'a KnownPair,
 }
 
-/// Faults of the parts of a case that can be checked although others are faulty.
-pub(crate) fn faults_of(given: PartialCase, limits: &Limits) -> Vec<Fault> {
-    // Without a load, which is a fault already, no patch can be found; profiles are checked nevertheless.
-    let without_load = matches!(
-        given.contact,
-        Some(Contact::PressureGrid { .. } | Contact::Profiles { .. } | Contact::Wheelset { .. })
-    );
-    let contact = given
-        .contact
-        .filter(|_| without_load || given.load.is_some());
-    CheckedParts::check(PartialCase { contact, ..given }, limits).1
-}
-
 /// The parts of a problem, checked as far as they are independent of each other.
 #[derive(Debug)]
 pub(crate) struct CheckedParts {

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::case::checks::{PartialCase, faults_of};
-use crate::case::solver::{KnownPair, Limits};
+use crate::case::checks::PartialCase;
+use crate::case::solver::KnownPair;
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, ThermalWords};
@@ -75,14 +75,18 @@ pub(crate) fn draft(value: &Value) -> (CaseDraft, Vec<Fault>) {
 }
 
 impl CaseDraft {
-    /// Faults against physics and limits of the parts that could be read.
-    pub(crate) fn faults_beside(&self, limits: &Limits) -> Vec<Fault> {
-        let known = &KnownPair::default();
-        let given = PartialCase {
+    /// The parts that could be read. Without a load no patch of a contact can be found that needs one.
+    pub(crate) fn given<'a>(&'a self, known: &'a KnownPair) -> PartialCase<'a> {
+        let without_load = matches!(
+            self.contact,
+            Some(Contact::PressureGrid { .. } | Contact::Profiles { .. } | Contact::Wheelset { .. })
+        );
+        let contact = self.contact.as_ref();
+        PartialCase {
             known,
             material: self.material.as_ref(),
             friction: self.friction.as_ref(),
-            contact: self.contact.as_ref(),
+            contact: contact.filter(|_| without_load || self.load.is_some()),
             load: self.load.as_ref(),
             motion: self.motion.as_ref(),
             solver: self.solver.as_ref(),
@@ -90,8 +94,7 @@ impl CaseDraft {
             subsurface: self.subsurface.as_ref().and_then(Option::as_ref),
             damage: self.damage.as_ref().and_then(Option::as_ref),
             thermal: self.thermal.as_ref().and_then(Option::as_ref),
-        };
-        faults_of(given, limits)
+        }
     }
 
     /// The case, if every required part could be read.

@@ -8,10 +8,11 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use crate::case::wheel_task::{PairWords, Placed};
 use crate::case::words::cross_section::CrossSection;
 use crate::case::words::solver::{MethodName, Solver};
 use crate::error::Fault;
-use crate::geometry::wheel_rail::{Placement, WheelRail};
+use crate::geometry::wheel_rail::Placement;
 use crate::method::Method;
 use crate::problem::memory::SizeInput;
 use crate::rolling::methods::fastsim;
@@ -107,13 +108,13 @@ const PAIRS_MAX: usize = 16;
 #[derive(Debug, Default)]
 pub struct KnownPair(Mutex<Vec<Arc<PairRead>>>);
 
-/// A pair, and the words that it was read from.
+/// A pair with the remark on its flange, and the words that it was read from.
 #[derive(Debug)]
 struct PairRead {
     sections: [CrossSection; 2],
-    /// y of the back of the flange, if the case states it.
     flange_back: Option<f64>,
-    geometry: WheelRail,
+    accept_rough: bool,
+    placed: Placed,
 }
 
 /// Whether the track is the same, for any placement of the wheelset. The back of the flange is compared as it was stated.
@@ -129,47 +130,51 @@ fn on_same_track(one: &Placement, other: &Placement) -> bool {
 }
 
 impl KnownPair {
-    /// The pair of rail and wheel in their places, if it is kept.
+    /// The pair of rail and wheel in their places: the one that is kept, or the one that `read` finds without faults.
     pub(crate) fn placed(
         &self,
-        [rail, wheel]: [&CrossSection; 2],
-        flange_back: Option<f64>,
+        words: &PairWords,
         placement: &Placement,
-    ) -> Option<WheelRail> {
+        read: impl FnOnce() -> Result<Placed, Vec<Fault>>,
+    ) -> Result<Placed, Vec<Fault>> {
         let mut pairs = self.pairs();
         let found = pairs.iter().position(|known| {
-            known.flange_back == flange_back
-                && on_same_track(&known.geometry.placement, placement)
-                && known.sections[0] == *rail
-                && known.sections[1] == *wheel
-        })?;
-        let pair = pairs.remove(found);
-        pairs.insert(0, pair.clone());
+            known.flange_back == words.flange_back
+                && known.accept_rough == words.accept_rough
+                && on_same_track(&known.placed.0.placement, placement)
+                && [0, 1].iter().all(|k| known.sections[*k] == *words.sections[*k])
+        });
+        let known = found.map(|found| {
+            pairs[..=found].rotate_right(1);
+            Arc::clone(&pairs[0])
+        });
         drop(pairs);
+        let pair = match known {
+            Some(pair) => pair,
+            None => {
+                let pair = Arc::new(PairRead {
+                    sections: words.sections.map(CrossSection::clone),
+                    flange_back: words.flange_back,
+                    accept_rough: words.accept_rough,
+                    placed: read()?,
+                });
+                let mut pairs = self.pairs();
+                pairs.insert(0, Arc::clone(&pair));
+                pairs.truncate(PAIRS_MAX);
+                pair
+            }
+        };
         let Placement {
             lateral_shift,
             yaw,
             roll,
             ..
         } = *placement;
-        Some(pair.geometry.posed(lateral_shift, yaw, roll))
-    }
-
-    /// Keeps a pair that was read without faults.
-    pub(crate) fn keep(
-        &self,
-        sections: [&CrossSection; 2],
-        flange_back: Option<f64>,
-        geometry: &WheelRail,
-    ) {
-        let pair = Arc::new(PairRead {
-            sections: sections.map(CrossSection::clone),
-            flange_back,
-            geometry: geometry.clone(),
-        });
-        let mut pairs = self.pairs();
-        pairs.insert(0, pair);
-        pairs.truncate(PAIRS_MAX);
+        let (geometry, remark) = &pair.placed;
+        Ok((
+            geometry.posed(lateral_shift, yaw, roll),
+            remark.clone(),
+        ))
     }
 
     fn pairs(&self) -> MutexGuard<'_, Vec<Arc<PairRead>>> {

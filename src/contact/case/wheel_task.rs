@@ -34,16 +34,55 @@ pub(crate) fn task(
     surface: ReferenceSurface,
     known: &KnownPair,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
-    let (geometry, flange_back) = wheel_rail(contact, known)?;
-    if let Err(detail) = ContactLocus::new(&geometry) {
-        let faults = vec![Fault::new("/contact", detail)];
-        return Err(with_reasons(faults, &reasons(geometry.profiles())));
-    }
-    let mut remarks = geometry.remarks();
+    let Contact::Profiles {
+        rail,
+        wheel,
+        side,
+        rolling_radius_mm,
+        gauge_mm,
+        gauge_height_mm,
+        rail_origin_mm,
+        cant_rad,
+        flange_back_distance_mm,
+        flange_back_position_mm,
+        lateral_shift_mm,
+        yaw_rad,
+        roll_rad,
+        accept_rough_profiles,
+        reference_surface: _,
+        influence: _,
+    } = contact
+    else {
+        return Err(vec![Fault::new(
+            "/contact/type".to_owned(),
+            "no profiles".to_owned(),
+        )]);
+    };
+    let placement = Placement {
+        side: (*side).into(),
+        rolling_radius: *rolling_radius_mm,
+        rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
+        cant: *cant_rad,
+        flange_back_distance: *flange_back_distance_mm,
+        flange_back_position: 0.0,
+        lateral_shift: *lateral_shift_mm,
+        yaw: *yaw_rad,
+        roll: *roll_rad,
+    };
+    let words = PairWords {
+        sections: [rail, wheel],
+        flange_back: *flange_back_position_mm,
+        accept_rough: *accept_rough_profiles,
+    };
+    let pointers = ["/contact/rail", "/contact/wheel"];
+    let (geometry, flange_back) = known.placed(&words, &placement, || {
+        let read = (profile(Body::Rail, rail), profile(Body::Wheel, wheel));
+        let profiles = both(read, pointers)?;
+        in_place(profiles, &words, placement, pointers, "/contact/rolling_radius_mm")
+    })?;
+    meet(&geometry)?;
+    let mut remarks = remarks_of(&geometry, pointers);
     remarks.extend(flange_back);
-    let [rail, wheel] = geometry.profiles();
-    remarks.extend(checked_case::load_mismatch(rail, Body::Rail));
-    remarks.extend(checked_case::load_mismatch(wheel, Body::Wheel));
     let loading = load.and_then(loading);
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
@@ -52,7 +91,7 @@ pub(crate) fn task(
         geometry,
         loading,
         contact_modulus,
-        trust: trust(contact),
+        trust: trust(&words),
         surface,
     };
     Ok(Some((NormalTask::Wheel(Arc::new(contact)), remarks)))
@@ -124,7 +163,7 @@ fn loading(load: &Load) -> Option<WheelLoad> {
 
 /// Why a pair of profiles may not fit, each reason after a semicolon: the size of a profile in another unit, a stated sense that contradicts its
 /// shape. Empty for none.
-pub(crate) fn reasons(profiles: [&Profile; 2]) -> String {
+fn reasons(profiles: [&Profile; 2]) -> String {
     let mut reasons = String::new();
     let mut stated = Vec::new();
     for remark in profiles.into_iter().flat_map(|profile| &profile.remarks) {
@@ -151,86 +190,64 @@ pub(crate) fn reasons(profiles: [&Profile; 2]) -> String {
 }
 
 /// Faults of a pair of profiles, each with its [`reasons`].
-pub(crate) fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
+fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
     for fault in &mut faults {
         fault.detail.push_str(reasons);
     }
     faults
 }
 
-/// Rail and wheel in place, with a remark on the back of the flange.
-fn wheel_rail(
-    contact: &Contact,
-    known: &KnownPair,
-) -> Result<(WheelRail, Option<RemarkEntry>), Vec<Fault>> {
-    let Contact::Profiles {
-        rail,
-        wheel,
-        side,
-        rolling_radius_mm,
-        gauge_mm,
-        gauge_height_mm,
-        rail_origin_mm,
-        cant_rad,
-        flange_back_distance_mm,
-        flange_back_position_mm,
-        lateral_shift_mm,
-        yaw_rad,
-        roll_rad,
-        accept_rough_profiles,
-        reference_surface: _,
-        influence: _,
-    } = contact
-    else {
-        return Err(vec![Fault::new(
-            "/contact/type".to_owned(),
-            "no profiles".to_owned(),
-        )]);
-    };
-    let mut placement = Placement {
-        side: (*side).into(),
-        rolling_radius: *rolling_radius_mm,
-        rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
-        cant: *cant_rad,
-        flange_back_distance: *flange_back_distance_mm,
-        flange_back_position: 0.0,
-        lateral_shift: *lateral_shift_mm,
-        yaw: *yaw_rad,
-        roll: *roll_rad,
-    };
-    let in_order = |profiles: [&Profile; 2]| {
-        if *accept_rough_profiles {
-            return Ok(());
-        }
-        exchanged(profiles, ["/contact/rail", "/contact/wheel"])
-    };
-    let sections: [&CrossSection; 2] = [rail, wheel];
-    let stated = *flange_back_position_mm;
-    let back_of = |wheel: &Profile| {
-        let distance = *flange_back_distance_mm;
-        contact_task::position(wheel, "/contact/wheel", stated, distance)
-            .map_err(|fault| vec![fault])
-    };
-    let checked = |profiles: [&Profile; 2]| {
-        let back = in_order(profiles).and_then(|()| back_of(profiles[1]));
-        back.map_err(|faults| with_reasons(faults, &reasons(profiles)))
-    };
-    if let Some(geometry) = known.placed(sections, stated, &placement) {
-        let (_, remark) = checked(geometry.profiles())?;
-        return Ok((geometry, remark));
-    }
-    let pointers = ["/contact/rail", "/contact/wheel"];
-    let read = (profile(Body::Rail, rail), profile(Body::Wheel, wheel));
-    let [rail, wheel] = both(read, pointers)?;
-    let (position, remark) = checked([&rail, &wheel])?;
+/// What a case says of a pair of cross-sections, its placement aside.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PairWords<'a> {
+    /// Rail and wheel.
+    pub(crate) sections: [&'a CrossSection; 2],
+    /// y of the back of the flange, if the case states it.
+    pub(crate) flange_back: Option<f64>,
+    /// Whether rough or exchanged profiles are accepted.
+    pub(crate) accept_rough: bool,
+}
+
+/// A wheel over its rail, with the remark on the back of its flange, from whose position the placement follows; the pointers are those of rail and
+/// wheel, and of the rolling radius.
+pub(crate) fn in_place(
+    [rail, wheel]: [Profile; 2],
+    words: &PairWords,
+    placement: Placement,
+    pointers: [&str; 2],
+    radius: &str,
+) -> Result<Placed, Vec<Fault>> {
     let reasons = reasons([&rail, &wheel]);
-    placement.flange_back_position = position;
-    let geometry = WheelRail::new(rail, wheel, placement).map_err(|reason| {
-        let pointers = ["/contact/rail", "/contact/rolling_radius_mm"];
-        with_reasons(vec![unplaced(reason, pointers)], &reasons)
-    })?;
-    known.keep(sections, stated, &geometry);
+    let explained = |faults| with_reasons(faults, &reasons);
+    if !words.accept_rough {
+        exchanged([&rail, &wheel], pointers).map_err(explained)?;
+    }
+    let (flange_back_position, remark) = contact_task::position(
+        &wheel,
+        pointers[1],
+        words.flange_back,
+        placement.flange_back_distance,
+    )
+    .map_err(|fault| explained(vec![fault]))?;
+    let placement = Placement {
+        flange_back_position,
+        ..placement
+    };
+    let geometry = WheelRail::new(rail, wheel, placement)
+        .map_err(|reason| explained(vec![unplaced(reason, [pointers[0], radius])]))?;
     Ok((geometry, remark))
+}
+
+/// A wheel over its rail, with a remark on the back of its flange.
+pub(crate) type Placed = (WheelRail, Option<RemarkEntry>);
+
+/// The fault of a wheel that is not above its rail.
+pub(crate) fn meet(geometry: &WheelRail) -> Result<(), Vec<Fault>> {
+    let found = ContactLocus::new(geometry).map(|_| ());
+    found.map_err(|detail| {
+        let faults = vec![Fault::new("/contact", detail)];
+        with_reasons(faults, &reasons(geometry.profiles()))
+    })
 }
 
 /// Both profiles, or the faults of both. If one is not read, the other is named as well where it is that of the other body.
@@ -258,7 +275,7 @@ pub(crate) fn both(
 }
 
 /// The fault of a pair that cannot be placed, at the pointer of the rail or of the rolling radius.
-pub(crate) fn unplaced(reason: NotPlaced, [rail, radius]: [&str; 2]) -> Fault {
+fn unplaced(reason: NotPlaced, [rail, radius]: [&str; 2]) -> Fault {
     let pointer = match reason {
         NotPlaced::NoGaugeFace { .. } => rail,
         NotPlaced::ReachesAxle { .. } => radius,
@@ -267,7 +284,7 @@ pub(crate) fn unplaced(reason: NotPlaced, [rail, radius]: [&str; 2]) -> Fault {
 }
 
 /// Faults of two profiles that both look like the other body's, at the pointers of both; one of them alone may be an unusual shape.
-pub(crate) fn exchanged(
+fn exchanged(
     [rail, wheel]: [&Profile; 2],
     pointers: [&str; 2],
 ) -> Result<(), Vec<Fault>> {
@@ -288,21 +305,31 @@ pub(crate) fn exchanged(
     ])
 }
 
-fn trust(contact: &Contact) -> ProfileTrust {
-    let Contact::Profiles {
-        rail,
-        wheel,
-        accept_rough_profiles,
-        ..
-    } = contact
-    else {
-        return ProfileTrust::default();
-    };
+/// How far the points of a pair of cross-sections are trusted.
+pub(crate) fn trust(words: &PairWords) -> ProfileTrust {
     let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
     ProfileTrust {
-        auto: [auto(rail), auto(wheel)],
-        accept_rough: *accept_rough_profiles,
+        auto: words.sections.map(auto),
+        accept_rough: words.accept_rough,
     }
+}
+
+/// Remarks on two profiles, at their pointers.
+pub(crate) fn remarks_of(geometry: &WheelRail, pointers: [&str; 2]) -> Vec<RemarkEntry> {
+    let bodies = [Body::Rail, Body::Wheel];
+    let profiles = geometry.profiles().into_iter().zip(bodies).zip(pointers);
+    profiles
+        .flat_map(|((profile, body), pointer)| {
+            let own = profile.remarks.iter().cloned();
+            let own = own.map(|remark| remark.at_pointer(pointer));
+            let load_mismatch = checked_case::load_mismatch(profile, body);
+            let load_mismatch = load_mismatch.map(|remark| RemarkEntry {
+                pointer: Some(pointer.to_owned()),
+                ..remark
+            });
+            own.chain(load_mismatch).collect::<Vec<_>>()
+        })
+        .collect()
 }
 
 /// The profile of a cross-section as that of a body.

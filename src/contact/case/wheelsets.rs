@@ -2,25 +2,21 @@
 
 use std::sync::Arc;
 
-use crate::case::contact_task;
 use crate::case::motions::swept_values;
 use crate::case::solver::Limits;
 use crate::case::wheel_task::{
-    both, exchanged, moves, profile_at, reasons, unplaced, with_reasons,
+    PairWords, both, in_place, meet, moves, profile_at, remarks_of, trust,
 };
 use crate::case::words::contact::{Contact, Load};
-use crate::case::words::cross_section::{CrossSection, Smoothing};
+use crate::case::words::cross_section::CrossSection;
 use crate::case::words::motion::{Combine, Motions, Swept};
 use crate::error::Fault;
-use crate::geometry::contact_locus::ContactLocus;
-use crate::geometry::profile::{Body, Profile};
-use crate::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
+use crate::geometry::profile::Body;
+use crate::geometry::wheel_rail::{Placement, RailPlace, Side};
 use crate::normal::footprint::NormalTask;
 use crate::normal::wheel::{
-    KinematicsTask, ProfileTrust, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove,
-    WheelsetTask,
+    KinematicsTask, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove, WheelsetTask,
 };
-use crate::problem::checked_case;
 use crate::remark::entry::{RemarkEntry, merged};
 
 /// The task of a wheelset with its remarks; `None` without faults where the load or the contact modulus in MPa is not known.
@@ -75,7 +71,9 @@ pub(crate) fn task(
     let (mut geometries, mut remarks) = (Vec::with_capacity(2), Vec::new());
     for (k, profiles) in sides.into_iter().enumerate() {
         let pointers = pointers[k];
-        let (geometry, flange_back) = in_place(contact, k, profiles, pointers, poses[0])?;
+        let (words, placement, radius) = placement(contact, k, poses[0]);
+        let (geometry, flange_back) = in_place(profiles, &words, placement, pointers, radius)?;
+        meet(&geometry)?;
         remarks.extend(remarks_of(&geometry, pointers));
         remarks.extend(flange_back);
         geometries.push(geometry);
@@ -92,7 +90,7 @@ pub(crate) fn task(
             geometry,
             loading: WheelLoad::Vertical(share * force),
             contact_modulus,
-            trust: trust(contact, sections[k].map(|(_, section)| section)),
+            trust: trust(&placement(contact, k, poses[0]).0),
             surface,
         })
     };
@@ -210,14 +208,12 @@ fn sections(contact: &Contact) -> Sections<'_> {
     [left, [of_right(0), of_right(1)]]
 }
 
-/// A wheel over its rail in the first position, without roll, with a remark on the back of its flange.
-fn in_place(
+/// What a case says of the pair of a side, its placement at a shift and a yaw without roll, and the pointer to the rolling radius.
+fn placement(
     contact: &Contact,
     side: usize,
-    [rail, wheel]: [Profile; 2],
-    pointers: [&str; 2],
     [lateral_shift, yaw]: [f64; 2],
-) -> Result<(WheelRail, Option<RemarkEntry>), Vec<Fault>> {
+) -> (PairWords<'_>, Placement, &'static str) {
     let Contact::Wheelset {
         right,
         rolling_radius_mm,
@@ -233,18 +229,6 @@ fn in_place(
     else {
         unreachable!("only wheelsets have two sides")
     };
-    let reasons = reasons([&rail, &wheel]);
-    let explained = |faults| with_reasons(faults, &reasons);
-    if !accept_rough_profiles {
-        exchanged([&rail, &wheel], pointers).map_err(explained)?;
-    }
-    let (flange_back_position, remark) = contact_task::position(
-        &wheel,
-        pointers[1],
-        *flange_back_position_mm,
-        *flange_back_distance_mm,
-    )
-    .map_err(|fault| explained(vec![fault]))?;
     let own = right.as_ref().and_then(|right| right.rolling_radius_mm);
     let own = own.filter(|_| side == 1);
     let placement = Placement {
@@ -253,52 +237,19 @@ fn in_place(
         rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
         cant: *cant_rad,
         flange_back_distance: *flange_back_distance_mm,
-        flange_back_position,
+        flange_back_position: 0.0,
         lateral_shift,
         yaw,
         roll: 0.0,
+    };
+    let words = PairWords {
+        sections: sections(contact)[side].map(|(_, section)| section),
+        flange_back: *flange_back_position_mm,
+        accept_rough: *accept_rough_profiles,
     };
     let radius = match own {
         Some(_) => "/contact/right/rolling_radius_mm",
         None => "/contact/rolling_radius_mm",
     };
-    let geometry = WheelRail::new(rail, wheel, placement)
-        .map_err(|reason| explained(vec![unplaced(reason, [pointers[0], radius])]))?;
-    if let Err(detail) = ContactLocus::new(&geometry) {
-        return Err(explained(vec![Fault::new("/contact", detail)]));
-    }
-    Ok((geometry, remark))
-}
-
-/// Remarks on two profiles, at their pointers.
-fn remarks_of(geometry: &WheelRail, pointers: [&str; 2]) -> Vec<RemarkEntry> {
-    let bodies = [Body::Rail, Body::Wheel];
-    let profiles = geometry.profiles().into_iter().zip(bodies).zip(pointers);
-    profiles
-        .flat_map(|((profile, body), pointer)| {
-            let own = profile.remarks.iter().cloned();
-            let own = own.map(|remark| remark.at_pointer(pointer));
-            let load_mismatch = checked_case::load_mismatch(profile, body);
-            let load_mismatch = load_mismatch.map(|remark| RemarkEntry {
-                pointer: Some(pointer.to_owned()),
-                ..remark
-            });
-            own.chain(load_mismatch).collect::<Vec<_>>()
-        })
-        .collect()
-}
-
-fn trust(contact: &Contact, sections: [&CrossSection; 2]) -> ProfileTrust {
-    let accept_rough = matches!(
-        contact,
-        Contact::Wheelset {
-            accept_rough_profiles: true,
-            ..
-        }
-    );
-    let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
-    ProfileTrust {
-        auto: sections.map(auto),
-        accept_rough,
-    }
+    (words, placement, radius)
 }

@@ -509,21 +509,6 @@ pub struct Roughness {
     pub ambiguity: f64,
 }
 
-/// How the readings of a stretch of a profile differ, at places with equal distances.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ProfileStretch {
-    /// The first place in mm along the profile.
-    first: f64,
-    /// Distance of the places in mm.
-    step: f64,
-    /// The waves between the smoothing in use and twice that, or 3 mm: the pressure that flattens them over the contact modulus.
-    waves: Vec<f64>,
-    /// The same of the difference between the spline in use and Akima's curve; empty with smoothing.
-    ambiguity: Vec<f64>,
-    /// Deviation of the waves, from their median.
-    everywhere: f64,
-}
-
 /// The points of a profile and the curve in use.
 #[derive(Debug, Clone, Copy)]
 pub struct PointsRead<'a> {
@@ -539,81 +524,54 @@ pub struct PointsRead<'a> {
     pub rounding: Option<f64>,
 }
 
-/// Both ends of the stretch that the roughness at a contact is taken from, in mm along the profile.
-fn stretch_about(points: Points, [low, high]: [f64; 2]) -> [f64; 2] {
+/// Roughness at the contact `[low, high]` (mm along the profile): the readings are compared there and beside it, at places of equal distance.
+/// The contact modulus is in MPa.
+fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Roughness {
+    let PointsRead {
+        points,
+        curve,
+        smoothing,
+        ..
+    } = *reading;
     let beyond = 0.5 * (high - low) + BEYOND;
-    let last = points.along.len() - 1;
-    [
-        (low - beyond).max(points.along[0]),
-        (high + beyond).min(points.along[last]),
-    ]
-}
-
-impl ProfileStretch {
-    /// The readings compared about a contact, given by its ends in mm along the profile.
-    pub fn about(reading: &PointsRead, contact: [f64; 2]) -> ProfileStretch {
-        let window = stretch_about(reading.points, contact);
-        let PointsRead {
-            points,
-            curve,
-            smoothing,
-            ..
-        } = *reading;
-        let reference = REFERENCE_MIN.max(2.0 * smoothing);
-        let part = points.within([
-            window[0] - SUPPORT * reference,
-            window[1] + SUPPORT * reference,
-        ]);
-        let spacing =
-            (part.along[part.along.len() - 1] - part.along[0]) / (part.along.len() - 1) as f64;
-        let step = (spacing / PLACES).clamp(STEP[0], STEP[1]);
-        let step = step.max((window[1] - window[0]) / SAMPLES_MAX as f64);
-        let count = ((window[1] - window[0]) / step).floor() as usize + 1;
-        let places = || (0..count).map(|k| window[0] + step * k as f64);
-        let used: Vec<([f64; 2], [f64; 2])> = places()
-            .map(|s| curve.at(s))
-            .map(|used| (used.at, used.tangent()))
+    let first = (low - beyond).max(points.along[0]);
+    let last = (high + beyond).min(points.along[points.along.len() - 1]);
+    let reference = REFERENCE_MIN.max(2.0 * smoothing);
+    let part = points.within([first - SUPPORT * reference, last + SUPPORT * reference]);
+    let spacing =
+        (part.along[part.along.len() - 1] - part.along[0]) / (part.along.len() - 1) as f64;
+    let step = (spacing / PLACES).clamp(STEP[0], STEP[1]);
+    let step = step.max((last - first) / SAMPLES_MAX as f64);
+    let count = ((last - first) / step).floor() as usize + 1;
+    let places = || (0..count).map(|k| first + step * k as f64);
+    let used: Vec<([f64; 2], [f64; 2])> = places()
+        .map(|s| curve.at(s))
+        .map(|used| (used.at, used.tangent()))
+        .collect();
+    let pressures = |other: &PlaneCurve| {
+        let heights: Vec<f64> = (used.iter().zip(places()))
+            .map(|(used, s)| above(*used, other.position(s)))
             .collect();
-        let pressures = |other: &PlaneCurve| {
-            let heights: Vec<f64> = (used.iter().zip(places()))
-                .map(|(used, s)| above(*used, other.position(s)))
-                .collect();
-            flattening(&heights, step, 1.0)
-        };
-        let waves = pressures(&PlaneCurve::through(part.at, part.along, reference));
-        let ambiguity = if smoothing > 0.0 {
-            Vec::new()
-        } else {
-            pressures(&PlaneCurve::akima(part.at, part.along))
-        };
-        let mut sizes: Vec<f64> = waves.iter().map(|pressure| pressure.abs()).collect();
-        ProfileStretch {
-            first: window[0],
-            step,
-            waves,
-            ambiguity,
-            everywhere: median(&mut sizes) / MEDIAN_OF_NORMAL,
-        }
-    }
-
-    /// Roughness at the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
-    pub fn roughness(&self, [low, high]: [f64; 2], modulus: f64) -> Roughness {
-        let place = |k: usize| self.first + self.step * k as f64;
-        let over_contact = |pressures: &[f64]| {
-            let (mut sum, mut count) = (0.0, 0.0_f64);
-            for (k, pressure) in pressures.iter().enumerate() {
-                if (low..=high).contains(&place(k)) {
-                    sum += pressure * pressure;
-                    count += 1.0;
-                }
-            }
-            modulus * (sum / count.max(1.0)).sqrt()
-        };
-        Roughness {
-            waviness: over_contact(&self.waves),
-            everywhere: modulus * self.everywhere,
-            ambiguity: over_contact(&self.ambiguity),
-        }
+        flattening(&heights, step, 1.0)
+    };
+    let over_contact = |pressures: &[f64]| {
+        let inside = places().zip(pressures);
+        let inside = inside.filter(|(s, _)| (low..=high).contains(s));
+        let (sum, count) = inside.fold((0.0, 0.0_f64), |(sum, count), (_, pressure)| {
+            (sum + pressure * pressure, count + 1.0)
+        });
+        modulus * (sum / count.max(1.0)).sqrt()
+    };
+    let waves = pressures(&PlaneCurve::through(part.at, part.along, reference));
+    let ambiguity = match smoothing > 0.0 {
+        true => 0.0,
+        false => over_contact(&pressures(&PlaneCurve::akima(part.at, part.along))),
+    };
+    let mut sizes: Vec<f64> = waves.iter().map(|pressure| pressure.abs()).collect();
+    Roughness {
+        waviness: over_contact(&waves),
+        everywhere: modulus * (median(&mut sizes) / MEDIAN_OF_NORMAL),
+        ambiguity,
     }
 }
 
@@ -746,7 +704,7 @@ pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> U
     let near = half.max(REFERENCE_MIN);
     let near = points.numbers([low - near, high + near]);
     let noise = noise_of(reading, around).or_else(|| noise_of(reading, whole));
-    let roughness = ProfileStretch::about(reading, contact).roughness(contact, modulus);
+    let roughness = roughness(reading, contact, modulus);
     let rounding = reading.rounding;
     let rounding = rounding.filter(|step| noise.is_some_and(|noise| noise <= 2.0 * ROUNDED * step));
     let white = rounding.is_some() || is_white(points, around);
@@ -1063,8 +1021,7 @@ mod readings_tests {
             digits: 0.0,
             rounding: None,
         };
-        let stretch = ProfileStretch::about(&reading, CONTACT);
-        stretch.roughness(CONTACT, MODULUS)
+        roughness(&reading, CONTACT, MODULUS)
     }
 
     #[test]

@@ -15,7 +15,6 @@ use crate::geometry::locus_lines::LocusLines;
 use crate::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::geometry::profile::Profile;
 use crate::lazy_field::LazyField;
-use crate::remark::entry::RemarkEntry;
 
 /// Left or right rail, seen along rolling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -425,17 +424,6 @@ impl WheelRail {
     pub fn on_wheel(&self, s: f64) -> [f64; 2] {
         let [y, z] = self.wheel.at(s).at;
         [y, -z]
-    }
-
-    /// Remarks on the two profiles.
-    pub fn remarks(&self) -> Vec<RemarkEntry> {
-        let placed = |pointer: &'static str, profile: &Profile| {
-            let remarks = profile.remarks.clone().into_iter();
-            remarks.map(move |remark| remark.at_pointer(pointer))
-        };
-        placed("/contact/rail", &self.rail_given)
-            .chain(placed("/contact/wheel", &self.wheel))
-            .collect()
     }
 }
 

@@ -95,7 +95,7 @@ fn assessed(
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
     let contact = judgement.contact;
-    let (qualities, findings) = judgement.of(&found.wheel);
+    let (qualities, findings) = judgement.assess(&found.wheel);
     let solution = &mut found.solution;
     for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
         patch.quality = Some(quality);
@@ -136,20 +136,12 @@ fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
 /// Assesses the profiles under the patches of a wheel at rest.
 struct Judgement<'a> {
     contact: &'a WheelTask,
-    /// The last wheel that was assessed and what was found: it is asked about before and after its motions are solved.
-    last: Option<(WheelAtRest, Assessed)>,
+    /// What was found under the last wheel.
+    last: Option<Assessed>,
 }
 
 /// The quality of the profiles under every patch, and the findings.
 type Assessed = (Vec<PatchQuality>, Vec<Finding>);
-
-/// Identifies a wheel at rest: its lowering in mm and the normal forces of its patches in N.
-type WheelAtRest = (f64, Vec<f64>);
-
-fn at_rest(wheel: &WheelContact) -> WheelAtRest {
-    let forces = wheel.patches.iter().map(WheelPatch::normal_force);
-    (wheel.lowering, forces.collect())
-}
 
 /// Advice that ends the error about a refused profile.
 const ACCEPT: &str = "; to solve it anyway, give accept_rough_profiles: true";
@@ -186,7 +178,7 @@ impl<'a> Judgement<'a> {
     /// solve would fail with an error that does not mention the outlier.
     fn before(&mut self, wheel: &WheelContact) -> Result<(), SolveError> {
         let assessed = self.assess(wheel);
-        let (_, (_, findings)) = self.last.insert((at_rest(wheel), assessed));
+        let (_, findings) = self.last.insert(assessed);
         if self.contact.trust.accept_rough {
             return Ok(());
         }
@@ -200,7 +192,7 @@ impl<'a> Judgement<'a> {
             error,
             SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }
         );
-        let Some((_, (_, findings))) = self.last.as_ref().filter(|_| of_mesh) else {
+        let Some((_, findings)) = self.last.as_ref().filter(|_| of_mesh) else {
             return error;
         };
         let worst = findings
@@ -216,14 +208,7 @@ impl<'a> Judgement<'a> {
         }
     }
 
-    /// The quality of the profiles under every patch, and the findings; not assessed again if this wheel was the last one.
-    fn of(&self, wheel: &WheelContact) -> Assessed {
-        match &self.last {
-            Some((known, assessed)) if *known == at_rest(wheel) => assessed.clone(),
-            _ => self.assess(wheel),
-        }
-    }
-
+    /// The quality of the profiles under every patch, and the findings.
     fn assess(&self, wheel: &WheelContact) -> Assessed {
         let contact = self.contact;
         let (mut qualities, mut findings) = (Vec::new(), Vec::new());
