@@ -9,13 +9,16 @@ use thiserror::Error;
 
 use crate::case::contact_task::{FLANGE_BACKS, GAUGE};
 use crate::case::solver::Limits;
-use crate::case::words::contact::{Contact, InfluenceName, Load, SideName, SurfaceName};
-use crate::case::words::cross_section::{CrossSection, FormatName, Smoothing};
+use crate::case::words::contact::{Contact, Load, SurfaceName};
+use crate::case::words::cross_section::{CrossSection, Smoothing};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Elastic, Material};
 use crate::case::words::motion::{AskedMotion, Motions, Wheelset};
 use crate::case::words::solver::{Case, MethodName, Output, Solver};
 use crate::error::{CaseError, Fault, SolveError};
+use crate::geometry::formats::Format;
+use crate::geometry::wheel_rail::Side;
+use crate::half_space::bent_surface::Influence;
 use crate::monitor::Unmonitored;
 use crate::problem::checked_case::CheckedCase;
 use crate::solution::words::answer::Solution;
@@ -261,7 +264,7 @@ impl Contact {
     pub fn profiles(
         rail: CrossSection,
         wheel: CrossSection,
-        side: SideName,
+        side: Side,
         rolling_radius_mm: f64,
     ) -> Contact {
         Contact::Profiles {
@@ -307,7 +310,7 @@ impl Contact {
     /// # Ok::<(), railhead_contact::Error>(())
     /// ```
     #[must_use]
-    pub fn on_curve(mut self, asked: InfluenceName) -> Contact {
+    pub fn on_curve(mut self, asked: Influence) -> Contact {
         if let Contact::Profiles {
             reference_surface,
             influence,
@@ -346,7 +349,7 @@ impl CrossSection {
     }
 
     /// The content of a file.
-    pub fn text(format: FormatName, text: impl Into<String>) -> CrossSection {
+    pub fn text(format: Format, text: impl Into<String>) -> CrossSection {
         CrossSection {
             format: Some(format),
             text: Some(text.into()),

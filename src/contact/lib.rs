@@ -130,11 +130,8 @@ pub mod wheel_on_rail;
 pub mod wheelset;
 
 pub use crate::case::solver::Limits;
-pub use crate::case::words::contact::{
-    Contact, InfluenceName as SurfaceInfluence, Load, SideName as Side,
-    SurfaceName as ReferenceSurface,
-};
-pub use crate::case::words::cross_section::{CrossSection, FormatName as Format};
+pub use crate::case::words::contact::{Contact, Load, SurfaceName as ReferenceSurface};
+pub use crate::case::words::cross_section::CrossSection;
 pub use crate::case::words::friction::Friction;
 pub use crate::case::words::material::{Elastic, Material};
 pub use crate::case::words::motion::{AskedMotion as Motion, Motions, Wheelset};
@@ -142,6 +139,9 @@ pub use crate::case::words::solver::Case;
 pub use crate::case::words::solver::{MethodName as Method, Output, Solver};
 pub use crate::error::{CaseError, Fault, SolveError};
 pub use crate::facade::Error;
+pub use crate::geometry::formats::Format;
+pub use crate::geometry::wheel_rail::Side;
+pub use crate::half_space::bent_surface::Influence as SurfaceInfluence;
 pub use crate::monitor::{Monitor, Unmonitored};
 pub use crate::problem::checked_case::CheckedCase;
 pub use crate::solution::words::answer::Fields;

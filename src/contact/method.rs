@@ -1,6 +1,8 @@
 //! Which method solves a motion.
 
-use railhead_macros::Named;
+use railhead_macros::{Named, Words};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// A method; each is a file or folder of this name in [`rolling::methods`](crate::rolling::methods).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Named)]
@@ -17,12 +19,13 @@ pub enum Method {
 }
 
 /// Traction bound at which `fastsim` slips.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
 pub enum TractionBound {
-    /// At μ times the pressure.
+    /// At μ times the pressure, for an ellipse Hertz's semi-ellipsoid.
     #[default]
     Elliptic,
-    /// At the square of the pressure, scaled to carry the same μN.
+    /// At the square of the pressure, scaled to carry the same μN: for an ellipse Kalker's paraboloid, 4/3 as high in the middle.
     Parabolic,
 }
 

@@ -124,9 +124,9 @@ fn run(case: &Case, limits: &Limits) -> Run {
     Run {
         method: case.solver.method.into(),
         method_asked: case.solver.method,
-        traction_bound: case.solver.traction_bound.unwrap_or_default().into(),
+        traction_bound: case.solver.traction_bound.unwrap_or_default(),
         resolution: resolution(&case.solver),
-        relative_to: case.solver.relative_to.unwrap_or_default().into(),
+        relative_to: case.solver.relative_to.unwrap_or_default(),
         time_limit: case.solver.time_limit_s.map(Duration::from_secs_f64),
         memory_bytes: limits.memory_bytes,
         operator_store_bytes: limits.operator_store_bytes,

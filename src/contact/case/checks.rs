@@ -4,16 +4,15 @@
 
 use crate::case::motions::{BesideHistory, ExpandedMotions};
 use crate::case::solver::{KnownPair, Limits, resolution};
-use crate::case::words::contact::{Contact, InfluenceName, Load, SurfaceName};
+use crate::case::words::contact::{Contact, Load, SurfaceName};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, ThermalWords};
 use crate::case::words::motion::Motions;
-use crate::case::words::solver::{MethodName, Output, RelativeToName, Solver};
+use crate::case::words::solver::{MethodName, Output, Solver};
 use crate::case::words::subsurface::{DamageModel, DamageWords, SubsurfaceWords};
 use crate::case::{after_tasks, contact_task, motions, wheel_task, wheelsets};
 use crate::error::Fault;
 use crate::friction::law::FrictionLaw;
-use crate::half_space::bent_surface::Influence;
 use crate::half_space::unlike_bodies::Elasticity;
 use crate::method::Method;
 use crate::normal::footprint::NormalTask;
@@ -24,6 +23,7 @@ use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 use crate::rolling::history::plan::{HistoryStart, HistoryTask};
 use crate::rolling::methods::table::solve as table;
+use crate::rolling::task::RelativeTo;
 
 /// Friction coefficient above which the answer carries a remark.
 const FRICTION_USUAL_MAX: f64 = 1.0;
@@ -160,12 +160,8 @@ fn surface(given: &PartialCase) -> Result<(ReferenceSurface, Option<Remark>), Fa
         let reason = reason.to_owned();
         return Ok((ReferenceSurface::Planes, Some(Remark::OnPlanes { reason })));
     }
-    let influence = match influence.unwrap_or_default() {
-        InfluenceName::AngleCorrected => Influence::AngleCorrected,
-        InfluenceName::HalfSpace => Influence::HalfSpace,
-    };
     let surface = ReferenceSurface::Curve {
-        influence,
+        influence: influence.unwrap_or_default(),
         required,
     };
     Ok((surface, None))
@@ -186,7 +182,7 @@ fn history_faults(
         patches: &task.and_then(NormalTask::known_patches).unwrap_or_default(),
     };
     let mut faults = motions::faults(history, &beside, limits);
-    let of_force = |solver: &&Solver| solver.relative_to == Some(RelativeToName::Force);
+    let of_force = |solver: &&Solver| solver.relative_to == Some(RelativeTo::Force);
     if given.solver.as_ref().is_some_and(of_force) {
         faults.push(Fault::new(
             "/solver/relative_to",

@@ -1,46 +1,27 @@
 //! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
 
-use crate::case::words::contact::SideName;
-use crate::case::words::cross_section::{FormatName, UnitName};
-use crate::case::words::friction::{FallName, Friction};
+use crate::case::words::friction::Friction;
 use crate::case::words::material::ThermalWords;
 use crate::case::words::motion::MotionWords;
-use crate::case::words::solver::{
-    MeshSizeWords, MethodName, Output, RelativeToName, TractionBoundName,
-};
+use crate::case::words::solver::{MeshSizeWords, MethodName, Output};
 use crate::friction::coefficient_table::CoefficientTable;
 use crate::friction::law::{AcrossLaw, AcrossPlace, FrictionLaw};
 use crate::friction::path_dependent::{HeatedLaw, Interface, LayerYield};
-use crate::friction::velocity_weakening::{FallForm, FallingLaw, SofteningTerm};
-use crate::geometry::formats::Format;
-use crate::geometry::profile::LengthUnit;
-use crate::geometry::wheel_rail::Side;
+use crate::friction::velocity_weakening::{FallingLaw, SofteningTerm};
 use crate::mesh::MeshSize;
-use crate::method::{Method, TractionBound};
+use crate::method::Method;
 use crate::post::local_power::ThermalTask;
-use crate::rolling::task::{Motion, RelativeTo};
+use crate::rolling::task::Motion;
 
-/// Words that stand for a type of the numerics variant by variant.
-macro_rules! words {
-    ($($from:ident => $to:ident { $($name:ident),+ })+) => {
-        $(impl From<$from> for $to {
-            fn from(name: $from) -> $to {
-                match name {
-                    $($from::$name => $to::$name),+
-                }
-            }
-        })+
-    };
-}
-
-words! {
-    SideName => Side { Left, Right }
-    UnitName => LengthUnit { Mm, Cm, M, Inch }
-    FormatName => Format { Columns, Simpack, Miniprof }
-    FallName => FallForm { Exponential, Rational, Linear }
-    RelativeToName => RelativeTo { FrictionLimit, Force }
-    TractionBoundName => TractionBound { Elliptic, Parabolic }
-    Method => MethodName { BoundaryElement, LiuHsu, Fastsim, Table }
+impl From<Method> for MethodName {
+    fn from(method: Method) -> MethodName {
+        match method {
+            Method::BoundaryElement => MethodName::BoundaryElement,
+            Method::LiuHsu => MethodName::LiuHsu,
+            Method::Fastsim => MethodName::Fastsim,
+            Method::Table => MethodName::Table,
+        }
+    }
 }
 
 impl From<MotionWords> for Motion {
@@ -95,7 +76,7 @@ impl FrictionLaw {
             None => SofteningTerm::NONE,
         };
         FrictionLaw::Falling(FallingLaw {
-            form: law.into(),
+            form: law,
             limit: words.limit.unwrap_or(0.0),
             terms: [term(0), term(1)],
         })

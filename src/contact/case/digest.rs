@@ -2,9 +2,10 @@
 
 use crate::case::solver::resolution;
 use crate::case::words::motion::Motions;
-use crate::case::words::solver::{Canonical, Case, RelativeToName, TractionBoundName};
+use crate::case::words::solver::{Canonical, Case};
 use crate::half_space::unlike_bodies::Elasticity;
-use crate::rolling::task::{Motion, PrescribedForces, Resolution};
+use crate::method::TractionBound;
+use crate::rolling::task::{Motion, PrescribedForces, RelativeTo, Resolution};
 
 /// Raised whenever a change moves numbers that clients get: equal cases share one answer, and answers of an older revision are not theirs.
 /// `tests/physics/golden.rs` fails if numbers move without it, and says how to record the new ones.
@@ -58,12 +59,12 @@ pub(crate) fn digest(
         traction_bound: case
             .solver
             .traction_bound
-            .filter(|bound| *bound != TractionBoundName::default()),
+            .filter(|bound| *bound != TractionBound::default()),
         target_error,
         relative_to: case
             .solver
             .relative_to
-            .filter(|of| *of != RelativeToName::default()),
+            .filter(|of| *of != RelativeTo::default()),
         mesh: case.solver.mesh,
         time_limit_s: case.solver.time_limit_s,
         outputs: &case.outputs,

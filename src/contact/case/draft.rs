@@ -79,7 +79,9 @@ impl CaseDraft {
     pub(crate) fn given<'a>(&'a self, known: &'a KnownPair) -> PartialCase<'a> {
         let without_load = matches!(
             self.contact,
-            Some(Contact::PressureGrid { .. } | Contact::Profiles { .. } | Contact::Wheelset { .. })
+            Some(
+                Contact::PressureGrid { .. } | Contact::Profiles { .. } | Contact::Wheelset { .. }
+            )
         );
         let contact = self.contact.as_ref();
         PartialCase {

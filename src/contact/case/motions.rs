@@ -6,7 +6,7 @@ use crate::case::solver::Limits;
 use crate::case::words::contact::Contact;
 use crate::case::words::friction::Friction;
 use crate::case::words::motion::{
-    AskedMotion, Combine, History, HistoryCourse, HistoryStartName, Motions, Sweep, Swept, Wheelset,
+    AskedMotion, Combine, History, HistoryCourse, Motions, Sweep, Swept, Wheelset,
 };
 use crate::case::words::object::FAULTS_MAX;
 use crate::case::words::solver::{MethodName, Output, Solver};
@@ -206,17 +206,13 @@ fn point_by_point(history: &History) -> Vec<AskedMotion> {
 }
 
 /// Distances and shifts of a history.
-fn history_task(history: &History, start: HistoryStartName) -> HistoryTask {
+fn history_task(history: &History, start: HistoryStart) -> HistoryTask {
     let points = history.distance_mm.points();
     let shifts = [&history.shift_x_mm, &history.shift_y_mm, &history.turn_rad];
     let [x, y, turn] = shifts.map(|given| course(given.as_ref(), points));
     let at = |values: &Option<Vec<f64>>, k: usize| values.as_ref().map_or(0.0, |values| values[k]);
     HistoryTask {
-        start: match start {
-            HistoryStartName::Rest => HistoryStart::Rest,
-            HistoryStartName::Steady => HistoryStart::Steady,
-            HistoryStartName::Pressed => HistoryStart::Pressed,
-        },
+        start,
         distances: history.distance_mm.values(points),
         shifts: (0..points)
             .map(|k| Motion {

@@ -142,7 +142,9 @@ impl KnownPair {
             known.flange_back == words.flange_back
                 && known.accept_rough == words.accept_rough
                 && on_same_track(&known.placed.0.placement, placement)
-                && [0, 1].iter().all(|k| known.sections[*k] == *words.sections[*k])
+                && [0, 1]
+                    .iter()
+                    .all(|k| known.sections[*k] == *words.sections[*k])
         });
         let known = found.map(|found| {
             pairs[..=found].rotate_right(1);
@@ -171,10 +173,7 @@ impl KnownPair {
             ..
         } = *placement;
         let (geometry, remark) = &pair.placed;
-        Ok((
-            geometry.posed(lateral_shift, yaw, roll),
-            remark.clone(),
-        ))
+        Ok((geometry.posed(lateral_shift, yaw, roll), remark.clone()))
     }
 
     fn pairs(&self) -> MutexGuard<'_, Vec<Arc<PairRead>>> {

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use crate::case::contact_task;
 use crate::case::solver::KnownPair;
 use crate::case::words::contact::{Contact, Load};
-use crate::case::words::cross_section::{CrossSection, FormatName, Smoothing, SmoothingWord};
+use crate::case::words::cross_section::{CrossSection, Smoothing, SmoothingWord};
 use crate::case::words::motion::{Motions, Wheelset};
 use crate::error::Fault;
 use crate::geometry::contact_locus::ContactLocus;
 use crate::geometry::formats;
-use crate::geometry::formats::ProfileFile;
+use crate::geometry::formats::{Format, ProfileFile};
 use crate::geometry::orientation::{FormatSenses, Senses, StatedSenses};
 use crate::geometry::profile::{Body, LengthUnit, Profile, Reading};
 use crate::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
@@ -59,7 +59,7 @@ pub(crate) fn task(
         )]);
     };
     let placement = Placement {
-        side: (*side).into(),
+        side: *side,
         rolling_radius: *rolling_radius_mm,
         rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
         cant: *cant_rad,
@@ -78,7 +78,13 @@ pub(crate) fn task(
     let (geometry, flange_back) = known.placed(&words, &placement, || {
         let read = (profile(Body::Rail, rail), profile(Body::Wheel, wheel));
         let profiles = both(read, pointers)?;
-        in_place(profiles, &words, placement, pointers, "/contact/rolling_radius_mm")
+        in_place(
+            profiles,
+            &words,
+            placement,
+            pointers,
+            "/contact/rolling_radius_mm",
+        )
     })?;
     meet(&geometry)?;
     let mut remarks = remarks_of(&geometry, pointers);
@@ -284,10 +290,7 @@ fn unplaced(reason: NotPlaced, [rail, radius]: [&str; 2]) -> Fault {
 }
 
 /// Faults of two profiles that both look like the other body's, at the pointers of both; one of them alone may be an unusual shape.
-fn exchanged(
-    [rail, wheel]: [&Profile; 2],
-    pointers: [&str; 2],
-) -> Result<(), Vec<Fault>> {
+fn exchanged([rail, wheel]: [&Profile; 2], pointers: [&str; 2]) -> Result<(), Vec<Fault>> {
     let both = checked_case::load_mismatch(rail, Body::Rail)
         .zip(checked_case::load_mismatch(wheel, Body::Wheel));
     let Some((rail, wheel)) = both else {
@@ -359,7 +362,7 @@ pub(crate) fn profile_at(
             "given for a wheel; only a rail has a guard rail beside it".to_owned(),
         ));
     }
-    let unit_mm = section.unit.map_or(1.0, |unit| LengthUnit::from(unit).mm());
+    let unit_mm = section.unit.map_or(1.0, LengthUnit::mm);
     profile
         .with_guard_rail(&scaled(points, unit_mm))
         .map_err(fault)
@@ -376,7 +379,7 @@ fn own_profile(pointer: &str, body: Body, section: &CrossSection) -> Result<Prof
             Smoothing::ByNoise(SmoothingWord::Auto) => 0.0,
         },
     };
-    let stated_mm = section.unit.map(|unit| LengthUnit::from(unit).mm());
+    let stated_mm = section.unit.map(LengthUnit::mm);
     let (Some(format), Some(text)) = (section.format, &section.text) else {
         let points = section.points_mm.as_deref().unwrap_or_default();
         let profile = match stated_mm {
@@ -386,7 +389,7 @@ fn own_profile(pointer: &str, body: Body, section: &CrossSection) -> Result<Prof
         return profile.map_err(|detail| Fault::new(format!("{pointer}/points_mm"), detail));
     };
     let refuse = |detail| Fault::new(format!("{pointer}/text"), detail);
-    let mut contents = formats::read(format.into(), text).map_err(refuse)?;
+    let mut contents = formats::read(format, text).map_err(refuse)?;
     let is_wheel = body == Body::Wheel;
     if contents.wheel.is_some_and(|wheel| wheel != is_wheel) {
         let other = if is_wheel { "rail" } else { "wheel" };
@@ -432,9 +435,9 @@ fn scaled(points: &[[f64; 2]], scale: f64) -> Vec<[f64; 2]> {
 }
 
 /// What the format of a file specifies about the senses of its points.
-fn senses_of(body: Body, format: FormatName, contents: &ProfileFile) -> FormatSenses {
+fn senses_of(body: Body, format: Format, contents: &ProfileFile) -> FormatSenses {
     // MiniProf instruments differ in the sense of a wheel's X.
-    let varies = body == Body::Wheel && format == FormatName::Miniprof;
+    let varies = body == Body::Wheel && format == Format::Miniprof;
     FormatSenses {
         usual: Senses {
             mirror_y: contents.mirror_y.unwrap_or(false),

@@ -2,6 +2,10 @@
 
 use std::f64::consts::LN_2;
 
+use railhead_macros::Words;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use crate::numerics::roots::{CloseEnough, Course, find};
 
 /// Rounding of the slip of [`Softening::resolvent`], relative to that of a cell without traction.
@@ -14,15 +18,17 @@ pub(crate) const SLIP_OF_CELL: f64 = 1.7;
 /// at 1.5 one.
 pub(crate) const STABILITY_MAX: f64 = 1.0;
 
-/// How fast the terms of a law fall.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How a coefficient falls with the slip speed v. In the formulas, f₀ is `limit`; f₁, f₂ are the `coefficient` and v₁, v₂ the
+/// `half_speed_mm_per_s` of the terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = FallName)]
 pub enum FallForm {
-    /// `μ = f₀ + f₁ exp(−ln 2 v/v₁) + f₂ exp(−ln 2 v/v₂)`. Polach's law `μ₀ ((1 − A) exp(−B v) + A)` (2005) is
-    /// f₀ = A μ₀, f₁ = (1 − A) μ₀, v₁ = ln 2/B.
+    /// f₀ + f₁ exp(−ln 2 v/v₁) + f₂ exp(−ln 2 v/v₂). Polach's μ₀((1 − A) exp(−B v) + A) is f₀ = A μ₀, f₁ = (1 − A) μ₀, v₁ = ln 2/B.
     Exponential,
-    /// `μ = f₀ + f₁/(1 + v/v₁) + f₂/(1 + (v/v₂)²)`.
+    /// f₀ + f₁/(1 + v/v₁) + f₂/(1 + (v/v₂)²).
     Rational,
-    /// `μ = f₀ + f₁ max(0, 1 − v/(2 v₁)) + f₂ max(0, 1 − v/(2 v₂))`.
+    /// f₀ + f₁ max(0, 1 − v/(2 v₁)) + f₂ max(0, 1 − v/(2 v₂)).
     Linear,
 }
 

@@ -23,14 +23,17 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-use railhead_macros::Named;
+use railhead_macros::{Named, Words};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::geometry::profile::{LengthUnit, POINTS_MIN};
 
-/// A file format that a client can name; each is read in the file of that name in this folder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
+/// A file format of cross-sections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words, Named)]
+#[serde(rename_all = "snake_case")]
 pub enum Format {
-    /// Two columns y and z, separated by blanks, commas, semicolons or tabs.
+    /// Columns of numbers, the first two or those with the titles y and z, separated by blanks, commas, semicolons or tabs.
     Columns,
     /// Simpack's `.prr` (rail) and `.prw` (wheel).
     Simpack,

@@ -8,7 +8,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use railhead_macros::Named;
+use railhead_macros::{Named, Words};
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::geometry::orientation::{
     self, Flange, FormatSenses, FoundSenses, Senses, StatedSenses, SureBody,
@@ -518,8 +520,9 @@ fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
     [to[0] - from[0], to[1] - from[1]]
 }
 
-/// A unit of length.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
+/// A unit of length of cross-sections.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words, Named)]
+#[serde(rename_all = "snake_case")]
 pub enum LengthUnit {
     /// Millimetre.
     Mm,
@@ -527,7 +530,7 @@ pub enum LengthUnit {
     Cm,
     /// Metre.
     M,
-    /// Inch.
+    /// Inch, 25.4 mm.
     Inch,
 }
 

@@ -9,6 +9,10 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use railhead_macros::Words;
+use serde::Serialize;
+use utoipa::ToSchema;
+
 use crate::geometry::curve_place::CurvePlace;
 use crate::geometry::envelope::Envelope;
 use crate::geometry::locus_lines::LocusLines;
@@ -16,12 +20,13 @@ use crate::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::geometry::profile::Profile;
 use crate::lazy_field::LazyField;
 
-/// Left or right rail, seen along rolling.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Left or right rail, seen in the rolling direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
 pub enum Side {
-    /// y of the track is positive there.
+    /// The rail at positive y of the track.
     Left,
-    /// y of the track is negative there.
+    /// The rail at negative y of the track.
     Right,
 }
 

@@ -18,20 +18,26 @@
 use std::cmp::Ordering;
 
 use pulp::{NullaryFnOnce, Simd, WithSimd};
+use railhead_macros::Words;
 use rustfft::num_complex::Complex;
+use serde::Serialize;
+use utoipa::ToSchema;
 
 use crate::half_space::grid_operator::{FftPlanners, FftPlans, coefficients, lines};
 use crate::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
 use crate::lazy_field::LazyField;
 use crate::numerics::simd::{self, LANES};
 
-/// How strips of a bent surface act on each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// How cells of a curved contact surface act on each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = SurfaceInfluence)]
 pub enum Influence {
-    /// As on a half-space, within a run of contact only.
-    HalfSpace,
-    /// With factors for the turn between them, across the whole contact.
+    /// As on a half-space with factors for the turn of the surface between them, across the whole contact.
+    #[default]
     AngleCorrected,
+    /// As on a half-space, among strips that touch less than 4 mm from each other: for comparison with other programs.
+    HalfSpace,
 }
 
 /// Turn up to which the factors were compared with boundary elements, in rad.

@@ -4,6 +4,10 @@
 //!
 //! The relative motion of two rolling bodies.
 
+use railhead_macros::Words;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use crate::friction::law::FrictionLaw;
 use crate::friction::path_dependent::{Interface, PathDependentLaws};
 use crate::friction::velocity_weakening::Softening;
@@ -139,13 +143,14 @@ const ERROR_MAX: f64 = 0.95;
 /// Least target of an error relative to μN: no mesh resolves less.
 pub const TARGET_LEAST: f64 = 1e-4;
 
-/// What the target of an error is a share of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// Reference quantity of a relative error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
 pub enum RelativeTo {
     /// The friction limit μN.
     #[default]
     FrictionLimit,
-    /// The tangential force.
+    /// The tangential force of the motion, of all patches that share a frame.
     Force,
 }
 

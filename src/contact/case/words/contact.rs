@@ -9,6 +9,8 @@ use crate::case::words::cross_section::CrossSection;
 use crate::case::words::motion::{Combine, Swept, swept};
 use crate::case::words::object::{AllowedRange, Object, shown};
 use crate::case::words::samples;
+use crate::geometry::wheel_rail::Side;
+use crate::half_space::bent_surface::Influence;
 
 /// Where the bodies touch.
 #[none_is_absent]
@@ -82,7 +84,7 @@ pub enum Contact {
         wheel: Box<CrossSection>,
         /// The side of the wheel in its wheelset, seen in the rolling direction.
         #[member(what = "left or right")]
-        side: SideName,
+        side: Side,
         /// Radius of the wheel at z = 0 of its cross-section, in mm.
         #[member(positive(1e5, "mm"))]
         rolling_radius_mm: f64,
@@ -124,7 +126,7 @@ pub enum Contact {
         /// `on-planes`.
         reference_surface: Option<SurfaceName>,
         /// How cells of a curved surface act on each other; default `angle_corrected`. Not with `reference_surface: "plane"`.
-        influence: Option<InfluenceName>,
+        influence: Option<Influence>,
     },
     /// A wheelset on both rails of a track, given by their cross-sections. Its roll, its height and every patch of both wheels are
     /// computed.
@@ -184,7 +186,7 @@ pub enum Contact {
         /// As in `profiles`.
         reference_surface: Option<SurfaceName>,
         /// As in `profiles`.
-        influence: Option<InfluenceName>,
+        influence: Option<Influence>,
     },
 }
 
@@ -231,7 +233,7 @@ impl Contact {
     }
 
     /// The surface of the contact and how its cells act on each other, as far as they are given.
-    pub(crate) fn surface(&self) -> (Option<SurfaceName>, Option<InfluenceName>) {
+    pub(crate) fn surface(&self) -> (Option<SurfaceName>, Option<Influence>) {
         match self {
             Contact::Profiles {
                 reference_surface,
@@ -268,17 +270,6 @@ pub struct Load {
     pub approach_mm: Option<f64>,
 }
 
-/// Left or right rail, seen in the rolling direction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
-#[schema(as = Side)]
-pub enum SideName {
-    /// The rail at positive y of the track.
-    Left,
-    /// The rail at negative y of the track.
-    Right,
-}
-
 /// The surface on which the contact of a wheel on a rail is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
 #[serde(rename_all = "snake_case")]
@@ -289,18 +280,6 @@ pub enum SurfaceName {
     /// The cross-section of the rail: normals, slips and influences follow the bend of its surface, and all patches of a wheel are one problem. For
     /// bodies that do not differ.
     Curve,
-}
-
-/// How cells of a curved contact surface act on each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
-#[schema(as = SurfaceInfluence)]
-pub enum InfluenceName {
-    /// As on a half-space with factors for the turn of the surface between them, across the whole contact.
-    #[default]
-    AngleCorrected,
-    /// As on a half-space, among strips that touch less than 4 mm from each other: for comparison with other programs.
-    HalfSpace,
 }
 
 const FORCE: AllowedRange = AllowedRange::positive(1e12, "N");

@@ -1,11 +1,13 @@
 //! Cross-sections of rails and wheels.
 
-use railhead_macros::{Members, Words, none_is_absent};
+use railhead_macros::{Members, none_is_absent};
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::case::words::object::{AllowedRange, LISTED_MAX, Object, join, names, number, shown};
+use crate::geometry::formats::Format;
+use crate::geometry::profile::LengthUnit;
 use crate::geometry::profile::{POINTS_MAX, POINTS_MIN};
 
 /// A cross-section of a rail or a wheel, as points or as the text of a file; exactly one of the two.
@@ -27,12 +29,12 @@ pub struct CrossSection {
     #[member(skip)]
     pub profile: Option<String>,
     /// Format of `text`.
-    pub format: Option<FormatName>,
+    pub format: Option<Format>,
     /// Content of the file, not its path.
     #[member(with = text)]
     pub text: Option<String>,
     /// Unit of the points or of the text. Default: the unit named in the file, otherwise mm. All other lengths of a case are in mm.
-    pub unit: Option<UnitName>,
+    pub unit: Option<LengthUnit>,
     /// `true` if y of the points is positive toward the track centre. Default: the flange of a wheel decides; for a rail, the format
     /// (points: `false`, MiniProf: `true`). A wheel without a flange requires this member, except in Simpack files.
     pub mirror_y: Option<bool>,
@@ -63,34 +65,6 @@ pub enum SmoothingWord {
     Auto,
 }
 
-/// A file format of cross-sections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
-#[schema(as = Format)]
-pub enum FormatName {
-    /// Columns of numbers, the first two or those with the titles y and z, separated by blanks, commas, semicolons or tabs.
-    Columns,
-    /// Simpack's `.prr` (rail) and `.prw` (wheel).
-    Simpack,
-    /// MiniProf's `.ban` (rail) and `.whl` (wheel).
-    Miniprof,
-}
-
-/// A unit of length of cross-sections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
-#[schema(as = LengthUnit)]
-pub enum UnitName {
-    /// Millimetre.
-    Mm,
-    /// Centimetre.
-    Cm,
-    /// Metre.
-    M,
-    /// Inch, 25.4 mm.
-    Inch,
-}
-
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
 /// Characters of a file.
@@ -105,7 +79,7 @@ pub(crate) fn faults_of_section(block: &mut Object, _: Option<&CrossSection>) ->
         ),
         (true, false) => return Some(()),
         (false, true) => {
-            let what = format!("one of {}", names(FormatName::WORDS));
+            let what = format!("one of {}", names(Format::WORDS));
             return block.required("format", &what).map(|_| ());
         }
         (false, false) => block.fault(

@@ -1,11 +1,12 @@
 //! Friction between the bodies, and what lies between them.
 
-use railhead_macros::{Members, Words, none_is_absent};
+use railhead_macros::{Members, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::case::words::object::{AllowedRange, Object, join};
 use crate::case::words::samples::AXIS_POINTS;
+use crate::friction::velocity_weakening::FallForm;
 
 /// Coulomb friction: exactly one of `coefficient`, `law` (with `limit` and `terms`), `across`, `along` and `by_temperature`. `layer` and
 /// `reduction` make the contact more compliant and may be added to each of them.
@@ -18,7 +19,7 @@ pub struct Friction {
     #[member(closed(0.0, 100.0, ""))]
     pub coefficient: Option<f64>,
     /// How the coefficient falls with slip speed; requires `speed_mm_per_s` in every motion.
-    pub law: Option<FallName>,
+    pub law: Option<FallForm>,
     /// Limit of the coefficient at high slip speed, 0 to 100; with `law`.
     #[schema(minimum = 0.0, maximum = 100.0)]
     #[member(closed(0.0, 100.0, ""))]
@@ -40,19 +41,6 @@ pub struct Friction {
     #[schema(maximum = 1.0)]
     #[member(positive(1.0, ""))]
     pub reduction: Option<f64>,
-}
-
-/// How a coefficient falls with the slip speed v. In the formulas, f₀ is `limit`; f₁, f₂ are the `coefficient` and v₁, v₂ the
-/// `half_speed_mm_per_s` of the terms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
-pub enum FallName {
-    /// f₀ + f₁ exp(−ln 2 v/v₁) + f₂ exp(−ln 2 v/v₂). Polach's μ₀((1 − A) exp(−B v) + A) is f₀ = A μ₀, f₁ = (1 − A) μ₀, v₁ = ln 2/B.
-    Exponential,
-    /// f₀ + f₁/(1 + v/v₁) + f₂/(1 + (v/v₂)²).
-    Rational,
-    /// f₀ + f₁ max(0, 1 − v/(2 v₁)) + f₂ max(0, 1 − v/(2 v₂)).
-    Linear,
 }
 
 /// A part of the coefficient that falls with slip speed.

@@ -8,6 +8,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::case::words::object::{AllowedRange, Faults, Member, Object, join, shown};
+use crate::rolling::history::plan::HistoryStart;
 
 /// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
@@ -70,7 +71,7 @@ pub enum Motions {
         history: History,
         /// State at distance 0; default `rest`.
         #[schema(required = false)]
-        start: HistoryStartName,
+        start: HistoryStart,
     },
     /// The motion of the wheelset, from which the creepages of each patch follow; for `profiles` and `wheelset`.
     Wheelset {
@@ -288,19 +289,6 @@ impl HistoryCourse {
             HistoryCourse::Values(values) => values.clone(),
         }
     }
-}
-
-/// The state in which a history begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
-pub enum HistoryStartName {
-    /// Pressed together without tangential tractions.
-    #[default]
-    Rest,
-    /// In steady rolling with the motion or forces of the first point.
-    Steady,
-    /// Pressed together under friction without rolling: bodies that differ have tangential tractions then. For `radii` and `ellipse`.
-    Pressed,
 }
 
 /// Equally spaced values, both ends included.
@@ -557,12 +545,12 @@ fn range(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Range>
 /// Reads the block `{"history": …, "start": …}`.
 pub(crate) fn read_history(block: &mut Object) -> Option<Motions> {
     block.only(&["history", "start"]);
-    let start = block.optional_word("start", HistoryStartName::WORDS);
+    let start = block.optional_word("start", HistoryStart::WORDS);
     let mut block = block.child("history")?;
     let history = History::members(&mut block)?;
     let start = start?.unwrap_or_default();
     let courses = history.courses();
-    if start != HistoryStartName::Pressed && courses.iter().all(|(_, course)| course.is_none()) {
+    if start != HistoryStart::Pressed && courses.iter().all(|(_, course)| course.is_none()) {
         let names = courses.map(|(name, _)| name).join(", ");
         block.fault_here(format!(
             "no motion given; at least one of {names} is needed"
@@ -635,11 +623,11 @@ fn shifted_at_rest(
     name: &str,
     course: &HistoryCourse,
     distances: &[f64],
-    start: HistoryStartName,
+    start: HistoryStart,
 ) -> bool {
     let values = course.values(distances.len());
     let rolls = |k: usize| match k {
-        0 => distances[0] > 0.0 || start == HistoryStartName::Steady,
+        0 => distances[0] > 0.0 || start == HistoryStart::Steady,
         _ => distances[k] > distances[k - 1],
     };
     let wrong = (0..distances.len()).find(|k| values[*k] != 0.0 && rolls(*k));

@@ -17,9 +17,12 @@ use utoipa::ToSchema;
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, ThermalWords};
-use crate::case::words::motion::{History, HistoryStartName, MotionWords, Motions, Wheelset};
+use crate::case::words::motion::{History, MotionWords, Motions, Wheelset};
 use crate::case::words::object::{Object, names, shown, word};
 use crate::case::words::subsurface::{DamageWords, SubsurfaceWords};
+use crate::method::TractionBound;
+use crate::rolling::history::plan::HistoryStart;
+use crate::rolling::task::RelativeTo;
 use crate::rolling::task::{PrescribedForces, TARGET_LEAST, TARGET_USUAL};
 
 /// Method and accuracy of the solution.
@@ -39,11 +42,11 @@ pub struct Solver {
     pub target_error: Option<f64>,
     /// What the allowed error is relative to; default `friction_limit`. With `force`, a motion is solved again until its error is
     /// `target_error` of its own tangential force, but not below 1e-4 of μN. Not allowed with `mesh` or for histories.
-    pub relative_to: Option<RelativeToName>,
+    pub relative_to: Option<RelativeTo>,
     /// An explicit mesh instead of a target.
     pub mesh: Option<MeshSizeWords>,
     /// Traction bound of `fastsim`; default `elliptic`. Not allowed for other methods.
-    pub traction_bound: Option<TractionBoundName>,
+    pub traction_bound: Option<TractionBound>,
     /// Give up after this many seconds of solving.
     #[member(positive(86_400.0, "s"))]
     pub time_limit_s: Option<f64>,
@@ -79,30 +82,6 @@ pub enum MethodName {
     /// Interpolates resultants of elliptic patches in a table computed by `boundary_element`, in less than a microsecond, with an error
     /// bound. A patch of another shape is replaced by the ellipse with the same load distribution.
     Table,
-}
-
-/// Reference quantity of a relative error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
-#[schema(as = RelativeTo)]
-pub enum RelativeToName {
-    /// The friction limit μN.
-    #[default]
-    FrictionLimit,
-    /// The tangential force of the motion, of all patches that share a frame.
-    Force,
-}
-
-/// Traction bound at which `fastsim` slips.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
-#[schema(as = TractionBound)]
-pub enum TractionBoundName {
-    /// At μ times the pressure, for an ellipse Hertz's semi-ellipsoid.
-    #[default]
-    Elliptic,
-    /// At the square of the pressure, scaled to carry the same μN: for an ellipse Kalker's paraboloid, 4/3 as high in the middle.
-    Parabolic,
 }
 
 /// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.
@@ -218,12 +197,12 @@ pub(crate) struct Canonical<'a> {
     pub(crate) forces: Option<&'a [PrescribedForces]>,
     pub(crate) wheelset: Option<&'a Wheelset>,
     pub(crate) wheelsets: Option<&'a [Wheelset]>,
-    pub(crate) history: Option<(&'a History, HistoryStartName)>,
+    pub(crate) history: Option<(&'a History, HistoryStart)>,
     pub(crate) method: MethodName,
-    pub(crate) traction_bound: Option<TractionBoundName>,
+    pub(crate) traction_bound: Option<TractionBound>,
     #[or_null]
     pub(crate) target_error: Option<f64>,
-    pub(crate) relative_to: Option<RelativeToName>,
+    pub(crate) relative_to: Option<RelativeTo>,
     #[or_null]
     pub(crate) mesh: Option<MeshSizeWords>,
     #[or_null]

@@ -9,6 +9,10 @@
 //!
 //! What is kept of a point of a history.
 
+use railhead_macros::Words;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use crate::half_space::strip_operator::kind::Parity;
 use crate::half_space::strip_operator::operator::StripOperator;
 use crate::rolling::answer::{Resultants, Work};
@@ -209,15 +213,17 @@ pub(super) fn steady<'e>(
         .with_layer(&level.normalised, level.layer)
 }
 
-/// The state at the distance 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+/// The state in which a history begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
+#[serde(rename_all = "snake_case")]
+#[schema(as = HistoryStartName)]
 pub enum HistoryStart {
-    /// No tangential tractions: the bodies were just pressed together.
+    /// Pressed together without tangential tractions.
     #[default]
     Rest,
-    /// Steady rolling with the first motion.
+    /// In steady rolling with the motion or forces of the first point.
     Steady,
-    /// Pressed together under friction, without rolling.
+    /// Pressed together under friction without rolling: bodies that differ have tangential tractions then. For `radii` and `ellipse`.
     Pressed,
 }
 
