@@ -155,7 +155,7 @@ pub fn check(case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
     check_with(&KnownPair::default(), case, limits)
 }
 
-/// The same for one of many cases: profiles that were read for the one before are not read again.
+/// Like [`check`], for one of many cases: profiles that were read for a case before are not read again.
 ///
 /// # Errors
 /// The same.
@@ -176,7 +176,7 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<(Solution, Fie
     solve_with(&Arc::default(), case, monitor)
 }
 
-/// The same for one of many problems: operators of patches of the same shape are kept in the store for the next.
+/// Like [`solve`], for one of many problems: the store keeps operators for patches of the same shape.
 ///
 /// # Errors
 /// The same.

@@ -67,7 +67,7 @@ pub(crate) struct Shared {
     pub(crate) staged: StagedBytes,
     /// Batches that are being received or filled, and those that are to be removed.
     pub(crate) batches: Mutex<UnfinishedBatches>,
-    /// What clients follow, as it was a moment ago.
+    /// Jobs, batches and runs that clients follow, as they were read a moment ago.
     pub(crate) recent: RecentReads<Option<Work>>,
     /// Steps of the wall clock.
     pub(crate) leaps: ClockSteps,

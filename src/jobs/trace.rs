@@ -1,4 +1,4 @@
-//! What makes spans: of a request, and of the life of one job: `submit`, `queue`, `solve`, `store`.
+//! Spans of a request and of a job: `submit`, `queue`, `solve`, `store`.
 //!
 //! A job may be solved by another process than the one that took it, so its trace travels with its row, as a W3C
 //! `traceparent`. Where nobody collects spans there is no [`Tracer`], and nothing is made, stored or measured.

@@ -7,7 +7,7 @@ use crate::csv::{Precision, write_number};
 /// Named columns of equal length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellTable {
-    /// What a row belongs to.
+    /// Whether a row is a cell or a sample of a grid.
     pub rows: CellRows,
     /// Its columns; on a grid without those of the axes.
     pub columns: Vec<CellColumn>,
@@ -82,7 +82,7 @@ impl CellTable {
     }
 }
 
-/// What the rows of a table belong to.
+/// Whether the rows of a table are cells of a mesh or samples of a grid.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CellRows {
     /// One row per cell. The columns [`PLACES`] and `strip` say where the cell lies.

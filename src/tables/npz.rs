@@ -17,7 +17,7 @@ use crate::csv::{Precision, single};
 use crate::error::{Result, faulty, too_large};
 use crate::titles::require_few;
 
-/// What an array may hold.
+/// The types of numbers that are read.
 const KINDS: &str = "float32, float64, or integers";
 
 /// The arrays of an archive with their names, all of one length.
@@ -135,7 +135,7 @@ fn decoded(kind: &str, bytes: &[u8]) -> Option<Vec<f64>> {
     })
 }
 
-/// What an NPY header has to be a multiple of, the parts before it included.
+/// The length of an NPY header, with the parts before it, is a multiple of this.
 const ALIGNMENT: usize = 64;
 /// Bytes before the header: mark, version, length.
 const BEFORE_HEADER: usize = 10;

@@ -29,7 +29,7 @@ const GROUP_VALUES_MAX: usize = 1 << 24;
 /// Bytes of the texts of one column of a group at most.
 const TEXT_BYTES_MAX: usize = 1 << 27;
 
-/// The codecs of columns that are read. Those of GZIP and Brotli have no bound for what a page unpacks to.
+/// The codecs of columns that are read. GZIP and Brotli are not among them, because the library does not limit the size of an unpacked page.
 const CODECS: [CompressionCodec; 4] = [
     CompressionCodec::UNCOMPRESSED,
     CompressionCodec::SNAPPY,
@@ -267,7 +267,7 @@ impl<R: ChunkReader + 'static> TableReader<R> {
     }
 }
 
-/// What the stored values of a column stand for.
+/// How the stored values of a column become numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meaning {
     /// The values themselves.

@@ -37,7 +37,7 @@ pub struct TitledColumn {
     pub name: String,
     /// The place in the case that it stands for; a column without one is carried along to the answers.
     pub pointer: Option<String>,
-    /// What makes a number that was sent one of the case, in its unit.
+    /// Turns a number as it was sent into the unit of the case.
     #[serde(default = "unchanged")]
     pub factor: f64,
     /// Unit named in its title or in a line of units.
@@ -560,8 +560,8 @@ impl NamedColumns {
     }
 }
 
-/// What a column is: a place in the case, or nothing if it is carried along. `named` is what the client says of it, `in_query` whether the
-/// query may say so.
+/// The place of a column in the case; nothing if it is carried along. `named` is its name in the query, and `in_query` says whether queries of
+/// the route name columns.
 fn place_of(
     title: &str,
     below: Option<&str>,

@@ -203,7 +203,7 @@ fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
     faults
 }
 
-/// What a case says of a pair of cross-sections, its placement aside.
+/// The members of a case that describe a pair of cross-sections, without its placement.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PairWords<'a> {
     /// Rail and wheel.

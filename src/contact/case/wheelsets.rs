@@ -208,7 +208,7 @@ fn sections(contact: &Contact) -> Sections<'_> {
     [left, [of_right(0), of_right(1)]]
 }
 
-/// What a case says of the pair of a side, its placement at a shift and a yaw without roll, and the pointer to the rolling radius.
+/// The members of a case that describe the pair of a side, its placement at a shift and a yaw without roll, and the pointer to the rolling radius.
 fn placement(
     contact: &Contact,
     side: usize,
