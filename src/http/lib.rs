@@ -42,6 +42,7 @@ use axum::extract::DefaultBodyLimit;
 use axum::http::Uri;
 use axum::middleware::{from_fn, from_fn_with_state};
 use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::decompression::DecompressionLayer;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
@@ -114,12 +115,16 @@ pub fn routers(
 
 fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
     let (resources, _) = resources().split_for_parts();
-    let contract = SwaggerUi::new("/docs").config(
-        // The validator badge would ask a server on the internet.
-        Config::from("/openapi.json")
-            .validator_url("none")
-            .try_it_out_enabled(true),
-    );
+    let contract: Router<AppState> = SwaggerUi::new("/docs")
+        .config(
+            // The validator badge would ask a server on the internet.
+            Config::from("/openapi.json")
+                .validator_url("none")
+                .try_it_out_enabled(true),
+        )
+        .into();
+    // Its files are packed in the program; clients choose their compression as for all answers.
+    let contract = contract.layer(DecompressionLayer::new());
     let router = resources
         .merge(contract)
         .merge(page::routes(options.page_dir.clone()))
