@@ -158,7 +158,7 @@ pub fn check(case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
 /// Like [`check`], for one of many cases: profiles that were read for a case before are not read again.
 ///
 /// # Errors
-/// The same.
+/// See [`check`].
 pub fn check_with(
     known: &KnownPair,
     case: &Value,
@@ -179,7 +179,7 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<(Solution, Fie
 /// Like [`solve`], for one of many problems: the store keeps operators for patches of the same shape.
 ///
 /// # Errors
-/// The same.
+/// See [`solve`].
 pub fn solve_with(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,

@@ -30,7 +30,7 @@ use crate::rolling::refinement::interpolate::RefinementState;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Resolution, RollingTask, TARGET_USUAL};
 use crate::rolling::{force_control, history};
-use crate::solution::words::answer::{Fields, MotionRegion, NormalReport, PatchSolution, Solution};
+use crate::solution::words::answer::{Fields, NormalReport, PatchSolution, Solution};
 use crate::time_limit::TimeLimit;
 use crate::{normal_stage, rolling_stage};
 
@@ -362,14 +362,7 @@ fn with_patches_of(
 
 /// Writes region and pressure of the one motion of a patch into its point.
 pub(crate) fn tell_region(patch: &mut PatchSolution) {
-    let region = MotionRegion {
-        normal_force_n: patch.normal_force_n,
-        friction_limit_n: patch.friction_limit_n,
-        approach_mm: patch.approach_mm,
-        area_mm2: patch.area_mm2,
-        pressure_max_mpa: patch.pressure_max_mpa,
-        extent_mm: patch.extent_mm,
-    };
+    let region = patch.region();
     for point in &mut patch.points {
         point.region = Some(Box::new(region));
     }

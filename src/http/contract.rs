@@ -15,6 +15,7 @@ use utoipa_axum::router::OpenApiRouter;
 use crate::contract;
 use crate::problem::{ProblemBody, ProblemKind, describe, describe_together};
 use crate::routes::work::{header_parameter, text_header};
+use crate::state::Document;
 
 #[derive(OpenApi)]
 #[openapi(
@@ -80,10 +81,6 @@ pub(super) fn text(mut document: utoipa::openapi::OpenApi) -> String {
     contract::share(&mut document);
     contract::lines(&document)
 }
-
-/// Returns the text of the contract, which is built on the first request for it.
-#[derive(Debug, Clone, Copy)]
-pub struct Document(pub fn() -> &'static str);
 
 /// What requests of a tenant may be answered with, whatever they ask.
 const COMMON: &[ProblemKind] = &[

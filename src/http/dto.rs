@@ -636,7 +636,7 @@ pub(crate) struct Sum {
     pub history: Option<HistoryPoint>,
 }
 
-/// Sums over all patches of a motion, of what `total` does not have; nothing if it has no patches.
+/// Sums over all patches of a motion that `total` does not contain; `None` without patches.
 #[must_use]
 pub(crate) fn sum(solution: &Solution, motion: usize) -> Option<Sum> {
     let parts = || solution.at(motion);

@@ -47,7 +47,6 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
-use crate::contract::Document;
 use crate::extract::{accept, query};
 use crate::layers::metrics::{self, Metrics};
 use crate::layers::{admission, auth, client_address, etag, request_log, response};
@@ -57,7 +56,7 @@ use crate::routes::{
     service, work,
 };
 use crate::server::drain_body;
-use crate::state::AppState;
+use crate::state::{AppState, Document};
 use railhead_jobs::Jobs;
 use railhead_jobs::model::Kind;
 

@@ -2,13 +2,16 @@
 
 use axum::extract::FromRef;
 
-use crate::contract::Document;
 use crate::extract::caller::AnyTenant;
 use crate::layers::auth::Access;
 use crate::layers::metrics::Metrics;
 use crate::limits::{ConcurrencyLimits, Memory};
 use crate::options::HttpOptions;
 use railhead_jobs::Jobs;
+
+/// Returns the text of the contract, which is built on the first request for it.
+#[derive(Debug, Clone, Copy)]
+pub struct Document(pub fn() -> &'static str);
 
 /// What every handler can reach; clones share it.
 #[derive(Clone, FromRef)]

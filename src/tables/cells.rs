@@ -102,7 +102,7 @@ pub const PLACES: [&str; 4] = ["x_mm", "y_mm", "dx_mm", "dy_mm"];
 /// One value per row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellColumn {
-    /// The same name in every format.
+    /// Name of the column, equal in all formats.
     pub name: &'static str,
     /// The values.
     pub data: CellData,

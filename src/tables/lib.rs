@@ -28,7 +28,7 @@ pub mod write;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Calls a library that may panic at damaged bytes; nothing if it did.
+/// Calls a library that may panic at damaged bytes; `None` if it panics.
 fn guarded<T>(read: impl FnOnce() -> T) -> Option<T> {
     catch_unwind(AssertUnwindSafe(read)).ok()
 }

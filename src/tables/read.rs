@@ -12,7 +12,7 @@ use crate::arrow;
 use crate::error::{Result, faulty, too_large};
 use crate::npz::read_arrays;
 use crate::parquet::TableReader;
-use crate::table::{RowTable, TableColumn, TableKind};
+use crate::table::{Chunk, RowTable, TableColumn, TableKind, Title};
 use crate::text::{CsvRows, JsonRows};
 use crate::titles::{NamedColumns, Titled, TitledColumn, require_few};
 
@@ -88,20 +88,6 @@ impl TableSource {
         }
     }
 }
-
-/// The title of a column.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Title {
-    /// The title as sent.
-    pub name: String,
-    /// Its unit in a line of units.
-    pub unit: Option<String>,
-    /// It holds texts; otherwise numbers.
-    pub text: bool,
-}
-
-/// Some rows, column by column; numbers are NaN where a row has none.
-pub type Chunk = Vec<Values>;
 
 /// A table, read some rows at a time.
 pub struct TableRows {

@@ -1,5 +1,6 @@
 //! A table of rows: named columns of numbers and texts.
 
+use railhead_contact::evaluate::varied::Values;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -31,6 +32,20 @@ pub enum TableKind {
     #[serde(rename = "text")]
     Texts,
 }
+
+/// The title of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Title {
+    /// The title as sent.
+    pub name: String,
+    /// Its unit in a line of units.
+    pub unit: Option<String>,
+    /// It holds texts; otherwise numbers.
+    pub text: bool,
+}
+
+/// Some rows, column by column; numbers are NaN where a row has none.
+pub type Chunk = Vec<Values>;
 
 /// Columns of the same length.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -10,7 +10,7 @@ use railhead_contact::evaluate::varied::Values;
 pub use csv::StringRecord;
 
 use crate::error::{Result, TableError, faulty};
-use crate::read::{Chunk, Title};
+use crate::table::{Chunk, Title};
 use crate::titles::{Decimals, delimiter, is_line_of_units, is_text, number, require_few};
 
 /// Rows that are read at once.

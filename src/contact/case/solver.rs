@@ -8,13 +8,13 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::case::wheel_task::{PairWords, Placed};
 use crate::case::words::cross_section::CrossSection;
 use crate::case::words::solver::{MethodName, Solver};
 use crate::error::Fault;
-use crate::geometry::wheel_rail::Placement;
+use crate::geometry::wheel_rail::{Placement, WheelRail};
 use crate::method::Method;
 use crate::problem::memory::SizeInput;
+use crate::remark::entry::RemarkEntry;
 use crate::rolling::methods::fastsim;
 use crate::rolling::operator_store::BYTES_DEFAULT;
 use crate::rolling::task::{Resolution, TARGET_USUAL};
@@ -107,6 +107,20 @@ const PAIRS_MAX: usize = 16;
 /// The pairs read last, the most recent first.
 #[derive(Debug, Default)]
 pub struct KnownPair(Mutex<Vec<Arc<PairRead>>>);
+
+/// The members of a case that describe a pair of cross-sections, without its placement.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PairWords<'a> {
+    /// Rail and wheel.
+    pub(crate) sections: [&'a CrossSection; 2],
+    /// y of the back of the flange, if the case states it.
+    pub(crate) flange_back: Option<f64>,
+    /// Whether rough or exchanged profiles are accepted.
+    pub(crate) accept_rough: bool,
+}
+
+/// A wheel over its rail, with a remark on the back of its flange.
+pub(crate) type Placed = (WheelRail, Option<RemarkEntry>);
 
 /// A pair with the remark on its flange, and the words that it was read from.
 #[derive(Debug)]

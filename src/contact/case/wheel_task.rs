@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::case::contact_task;
-use crate::case::solver::KnownPair;
+use crate::case::solver::{KnownPair, PairWords, Placed};
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::cross_section::{CrossSection, Smoothing, SmoothingWord};
 use crate::case::words::motion::{Motions, Wheelset};
@@ -203,17 +203,6 @@ fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
     faults
 }
 
-/// The members of a case that describe a pair of cross-sections, without its placement.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PairWords<'a> {
-    /// Rail and wheel.
-    pub(crate) sections: [&'a CrossSection; 2],
-    /// y of the back of the flange, if the case states it.
-    pub(crate) flange_back: Option<f64>,
-    /// Whether rough or exchanged profiles are accepted.
-    pub(crate) accept_rough: bool,
-}
-
 /// A wheel over its rail, with the remark on the back of its flange, from whose position the placement follows; the pointers are those of rail and
 /// wheel, and of the rolling radius.
 pub(crate) fn in_place(
@@ -243,9 +232,6 @@ pub(crate) fn in_place(
         .map_err(|reason| explained(vec![unplaced(reason, [pointers[0], radius])]))?;
     Ok((geometry, remark))
 }
-
-/// A wheel over its rail, with a remark on the back of its flange.
-pub(crate) type Placed = (WheelRail, Option<RemarkEntry>);
 
 /// The fault of a wheel that is not above its rail.
 pub(crate) fn meet(geometry: &WheelRail) -> Result<(), Vec<Fault>> {

@@ -3,10 +3,8 @@
 use std::sync::Arc;
 
 use crate::case::motions::swept_values;
-use crate::case::solver::Limits;
-use crate::case::wheel_task::{
-    PairWords, both, in_place, meet, moves, profile_at, remarks_of, trust,
-};
+use crate::case::solver::{Limits, PairWords};
+use crate::case::wheel_task::{both, in_place, meet, moves, profile_at, remarks_of, trust};
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::cross_section::CrossSection;
 use crate::case::words::motion::{Combine, Motions, Swept};

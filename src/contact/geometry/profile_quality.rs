@@ -524,7 +524,7 @@ pub struct PointsRead<'a> {
     pub rounding: Option<f64>,
 }
 
-/// Roughness at the contact `[low, high]` (mm along the profile): the readings are compared there and beside it, at places of equal distance.
+/// Roughness at the contact `[low, high]`, in mm along the profile. Compares the readings there and beside it, at equally spaced points.
 /// The contact modulus is in MPa.
 fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Roughness {
     let PointsRead {

@@ -136,7 +136,7 @@ fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
 /// Assesses the profiles under the patches of a wheel at rest.
 struct Judgement<'a> {
     contact: &'a WheelTask,
-    /// What was found under the last wheel.
+    /// Findings of the last wheel that was judged.
     last: Option<Assessed>,
 }
 

@@ -24,7 +24,8 @@ use railhead_contact::evaluate::varied::{Values, members};
 use railhead_jobs::Jobs;
 use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
-use railhead_tables::read::{Chunk, TableForm, TableRows, TableSource, Title};
+use railhead_tables::read::{TableForm, TableRows, TableSource};
+use railhead_tables::table::{Chunk, Title};
 use railhead_tables::text::{CsvRows, StringRecord, without_mark};
 use railhead_tables::titles::{Decimals, Place, converted, is_text, place, question, short_names};
 

@@ -244,7 +244,7 @@ pub struct PassageValue {
     pub stress: f64,
     /// States that decide it.
     pub deciding: Vec<usize>,
-    /// What is left of the search for the smallest ball: see [`EnclosingBall`](crate::post::subsurface::worst::EnclosingBall).
+    /// State of the search for the smallest enclosing ball, see [`EnclosingBall`](crate::post::subsurface::worst::EnclosingBall).
     pub gap: f64,
 }
 

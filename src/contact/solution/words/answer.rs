@@ -184,14 +184,7 @@ impl Solution {
             let point = point?;
             let region = match point.region.as_deref() {
                 Some(region) => *region,
-                None => MotionRegion {
-                    normal_force_n: patch.normal_force_n,
-                    friction_limit_n: patch.friction_limit_n,
-                    approach_mm: patch.approach_mm,
-                    area_mm2: patch.area_mm2,
-                    pressure_max_mpa: patch.pressure_max_mpa,
-                    extent_mm: patch.extent_mm,
-                },
+                None => patch.region(),
             };
             Some(PatchPoint {
                 number,
@@ -232,6 +225,21 @@ pub struct PatchSolution {
     pub quality: Option<PatchQuality>,
     /// One entry per motion, in the order of the case.
     pub points: Vec<PointSolution>,
+}
+
+impl PatchSolution {
+    /// Its region and pressure under the first motion.
+    #[must_use]
+    pub fn region(&self) -> MotionRegion {
+        MotionRegion {
+            normal_force_n: self.normal_force_n,
+            friction_limit_n: self.friction_limit_n,
+            approach_mm: self.approach_mm,
+            area_mm2: self.area_mm2,
+            pressure_max_mpa: self.pressure_max_mpa,
+            extent_mm: self.extent_mm,
+        }
+    }
 }
 
 /// Position of the load centre of a patch on wheel and rail, and the frame of the patch's coordinates.
