@@ -1,4 +1,5 @@
-//! The contract: an OpenAPI 3.1 document made from the handlers and their types, with the examples of `api/examples`.
+//! The contract: an OpenAPI 3.1 document generated from the handlers and their types, with the examples of `api/examples`.
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use axum::extract::State;
@@ -12,7 +13,6 @@ use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement
 use utoipa::openapi::{Discriminator, Ref, RefOr, ResponseBuilder, Schema};
 use utoipa_axum::router::OpenApiRouter;
 
-use crate::contract;
 use crate::problem::{ProblemBody, ProblemKind, describe, describe_together};
 use crate::routes::work::{header_parameter, text_header};
 use crate::state::Document;
@@ -39,12 +39,12 @@ use crate::state::Document;
 )]
 struct Head;
 
-/// The part of the document that no route carries.
+/// Returns the document without routes.
 pub(super) fn head() -> utoipa::openapi::OpenApi {
     Head::openapi()
 }
 
-/// Documents that every `GET` of these routes answers conditional requests.
+/// Documents conditional requests for every `GET` of these routes.
 pub(super) fn conditional<S: Clone + Send + Sync + 'static>(
     mut routes: OpenApiRouter<S>,
 ) -> OpenApiRouter<S> {
@@ -68,21 +68,21 @@ pub(super) fn conditional<S: Clone + Send + Sync + 'static>(
     routes
 }
 
-/// The contract as JSON text, ending with a line break, made from what the routes say of themselves.
+/// Returns the contract as JSON text that ends with a line break, from the document of all routes.
 pub(super) fn text(mut document: utoipa::openapi::OpenApi) -> String {
     for path in ["/v1/jobs", "/v1/cases/check"] {
         add_examples(&mut document, path);
     }
     add_batches(&mut document);
     require_keys(&mut document);
-    contract::complete(&mut document);
-    // Only a map with keys that are not strings cannot be written; the document has none.
+    complete(&mut document);
+    // Serialisation fails only for maps with keys that are not strings, which the document does not have.
     let mut document = serde_json::to_value(&document).unwrap_or_default();
-    contract::share(&mut document);
-    contract::lines(&document)
+    share(&mut document);
+    lines(&document)
 }
 
-/// What requests of a tenant may be answered with, whatever they ask.
+/// Problems that every request of a tenant can have.
 const COMMON: &[ProblemKind] = &[
     ProblemKind::BadHeader,
     ProblemKind::Unauthorized,
@@ -97,15 +97,14 @@ const COMMON: &[ProblemKind] = &[
     ProblemKind::StorageUnreachable,
     ProblemKind::StorageFull,
 ];
-/// The same of requests that concern no tenant.
+/// Problems that every request without a tenant can have.
 const COMMON_OPEN: &[ProblemKind] = &[
     ProblemKind::NotAcceptable,
     ProblemKind::Internal,
     ProblemKind::Overloaded,
 ];
 
-/// Says of every operation on what belongs to a tenant that it may need a key, and that its work may have expired; and of every operation
-/// which problems all have in common.
+/// Documents keys and expiry for the operations of a tenant, and the common problems for all operations.
 fn require_keys(document: &mut utoipa::openapi::OpenApi) {
     let scheme = HttpBuilder::new()
         .scheme(HttpAuthScheme::Bearer)
@@ -152,7 +151,7 @@ fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {
     }
 }
 
-/// Shows a batch in the forms that need nothing else.
+/// Adds a batch as an example in JSON and in NDJSON.
 fn add_batches(document: &mut utoipa::openapi::OpenApi) {
     let cases = EXAMPLES.iter().take(2);
     let cases = cases.filter_map(|(_, _, text)| serde_json::from_str(text).ok());
@@ -194,7 +193,7 @@ fn add_example(
     responses((status = 200, description = "The contract in OpenAPI 3.1", body = Value))
 )]
 pub(super) async fn contract(State(Document(text)): State<Document>) -> Response {
-    // The newline at the end is that of every answer.
+    // A layer appends the line break to every response.
     let text = text().trim_end();
     ([(header::CONTENT_TYPE, "application/json")], text).into_response()
 }
@@ -209,7 +208,7 @@ macro_rules! examples {
     };
 }
 
-/// Name, summary and text of each.
+/// The examples: name, summary and text.
 pub(super) const EXAMPLES: [(&str, &str, &str); 18] = examples! {
     "hertz-steel": "A wheel on a rail by its radii, with both creepages and spin";
     "spin": "An ellipse with lateral creepage and spin";
@@ -231,11 +230,11 @@ pub(super) const EXAMPLES: [(&str, &str, &str); 18] = examples! {
     "paper-figure-5": "Force and moment against longitudinal creepage, as their figure 5";
 };
 
-/// Schemas that requests are made of; what they lead to belongs to them.
+/// Schemas of requests; the schemas that they refer to are requests too.
 const REQUESTS: [&str; 4] = ["Case", "CaseWithOptions", "EvaluateRequest", "TableUpload"];
 
-/// Names for the forms of a choice that have none, in their order.
-const FORMS: [(&str, &[&str]); 6] = [
+/// Names for the unnamed alternatives of a schema, in order.
+const ALTERNATIVES: [(&str, &[&str]); 6] = [
     (
         "Contact",
         &[
@@ -263,17 +262,17 @@ const FORMS: [(&str, &[&str]); 6] = [
     ("Thermal", &["ThermalOfTwo"]),
 ];
 
-/// Choices whose forms are told apart by a word in this member.
-const TOLD_BY: [(&str, &str); 1] = [("Contact", "type")];
+/// Schemas whose alternatives have a discriminator: this member.
+const DISCRIMINATORS: [(&str, &str); 1] = [("Contact", "type")];
 
-/// Least and largest number of members.
+/// Least and largest number of members of a schema.
 const MEMBERS: [(&str, usize, Option<usize>); 3] = [
     ("AskedMotion", 1, None),
     ("Load", 1, Some(2)),
     ("Sweep", 1, None),
 ];
 
-/// Members that are lists of so many numbers, or lists of those.
+/// Members that are arrays of this many numbers, or arrays of such arrays.
 const TUPLES: [(&str, &str, usize); 38] = [
     ("ArchardFigures", "speeds_mm_per_s", 2),
     ("CrossSection", "guard_rail_points_mm", 2),
@@ -315,12 +314,12 @@ const TUPLES: [(&str, &str, usize); 38] = [
     ("TemperatureSummary", "at_mm", 2),
 ];
 
-/// Says all of it.
-pub(super) fn complete(document: &mut utoipa::openapi::OpenApi) {
+/// Adds what derived schemas lack: names of alternatives, discriminators, closed requests, numbers of members, lengths of arrays.
+fn complete(document: &mut utoipa::openapi::OpenApi) {
     let components = document.components.get_or_insert_default();
-    name_forms(components);
-    for (name, member) in TOLD_BY {
-        tell_by(components, name, member);
+    name_alternatives(components);
+    for (name, member) in DISCRIMINATORS {
+        add_discriminator(components, name, member);
     }
     for name in reached(components) {
         if let Some(schema) = components.schemas.get_mut(&name) {
@@ -342,14 +341,17 @@ pub(super) fn complete(document: &mut utoipa::openapi::OpenApi) {
     }
 }
 
-fn forms<'a>(components: &'a mut Components, name: &str) -> Option<&'a mut Vec<RefOr<Schema>>> {
+fn alternatives<'a>(
+    components: &'a mut Components,
+    name: &str,
+) -> Option<&'a mut Vec<RefOr<Schema>>> {
     match components.schemas.get_mut(name) {
         Some(RefOr::T(Schema::OneOf(choice))) => Some(&mut choice.items),
         _ => None,
     }
 }
 
-/// Says that a schema has no members but its own, nor has what is written inside it.
+/// Disallows additional members in a schema and in the schemas written inside it.
 fn close(schema: &mut RefOr<Schema>) {
     match schema {
         RefOr::T(Schema::Object(object)) => {
@@ -369,15 +371,15 @@ fn close(schema: &mut RefOr<Schema>) {
     }
 }
 
-/// Makes schemas of the forms of choices, which lead to them.
-fn name_forms(components: &mut Components) {
-    for (choice, names) in FORMS {
+/// Moves the unnamed alternatives of schemas into components of their own.
+fn name_alternatives(components: &mut Components) {
+    for (choice, names) in ALTERNATIVES {
         let mut names = names.iter();
         let mut named = BTreeMap::new();
-        let Some(forms) = forms(components, choice) else {
+        let Some(forms) = alternatives(components, choice) else {
             continue;
         };
-        // Some clients take the first form that lacks nothing, whatever else is there.
+        // Some clients take the first alternative whose required members are present.
         forms.sort_by_key(|form| !requires(form));
         for form in forms {
             if matches!(form, RefOr::T(Schema::Object(object)) if !object.properties.is_empty())
@@ -391,14 +393,14 @@ fn name_forms(components: &mut Components) {
     }
 }
 
-/// Does this form have members that must be there?
+/// Whether an alternative has required members.
 fn requires(form: &RefOr<Schema>) -> bool {
     matches!(form, RefOr::T(Schema::Object(object)) if !object.required.is_empty())
 }
 
-/// Says which word of a member stands for which form of a choice.
-fn tell_by(components: &mut Components, choice: &str, member: &str) {
-    let leading = forms(components, choice).map(|forms| references(forms.iter()));
+/// Adds the discriminator of a schema: the word of a member that selects each alternative.
+fn add_discriminator(components: &mut Components, choice: &str, member: &str) {
+    let leading = alternatives(components, choice).map(|forms| references(forms.iter()));
     let mut told = Discriminator::new(member);
     for form in leading.unwrap_or_default() {
         if let Some(RefOr::T(Schema::Object(object))) = components.schemas.get(&form)
@@ -415,7 +417,7 @@ fn tell_by(components: &mut Components, choice: &str, member: &str) {
     }
 }
 
-/// The schemas of requests and all that they lead to.
+/// Returns the names of the schemas of requests and of all schemas that they refer to.
 fn reached(components: &Components) -> BTreeSet<String> {
     let mut seen = BTreeSet::new();
     let mut next: Vec<String> = REQUESTS.map(str::to_owned).into();
@@ -429,7 +431,7 @@ fn reached(components: &Components) -> BTreeSet<String> {
     seen
 }
 
-/// Names of the schemas that these lead to at once.
+/// Returns the names of the schemas that these refer to directly.
 fn references<'a>(schemas: impl IntoIterator<Item = &'a RefOr<Schema>>) -> Vec<String> {
     let mut found = Vec::new();
     for schema in schemas {
@@ -452,7 +454,7 @@ fn references<'a>(schemas: impl IntoIterator<Item = &'a RefOr<Schema>>) -> Vec<S
     found
 }
 
-/// Says how many numbers the innermost list has.
+/// Sets the length of the innermost array.
 fn fix_length(schema: &mut Schema, length: usize) {
     let Schema::Array(array) = schema else {
         return;
@@ -465,7 +467,7 @@ fn fix_length(schema: &mut Schema, length: usize) {
         RefOr::T(number @ Schema::Object(_)) => {
             array.prefix_items = vec![number.clone(); length];
             array.min_items = Some(length);
-            // `items: false` would say the same; some makers of clients cannot read it.
+            // `items: false` means the same, but some generators of clients cannot read it.
             array.max_items = Some(length);
         }
         _ => {}
@@ -473,8 +475,8 @@ fn fix_length(schema: &mut Schema, length: usize) {
 }
 
 /// Moves headers, responses, parameters and examples that several operations have into `components`.
-pub(super) fn share(document: &mut Value) {
-    leave_out_double(document);
+fn share(document: &mut Value) {
+    remove_double(document);
     for (kind, path) in SHARED {
         let path: Vec<&str> = path.split('/').collect();
         let mut uses: BTreeMap<String, usize> = BTreeMap::new();
@@ -508,8 +510,8 @@ pub(super) fn share(document: &mut Value) {
     }
 }
 
-/// Leaves out that numbers are of double precision: all are, as the head of the document says.
-fn leave_out_double(value: &mut Value) {
+/// Removes the format `double` of numbers, which the head of the document states for all of them.
+fn remove_double(value: &mut Value) {
     match value {
         Value::Object(members) => {
             if members
@@ -518,15 +520,15 @@ fn leave_out_double(value: &mut Value) {
             {
                 members.remove("format");
             }
-            members.values_mut().for_each(leave_out_double);
+            members.values_mut().for_each(remove_double);
         }
-        Value::Array(items) => items.iter_mut().for_each(leave_out_double),
+        Value::Array(items) => items.iter_mut().for_each(remove_double),
         _ => {}
     }
 }
 
-/// The contract as text: one line for each operation and each component.
-pub(super) fn lines(document: &Value) -> String {
+/// Returns the contract as text, with one line for each operation and each component.
+fn lines(document: &Value) -> String {
     let mut text = String::new();
     write(document, &[], &mut text);
     text.push('\n');
@@ -553,7 +555,7 @@ fn write(value: &Value, path: &[&str], text: &mut String) {
     }
 }
 
-/// Components that operations share: the member of `components`, and where they stand; `*` is any member or entry.
+/// Components that operations share: the member of `components`, and the path of their uses; `*` is any member or entry.
 const SHARED: [(&str, &str); 4] = [
     ("headers", "paths/*/*/responses/*/headers/*"),
     ("responses", "paths/*/*/responses/*"),
@@ -561,7 +563,7 @@ const SHARED: [(&str, &str); 4] = [
     ("examples", "paths/*/*/requestBody/content/*/examples/*"),
 ];
 
-/// The name of a component, which may get a number.
+/// Returns the name of a component, to which a number may be appended.
 fn stem(kind: &str, key: &str, value: &Value) -> String {
     let reason = || {
         StatusCode::from_u16(key.parse().ok()?)
@@ -614,7 +616,7 @@ mod tests {
     fn every_entry_of_the_tables_is_there() {
         let document = document();
         let schemas = &document["components"]["schemas"];
-        for name in FORMS.iter().flat_map(|(_, names)| *names) {
+        for name in ALTERNATIVES.iter().flat_map(|(_, names)| *names) {
             assert!(schemas[name].is_object(), "{name}");
         }
         for (name, member, length) in TUPLES {
@@ -624,7 +626,7 @@ mod tests {
                 "{name}.{member}: {text}"
             );
         }
-        for (choice, member) in TOLD_BY {
+        for (choice, member) in DISCRIMINATORS {
             let schema = &schemas[choice];
             let told = &schema["discriminator"];
             assert_eq!(told["propertyName"], member);
@@ -633,7 +635,7 @@ mod tests {
         }
     }
 
-    /// Every object below a schema that has members but lets others in.
+    /// Finds the objects below a schema that have members but allow others.
     fn open(schema: &Value, found: &mut Vec<Value>) {
         match schema {
             Value::Object(members) => {
@@ -649,7 +651,7 @@ mod tests {
         }
     }
 
-    /// The schemas that a part of the document leads to at once.
+    /// Finds the schemas that a part of the document refers to directly.
     fn leads(part: &Value, found: &mut Vec<String>) {
         match part {
             Value::Object(members) => {

@@ -1,4 +1,5 @@
-//! The forms of answers as JSON.
+//! Types of JSON responses.
+
 use std::collections::BTreeMap;
 
 use railhead_macros::none_is_absent;
@@ -13,7 +14,7 @@ use railhead_contact::case::words::motion::MotionWords;
 use railhead_contact::case::words::solver::{Case, Output};
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::answer::{
-    ErrorEstimate, HistoryPoint, Origin, Solution, Total, Zone,
+    ErrorEstimate, HistoryPoint, Origin, PatchPoint, Solution, Total, Zone,
 };
 use railhead_contact::solution::words::damage::ProfileUncertainty;
 use railhead_jobs::model::{Batch, Job, Kind, Priority, QueuePlace, State as JobState};
@@ -79,7 +80,7 @@ pub(crate) struct JobAnswer {
 }
 
 impl JobAnswer {
-    /// Shows a job.
+    /// Converts a job.
     #[must_use]
     pub(crate) fn new(job: Job) -> Self {
         let error = job
@@ -111,7 +112,7 @@ impl JobAnswer {
     }
 }
 
-/// What can be done with a job in its present state.
+/// Returns the links of a job in its present state.
 fn job_links(job: &Job) -> BTreeMap<String, String> {
     let (own, asked) = match job.kind {
         Kind::Evolution => (format!("/v1/evolutions/{}", job.id), "request"),
@@ -124,7 +125,7 @@ fn job_links(job: &Job) -> BTreeMap<String, String> {
     links(own, [asked, "events"].into_iter().chain(own_state))
 }
 
-/// The path of something, and those of its parts.
+/// Returns the path of a resource and the paths of its parts.
 fn links<'a>(own: String, parts: impl IntoIterator<Item = &'a str>) -> BTreeMap<String, String> {
     let below = parts.into_iter();
     let below = below.map(|name| (name.to_owned(), format!("{own}/{name}")));
@@ -133,7 +134,7 @@ fn links<'a>(own: String, parts: impl IntoIterator<Item = &'a str>) -> BTreeMap<
     links
 }
 
-/// Milliseconds since 1970 as RFC 3339 in UTC, for example `2026-01-31T09:30:00.000Z`.
+/// Formats milliseconds since 1970 as RFC 3339 in UTC, for example `2026-01-31T09:30:00.000Z`.
 pub(crate) fn rfc3339(epoch_ms: i64) -> String {
     jiff::Timestamp::from_millisecond(epoch_ms)
         .map_or_else(|_| epoch_ms.to_string(), |time| format!("{time:.3}"))
@@ -144,7 +145,7 @@ pub(crate) fn rfc3339(epoch_ms: i64) -> String {
 #[schema(min_items = 1, max_items = 200_000)]
 #[expect(
     dead_code,
-    reason = "the form of a body that is cut into cases while it arrives"
+    reason = "describes a body that is split into cases while it arrives"
 )]
 pub(crate) struct Cases(Vec<BatchElement>);
 
@@ -153,7 +154,7 @@ pub(crate) struct Cases(Vec<BatchElement>);
 #[serde(untagged)]
 #[expect(
     dead_code,
-    reason = "the form of a body that is cut into cases while it arrives"
+    reason = "describes a body that is split into cases while it arrives"
 )]
 pub(crate) enum BatchElement {
     /// A case without options.
@@ -166,7 +167,7 @@ pub(crate) enum BatchElement {
 #[derive(ToSchema)]
 #[expect(
     dead_code,
-    reason = "the form of a body that is cut into cases while it arrives"
+    reason = "describes a body that is split into cases while it arrives"
 )]
 pub(crate) struct CaseWithOptions {
     /// The case.
@@ -247,10 +248,9 @@ pub(crate) struct BatchStates {
 impl From<Batch> for BatchAnswer {
     fn from(batch: Batch) -> Self {
         let (ended, all) = batch.ended();
-        let progress = if all == 0 {
-            1.0
-        } else {
-            ended as f64 / all as f64
+        let progress = match all {
+            0 => 1.0,
+            _ => ended as f64 / all as f64,
         };
         let state = match (ended, batch.in_state(JobState::Running)) {
             (ended, _) if ended == all => BatchState::Ended,
@@ -293,7 +293,7 @@ fn batch_links(batch: &Batch) -> BTreeMap<String, String> {
 #[schema(as = RunRequest)]
 #[allow(
     dead_code,
-    reason = "the contract; bodies are read straight into columns"
+    reason = "describes a body that is read directly into columns"
 )]
 pub(crate) struct RunRequest {
     /// A case with one motion. Members that a column replaces may be omitted. Of `outputs` only `resultants`, `zones` and `gradients` are
@@ -311,7 +311,7 @@ pub(crate) struct RunRequest {
 #[serde(untagged)]
 #[allow(
     dead_code,
-    reason = "the contract; bodies are read straight into columns"
+    reason = "describes a body that is read directly into columns"
 )]
 pub(crate) enum CellValue {
     /// A number.
@@ -398,7 +398,7 @@ pub(crate) struct AnswerColumn {
     kind: TableKind,
 }
 
-/// The columns of the answers of a run.
+/// Returns the result columns of a run.
 #[must_use]
 pub(crate) fn answer_columns(run: &Run) -> Vec<AnswerColumn> {
     let columns = run.head.answers().into_iter();
@@ -459,23 +459,23 @@ pub(crate) struct JobResult {
 }
 
 impl JobResult {
-    /// What follows the stored solution, whose closing brace makes way for it.
+    /// Returns the JSON that replaces the closing brace of the stored solution.
     ///
     /// # Errors
     /// It cannot be written as JSON.
     pub(crate) fn tail(id: Uuid, cached: bool, outputs: &[Output]) -> Result<String> {
         let outputs: Vec<&str> = outputs.iter().copied().map(Output::name).collect();
         let links = serde_json::to_string(&JobResult::links(id, &outputs));
-        let links = links.map_err(|error| ApiError::internal(&error))?;
+        let links = links.map_err(ApiError::internal)?;
         Ok(format!(",\"cached\":{cached},\"links\":{links}}}"))
     }
 
-    /// The links of the result of a job whose case asked for these outputs.
+    /// Returns the links of the result of a job whose case requests these outputs.
     #[must_use]
     pub(crate) fn links(id: Uuid, outputs: &[impl AsRef<str>]) -> BTreeMap<String, String> {
         let own = format!("/v1/jobs/{id}");
         let mut links = BTreeMap::from([("resultants".to_owned(), format!("{own}/resultants"))]);
-        // Derivatives stand beside the resultants.
+        // Gradients are a part of the resultants.
         let own_parts = outputs.iter().map(AsRef::as_ref);
         for name in own_parts.filter(|name| *name != Output::Gradients.name()) {
             links.insert(name.to_owned(), format!("{own}/{name}"));
@@ -503,7 +503,7 @@ pub(crate) struct TenantLimits {
 }
 
 impl TenantLimits {
-    /// The limits that every tenant has.
+    /// Returns the limits of every tenant.
     #[must_use]
     pub(crate) fn of(options: &HttpOptions) -> TenantLimits {
         TenantLimits {
@@ -570,8 +570,56 @@ pub(crate) struct PointResultants {
     pub history: Option<Box<HistoryPoint>>,
 }
 
+impl PointResultants {
+    fn of_patch(motion: usize, part: &PatchPoint<'_>) -> PointResultants {
+        let point = part.point;
+        PointResultants {
+            point: motion,
+            motion: point.motion,
+            normal_force_n: part.region.normal_force_n,
+            force_x_n: point.force_x_n,
+            force_y_n: point.force_y_n,
+            moment_z_n_mm: point.moment_z_n_mm,
+            error_estimate: point.error_estimate,
+            profile_uncertainty: point.profile_uncertainty.map(Box::new),
+            friction_power_n: point.friction_power_n,
+            friction_power_without_spin_n: point.friction_power_without_spin_n,
+            saturated: point.saturated,
+            history: point.history.map(Box::new),
+        }
+    }
+
+    /// Returns the sums over all patches for a motion; `None` without patches.
+    #[must_use]
+    pub(crate) fn total(solution: &Solution, motion: usize) -> Option<PointResultants> {
+        let parts = || solution.at(motion);
+        let sum = |of: fn(&PatchPoint<'_>) -> f64| parts().map(|part| of(&part)).sum();
+        let total = solution.total.get(motion)?;
+        let first = PointResultants::of_patch(motion, &parts().next()?);
+        Some(PointResultants {
+            normal_force_n: sum(|part| part.region.normal_force_n),
+            force_x_n: total.force_x_n,
+            force_y_n: total.force_y_n,
+            moment_z_n_mm: total.moment_z_n_mm,
+            error_estimate: total.error_estimate,
+            friction_power_n: sum(|part| part.point.friction_power_n),
+            friction_power_without_spin_n: sum(|part| part.point.friction_power_without_spin_n),
+            saturated: parts().any(|part| part.point.saturated),
+            history: first.history.map(|history| {
+                Box::new(HistoryPoint {
+                    dissipated_n_mm: parts()
+                        .filter_map(|part| Some(part.point.history?.dissipated_n_mm))
+                        .sum(),
+                    ..*history
+                })
+            }),
+            ..first
+        })
+    }
+}
+
 impl Resultants {
-    /// Forces and moments of a solution: of one patch or all of them, for one motion or all of them.
+    /// Returns forces and moments of a solution, of one patch or all patches, for one motion or all motions.
     #[must_use]
     pub(crate) fn select(
         solution: Solution,
@@ -594,21 +642,8 @@ impl Resultants {
                     });
                     patches.len() - 1
                 });
-                let of = part.point;
-                patches[place].points.push(PointResultants {
-                    point: number,
-                    motion: of.motion,
-                    normal_force_n: part.region.normal_force_n,
-                    force_x_n: of.force_x_n,
-                    force_y_n: of.force_y_n,
-                    moment_z_n_mm: of.moment_z_n_mm,
-                    error_estimate: of.error_estimate,
-                    profile_uncertainty: of.profile_uncertainty.map(Box::new),
-                    friction_power_n: of.friction_power_n,
-                    friction_power_without_spin_n: of.friction_power_without_spin_n,
-                    saturated: of.saturated,
-                    history: of.history.map(Box::new),
-                });
+                let point = PointResultants::of_patch(number, &part);
+                patches[place].points.push(point);
             }
         }
         Resultants {
@@ -617,46 +652,6 @@ impl Resultants {
             origin: solution.origin,
         }
     }
-}
-
-/// What a line of CSV holds besides forces and their errors.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Sum {
-    /// The motion.
-    pub motion: MotionWords,
-    /// Normal force in N.
-    pub normal_force_n: f64,
-    /// Dissipated power divided by rolling speed, in N.
-    pub friction_power_n: f64,
-    /// The same without the part of spin, in N.
-    pub friction_power_without_spin_n: f64,
-    /// Whether a prescribed force could not be reached.
-    pub saturated: bool,
-    /// What a history adds, with what all patches have dissipated.
-    pub history: Option<HistoryPoint>,
-}
-
-/// Sums over all patches of a motion that `total` does not contain; `None` without patches.
-#[must_use]
-pub(crate) fn sum(solution: &Solution, motion: usize) -> Option<Sum> {
-    let parts = || solution.at(motion);
-    let points = || parts().map(|part| part.point);
-    let first = points().next()?;
-    Some(Sum {
-        motion: first.motion,
-        normal_force_n: parts().map(|part| part.region.normal_force_n).sum(),
-        friction_power_n: points().map(|point| point.friction_power_n).sum(),
-        friction_power_without_spin_n: points()
-            .map(|point| point.friction_power_without_spin_n)
-            .sum(),
-        saturated: points().any(|point| point.saturated),
-        history: first.history.map(|history| HistoryPoint {
-            dissipated_n_mm: points()
-                .filter_map(|point| Some(point.history?.dissipated_n_mm))
-                .sum(),
-            ..history
-        }),
-    })
 }
 
 /// Closed polygons as lists of `[x, y]` in mm; the last point is joined to the first. Outer borders run

@@ -1,22 +1,22 @@
-//! The HTTP API of the service. Handlers read a request, call [`Jobs`] and answer.
+//! The HTTP API of the service.
 //!
-//! The way of a request:
+//! A request takes these steps:
 //!
-//! 1. [`server::serve`] accepts the connection and passes its requests on. [`server::connections`] limits the number of connections,
-//!    and closes those whose client sends no request or does not read its answer.
+//! 1. [`server::serve`] accepts the connection. [`server::connections`] limits the number of connections, and closes those whose client
+//!    sends no request or does not read its response.
 //! 2. The [`layers`] around all routes, from the outside inward: headers for browsers ([`response::secure`]), the client behind a trusted
 //!    proxy ([`client_address`]), [`drain_body`], the request's id and its line in the log ([`request_log`]), `otel` (feature `otlp`),
 //!    [`metrics`], [`etag::complete`], compression and the final line break ([`response`]), the path in problems
-//!    ([`problem::name_instance`]), [`auth::admit`], what is left of the rate ([`auth::add_rate_limit_headers`]), what the request holds
-//!    until its answer is sent ([`limits::hold`]), panics as answers, [`admission`] of compressed bodies and their decompression.
-//! 3. The layers of a group of routes: whether JSON is accepted ([`accept::require_json`]) and what clients may keep
-//!    ([`etag::immutable`], [`etag::revalidate`]).
-//! 4. [`extract`]: the caller (key, tenant, rate), ids, query and body, each read strictly; what it takes is counted by
-//!    [`limits`].
-//! 5. The handler in [`routes`](mod@routes) asks [`Jobs`]. Parts of a result get their tag before any work is done ([`etag::tag_of`]).
-//! 6. The answer: a type of [`dto`] as JSON, or a form of [`render`].
-//! 7. [`page`] answers `/` and the files of the page, which needs no key and asks the same API.
-//! 8. Whatever fails becomes a [`problem`] with a kind, a status and what to do.
+//!    ([`problem::name_instance`]), [`auth::admit`], the rate limit ([`auth::add_rate_limit_headers`]), the permits of the request
+//!    ([`limits::hold`]), panics, [`admission`] and decompression of compressed bodies.
+//! 3. The layers of a group of routes: content negotiation ([`accept::require_json`]) and caching ([`etag::immutable`],
+//!    [`etag::revalidate`]).
+//! 4. [`extract`] reads the caller (key, tenant, rate), ids, query and body strictly, within the [`limits`].
+//! 5. The handler in [`routes`](mod@routes) calls [`Jobs`]. Parts of a result get their tag before any work is done ([`etag::tag_of`]).
+//! 6. The response is a type of [`dto`] as JSON, or a format of [`render`].
+//! 7. Every failure becomes a [`problem`] with a kind, a status and advice.
+//!
+//! [`page`] answers `/` and the files of the page, which needs no key and uses the same API.
 
 #![warn(unreachable_pub)]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
@@ -68,7 +68,7 @@ pub use crate::options::{AddressRange, HttpOptions};
 pub use crate::server::connections::Peer;
 pub use crate::server::serve;
 
-/// The contract as JSON text, ending with a line break; the same as `api/openapi.json`.
+/// Returns the contract as JSON text that ends with a line break, the same as `api/openapi.json`.
 #[must_use]
 pub fn openapi_json() -> String {
     (DOCUMENT.0)().to_owned()
@@ -82,14 +82,14 @@ const DOCUMENT: Document = Document(|| {
     &TEXT
 });
 
-/// The whole API, ready to be served.
+/// Returns the router of the API.
 pub fn router(jobs: Jobs, options: HttpOptions) -> Router {
     let metrics = Metrics::new(&jobs, || 0);
     api(jobs, options, metrics)
 }
 
-/// The whole API, and the probes and metrics alone for a port of their own, on which requests without a key are answered
-/// if `probes_anonymous` says so. `dropped_lines` returns the number of log lines that were dropped.
+/// Returns the router of the API, and one with the probes and metrics alone for a port of their own, which answers requests without a key
+/// if `probes_anonymous` is set. `dropped_lines` returns the number of log lines that were dropped.
 pub fn routers(
     jobs: Jobs,
     options: HttpOptions,
@@ -116,13 +116,13 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
     let (resources, _) = resources().split_for_parts();
     let contract: Router<AppState> = SwaggerUi::new("/docs")
         .config(
-            // The validator badge would ask a server on the internet.
+            // The validator badge would call a server on the internet.
             Config::from("/openapi.json")
                 .validator_url("none")
                 .try_it_out_enabled(true),
         )
         .into();
-    // Its files are packed in the program; clients choose their compression as for all answers.
+    // The program contains its files compressed; clients choose the compression as for all responses.
     let contract = contract.layer(DecompressionLayer::new());
     let router = resources
         .merge(contract)
@@ -154,7 +154,7 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
     response::secure(router)
 }
 
-/// Every documented route, in the order of the contract.
+/// Returns every documented route, in the order of the contract.
 fn resources() -> OpenApiRouter<AppState> {
     let every = |routes: fn(Kind) -> OpenApiRouter<AppState>| {
         let routes = work::KINDS.map(routes).into_iter();
@@ -179,7 +179,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .merge(case)
         .route_layer(from_fn(etag::immutable));
     let finished = contract::conditional(finished);
-    // They check their parameters themselves.
+    // These check their parameters themselves.
     let lists = OpenApiRouter::new()
         .routes(routes!(jobs::submit))
         .routes(routes!(batches::submit))
@@ -238,7 +238,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .merge(contract)
 }
 
-/// What is asked every few seconds, of a port of its own if there is one.
+/// Returns the routes that monitoring requests every few seconds, possibly on a port of their own.
 fn probes() -> OpenApiRouter<AppState> {
     OpenApiRouter::new()
         .routes(routes!(service::alive))

@@ -1,4 +1,5 @@
-//! What requests may take at once: places, memory, and turns at long work.
+//! Limits of concurrent requests, memory and long computations.
+
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 use std::thread::available_parallelism;
@@ -18,16 +19,16 @@ use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind, Result};
 use railhead_jobs::sync::{blocking, lock};
 
-/// Units of memory, requests or turns, in all and for each tenant. Clones share the semaphore.
+/// Counts units, such as requests or bytes, in total and for each tenant. Clones share the semaphore.
 #[derive(Debug, Clone)]
 pub(crate) struct TenantSemaphore {
     all: Arc<Semaphore>,
     of_tenant: usize,
-    /// Tenants are made by the operator, so their number is small.
+    /// The semaphores of the tenants. The operator creates tenants, so that their number is small.
     tenants: Arc<Mutex<HashMap<Arc<str>, Arc<Semaphore>>>>,
 }
 
-/// Units that one request holds; they are released on drop.
+/// Units that a request holds. They are released on drop.
 #[derive(Debug)]
 pub struct Permit {
     of_tenant: OwnedSemaphorePermit,
@@ -35,7 +36,7 @@ pub struct Permit {
 }
 
 impl TenantSemaphore {
-    /// A semaphore of `all` units, of which a tenant may hold `of_tenant`.
+    /// Creates a semaphore of `all` units, of which a tenant may hold `of_tenant`.
     #[must_use]
     pub(crate) fn new(all: usize, of_tenant: usize) -> TenantSemaphore {
         TenantSemaphore {
@@ -45,13 +46,13 @@ impl TenantSemaphore {
         }
     }
 
-    /// The most that one tenant may hold.
+    /// Returns the number of units that a tenant may hold.
     #[must_use]
     pub(crate) fn of_one(&self) -> usize {
         self.of_tenant
     }
 
-    /// Takes `many` units at once, if they are free.
+    /// Takes `many` units, if they are free.
     #[must_use]
     pub(crate) fn try_take(&self, tenant: &str, many: u32) -> Option<Permit> {
         let of_tenant = self.of(tenant).try_acquire_many_owned(many).ok()?;
@@ -92,27 +93,28 @@ impl Permit {
     }
 }
 
-/// How long a request waits for memory, or for its first turn.
+/// Time that a request waits for memory or for its first turn.
 const WITHIN: Duration = Duration::from_secs(20);
-/// How long a computation keeps its turn while others wait: far longer than passing it on takes, shorter than people notice.
+/// Time that a computation keeps its turn while others wait. A judgement: much longer than passing the turn on, too short to notice.
 const SLICE: Duration = Duration::from_millis(100);
 
-/// A number of turns; clones share them. Tenants that wait take turns: only one request of each stands in the line, where the others follow it.
+/// Slots for computations, which waiting tenants get in turn: one request of each tenant waits in the queue, the others wait for it. Clones share
+/// the slots.
 #[derive(Debug, Clone)]
 pub(crate) struct Turns {
     free: Arc<Semaphore>,
-    /// The place of each tenant in the line.
+    /// The place of each tenant in the queue.
     places: TenantSemaphore,
 }
 
-/// A turn; passed on when dropped.
+/// A slot for a computation. It is released on drop.
 #[derive(Debug)]
 pub struct Turn(
     #[expect(dead_code, reason = "held until it is dropped")] Option<OwnedSemaphorePermit>,
 );
 
 impl Turns {
-    /// This many turns, at least one.
+    /// Creates this many slots, at least one.
     #[must_use]
     pub(crate) fn new(count: usize) -> Turns {
         Turns {
@@ -121,29 +123,27 @@ impl Turns {
         }
     }
 
-    /// Waits for a turn.
+    /// Waits for a slot.
     pub(crate) async fn take(&self, tenant: &str) -> Turn {
         let _place = self.places.of(tenant).acquire_owned().await;
-        // It is never closed.
+        // The semaphore is never closed.
         Turn(self.free.clone().acquire_owned().await.ok())
     }
 
-    /// Waits for a turn, but not longer than a request may wait.
+    /// Waits for a slot, at most [`WITHIN`].
     ///
     /// # Errors
-    /// `overloaded`: it does not come in time.
+    /// `overloaded`: no slot became free in time.
     pub(crate) async fn take_in_time(&self, tenant: &str) -> Result<Turn> {
         let turn = timeout(WITHIN, self.take(tenant)).await;
         turn.map_err(|_| overloaded("other requests of this kind use all slots"))
     }
-}
 
-impl Turns {
-    /// Does work of a tenant on the pool of blocking threads, in turns, which may take `limit` of computing time. The work calls
-    /// [`Pace::step`] between its steps, which fails once the client has left.
+    /// Runs work of a tenant on a blocking thread, for at most `limit` of computing time. The work calls [`Pace::step`] between its steps, which
+    /// lets other requests run, and fails once the client has disconnected.
     ///
     /// # Errors
-    /// `overloaded`: the first turn does not come in time; or the error of the work or of its steps.
+    /// `overloaded`: no slot became free in time; or the error of the work or of its steps.
     pub(crate) async fn compute<T: Send + 'static>(
         &self,
         tenant: &str,
@@ -165,25 +165,25 @@ impl Turns {
     }
 }
 
-/// The pace of a computation on its blocking thread.
+/// The time slices of a computation on its blocking thread.
 #[derive(Debug)]
 pub struct Pace {
     turn: Option<Turn>,
     turns: Turns,
     tenant: Arc<str>,
     limit: Duration,
-    /// Computing time before the present slice.
+    /// Computing time before the current slice.
     spent: Duration,
-    /// The begin of the present slice.
+    /// Start of the current slice.
     begun: Instant,
     left: CancellationToken,
 }
 
 impl Pace {
-    /// Ends a step of the work. Passes the turn on and waits for the next one if the slice is over and another request waits.
+    /// Ends a step of the work. At the end of a slice, releases the slot and waits for one again.
     ///
     /// # Errors
-    /// The client has left, or `body-too-large`: the computation has taken longer than it may.
+    /// The client has disconnected, or `body-too-large`: the computation exceeds its time.
     pub fn step(&mut self) -> Result<()> {
         if self.left.is_cancelled() {
             return Err(client_left());
@@ -202,7 +202,7 @@ impl Pace {
             return Ok(());
         }
         self.spent += slice;
-        // It comes back at once if nobody waits.
+        // The slot is free again at once if no other request waits.
         self.turn = None;
         self.turn = Handle::current().block_on(async {
             tokio::select! {
@@ -218,12 +218,12 @@ impl Pace {
     }
 }
 
-/// Nobody reads this.
+/// Returns an error that nobody receives.
 fn client_left() -> ApiError {
-    ApiError::internal(&"the client has left")
+    ApiError::internal("the client has left")
 }
 
-/// Requests, streams and waits in progress; clones share them.
+/// Limits of concurrent requests, event streams and waits. Clones share them.
 #[derive(Debug, Clone)]
 pub struct ConcurrencyLimits {
     requests: TenantSemaphore,
@@ -232,7 +232,7 @@ pub struct ConcurrencyLimits {
 }
 
 impl ConcurrencyLimits {
-    /// The limits of these options.
+    /// Creates the limits of these options.
     #[must_use]
     pub fn new(options: &HttpOptions) -> ConcurrencyLimits {
         ConcurrencyLimits {
@@ -242,10 +242,10 @@ impl ConcurrencyLimits {
         }
     }
 
-    /// Counts one more request of a tenant.
+    /// Counts a request of a tenant.
     ///
     /// # Errors
-    /// `too-many-requests`: there are as many as there may be.
+    /// `too-many-requests`: the limit is reached.
     pub fn request(&self, tenant: &str) -> Result<Permit> {
         self.requests.try_take(tenant, 1).ok_or_else(|| {
             too_many(
@@ -254,26 +254,26 @@ impl ConcurrencyLimits {
         })
     }
 
-    /// Counts one more stream of events of a tenant.
+    /// Counts an event stream of a tenant.
     ///
     /// # Errors
-    /// As [`ConcurrencyLimits::request`].
+    /// See [`ConcurrencyLimits::request`].
     pub fn stream(&self, tenant: &str) -> Result<Permit> {
         self.streams.try_take(tenant, 1).ok_or_else(|| {
             too_many("the limit of open event streams is reached (`--tenant-streams-max`, `--streams-max`)")
         })
     }
 
-    /// Counts one more waiting request, if there may be one. If not, the request is answered at once: `Prefer: wait` is not binding.
+    /// Counts a waiting request; `None` if the limit is reached. The request is then answered at once, since `Prefer: wait` is not binding.
     #[must_use]
     pub fn wait(&self, tenant: &str) -> Option<Permit> {
         self.waits.try_take(tenant, 1)
     }
 
-    /// The same where the answer depends on the wait.
+    /// Counts a waiting request whose response depends on the wait.
     ///
     /// # Errors
-    /// As [`ConcurrencyLimits::request`].
+    /// See [`ConcurrencyLimits::request`].
     pub fn require_wait(&self, tenant: &str) -> Result<Permit> {
         self.wait(tenant).ok_or_else(|| {
             too_many(
@@ -287,74 +287,73 @@ fn too_many(detail: &str) -> ApiError {
     ApiError::new(ProblemKind::TooManyRequests, detail)
 }
 
-/// The same answer; `held` is dropped when its body has been sent.
+/// Keeps `held` until the body of a response has been sent.
 pub(crate) fn hold_while_sent<T: Send + 'static>(response: Response, held: T) -> Response {
     response.map(|body| {
         Body::new(body.map_err(move |error| {
-            // The closure lives as long as the body.
             let _held = &held;
             error
         }))
     })
 }
 
-/// Permits that a request holds until its answer has been sent; in its extensions.
+/// Permits that a request holds until its response has been sent, in its extensions.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct HeldPermits(Arc<Mutex<Vec<Permit>>>);
 
 impl HeldPermits {
-    /// Holds one more share.
+    /// Adds a permit.
     pub(crate) fn add(&self, share: Permit) {
         lock(&self.0).push(share);
     }
 
-    /// Gives all shares back; the caller counts the rest of the request elsewhere.
+    /// Releases all permits; the caller counts the rest of the request elsewhere.
     pub(crate) fn release(&self) {
         lock(&self.0).clear();
     }
 }
 
-/// Layer in which requests can hold shares.
+/// Layer that lets requests hold permits until their response has been sent.
 pub(crate) async fn hold(mut request: Request, next: Next) -> Response {
     let held = HeldPermits::default();
     request.extensions_mut().insert(held.clone());
     hold_while_sent(next.run(request).await, held)
 }
 
-/// Bytes of one unit, in which shares are counted.
+/// Bytes of a unit of memory.
 const UNIT: usize = 1 << 10;
-/// Smaller amounts are not counted: even the largest number of requests takes little memory with them.
+/// Bytes up to which memory is not counted: it is little even for the largest number of requests.
 pub(crate) const SMALL_BYTES: usize = 64 << 10;
-/// The word for the memory of answers in refusals.
+/// Description of the memory of responses in refusals.
 const ANSWERS: &str = "responses that clients have not read yet";
 
-/// Memory and turns to compute of all requests; clones share them.
+/// Memory and computations of all requests. Clones share them.
 #[derive(Debug, Clone)]
 pub struct Memory {
     bodies: TenantSemaphore,
     parsed: TenantSemaphore,
     answers: TenantSemaphore,
-    /// Turns for large cases: half of the cores, so that small cases need not wait for large ones.
+    /// Slots for large cases, half as many as cores, so that small cases need not wait for large ones.
     large: Turns,
     small: Turns,
-    /// Turns for solves that find out how long a case takes: half of the cores, beside the workers.
+    /// Slots for trial solves that estimate the time of a case, half as many as cores.
     trials: Turns,
-    /// Turns for large grids.
+    /// Slots for large grids.
     grids: Turns,
-    /// Turns for pictures, small grids and tables, which therefore need not wait for large grids.
+    /// Slots for pictures, small grids and tables, which therefore need not wait for large grids.
     renderings: Turns,
     waiting: TenantSemaphore,
     table_time: Duration,
 }
 
 impl Permit {
-    /// Releases what is held beyond `bytes`.
+    /// Releases the memory beyond `bytes`.
     pub fn shrink_to(&mut self, bytes: usize) {
         self.shrink_to_units(bytes.div_ceil(UNIT));
     }
 }
 
-/// A turn to compute an answer, and the memory for it.
+/// A slot for computing a response, and a permit for its memory.
 #[derive(Debug)]
 pub struct Rendering {
     share: Option<Permit>,
@@ -363,17 +362,17 @@ pub struct Rendering {
     tenant: String,
 }
 
-/// Memory and a turn to compute; given back on drop.
+/// Memory and a slot for a computation. Both are released on drop.
 #[derive(Debug, Default)]
 pub struct MemoryPermit {
-    /// The memory.
+    /// The permit for the memory; `None` for small amounts.
     pub share: Option<Permit>,
-    /// The turn.
+    /// The slot.
     pub turn: Option<Turn>,
 }
 
 impl Memory {
-    /// The limits of these options.
+    /// Creates the limits of these options.
     #[must_use]
     pub fn new(options: &HttpOptions) -> Memory {
         let part = |eighths: usize| {
@@ -399,34 +398,34 @@ impl Memory {
         }
     }
 
-    /// Memory for a body of so many bytes.
+    /// Waits for memory for a body.
     ///
     /// # Errors
-    /// `overloaded`: it is not free in time.
+    /// `overloaded`: the memory is not free in time.
     pub async fn body(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>> {
         take(&self.bodies, tenant, bytes, "the bodies of requests").await
     }
 
-    /// Memory for a parsed case of so many bytes.
+    /// Waits for memory for a parsed case.
     ///
     /// # Errors
-    /// As [`Memory::body`].
+    /// See [`Memory::body`].
     pub async fn parsed(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>> {
         take(&self.parsed, tenant, bytes, "cases that are read").await
     }
 
-    /// Memory for rows: their text, columns and answer.
+    /// Waits for memory for rows: their text, columns and response.
     ///
     /// # Errors
-    /// As [`Memory::body`].
+    /// See [`Memory::body`].
     pub async fn rows(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>> {
         take(&self.answers, tenant, bytes, ANSWERS).await
     }
 
-    /// A turn to check a case of this size in memory.
+    /// Waits for a slot to check a case of this size in memory.
     ///
     /// # Errors
-    /// `overloaded`: it does not come in time.
+    /// `overloaded`: no slot became free in time.
     pub async fn turn(&self, tenant: &str, bytes: usize) -> Result<Turn> {
         let turns = if bytes > SMALL_BYTES {
             &self.large
@@ -436,10 +435,10 @@ impl Memory {
         turns.take_in_time(tenant).await
     }
 
-    /// Reads a table or evaluates rows, in turns for large cases.
+    /// Reads a table or evaluates rows in a slot for large cases.
     ///
     /// # Errors
-    /// As [`Turns::compute`].
+    /// See [`Turns::compute`].
     pub async fn compute<T: Send + 'static>(
         &self,
         tenant: &str,
@@ -448,16 +447,16 @@ impl Memory {
         self.large.compute(tenant, self.table_time, work).await
     }
 
-    /// A turn to solve a case for a moment; none if it does not come within that time.
+    /// Waits for a slot for a trial solve; `None` if no slot became free within this time.
     pub async fn trial(&self, tenant: &str, within: Duration) -> Option<Turn> {
         let turn = timeout(within, self.trials.take(tenant));
         turn.await.ok()
     }
 
-    /// Memory for an answer that exists already. It does not wait, since the answer would be held in the meantime.
+    /// Takes memory for a response that exists already, without waiting.
     ///
     /// # Errors
-    /// `overloaded`: it is not free.
+    /// `overloaded`: the memory is not free.
     pub fn ready_answer(&self, tenant: &str, bytes: usize) -> Result<Option<Permit>> {
         if bytes <= SMALL_BYTES {
             return Ok(None);
@@ -466,16 +465,16 @@ impl Memory {
         share.map(Some).ok_or_else(|| no_memory(ANSWERS, bytes))
     }
 
-    /// Could there ever be memory for an answer of so many bytes?
+    /// Whether the limits allow a response of this many bytes.
     #[must_use]
     pub fn has_room_for(&self, bytes: usize) -> bool {
         bytes <= SMALL_BYTES || self.answers.of_one() >= units(bytes) as usize
     }
 
-    /// A turn and memory for an answer of so many bytes; to be taken before anything is loaded for it.
+    /// Waits for a slot and memory for a response of this many bytes. To be called before anything is loaded for the response.
     ///
     /// # Errors
-    /// `overloaded`: too many wait already, or too long.
+    /// `overloaded`: too many requests wait already, or slot or memory are not free in time.
     pub async fn rendering(&self, tenant: &str, bytes: usize) -> Result<Rendering> {
         let waiting = self.waiting.try_take(tenant, 1).ok_or_else(|| {
             overloaded("the limit of requests that wait for pictures, grids and tables is reached (`--renderings-waiting-max`)")
@@ -498,10 +497,10 @@ impl Memory {
 }
 
 impl Rendering {
-    /// Runs the work on the pool of blocking threads. The second value holds the memory of the answer, counted by its actual size.
+    /// Runs the work on a blocking thread. The second value is the permit for the memory of the response, by its actual `size`.
     ///
     /// # Errors
-    /// What `work` fails with, or `overloaded` if the answer is larger than was thought and there is no memory for it.
+    /// The error of `work`, or `overloaded` if the response is larger than expected and its memory is not free.
     pub async fn run<T: Send + 'static>(
         self,
         work: impl FnOnce() -> Result<T> + Send + 'static,
@@ -509,7 +508,7 @@ impl Rendering {
     ) -> Result<(T, Option<Permit>)> {
         let turn = self.turn;
         let work = blocking(move || {
-            // The turn is held until the work ends, even if the client has gone away.
+            // The slot is held until the work ends, even if the client has disconnected.
             let _turn = turn;
             work()
         });

@@ -1,4 +1,4 @@
-//! What requests and connections may cost, and who may send them.
+//! Limits of requests and connections, and who may send them.
 
 use std::net::IpAddr;
 use std::ops::RangeBounds;
@@ -13,7 +13,7 @@ use clap::{Args, value_parser};
 
 use railhead_jobs::options::{defaults, mib, seconds};
 
-/// The limits of a service; nearly every one is a flag of `serve`, declared here.
+/// The limits of a service. Nearly all of them are flags of `serve`.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Requests")]
 pub struct HttpOptions {
@@ -44,7 +44,7 @@ pub struct HttpOptions {
     #[arg(long = "first-head-timeout-s", env = "RAILHEAD_FIRST_HEAD_TIMEOUT_S", default_value = "10", value_name = "SECONDS", value_parser = seconds(1..))]
     pub first_head_timeout: Duration,
     /// Seconds within which the head of each further request must arrive, including idle time.
-    // By default longer than the usual proxies keep an idle connection, so that they close it first.
+    // The default is longer than common proxies keep an idle connection, so that the proxy closes it.
     #[arg(long = "head-timeout-s", env = "RAILHEAD_HEAD_TIMEOUT_S", default_value = "75", value_name = "SECONDS", value_parser = seconds(1..))]
     pub head_timeout: Duration,
     /// Seconds within which the body of a case must arrive. For a batch, a run or an evaluation: maximum time between two parts of the
@@ -104,23 +104,23 @@ pub struct HttpOptions {
     /// Maximum solver time in seconds for the rows of one evaluation; beyond it: 422.
     #[arg(long = "evaluate-time-s", env = "RAILHEAD_EVALUATE_TIME_S", default_value = "10", value_name = "SECONDS", value_parser = seconds(1..))]
     pub evaluate_time: Duration,
-    /// Folder that the files of the page at `/` are read from for each request, for those who change it.
+    /// Folder from which the files of the page at `/` are read for each request, for development of the page.
     #[arg(long, env = "RAILHEAD_PAGE_DIR", value_name = "FOLDER", hide = true,
           value_parser = PathBufValueParser::new().map(|path: PathBuf| Arc::<Path>::from(path)))]
     pub page_dir: Option<Arc<Path>>,
-    /// Addresses of proxies that are believed when they name the addresses of their clients.
+    /// Addresses of proxies whose headers with the addresses of their clients are trusted.
     #[arg(skip)]
     pub trusted_proxies: Arc<[AddressRange]>,
-    /// Names of the service for requests without a key, besides addresses and `localhost`.
+    /// Names of the service that are allowed in requests without a key, besides addresses and `localhost`.
     #[arg(skip)]
     pub allowed_hosts: Arc<[String]>,
-    /// Origins of web pages that may read answers and change things.
+    /// Origins of web pages that may read responses and send changes.
     #[arg(skip)]
     pub origins: Arc<[String]>,
-    /// Requests without a key are answered, as those of a tenant of their own.
+    /// Whether requests without a key are answered, as those of the tenant `anonymous`.
     #[arg(skip = true)]
     pub anonymous: bool,
-    /// Requests without a key that came through a proxy are answered too.
+    /// Whether requests without a key that came through a proxy are answered too.
     #[arg(skip)]
     pub anonymous_proxied: bool,
     /// Requests per second of one key, or of one address without a key; 0: no limit.
@@ -152,7 +152,7 @@ fn milliseconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value =
     number.map(|number| Duration::from_millis(number.into()))
 }
 
-/// Addresses that begin with the same bits, written as `10.0.0.0/8`; an address alone is a range by itself.
+/// A range of addresses with the same leading bits, written as `10.0.0.0/8`; a single address is a range too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AddressRange {
     first: IpAddr,
@@ -160,7 +160,7 @@ pub struct AddressRange {
 }
 
 impl AddressRange {
-    /// Is this one of the addresses? IPv4 addresses written as IPv6 ones count as IPv4.
+    /// Whether the range contains an address. An IPv4-mapped IPv6 address counts as IPv4.
     #[must_use]
     pub fn contains(&self, address: IpAddr) -> bool {
         match (self.first, address.to_canonical()) {

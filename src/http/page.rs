@@ -14,12 +14,12 @@ use rust_embed::Embed;
 use crate::layers::etag;
 use crate::problem::{Result, unknown_route};
 
-/// The files of the page, as they are in the program.
+/// The files of the page, embedded in the program.
 #[derive(Embed)]
 #[folder = "page/web/"]
 struct Files;
 
-/// Digest of all files: it changes with any of them, so that addresses with it may be kept for good.
+/// Digest of all files. It changes with any of them, so that responses at paths with the digest never change.
 static DIGEST: LazyLock<String> = LazyLock::new(|| {
     let mut hasher = blake3::Hasher::new();
     for (path, body) in
@@ -32,21 +32,21 @@ static DIGEST: LazyLock<String> = LazyLock::new(|| {
     hasher.finalize().to_hex()[..16].to_owned()
 });
 
-/// What the page may do in a browser: run and load its own files, ask its own service, and nothing else. Text becomes HTML by the
-/// templates of `lit-html` alone.
+/// Policy of the page: it loads only its own files and calls only its own service. Only the templates of `lit-html` turn text into HTML.
 const POLICY: HeaderValue = HeaderValue::from_static(
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'; trusted-types lit-html",
 );
-/// For addresses with the digest of the files in them.
-const FOR_GOOD: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
-/// For the same files at other addresses, as a page asks for that was loaded from another version.
-const FOR_NOW: HeaderValue = HeaderValue::from_static("no-cache");
-/// The first file, in which this stands for the path of the others.
+/// Caching of files at paths with the digest.
+const IMMUTABLE: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
+/// Caching of files at other paths, which a page of another version requests.
+const REVALIDATE: HeaderValue = HeaderValue::from_static("no-cache");
+/// The first file.
 const INDEX: &str = "index.html";
+/// Placeholder in the first file for the path of the others.
 const BASE: &str = "/page/-/";
 
-/// Where the files come from: from a folder while the page is worked on, else from the program.
+/// The folder with the files, for development of the page; `None` for the embedded files.
 type Folder = Option<Arc<Path>>;
 
 /// The routes of the page.
@@ -76,14 +76,14 @@ async fn file(
     let body = load(folder.as_deref(), &path).await;
     let body = body.ok_or_else(|| unknown_route(uri.path()))?;
     let lifetime = match folder {
-        None if digest == *DIGEST => FOR_GOOD,
-        _ => FOR_NOW,
+        None if digest == *DIGEST => IMMUTABLE,
+        _ => REVALIDATE,
     };
     let lifetime = [(header::CACHE_CONTROL, lifetime)];
     Ok((described(&path), lifetime, body).into_response())
 }
 
-/// What a file holds; nothing if there is none.
+/// Returns the content of a file; `None` if it does not exist.
 async fn load(folder: Option<&Path>, path: &str) -> Option<Vec<u8>> {
     let Some(folder) = folder else {
         return Files::get(path).map(|file| file.data.into_owned());

@@ -1,4 +1,5 @@
-//! Problems (RFC 9457): their kinds, their form, and how errors become answers.
+//! Problems (RFC 9457): their kinds, their form, and the conversion of errors.
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -28,22 +29,22 @@ macro_rules! kinds {
         pub enum ProblemKind { $(#[doc = $meaning] $kind,)* }
 
         impl ProblemKind {
-            /// Every kind there is.
+            /// Every kind.
             pub const ALL: &[ProblemKind] = &[$(ProblemKind::$kind),*];
 
-            /// The last part of the problem's `type`.
+            /// Returns the last part of the problem's `type`.
             #[must_use]
             pub fn slug(self) -> &'static str { match self { $(ProblemKind::$kind => $slug),* } }
 
-            /// The problem's `title`.
+            /// Returns the problem's `title`.
             #[must_use]
             pub fn title(self) -> &'static str { match self { $(ProblemKind::$kind => $title),* } }
 
-            /// What this kind means and what to do about it.
+            /// Returns the meaning of this kind, with advice.
             #[must_use]
             pub fn meaning(self) -> &'static str { match self { $(ProblemKind::$kind => $meaning),* } }
 
-            /// The status code that goes with it.
+            /// Returns the HTTP status code.
             #[must_use]
             pub fn status(self) -> u16 { match self { $(ProblemKind::$kind => $status),* } }
         }
@@ -105,7 +106,7 @@ kinds! {
 }
 
 impl ProblemKind {
-    /// There is no work of this kind with an id.
+    /// Returns the problem of an unknown id of work of this kind.
     #[must_use]
     pub fn not_found(kind: Kind) -> ProblemKind {
         match kind {
@@ -115,7 +116,7 @@ impl ProblemKind {
         }
     }
 
-    /// Work of this kind has not ended.
+    /// Returns the problem of work of this kind that has not ended.
     #[must_use]
     pub fn not_ended(kind: Kind) -> ProblemKind {
         match kind {
@@ -125,7 +126,7 @@ impl ProblemKind {
         }
     }
 
-    /// Does it pass with time, so that the answer carries `Retry-After`?
+    /// Whether the problem is temporary, so that the response has `Retry-After`.
     #[must_use]
     pub fn passes(self) -> bool {
         matches!(
@@ -221,7 +222,7 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// A fault of a query parameter.
+    /// Creates a fault of a query parameter.
     #[must_use]
     pub fn parameter(name: &str, detail: impl Into<String>) -> Self {
         Fault {
@@ -230,7 +231,7 @@ impl Fault {
         }
     }
 
-    /// A fault of which no more is known than the sentence; where it is has to be filled in.
+    /// Creates a fault with a detail only; the caller sets its location.
     #[must_use]
     pub fn invalid(detail: impl Into<String>) -> Self {
         Fault {
@@ -259,7 +260,7 @@ impl From<CaseFault> for Fault {
 }
 
 impl ProblemBody {
-    /// A problem of this kind with a sentence about this occurrence.
+    /// Creates a problem of this kind; `detail` describes the occurrence.
     #[must_use]
     pub(crate) fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         ProblemBody {
@@ -276,7 +277,7 @@ impl ProblemBody {
         }
     }
 
-    /// The reason why a job failed, as the job shows it.
+    /// Returns the reason why a job failed.
     #[must_use]
     pub(crate) fn of_job(job: &Job, failure: &Failure) -> Self {
         let kind = match failure.kind {
@@ -329,7 +330,7 @@ impl From<ProblemKind> for ProblemMeaning {
     }
 }
 
-/// Declares the problems that a route can answer beside those that every route can, for its documentation.
+/// Declares the problems of a route for its documentation, besides those that all routes have in common.
 macro_rules! problems {
     ($(#[$meta:meta])* $name:ident: $($kind:ident),* $(,)?) => {
         $(#[$meta])*
@@ -348,11 +349,11 @@ macro_rules! problems {
 pub(crate) use problems;
 
 problems! {
-    /// What a route that takes nothing can fail with.
+    /// Problems of a route without parameters.
     PlainProblems: BadQuery
 }
 
-/// The responses of these kinds of problems, one per status code.
+/// Describes these kinds of problems, one response per status code.
 #[must_use]
 pub(crate) fn describe(
     kinds: &[ProblemKind],
@@ -367,7 +368,7 @@ pub(crate) fn describe(
         .collect()
 }
 
-/// One response for all of these kinds.
+/// Describes these kinds of problems in one response.
 pub(crate) fn describe_together(kinds: &[ProblemKind]) -> RefOr<utoipa::openapi::Response> {
     let lines: Vec<String> = kinds
         .iter()
@@ -386,28 +387,28 @@ pub(crate) fn describe_together(kinds: &[ProblemKind]) -> RefOr<utoipa::openapi:
     response.build().into()
 }
 
-/// A header of an answer, a number of seconds.
+/// Describes a response header with a number of seconds.
 pub(crate) fn seconds_header(about: &str) -> utoipa::openapi::Header {
     let number = ObjectBuilder::new().schema_type(Type::Integer);
     let header = HeaderBuilder::new().schema(Some(number));
     header.description(Some(about)).build()
 }
 
-/// Content type of every failure.
+/// Content type of every problem.
 pub(crate) const PROBLEM_JSON: &str = "application/problem+json";
 
-/// Seconds after which a refused client may try again.
+/// Seconds after which a client may retry.
 const RETRY_SECONDS: u32 = 1;
-/// The same where somebody has to make room first.
+/// Seconds after which a client may retry if the operator must free disk space first.
 const DISK_RETRY_SECONDS: u32 = 10;
 
-/// Faults of one case that are listed.
+/// Most faults of a case in `errors`.
 const FAULTS_LISTED: usize = 1000;
 
 /// The result of a request.
 pub(crate) type Result<T, E = ApiError> = std::result::Result<T, E>;
 
-/// A failure on its way to the client.
+/// A failure of a request.
 #[derive(Debug)]
 pub struct ApiError {
     problem: Box<ProblemBody>,
@@ -415,7 +416,7 @@ pub struct ApiError {
 }
 
 impl ApiError {
-    /// A problem of this kind with a sentence about this occurrence.
+    /// Creates a problem of this kind; `detail` describes the occurrence.
     #[must_use]
     pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
         ApiError {
@@ -424,14 +425,14 @@ impl ApiError {
         }
     }
 
-    /// The same, with the seconds after which to try again.
+    /// Sets the seconds after which the client may retry.
     #[must_use]
     pub fn after(mut self, seconds: u32) -> Self {
         self.retry_after = Some(seconds);
         self
     }
 
-    /// The same, naming the query parameter that it is about.
+    /// Names the query parameter that the problem is about.
     #[must_use]
     pub fn about(mut self, parameter: &str) -> Self {
         let detail = self.problem.detail.clone();
@@ -441,22 +442,22 @@ impl ApiError {
         self
     }
 
-    /// The sentence about this occurrence.
+    /// Returns the description of the occurrence.
     #[must_use]
     pub fn detail(&self) -> &str {
         &self.problem.detail
     }
 
-    /// The same in other words.
+    /// Replaces the description of the occurrence.
     #[must_use]
     pub fn saying(mut self, detail: impl Into<String>) -> Self {
         self.problem.detail = detail.into();
         self
     }
 
-    /// A failure of the service itself: the reason goes to the log, not to the client.
+    /// Creates a failure of the service itself. The reason is logged, and not sent to the client.
     #[must_use]
-    pub fn internal(reason: &dyn std::fmt::Display) -> Self {
+    pub fn internal(reason: impl std::fmt::Display) -> Self {
         tracing::error!(%reason, "a request failed inside the service");
         ApiError::new(
             ProblemKind::Internal,
@@ -464,7 +465,7 @@ impl ApiError {
         )
     }
 
-    /// Malformed JSON, or JSON with a value of another kind than is needed, with its position.
+    /// Creates the problem of malformed JSON, or of JSON with a value of a wrong type, with its position.
     #[must_use]
     pub fn malformed(error: &serde_json::Error) -> Self {
         let what = match error.is_data() {
@@ -477,7 +478,7 @@ impl ApiError {
         failure
     }
 
-    /// An element of an array that is not JSON, with its place in the array.
+    /// Creates the problem of an element of an array that is not JSON, with its index.
     #[must_use]
     pub fn malformed_element(index: u32, error: &serde_json::Error) -> Self {
         ApiError::new(
@@ -488,7 +489,7 @@ impl ApiError {
         )
     }
 
-    /// A problem of this kind with faults that clients can find.
+    /// Creates a problem of this kind with a list of faults.
     #[must_use]
     pub fn listing(kind: ProblemKind, detail: impl Into<String>, faults: Vec<Fault>) -> Self {
         let mut failure = ApiError::new(kind, detail);
@@ -496,20 +497,20 @@ impl ApiError {
         failure
     }
 
-    /// A query with faults; `faults` is not empty.
+    /// Creates the problem of a query with faults; `faults` is not empty.
     #[must_use]
     pub fn bad_query(faults: Vec<Fault>) -> Self {
         let details: Vec<&str> = faults.iter().map(|fault| &*fault.detail).collect();
         ApiError::listing(ProblemKind::BadQuery, details.join("; "), faults)
     }
 
-    /// One query parameter with a value that is not allowed.
+    /// Creates the problem of a query parameter with a value that is not allowed.
     #[must_use]
     pub fn bad_parameter(name: &str, detail: impl Into<String>) -> Self {
         ApiError::bad_query(vec![Fault::parameter(name, detail)])
     }
 
-    /// A request header with a value that is not allowed.
+    /// Creates the problem of a request header with a value that is not allowed.
     #[must_use]
     pub fn bad_header(name: &str, detail: impl Into<String>) -> Self {
         let detail = detail.into();
@@ -521,7 +522,7 @@ impl ApiError {
     }
 }
 
-/// A refusal of a table.
+/// Creates the refusal of a table.
 pub(crate) fn faulty(detail: impl Into<String>) -> ApiError {
     ApiError::new(ProblemKind::FaultyTable, detail)
 }
@@ -604,7 +605,7 @@ impl From<JobsError> for ApiError {
     }
 }
 
-/// The storage rejects writes; the log has the message of the system.
+/// Returns the problem of a storage that rejects writes. The message of the system is logged.
 fn storage_failed(fault: StorageFault, reason: &JobsError) -> ApiError {
     tracing::warn!(%reason, "a request failed because its storage is not available");
     let (kind, what) = match fault {
@@ -639,17 +640,17 @@ impl IntoResponse for ApiError {
                 .headers_mut()
                 .insert(header::WWW_AUTHENTICATE, scheme);
         }
-        // The handler does not know the path it answers for; `name_instance` writes the problem again with it.
+        // The path is not known here; `name_instance` serialises the problem again with it.
         response.extensions_mut().insert(self.problem);
         response
     }
 }
 
-/// Completes every problem with the path it is about; layer around all routes.
+/// Layer around all routes that adds the requested path to every problem.
 pub(crate) async fn name_instance(request: Request, next: Next) -> Response {
     let path = request.uri().path().to_owned();
     let mut response = next.run(request).await;
-    // The readable contract answers unknown files of its own with bare text.
+    // The readable contract answers unknown files with plain text.
     if response.status() == StatusCode::NOT_FOUND
         && response.extensions().get::<Box<ProblemBody>>().is_none()
     {
@@ -665,7 +666,7 @@ pub(crate) async fn name_instance(request: Request, next: Next) -> Response {
     Response::from_parts(parts, body)
 }
 
-/// The answer for a path that names nothing.
+/// Returns the problem of a path without a resource.
 #[must_use]
 pub(crate) fn unknown_route(path: &str) -> ApiError {
     if path.len() > 1 && path.ends_with('/') {

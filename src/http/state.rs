@@ -1,8 +1,7 @@
-//! What every handler can reach.
+//! The state that handlers share.
 
 use axum::extract::FromRef;
 
-use crate::extract::caller::AnyTenant;
 use crate::layers::auth::Access;
 use crate::layers::metrics::Metrics;
 use crate::limits::{ConcurrencyLimits, Memory};
@@ -13,7 +12,11 @@ use railhead_jobs::Jobs;
 #[derive(Debug, Clone, Copy)]
 pub struct Document(pub fn() -> &'static str);
 
-/// What every handler can reach; clones share it.
+/// All jobs, for handlers that do not act for a tenant.
+#[derive(Debug, Clone)]
+pub struct AnyTenant(pub Jobs);
+
+/// The state that handlers share. Clones are cheap.
 #[derive(Clone, FromRef)]
 pub struct AppState {
     pub unscoped: AnyTenant,
@@ -26,7 +29,7 @@ pub struct AppState {
 }
 
 impl AppState {
-    /// The jobs and the limits of these options.
+    /// Creates the state with the limits of these options.
     pub fn new(jobs: Jobs, options: HttpOptions, metrics: Metrics, document: Document) -> AppState {
         AppState {
             access: Access::new(&jobs, &options),

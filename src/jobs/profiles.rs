@@ -195,11 +195,15 @@ impl Jobs {
                 continue;
             };
             for (row, digest) in (first..).zip(digests) {
-                // A row without a name is refused with its case.
-                let Some(digest) = digest.as_ref().filter(|it| !known.contains_key(*it)) else {
-                    continue;
+                let pointer = || format!("{}/{row}", column_pointer(name));
+                let Some(digest) = digest else {
+                    let detail = "no text given; the digest of a stored profile is needed, as `POST /v1/profiles` returns it";
+                    return Ok(vec![Fault::new(pointer(), detail)]);
                 };
-                let pointer = format!("{}/{row}", column_pointer(name));
+                if known.contains_key(digest) {
+                    continue;
+                }
+                let pointer = pointer();
                 match Handle::current().block_on(self.known_section(digest, known))? {
                     Some(section) => *bytes += section.to_string().len(),
                     None => return Ok(vec![unknown(pointer, digest)]),

@@ -20,6 +20,7 @@ pub mod error;
 pub mod npz;
 pub mod parquet;
 pub mod read;
+pub mod strict_json;
 pub mod table;
 pub mod text;
 pub mod titles;

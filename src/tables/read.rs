@@ -14,7 +14,7 @@ use crate::npz::read_arrays;
 use crate::parquet::TableReader;
 use crate::table::{Chunk, RowTable, TableColumn, TableKind, Title};
 use crate::text::{CsvRows, JsonRows};
-use crate::titles::{NamedColumns, Titled, TitledColumn, require_few};
+use crate::titles::{NamedColumns, TitledColumn, require_few};
 
 /// Largest group of rows of a Parquet file, unpacked, in bytes.
 const GROUP_BYTES_MAX: i64 = 1 << 28;
@@ -93,14 +93,22 @@ impl TableSource {
 pub struct TableRows {
     /// The titles of the columns.
     pub titles: Vec<Title>,
-    chunks: Box<dyn Iterator<Item = Result<Chunk>>>,
+    rows: Rows,
+}
+
+enum Rows {
+    Csv(Box<CsvRows<Box<dyn Seekable>>>),
+    Other(Box<dyn Iterator<Item = Result<Chunk>>>),
 }
 
 impl Iterator for TableRows {
     type Item = Result<Chunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.chunks.next()
+        match &mut self.rows {
+            Rows::Csv(rows) => rows.next(),
+            Rows::Other(rows) => rows.next(),
+        }
     }
 }
 
@@ -115,14 +123,14 @@ impl TableRows {
                 let rows = CsvRows::new(source.reader(), ROW_BYTES_MAX)?;
                 Ok(TableRows {
                     titles: rows.titles.clone(),
-                    chunks: Box::new(rows),
+                    rows: Rows::Csv(Box::new(rows)),
                 })
             }
             TableForm::Ndjson => {
                 let rows = JsonRows::new(source.reader())?;
                 Ok(TableRows {
                     titles: rows.titles.clone(),
-                    chunks: Box::new(rows),
+                    rows: Rows::Other(Box::new(rows)),
                 })
             }
             TableForm::Arrow => {
@@ -143,15 +151,19 @@ impl TableRows {
         }
     }
 
-    /// The columns, as a run names them.
+    /// Finds the place of each column in the case; to be called before the rows are read. Columns that are copied to the results may be read
+    /// as texts from then on, see [`Title::text_if_copied`].
     ///
     /// # Errors
     /// See [`NamedColumns::columns`].
-    pub fn named(&self, named: &NamedColumns) -> Result<Vec<TitledColumn>> {
-        let titles = self.titles.iter();
-        named.columns(
-            titles.map(|title| -> Titled<'_> { (&title.name, title.unit.as_deref(), title.text) }),
-        )
+    pub fn named(&mut self, named: &NamedColumns) -> Result<Vec<TitledColumn>> {
+        let columns = named.columns(&self.titles)?;
+        if let Rows::Csv(rows) = &mut self.rows {
+            for (title, column) in rows.titles.iter_mut().zip(&columns) {
+                title.text = column.text;
+            }
+        }
+        Ok(columns)
     }
 
     /// The rows of tables that all have the columns of the first.
@@ -166,14 +178,15 @@ impl TableRows {
             name: name.clone(),
             unit: None,
             text: values.kind() == TableKind::Texts,
+            text_if_copied: false,
         });
         Ok(TableRows {
             titles: titles.collect(),
-            chunks: Box::new(
+            rows: Rows::Other(Box::new(
                 std::iter::once(Ok(first))
                     .chain(tables)
                     .map(|table| Ok(table?.columns.into_iter().map(plain).collect())),
-            ),
+            )),
         })
     }
 }

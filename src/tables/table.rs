@@ -33,15 +33,17 @@ pub enum TableKind {
     Texts,
 }
 
-/// The title of a column.
+/// The title of a column of a client's table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Title {
     /// The title as sent.
     pub name: String,
-    /// Its unit in a line of units.
+    /// The unit in a line of units below the titles.
     pub unit: Option<String>,
-    /// It holds texts; otherwise numbers.
+    /// Whether the column holds texts; otherwise it holds numbers.
     pub text: bool,
+    /// Whether the values of a column that is copied to the results are kept as texts: CSV of names, and of numbers such as `007`.
+    pub text_if_copied: bool,
 }
 
 /// Some rows, column by column; numbers are NaN where a row has none.

@@ -1,4 +1,6 @@
-//! Rows as CSV and NDJSON, some lines at a time. The first value of a column decides whether it holds numbers or texts.
+//! Tables as CSV and NDJSON, read some rows at a time.
+//!
+//! The first rows, at most [`ROWS`], decide the kind of each column: its first value makes it numbers or texts.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, Chain, Cursor, Read};
@@ -10,23 +12,26 @@ use railhead_contact::evaluate::varied::Values;
 pub use csv::StringRecord;
 
 use crate::error::{Result, TableError, faulty};
+use crate::strict_json::Strict;
 use crate::table::{Chunk, Title};
-use crate::titles::{Decimals, delimiter, is_line_of_units, is_text, number, require_few};
+use crate::titles::{is_line_of_units, is_text, is_thing, require_few};
 
-/// Rows that are read at once.
+/// Rows that are read at once, and at most ahead of the first chunk.
 const ROWS: usize = 8192;
-/// Longest line in bytes.
-const LINE_BYTES_MAX: u64 = 1 << 20;
+/// Longest line, in bytes.
+const LINE_BYTES_MAX: usize = 1 << 20;
+/// Digits that a 64-bit float always preserves.
+const EXACT_DIGITS: usize = 15;
 
-/// A source from its first line on, with an end of line behind it.
+/// A source behind its first line, which was read already, with a line break appended.
 type Ended<R> = Chain<Chain<Cursor<Vec<u8>>, R>, &'static [u8]>;
 
-/// A source of which a record takes a bounded number of bytes.
+/// A source that fails when a record takes more than a number of bytes.
 struct Bounded<R> {
     source: R,
     /// Most bytes of a record.
     max: usize,
-    /// What is left of them.
+    /// Bytes that the present record may still take.
     left: usize,
 }
 
@@ -40,40 +45,41 @@ impl<R: Read> Read for Bounded<R> {
     }
 }
 
-/// Rows in CSV, whose first line names the columns; fields are parted by what parts the titles, commas, semicolons or tabs. A second line may give
-/// the units.
+/// Rows of a CSV table. The first line names the columns; a line `sep=;` before it, as Excel writes, names the delimiter. Otherwise the
+/// delimiter is that of the titles: comma, semicolon or tab. A line below the titles may give the units.
 pub struct CsvRows<R: Read> {
     reader: csv::Reader<Bounded<Ended<R>>>,
     /// The decimal mark of its numbers.
     pub decimals: Decimals,
     /// The titles of the columns.
     pub titles: Vec<Title>,
-    /// The next row and its line, if there is one.
-    record: Option<(u64, StringRecord)>,
-    /// Rows after it that were read to find the first values of columns.
+    /// Rows that were read ahead, each with its line.
     ahead: VecDeque<(u64, StringRecord)>,
 }
 
 impl<R: BufRead> CsvRows<R> {
-    /// Reads the header and the first row; no row may take more than `record_max` bytes.
+    /// Reads the titles and the first rows; no row may take more than `record_max` bytes.
     ///
     /// # Errors
     /// `faulty-table`
     pub fn new(mut source: R, record_max: usize) -> Result<CsvRows<R>> {
         let mut first = Vec::new();
-        let read = (&mut source).take(LINE_BYTES_MAX);
-        let read = { read }.read_until(b'\n', &mut first);
-        read?;
+        let mut line = (&mut source).take(LINE_BYTES_MAX as u64);
+        line.read_until(b'\n', &mut first)?;
         if first.starts_with(b"\xff\xfe") || first.starts_with(b"\xfe\xff") {
             return Err(faulty("the table is UTF-16, not UTF-8; send it as UTF-8"));
         }
-        let delimiter = delimiter(&first);
+        let (delimiter, is_separator_line) = match separator_line(&first) {
+            Some(named) => (named, true),
+            None => (delimiter(&first), false),
+        };
         // With this end of line the reader counts lines exactly; other files end their lines with `\r` alone.
         let terminator = match first.ends_with(b"\r\n") || !first.contains(&b'\r') {
             true => csv::Terminator::Any(b'\n'),
             false => csv::Terminator::CRLF,
         };
-        let mut reader = csv::ReaderBuilder::new()
+        let reader = csv::ReaderBuilder::new()
+            .has_headers(false)
             .trim(csv::Trim::All)
             .terminator(terminator)
             .flexible(true)
@@ -81,76 +87,83 @@ impl<R: BufRead> CsvRows<R> {
             // The last line ends as the others do.
             .from_reader(Bounded {
                 max: record_max,
-                left: record_max + first.len(),
+                left: record_max,
                 source: Cursor::new(first).chain(source).chain(&b"\n"[..]),
             });
-        let titles = reader.headers();
-        let titles = titles.map_err(|error| unread(&error))?;
-        require_few(titles.len())?;
-        let titles: Vec<String> = titles
-            .iter()
-            .map(|title| title.trim_start_matches('\u{feff}').to_owned())
-            .collect();
         let mut rows = CsvRows {
             reader,
             decimals: Decimals::of(delimiter),
             titles: Vec::new(),
-            record: Some((0, StringRecord::new())),
             ahead: VecDeque::new(),
         };
-        rows.advance()?;
-        let second = rows.record.as_ref().map(|(_, record)| record.clone());
-        let units = second.filter(|units| {
-            // Texts have no units.
-            let said = |(title, unit): (&String, &str)| !is_text(title) && !unit.is_empty();
-            units.len() == titles.len()
-                && titles.iter().zip(units).any(said)
+        if is_separator_line {
+            rows.fetch()?;
+        }
+        let names = rows.fetch()?.map(|(_, names)| names).unwrap_or_default();
+        require_few(names.len())?;
+        let names: Vec<&str> = names
+            .iter()
+            .map(|name| name.trim_start_matches('\u{feff}'))
+            .collect();
+        let second = rows.fetch()?;
+        // Columns of texts have no units.
+        let has_unit = |(name, unit): (&&str, &str)| !is_text(name) && !unit.is_empty();
+        let units = second.as_ref().map(|(_, units)| units).filter(|units| {
+            units.len() == names.len()
+                && names.iter().zip(*units).any(has_unit)
                 && is_line_of_units(units.iter())
         });
-        if units.is_some() {
-            rows.advance()?;
-        }
-        let unit = |place: usize| units.as_ref().and_then(|units| units.get(place));
-        let texts = rows.texts(titles.len(), record_max)?;
-        let titles = titles.into_iter().enumerate().map(|(place, name)| Title {
-            name,
-            unit: unit(place).map(str::to_owned),
-            text: texts[place],
-        });
-        rows.titles = titles.collect();
+        let units: Vec<Option<String>> = match units {
+            Some(units) => units.iter().map(|unit| Some(unit.to_owned())).collect(),
+            None => {
+                rows.ahead.extend(second.clone());
+                vec![None; names.len()]
+            }
+        };
+        rows.read_ahead(record_max)?;
+        let titles = names.iter().zip(units).enumerate();
+        rows.titles = titles
+            .map(|(place, (name, unit))| rows.title(place, name, unit))
+            .collect();
         Ok(rows)
     }
 
-    /// Whether the first value of each column is a text. Reads ahead while columns are empty, at most [`ROWS`] rows and about so many bytes.
-    fn texts(&mut self, columns: usize, bytes_max: usize) -> Result<Vec<bool>> {
-        let mut texts = vec![None; columns];
-        let mut look = |record: &StringRecord| {
-            for (field, text) in record.iter().zip(&mut texts) {
-                if text.is_none() && !field.is_empty() {
-                    *text = Some(number(field, self.decimals.comma).is_none());
-                }
-            }
-            texts.iter().any(Option::is_none)
-        };
-        let mut open = self.record.as_ref().is_some_and(|(_, record)| look(record));
+    /// Reads at most [`ROWS`] rows and about this many bytes ahead.
+    fn read_ahead(&mut self, bytes_max: usize) -> Result<()> {
         let mut bytes = 0;
-        while open && self.ahead.len() < ROWS && bytes < bytes_max {
-            let mut record = StringRecord::new();
-            let Some(line) = next_record(&mut self.reader, &mut record)? else {
+        while self.ahead.len() < ROWS && bytes < bytes_max {
+            let Some((line, record)) = self.fetch()? else {
                 break;
             };
-            open = look(&record);
             bytes += record.as_slice().len();
             self.ahead.push_back((line, record));
         }
-        Ok(texts.into_iter().map(Option::unwrap_or_default).collect())
+        Ok(())
+    }
+
+    /// The title of a column, with its kind by the rows read ahead.
+    fn title(&self, place: usize, name: &str, unit: Option<String>) -> Title {
+        let fields = self
+            .ahead
+            .iter()
+            .filter_map(|(_, record)| record.get(place));
+        let mut fields = fields.filter(|field| !field.is_empty()).peekable();
+        let comma = self.decimals.comma;
+        Title {
+            text: fields
+                .peek()
+                .is_some_and(|field| number(field, comma).is_none()),
+            text_if_copied: is_thing(name) || !fields.all(is_exact),
+            name: name.to_owned(),
+            unit,
+        }
     }
 
     /// Some more rows, none at the end.
     fn read(&mut self) -> Result<Chunk> {
         let mut values = empty(&self.titles);
         for _ in 0..ROWS {
-            let Some((line, record)) = &self.record else {
+            let Some((line, record)) = self.record()? else {
                 break;
             };
             if record.len() != self.titles.len() {
@@ -161,71 +174,54 @@ impl<R: BufRead> CsvRows<R> {
                 )));
             }
             for ((field, column), values) in record.iter().zip(&self.titles).zip(&mut values) {
-                let wrong = || {
-                    faulty(format!(
-                        "line {line}, column `{}`: `{field}` is not a number; the first value of this column is a number",
-                        column.name
-                    ))
-                };
+                let wrong =
+                    |detail| faulty(format!("line {line}, column `{}`: {detail}", column.name));
                 match values {
                     Values::Texts(texts) => {
                         texts.push(Some(field.to_owned()).filter(|text| !text.is_empty()));
                     }
                     Values::Numbers(numbers) if field.is_empty() => numbers.push(f64::NAN),
                     Values::Numbers(numbers) => {
-                        let number = self.decimals.number(field);
-                        let number = number.map_err(|detail| {
-                            faulty(format!("line {line}, column `{}`: {detail}", column.name))
-                        })?;
-                        numbers.push(number.ok_or_else(wrong)?);
+                        let number = self.decimals.number(field).map_err(wrong)?;
+                        numbers.push(number.ok_or_else(|| {
+                            wrong(format!(
+                                "`{field}` is not a number; the first value of this column is a number"
+                            ))
+                        })?);
                     }
                 }
             }
-            self.advance()?;
         }
         Ok(values)
     }
 
-    /// The fields of the next row and the line on which it begins, whatever the fields hold.
+    /// The fields of the next row and the line on which it begins.
     ///
     /// # Errors
     /// `faulty-table`
     pub fn record(&mut self) -> Result<Option<(u64, StringRecord)>> {
-        let next = self.record.clone();
-        self.advance()?;
-        Ok(next)
+        match self.ahead.pop_front() {
+            Some(next) => Ok(Some(next)),
+            None => self.fetch(),
+        }
     }
 
-    /// Goes on to the next record.
-    fn advance(&mut self) -> Result<()> {
-        if let Some(next) = self.ahead.pop_front() {
-            self.record = Some(next);
-        } else if let Some((line, record)) = &mut self.record {
-            match next_record(&mut self.reader, record)? {
-                Some(next) => *line = next,
-                None => self.record = None,
+    /// Reads the next record that is not a blank line, and the number of the line on which it begins.
+    fn fetch(&mut self) -> Result<Option<(u64, StringRecord)>> {
+        let mut record = StringRecord::new();
+        loop {
+            let source = self.reader.get_mut();
+            source.left = source.max;
+            let more = self.reader.read_record(&mut record);
+            if !more.map_err(|error| unread(&error))? {
+                return Ok(None);
             }
-        }
-        Ok(())
-    }
-}
-
-/// Reads the next record that is no blank line, and the number of the line on which it begins.
-fn next_record<R: Read>(
-    reader: &mut csv::Reader<Bounded<Ended<R>>>,
-    record: &mut StringRecord,
-) -> Result<Option<u64>> {
-    loop {
-        let source = reader.get_mut();
-        source.left = source.max;
-        let more = reader.read_record(record);
-        if !more.map_err(|error| unread(&error))? {
-            return Ok(None);
-        }
-        if record.len() > 1 || record.get(0) != Some("") {
-            let inside = record.as_slice().bytes().filter(|byte| *byte == b'\n');
-            let after = reader.position().line();
-            return Ok(Some(after.saturating_sub(1 + inside.count() as u64)));
+            if record.len() > 1 || record.get(0) != Some("") {
+                let inside = record.as_slice().bytes().filter(|byte| *byte == b'\n');
+                let after = self.reader.position().line();
+                let line = after.saturating_sub(1 + inside.count() as u64);
+                return Ok(Some((line, record)));
+            }
         }
     }
 }
@@ -248,25 +244,105 @@ pub fn without_mark(text: &[u8], line: u64) -> &[u8] {
     rest.unwrap_or(text)
 }
 
+/// The delimiter that a line `sep=;` names, as Excel writes it before the titles.
+fn separator_line(first: &[u8]) -> Option<u8> {
+    match without_mark(first, 1).strip_prefix(b"sep=")? {
+        [mark @ (b',' | b';' | b'\t' | b'|'), rest @ ..] if rest.trim_ascii().is_empty() => {
+            Some(*mark)
+        }
+        _ => None,
+    }
+}
+
+/// The delimiter of the fields, by the line of titles: a tab if there is one outside of quotes, else a semicolon, else a comma.
+fn delimiter(header: &[u8]) -> u8 {
+    let mut quoted = false;
+    let outside: Vec<u8> = header
+        .iter()
+        .copied()
+        .filter(|byte| {
+            quoted ^= *byte == b'"';
+            !quoted
+        })
+        .collect();
+    let found = [b'\t', b';']
+        .into_iter()
+        .find(|mark| outside.contains(mark));
+    found.unwrap_or(b',')
+}
+
+/// The decimal mark of a table.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Decimals {
+    /// Whether numbers may have a decimal comma.
+    comma: bool,
+    /// The decimal mark of the first number that has one.
+    seen: Option<char>,
+}
+
+impl Decimals {
+    /// The decimal mark of a table with this delimiter is not known yet.
+    #[must_use]
+    fn of(delimiter: u8) -> Decimals {
+        Decimals {
+            comma: delimiter != b',',
+            seen: None,
+        }
+    }
+
+    /// Reads a number; `None` if the field is not a number.
+    ///
+    /// # Errors
+    /// The number has another decimal mark than those before it, as separators of thousands have.
+    pub fn number(&mut self, field: &str) -> Result<Option<f64>, String> {
+        let Some(number) = number(field, self.comma) else {
+            return Ok(None);
+        };
+        if let Some(mark) = field.chars().find(|mark| [',', '.'].contains(mark)) {
+            let seen = *self.seen.get_or_insert(mark);
+            if seen != mark {
+                return Err(format!(
+                    "`{field}` has a `{mark}`, and a number before it a `{seen}` as its decimal mark; use one mark, and none between thousands"
+                ));
+            }
+        }
+        Ok(Some(number))
+    }
+}
+
+/// Reads a number, whose decimal mark may be a comma if `decimal_comma` is set.
+fn number(field: &str, decimal_comma: bool) -> Option<f64> {
+    let plain = field.parse().ok();
+    plain.or_else(|| {
+        let pointed = field.replacen(',', ".", 1);
+        (decimal_comma && !field.contains('.')).then(|| pointed.parse().ok())?
+    })
+}
+
+/// Whether a number comes back as it was written. A whole number such as `007`, `+7`, or one of 20 digits does not.
+fn is_exact(field: &str) -> bool {
+    let digits = field.strip_prefix(['-', '+']).unwrap_or(field);
+    let padded = digits.len() > 1 && digits.starts_with('0');
+    !digits.bytes().all(|byte| byte.is_ascii_digit())
+        || digits.len() <= EXACT_DIGITS && !padded && !field.starts_with('+')
+}
+
 /// A row by the titles of its columns.
 type JsonRow = Map<String, Value>;
 
-/// Rows as JSON objects, one in a line.
+/// Rows as JSON objects, one per line.
 pub(crate) struct JsonRows<R: BufRead> {
     source: R,
-    /// Lines that were read.
+    /// Number of lines that were read.
     lines: u64,
-    /// The line of the next row.
-    line: u64,
     /// The titles of the columns: the members of the first row.
     pub titles: Vec<Title>,
-    row: Option<JsonRow>,
-    /// Rows after it that were read to find the first values of columns.
+    /// Rows that were read ahead, each with its line.
     ahead: VecDeque<(u64, JsonRow)>,
 }
 
 impl<R: BufRead> JsonRows<R> {
-    /// Reads the first row.
+    /// Reads the first rows.
     ///
     /// # Errors
     /// `faulty-table`
@@ -274,39 +350,34 @@ impl<R: BufRead> JsonRows<R> {
         let mut rows = JsonRows {
             source,
             lines: 0,
-            line: 0,
             titles: Vec::new(),
-            row: None,
             ahead: VecDeque::new(),
         };
-        rows.advance()?;
-        let members = rows.row.iter().flatten();
-        let names: Vec<String> = members.map(|(name, _)| name.clone()).collect();
-        require_few(names.len())?;
-        let mut texts = vec![None; names.len()];
-        let mut look = |row: &JsonRow| {
-            for (name, text) in names.iter().zip(&mut texts) {
-                let value = row.get(name).filter(|value| !value.is_null());
-                *text = text.or(value.map(Value::is_string));
-            }
-            texts.iter().any(Option::is_none)
-        };
-        let mut open = rows.row.as_ref().is_some_and(&mut look);
         let mut bytes = 0;
-        while open && rows.ahead.len() < ROWS && bytes < LINE_BYTES_MAX {
-            let Some((line, row, length)) = rows.fetch()? else {
+        while rows.ahead.len() < ROWS && bytes < LINE_BYTES_MAX {
+            let Some((row, length)) = rows.fetch()? else {
                 break;
             };
-            open = look(&row);
             bytes += length;
-            rows.ahead.push_back((line, row));
+            rows.ahead.push_back((rows.lines, row));
         }
-        let titles = names.into_iter().zip(texts).map(|(name, text)| Title {
-            name,
+        let names = rows
+            .ahead
+            .front()
+            .into_iter()
+            .flat_map(|(_, row)| row.keys());
+        let first_value = |name: &String| {
+            let mut values = rows.ahead.iter().filter_map(|(_, row)| row.get(name));
+            values.find(|value| !value.is_null())
+        };
+        let titles = names.map(|name| Title {
+            name: name.clone(),
             unit: None,
-            text: text.unwrap_or_default(),
+            text: first_value(name).is_some_and(Value::is_string),
+            text_if_copied: false,
         });
         rows.titles = titles.collect();
+        require_few(rows.titles.len())?;
         Ok(rows)
     }
 
@@ -314,9 +385,10 @@ impl<R: BufRead> JsonRows<R> {
     fn read(&mut self) -> Result<Chunk> {
         let mut values = empty(&self.titles);
         for _ in 0..ROWS {
-            let Some(mut row) = self.row.take() else {
+            let Some((line, mut row)) = self.row()? else {
                 break;
             };
+            let wrong = |detail| faulty(format!("line {line}: {detail}"));
             for (column, values) in self.titles.iter().zip(&mut values) {
                 match (values, row.remove(&column.name)) {
                     (Values::Texts(texts), Some(Value::String(text))) => texts.push(Some(text)),
@@ -326,59 +398,54 @@ impl<R: BufRead> JsonRows<R> {
                         numbers.push(value.as_f64().unwrap_or(f64::NAN));
                     }
                     (_, Some(value)) => {
-                        return Err(self.wrong(&format!(
+                        return Err(wrong(format!(
                             "`{}` is {value}, which has another type than the first value of this column",
                             column.name
                         )));
                     }
                     (_, None) => {
-                        return Err(self.wrong(&format!("the member `{}` is missing", column.name)));
+                        return Err(wrong(format!("the member `{}` is missing", column.name)));
                     }
                 }
             }
             if let Some(other) = row.keys().next() {
                 let detail = format!("the member `{other}` is not in the first row");
-                return Err(self.wrong(&detail));
+                return Err(wrong(detail));
             }
-            self.advance()?;
         }
         Ok(values)
     }
 
-    /// Goes on to the next row.
-    fn advance(&mut self) -> Result<()> {
-        let next = match self.ahead.pop_front() {
-            Some(next) => Some(next),
-            None => self.fetch()?.map(|(line, row, _)| (line, row)),
-        };
-        let (line, row) = next.unzip();
-        self.line = line.unwrap_or(self.line);
-        self.row = row;
-        Ok(())
+    fn row(&mut self) -> Result<Option<(u64, JsonRow)>> {
+        match self.ahead.pop_front() {
+            Some(next) => Ok(Some(next)),
+            None => Ok(self.fetch()?.map(|(row, _)| (self.lines, row))),
+        }
     }
 
-    /// Reads the next line that is not blank: its number, its row and its length.
-    fn fetch(&mut self) -> Result<Option<(u64, JsonRow, u64)>> {
+    /// Reads the next line that is not blank: its row and its length in bytes.
+    fn fetch(&mut self) -> Result<Option<(JsonRow, usize)>> {
         loop {
             let mut text = Vec::new();
-            let mut line = (&mut self.source).take(LINE_BYTES_MAX);
+            let mut line = (&mut self.source).take(LINE_BYTES_MAX as u64);
             let read = line.read_until(b'\n', &mut text)?;
             self.lines += 1;
             if read == 0 {
                 return Ok(None);
             }
-            let row = without_mark(&text, self.lines);
-            if row.iter().all(u8::is_ascii_whitespace) {
+            let text = without_mark(&text, self.lines);
+            if text.iter().all(u8::is_ascii_whitespace) {
                 continue;
             }
-            let row = serde_json::from_slice(row);
-            let row = row.map_err(|error| faulty(format!("line {}: {error}", self.lines)))?;
-            return Ok(Some((self.lines, row, read as u64)));
+            return match serde_json::from_slice(text) {
+                Ok(Strict(Value::Object(row))) => Ok(Some((row, read))),
+                Ok(_) => Err(faulty(format!(
+                    "line {}: expected an object, a member for each column",
+                    self.lines
+                ))),
+                Err(error) => Err(faulty(format!("line {}: {error}", self.lines))),
+            };
         }
-    }
-
-    fn wrong(&self, detail: &str) -> TableError {
-        faulty(format!("line {}: {detail}", self.line))
     }
 }
 
@@ -386,7 +453,7 @@ impl<R: BufRead> Iterator for CsvRows<R> {
     type Item = Result<Chunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.read().map(there).transpose()
+        self.read().map(unless_empty).transpose()
     }
 }
 
@@ -394,7 +461,7 @@ impl<R: BufRead> Iterator for JsonRows<R> {
     type Item = Result<Chunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.read().map(there).transpose()
+        self.read().map(unless_empty).transpose()
     }
 }
 
@@ -406,8 +473,7 @@ fn empty(titles: &[Title]) -> Chunk {
     titles.iter().map(empty).collect()
 }
 
-/// The chunk, unless it has no row.
-fn there(chunk: Chunk) -> Option<Chunk> {
+fn unless_empty(chunk: Chunk) -> Option<Chunk> {
     let some = chunk.first().is_some_and(|column| !column.is_empty());
     some.then_some(chunk)
 }
@@ -428,12 +494,57 @@ mod tests {
     }
 
     #[test]
+    fn a_separator_line_names_the_delimiter_and_counts_as_a_line() {
+        let plain = "creepage_x;km\r\n0,001;2\r\n";
+        for text in [
+            "sep=;\r\ncreepage_x;km\r\n0,001;2\r\n",
+            "\u{feff}sep=;\ncreepage_x;km\n0,001;2\n",
+        ] {
+            let (mut marked, mut plain) = (
+                rows(TableForm::Csv, text).unwrap(),
+                rows(TableForm::Csv, plain).unwrap(),
+            );
+            assert_eq!(marked.titles, plain.titles);
+            assert_eq!(
+                marked.next().unwrap().unwrap(),
+                plain.next().unwrap().unwrap()
+            );
+        }
+        let tabs = rows(TableForm::Csv, "sep=\t\ncreepage_x\tkm\n1\tx\n2\n")
+            .unwrap()
+            .next();
+        let refused = tabs.unwrap().unwrap_err().to_string();
+        assert!(refused.contains("line 4 has 1 fields"), "{refused}");
+    }
+
+    #[test]
+    fn copied_names_and_padded_or_long_numbers_stay_as_they_are_written() {
+        let text = "creepage_x,axle_no,code,order,km\n0.1,1,007,12345678901234567890,1.50\n0.2,2,010,1,2.0\n";
+        let mut rows = rows(TableForm::Csv, text).unwrap();
+        let named = ["code", "order"].map(|title| (title.to_owned(), String::new()));
+        let columns = rows.named(&NamedColumns(Some(named.to_vec()))).unwrap();
+        let texts: Vec<bool> = columns.iter().map(|column| column.text).collect();
+        assert_eq!(texts, [false, true, true, true, false]);
+        let values = rows.next().unwrap().unwrap();
+        let texts =
+            |values: [&str; 2]| Values::Texts(values.map(|text| Some(text.to_owned())).to_vec());
+        assert_eq!(values[1], texts(["1", "2"]));
+        assert_eq!(values[2], texts(["007", "010"]));
+        assert_eq!(values[3], texts(["12345678901234567890", "1"]));
+        assert_eq!(values[4], Values::Numbers(vec![1.5, 2.0]));
+    }
+
+    #[test]
     fn csv_and_ndjson_of_the_same_rows_are_the_same_columns() {
         let csv = "\u{feff}creepage_x, km ,section\r\n0.1,,a\r\n-2e-3,37.5,\"b, c\"\r\n";
         let json = "{\"creepage_x\":0.1,\"km\":null,\"section\":\"a\"}\n\n{\"section\":\"b, c\",\"km\":37.5,\"creepage_x\":-2e-3}";
         let mut by_csv = rows(TableForm::Csv, csv).unwrap();
         let mut by_json = rows(TableForm::Ndjson, json).unwrap();
-        assert_eq!(by_csv.titles, by_json.titles);
+        let kinds = |titles: &[Title]| -> Vec<(String, bool)> {
+            let kinds = titles.iter().map(|title| (title.name.clone(), title.text));
+            kinds.collect()
+        };
+        assert_eq!(kinds(&by_csv.titles), kinds(&by_json.titles));
         let columns = by_csv.named(&NamedColumns::default()).unwrap();
         let pointers = columns.iter().map(|column| column.pointer.as_deref());
         assert_eq!(
@@ -544,6 +655,8 @@ mod tests {
             (json("{\"s\":1}\n{\"s\":\"x\"}"), ["line 2", "type"]),
             (json("{\"s\":1}\n{\"s\":1,\"b\":2}"), ["line 2", "`b`"]),
             (json("{\"s\":1}\nnothing"), ["line 2", "expected"]),
+            (json("{\"s\":1}\n[2]"), ["line 2", "an object"]),
+            (json("{\"s\":1,\"s\":2}"), ["line 1", "written twice"]),
         ] {
             let fault = format!("{:?}", read.expect_err("it is faulty"));
             assert!(words.iter().all(|word| fault.contains(word)), "{fault}");

@@ -1,6 +1,6 @@
-//! The titles of the columns of tables: JSON pointers, short names, quantities with a unit, and names that are carried along to the answers.
+//! Titles of columns: JSON pointers, short names of members, quantities with a unit, and names whose columns are copied to the results.
 //!
-//! Batches, runs and `/v1/evaluate` read titles here, so that a title means the same wherever it is sent.
+//! Batches, runs, evolutions and `/v1/evaluate` use this module, so that a title has the same meaning in all of them.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::f64::consts::PI;
@@ -8,46 +8,46 @@ use std::f64::consts::PI;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Result, TableError, faulty};
-use crate::table::{COLUMNS_MAX, TableKind};
+use crate::table::{COLUMNS_MAX, TableKind, Title};
 
-/// Faulty columns and recognised columns that the sentence of a refusal names; `errors` has all faulty ones.
+/// Most faulty columns and recognised columns that the detail of a refusal names; `errors` has all faulty ones.
 const NAMED_MAX: usize = 20;
-/// Titles differ from a misspelt name by at most this many letters.
+/// Largest Levenshtein distance between a title and the name that it may be a misspelling of.
 const MISSPELT_LETTERS: usize = 2;
 /// Shortest name that a misspelt title is compared with.
 const MISSPELT_LENGTH: usize = 5;
 
-/// The refusal of a table with this many columns, if they are too many.
+/// Refuses a table with more than [`COLUMNS_MAX`] columns.
 ///
 /// # Errors
 /// `faulty-table`
 pub fn require_few(columns: usize) -> Result<()> {
-    match columns > COLUMNS_MAX {
-        false => Ok(()),
-        true => Err(faulty(format!(
-            "the table has {columns} columns; allowed: at most {COLUMNS_MAX}"
-        ))),
+    if columns <= COLUMNS_MAX {
+        return Ok(());
     }
+    Err(faulty(format!(
+        "the table has {columns} columns; allowed: at most {COLUMNS_MAX}"
+    )))
 }
 
-/// A column of a table by its title.
+/// A column with the meaning of its title.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TitledColumn {
-    /// As the client names it, and as it is answered.
+    /// The title as sent, which is also the name of a copied column in the results.
     pub name: String,
-    /// The place in the case that it stands for; a column without one is carried along to the answers.
+    /// JSON pointer to the member of the case that the column varies; `None` if it is copied to the results.
     pub pointer: Option<String>,
-    /// Turns a number as it was sent into the unit of the case.
-    #[serde(default = "unchanged")]
+    /// Factor from the unit of the column to that of the case.
+    #[serde(default = "one")]
     pub factor: f64,
-    /// Unit named in its title or in a line of units.
+    /// The unit in the title or in a line of units.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// It holds texts; otherwise numbers.
+    /// Whether the column holds texts; otherwise it holds numbers.
     pub text: bool,
 }
 
-/// A number times the factor of its unit, to 15 digits, so that 64.1 kN are 64100 N.
+/// Returns a number times the factor of its unit, rounded to 15 digits, so that 64.1 kN are 64100 N.
 #[must_use]
 pub fn converted(number: f64, factor: f64) -> f64 {
     if factor == 1.0 {
@@ -57,19 +57,18 @@ pub fn converted(number: f64, factor: f64) -> f64 {
     format!("{number:.14e}").parse().unwrap_or(number)
 }
 
-/// The factor of a column in the unit of the case.
-fn unchanged() -> f64 {
+fn one() -> f64 {
     1.0
 }
 
 impl TitledColumn {
-    /// A number that was sent, in the unit of the case.
+    /// Converts a number of the column to the unit of the case.
     #[must_use]
     pub fn in_case(&self, number: f64) -> f64 {
         converted(number, self.factor)
     }
 
-    /// Type of its values.
+    /// The kind of its values.
     #[must_use]
     pub fn kind(&self) -> TableKind {
         match self.text {
@@ -79,10 +78,10 @@ impl TitledColumn {
     }
 }
 
-/// Units of a quantity.
+/// The units of a quantity.
 #[derive(Debug)]
 struct Units {
-    /// Each by its name in brackets and at the end of a title, and the factor that makes a value one of the case.
+    /// Symbol in brackets, suffix of a title, and factor to the unit of the case.
     list: &'static [(&'static str, &'static str, f64)],
     /// The unit that messages suggest.
     usual: &'static str,
@@ -93,7 +92,7 @@ macro_rules! units {
         $(const $name: Units = Units { list: &[$(($unit, $end, $factor)),+], usual: $usual };)*
     };
 }
-// Name of the quantity, its usual unit, and each unit with the end of a title that stands for it and its factor.
+// Name, usual unit, then symbol, suffix and factor of each unit.
 units! {
     FORCE "kN": "N" "n" 1.0, "kN" "kn" 1e3;
     LENGTH "mm": "mm" "mm" 1.0, "m" "m" 1e3, "cm" "cm" 10.0, "µm" "um" 1e-3, "μm" "um" 1e-3, "um" "um" 1e-3;
@@ -108,7 +107,7 @@ units! {
     TIME "s": "s" "s" 1.0;
 }
 
-/// The ends of names of members and the units that they stand for; the longer ends come first.
+/// Suffixes of names of members and the units of these members; a longer suffix precedes those that it ends in.
 const MEMBER_UNITS: [(&str, &Units); 10] = [
     ("spin_per_mm", &CURVATURE),
     ("_mm_per_s", &SPEED),
@@ -122,13 +121,13 @@ const MEMBER_UNITS: [(&str, &Units); 10] = [
     ("_s", &TIME),
 ];
 
-/// A quantity that columns vary. Names in a list are separated by spaces.
+/// A quantity that columns can vary. Names in a list are separated by spaces.
 #[derive(Debug)]
 struct Quantity {
-    /// Where it stands in the case.
+    /// JSON pointer into the case.
     pointer: &'static str,
     units: &'static Units,
-    /// Its names here.
+    /// Names of this service.
     names: &'static str,
     /// Names in vehicle-dynamics codes that mean this quantity if the column has one of its units.
     codes: &'static str,
@@ -185,37 +184,37 @@ const QUANTITIES: [Quantity; 13] = quantities! {
         "phi phi_x";
 };
 
-/// Members whose names are also short names of columns; `friction_coefficient` is one as well.
+/// Members whose names are short names of columns; `friction_coefficient` is a further short name.
 const SHORT_NAMES: &str = "/name /load/normal_force_n /load/vertical_force_n /load/approach_mm /motion/creepage_x /motion/creepage_y \
     /motion/spin_per_mm /motion/force_x_n /motion/force_y_n /contact/rolling_mm /contact/lateral_mm /contact/a_mm \
     /contact/b_mm /contact/rolling_radius_mm /contact/lateral_shift_mm /contact/yaw_rad /contact/roll_rad";
 
-/// The short names of columns and what they stand for.
+/// The short names of columns, each with its JSON pointer.
 fn named_members() -> impl Iterator<Item = (&'static str, &'static str)> {
     let members = SHORT_NAMES.split_whitespace();
     let members = members.map(|pointer| (pointer.rsplit('/').next().unwrap_or_default(), pointer));
     members.chain([("friction_coefficient", "/friction/coefficient")])
 }
 
-/// Names of places along the track and of times, which are carried along with or without a unit of length or time.
+/// Names of places along the track and of times. Their columns are copied to the results, with or without a unit of length or time.
 const PLACES_AND_TIMES: &str = "t time clock hour step time_step timestep s s_track track_s km kp pk kilometre kilometer kilometrage chainage station \
     stationing mile mileage milepost position pos place location distance dist distance_travelled distance_traveled \
     track_position track_distance position_along_track distance_along_track track_km track_chainage arc_length latitude \
     longitude date datetime timestamp";
 
-/// Names of sections of a line, of vehicles and their parts, and of rows, which are carried along; also with an end of [`NUMBERED`].
-/// `row`, `status` and `method` are also columns of the answers; a carried column of that name is refused.
+/// Names of sections of a line, of vehicles and their parts, and of rows, also with a suffix of [`NUMBERED`]. Their columns are copied to the
+/// results. `row`, `status` and `method` are also result columns; a copied column of that name is refused.
 const SECTIONS_AND_THINGS: &str = "section segment track track_section line route curve region direction site switch side rail rail_side left_right id \
     uuid key name title label tag comment remark note description case run scenario variant simulation train vehicle car \
     wagon coach locomotive bogie wheelset axle wheel wheel_side contact_point row status method record frame sample index \
     number no nr num passage";
 
-/// Ends of names such as `axle_no`.
+/// Suffixes of names such as `axle_no`.
 const NUMBERED: &[&str] = &[
     "id", "no", "nr", "num", "number", "name", "index", "code", "type",
 ];
 
-/// Units of places and times, by their names in brackets and at the ends of titles.
+/// Units of places and times, as symbols in brackets and as suffixes of titles.
 const PLACE_UNITS: &[&str] = &[
     "s", "ms", "us", "min", "h", "d", "km", "m", "cm", "mm", "mi", "ft", "°",
 ];
@@ -223,16 +222,17 @@ const PLACE_UNITS: &[&str] = &[
 /// Further units that a line of units below the titles may name.
 const OTHER_UNITS: &[&str] = &["Hz", "m/s²", "Nm", "°C"];
 
-/// Where a column stands in the case, and the factor that makes its values those of the case.
+/// A member of the case that a column varies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Place {
     /// JSON pointer into the case.
     pub pointer: String,
-    /// Of numbers.
+    /// Factor from the unit of the column to that of the case.
     pub factor: f64,
 }
 
-/// The place that a title names, with the unit of its column in a line of units; nothing if it names none.
+/// Returns the member that a title names. `below` is the unit of the column by a line of units, or by the title where the client gave the
+/// column another name. Returns `None` if the title names no member.
 ///
 /// # Errors
 /// The title names a quantity without a unit, or with one that it does not have.
@@ -242,21 +242,21 @@ pub fn place(title: &str, below: Option<&str>) -> Result<Option<Place>, String> 
     let unit = match (in_title, below) {
         (Some(one), Some(other)) if one != other => {
             return Err(format!(
-                "has the unit `{one}`, and `{other}` in the line of units; they must agree"
+                "has two units, `{one}` and `{other}`; they must agree"
             ));
         }
         (in_title, below) => in_title.or(below),
     };
+    let found = |pointer: &str, factor| {
+        let pointer = pointer.to_owned();
+        Ok(Some(Place { pointer, factor }))
+    };
     let direct = match title.starts_with('/') {
         true => Some(title),
-        false => short_pointer(title),
+        false => named_members().find_map(|(name, pointer)| (name == title).then_some(pointer)),
     };
     if let Some(pointer) = direct {
-        let factor = factor_at(pointer, below)?;
-        return Ok(Some(Place {
-            pointer: pointer.to_owned(),
-            factor,
-        }));
+        return found(pointer, factor_at(pointer, below)?);
     }
     let stem = normal(bare);
     for quantity in &QUANTITIES {
@@ -264,18 +264,28 @@ pub fn place(title: &str, below: Option<&str>) -> Result<Option<Place>, String> 
         let codes = quantity.codes.split_whitespace().map(|name| (name, false));
         for (name, own) in names.chain(codes) {
             if let Some(factor) = quantity.factor(&stem, name, own, unit)? {
-                return Ok(Some(Place {
-                    pointer: quantity.pointer.to_owned(),
-                    factor,
-                }));
+                return found(quantity.pointer, factor);
             }
+        }
+    }
+    // Such as `rolling_radius [m]` and `rolling_radius_m`, as for `rolling_radius_mm`.
+    for (name, pointer) in named_members() {
+        let known = MEMBER_UNITS
+            .iter()
+            .find_map(|(end, units)| Some((name.strip_suffix(end)?, *units)));
+        if let Some((base, units)) = known
+            && !QUANTITIES.iter().any(|quantity| quantity.may_be(base))
+            && let Some(factor) = units.factor_of_title(&stem, base, unit)?
+        {
+            return found(pointer, factor);
         }
     }
     Ok(None)
 }
 
 impl Quantity {
-    /// The factor of a title that is one of its names; nothing if it is none, or if a name of a code comes without a unit of the quantity.
+    /// Returns the factor of a title that is this name of the quantity. Returns `None` for another title, and for a name of a code without a
+    /// unit of the quantity.
     fn factor(
         &self,
         stem: &str,
@@ -283,33 +293,18 @@ impl Quantity {
         own: bool,
         unit: Option<&str>,
     ) -> Result<Option<f64>, String> {
-        let Some(rest) = stem.strip_prefix(name) else {
-            return Ok(None);
-        };
-        if rest.is_empty() {
-            let factor = match unit {
-                Some(unit) => self.units.factor(unit),
-                // A ratio without a unit is a number.
-                None => self.units.of_suffix("").filter(|_| own),
-            };
-            return match factor {
-                None if own => Err(match unit {
-                    Some(unit) => format!("has the unit `{unit}`; {}", self.allowed()),
-                    None => format!("has no unit; {}", self.allowed()),
-                }),
-                factor => Ok(factor),
-            };
+        let factor = self.units.factor_of_title(stem, name, unit)?;
+        if !own || factor.is_some() || stem != name {
+            return Ok(factor);
         }
-        let suffix = rest.strip_prefix('_').filter(|suffix| !suffix.is_empty());
-        let Some(factor) = suffix.and_then(|suffix| self.units.of_suffix(suffix)) else {
-            // Such as `spin_axis`: another quantity.
-            return Ok(None);
-        };
         match unit {
-            Some(unit) if self.units.factor(unit) != Some(factor) => Err(format!(
-                "ends in one unit and has the unit `{unit}` beside it; they must agree"
-            )),
-            _ => Ok(Some(factor)),
+            Some(unit) => Err(format!("has the unit `{unit}`; {}", self.allowed())),
+            // A ratio without a unit is a number.
+            None => self
+                .units
+                .of_suffix("")
+                .map(Some)
+                .ok_or_else(|| format!("has no unit; {}", self.allowed())),
         }
     }
 
@@ -324,7 +319,7 @@ impl Quantity {
         )
     }
 
-    /// The quantity as a client may write it, in this unit if it has it.
+    /// Returns the quantity as a title, in this unit if the quantity has it.
     fn written(&self, unit: Option<&str>) -> String {
         let unit = unit.filter(|unit| self.units.factor(unit).is_some());
         format!(
@@ -338,7 +333,7 @@ impl Quantity {
         self.names.split_whitespace().next().unwrap_or_default()
     }
 
-    /// Does the quantity have this name, or may it?
+    /// Whether this is a name of the quantity, or one that may mean it.
     fn may_be(&self, name: &str) -> bool {
         [self.names, self.codes, self.doubtful]
             .iter()
@@ -347,6 +342,30 @@ impl Quantity {
 }
 
 impl Units {
+    /// Returns the factor of a title that is this name with a unit in brackets or as a suffix; `None` for another title or unit.
+    fn factor_of_title(
+        &self,
+        stem: &str,
+        name: &str,
+        unit: Option<&str>,
+    ) -> Result<Option<f64>, String> {
+        let Some(rest) = stem.strip_prefix(name) else {
+            return Ok(None);
+        };
+        if rest.is_empty() {
+            return Ok(unit.and_then(|unit| self.factor(unit)));
+        }
+        // Another suffix, as in `spin_axis`, makes it another quantity.
+        let suffix = rest.strip_prefix('_').filter(|suffix| !suffix.is_empty());
+        let factor = suffix.and_then(|suffix| self.of_suffix(suffix));
+        match unit {
+            Some(unit) if factor.is_some() && self.factor(unit) != factor => Err(format!(
+                "ends in one unit and has the unit `{unit}` beside it; they must agree"
+            )),
+            _ => Ok(factor),
+        }
+    }
+
     fn factor(&self, unit: &str) -> Option<f64> {
         let exact = self.list.iter().find(|(known, ..)| *known == unit);
         let lower = || {
@@ -362,7 +381,7 @@ impl Units {
     }
 }
 
-/// The factor of a column that is named by its place in the case, with this unit in a line of units. A name that ends in its unit is in this unit.
+/// Returns the factor of a column in `unit` that is named by a pointer. The suffix of the pointer names its unit, so another unit is refused.
 fn factor_at(pointer: &str, unit: Option<&str>) -> Result<f64, String> {
     let Some(unit) = unit else {
         return Ok(1.0);
@@ -371,59 +390,56 @@ fn factor_at(pointer: &str, unit: Option<&str>) -> Result<f64, String> {
     match known {
         Some((_, units)) if units.factor(unit) == Some(1.0) => Ok(1.0),
         Some((_, units)) => Err(format!(
-            "is in {} by its name, and in `{unit}` by the line of units; they must agree",
+            "is in {} by its name, and the column has the unit `{unit}`; they must agree",
             units.list[0].0
         )),
-        None => RATIO.factor(unit).ok_or_else(|| {
-            format!("has the unit `{unit}` in the line of units, which its name does not allow")
-        }),
+        None => RATIO
+            .factor(unit)
+            .ok_or_else(|| format!("does not allow the unit `{unit}` of the column by its name")),
     }
 }
 
-/// The JSON pointer that a short name stands for.
-fn short_pointer(title: &str) -> Option<&'static str> {
-    named_members().find_map(|(name, pointer)| (name == title).then_some(pointer))
-}
-
-/// The short names, for messages.
+/// Returns the short names as a list for messages.
 #[must_use]
 pub fn short_names() -> String {
     let names = named_members().map(|(name, _)| format!("`{name}`"));
     names.collect::<Vec<_>>().join(", ")
 }
 
-/// Does a list of names, separated by spaces, have this name?
+/// Whether a list of names, separated by spaces, contains this name.
 fn is_among(name: &str, names: &str) -> bool {
     names.split_whitespace().any(|known| known == name)
 }
 
-/// Is this a name of a place, a time, a section or a thing, which says nothing of the contact?
-fn is_carried(title: &str, below: Option<&str>) -> bool {
-    let (bare, in_title) = parted(title);
-    let below = below.map(unbracketed);
-    let stem = normal(bare);
-    let unit = in_title.or(below).filter(|unit| !unit.is_empty());
+/// Whether a title names a place, a time, a section or a thing, whose column is copied to the results.
+fn is_copied(title: &str, below: Option<&str>) -> bool {
+    let unit = unit_of(title, below);
     let unitless = unit.is_none_or(|unit| ["-", "1"].contains(&unit));
     let of_place = unitless || unit.is_some_and(|unit| PLACE_UNITS.contains(&unit));
-    let cut = |ends: &[&str]| {
-        let (before, end) = stem.rsplit_once('_')?;
-        ends.contains(&end).then(|| before.to_owned())
-    };
-    let is = |list: &str, ends: &[&str]| {
-        is_among(&stem, list) || cut(ends).is_some_and(|before| is_among(&before, list))
-    };
-    // A label has this name in a table of a batch.
+    // In a table of a batch such a column is a label.
     title.starts_with("label:")
-        || is(PLACES_AND_TIMES, PLACE_UNITS) && of_place
-        || is(SECTIONS_AND_THINGS, NUMBERED) && unitless
+        || is_listed(title, PLACES_AND_TIMES, PLACE_UNITS) && of_place
+        || is_thing(title) && unitless
 }
 
-/// The quantities that a title may mean, as a client may write them.
+/// Whether a title names a section, a vehicle, one of its parts, or a row.
+pub(crate) fn is_thing(title: &str) -> bool {
+    is_listed(title, SECTIONS_AND_THINGS, NUMBERED)
+}
+
+/// Whether a list has the name of a title, possibly with one of these suffixes.
+fn is_listed(title: &str, list: &str, suffixes: &[&str]) -> bool {
+    let stem = normal(parted(title).0);
+    let before = stem
+        .rsplit_once('_')
+        .filter(|(_, suffix)| suffixes.contains(suffix));
+    is_among(&stem, list) || before.is_some_and(|(before, _)| is_among(before, list))
+}
+
+/// Returns the quantities that an unknown title may mean, as titles.
 fn suggested(title: &str, below: Option<&str>) -> Vec<String> {
-    let (bare, in_title) = parted(title);
-    let unit = in_title.or(below.map(unbracketed));
-    let unit = unit.filter(|unit| !unit.is_empty());
-    let stem = normal(bare);
+    let unit = unit_of(title, below);
+    let stem = normal(parted(title).0);
     let written = |quantities: Vec<&Quantity>| -> Vec<String> {
         let in_unit =
             |quantity: &&&Quantity| unit.is_none_or(|unit| quantity.units.factor(unit).is_some());
@@ -469,7 +485,7 @@ fn suggested(title: &str, below: Option<&str>) -> Vec<String> {
     written(QUANTITIES.iter().filter(of_unit).collect())
 }
 
-/// What a title that is not known may mean, as a question; empty if there is no guess.
+/// Returns a question that names the quantities that an unknown title may mean; empty if there are none.
 #[must_use]
 pub fn question(title: &str, below: Option<&str>) -> String {
     let guesses: Vec<String> = suggested(title, below)
@@ -482,57 +498,53 @@ pub fn question(title: &str, below: Option<&str>) -> String {
     }
 }
 
-/// Columns that a client named in the query: the title of each, and its name here; columns without one are carried along. Nothing for a route
-/// whose query names no columns.
+/// Columns that the query names: the title of each, and the name that gives its meaning; a column with an empty name is copied to the
+/// results. `None` for a route whose query names no columns.
 #[derive(Debug, Clone, Default)]
 pub struct NamedColumns(pub Option<Vec<(String, String)>>);
 
-/// The title of a column, its unit in a line of units, and whether it holds texts.
-pub type Titled<'a> = (&'a str, Option<&'a str>, bool);
-
 impl NamedColumns {
-    /// The columns of these titles. A title that was named has to be among them, and every other one has to be known.
+    /// Whether the query names the column of this title, with or without its unit.
+    #[must_use]
+    pub fn names(&self, title: &str) -> bool {
+        let mut named = self.0.iter().flatten();
+        named.any(|(name, _)| *name == title || *name == parted(title).0)
+    }
+
+    /// Returns the columns of these titles.
     ///
     /// # Errors
     /// `faulty-table` with every column at fault: a title is not known, or it names a quantity with a unit that it does not have, or without
-    /// one; or there are too many columns; or the client named a column twice, or one that is not there.
-    pub fn columns<'a>(
-        &self,
-        titles: impl Iterator<Item = Titled<'a>>,
-    ) -> Result<Vec<TitledColumn>> {
-        let titles: Vec<Titled<'_>> = titles.take(COLUMNS_MAX + 1).collect();
-        if titles.len() > COLUMNS_MAX {
-            return Err(faulty(format!(
-                "the table has more than {COLUMNS_MAX} columns, which are allowed at most"
-            )));
-        }
+    /// one; or there are too many columns; or the query names a column twice, or one that does not exist.
+    pub fn columns(&self, titles: &[Title]) -> Result<Vec<TitledColumn>> {
+        require_few(titles.len())?;
         let mut named = HashMap::new();
-        for (title, what) in self.0.iter().flatten() {
-            if named.insert(title.as_str(), what.as_str()).is_some() {
+        for (title, name) in self.0.iter().flatten() {
+            if named.insert(title.as_str(), name.as_str()).is_some() {
                 return Err(faulty(format!("`{title}` is named twice in the query")));
             }
         }
         let mut missing: HashSet<&str> = named.keys().copied().collect();
         let (mut columns, mut faults) = (Vec::with_capacity(titles.len()), BTreeMap::new());
-        for (number, (title, below, text)) in titles.iter().copied().enumerate() {
-            // A title may be named without its unit.
-            let found = [title, parted(title).0]
+        for (number, title) in titles.iter().enumerate() {
+            let (name, below) = (title.name.as_str(), title.unit.as_deref());
+            // The query may name a title without its unit.
+            let found = [name, parted(name).0]
                 .into_iter()
                 .find_map(|name| named.get_key_value(name));
             if let Some((name, _)) = found {
                 missing.remove(name);
             }
-            let named = found.map(|(_, what)| *what);
-            match place_of(title, below, named, self.0.is_some()) {
+            match place_of(name, below, found.map(|(_, name)| *name), self.0.is_some()) {
                 Ok(place) => columns.push(TitledColumn {
-                    name: title.to_owned(),
+                    name: name.to_owned(),
                     factor: place.as_ref().map_or(1.0, |place| place.factor),
+                    text: title.text || place.is_none() && title.text_if_copied,
                     pointer: place.map(|place| place.pointer),
-                    unit: unit_of(title, below).map(str::to_owned),
-                    text,
+                    unit: unit_of(name, below).map(str::to_owned),
                 }),
                 Err(detail) => {
-                    faults.insert(number, (title, detail));
+                    faults.insert(number, (name, detail));
                 }
             }
         }
@@ -546,7 +558,7 @@ impl NamedColumns {
             let titles: Vec<String> = titles
                 .iter()
                 .take(NAMED_MAX)
-                .map(|(title, ..)| format!("`{title}`"))
+                .map(|title| format!("`{}`", title.name))
                 .collect();
             return Err(faulty(format!(
                 "the query names the column `{title}`, which is not a title of the table; its titles: {}",
@@ -560,8 +572,8 @@ impl NamedColumns {
     }
 }
 
-/// The place of a column in the case; nothing if it is carried along. `named` is its name in the query, and `in_query` says whether queries of
-/// the route name columns.
+/// Returns the member that a column varies; `None` if it is copied to the results. `named` is its name in the query, and `in_query` tells
+/// whether the query of this route can name columns.
 fn place_of(
     title: &str,
     below: Option<&str>,
@@ -574,11 +586,10 @@ fn place_of(
     };
     match named {
         Some("") => Ok(None),
-        // Rows are no jobs that have a name.
+        // A row has no name, unlike a job.
         None if title == "name" => Ok(None),
         Some(what) => {
-            let unit = below.map(unbracketed).filter(|unit| !unit.is_empty());
-            let place = place(what, unit.or(parted(title).1));
+            let place = place(what, unit_of(title, below));
             match place.map_err(|detail| format!("`{what}` {detail}"))? {
                 Some(place) => Ok(Some(place)),
                 None => {
@@ -593,7 +604,7 @@ fn place_of(
         }
         None => match place(title, below).map_err(|detail| format!("{detail}; {carry}"))? {
             Some(place) => Ok(Some(place)),
-            None if is_carried(title, below) => Ok(None),
+            None if is_copied(title, below) => Ok(None),
             None => {
                 let asked = match question(title, below) {
                     asked if asked.is_empty() => "if it is a quantity of the case,".to_owned(),
@@ -616,7 +627,7 @@ fn place_of(
     }
 }
 
-/// Does the column hold texts, which have no unit?
+/// Whether the column of this title holds texts, which have no unit.
 #[must_use]
 pub fn is_text(title: &str) -> bool {
     title == "name"
@@ -625,13 +636,13 @@ pub fn is_text(title: &str) -> bool {
         || title.starts_with("/labels/")
 }
 
-/// The unit that a title or a line of units names.
+/// Returns the unit in a title or in a line of units.
 fn unit_of<'a>(title: &'a str, below: Option<&'a str>) -> Option<&'a str> {
     let below = below.map(unbracketed).filter(|unit| !unit.is_empty());
     parted(title).1.or(below)
 }
 
-/// The refusal of a table with faulty columns; also says what the others were taken for.
+/// Returns the refusal of a table with faulty columns, with the meaning of the other columns.
 fn refusal<'a>(
     faults: impl Iterator<Item = (&'a str, String)>,
     good: &[TitledColumn],
@@ -669,16 +680,15 @@ fn refusal<'a>(
     }
 }
 
-/// Reads `TITLE:NAME` of the query; the title may contain colons.
+/// Parses `TITLE:NAME` of the query; the title may contain colons.
 #[must_use]
 pub fn named_column(text: &str) -> Option<(String, String)> {
     let (title, what) = text.rsplit_once(':')?;
     (!title.is_empty()).then(|| (title.trim().to_owned(), what.trim().to_owned()))
 }
 
-/// Could this be a unit in a line of units?
-#[must_use]
-pub fn is_unit(text: &str) -> bool {
+/// Whether a field can be a unit in a line of units.
+fn is_unit(text: &str) -> bool {
     let bare = unbracketed(text);
     let members = MEMBER_UNITS.iter().map(|(_, units)| *units);
     let mut known = members.chain([&RATIO]).flat_map(|units| units.list);
@@ -689,7 +699,7 @@ pub fn is_unit(text: &str) -> bool {
         || OTHER_UNITS.contains(&bare)
 }
 
-/// Are these the units of the columns below their titles?
+/// Whether the fields of a line are units; at least one must not be empty.
 pub fn is_line_of_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
     let mut some = false;
     let all = fields.map(str::trim).all(|field| {
@@ -699,74 +709,7 @@ pub fn is_line_of_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
     all && some
 }
 
-/// The mark that parts the fields of a table, by its header: tabs if there is one outside of quotes, else semicolons, else commas.
-#[must_use]
-pub fn delimiter(header: &[u8]) -> u8 {
-    let mut quoted = false;
-    let outside: Vec<u8> = header
-        .iter()
-        .copied()
-        .filter(|byte| {
-            quoted ^= *byte == b'"';
-            !quoted
-        })
-        .collect();
-    let found = [b'\t', b';']
-        .into_iter()
-        .find(|mark| outside.contains(mark));
-    found.unwrap_or(b',')
-}
-
-/// The decimal mark of a table.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Decimals {
-    /// Commas may stand in numbers.
-    pub comma: bool,
-    /// The mark of the first number that has one.
-    seen: Option<char>,
-}
-
-impl Decimals {
-    /// Of a table whose fields are parted by this mark.
-    #[must_use]
-    pub fn of(delimiter: u8) -> Decimals {
-        Decimals {
-            comma: delimiter != b',',
-            seen: None,
-        }
-    }
-
-    /// Reads a number; nothing if the field is none.
-    ///
-    /// # Errors
-    /// It has another decimal mark than the numbers before it, as separators of thousands make it look.
-    pub fn number(&mut self, field: &str) -> Result<Option<f64>, String> {
-        let Some(number) = number(field, self.comma) else {
-            return Ok(None);
-        };
-        if let Some(mark) = field.chars().find(|mark| [',', '.'].contains(mark)) {
-            let seen = *self.seen.get_or_insert(mark);
-            if seen != mark {
-                return Err(format!(
-                    "`{field}` has a `{mark}`, and a number before it a `{seen}` as its decimal mark; use one mark, and none between thousands"
-                ));
-            }
-        }
-        Ok(Some(number))
-    }
-}
-
-/// A number, with a comma in place of its point where one may be.
-#[must_use]
-pub fn number(field: &str, decimal_comma: bool) -> Option<f64> {
-    let plain = field.parse().ok();
-    plain.or_else(|| {
-        let pointed = field.replacen(',', ".", 1);
-        (decimal_comma && !field.contains('.')).then(|| pointed.parse().ok())?
-    })
-}
-
-/// A title and the unit in brackets at its end.
+/// Splits a title into its name and the unit in brackets at its end.
 fn parted(title: &str) -> (&str, Option<&str>) {
     match bracketed(title) {
         Some((stem, unit)) => (stem.trim(), Some(unit)),
@@ -784,12 +727,12 @@ fn bracketed(title: &str) -> Option<(&str, &str)> {
     Some((stem, unit.trim()))
 }
 
-/// A unit without its brackets.
+/// Returns a unit without its brackets.
 fn unbracketed(unit: &str) -> &str {
     bracketed(unit).map_or(unit.trim(), |(_, unit)| unit)
 }
 
-/// A title as names are compared: small letters, Greek ones spelt out, words parted by `_`.
+/// Normalises a title for comparison: lower case, Greek letters spelt out, words separated by `_`.
 fn normal(title: &str) -> String {
     let mut text = String::with_capacity(title.len());
     let mut before = ' ';
@@ -820,9 +763,18 @@ fn normal(title: &str) -> String {
 mod tests {
     use super::*;
 
+    fn column(title: &str, unit: Option<&str>) -> Title {
+        Title {
+            name: title.to_owned(),
+            unit: unit.map(str::to_owned),
+            text: false,
+            text_if_copied: false,
+        }
+    }
+
     fn read(title: &str, unit: Option<&str>) -> Result<Option<(String, f64)>, String> {
         let named = NamedColumns(Some(Vec::new()));
-        let columns = named.columns([(title, unit, false)].into_iter());
+        let columns = named.columns(&[column(title, unit)]);
         let column = columns.map_err(|error| format!("{error:?}"))?.remove(0);
         Ok(column.pointer.map(|pointer| (pointer, column.factor)))
     }
@@ -862,6 +814,15 @@ mod tests {
                 "lateral_displacement [m]",
                 None,
                 "/contact/lateral_shift_mm",
+                1e3,
+            ),
+            ("a [mm]", None, "/contact/a_mm", 1.0),
+            ("a_m", None, "/contact/a_mm", 1e3),
+            ("b", Some("[m]"), "/contact/b_mm", 1e3),
+            (
+                "Rolling radius [m]",
+                None,
+                "/contact/rolling_radius_mm",
                 1e3,
             ),
         ] {
@@ -908,6 +869,8 @@ mod tests {
             ("phi [rad]", None, &["roll [rad]"]),
             ("alpha", None, &["yaw [mrad]"]),
             ("y [mm]", None, &["lateral_shift [mm]"]),
+            ("lateral [mm]", None, &["lateral_shift [mm]"]),
+            ("a", None, &["?carry=a"]),
             ("v", None, &["speed [km/h]"]),
             ("normal_forse", None, &["normal_force [kN]"]),
             ("whatever [1/m]", None, &["spin [1/m]"]),
@@ -933,7 +896,7 @@ mod tests {
 
     #[test]
     fn advice_names_parameters_only_where_the_query_has_them() {
-        let columns = NamedColumns::default().columns([("nu_x", None, false)].into_iter());
+        let columns = NamedColumns::default().columns(&[column("nu_x", None)]);
         let refused = columns.unwrap_err().to_string();
         assert!(
             refused.contains("write its title as `creepage_x [-]`"),
@@ -955,7 +918,8 @@ mod tests {
             ("normal_force_n", Some("kN"), "agree"),
             ("/load/normal_force_n", Some("kN"), "agree"),
             ("normal_force_kn [N]", None, "agree"),
-            ("spin [1/m]", Some("1/mm"), "agree"),
+            ("spin [1/m]", Some("1/mm"), "two units, `1/m` and `1/mm`"),
+            ("rolling_radius_m [mm]", None, "agree"),
         ] {
             let refused = read(title, unit).expect_err(title);
             assert!(refused.contains(word), "{refused}");
@@ -973,14 +937,10 @@ mod tests {
         ];
         let named = named.iter().filter_map(|text| named_column(text));
         let named = NamedColumns(Some(named.collect()));
-        let titles = [
-            ("Q.left", None, false),
-            ("Q.right", Some("[kN]"), false),
-            ("ny [%]", None, false),
-            ("spin", None, false),
-            ("t:x", None, false),
-        ];
-        let columns = named.columns(titles.into_iter()).expect("columns");
+        let titles = ["Q.left", "Q.right", "ny [%]", "spin", "t:x"];
+        let mut titles = titles.map(|title| column(title, None));
+        titles[1].unit = Some("[kN]".to_owned());
+        let columns = named.columns(&titles).expect("columns");
         let found: Vec<_> = columns
             .iter()
             .map(|column| (column.pointer.as_deref(), column.factor))
@@ -997,7 +957,7 @@ mod tests {
         let of = |named: &[&str]| {
             let named = named.iter().filter_map(|text| named_column(text));
             let named = NamedColumns(Some(named.collect()));
-            let columns = named.columns([("a", None, false)].into_iter());
+            let columns = named.columns(&[column("a", None)]);
             format!("{:?}", columns.expect_err("a refusal"))
         };
         assert!(of(&["a:load"]).contains("not a place in a case"));
@@ -1012,13 +972,9 @@ mod tests {
 
     #[test]
     fn columns_are_bounded() {
-        let titles: Vec<String> = (0..=COLUMNS_MAX).map(|k| format!("/a/{k}")).collect();
-        let columns = |count: usize| {
-            let titles = titles[..count]
-                .iter()
-                .map(|title| (title.as_str(), None, false));
-            NamedColumns::default().columns(titles)
-        };
+        let titles = (0..=COLUMNS_MAX).map(|k| column(&format!("/a/{k}"), None));
+        let titles: Vec<Title> = titles.collect();
+        let columns = |count: usize| NamedColumns::default().columns(&titles[..count]);
         assert_eq!(columns(COLUMNS_MAX).expect("columns").len(), COLUMNS_MAX);
         assert!(columns(COLUMNS_MAX + 1).is_err());
     }

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use crate::errors::assert_problem;
 use crate::runs::answers;
 use crate::server::{Server, Setup, count, example};
+use crate::table_forms::send_rows;
 
 /// The shipped wheel on a rail, its two cross-sections and the same case without them.
 fn pair() -> (Value, Value, Value) {
@@ -92,6 +93,16 @@ async fn assert_run(server: &Server, named: &Value, rail: &Value) {
     let single = server.solve(&single).await;
     assert_eq!(&rows[1]["force_y_n"], forces(&single["result"]));
     assert_ne!(rows[0]["force_y_n"], rows[1]["force_y_n"]);
+    let id = server.keep(named).await;
+    let csv = format!(
+        "/contact/rail/profile,lateral_shift_mm\n{},0\n,1\n",
+        rail["digest"].as_str().expect("a digest")
+    );
+    let empty = send_rows(server, &id, "text/csv", csv).await;
+    assert_problem(&empty, 422, "faulty-case", "no text given");
+    let csv = "side,lateral_shift_mm\nright,0\n";
+    let copied = send_rows(server, &id, "text/csv", csv).await;
+    assert_problem(&copied, 422, "faulty-table", "`/contact/side`");
     let mut unknown =
         json!({ "template": named, "columns": { "/contact/rail/profile": ["nothing"] } });
     let refused = server.post("/v1/runs", &unknown).await;

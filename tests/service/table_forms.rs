@@ -112,6 +112,27 @@ async fn a_run_answers_the_same_rows_alike_whatever_form_they_come_in() {
 }
 
 #[tokio::test]
+async fn copied_columns_of_csv_come_back_as_they_were_written() {
+    let server = Server::start().await;
+    let template = kept_template(&server).await;
+    let csv =
+        "sep=;\ncreepage_x;axle_no;order;km\n0,001;007;12345678901234567890;1,5\n0,002;8;2;2,0\n";
+    let query = format!("{template}&carry=order");
+    let run = send_rows(&server, &query, "text/csv", csv).await.is(202);
+    let run = run.location();
+    ended(&server, &run).await;
+    let path = format!("{run}/results?format=csv&columns=axle_no,order,km");
+    let copied = server.get(&path).await.text;
+    assert_eq!(
+        copied,
+        "axle_no,order,km\n007,12345678901234567890,1.5\n8,2,2.0\n"
+    );
+    let twice = "{\"creepage_x\":0.001,\"creepage_x\":0.002}";
+    let refused = send_rows(&server, &template, "application/x-ndjson", twice).await;
+    assert_problem(&refused, 422, "faulty-table", "written twice");
+}
+
+#[tokio::test]
 async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
     let server = Server::start().await;
     let template = kept_template(&server).await;

@@ -9,17 +9,14 @@ use crate::extract::query::{Reader, reader};
 use crate::problem::{ApiError, ProblemKind, Result};
 use crate::render::format::Format;
 
-/// Refuses requests that want something else than JSON, by `format` or because `Accept` excludes `application/json`.
+/// Layer that refuses requests for another format than JSON, by `format` or because `Accept` excludes `application/json`.
 pub async fn require_json(request: Request, next: Next) -> Response {
-    let named = named(request.uri());
+    let named = named_format(request.uri());
     if let Some(other) = named.as_deref().filter(|name| *name != Format::Json.name()) {
         let detail = format!("`format` is `{other}`; this resource answers `json` only");
         return ApiError::new(ProblemKind::NotAcceptable, detail).into_response();
     }
-    if named.is_some() {
-        return next.run(request).await;
-    }
-    if accepts_json(request.headers()) {
+    if named.is_some() || accepts_json(request.headers()) {
         return next.run(request).await;
     }
     let given: Vec<&str> = accept_values(request.headers()).collect();
@@ -30,7 +27,7 @@ pub async fn require_json(request: Request, next: Next) -> Response {
     ApiError::new(ProblemKind::NotAcceptable, detail).into_response()
 }
 
-/// Reads the name of one of the formats that are offered.
+/// Returns the reader of the name of one of these formats.
 pub fn one_of(offered: &'static [Format]) -> Reader<Format> {
     let names: Vec<String> = offered
         .iter()
@@ -41,11 +38,10 @@ pub fn one_of(offered: &'static [Format]) -> Reader<Format> {
     })
 }
 
-/// The format to answer in: the one that was named, else the one that `Accept` likes best, the first one offered among
-/// equals.
+/// Chooses the format of a response: the named one, else the one that `Accept` prefers; of equals the first.
 ///
 /// # Errors
-/// `not-acceptable`: `Accept` excludes all that are offered.
+/// `not-acceptable`: `Accept` excludes every offered format.
 pub fn choose(headers: &HeaderMap, named: Option<Format>, offered: &[Format]) -> Result<Format> {
     if let Some(format) = named {
         return Ok(format);
@@ -73,20 +69,20 @@ pub fn choose(headers: &HeaderMap, named: Option<Format>, offered: &[Format]) ->
     })
 }
 
-/// What `format` is in a query that is not read otherwise.
-fn named(uri: &Uri) -> Option<String> {
+/// Returns the parameter `format` of a URI.
+fn named_format(uri: &Uri) -> Option<String> {
     let Pairs(pairs) = Pairs::<Vec<(String, String)>>::try_from_uri(uri).ok()?;
     let format = pairs.into_iter().find(|(name, _)| name == "format");
     format.map(|(_, value)| value)
 }
 
-/// Does `Accept` allow `application/json`?
+/// Whether `Accept` allows `application/json`.
 fn accepts_json(headers: &HeaderMap) -> bool {
     quality(headers, "application/json") > 0.0
 }
 
-/// How much `Accept` likes a media type (RFC 9110, section 12.5.1), 0 to 1. The most specific range decides; without
-/// the header everything is liked.
+/// Returns the quality of a media type by `Accept` (RFC 9110, section 12.5.1), from 0 to 1. The most specific range decides; without the
+/// header the quality is 1.
 fn quality(headers: &HeaderMap, media_type: &str) -> f64 {
     if !headers.contains_key(header::ACCEPT) {
         return 1.0;

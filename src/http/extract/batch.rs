@@ -1,4 +1,5 @@
-//! Reads the body of a batch: an array, lines or a table, which is spooled while it arrives and then cut into cases.
+//! Reads the body of a batch: an array, lines or a table, which is spooled while it arrives and then split into cases.
+
 use std::cell::Cell as Shared;
 use std::collections::HashSet;
 use std::fmt::{self, Display};
@@ -26,23 +27,23 @@ use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
 use railhead_tables::read::{TableForm, TableRows, TableSource};
 use railhead_tables::table::{Chunk, Title};
-use railhead_tables::text::{CsvRows, StringRecord, without_mark};
-use railhead_tables::titles::{Decimals, Place, converted, is_text, place, question, short_names};
+use railhead_tables::text::{CsvRows, Decimals, StringRecord, without_mark};
+use railhead_tables::titles::{Place, converted, is_text, place, question, short_names};
 
-/// Takes a case with the number of its line, if it has one.
+/// Adds a case, with the number of its line in a body of lines.
 pub type Add<'a> = &'a mut dyn FnMut(Option<u64>, &[u8]) -> Result<()>;
 
-/// Reads cases that stand in a line each, of at most `most` bytes; blank lines are counted and left out.
+/// Reads cases of one line each, of at most `most` bytes. Blank lines are counted and skipped.
 ///
 /// # Errors
-/// `body-too-large`: a line is longer; what `add` refuses.
+/// `body-too-large`: a line is longer; or the error of `add`.
 pub fn read_lines(mut source: impl BufRead, most: usize, add: Add<'_>) -> Result<()> {
     let mut text = Vec::new();
     for line in 1.. {
         text.clear();
         let mut rest = (&mut source).take(most as u64 + 1);
         let read = rest.read_until(b'\n', &mut text);
-        if read.map_err(|error| ApiError::internal(&error))? == 0 {
+        if read.map_err(ApiError::internal)? == 0 {
             break;
         }
         text.pop_if(|byte| *byte == b'\n');
@@ -58,7 +59,7 @@ pub fn read_lines(mut source: impl BufRead, most: usize, add: Add<'_>) -> Result
 /// Reads cases that are the elements of an array, each of at most `most` bytes.
 ///
 /// # Errors
-/// `malformed-json`, `faulty-batch`: it is no array; `body-too-large`: an element is longer; what `add` refuses.
+/// `malformed-json`; `faulty-batch`: the body is not an array; `body-too-large`: an element is longer; or the error of `add`.
 pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()> {
     let left = Shared::new(most + BETWEEN);
     let source = Bounded {
@@ -66,10 +67,8 @@ pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()>
         left: &left,
     };
     let mut source = BufReader::new(source);
-    let begin = source
-        .fill_buf()
-        .map_err(|error| ApiError::internal(&error))?;
-    // Where blanks come first, only the beginning of the text is known here.
+    let begin = source.fill_buf().map_err(ApiError::internal)?;
+    // With leading blanks, the buffer may contain nothing else.
     let blank = begin.first().is_some_and(u8::is_ascii_whitespace);
     let unlike = unlike_json(begin).filter(|_| !blank);
     let mut json = Deserializer::from_reader(source);
@@ -94,10 +93,10 @@ pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()>
     }
 }
 
-/// Bytes that are read ahead, or stand between two elements.
+/// Bytes that are read ahead or separate two elements.
 const BETWEEN: usize = 16 << 10;
 
-/// A source that ends in an error where nothing is left of the bytes that an element may take. Below a buffer, whose bytes are read fast.
+/// A source that fails after the bytes that one element may take.
 struct Bounded<'a, R> {
     source: R,
     left: &'a Shared<usize>,
@@ -168,13 +167,13 @@ fn no_array() -> ApiError {
 }
 
 /// Names of the options, as members and as columns.
-pub const OPTION_NAMES: [&str; 2] = ["priority", "deadline_s"];
+const OPTION_NAMES: [&str; 2] = ["priority", "deadline_s"];
 
-/// The case that an element of a batch is or has.
+/// Reads the case of an element of a batch, with its options if it has some.
 ///
 /// # Errors
 /// Every fault of its options.
-pub fn read_options(mut element: Value) -> Result<BatchCase, Vec<Fault>> {
+fn read_options(mut element: Value) -> Result<BatchCase, Vec<Fault>> {
     let members = element.as_object_mut();
     let Some((members, case)) = members.and_then(|members| {
         let case = members.remove("case")?;
@@ -209,8 +208,8 @@ pub fn read_options(mut element: Value) -> Result<BatchCase, Vec<Fault>> {
 /// Sets the option of this name.
 ///
 /// # Errors
-/// There is none, or the value is not one of it.
-pub fn set_option(own: &mut CaseOptions, name: &str, value: &Value) -> Result<(), String> {
+/// The option does not exist, or the value is not allowed.
+fn set_option(own: &mut CaseOptions, name: &str, value: &Value) -> Result<(), String> {
     match name {
         "priority" => {
             let priority = value.as_str().and_then(Priority::from_name);
@@ -239,26 +238,26 @@ pub fn set_option(own: &mut CaseOptions, name: &str, value: &Value) -> Result<()
     Ok(())
 }
 
-/// What a line puts into the template, or why it stands for no case.
+/// The values of a row for the template, or the reason why the row is not a case.
 pub type Row = Result<BatchRow, String>;
 
 /// A column of a table that fills a template.
 #[derive(Debug, PartialEq)]
 pub struct TemplateColumn {
-    /// As it stands in the header.
+    /// The title as sent.
     title: String,
-    /// The members that lead to the value; none for an option of the line.
+    /// Path of members to the value; empty for an option of the row.
     path: Vec<String>,
-    /// What makes a number one of the case.
+    /// Factor from the unit of the column to that of the case.
     factor: f64,
-    /// The value is text, whatever it looks like.
+    /// Whether values are texts even if they are written like numbers.
     text: bool,
 }
 
-/// The columns of a table.
+/// Returns the columns of a table.
 ///
 /// # Errors
-/// `faulty-table`: a title names no column, or two the same.
+/// `faulty-table`: a title is not known, or two columns have the same member.
 pub fn columns_of(titles: &[Title]) -> Result<Vec<TemplateColumn>> {
     let mut seen = HashSet::new();
     let mut columns = Vec::new();
@@ -276,8 +275,8 @@ pub fn columns_of(titles: &[Title]) -> Result<Vec<TemplateColumn>> {
     Ok(columns)
 }
 
-/// The rows of a part of a table whose columns have kinds.
-pub fn rows_of(columns: &[TemplateColumn], chunk: &Chunk) -> impl Iterator<Item = Row> {
+/// Returns the rows of a part of a table whose columns have kinds.
+fn rows_of(columns: &[TemplateColumn], chunk: &Chunk) -> impl Iterator<Item = Row> {
     let rows = chunk.first().map_or(0, Values::len);
     (0..rows).map(move |row| {
         let mut filled = BatchRow::default();
@@ -301,7 +300,7 @@ pub fn rows_of(columns: &[TemplateColumn], chunk: &Chunk) -> impl Iterator<Item 
 }
 
 impl TemplateColumn {
-    /// Puts the value of a row where it belongs.
+    /// Adds the value of a row to its cells or its options.
     fn put(&self, value: Value, row: &mut BatchRow) -> Result<(), String> {
         if self.path.is_empty() {
             return set_option(&mut row.own, &self.title, &value)
@@ -347,10 +346,10 @@ fn column(title: &str, unit: Option<&str>) -> Result<TemplateColumn, String> {
     })
 }
 
-/// What a record of CSV puts into the template.
+/// Reads a record of CSV.
 ///
 /// # Errors
-/// It has another number of fields, numbers with another decimal mark than those before, or a value of an option is not allowed.
+/// The record has another number of fields or a number with another decimal mark, or the value of an option is not allowed.
 pub fn row_of(columns: &[TemplateColumn], decimals: &mut Decimals, record: &StringRecord) -> Row {
     if record.len() != columns.len() {
         return Err(format!(
@@ -374,10 +373,10 @@ pub fn row_of(columns: &[TemplateColumn], decimals: &mut Decimals, record: &Stri
     Ok(row)
 }
 
-/// A number in the unit of the case, `true`, `false` or `null` as JSON has them; everything else is text, and the case says whether it may be.
+/// Parses a field: a number, converted to the unit of the case, or `true`, `false` or `null`. Any other field is a text.
 fn read_value(field: &str, factor: f64, decimals: &mut Decimals) -> Result<Value, String> {
     let number = decimals.number(field)?.filter(|number| number.is_finite());
-    // JSON numbers have no plus sign. Whole numbers stay whole.
+    // JSON numbers have no plus sign. Whole numbers remain integers.
     let text = number.map_or(field, |_| field.trim_start_matches('+'));
     let value = match (serde_json::from_str(text), number) {
         (Ok(value @ (Value::Number(_) | Value::Bool(_) | Value::Null)), _) => value,
@@ -390,10 +389,10 @@ fn read_value(field: &str, factor: f64, decimals: &mut Decimals) -> Result<Value
     })
 }
 
-/// Reads and checks the body once it has arrived: a table, or cases one after the other.
+/// Reads and checks a body: a table, or cases one after the other. The faults of single cases are kept in the draft.
 ///
 /// # Errors
-/// The body is too large, too slow, broken, or not of its form; faults of single cases are kept in the draft.
+/// The body is too large, too slow, ends early or is malformed.
 pub async fn read_draft(
     (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
     table: Option<Table>,
@@ -406,7 +405,7 @@ pub async fn read_draft(
     let (one, archive) = (options.body_max_bytes, 2 * options.evaluate_max_bytes);
     let bytes = move |length: usize| match form {
         TableForm::Csv => length.min(one),
-        // It is read as a whole, once packed and once as numbers.
+        // The table is held in memory, compressed and as numbers.
         _ => archive,
     };
     let mut held = None;
@@ -433,7 +432,7 @@ pub async fn read_draft(
     read_spooled((jobs, memory), limits, bytes, request, read).await
 }
 
-/// Adds the rows of a table that has arrived.
+/// Adds the rows of a spooled table.
 fn read_rows(
     mut draft: BatchUpload,
     (form, file): (TableForm, File),
@@ -478,7 +477,7 @@ fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<()> {
     ))
 }
 
-/// Adds one case to a draft, with its faults if it has any. One in a line of its own need not be JSON.
+/// Adds a case to a draft, with its faults. A line that is not JSON is a faulty case, an element is not.
 fn add(
     draft: &mut BatchUpload,
     line: Option<u64>,

@@ -1,12 +1,13 @@
-//! Who asks and for what: the tenant whose jobs a handler may reach, the operator of the service, and ids in paths.
+//! The sender of a request and the ids in its path: the tenant whose jobs a handler can access, and the operator of the service.
+
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::BoxError;
 use axum::body::Bytes;
 use axum::extract::{FromRequestParts, Path};
-use axum::http::header;
 use axum::http::request::Parts;
+use axum::http::{Extensions, header};
 use futures_util::stream::{Stream, TryStreamExt, try_unfold};
 use uuid::Uuid;
 
@@ -17,32 +18,41 @@ use crate::state::AppState;
 use railhead_jobs::Jobs;
 use railhead_jobs::model::{ANONYMOUS, Kind, OPERATOR};
 
-/// Whose request it is, once that is known; in its extensions.
+/// The tenant of a request, in its extensions once it is known.
 #[derive(Debug, Clone)]
 pub struct Tenant(pub Arc<str>);
 
-/// The key of a request, which is checked again while its answer is being sent; in its extensions.
+impl Tenant {
+    /// Returns the tenant of a request; empty before it is known.
+    pub(crate) fn of(extensions: &Extensions) -> Arc<str> {
+        let tenant = extensions.get::<Tenant>();
+        tenant.map_or_else(|| "".into(), |Tenant(tenant)| tenant.clone())
+    }
+}
+
+/// The API key of a request, in its extensions. It is checked again while a long response is sent.
 #[derive(Debug, Clone)]
 pub struct Credential(Arc<str>);
 
-/// How often the key of a long answer is checked again.
+/// Interval between two checks of the key of a long response.
 const POLL_INTERVAL: Duration = Duration::from_secs(2);
 
-/// Ends when the key of a request has been revoked; never if the request has none.
+/// Resolves when the key of a request has been revoked; never if the request has no key.
 pub async fn revoked(jobs: Jobs, credential: Option<Credential>) {
     let Some(Credential(text)) = credential else {
         return std::future::pending().await;
     };
     loop {
         tokio::time::sleep(POLL_INTERVAL).await;
-        // A key table that does not answer does not count as a revocation.
+        // A key table that does not respond does not count as a revocation.
         if matches!(jobs.key(&text).await, Ok(None)) {
             return;
         }
     }
 }
 
-/// The pieces of an answer. They break off once `revoked` ends, so that no client takes what was sent for all there is.
+/// Passes the pieces of a response on until `revoked` resolves. The stream then ends in an error, so that the client does not take it for
+/// complete.
 pub fn until_revoked<E: Into<BoxError>>(
     pieces: impl Stream<Item = Result<Bytes, E>> + Send,
     revoked: impl Future<Output = ()> + Send,
@@ -60,22 +70,18 @@ pub fn until_revoked<E: Into<BoxError>>(
     })
 }
 
-/// The answer to a waiting request whose key was revoked.
+/// Returns the error of a waiting request whose key was revoked.
 pub(crate) fn revoked_meanwhile() -> ApiError {
     unauthorized("the key was revoked while the request waited")
 }
 
-/// The jobs that the client may see: those of its tenant. Every handler that touches jobs takes this.
+/// The jobs of the tenant of the request. Every handler that accesses jobs takes this.
 #[derive(Debug, Clone)]
 pub struct Caller(pub Jobs);
 
-/// A client that may read the figures of the whole service.
+/// All jobs, for a client that may read the figures of the whole service.
 #[derive(Debug, Clone)]
 pub struct Operator(pub Jobs);
-
-/// All jobs, for what concerns no tenant.
-#[derive(Debug, Clone)]
-pub struct AnyTenant(pub Jobs);
 
 impl FromRequestParts<AppState> for Caller {
     type Rejection = ApiError;
@@ -114,7 +120,7 @@ impl FromRequestParts<AppState> for Operator {
     }
 }
 
-/// Declares the id in the path of a resource. A text that is no id names nothing, so it is answered like an unknown one.
+/// Declares the id in the path of a resource. A text that is not an id is answered like an unknown id.
 macro_rules! id {
     ($(#[doc = $doc:literal])* $name:ident: $kind:ident) => {
         $(#[doc = $doc])*
@@ -125,7 +131,8 @@ macro_rules! id {
             type Rejection = ApiError;
 
             async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
-                read_id(parts, state, Kind::$kind).await.map($name)
+                let text = path_text(parts, state, ProblemKind::not_found(Kind::$kind)).await?;
+                work_id(Kind::$kind, &text).map($name)
             }
         }
     };
@@ -144,7 +151,7 @@ id! {
     RunId: Rows
 }
 
-/// The id of a run in the path, and the number of one of its rows.
+/// The id of a run in the path, and the index of one of its rows.
 #[derive(Debug, Clone, Copy)]
 pub struct RunRowId(pub Uuid, pub u64);
 
@@ -164,14 +171,21 @@ impl FromRequestParts<AppState> for RunRowId {
     }
 }
 
-async fn read_id(parts: &mut Parts, state: &AppState, kind: Kind) -> Result<Uuid> {
+/// Returns the only parameter of the path.
+///
+/// # Errors
+/// A problem of the kind `unreadable`: the parameter is not UTF-8.
+pub(crate) async fn path_text(
+    parts: &mut Parts,
+    state: &AppState,
+    unreadable: ProblemKind,
+) -> Result<String> {
     let path = Path::<String>::from_request_parts(parts, state).await;
-    let Path(text) = path
-        .map_err(|rejection| ApiError::new(ProblemKind::not_found(kind), rejection.body_text()))?;
-    work_id(kind, &text)
+    let Path(text) = path.map_err(|rejection| ApiError::new(unreadable, rejection.body_text()))?;
+    Ok(text)
 }
 
-/// Reads the id of work of this kind from a text.
+/// Parses the id of work of this kind.
 ///
 /// # Errors
 /// The text is not an id.

@@ -1,29 +1,29 @@
-//! Reads bodies: as they arrive, within limits of size and time, and as JSON that is declared as such and names no member twice.
-use std::fmt;
+//! Reads bodies within limits of size and time, and as JSON without repeated members.
+
 use std::time::Duration;
 
 use axum::body::{Body, BodyDataStream, Bytes, HttpBody};
 use axum::extract::{FromRequest, Request};
 use axum::http::{HeaderMap, header};
 use futures_util::StreamExt;
-use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
-use serde_json::{Map, Number, Value};
+use serde_json::Value;
 use tokio::time::{Instant, timeout_at};
 
 use crate::extract::caller::Tenant;
-use crate::layers::admission::{PackedLength, too_long};
+use crate::layers::admission::{PackedLength, declared_length, too_long};
 use crate::limits::{Memory, MemoryPermit, Permit, SMALL_BYTES};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind, Result};
 use crate::state::AppState;
 use railhead_jobs::sync::blocking;
+use railhead_tables::strict_json::Strict;
 
-/// The JSON body of a request. What it means is for others to judge.
+/// The JSON body of a request.
 #[derive(Debug)]
 pub struct JsonBody {
-    /// What was sent.
+    /// The parsed body.
     pub value: Value,
-    /// The memory that it takes, and the turn of a large one; to be held until it has been checked.
+    /// The permit for its memory, and the turn of a large body. It is held until the body has been checked.
     pub room: MemoryPermit,
 }
 
@@ -35,8 +35,7 @@ impl FromRequest<AppState> for JsonBody {
             options, memory, ..
         } = state;
         require_json(request.headers())?;
-        let tenant = request.extensions().get::<Tenant>().cloned();
-        let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
+        let tenant = Tenant::of(request.extensions());
         let (bytes, held) = read_whole(request, memory, &tenant, options).await?;
         let weight = weigh_in_turn(memory, &tenant, &bytes, options.parsed_max_bytes).await?;
         let share = memory.parsed(&tenant, weight).await?;
@@ -47,7 +46,7 @@ impl FromRequest<AppState> for JsonBody {
                 room: MemoryPermit { share, turn: None },
             });
         }
-        // Off the threads that answer requests, few at a time.
+        // Large bodies are parsed on blocking threads, a few at a time.
         let turn = memory.turn(&tenant, weight).await?;
         let room = MemoryPermit {
             share,
@@ -56,14 +55,14 @@ impl FromRequest<AppState> for JsonBody {
         let read = blocking(move || {
             let value = read_json(&bytes);
             drop((bytes, held));
-            // The memory is held until the work ends, even if the client has gone away.
+            // The permit is held until the work ends, even if the client has disconnected.
             value.map(|value| JsonBody { value, room })
         });
         read.await?
     }
 }
 
-/// The weight of a case; counting in a large one takes long enough that it must not hold up other requests.
+/// Returns the memory of a parsed case. Large texts are scanned on a blocking thread, because that would delay other requests.
 async fn weigh_in_turn(
     memory: &Memory,
     tenant: &str,
@@ -81,10 +80,10 @@ async fn weigh_in_turn(
     weighed.await?
 }
 
-/// What the text of a case will take in memory once it is parsed.
+/// Estimates the memory of a case once it is parsed, in bytes.
 ///
 /// # Errors
-/// `body-too-large`: more than one case may take.
+/// `body-too-large`: the memory or the number of members exceeds the limit of a case.
 pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize> {
     let weight = weigh(text);
     if weight.bytes > max_bytes {
@@ -108,8 +107,7 @@ pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize> {
     Ok(weight.bytes)
 }
 
-/// Parses JSON text (RFC 8259) without repairing anything: a member written twice and a number beyond the range of
-/// `f64` are refused, like every other error, with line and column.
+/// Parses JSON text (RFC 8259). A repeated member and a number beyond the range of `f64` are errors.
 ///
 /// # Errors
 /// `malformed-json` with its position.
@@ -117,7 +115,7 @@ pub fn read_json(text: &[u8]) -> Result<Value> {
     read_strict(text).map_err(|error| not_json(unlike_json(text), &error))
 }
 
-/// The refusal of a body that is not JSON, with what is wrong with its beginning, if anything is.
+/// Returns the refusal of a body that is not JSON; `unlike` is the fault of its beginning, if there is one.
 #[must_use]
 pub fn not_json(unlike: Option<&str>, error: &serde_json::Error) -> ApiError {
     let refusal = ApiError::malformed(error);
@@ -127,7 +125,7 @@ pub fn not_json(unlike: Option<&str>, error: &serde_json::Error) -> ApiError {
     }
 }
 
-/// What is wrong with a text that does not even begin like JSON.
+/// Returns the fault of a text that does not begin like JSON.
 #[must_use]
 pub fn unlike_json(text: &[u8]) -> Option<&'static str> {
     match text {
@@ -138,7 +136,7 @@ pub fn unlike_json(text: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// As [`read_json`], with the parser's own error.
+/// Like [`read_json`], with the error of the parser.
 ///
 /// # Errors
 /// The text is not JSON.
@@ -146,7 +144,7 @@ pub fn read_strict(text: &[u8]) -> Result<Value, serde_json::Error> {
     serde_json::from_slice::<Strict>(text).map(|Strict(value)| value)
 }
 
-/// The media type of a body without its parameters, in small letters; empty if none is given.
+/// Returns the media type of a body without parameters, in lower case; empty if there is none.
 #[must_use]
 pub fn essence(headers: &HeaderMap) -> String {
     let given = headers.get(header::CONTENT_TYPE);
@@ -155,7 +153,7 @@ pub fn essence(headers: &HeaderMap) -> String {
     essence.trim().to_ascii_lowercase()
 }
 
-/// Refuses a content type that names another charset than UTF-8.
+/// Refuses a content type with another charset than UTF-8.
 ///
 /// # Errors
 /// `unsupported-media-type`
@@ -198,8 +196,8 @@ fn require_json(headers: &HeaderMap) -> Result<()> {
     ))
 }
 
-/// The whole body, and the share of memory that it takes. Memory is taken before anything is read: the declared length,
-/// or where it is not known, as that of a packed body, as much as a body may have once it turns out not to be small.
+/// Reads the whole body, and returns the permit for its memory. The permit is for the declared length. If the length is not known, as for a
+/// compressed body, the permit is for the largest body, and taken as soon as the body is not small.
 async fn read_whole(
     request: Request,
     memory: &Memory,
@@ -217,7 +215,7 @@ async fn read_whole(
             if share.is_none() && held.len() + data.len() > SMALL_BYTES {
                 share = memory.body(tenant, max_bytes).await?;
             }
-            // A packed body is there at once and unpacks for a while: others get their turn in between.
+            // A compressed body is decompressed without waiting for the client; other tasks run in between.
             if (held.len() + data.len()) / SMALL_BYTES > held.len() / SMALL_BYTES {
                 tokio::task::yield_now().await;
             }
@@ -236,96 +234,26 @@ async fn read_whole(
     Ok((Bytes::from(held), share))
 }
 
-/// A JSON value in which no object names a member twice; `Value` itself would keep the last one silently.
-pub struct Strict(pub Value);
-
-impl<'de> Deserialize<'de> for Strict {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(StrictVisitor).map(Strict)
-    }
-}
-
-struct StrictVisitor;
-
-impl<'de> Visitor<'de> for StrictVisitor {
-    type Value = Value;
-
-    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        formatter.write_str("a JSON value")
-    }
-
-    fn visit_unit<E>(self) -> Result<Value, E> {
-        Ok(Value::Null)
-    }
-
-    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
-        Ok(Value::Bool(value))
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
-        Ok(Value::Number(value.into()))
-    }
-
-    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
-        Ok(Value::Number(value.into()))
-    }
-
-    fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
-        let number = Number::from_f64(value).ok_or_else(|| E::custom("number out of range"))?;
-        Ok(Value::Number(number))
-    }
-
-    fn visit_str<E>(self, value: &str) -> Result<Value, E> {
-        Ok(Value::String(value.to_owned()))
-    }
-
-    fn visit_string<E>(self, value: String) -> Result<Value, E> {
-        Ok(Value::String(value))
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Value, A::Error> {
-        let mut array = Vec::new();
-        while let Some(Strict(item)) = items.next_element()? {
-            array.push(item);
-        }
-        Ok(Value::Array(array))
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Value, A::Error> {
-        let mut object = Map::new();
-        while let Some(name) = members.next_key::<String>()? {
-            if object.contains_key(&name) {
-                return Err(A::Error::custom(format_args!(
-                    "the member `{name}` is written twice"
-                )));
-            }
-            let Strict(value) = members.next_value()?;
-            object.insert(name, value);
-        }
-        Ok(Value::Object(object))
-    }
-}
-
-/// Most members of all objects together. The longest list of motions has less than half as many.
+/// Most members of all objects together. The longest allowed list of motions has less than half of it.
 pub const MEMBERS_MAX: usize = 200_000;
 
-/// A node of the tree that holds an object's members takes this much, also if there is only one of them.
+/// Bytes of an object: a node of its tree of members.
 const OBJECT_BYTES: usize = 640;
-/// What a member takes besides its value: the text of its name, and its part of further nodes.
+/// Bytes of a member without its value: its name, and its share of further nodes.
 const MEMBER_BYTES: usize = 112;
-/// The smallest array that is not empty.
+/// Bytes of the smallest array that is not empty.
 const ARRAY_BYTES: usize = 4 * size_of::<Value>();
 
-/// What a text holds.
+/// Size of a text once it is parsed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Weight {
-    /// Memory of the parsed value in bytes, rather too much than too little.
+    /// Memory of the parsed value in bytes, an upper estimate.
     pub bytes: usize,
-    /// Members of all objects.
+    /// Number of members of all objects.
     pub members: usize,
 }
 
-/// Weighs a text, be it JSON or not.
+/// Estimates the memory of the parsed text; the text need not be valid JSON.
 #[must_use]
 pub fn weigh(text: &[u8]) -> Weight {
     let (mut values, mut arrays, mut objects, mut members) = (1_usize, 0_usize, 0_usize, 0_usize);
@@ -361,11 +289,11 @@ pub fn weigh(text: &[u8]) -> Weight {
     }
 }
 
-/// Bytes per second of a body at least, on average and after a head start of the time that a piece may take: otherwise
-/// one byte at a time could keep a connection and a file open for ever.
+/// Lowest average rate of a body in bytes per second, after the time that one piece may take. Without it, a client could keep a connection
+/// open for ever by sending single bytes.
 const LOWEST_RATE: f64 = 1024.0;
 
-/// A body on its way, held to its limits of size and time.
+/// Streams a body within limits of size and time.
 pub struct BodyReader {
     timeout: Duration,
     max_bytes: u64,
@@ -377,18 +305,17 @@ pub struct BodyReader {
 }
 
 impl BodyReader {
-    /// The body of a request: `what` it is, the time that a piece of it may take, and its largest size.
+    /// Creates the reader of the body of a request. `timeout` limits the time of a piece; `what` describes the body in errors.
     ///
     /// # Errors
-    /// The body says itself that it is too large.
+    /// `body-too-large`: the declared length exceeds `max_bytes`.
     pub fn new(
         timeout: Duration,
         max_bytes: u64,
         what: &'static str,
         request: Request<Body>,
     ) -> Result<BodyReader> {
-        let declared = request.headers().get(header::CONTENT_LENGTH);
-        let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+        let declared = declared_length(request.headers());
         let packed = request.extensions().get::<PackedLength>().cloned();
         let reader = BodyReader {
             timeout,
@@ -405,10 +332,21 @@ impl BodyReader {
         Ok(reader)
     }
 
-    /// The next piece, or nothing at the end.
+    /// Appends the rest of the body to `text`.
     ///
     /// # Errors
-    /// It is too large, too slow, or breaks off.
+    /// See [`BodyReader::next`].
+    pub async fn read_to_end(&mut self, text: &mut Vec<u8>) -> Result<()> {
+        while let Some(piece) = self.next().await? {
+            text.extend_from_slice(&piece);
+        }
+        Ok(())
+    }
+
+    /// Returns the next piece; `None` at the end.
+    ///
+    /// # Errors
+    /// The body is too large, too slow, or ends early.
     pub async fn next(&mut self) -> Result<Option<Bytes>> {
         let owed = Duration::from_secs_f64(self.total as f64 / LOWEST_RATE);
         let latest = self.begun + self.timeout + owed;
@@ -426,12 +364,9 @@ impl BodyReader {
             )
         })?;
         let Some(piece) = piece else { return Ok(None) };
-        let piece = piece.map_err(|error| {
-            if too_long(&error) {
-                self.too_large()
-            } else {
-                unreadable(&error)
-            }
+        let piece = piece.map_err(|error| match too_long(&error) {
+            true => self.too_large(),
+            false => unreadable(&error),
         })?;
         self.total += piece.len() as u64;
         if self.total > self.max_bytes {
@@ -455,7 +390,7 @@ impl BodyReader {
     }
 }
 
-/// A part of `multipart/form-data` after the last one that is allowed.
+/// A part of `multipart/form-data` after the last allowed one.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "the body has the part `{0}` after the table; allowed are one part `template` (the case, JSON) and one part `table`, in this order; \
@@ -463,7 +398,7 @@ impl BodyReader {
 )]
 pub struct UnexpectedPart(pub String);
 
-/// A body that broke off, could not be unpacked, or has a part that is not allowed.
+/// Returns the error of a body that ended early, cannot be decompressed, or has a part that is not allowed.
 pub fn unreadable(error: &(dyn std::error::Error + 'static)) -> ApiError {
     let mut deepest = error;
     while let Some(next) = deepest.source() {

@@ -1,4 +1,4 @@
-//! What a request contains, read strictly: caller, ids, query, body, and the formats that the client accepts.
+//! Extractors, which read requests strictly: caller, ids, query, body, and the formats that the client accepts.
 
 pub mod accept;
 pub mod batch;

@@ -1,5 +1,5 @@
-//! Query parameters: each is one entry of a table, which gives its reader, its place in the contract and its fault. Unknown, repeated and
-//! unreadable parameters are refused together.
+//! Query parameters: each is one entry of a `query!` table, which gives its reader, its description in the contract and its fault. Unknown,
+//! repeated and unreadable parameters are refused together.
 use std::borrow::Cow;
 use std::time::Duration;
 
@@ -12,24 +12,21 @@ use uuid::Uuid;
 use crate::problem::{ApiError, Fault, Result};
 use railhead_jobs::model::{Priority, SubmitOptions};
 
-/// Parameters that belong together; [`query`] makes such types.
+/// A group of parameters, declared by [`query`].
 pub trait Parameters: Sized {
-    /// What the readers need to know of the service.
-    type Limits;
-
     /// The names of the parameters.
     fn names() -> Vec<&'static str>;
 
-    /// Takes the parameters from a query, which notes their faults.
-    fn take(query: &mut Query, limits: &Self::Limits) -> Self;
+    /// Takes the parameters from a query, which collects their faults.
+    fn take(query: &mut Query) -> Self;
 
-    /// Reads the query of an address that has no other parameters.
+    /// Reads the query of a route that has no other parameters.
     ///
     /// # Errors
     /// `bad-query` with every fault.
-    fn read(uri: &Uri, limits: &Self::Limits) -> Result<Self> {
+    fn read(uri: &Uri) -> Result<Self> {
         let mut query = Query::read(uri, &Self::names());
-        let parameters = Self::take(&mut query, limits);
+        let parameters = Self::take(&mut query);
         query.finish()?;
         Ok(parameters)
     }
@@ -37,70 +34,67 @@ pub trait Parameters: Sized {
 
 /// No parameters.
 impl Parameters for () {
-    type Limits = ();
-
     fn names() -> Vec<&'static str> {
         Vec::new()
     }
 
-    fn take(_: &mut Query, (): &()) {}
+    fn take(_: &mut Query) {}
 }
 
 /// Both groups of parameters.
-impl<A: Parameters<Limits = ()>, B: Parameters<Limits = ()>> Parameters for (A, B) {
-    type Limits = ();
-
+impl<A: Parameters, B: Parameters> Parameters for (A, B) {
     fn names() -> Vec<&'static str> {
         [A::names(), B::names()].concat()
     }
 
-    fn take(query: &mut Query, limits: &()) -> Self {
-        (A::take(query, limits), B::take(query, limits))
+    fn take(query: &mut Query) -> Self {
+        (A::take(query), B::take(query))
     }
 }
 
-/// Layer around resources that have no parameters but their form, which was looked at before.
+/// Layer around resources without parameters except `format`, which [`require_json`](super::accept::require_json) checks.
 pub async fn refuse_parameters(request: Request, next: Next) -> Response {
-    match Query::read(request.uri(), &["format"]).finish() {
-        Ok(()) => next.run(request).await,
-        Err(fault) => fault.into_response(),
-    }
+    refuse_unknown(&["format"], request, next).await
 }
 
-/// As [`refuse_parameters`], around resources whose `GET` can wait.
+/// Like [`refuse_parameters`], around resources whose `GET` can wait.
 pub async fn refuse_all_but_wait(request: Request, next: Next) -> Response {
     let known: &[&str] = match *request.method() {
         Method::GET => &["format", "wait"],
         _ => &["format"],
     };
+    refuse_unknown(known, request, next).await
+}
+
+async fn refuse_unknown(known: &[&str], request: Request, next: Next) -> Response {
     match Query::read(request.uri(), known).finish() {
         Ok(()) => next.run(request).await,
         Err(fault) => fault.into_response(),
     }
 }
 
-/// How the text of a parameter is read, and what is allowed, in words.
+/// Parses the text of a parameter, and describes the texts that it accepts.
 pub struct Reader<T> {
     allowed: Cow<'static, str>,
-    /// May the parameter be given more than once?
+    /// Whether the parameter may be given more than once.
     repeated: bool,
     read: Read<T>,
 }
 
-/// The value of the texts of a parameter, of which there is at least one, or the place of the one that cannot be read.
+/// Parses the texts of a parameter, at least one. Fails with the index of the text that cannot be parsed.
 type Read<T> = Box<dyn Fn(&[&str]) -> Result<T, usize>>;
 
 impl<T> Reader<T> {
-    /// The value of a text.
+    /// Parses a text.
     ///
     /// # Errors
-    /// The allowed values, for the error if a text cannot be read.
+    /// A description of the allowed values.
     pub fn read(&self, text: &str) -> Result<T, &str> {
         (self.read)(&[text]).map_err(|_| &*self.allowed)
     }
 }
 
-/// Reads a parameter that may be given more than once.
+/// Returns the reader of a parameter that may be given more than once.
 pub fn repeated<T: 'static>(one: Reader<T>) -> Reader<Vec<T>> {
     let read = one.read;
     let all = move |texts: &[&str]| {
@@ -116,7 +110,7 @@ pub fn repeated<T: 'static>(one: Reader<T>) -> Reader<Vec<T>> {
     }
 }
 
-/// Reads by a function; `allowed` says in words what it accepts.
+/// Returns a reader that parses by a function; `allowed` describes the texts that it accepts.
 pub fn reader<T>(
     allowed: impl Into<Cow<'static, str>>,
     read: impl Fn(&str) -> Option<T> + 'static,
@@ -128,14 +122,14 @@ pub fn reader<T>(
     }
 }
 
-/// The number of a motion or a patch.
+/// Returns the reader of the index of a motion or a patch.
 pub fn index() -> Reader<usize> {
     reader("a whole number, counted from 0", |text| {
         whole(text, 0, u32::MAX).and_then(|number| usize::try_from(number).ok())
     })
 }
 
-/// A whole number of something from `low` to `high`.
+/// Returns the reader of a whole number from `low` to `high`.
 pub fn count(low: u32, high: u32) -> Reader<u32> {
     reader(
         format!("a whole number from {low} to {high}"),
@@ -143,7 +137,7 @@ pub fn count(low: u32, high: u32) -> Reader<u32> {
     )
 }
 
-/// A whole number of seconds from `low` to `high`.
+/// Returns the reader of a whole number of seconds from `low` to `high`.
 pub fn seconds(low: u32, high: u32) -> Reader<u32> {
     reader(
         format!("a whole number of seconds from {low} to {high}"),
@@ -151,7 +145,7 @@ pub fn seconds(low: u32, high: u32) -> Reader<u32> {
     )
 }
 
-/// One of some words, each with its meaning.
+/// Returns the reader of one of these words, each with its value.
 pub fn word<T: Copy>(words: &'static [(&'static str, T)]) -> Reader<T> {
     let names = words.iter().map(|(name, _)| format!("`{name}`"));
     let names: Vec<String> = names.collect();
@@ -161,19 +155,19 @@ pub fn word<T: Copy>(words: &'static [(&'static str, T)]) -> Reader<T> {
     })
 }
 
-/// The id of a job or batch.
+/// Returns the reader of the id of a job or a batch.
 pub fn id(of: &'static str) -> Reader<Uuid> {
     reader(format!("the id of a {of}"), |text| {
         Uuid::try_parse(text).ok()
     })
 }
 
-/// Declares a group of parameters: a type with one field for each, `None` where it was left out. An entry has what the contract says of the
-/// parameter (`///` and `#[param(…)]`), its type, `as` its type in the contract, and its [`Reader`].
+/// Declares a group of parameters: a type with a field for each, `None` if the parameter is absent. An entry has the description in the
+/// contract (`///` and `#[param(…)]`), the type, `as` the type in the contract, and the [`Reader`].
 macro_rules! query {
     (
         $(#[doc = $about:literal])*
-        $name:ident($limits:pat => $of:ty) {
+        $name:ident {
             $(
                 $(#[doc = $doc:literal])*
                 $(#[param($($attribute:tt)*)])?
@@ -188,13 +182,11 @@ macro_rules! query {
         }
 
         impl $crate::extract::query::Parameters for $name {
-            type Limits = $of;
-
             fn names() -> Vec<&'static str> {
                 vec![$(stringify!($parameter)),*]
             }
 
-            fn take(query: &mut $crate::extract::query::Query, $limits: &$of) -> Self {
+            fn take(query: &mut $crate::extract::query::Query) -> Self {
                 $name {
                     $($parameter: query.take(stringify!($parameter), &$reader),)*
                 }
@@ -218,7 +210,7 @@ macro_rules! query {
 }
 pub(crate) use query;
 
-/// The parameters of one request and the faults found in them so far.
+/// The parameters of one request, and the faults found in them so far.
 #[derive(Debug)]
 pub struct Query {
     pairs: Vec<(String, String)>,
@@ -227,7 +219,7 @@ pub struct Query {
 }
 
 impl Query {
-    /// Splits the query of an address; `known` lists the parameters that the route has.
+    /// Splits the query of a URI; `known` lists the parameters of the route.
     #[must_use]
     pub fn read(uri: &Uri, known: &[&str]) -> Self {
         let mut query = Query {
@@ -265,7 +257,7 @@ impl Query {
         query
     }
 
-    /// As [`Query::read`], without the parameters that `known` does not list.
+    /// Like [`Query::read`], but ignores the parameters that `known` does not list.
     #[must_use]
     pub fn part_of(uri: &Uri, known: &[&str]) -> Self {
         let mut query = Query::read(uri, known);
@@ -273,7 +265,7 @@ impl Query {
         query
     }
 
-    /// The value of a parameter, if it is given and can be read; otherwise notes what would be allowed.
+    /// Returns the value of a parameter; `None` if it is absent, or if it cannot be parsed, which is noted as a fault.
     pub fn take<T>(&mut self, name: &str, reader: &Reader<T>) -> Option<T> {
         let pairs = self.pairs.iter();
         let texts: Vec<&str> = pairs
@@ -300,7 +292,7 @@ impl Query {
         }
     }
 
-    /// Ends the reading.
+    /// Checks that every parameter was valid.
     ///
     /// # Errors
     /// `bad-query` with every fault found.
@@ -325,7 +317,7 @@ impl Query {
     }
 }
 
-/// A whole number from `low` to `high`; `22.0` counts as whole, as it does in JSON Schema.
+/// Parses a whole number from `low` to `high`; `22.0` counts as whole, as in JSON Schema.
 #[must_use]
 pub fn whole(text: &str, low: u32, high: u32) -> Option<u32> {
     let value: f64 = text.parse().ok()?;
@@ -333,7 +325,7 @@ pub fn whole(text: &str, low: u32, high: u32) -> Option<u32> {
     within.then_some(value as u32)
 }
 
-/// Is the number of a motion or patch, if one is given, one of `count`?
+/// Refuses the index of a motion or a patch that is not below `count`.
 ///
 /// # Errors
 /// `bad-query` naming the parameter, its value and the largest number allowed.
@@ -355,14 +347,14 @@ fn quoted(names: &[&str]) -> String {
     quoted.join(", ")
 }
 
-/// Characters of a name, a key and a value of a label at most, as in a case.
+/// Most characters of a name, and of the key and the value of a label, as in a case.
 const NAME_MAX: usize = 200;
 const KEY_MAX: usize = 64;
 const VALUE_MAX: usize = 256;
-/// Labels at most, as in a case.
+/// Most labels, as in a case.
 pub const LABELS_MAX: usize = 32;
 
-/// A label to be looked for.
+/// Returns the reader of a label to search for.
 pub fn label() -> Reader<(String, String)> {
     reader("`key:value`", |text| {
         let (key, value) = text.split_once(':')?;
@@ -370,7 +362,7 @@ pub fn label() -> Reader<(String, String)> {
     })
 }
 
-/// A label that something is to carry.
+/// Returns the reader of a label to assign.
 pub fn new_label() -> Reader<(String, String)> {
     let allowed = format!(
         "`key:value`, the key of 1 to {KEY_MAX} characters, the value of at most {VALUE_MAX}, without control characters"
@@ -383,7 +375,7 @@ pub fn new_label() -> Reader<(String, String)> {
     })
 }
 
-/// A name to be given, or a part of one to be looked for.
+/// Returns the reader of a name to assign, or of a part of a name to search for.
 pub fn name() -> Reader<String> {
     let allowed = format!("1 to {NAME_MAX} characters without control characters");
     reader(allowed, |text| {
@@ -392,7 +384,7 @@ pub fn name() -> Reader<String> {
     })
 }
 
-/// A time, as milliseconds since 1970.
+/// Returns the reader of a time, in milliseconds since 1970.
 pub fn time() -> Reader<i64> {
     let allowed = "a time in RFC 3339 such as `2026-01-31T09:30:00Z` (write `+` as `%2B`)";
     reader(allowed, |text| {
@@ -405,12 +397,12 @@ fn is_line(text: &str) -> bool {
     !text.chars().any(char::is_control)
 }
 
-/// Longest deadline in s: 30 days.
+/// Longest deadline in s, 30 days.
 pub const DEADLINE_MAX_SECONDS: u32 = 30 * 24 * 3600;
 
 query! {
     /// Options of a submission.
-    SubmitQuery(() => ()) {
+    SubmitQuery {
         /// Order of the tenant's queued jobs: `high` before `normal` (default) before `low`. Priorities have no effect between tenants,
         /// which take turns
         #[param(example = "high")]
@@ -422,7 +414,7 @@ query! {
 }
 
 impl SubmitQuery {
-    /// The options of a submission with these headers.
+    /// Returns the options of a submission with these headers.
     #[must_use]
     pub(crate) fn options(self, headers: &HeaderMap) -> SubmitOptions {
         SubmitOptions {
@@ -435,7 +427,7 @@ impl SubmitQuery {
     }
 }
 
-/// Does the client refuse the result of an earlier identical case?
+/// Whether the client refuses the result of an earlier identical case.
 fn wants_fresh(headers: &HeaderMap) -> bool {
     let values = headers.get_all(header::CACHE_CONTROL);
     let mut directives = values
@@ -473,10 +465,10 @@ mod tests {
 
     query! {
         /// Two parameters.
-        Two(largest => u32) {
+        Two {
             /// How many
             #[param(minimum = 1)]
-            many: u32 as u32 = count(1, *largest);
+            many: u32 as u32 = count(1, 7);
             /// Of what
             of: String as String = reader("a word", |text| Some(text.to_owned()));
         }
@@ -484,7 +476,7 @@ mod tests {
 
     #[test]
     fn a_table_of_parameters_reads_names_faults_and_describes_itself() {
-        let read = |text: &str| Two::read(&text.parse().unwrap(), &7);
+        let read = |text: &str| Two::read(&text.parse().unwrap());
         let two = read("/x?of=cases&many=7").unwrap();
         assert_eq!((two.many, two.of.as_deref()), (Some(7), Some("cases")));
         assert!(read("/x").unwrap().many.is_none());

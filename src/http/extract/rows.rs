@@ -1,4 +1,5 @@
-//! Reads the bodies of runs and evaluations: a template with columns in JSON, or with a table.
+//! Reads the bodies of runs and evaluations: a template and columns in JSON, or a template and a table.
+
 use std::collections::HashSet;
 use std::fmt;
 use std::fs::File;
@@ -20,9 +21,10 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::extract::json::{
-    BodyReader, Strict, UnexpectedPart, essence, not_json, read_json, require_utf8, unlike_json,
+    BodyReader, UnexpectedPart, essence, not_json, read_json, require_utf8, unlike_json,
     unreadable, weigh_case,
 };
+use crate::layers::admission::declared_length;
 use crate::limits::{Memory, Pace, Permit};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind, Result, faulty};
@@ -30,25 +32,28 @@ use railhead_contact::case::words::solver::Case;
 use railhead_contact::evaluate::varied::Values;
 use railhead_jobs::Jobs;
 use railhead_jobs::run::draft::RunDraft;
+use railhead_tables::error::TableError;
 use railhead_tables::read::{TableForm, TableRows, TableSource};
-use railhead_tables::table::COLUMNS_MAX;
+use railhead_tables::strict_json::Strict;
+use railhead_tables::table::{COLUMNS_MAX, Title};
 use railhead_tables::titles::{NamedColumns, TitledColumn, require_few};
 
-/// The bytes that a request's body may have, or has as far as it says.
+/// Returns the declared length of a body in bytes, or the largest allowed one.
 #[must_use]
 pub fn declared_bytes(request: &Request, options: &HttpOptions) -> usize {
-    let length = request.headers().get(header::CONTENT_LENGTH);
-    let length = length.and_then(|value| value.to_str().ok()?.parse().ok());
-    let packed = request.headers().contains_key(header::CONTENT_ENCODING);
-    length
-        .filter(|_| !packed)
-        .unwrap_or(options.evaluate_max_bytes)
+    let most = options.evaluate_max_bytes;
+    match declared_length(request.headers()) {
+        Some(length) if !request.headers().contains_key(header::CONTENT_ENCODING) => {
+            usize::try_from(length).unwrap_or(most)
+        }
+        _ => most,
+    }
 }
 
-/// The whole body. It may take long as long as it keeps to the lowest rate of large bodies.
+/// Reads the whole body, without a limit of its total time.
 ///
 /// # Errors
-/// It is too large, too slow, or breaks off.
+/// The body is too large, too slow, or ends early.
 pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes> {
     let max_bytes = options.evaluate_max_bytes;
     let declared = declared_bytes(&request, options);
@@ -58,19 +63,16 @@ pub async fn read_body(request: Request, options: &HttpOptions) -> Result<Bytes>
         "rows (`--evaluate-max-mib`)",
         request,
     )?;
-    // A body that does not say its length grows.
+    // The buffer of a body without a declared length grows.
     let mut text = Vec::with_capacity(if declared < max_bytes { declared } else { 0 });
-    while let Some(piece) = reader.next().await? {
-        text.extend_from_slice(&piece);
-    }
+    reader.read_to_end(&mut text).await?;
     Ok(text.into())
 }
 
-/// A template and columns of numbers or texts from JSON, `{"template": …, "columns": {"<JSON pointer>": […], …}}`; the client may have said
-/// what columns are.
+/// Reads a template and columns of numbers or texts from JSON, `{"template": …, "columns": {"<JSON pointer>": […], …}}`.
 ///
 /// # Errors
-/// `malformed-json` with its position, and with column and row where the fault is in a column; or as [`NamedColumns::columns`].
+/// `malformed-json` with the position, and with column and row for a fault in a column; or the error of [`NamedColumns::columns`].
 pub fn read_json_columns(
     text: &[u8],
     named: &NamedColumns,
@@ -78,15 +80,13 @@ pub fn read_json_columns(
     let read: RowsBody =
         serde_json::from_slice(text).map_err(|error| not_json(unlike_json(text), &error))?;
     require_few(read.columns.count)?;
-    let columns = read.columns.columns;
-    let titles = columns.iter();
-    let titles = titles.map(|(title, values)| (&**title, None, matches!(values, Values::Texts(_))));
-    let titles = named.columns(titles)?;
-    let values = columns.into_iter().map(|(_, values)| values).collect();
-    Ok((read.template.0, titles, values))
+    let (titles, values): (Vec<Title>, _) = read.columns.columns.into_iter().unzip();
+    let Strict(template) = read.template;
+    let columns = named.columns(&titles)?;
+    Ok((template, columns, values))
 }
 
-/// The JSON body of rows.
+/// A JSON body with rows.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RowsBody {
@@ -94,10 +94,10 @@ struct RowsBody {
     columns: RowColumns,
 }
 
-/// Columns; of those beyond [`COLUMNS_MAX`] only the count is kept.
+/// Columns. Those beyond [`COLUMNS_MAX`] are only counted.
 #[derive(Default)]
 struct RowColumns {
-    columns: Vec<(String, Values)>,
+    columns: Vec<(Title, Values)>,
     count: usize,
 }
 
@@ -130,7 +130,13 @@ impl<'de> Visitor<'de> for RowColumnsVisitor {
                 )));
             }
             let values = members.next_value_seed(RowValues(&pointer))?;
-            read.columns.push((pointer, values));
+            let title = Title {
+                name: pointer,
+                unit: None,
+                text: matches!(values, Values::Texts(_)),
+                text_if_copied: false,
+            };
+            read.columns.push((title, values));
         }
         Ok(read)
     }
@@ -219,7 +225,7 @@ impl Visitor<'_> for RowValueVisitor {
     }
 }
 
-/// What JSON is in a request with rows; NDJSON is a table.
+/// The JSON that a request with rows accepts, for errors; NDJSON is a table.
 pub const JSON: (&str, bool) = ("`application/json` with `template` and `columns`", false);
 
 /// The part that holds the case.
@@ -234,16 +240,17 @@ pub struct Table {
     pub form: TableForm,
     /// The case.
     pub template: Value,
-    /// The memory that the case takes, if it came with the request.
+    /// The permit for the memory of the case, if the request contains it.
     pub share: Option<Permit>,
 }
 
-/// Separates the table of a request from its template, a part of `multipart/form-data` or the case of `job`. The request returned has the table as
-/// its body. There is none in a request with JSON, which is `json` here, and with `lines` none in NDJSON without a template.
+/// Separates the table of a request from its template, which is a part of `multipart/form-data` or the case of `job`. The body of the
+/// returned request is the table. There is no table in a request with JSON, which `json` describes for errors. If `lines` is set, NDJSON
+/// without a template is not a table either.
 ///
 /// # Errors
-/// The content type is none of these; a template is missing, not wanted, or given twice; the parts are not `template` and then `table`; or the
-/// template is not JSON, too large, or that of a job that does not exist.
+/// The content type is not supported; the template is missing, not allowed, or given twice; the parts are not `template` and then `table`; the
+/// template is not JSON or too large; or `job` does not exist.
 pub async fn separate_table(
     (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
     job: Option<Uuid>,
@@ -298,10 +305,10 @@ pub async fn separate_table(
     Ok((request, Some(table)))
 }
 
-/// A case and the memory that it takes.
+/// A case and the permit for its memory.
 type Held = (Value, Option<Permit>);
 
-/// The template of `multipart/form-data`, and a request whose body is the table, with the content type of its part.
+/// Returns the template of `multipart/form-data`, and a request whose body is the table, with the content type of its part.
 async fn separate_parts(
     jobs: &Jobs,
     memory: &Memory,
@@ -328,10 +335,8 @@ async fn separate_parts(
         Request::new(Body::from_stream(template)),
     )?;
     let mut text = Vec::new();
-    while let Some(piece) = reader.next().await? {
-        text.extend_from_slice(&piece);
-    }
-    // The next part can be read once this one is gone.
+    reader.read_to_end(&mut text).await?;
+    // The next part can be read once this one is dropped.
     drop(reader);
     let weight = weigh_case(&text, options.parsed_max_bytes)?;
     let share = memory.parsed(jobs.tenant(), weight).await?;
@@ -344,17 +349,17 @@ async fn separate_parts(
     Ok((request, Some(template)))
 }
 
-/// The parts that are still to come, and the last one that is allowed.
+/// The remaining parts, and the last allowed one.
 type LastPart = (Multipart<'static>, Option<Field<'static>>);
 
-/// The next piece of the last part. At its end no other part may follow.
+/// Returns the next piece of the last part. No other part may follow it.
 async fn last_part((mut parts, mut part): LastPart) -> Result<Option<(Bytes, LastPart)>, BoxError> {
     if let Some(field) = &mut part
         && let Some(piece) = field.chunk().await?
     {
         return Ok(Some((piece, (parts, part))));
     }
-    // The next part can be read once this one is gone.
+    // The next part can be read once this one is dropped.
     drop(part);
     match parts.next_field().await? {
         Some(other) => Err(UnexpectedPart(other.name().unwrap_or_default().to_owned()).into()),
@@ -362,7 +367,7 @@ async fn last_part((mut parts, mut part): LastPart) -> Result<Option<(Bytes, Las
     }
 }
 
-/// The next part, which must have this name.
+/// Returns the next part, which must have this name.
 async fn next_part(
     parts: &mut Multipart<'static>,
     options: &HttpOptions,
@@ -385,7 +390,8 @@ async fn next_part(
     }
 }
 
-/// The content type of a part. Clients that do not know the form of a file send none or `application/octet-stream`; the extension of its name tells it.
+/// Returns the content type of a part. Clients that do not know the format of a file send no content type or `application/octet-stream`; the
+/// extension of the file name then determines it.
 fn content_type_of(part: &Field<'_>) -> HeaderValue {
     let mut headers = HeaderMap::new();
     if let Some(value) = part.headers().get(header::CONTENT_TYPE) {
@@ -423,13 +429,13 @@ pub(crate) struct TableUpload {
     table: String,
 }
 
-/// Memory that a table takes while a piece of it is read.
+/// Memory for reading a piece of a table, in bytes.
 const PIECE_BYTES: usize = 64 << 20;
 
-/// Reads the rows into a draft: of a table, or of JSON, which has a template of its own.
+/// Reads rows into a draft, from a table or from JSON, which contains its template.
 ///
 /// # Errors
-/// The body is too large, too slow, broken or not of its form; or what the draft says of its rows.
+/// The body is too large, too slow, ends early or is malformed; or the error of the draft.
 pub async fn read_run(
     (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
     (table, named): (Option<Table>, NamedColumns),
@@ -444,6 +450,7 @@ pub async fn read_run(
         let read = memory.compute(jobs.tenant(), move |_| {
             let _held = share;
             let (template, columns, values) = read_json_columns(&text, &named)?;
+            refuse_copied_members(&template, &columns, &named)?;
             drop(text);
             let mut draft = drafts.draft_run(template, columns, rows_max)?;
             draft.push(values)?;
@@ -453,7 +460,7 @@ pub async fn read_run(
         return read.await;
     };
     let limits = (options.body_timeout, options.run_max_bytes, "one run");
-    // An archive is read as a whole, once packed and once as numbers.
+    // An archive is held in memory, compressed and as numbers.
     let bytes = match table.form {
         TableForm::Npz => 2 * bytes_max,
         _ => PIECE_BYTES,
@@ -461,8 +468,10 @@ pub async fn read_run(
     let bytes = move |_| bytes;
     read_spooled((jobs, memory), limits, bytes, request, move |file, pace| {
         let _held = table.share;
-        let rows = TableRows::new(table.form, TableSource::File(file), bytes_max)?;
-        let mut draft = drafts.draft_run(table.template, rows.named(&named)?, rows_max)?;
+        let mut rows = TableRows::new(table.form, TableSource::File(file), bytes_max)?;
+        let columns = rows.named(&named)?;
+        refuse_copied_members(&table.template, &columns, &named)?;
+        let mut draft = drafts.draft_run(table.template, columns, rows_max)?;
         for chunk in rows {
             pace.step()?;
             draft.push(chunk?)?;
@@ -473,11 +482,61 @@ pub async fn read_run(
     .await
 }
 
-/// Reads a body from a nameless file into which it is spooled while it arrives, so that a large one takes little memory. `limits` are the time
-/// allowed for a piece of the body, its largest size, and its name in errors; `bytes` returns the memory in bytes that the reader needs for a body of a given length.
+/// Refuses columns such as `side` that would be copied to the results by their title, although the template has a member of this name. The
+/// client titles such a column with the pointer of the member, or names it in `carry`.
 ///
 /// # Errors
-/// The body is too large, too slow or broken; the file cannot be written; or the error of `read`.
+/// `faulty-table` with every such column.
+fn refuse_copied_members(
+    template: &Value,
+    columns: &[TitledColumn],
+    named: &NamedColumns,
+) -> Result<()> {
+    let mut faults = Vec::new();
+    for TitledColumn {
+        name,
+        pointer,
+        text,
+        ..
+    } in columns
+    {
+        if pointer.is_some() || named.names(name) {
+            continue;
+        }
+        let parts = template.as_object().into_iter().flatten();
+        for (part, members) in parts.filter(|(part, _)| *part != "labels") {
+            let member = name.to_lowercase();
+            let place = match members.get(&member) {
+                // Texts in place of a cross-section are digests of stored profiles.
+                Some(Value::Object(_)) if *text => format!("/{part}/{member}/profile"),
+                None | Some(Value::Object(_) | Value::Array(_)) => continue,
+                Some(_) => format!("/{part}/{member}"),
+            };
+            let detail = format!(
+                "column `{name}`: the template has the member `{place}`; title the column `{place}` to vary it, or copy it to the results with \
+                 `?carry={name}`"
+            );
+            faults.push((name.clone(), detail));
+        }
+    }
+    if faults.is_empty() {
+        return Ok(());
+    }
+    let details: Vec<&str> = faults.iter().map(|(_, detail)| &**detail).collect();
+    let detail = details.join("; ");
+    Err(TableError::Faulty {
+        detail,
+        columns: faults,
+    }
+    .into())
+}
+
+/// Spools a body to a nameless file while it arrives, then calls `read` with the file, so that a large body takes little memory. The limits
+/// are the time of a piece of the body, its largest size, and its name in errors. `bytes` returns the memory in bytes that `read` needs for a
+/// body of a given length.
+///
+/// # Errors
+/// The body is too large, too slow or ends early; the file cannot be written; or the error of `read`.
 pub async fn read_spooled<T: Send + 'static>(
     (jobs, memory): (&Jobs, &Memory),
     (timeout, most, what): (Duration, u64, &'static str),
@@ -494,7 +553,7 @@ pub async fn read_spooled<T: Send + 'static>(
         let written = file.write_all(&piece).await;
         written.map_err(|source| ApiError::from(jobs.spool_failed(source)))?;
     }
-    // Tells whether the last piece was written too.
+    // Flushing reports whether the last piece was written.
     let written = file.flush().await;
     let mut file = file.into_std().await;
     let ready = written.and_then(|()| file.seek(SeekFrom::Start(0)));
@@ -507,7 +566,7 @@ pub async fn read_spooled<T: Send + 'static>(
     read.await
 }
 
-/// The fault of a body that is neither JSON nor a table.
+/// Returns the refusal of a body that is neither JSON nor a table.
 pub(crate) fn unsupported(essence: &str, json: &str) -> ApiError {
     ApiError::new(
         ProblemKind::UnsupportedMediaType,
@@ -520,6 +579,8 @@ pub(crate) fn unsupported(essence: &str, json: &str) -> ApiError {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
@@ -531,5 +592,36 @@ mod tests {
             fault.contains("/motion/creepage_x") && fault.contains("row 1"),
             "{fault}"
         );
+    }
+
+    #[test]
+    fn a_copied_column_must_not_have_the_name_of_a_member_of_the_template() {
+        let template =
+            json!({ "contact": { "type": "profiles", "side": "left", "rail": {}, "wheel": {} } });
+        let column = |name: &str, text| TitledColumn {
+            name: name.to_owned(),
+            pointer: None,
+            factor: 1.0,
+            unit: None,
+            text,
+        };
+        let columns = [
+            column("side", true),
+            column("Rail", true),
+            column("wheel", false),
+            column("km", false),
+        ];
+        let refused = refuse_copied_members(&template, &columns, &NamedColumns(None)).unwrap_err();
+        let detail = refused.detail();
+        for word in ["`/contact/side`", "`/contact/rail/profile`", "?carry=side"] {
+            assert!(detail.contains(word), "{detail}");
+        }
+        assert!(
+            !detail.contains("wheel") && !detail.contains("km"),
+            "{detail}"
+        );
+        let named = ["side", "Rail"].map(|name| (name.to_owned(), String::new()));
+        let named = NamedColumns(Some(named.to_vec()));
+        assert!(refuse_copied_members(&template, &columns, &named).is_ok());
     }
 }

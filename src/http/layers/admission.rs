@@ -1,7 +1,7 @@
-//! Compressed bodies of requests: which codings are accepted, and how much a body may unpack to.
+//! Compressed bodies of requests: accepted codings and limits of the decompressed size.
 //!
-//! The limits of a body hold before and after it is unpacked, so a small body that unpacks to a large one is given up as soon
-//! as the limit is passed, and one that unpacks to nothing cannot be sent for ever.
+//! The size limit of a body holds before and after it is decompressed. A small body that decompresses to a large one is therefore refused
+//! when it exceeds the limit, and so is a large one that decompresses to nothing.
 
 use std::io;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use async_compression::tokio::bufread::{GzipDecoder, ZstdDecoder};
 use axum::body::Body;
 use axum::extract::{Request, State};
-use axum::http::{HeaderValue, header};
+use axum::http::{HeaderMap, HeaderValue, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use futures_util::TryStreamExt;
@@ -20,28 +20,28 @@ use tokio_util::io::{ReaderStream, StreamReader};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind};
 
-/// Bytes that a packed batch may unpack to for each of its own; tables of numbers reach some 30.
+/// Largest ratio of decompressed to compressed bytes; tables of numbers reach about 30.
 const UNPACKED_PER_BYTE: u64 = 200;
 
-/// Unpacked bytes up to which the ratio to the packed bytes is not checked.
+/// Decompressed bytes up to which the ratio is not checked.
 const UNPACKED_FREE: u64 = 16 << 20;
 
-/// The codings that a body may have.
+/// The accepted codings.
 const ACCEPTED: HeaderValue = HeaderValue::from_static("gzip, zstd");
 
-/// Bytes of a packed body that have arrived; in the extensions of its request.
+/// Number of compressed bytes that have arrived, in the extensions of a request.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PackedLength(Arc<AtomicU64>);
 
 impl PackedLength {
-    /// Has a body that unpacked to so many bytes so far grown more than any honest one does?
+    /// Whether a body with this many decompressed bytes so far exceeds the ratio.
     #[must_use]
     pub(crate) fn is_bomb(&self, unpacked: u64) -> bool {
         let packed = self.0.load(Ordering::Relaxed);
         unpacked > UNPACKED_FREE.saturating_add(packed.saturating_mul(UNPACKED_PER_BYTE))
     }
 
-    /// Why such a body is refused.
+    /// Returns the refusal of such a body.
     #[must_use]
     pub(crate) fn refusal() -> ApiError {
         ApiError::new(
@@ -53,7 +53,13 @@ impl PackedLength {
     }
 }
 
-/// Layer that unpacks bodies. It refuses unknown codings, and limits a packed body before it is unpacked.
+/// Returns the number in the header `Content-Length`.
+pub(crate) fn declared_length(headers: &HeaderMap) -> Option<u64> {
+    let value = headers.get(header::CONTENT_LENGTH)?;
+    value.to_str().ok()?.parse().ok()
+}
+
+/// Layer that decompresses bodies. It refuses unknown codings, and limits the size of the compressed body.
 pub(crate) async fn unpack(
     State(options): State<HttpOptions>,
     request: Request,
@@ -88,9 +94,7 @@ pub(crate) async fn unpack(
         "/v1/evaluate" => options.evaluate_max_bytes as u64,
         _ => options.body_max_bytes as u64,
     };
-    let declared = request.headers().get(header::CONTENT_LENGTH);
-    let declared = declared.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-    if declared.is_some_and(|length| length > most) {
+    if declared_length(request.headers()).is_some_and(|length| length > most) {
         return ApiError::new(
             ProblemKind::BodyTooLarge,
             format!("the compressed body is larger than the {most} bytes that are allowed"),
@@ -115,8 +119,8 @@ pub(crate) async fn unpack(
     next.run(request).await
 }
 
-/// A body without its gzip or zstd coding: all members of it (RFC 1952, RFC 8878), one after the other. Reading it fails if anything
-/// follows the last member, or if that is not complete.
+/// Decompresses all members of a gzip or zstd body (RFC 1952, RFC 8878). Reading fails if anything follows the last member, or if it is
+/// not complete.
 fn unpacked(body: Body, is_gzip: bool) -> Body {
     let packed = StreamReader::new(TryStreamExt::map_err(
         body.into_data_stream(),
@@ -132,7 +136,7 @@ fn unpacked(body: Body, is_gzip: bool) -> Body {
     Body::from_stream(ReaderStream::new(frames))
 }
 
-/// Did reading a body fail because it passed a limit?
+/// Whether reading a body failed because it exceeded its limit.
 #[must_use]
 pub(crate) fn too_long(error: &(dyn std::error::Error + 'static)) -> bool {
     let mut next = Some(error);

@@ -1,4 +1,5 @@
-//! Whose request is answered: keys, requests without one, pages of other origins, and requests per second.
+//! Authentication: keys, requests without a key, pages of other origins, and requests per second.
+
 use std::collections::HashMap;
 use std::net::IpAddr;
 use std::num::NonZeroU32;
@@ -25,13 +26,13 @@ use railhead_jobs::Jobs;
 use railhead_jobs::model::Key;
 use railhead_jobs::sync::lock;
 
-/// Paths where a body is sent and nothing is changed.
+/// Paths of `POST` requests that change nothing.
 const QUESTIONS: [&str; 2] = ["/v1/cases/check", "/v1/evaluate"];
 
-/// Who may ask, and how often; clones share it.
+/// Checks keys and rates of requests. Clones share their state.
 #[derive(Debug, Clone)]
 pub struct Access {
-    /// All jobs, whoever they belong to.
+    /// The jobs of all tenants.
     pub jobs: Jobs,
     anonymous: bool,
     guard: Guard,
@@ -39,7 +40,7 @@ pub struct Access {
 }
 
 impl Access {
-    /// The rules of these options.
+    /// Creates the checks with these options.
     #[must_use]
     pub fn new(jobs: &Jobs, options: &HttpOptions) -> Access {
         Access {
@@ -50,10 +51,10 @@ impl Access {
         }
     }
 
-    /// The key of a request; `None` for a request without a key where that is allowed.
+    /// Returns the key of a request; `None` for a request without a key, if these are allowed.
     ///
     /// # Errors
-    /// `unauthorized`, `too-many-requests`, or what [`Guard::require_direct`] says.
+    /// `unauthorized`, `too-many-requests`, or the error of [`Guard::require_direct`].
     pub async fn key(&self, parts: &Parts) -> Result<Option<Key>> {
         let mut given = parts.headers.get_all(header::AUTHORIZATION).iter();
         let peer = parts.extensions.get::<Peer>().copied();
@@ -81,7 +82,7 @@ impl Access {
             Some(RateKey::Address(address)) => Some(address),
             _ => None,
         });
-        // Only an unknown key is refused for the wrong ones before it: clients with good keys may have the same address.
+        // Earlier wrong keys of the address count only against an unknown key: clients with valid keys may share the address.
         let known = match self.jobs.remembered_key(text) {
             Some(key) => Some(key),
             None => {
@@ -108,7 +109,7 @@ impl Access {
     }
 }
 
-/// Would this request change anything? Checking a case and evaluating rows does not.
+/// Whether a request changes something. Checking a case and evaluating rows do not.
 fn changes(parts: &Parts) -> bool {
     !matches!(parts.method, Method::GET | Method::HEAD) && !QUESTIONS.contains(&parts.uri.path())
 }
@@ -117,7 +118,7 @@ pub(crate) fn unauthorized(detail: &str) -> ApiError {
     ApiError::new(ProblemKind::Unauthorized, detail)
 }
 
-/// The credentials of `Bearer …`; the scheme's case does not matter (RFC 9110, section 11.1).
+/// Returns the credentials of `Bearer …`; the case of the scheme does not matter (RFC 9110, section 11.1).
 pub(crate) fn bearer(header: &str) -> Option<&str> {
     let (scheme, key) = header.split_once(' ')?;
     let key = key.trim();
@@ -133,11 +134,11 @@ static FORWARDED: [HeaderName; 6] = [
     HeaderName::from_static("x-forwarded-proto"),
     HeaderName::from_static("x-real-ip"),
 ];
-/// Header in which a browser describes the page that sends the request.
+/// Header with which a browser describes the page that sends the request.
 const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
-/// Routes that are answered even if every connection is busy.
-const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
+/// Routes that are answered even if every connection is busy, and not traced.
+pub(super) const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
 /// Conditions for requests without a key.
 #[derive(Debug, Clone)]
@@ -148,7 +149,7 @@ pub(crate) struct Guard {
 }
 
 impl Guard {
-    /// The rules of these options.
+    /// Creates the conditions of these options.
     #[must_use]
     pub(crate) fn new(options: &HttpOptions) -> Guard {
         Guard {
@@ -158,17 +159,15 @@ impl Guard {
         }
     }
 
-    /// May a request without a key be answered?
+    /// Refuses requests without a key that do not meet the conditions.
     ///
     /// # Errors
-    /// `host-not-allowed`, `cross-site` or `unauthorized`, with what to do.
+    /// `host-not-allowed`, `cross-site` or `unauthorized`, with advice.
     pub(crate) fn require_direct(&self, parts: &Parts) -> Result<()> {
         self.require_host(parts)?;
         self.require_own_page(parts)?;
-        let told = FORWARDED
-            .iter()
-            .find(|name| parts.headers.contains_key(*name));
-        match told {
+        let mut names = FORWARDED.iter();
+        match names.find(|name| parts.headers.contains_key(*name)) {
             Some(name) if !self.proxied => Err(ApiError::new(
                 ProblemKind::Unauthorized,
                 format!(
@@ -181,7 +180,7 @@ impl Guard {
         }
     }
 
-    /// Is the service asked by a name that is its own? An address cannot be made to lead elsewhere, a name can.
+    /// Requires a name of the service in `Host`, or an address: a page can redirect a foreign name to this service, but not an address.
     fn require_host(&self, parts: &Parts) -> Result<()> {
         let Some(host) = host(parts) else {
             return Ok(());
@@ -201,7 +200,7 @@ impl Guard {
         ))
     }
 
-    /// Does a request that changes something come from a page of this service, or from no page at all?
+    /// Requires that a request that changes something comes from a page of this service, or not from a page.
     fn require_own_page(&self, parts: &Parts) -> Result<()> {
         if matches!(parts.method, Method::GET | Method::HEAD | Method::OPTIONS) {
             return Ok(());
@@ -210,10 +209,10 @@ impl Guard {
         let origin = text(&header::ORIGIN);
         let known = |origin: &str| {
             let own = origin.split_once("://").map(|(_, authority)| authority);
-            // HTTP/2 has the name in the address of the request.
-            let asked = parts.uri.authority().map(Authority::as_str);
-            let asked = asked.or_else(|| text(&header::HOST));
-            self.origins.iter().any(|allowed| allowed == origin) || (own.is_some() && own == asked)
+            // HTTP/2 has the name in the URI of the request.
+            let host = parts.uri.authority().map(Authority::as_str);
+            let host = host.or_else(|| text(&header::HOST));
+            self.origins.iter().any(|allowed| allowed == origin) || (own.is_some() && own == host)
         };
         let foreign = match (origin, text(&FETCH_SITE)) {
             (Some(origin), _) => !known(origin),
@@ -233,7 +232,7 @@ impl Guard {
     }
 }
 
-/// The host that a request is for, without its port; `None` if an old client does not say it.
+/// Returns the host of a request without its port; `None` if an old client does not send it.
 fn host(parts: &Parts) -> Option<String> {
     let named = parts.uri.authority().cloned().or_else(|| {
         let text = single(&parts.headers, &header::HOST)?;
@@ -246,11 +245,11 @@ fn single<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 
-/// Layer around everything: a request of HTTP/1.1 says its host once (RFC 9112, section 3.2), and a connection without a
-/// place of its own may ask for the probes only.
+/// Layer around all routes: requires one header `Host` of HTTP/1.1 requests (RFC 9112, section 3.2), and answers only the probes on
+/// connections of the reserve.
 pub(crate) async fn admit(request: Request, next: Next) -> Response {
     let mut hosts = request.headers().get_all(header::HOST).iter();
-    let readable = |value: &axum::http::HeaderValue| {
+    let readable = |value: &HeaderValue| {
         let text = value.to_str().ok();
         text.is_some_and(|text| text.is_empty() || text.parse::<Authority>().is_ok())
     };
@@ -268,27 +267,27 @@ pub(crate) async fn admit(request: Request, next: Next) -> Response {
     if crowded && !PROBES.contains(&request.uri().path()) {
         let detail = "every connection of the service, or of this address, has an active request";
         let mut refusal = ApiError::new(ProblemKind::Overloaded, detail).into_response();
-        let close = axum::http::HeaderValue::from_static("close");
+        let close = HeaderValue::from_static("close");
         refusal.headers_mut().insert(header::CONNECTION, close);
         return refusal;
     }
     next.run(request).await
 }
 
-/// Size of a burst: the requests of so many seconds.
+/// Size of a burst, as the number of seconds whose requests it contains.
 const BURST_SECONDS: u32 = 2;
 
-/// Senders that are remembered; beyond this number, those without recent requests are forgotten.
+/// Number of remembered senders beyond which those without recent requests are forgotten.
 const SENDERS_KEPT: usize = 10_000;
-/// Shortest time between two clean-ups, which visit all senders.
+/// Shortest time between two clean-ups, which scan all senders.
 const FORGET_EVERY: Duration = Duration::from_secs(10);
 
-/// Wrong keys of one address within [`FAILURES_WITHIN`] that are answered `401`, further ones `429`. Chosen by judgement: more than
-/// anybody mistypes.
+/// Number of wrong keys of one address within [`FAILURES_WITHIN`] that are answered `401`; further ones get `429`. A judgement: more than
+/// a person mistypes.
 const FAILURES_MAX: u32 = 20;
 const FAILURES_WITHIN: Duration = Duration::from_secs(10);
 
-/// Requests with the same value are counted together.
+/// The sender of requests, whose requests are counted together.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) enum RateKey {
     Key(String),
@@ -296,7 +295,7 @@ pub(crate) enum RateKey {
 }
 
 impl RateKey {
-    /// The sender of a request without a key. Requests over loopback are not counted: they may come from a proxy on behalf of many
+    /// Returns the sender of a request without a key. Requests over loopback are not counted, because a proxy may send them for many
     /// clients.
     pub(crate) fn at(peer: Peer) -> Option<RateKey> {
         let address = network(peer.0);
@@ -307,7 +306,7 @@ impl RateKey {
 type Limiter =
     RateLimiter<RateKey, HashMapStateStore<RateKey>, DefaultClock, StateInformationMiddleware>;
 
-/// What is left of the rate of the sender of a request; in its extensions, so that its answer can say so.
+/// Number of requests that the sender may still make, in the extensions of a request; the response reports it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RateLeft(Arc<Mutex<Option<u32>>>);
 
@@ -320,8 +319,8 @@ impl RateLeft {
 const POLICY: HeaderName = HeaderName::from_static("ratelimit-policy");
 const LEFT: HeaderName = HeaderName::from_static("ratelimit");
 
-/// Layer in which answers say how many requests the sender may still make, as the fields `RateLimit-Policy` and `RateLimit` of
-/// draft-ietf-httpapi-ratelimit-headers-10 do. Without a limit, or for senders that are not counted, they are absent.
+/// Layer that adds the fields `RateLimit-Policy` and `RateLimit` of draft-ietf-httpapi-ratelimit-headers-10 to responses, with the number of
+/// requests that the sender may still make. They are absent without a limit, and for senders that are not counted.
 pub(crate) async fn add_rate_limit_headers(
     per_second: u32,
     mut request: Request,
@@ -333,7 +332,7 @@ pub(crate) async fn add_rate_limit_headers(
     let left = *lock(&left.0);
     if let Some(left) = left {
         let burst = per_second.saturating_mul(BURST_SECONDS);
-        // Until everything is there again.
+        // The time until the whole burst is available again.
         let seconds = burst.saturating_sub(left).div_ceil(per_second.max(1));
         let fields = [
             (POLICY, format!("\"requests\";q={burst};w={BURST_SECONDS}")),
@@ -348,18 +347,18 @@ pub(crate) async fn add_rate_limit_headers(
     response
 }
 
-/// How often senders may ask; clones share it.
+/// The requests of senders per second, and their wrong keys. Clones share their state.
 #[derive(Debug, Clone)]
 pub(crate) struct RateLimit {
     per_second: u32,
     limiter: Option<Arc<Limiter>>,
     forgotten: Arc<Mutex<Instant>>,
     failures: Arc<Mutex<HashMap<IpAddr, Failures>>>,
-    /// One turn, for look-ups of addresses that sent many wrong keys.
+    /// One permit, for looking up keys of addresses that sent many wrong keys.
     lookups: Arc<Semaphore>,
 }
 
-/// Wrong keys from one address.
+/// Wrong keys of one address.
 #[derive(Debug, Clone, Copy)]
 struct Failures {
     since: Instant,
@@ -367,7 +366,7 @@ struct Failures {
 }
 
 impl RateLimit {
-    /// The limits of these options.
+    /// Creates the limits of these options.
     #[must_use]
     pub(crate) fn new(options: &HttpOptions) -> RateLimit {
         let per_second = NonZeroU32::new(options.requests_per_second);
@@ -385,7 +384,7 @@ impl RateLimit {
         }
     }
 
-    /// Counts a request of a sender, and notes in `left` how many more it may make.
+    /// Counts a request of a sender, and stores in `left` how many more it may make.
     ///
     /// # Errors
     /// `too-many-requests`, with the seconds after which to try again.
@@ -423,7 +422,7 @@ impl RateLimit {
         .after(seconds.max(1)))
     }
 
-    /// Is it time for another clean-up?
+    /// Whether a clean-up is due.
     fn may_forget(&self) -> bool {
         let mut last = lock(&self.forgotten);
         let due = last.elapsed() > FORGET_EVERY;
@@ -433,8 +432,8 @@ impl RateLimit {
         due
     }
 
-    /// Waits for the turn of an address to look a key up that is not remembered. Addresses that sent many wrong keys take turns, so that
-    /// together they keep one connection of the database busy at most.
+    /// Waits until a key of this address may be looked up. Addresses that sent many wrong keys look keys up one at a time, so that
+    /// together they use at most one connection of the database.
     pub(crate) async fn lookup_turn(
         &self,
         address: Option<IpAddr>,
@@ -447,7 +446,7 @@ impl RateLimit {
             })
         };
         match many {
-            // It is never closed.
+            // The semaphore is never closed.
             true => self.lookups.clone().acquire_owned().await.ok(),
             false => None,
         }

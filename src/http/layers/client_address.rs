@@ -1,9 +1,8 @@
 //! The address of the client behind a trusted proxy.
 //!
-//! A proxy opens the connections of all its clients, so their addresses are only in the headers that it adds: `Forwarded`
-//! (RFC 7239) or `X-Forwarded-For`. Anybody can send these headers, so they are believed only from the proxies that
-//! `--trusted-proxies` names, and only the part that trusted proxies wrote: from the right, up to the first address that is
-//! no trusted proxy.
+//! A proxy opens the connections of all its clients, so their addresses are only in the headers that it adds: `Forwarded` (RFC 7239) or
+//! `X-Forwarded-For`. Every client can send these headers. They are therefore used only from the proxies in `--trusted-proxies`, and only
+//! the part that trusted proxies wrote: from the right, up to the first address that is not a trusted proxy.
 
 use std::net::IpAddr;
 
@@ -17,7 +16,7 @@ use crate::server::connections::Peer;
 
 const X_FORWARDED_FOR: HeaderName = HeaderName::from_static("x-forwarded-for");
 
-/// Layer that replaces the address of a trusted proxy by that of its client.
+/// Layer that replaces the address of a trusted proxy by the address of its client.
 pub(crate) async fn resolve(
     State(options): State<HttpOptions>,
     mut request: Request,
@@ -30,13 +29,13 @@ pub(crate) async fn resolve(
     next.run(request).await
 }
 
-/// The address of the client of a request that came from `peer`.
+/// Returns the address of the client of a request from `peer`.
 fn client_of(peer: IpAddr, headers: &HeaderMap, trusted: &[AddressRange]) -> IpAddr {
     let is_trusted = |address: IpAddr| trusted.iter().any(|range| range.contains(address));
     if !is_trusted(peer) {
         return peer;
     }
-    // The addresses of a header from the right; one that cannot be read ends them.
+    // Reads the addresses of a header from the right, up to one that cannot be parsed.
     let nearest = |addresses: Vec<Option<IpAddr>>| {
         let mut client = peer;
         for address in addresses.into_iter().rev() {
@@ -55,12 +54,12 @@ fn client_of(peer: IpAddr, headers: &HeaderMap, trusted: &[AddressRange]) -> IpA
     match (forwarded, x_forwarded) {
         (Some(client), None) | (None, Some(client)) => client,
         (Some(client), Some(same)) if client == same => client,
-        // A proxy writes one of the headers. The client may have sent the other one.
+        // A proxy writes one of the headers; the other one may come from the client.
         _ => peer,
     }
 }
 
-/// The elements of a header, in their order, as addresses; nothing if the header is absent.
+/// Returns the elements of a header as addresses, in order; `None` if the header is absent.
 fn listed(
     headers: &HeaderMap,
     name: &HeaderName,
@@ -77,14 +76,14 @@ fn listed(
     (!elements.is_empty()).then_some(elements)
 }
 
-/// The address in the parameter `for` of an element of `Forwarded`.
+/// Returns the address in the parameter `for` of an element of `Forwarded`.
 fn forwarded_for(element: &str) -> Option<IpAddr> {
     let pairs = element.split(';').filter_map(|pair| pair.split_once('='));
     let mut nodes = pairs.filter(|(name, _)| name.trim().eq_ignore_ascii_case("for"));
     node(nodes.next()?.1.trim().trim_matches('"'))
 }
 
-/// An address, which may have a port; an IPv6 address with a port is in brackets.
+/// Parses an address with or without a port; an IPv6 address with a port is in brackets.
 fn node(text: &str) -> Option<IpAddr> {
     let bracketed = text.strip_prefix('[').and_then(|rest| rest.split_once(']'));
     let address = match bracketed {

@@ -1,8 +1,7 @@
-//! What a client may keep and for how long: entity tags, conditional requests, `Cache-Control`.
+//! Caching by clients: entity tags, conditional requests, `Cache-Control`.
 //!
-//! A tag is a digest of the body, so it is a strong one (RFC 9110, section 8.8.3); that of a result, which never changes, a digest
-//! of what it is asked by. Compressed forms of a body have tags of their own:
-//! the same digest with the coding behind it.
+//! A tag is strong (RFC 9110, section 8.8.3): a digest of the body, or for a result, which never changes, a digest of the request. The tag
+//! of a compressed body is the digest followed by the coding.
 
 use std::env::current_exe;
 use std::fs::File;
@@ -21,17 +20,17 @@ use crate::problem::ApiError;
 use crate::render::format::Format;
 use railhead_jobs::model::{Job, State};
 
-/// For results: they never change, but they can be deleted.
+/// Policy of results, which never change but can be deleted.
 const IMMUTABLE: HeaderValue = HeaderValue::from_static("private, max-age=3600");
-/// For resources that change: they may be stored, but must be revalidated for each use.
+/// Policy of resources that change: clients may store them, but revalidate them for each use.
 const REVALIDATE: HeaderValue = HeaderValue::from_static("private, no-cache");
-/// For everything else.
+/// Policy of all other responses.
 const NO_STORE: HeaderValue = HeaderValue::from_static("no-store");
 
-/// Codings that a tag may end with.
+/// Suffixes of the tags of compressed bodies.
 const CODINGS: [&str; 2] = ["-gzip", "-zstd"];
 
-/// Layer around resources that never change once they are there.
+/// Layer around resources that never change once they exist.
 pub(crate) async fn immutable(request: Request, next: Next) -> Response {
     tag(request, next, IMMUTABLE).await
 }
@@ -41,8 +40,7 @@ pub(crate) async fn revalidate(request: Request, next: Next) -> Response {
     tag(request, next, REVALIDATE).await
 }
 
-/// The outer layer, around compression: an answer without a policy of its own must not be stored, and the tag of a compressed body
-/// names its coding.
+/// Layer around compression: forbids storing responses without a policy, and adds the coding to the tag of a compressed body.
 pub(crate) async fn complete(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let headers = response.headers_mut();
@@ -63,10 +61,11 @@ pub(crate) async fn complete(request: Request, next: Next) -> Response {
     response
 }
 
-/// The tag of a result of this job, or of a part of it, and the answer if the client has it already; before anything is loaded or computed.
+/// Returns the tag of the result of a job, or of a part of it, and the response if the client has stored the result already. Nothing is
+/// loaded for it.
 ///
-/// Results never change, so job, path, query, format and the program that writes the answer determine the tag. `If-None-Match: *` is left
-/// to [`immutable`], since only the work itself shows whether there is an answer.
+/// Results never change, so job, path, query, format and the build of the program determine the tag. [`immutable`] handles
+/// `If-None-Match: *`, because only the handler finds out whether there is a result.
 pub(crate) async fn tag_of(
     job: &Job,
     uri: &Uri,
@@ -92,13 +91,12 @@ pub(crate) async fn tag_of(
     (digest, unchanged)
 }
 
-/// The digest of the program's own file. Every build has another one, so what one build wrote is not taken for what the next one
-/// writes; nodes that run the same build have the same.
+/// Returns the digest of the file of the program, which differs between builds and is the same on nodes with the same build.
 async fn program_digest() -> &'static str {
     static DIGEST: OnceCell<String> = OnceCell::const_new();
     let read = || async {
         let read = tokio::task::spawn_blocking(|| {
-            // This is the running program, also where a new one has been put into its place.
+            // This is the running program, even after its file was replaced.
             let file = File::open("/proc/self/exe").or_else(|_| File::open(current_exe()?))?;
             let mut hasher = blake3::Hasher::new();
             hasher.update_reader(file)?;
@@ -118,7 +116,7 @@ async fn program_digest() -> &'static str {
     DIGEST.get_or_init(read).await
 }
 
-/// The answer with its tag.
+/// Adds a tag to a response.
 pub(crate) fn tagged(tag: &str, mut response: Response) -> Response {
     if let Ok(tag) = HeaderValue::from_str(&format!("\"{tag}\"")) {
         response.headers_mut().insert(header::ETAG, tag);
@@ -141,7 +139,7 @@ async fn tag(request: Request, next: Next, lifetime: HeaderValue) -> Response {
         }
         return Response::from_parts(parts, body);
     }
-    // These resources have small bodies, which are in memory already.
+    // The bodies of these resources are small and in memory already.
     let body = match body.collect().await {
         Ok(body) => body.to_bytes(),
         Err(error) => return ApiError::internal(&error).into_response(),
@@ -162,7 +160,7 @@ fn not_modified(mut parts: Parts) -> Response {
     Response::from_parts(parts, Body::empty())
 }
 
-/// Is `If-None-Match` the wildcard `*`?
+/// Whether `If-None-Match` is the wildcard `*`.
 fn asks_for_any(headers: &HeaderMap) -> bool {
     let mut values = headers.get_all(header::IF_NONE_MATCH).iter();
     values.any(|value| value.as_bytes() == b"*")
@@ -173,7 +171,7 @@ fn digest(body: &[u8]) -> String {
     blake3::hash(body).to_hex()[..32].to_owned()
 }
 
-/// The tag in `If-None-Match` that belongs to this digest, in any coding; weak comparison (RFC 9110, section 13.1.2).
+/// Returns the tag in `If-None-Match` with this digest, in any coding, by weak comparison (RFC 9110, section 13.1.2).
 fn matching(headers: &HeaderMap, digest: &str) -> Option<HeaderValue> {
     let values = headers.get_all(header::IF_NONE_MATCH).iter();
     let given = values.filter_map(|value| value.to_str().ok());

@@ -1,4 +1,5 @@
-//! Counts requests and their times, by route, method and status.
+//! Metrics of requests, by route, method and status, and of the process.
+
 use std::sync::Arc;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
@@ -17,12 +18,12 @@ use prometheus_client::registry::Registry;
 
 use railhead_jobs::Jobs;
 
-/// Upper bounds of times to the head of an answer in s; `Prefer: wait` may take 60 of them.
+/// Upper bounds of the times to the head of a response, in s.
 const REQUEST_SECONDS: [f64; 13] = [
     0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 2.5, 10.0, 60.0,
 ];
 
-/// The label of requests for addresses that do not exist: clients could make up any number of those.
+/// Label of requests for paths that do not exist, of which clients could invent any number.
 const UNMATCHED: &str = "unmatched";
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -38,7 +39,7 @@ struct RouteLabel {
     route: String,
 }
 
-/// What is counted about requests, and the registry of everything that is counted; clones share it.
+/// Metrics of requests, and the registry of all metrics except those of jobs. Clones share them.
 #[derive(Debug, Clone)]
 pub struct Metrics {
     requests: Family<RequestLabel, Counter>,
@@ -48,7 +49,7 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// A registry with the figures of the jobs room and those of requests.
+    /// Creates the metrics. `dropped_lines` returns the number of log lines that were dropped.
     #[must_use]
     pub fn new(jobs: &Jobs, dropped_lines: fn() -> u64) -> Metrics {
         let mut registry = Registry::with_prefix("railhead");
@@ -79,17 +80,17 @@ impl Metrics {
         }
     }
 
-    /// All figures as OpenMetrics text, behind what is there already.
+    /// Appends all metrics as OpenMetrics text, those of jobs first.
     ///
     /// # Errors
-    /// As the writing of text.
+    /// Writing the text fails.
     pub fn write(&self, text: &mut String) -> std::fmt::Result {
         encode_registry(text, self.jobs.metrics())?;
         encode(text, &self.registry)
     }
 }
 
-/// Counts a request; layer around all routes.
+/// Layer around all routes that counts requests.
 pub(crate) async fn count(
     State(metrics): State<Metrics>,
     request: Request,
@@ -120,7 +121,7 @@ pub(crate) async fn count(
     response
 }
 
-/// The methods that the service knows; a client may send any word.
+/// Returns the label of a method; clients could invent any number of methods.
 fn known(method: &Method) -> &'static str {
     match *method {
         Method::GET => "GET",
@@ -132,13 +133,13 @@ fn known(method: &Method) -> &'static str {
     }
 }
 
-/// Reads the values when the metrics are scraped.
+/// Metrics of the process, read when they are scraped.
 #[derive(Debug)]
-pub(crate) struct Process {
-    /// How many lines of the log were dropped.
-    pub dropped_lines: fn() -> u64,
-    /// Start of the process in epoch seconds.
-    pub started_at: i64,
+struct Process {
+    /// Returns the number of log lines that were dropped.
+    dropped_lines: fn() -> u64,
+    /// Start of the process in seconds since 1970.
+    started_at: i64,
 }
 
 impl Collector for Process {
@@ -175,7 +176,7 @@ impl Collector for Process {
     }
 }
 
-/// Resident memory; `None` on systems that do not say it this way.
+/// Returns the resident memory in bytes; `None` on systems without `/proc`.
 fn resident_bytes() -> Option<i64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status

@@ -1,4 +1,4 @@
-//! What stands around every request; one layer is one file. `mod.rs` of the room says in which order.
+//! Layers around the routes, one per file. `lib.rs` lists their order.
 
 pub(super) mod admission;
 pub(super) mod auth;

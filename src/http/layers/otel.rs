@@ -1,4 +1,4 @@
-//! One span per request for those who collect traces; inside the client's trace if it sends one.
+//! One span per request for a collector of traces, inside the trace of the client if it sends one.
 
 use axum::Router;
 use axum::extract::{MatchedPath, Request, State};
@@ -9,12 +9,10 @@ use opentelemetry::KeyValue;
 use opentelemetry::context::FutureExt;
 use opentelemetry::trace::{Status, TraceContextExt};
 
+use crate::layers::auth::PROBES;
 use railhead_jobs::trace::Tracer;
 
-/// Routes that are asked every few seconds and tell nothing new.
-const UNTRACED: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
-
-/// Makes spans of requests, if there is something to make them with; else the router stays as it is.
+/// Adds a layer that makes spans, if there is a tracer.
 pub(crate) fn trace<S: Clone + Send + Sync + 'static>(
     router: Router<S>,
     tracer: Option<&Tracer>,
@@ -28,11 +26,11 @@ pub(crate) fn trace<S: Clone + Send + Sync + 'static>(
 async fn trace_request(State(tracer): State<Tracer>, request: Request, next: Next) -> Response {
     let matched = request.extensions().get::<MatchedPath>();
     let route = matched.map(MatchedPath::as_str).unwrap_or_default();
-    if route.is_empty() || UNTRACED.contains(&route) {
+    if route.is_empty() || PROBES.contains(&route) {
         return next.run(request).await;
     }
     let method = request.method().as_str().to_owned();
-    // Names as OpenTelemetry's conventions for HTTP have them.
+    // The names follow the conventions of OpenTelemetry for HTTP.
     let context = tracer.request(
         format!("{method} {route}"),
         single(request.headers(), "traceparent"),
@@ -58,7 +56,7 @@ async fn trace_request(State(tracer): State<Tracer>, request: Request, next: Nex
     response
 }
 
-/// The value of a header that is there once.
+/// Returns the value of a header that occurs once.
 fn single<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?;

@@ -1,4 +1,5 @@
-//! The id of a request, and the line that the log has for each.
+//! The id of a request, and its line in the log.
+
 use std::time::Duration;
 
 use axum::extract::{MatchedPath, Request};
@@ -12,14 +13,14 @@ use uuid::Uuid;
 
 use crate::server::connections::Peer;
 
-/// Header that carries the request id in both directions.
+/// Header with the id of a request, in requests and responses.
 pub(crate) const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 
-/// Longest request id taken over from a client.
+/// Longest id that is accepted from a client.
 const REQUEST_ID_MAX_CHARS: usize = 128;
 
-/// Takes over the client's request id, or makes one, and repeats it in the answer. An id that is empty, too long or
-/// not made of visible ASCII characters is replaced, because it goes into the log.
+/// Layer that accepts the id of the client, or creates one, and returns it in the response. An id that is empty, too long or does not
+/// consist of visible ASCII characters is replaced, because it is written to the log.
 pub(crate) async fn carry_request_id(mut request: Request, next: Next) -> Response {
     let given = request
         .headers()
@@ -50,7 +51,7 @@ type SpanLayer = TraceLayer<
     fn(&Response, Duration, &Span),
 >;
 
-/// One span per request, closed by one line with status and time.
+/// Layer with a span for each request, which ends with a log line with status and time.
 pub(crate) fn span_layer() -> SpanLayer {
     TraceLayer::new_for_http()
         .make_span_with(request_span as fn(&Request) -> Span)

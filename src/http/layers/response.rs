@@ -1,4 +1,5 @@
-//! What responses pass on their way out: a final line break, compression, headers for browsers, and panics as problems.
+//! Layers for responses: a final line break, compression, headers for browsers, and panics as problems.
+
 use std::any::Any;
 use std::convert::Infallible;
 use std::time::Duration;
@@ -17,9 +18,10 @@ use tower_http::compression::predicate::{NotForContentType, Predicate, SizeAbove
 use tower_http::cors::{AllowOrigin, CorsLayer};
 use tower_http::set_header::SetResponseHeaderLayer;
 
+use crate::layers::admission::declared_length;
 use crate::problem::ApiError;
 
-/// Layer around everything that answers JSON, within compression.
+/// Layer that appends a line break to JSON, inside compression.
 pub(crate) async fn end_line(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     let media_type = response.headers().get(header::CONTENT_TYPE);
@@ -30,13 +32,12 @@ pub(crate) async fn end_line(request: Request, next: Next) -> Response {
     if !is_json || response.status() == StatusCode::NOT_MODIFIED {
         return response;
     }
-    let named = response.headers().get(header::CONTENT_LENGTH);
-    let named = named.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-    if let Some(size) = named.or_else(|| response.body().size_hint().exact()) {
+    let declared = declared_length(response.headers());
+    if let Some(size) = declared.or_else(|| response.body().size_hint().exact()) {
         let size = HeaderValue::from(size + 1);
         response.headers_mut().insert(header::CONTENT_LENGTH, size);
     }
-    // The body of an answer to HEAD is dropped further out.
+    // An outer layer drops the body of a response to HEAD.
     response.map(|body| {
         let newline = stream::once(async { Ok::<_, Infallible>(Bytes::from_static(b"\n")) });
         let newline = newline.map_err(axum::Error::new);
@@ -44,14 +45,14 @@ pub(crate) async fn end_line(request: Request, next: Next) -> Response {
     })
 }
 
-/// Smaller bodies do not shrink.
+/// Size in bytes up to which a body is not compressed.
 const SMALLEST: u64 = 256;
 
-/// Marks an answer whose lines have to be sent at once; compression would delay them.
+/// Marks a response whose lines must be sent at once; compression would delay them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StreamedUnbuffered;
 
-/// Compresses answers for clients that accept it, except formats that are compressed already and answers marked [`StreamedUnbuffered`].
+/// Layer that compresses responses, except compressed formats and responses marked [`StreamedUnbuffered`].
 pub(crate) fn compression_layer() -> CompressionLayer<impl Predicate> {
     let not_live = |_: StatusCode, _: Version, _: &HeaderMap, extensions: &Extensions| {
         extensions.get::<StreamedUnbuffered>().is_none()
@@ -65,7 +66,7 @@ pub(crate) fn compression_layer() -> CompressionLayer<impl Predicate> {
     )
 }
 
-/// The readable contract is all that a browser shows; its styles are partly inside the page.
+/// Policy for the readable contract, whose page contains a part of its styles.
 const POLICY: &str = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
      object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
 
@@ -76,7 +77,7 @@ const FIXED: [(HeaderName, &str); 4] = [
     (header::REFERRER_POLICY, "no-referrer"),
 ];
 
-/// Adds the fixed headers to every answer that does not have its own.
+/// Adds the fixed headers to every response that does not have them.
 pub(crate) fn secure<S: Clone + Send + Sync + 'static>(router: Router<S>) -> Router<S> {
     FIXED.into_iter().fold(router, |router, (name, value)| {
         let value = HeaderValue::from_static(value);
@@ -84,59 +85,59 @@ pub(crate) fn secure<S: Clone + Send + Sync + 'static>(router: Router<S>) -> Rou
     })
 }
 
-/// Turns a panic of a handler into an answer; the service lives on.
+/// Answers a panic of a handler.
 pub(crate) fn answer_panic(panic: Box<dyn Any + Send + 'static>) -> Response {
     let text = panic
         .downcast_ref::<&str>()
         .map(ToString::to_string)
         .or_else(|| panic.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "a panic without words".to_owned());
-    ApiError::internal(&format_args!("a handler panicked: {text}")).into_response()
+        .unwrap_or_else(|| "no panic message".to_owned());
+    ApiError::internal(format_args!("a handler panicked: {text}")).into_response()
 }
 
-/// How long a browser may remember what it was allowed.
+/// Time for which a browser may cache a preflight response.
 const PREFLIGHT_AGE: Duration = Duration::from_secs(600);
 
-/// Lets pages of these origins read answers; without any, a browser lets no other origin read them.
+/// Allows pages of these origins to read responses. Without origins, browsers do not allow other pages to.
 pub fn allow_origins(router: Router, origins: Vec<HeaderValue>) -> Router {
     if origins.is_empty() {
         return router;
     }
-    let known = |names: &[&'static str]| -> Vec<HeaderName> {
-        names
-            .iter()
-            .map(|name| HeaderName::from_static(name))
-            .collect()
-    };
     router.layer(
         CorsLayer::new()
             .allow_origin(AllowOrigin::list(origins))
             .allow_methods([Method::GET, Method::POST, Method::DELETE])
-            .allow_headers(known(&[
-                "accept",
-                "authorization",
-                "cache-control",
-                "content-encoding",
-                "content-type",
-                "idempotency-key",
-                "if-none-match",
-                "last-event-id",
-                "prefer",
-                "traceparent",
-                "tracestate",
-                "x-request-id",
-            ]))
-            .expose_headers(known(&[
-                "etag",
-                "location",
-                "idempotency-replayed",
-                "link",
-                "preference-applied",
-                "ratelimit",
-                "ratelimit-policy",
-                "retry-after",
-                "x-request-id",
-            ]))
+            .allow_headers(
+                [
+                    "accept",
+                    "authorization",
+                    "cache-control",
+                    "content-encoding",
+                    "content-type",
+                    "idempotency-key",
+                    "if-none-match",
+                    "last-event-id",
+                    "prefer",
+                    "traceparent",
+                    "tracestate",
+                    "x-request-id",
+                ]
+                .map(HeaderName::from_static),
+            )
+            .expose_headers(
+                [
+                    "etag",
+                    "location",
+                    "idempotency-replayed",
+                    "link",
+                    "preference-applied",
+                    "ratelimit",
+                    "ratelimit-policy",
+                    "retry-after",
+                    "x-request-id",
+                ]
+                .map(HeaderName::from_static),
+            )
             .max_age(PREFLIGHT_AGE),
     )
 }

@@ -1,23 +1,24 @@
-//! Results of a batch as a table: one line per job and motion, or per patch too, with the columns that were asked for.
+//! Results of a batch as a table, with a row per job and motion, or per job, motion and patch.
 
 use std::ops::Range;
 
-use crate::render::forces::Forces;
-use railhead_contact::solution::words::answer::{PatchPoint, PointSolution, Solution};
+use railhead_contact::solution::words::answer::{
+    ErrorEstimate, PatchPoint, PointSolution, Solution,
+};
 use railhead_jobs::model::BatchItem;
 use railhead_tables::table::{RowTable, TableColumn, TableKind};
 
-/// How the value of a column is found.
+/// Returns the value of a column in a row.
 #[derive(Debug, Clone, Copy)]
 enum Of {
     Place(fn(&TableLine<'_>) -> i64),
     Number(fn(&TableLine<'_>) -> Option<f64>),
     Text(fn(&TableLine<'_>) -> Option<String>),
-    /// The label with the key behind [`LABEL`].
+    /// The label whose key follows [`LABEL`] in the name.
     Label,
 }
 
-/// Columns of a table for which none are named.
+/// Number of the default columns.
 const USUAL: usize = 21;
 
 macro_rules! columns {
@@ -33,16 +34,16 @@ const COLUMNS: [(&str, Of); 43] = columns! {
     "name" Text |line| line.item.job.name.clone();
     "state" Text |line| Some(line.item.job.state.name().into());
     "point" Place |line| line.point as i64;
-    "creepage_x" Number |line| line.force("creepage_x");
-    "creepage_y" Number |line| line.force("creepage_y");
-    "spin_per_mm" Number |line| line.force("spin_per_mm");
+    "creepage_x" Number |line| Some(line.parts().next()?.point.motion.creepage_x);
+    "creepage_y" Number |line| Some(line.parts().next()?.point.motion.creepage_y);
+    "spin_per_mm" Number |line| Some(line.parts().next()?.point.motion.spin_per_mm);
     "normal_force_n" Number |line| line.sum(|part| Some(part.region.normal_force_n));
-    "force_x_n" Number |line| line.force("force_x_n");
-    "force_y_n" Number |line| line.force("force_y_n");
-    "moment_z_n_mm" Number |line| line.force("moment_z_n_mm");
-    "error_force_x_n" Number |line| line.force("error_force_x_n");
-    "error_force_y_n" Number |line| line.force("error_force_y_n");
-    "error_moment_z_n_mm" Number |line| line.force("error_moment_z_n_mm");
+    "force_x_n" Number |line| Some(line.forces()?.0[0]);
+    "force_y_n" Number |line| Some(line.forces()?.0[1]);
+    "moment_z_n_mm" Number |line| Some(line.forces()?.0[2]);
+    "error_force_x_n" Number |line| Some(line.forces()?.1?.force_x_n);
+    "error_force_y_n" Number |line| Some(line.forces()?.1?.force_y_n);
+    "error_moment_z_n_mm" Number |line| Some(line.forces()?.1?.moment_z_n_mm);
     "friction_power_n" Number |line| line.sum(|part| Some(part.point.friction_power_n));
     "area_mm2" Number |line| line.sum(|part| Some(part.region.area_mm2));
     "pressure_max_mpa" Number |line| line.largest(|part| Some(part.region.pressure_max_mpa));
@@ -73,7 +74,7 @@ const COLUMNS: [(&str, Of); 43] = columns! {
     "temperature_max_c" Number |line| line.worst(|point| Some(point.temperature?.max_c));
 };
 
-/// Before the key of a label.
+/// Prefix of the column of a label.
 const LABEL: &str = "label:";
 
 /// The columns of a table.
@@ -81,7 +82,7 @@ const LABEL: &str = "label:";
 pub(crate) struct Columns(Vec<(String, Of)>);
 
 impl Columns {
-    /// The usual columns, and before `remarks` one for each of these labels.
+    /// Returns the default columns, with the columns of these labels before `remarks`.
     #[must_use]
     pub(crate) fn with_labels(keys: &[String]) -> Columns {
         let usual = COLUMNS[..USUAL].iter();
@@ -93,7 +94,7 @@ impl Columns {
         Columns(columns)
     }
 
-    /// Reads names with commas between.
+    /// Parses a comma-separated list of names.
     #[must_use]
     pub(crate) fn read(text: &str) -> Option<Columns> {
         let column = |name: &str| {
@@ -108,14 +109,14 @@ impl Columns {
             .map(Columns)
     }
 
-    /// The names that there are, in words.
+    /// Returns a description of the allowed names.
     #[must_use]
     pub(crate) fn allowed() -> String {
         let names = COLUMNS.map(|(name, _)| name).join(", ");
         format!("comma-separated names, of {names} and `label:KEY`")
     }
 
-    /// The names with the kinds of their values.
+    /// Returns the names of the columns with the kinds of their values.
     pub(crate) fn kinds(&self) -> Vec<(String, TableKind)> {
         let columns = self.0.iter().map(|(name, of)| {
             let kind = match of {
@@ -128,7 +129,7 @@ impl Columns {
         columns.collect()
     }
 
-    /// A table without rows.
+    /// Returns a table without rows.
     #[must_use]
     pub(crate) fn empty(&self) -> RowTable {
         let columns = self.kinds().into_iter();
@@ -138,7 +139,7 @@ impl Columns {
         }
     }
 
-    /// Adds the line of a job without a result, with `error` saying why.
+    /// Adds the row of a job without a result; `error` is the reason.
     pub(crate) fn add_without_result(&self, table: &mut RowTable, item: &BatchItem, error: &str) {
         self.add_line(
             table,
@@ -152,7 +153,7 @@ impl Columns {
         );
     }
 
-    /// Adds the lines of these motions of a job.
+    /// Adds the rows of these motions of a job.
     pub(crate) fn add(
         &self,
         table: &mut RowTable,
@@ -197,7 +198,7 @@ impl Columns {
     }
 }
 
-/// One line: a motion of a job, of one patch or of all of them together, or a job without a result.
+/// A row: a motion of a job, for one patch or for all patches together, or a job without a result.
 struct TableLine<'a> {
     item: &'a BatchItem,
     solution: Option<&'a Solution>,
@@ -206,11 +207,11 @@ struct TableLine<'a> {
     error: &'a str,
 }
 
-/// A number of a patch under the motion of the line.
+/// Returns a number of a patch for the motion of the row.
 type OfPart = fn(&PatchPoint<'_>) -> Option<f64>;
 
 impl TableLine<'_> {
-    /// The patches of the line under its motion.
+    /// Returns the patches of the row, with its motion.
     fn parts(&self) -> impl Iterator<Item = PatchPoint<'_>> + Clone {
         let parts = self
             .solution
@@ -219,14 +220,10 @@ impl TableLine<'_> {
         parts.filter(|part| self.patch.is_none_or(|patch| patch == part.number))
     }
 
-    /// True if it is of all patches, or of any of them; nothing where it is not told.
+    /// Whether `of` holds for all patches, or for any patch; `None` if no patch has the value.
     fn verdict(&self, of: fn(&PointSolution) -> Option<bool>, any: bool) -> Option<String> {
-        let mut told = self.parts().filter_map(|part| of(part.point)).peekable();
-        told.peek()?;
-        let verdict = match any {
-            true => told.any(|verdict| verdict),
-            false => told.all(|verdict| verdict),
-        };
+        let verdicts = self.parts().filter_map(|part| of(part.point));
+        let verdict = verdicts.reduce(|a, b| if any { a || b } else { a && b })?;
         Some(verdict.to_string())
     }
 
@@ -240,38 +237,32 @@ impl TableLine<'_> {
         values.reduce(f64::max)
     }
 
-    /// The largest, if every patch has one.
+    /// Returns the largest value; `None` unless every patch has one.
     fn worst(&self, of: fn(&PointSolution) -> Option<f64>) -> Option<f64> {
         let values = self.parts().map(|part| of(part.point));
         values.reduce(|a, b| Some(a?.max(b?))).flatten()
     }
 
-    /// Of a single patch; nothing for several patches together.
+    /// Returns the value of the only patch; `None` for several patches together.
     fn of_one(&self, of: OfPart) -> Option<f64> {
         let mut parts = self.parts();
         let part = parts.next()?;
         of(&part).filter(|_| parts.next().is_none())
     }
 
-    /// Motion, forces and their errors.
-    fn force(&self, name: &str) -> Option<f64> {
-        let first = self.parts().next().map(|part| part.point);
-        let motion = first.map(|point| point.motion);
-        let forces = match self.patch {
-            None => Forces::of_total(motion, self.solution?.total.get(self.point)?),
-            Some(_) => {
-                let point = first?;
-                Forces {
-                    motion,
-                    resultants: [point.force_x_n, point.force_y_n, point.moment_z_n_mm],
-                    error: point.error_estimate,
-                }
-            }
-        };
-        forces.number(name)
+    /// Returns longitudinal and lateral force in N, moment in N·mm, and their errors.
+    fn forces(&self) -> Option<([f64; 3], Option<ErrorEstimate>)> {
+        if self.patch.is_some() {
+            let point = self.parts().next()?.point;
+            let forces = [point.force_x_n, point.force_y_n, point.moment_z_n_mm];
+            return Some((forces, point.error_estimate));
+        }
+        let total = self.solution?.total.get(self.point)?;
+        let forces = [total.force_x_n, total.force_y_n, total.moment_z_n_mm];
+        Some((forces, total.error_estimate))
     }
 
-    /// The codes of the remarks that hold for the line, each once.
+    /// Returns the codes of the remarks about the row, each once.
     fn codes(&self) -> String {
         let mut codes: Vec<&str> = Vec::new();
         for remark in self.solution.into_iter().flat_map(|found| &found.remarks) {

@@ -1,7 +1,6 @@
-//! The forms of an answer other than JSON.
+//! Formats of responses other than plain JSON.
 
 pub(super) mod batch_table;
-pub(super) mod forces;
 pub(super) mod format;
 pub(super) mod picture;
 pub(super) mod pieces;

@@ -1,4 +1,5 @@
-//! `/v1/batches`: many cases in one request, and their results line by line.
+//! `/v1/batches`: many cases in one request, and their results.
+
 use std::sync::Arc;
 
 use axum::body::Bytes;
@@ -39,14 +40,14 @@ use railhead_jobs::sync::blocking;
 use railhead_tables::table::RowTable;
 
 problems! {
-    /// What `POST /v1/batches` can fail with.
+    /// Problems of `POST /v1/batches`.
     BatchProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding,
     FaultyBatch, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, StoredQuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable, StorageUnreachable
 }
 
 query! {
-    /// What the query of a submission says about the batch itself.
-    BatchQuery(() => ()) {
+    /// Parameters of the submission of a batch.
+    BatchQuery {
         /// `reject` (default): one faulty case refuses the batch; `skip`: faulty cases are skipped and reported
         #[param(pattern = "^(reject|skip)$", example = "skip")]
         on_invalid: bool as String = word(&[("reject", false), ("skip", true)]);
@@ -107,7 +108,7 @@ pub(crate) async fn submit(
         .await
 }
 
-/// Why a batch is not taken.
+/// Returns the refusal of a batch.
 fn refusal(draft: &BatchUpload) -> ApiError {
     if draft.cases == 0 {
         return ApiError::new(ProblemKind::FaultyBatch, "the batch has no case");
@@ -139,12 +140,12 @@ fn faults(draft: &BatchUpload) -> Vec<Fault> {
     faults.collect()
 }
 
-/// What a reader holds of small results: those of a page, and the text written of them.
+/// Memory of a response for small results, in bytes: a page of results and its text.
 const STREAM_BYTES: usize = 2 * PAGE_BYTES;
-/// Motions of a large result written at once.
+/// Number of motions of a large result that are written at once.
 const POINTS: usize = 64;
 
-/// What lines are made from.
+/// The source of the lines of a response.
 struct Source {
     jobs: Jobs,
     memory: Memory,
@@ -154,7 +155,7 @@ struct Source {
 
 type Pieces = BoxStream<'static, Result<Piece, BoxError>>;
 
-/// The lines of jobs.
+/// Returns the lines of jobs.
 fn lines(source: Source, items: Items) -> impl Stream<Item = Result<Piece, BoxError>> + Send {
     let pieces = try_unfold((source, items), async |(source, mut items)| {
         if !items.fill().await? {
@@ -176,7 +177,7 @@ fn lines(source: Source, items: Items) -> impl Stream<Item = Result<Piece, BoxEr
 }
 
 impl Source {
-    /// The lines of jobs with small results.
+    /// Returns the lines of jobs with small results.
     async fn write_small(&self, items: Vec<BatchItem>) -> Result<Piece, JobsError> {
         let columns = self.columns.clone();
         let written = blocking(move || match columns {
@@ -186,7 +187,7 @@ impl Source {
         written.await?
     }
 
-    /// The lines of a job whose result is large.
+    /// Returns the lines of a job with a large result.
     async fn open_large(&self, item: BatchItem) -> Result<Pieces, BoxError> {
         let id = item.job.id;
         let opened = match item.key() {
@@ -208,12 +209,12 @@ impl Source {
         };
         let (bytes, solution) = match opened {
             Ok(opened) => opened,
-            Err(fault) => return without(told(&item, fault)),
+            Err(fault) => return without(missing_result(&item, fault)),
         };
         let Some(columns) = self.columns.clone() else {
             return Ok(ndjson_of(&item, solution)?);
         };
-        // The text and what is read from it.
+        // The text and the solution parsed from it.
         let needed = 2 * bytes;
         if !self.memory.has_room_for(needed) {
             let detail = format!(
@@ -223,11 +224,11 @@ impl Source {
         }
         match self.read_large(needed, (bytes, solution)).await? {
             Some((solution, share)) => Ok(table_of(columns, item, solution, share)),
-            None => without(told(&item, ItemFault::Unreadable)),
+            None => without(missing_result(&item, ItemFault::Unreadable)),
         }
     }
 
-    /// The solution and its memory; nothing if the text is none.
+    /// Reads a solution, and returns the permit for its memory; `None` if the text is not a solution.
     async fn read_large(
         &self,
         needed: usize,
@@ -252,7 +253,7 @@ fn one(piece: Piece) -> Pieces {
     stream::iter([Ok(piece)]).boxed()
 }
 
-/// A line of NDJSON; `solution` is an object whose closing brace is missing.
+/// Returns a line of NDJSON; `solution` is an object without its closing brace.
 fn ndjson_of(
     item: &BatchItem,
     solution: BoxStream<'static, Result<Bytes, JobsError>>,
@@ -266,7 +267,7 @@ fn ndjson_of(
     Ok(front.chain(middle).chain(tail).boxed())
 }
 
-/// The lines of one job, some motions at a time.
+/// Returns the lines of a job, some motions at a time.
 fn table_of(
     columns: Arc<Columns>,
     item: BatchItem,
@@ -287,7 +288,7 @@ fn table_of(
     lines.boxed()
 }
 
-/// The lines of jobs with small results.
+/// Returns the lines of jobs with small results.
 fn table_of_small(columns: &Columns, items: &[BatchItem]) -> RowTable {
     let mut table = columns.empty();
     for item in items {
@@ -309,7 +310,7 @@ fn table_of_small(columns: &Columns, items: &[BatchItem]) -> RowTable {
     table
 }
 
-/// Writes lines of NDJSON of jobs with small results. A stored solution is passed on as it is, without reading it.
+/// Writes lines of NDJSON of jobs with small results. A stored solution is copied without parsing it.
 fn write_ndjson(items: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
     let mut out = Vec::with_capacity(items.len() * 2048);
     for item in items {
@@ -354,16 +355,16 @@ impl Front<'_> {
     }
 }
 
-/// Writes what stands before a solution.
+/// Writes the part of a line before a solution.
 fn open_line(out: &mut Vec<u8>, item: &BatchItem) -> Result<(), JobsError> {
     write_json(out, &Front::of(item, None))?;
-    // The object is continued: its closing brace makes way.
+    // The object continues, so that its closing brace is removed.
     out.pop();
     out.extend_from_slice(b",\"result\":");
     Ok(())
 }
 
-/// Writes what stands behind a solution without its closing brace.
+/// Writes the part of a line after a solution without its closing brace.
 fn close_line(out: &mut Vec<u8>, item: &BatchItem) -> Result<(), JobsError> {
     let outputs: Vec<Output> = serde_json::from_str(&item.outputs).unwrap_or_default();
     let tail = JobResult::tail(item.job.id, item.job.cached, &outputs);
@@ -379,14 +380,14 @@ fn write_json<T: Serialize>(out: &mut Vec<u8>, value: &T) -> Result<(), JobsErro
 
 const UNREADABLE: &str = "the stored result cannot be read";
 
-/// Why a job that has ended has no result.
+/// Returns the reason why an ended job has no result.
 fn failure(item: &BatchItem) -> Option<ProblemBody> {
     let job = &item.job;
     Some(ProblemBody::of_job(job, job.failure.as_ref()?))
 }
 
-/// Why the result of a succeeded job is not shown.
-fn told(item: &BatchItem, fault: ItemFault) -> ProblemBody {
+/// Returns the reason why the result of a succeeded job is missing.
+fn missing_result(item: &BatchItem, fault: ItemFault) -> ProblemBody {
     match fault {
         ItemFault::Gone => {
             let detail = "the job was removed with its result while the results were read";
@@ -402,7 +403,7 @@ fn problem(item: &BatchItem, kind: ProblemKind, detail: impl Into<String>) -> Pr
     problem
 }
 
-/// Most columns of labels of a table for which no columns are named: three times as many as one case has labels.
+/// Most columns of labels among the default columns, three times as many as a case may have.
 const LABEL_COLUMNS_MAX: u32 = 100;
 
 /// One line of the results of a batch.
@@ -429,7 +430,7 @@ pub(crate) struct BatchLine {
 
 query! {
     /// Parameters of the results of a batch.
-    BatchResultsQuery(() => ()) {
+    BatchResultsQuery {
         /// Only lines after that of this job, to continue after the last line that was read
         #[param(format = "uuid")]
         after: Uuid as String = id("job");
@@ -446,7 +447,7 @@ query! {
 }
 
 problems! {
-    /// What the results of a batch can fail with.
+    /// Problems of the results of a batch.
     BatchResultProblems: BadQuery, BatchNotFound
 }
 
@@ -482,7 +483,7 @@ pub(crate) async fn results(
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response> {
-    let (query, _) = <(BatchResultsQuery, WaitQuery)>::read(&uri, &())?;
+    let (query, _) = <(BatchResultsQuery, WaitQuery)>::read(&uri)?;
     let format = choose(&headers, query.format, RESULT_FORMATS)?;
     let is_table = format != Format::Ndjson;
     if query.columns.is_some() && !is_table {
@@ -490,14 +491,14 @@ pub(crate) async fn results(
             "NDJSON has no columns; ask for a table with `format=csv`, `arrow` or `parquet`";
         return Err(ApiError::bad_parameter("columns", detail));
     }
-    // Unknown batches are answered before the stream begins.
+    // An unknown batch is a problem, which must be known before the stream begins.
     jobs.of_kind(Kind::Cases).work(id).await?;
     let mut items = jobs.items(id);
     items.until = wait.at_most().map(|at_most| Instant::now() + at_most);
     items.after = query.after;
     items.states = query.state.unwrap_or_default();
     let waits = items.until.is_some();
-    // What a reader holds of small results; large ones are counted one by one.
+    // Large results are counted one by one.
     let share = memory.ready_answer(jobs.tenant(), STREAM_BYTES)?;
     let columns = match (is_table, query.columns) {
         (true, None) => {

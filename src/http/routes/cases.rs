@@ -1,4 +1,4 @@
-//! `/v1/cases/check`: is this a case, and what would it cost? Makes no job.
+//! `/v1/cases/check`: checks a case and estimates its cost, without a job.
 
 use axum::Json;
 use axum::extract::State;
@@ -55,7 +55,7 @@ pub(crate) struct Estimate {
 }
 
 problems! {
-    /// What `POST /v1/cases/check` can fail with.
+    /// Problems of `POST /v1/cases/check`.
     CheckProblems: BadQuery, MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase
 }
 
@@ -81,9 +81,9 @@ pub(crate) async fn check(
     }
     let value = jobs.with_profiles(value).await?;
     let MemoryPermit { share, turn } = room;
-    // A large grid takes long enough to check that it must not hold up other requests.
+    // Checking a large grid would delay other requests.
     let checked = blocking(move || {
-        // The turn is held until the work ends, even if the client has gone away.
+        // The slot is held until the work ends, even if the client has disconnected.
         let _turn = turn;
         let checked = jobs.check(&value)?;
         let report = report(&checked);
@@ -91,17 +91,16 @@ pub(crate) async fn check(
     });
     let (jobs, case, mut report) = checked.await??;
     let limit = options.check_trial;
-    let turn = if limit.is_zero() {
-        None
-    } else {
-        memory.trial(jobs.tenant(), limit).await
+    let turn = match limit.is_zero() {
+        true => None,
+        false => memory.trial(jobs.tenant(), limit).await,
     };
     if let Some(turn) = turn {
         let probed = blocking(move || {
             let _held = (turn, share);
             jobs.probe(&case, limit)
         });
-        // A solve that panics is the matter of its job; the formulas still stand.
+        // If the trial panics, the estimate by formulas remains.
         if let Ok(probed) = probed.await {
             report.estimate.seconds = probed.seconds;
             report.estimate.found_by = probed.found_by;
@@ -110,9 +109,9 @@ pub(crate) async fn check(
     Ok(Json(report))
 }
 
-/// What is said of a checked case, with the time by the formulas.
+/// Returns the report on a checked case, with the time by formulas.
 fn report(checked: &CheckedCase) -> CheckReport {
-    let cost = checked.cost();
+    let (cost, remarks) = (checked.cost(), checked.remarks.iter());
     CheckReport {
         digest: checked.label.digest.clone(),
         method: checked.run.method_asked,
@@ -124,15 +123,9 @@ fn report(checked: &CheckedCase) -> CheckReport {
             seconds: cost.seconds,
             found_by: FoundBy::Formulas,
         },
-        // What a wheel that lies nowhere above its rail is told when it is solved.
+        // A wheel that lies nowhere above its rail has no placement; solving such a case reports it.
         understood: checked.understood().ok(),
         quality: checked.quality(),
-        remarks: merged(
-            checked
-                .remarks
-                .iter()
-                .cloned()
-                .chain(checked.touch_remarks()),
-        ),
+        remarks: merged(remarks.cloned().chain(checked.touch_remarks())),
     }
 }

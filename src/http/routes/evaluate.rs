@@ -1,4 +1,4 @@
-//! `POST /v1/evaluate`: many rows of numbers answered at once, without jobs.
+//! `POST /v1/evaluate`: evaluates rows in the request, without jobs.
 
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
@@ -39,7 +39,7 @@ use railhead_tables::npz;
 use railhead_tables::read::{TableForm, TableRows, TableSource};
 use railhead_tables::titles::{NamedColumns, TitledColumn};
 
-/// The forms of an answer.
+/// Formats of the response.
 const FORMATS: &[Format] = &[
     Format::Json,
     Format::Csv,
@@ -54,7 +54,7 @@ const FORMATS: &[Format] = &[
 #[schema(as = EvaluateRequest)]
 #[allow(
     dead_code,
-    reason = "the contract; bodies are read straight into columns"
+    reason = "describes a body that is read directly into columns"
 )]
 pub(crate) struct EvaluateRequest {
     /// A case with one motion, of any contact and method. Members that a column replaces may be omitted. Of `outputs` only `gradients` has
@@ -71,7 +71,7 @@ pub(crate) struct EvaluateRequest {
 #[schema(as = EvaluateAnswer)]
 #[allow(
     dead_code,
-    reason = "the contract; answers are written column by column"
+    reason = "describes a response that is written column by column"
 )]
 pub(crate) struct EvaluateAnswer {
     /// Number of rows.
@@ -85,7 +85,7 @@ pub(crate) struct EvaluateAnswer {
 #[derive(Debug, Serialize, ToSchema)]
 #[allow(
     dead_code,
-    reason = "the contract; answers are written column by column"
+    reason = "describes a response that is written column by column"
 )]
 pub(crate) struct EvaluateColumns {
     /// Longitudinal force on the lower body in N.
@@ -146,14 +146,14 @@ pub(crate) struct EvaluateColumns {
 }
 
 problems! {
-    /// What `POST /v1/evaluate` can fail with.
+    /// Problems of `POST /v1/evaluate`.
     EvaluateProblems: MalformedJson, UnreadableBody, BadQuery, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding,
     FaultyCase, FaultyTable, JobNotFound, EvaluationTooLong
 }
 
 query! {
     /// Parameters of an evaluation.
-    EvaluateQuery(() => ()) {
+    EvaluateQuery {
         /// Id of the job whose case is the template of a table; not with `multipart/form-data`, which contains the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
@@ -184,12 +184,12 @@ pub(crate) async fn evaluate(
     State(memory): State<Memory>,
     request: Request,
 ) -> Result<Response> {
-    let EvaluateQuery { template, format } = EvaluateQuery::read(request.uri(), &())?;
+    let EvaluateQuery { template, format } = EvaluateQuery::read(request.uri())?;
     let format = choose(request.headers(), format, FORMATS)?;
     let state = (&jobs, &memory, &options);
     let (request, table) = separate_table(state, template, JSON, request).await?;
     let packed = table.as_ref().is_some_and(|table| table.form.packed());
-    // First the text and its numbers, then these and the answer: about twice the text at any time.
+    // First the text and its numbers, then the numbers and the response, each about twice the text.
     let bytes = match packed {
         true => options.evaluate_max_bytes,
         false => declared_bytes(&request, &options).min(options.evaluate_max_bytes),
@@ -226,14 +226,13 @@ pub(crate) async fn evaluate(
         let (bytes, body) = match format {
             Format::Json => (answer.bytes(), json_body(answer)),
             Format::Npz => {
-                let archive =
-                    npz::write_rows(&answer).map_err(|error| ApiError::internal(&error))?;
+                let archive = npz::write_rows(&answer).map_err(ApiError::internal)?;
                 (archive.len(), Body::from(archive))
             }
             _ => {
                 let bytes = answer.bytes();
                 let body = table_body(format, answer);
-                (bytes, body.map_err(|error| ApiError::internal(&*error))?)
+                (bytes, body.map_err(ApiError::internal)?)
             }
         };
         if let Some(share) = &mut share {
@@ -246,7 +245,7 @@ pub(crate) async fn evaluate(
     Ok(hold_while_sent(response, share))
 }
 
-/// All rows of a table, within these limits of their number and, if it is packed, of their bytes.
+/// Reads all rows of a table, within limits of their number and, in a compressed format, of their bytes.
 fn read_rows(
     form: TableForm,
     text: &Bytes,
@@ -254,7 +253,7 @@ fn read_rows(
     pace: &mut Pace,
 ) -> Result<ReceivedRows> {
     let source = TableSource::Memory(text.clone());
-    let table = TableRows::new(form, source, bytes_max)?;
+    let mut table = TableRows::new(form, source, bytes_max)?;
     let columns = table.titles.len();
     let mut rows = varied_alone(table.named(&NamedColumns::default())?)?;
     for chunk in table {
@@ -270,7 +269,7 @@ fn read_rows(
     Ok(rows)
 }
 
-/// No rows of these columns, all of which stand for something in the case.
+/// Creates an empty table of these columns, which must all vary the case.
 fn varied_alone(columns: Vec<TitledColumn>) -> Result<ReceivedRows> {
     let carried = columns.iter().find(|column| column.pointer.is_none());
     match carried {
@@ -286,7 +285,7 @@ fn too_many(rows: usize, rows_max: usize) -> ApiError {
     CaseError(vec![Fault::new("/columns", detail)]).into()
 }
 
-/// The rows with the limits that they are answered under.
+/// The limits of an evaluation.
 struct Evaluation {
     jobs: Jobs,
     memory: Memory,
@@ -312,7 +311,7 @@ impl Evaluation {
             .jobs
             .first_row(&template, columns, &profiles, &names, |_| None);
         let (case, checked) = first?;
-        // Beyond this number of rows the solver is not used.
+        // The solver is not used for more rows.
         let solver_bytes = match rows <= SOLVED_ROWS_MAX {
             true => usize::try_from(checked.cost().own_bytes()).unwrap_or(usize::MAX),
             false => 0,
@@ -353,12 +352,12 @@ fn too_long(reason: &str) -> ApiError {
     ApiError::new(ProblemKind::EvaluationTooLong, detail)
 }
 
-/// Stops the solver when its time is over or the client leaves, and passes the turn on to other requests.
+/// Stops the solver when its time is over or the client disconnects, and lets other requests run.
 struct Watch<'a, 'b> {
     pace: &'a RefCell<&'b mut Pace>,
     time: Duration,
     begun: OnceCell<Instant>,
-    /// Why the pace ended the work.
+    /// The error with which the pace ended the work.
     ended: RefCell<Option<ApiError>>,
 }
 

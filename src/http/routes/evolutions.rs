@@ -1,4 +1,4 @@
-//! `/v1/evolutions`: profiles that wear under a traffic, as work of their own.
+//! `/v1/evolutions`: wear of profiles under a traffic.
 
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, Uri, header};
@@ -27,7 +27,7 @@ use railhead_tables::table::{RowTable, TableColumn};
 use railhead_tables::titles::{Place, place, question};
 use railhead_tables::write::RowWriter;
 
-/// The forms of the tables.
+/// Formats of the tables.
 const TABLES: &[Format] = &[Format::Csv, Format::Ndjson, Format::Arrow, Format::Parquet];
 
 /// Submits an evolution: profiles that wear under a traffic, step by step.
@@ -64,10 +64,11 @@ pub(crate) async fn submit(
         .await
 }
 
-/// Pointers to a column of the request: with its JSON pointer as the name, and with the client's title as the name.
+/// Pointers to a column of the request: with the JSON pointer of its member as the name, and with its title as the name.
 type Title = [String; 2];
 
-/// Names the columns of the traffic by JSON pointers, in the units of the case. What is no table is left to the check.
+/// Renames the columns of the traffic to JSON pointers, and converts them to the units of the case. The check of the request refuses other
+/// JSON than a table.
 fn name_columns(request: &mut Value) -> Result<Vec<Title>> {
     let columns = request.pointer_mut("/traffic/columns");
     let (mut titles, mut named, mut faults) = (Vec::new(), Map::new(), Vec::new());
@@ -100,7 +101,7 @@ fn name_columns(request: &mut Value) -> Result<Vec<Title>> {
     }
 }
 
-/// Replaces the names of columns in the pointers of an error by the client's titles.
+/// Replaces the names of columns in the pointers of an error by their titles.
 fn by_title(mut error: JobsError, titles: &[Title]) -> JobsError {
     if let JobsError::Case(CaseError(faults)) = &mut error {
         for fault in faults {
@@ -163,7 +164,7 @@ pub(crate) async fn result(
 
 query! {
     /// Parameters of the tables of an evolution.
-    EvolutionTableQuery(() => ()) {
+    EvolutionTableQuery {
         /// `records` (default), a row for each stored step, or `points`, a row for each point of both sections in each stored step
         #[param(pattern = "^(records|points)$", example = "records")]
         of: TableOf as String = word(&ROWS);
@@ -173,9 +174,9 @@ query! {
     }
 }
 
-/// What makes a table.
+/// Creates a table.
 type TableOf = fn(&EvolutionAnswer) -> RowTable;
-/// What the rows of a table are.
+/// The tables by name.
 const ROWS: [(&str, TableOf); 2] = [("records", records_table), ("points", points_table)];
 
 /// Returns the result of a succeeded evolution as a table.
@@ -199,12 +200,11 @@ pub(crate) async fn table(
     State(memory): State<Memory>,
     headers: HeaderMap,
 ) -> Result<Response> {
-    let query = EvolutionTableQuery::read(&uri, &())?;
+    let query = EvolutionTableQuery::read(&uri)?;
     let format = choose(&headers, query.format, TABLES)?;
     let made = read(jobs, &memory, id, move |evolution| {
         let table = query.of.unwrap_or(records_table)(evolution);
-        let text =
-            RowWriter::whole(format.table(), table).map_err(|error| ApiError::internal(&error))?;
+        let text = RowWriter::whole(format.table(), table).map_err(ApiError::internal)?;
         Ok(format.answer(&format!("evolution-{id}"), text))
     });
     made.await
@@ -216,7 +216,7 @@ const BODIES: [(&str, BodyOf); 2] = [("rail", |r| &r.rail), ("wheel", |r| &r.whe
 
 query! {
     /// Parameters of a section of an evolution.
-    SectionQuery(() => ()) {
+    SectionQuery {
         /// Index of the record, from 0; default: the last
         #[param(minimum = 0, maximum = 100000, example = 3)]
         record: u32 as u32 = count(0, 100_000);
@@ -226,7 +226,7 @@ query! {
     }
 }
 
-/// A form of a file with a section: its extensions for a rail and a wheel, and its text for points `[y, z]` in mm.
+/// Format of a file with a section: its extensions for a rail and a wheel, and the function that writes points `[y, z]` in mm.
 type SectionForm = ([&'static str; 2], fn(&[[f64; 2]], bool) -> String);
 const FORMS: [(&str, SectionForm); 3] = [
     (
@@ -256,7 +256,7 @@ pub(crate) async fn section(
     uri: Uri,
     State(memory): State<Memory>,
 ) -> Result<Response> {
-    let query = SectionQuery::read(&uri, &())?;
+    let query = SectionQuery::read(&uri)?;
     let id = work_id(Kind::Evolution, &id)?;
     let Some(k) = BODIES.iter().position(|(name, _)| *name == body) else {
         let detail = format!("`{body}` is not a body; allowed: rail, wheel");
@@ -280,7 +280,7 @@ pub(crate) async fn section(
     made.await
 }
 
-/// Answers with something made of an evolution, off the threads that answer requests.
+/// Answers with the response that `make` creates from an evolution on a blocking thread.
 async fn read(
     jobs: Jobs,
     memory: &Memory,
@@ -288,13 +288,13 @@ async fn read(
     make: impl FnOnce(&EvolutionAnswer) -> Result<Response> + Send + 'static,
 ) -> Result<Response> {
     let jobs = jobs.of_kind(Kind::Evolution);
-    // Once as text, and about as much as numbers.
+    // The text, and about as much for the parsed evolution.
     let answer = jobs.open_answer(id).await?;
     let share = memory.ready_answer(jobs.tenant(), 2 * answer.bytes)?;
     let text = answer.text().await?;
     let made = blocking(move || {
         let read = serde_json::from_slice(&text);
-        make(&read.map_err(|error| ApiError::internal(&error))?)
+        make(&read.map_err(ApiError::internal)?)
     });
     Ok(hold_while_sent(made.await??, share))
 }
@@ -365,13 +365,13 @@ fn points_table(evolution: &EvolutionAnswer) -> RowTable {
     }
 }
 
-/// A line for each point; y is positive to the field side times `sense`.
+/// Returns a line per point; y is multiplied by `sense`.
 fn lines(points: &[[f64; 2]], sense: f64, between: char) -> String {
     let line = |[y, z]: &[f64; 2]| format!("{:.6}{between}{z:.6}\n", 0.0 + sense * y);
     points.iter().map(line).collect()
 }
 
-/// MiniProf's X points to the track centre.
+/// Writes a MiniProf file, whose X points to the track centre.
 fn miniprof(points: &[[f64; 2]], _: bool) -> String {
     let (count, lines) = (points.len(), lines(points, -1.0, '\t'));
     format!("ProgramName=railhead\nXYPoints={count}\nColumnDef=X,Y\n\n{lines}")

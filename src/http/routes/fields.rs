@@ -1,4 +1,5 @@
-//! `/v1/jobs/{id}/tractions`, `/pressure`, `/slip` and `/temperature`: values per cell, or on a regular grid.
+//! `/v1/jobs/{id}/tractions`, `/pressure`, `/slip`, `/temperature` and `/zones`: values per cell, or on a regular grid.
+
 use axum::body::Body;
 use axum::http::{HeaderValue, header};
 use axum::response::Response;
@@ -9,13 +10,15 @@ use uuid::Uuid;
 
 use crate::dto::{Cells, GriddedField, Outlines};
 use crate::extract::accept::{choose, one_of};
-use crate::extract::query::{Parameters, Reader, index, query, reader, whole, word};
+use crate::extract::query::{Parameters, Reader, query, reader, whole, word};
 use crate::limits::{Rendering, hold_while_sent};
 use crate::problem::{ApiError, Result};
 use crate::render::format::Format;
 use crate::render::pieces::{csv_body, json_body};
 use crate::render::table::{File, cell_table};
-use crate::routes::parts::{FieldProblems, PARTS, PartRequest, has, motion_of, not_asked, stored};
+use crate::routes::parts::{
+    FieldProblems, PARTS, PartRequest, PlaceQuery, has, motion_of, not_asked, stored,
+};
 use crate::routes::plots::{PlotOptions, View, WIDTH_DEFAULT, picture};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointFields};
@@ -24,13 +27,13 @@ use railhead_tables::cells::CellTable;
 use railhead_tables::csv::Precision;
 use railhead_tables::{npz, vtk};
 
-/// Most samples along one axis of a regular grid.
+/// Largest number of samples along one axis of a regular grid.
 const GRID_AXIS_MAX: u32 = 1000;
 
-/// What a sample takes until the client has taken it: two components.
+/// Memory of a sample until the client has received it, in bytes: two components.
 const SAMPLE_BYTES: usize = 2 * size_of::<f64>();
 
-/// The forms that a field comes in.
+/// The formats of a field.
 const FORMATS: &[Format] = &[
     Format::Json,
     Format::Csv,
@@ -61,66 +64,73 @@ pub(crate) enum Field {
 }
 
 query! {
-    /// The parameters of a field.
-    FieldQuery(samples_max => usize) {
-        /// Index of the motion, from 0; default 0
-        point: usize as u32 = index();
-        /// Index of the patch, from 0; default 0
-        patch: usize as u32 = index();
+    /// The parameters of values per cell.
+    ValuesQuery {
         /// `NXxNY`: resample on a regular grid over the bounding box of the patch; 2 to 1000 samples along each axis, by default at most
         /// 250 000 in all
         #[param(example = "60x40")]
-        grid: (usize, usize) as String = grid(*samples_max);
+        grid: (usize, usize) as String = grid();
         /// `double` (default) or `single`: 32-bit numbers, which are enough for a picture. VTK is always `double`
         #[param(pattern = "^(single|double)$", example = "single")]
-        precision: Precision as String = precision();
+        precision: Precision as String = word(&[("single", Precision::Single), ("double", Precision::Double)]);
+    }
+}
+
+query! {
+    /// The format of a field.
+    FieldQuery {
         /// `json`, `csv`, `npz`, `vtk`, or `svg` and `png` for a picture; overrides `Accept`
         #[param(example = "csv")]
         format: Format as String = one_of(FORMATS);
     }
 }
 
-/// Which patch and motion are wanted, on which grid and in which form.
+/// The requested patch and motion, grid and format.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Selection {
-    /// Number of the patch.
-    pub patch: usize,
-    /// Number of the motion.
-    pub point: usize,
-    /// Samples along x and y, if the field is to be resampled.
-    pub grid: Option<(usize, usize)>,
-    /// The form of the answer.
-    pub format: Format,
-    /// How exactly its numbers are written.
-    pub precision: Precision,
+struct Selection {
+    /// Index of the patch.
+    patch: usize,
+    /// Index of the motion.
+    point: usize,
+    /// Samples along x and y, if the field is resampled.
+    grid: Option<(usize, usize)>,
+    /// The format of the response.
+    format: Format,
+    /// Precision of its numbers.
+    precision: Precision,
 }
 
 impl Selection {
-    /// Reads `point`, `patch` (0 when left out), `grid`, and `format` or `Accept`.
-    ///
     /// # Errors
-    /// `bad-query` with every fault, or `not-acceptable`.
-    pub(crate) fn read(request: &PartRequest) -> Result<Self> {
+    /// `bad-query`: the grid has more samples than allowed.
+    fn new(
+        request: &PartRequest,
+        (place, values): (PlaceQuery, ValuesQuery),
+        format: Format,
+    ) -> Result<Selection> {
+        let [patch, point] = place.place();
         let samples_max = request.shared.options.grid_max_samples;
-        let query = FieldQuery::read(&request.uri, &samples_max)?;
+        if let Some((nx, ny)) = values.grid
+            && nx * ny > samples_max
+        {
+            let detail =
+                format!("`grid` is `{nx}x{ny}`; allowed: at most {samples_max} samples in all");
+            return Err(ApiError::bad_parameter("grid", detail));
+        }
         Ok(Selection {
-            patch: query.patch.unwrap_or(0),
-            point: query.point.unwrap_or(0),
-            grid: query.grid,
-            format: choose(&request.headers, query.format, FORMATS)?,
-            precision: query.precision.unwrap_or_default(),
+            patch,
+            point,
+            grid: values.grid,
+            format,
+            precision: values.precision.unwrap_or_default(),
         })
     }
 
-    /// The picture of an output, if the format is that of a picture.
+    /// Returns the picture of an output; `None` if the format is not that of a picture.
     ///
     /// # Errors
     /// `bad-query` if there is a `grid`, else as [`picture`].
-    pub(crate) async fn picture(
-        &self,
-        request: &PartRequest,
-        shown: Output,
-    ) -> Result<Option<Response>> {
+    async fn picture(&self, request: &PartRequest, shown: Output) -> Result<Option<Response>> {
         if !matches!(self.format, Format::Svg | Format::Png) {
             return Ok(None);
         }
@@ -130,7 +140,7 @@ impl Selection {
                 "a picture shows the cells themselves; leave `grid` out",
             ));
         }
-        let wish = PlotOptions {
+        let options = PlotOptions {
             view: View::Patch,
             shown,
             patch: self.patch,
@@ -138,36 +148,26 @@ impl Selection {
             width: WIDTH_DEFAULT,
             range: None,
         };
-        let mut response = picture(request, wish, self.format).await?;
+        let mut response = picture(request, options, self.format).await?;
         let vary = HeaderValue::from_static("Accept");
         response.headers_mut().insert(header::VARY, vary);
         Ok(Some(response))
     }
 
-    /// What the answer takes in memory before it is taken by the client, in bytes.
-    #[must_use]
-    pub(crate) fn bytes(&self) -> usize {
+    /// Memory of the response until the client has received it, in bytes.
+    fn bytes(&self) -> usize {
         let (nx, ny) = self.grid.unwrap_or_default();
         nx * ny * SAMPLE_BYTES
     }
 }
 
-/// How exactly numbers are written.
-pub(crate) fn precision() -> Reader<Precision> {
-    word(&[("single", Precision::Single), ("double", Precision::Double)])
-}
-
-/// A regular grid of at most so many samples.
-pub(crate) fn grid(samples_max: usize) -> Reader<(usize, usize)> {
-    let allowed = format!(
-        "`NXxNY` such as `60x40`, each from 2 to 1000, and at most {samples_max} samples in all"
-    );
-    reader(allowed, move |text| {
+/// Returns the reader of the numbers of samples of a regular grid.
+fn grid() -> Reader<(usize, usize)> {
+    let allowed = format!("`NXxNY` such as `60x40`, each from 2 to {GRID_AXIS_MAX}");
+    reader(allowed, |text| {
         let (nx, ny) = text.split_once(['x', 'X'])?;
-        let axis =
-            |text| whole(text, 2, GRID_AXIS_MAX).and_then(|number| usize::try_from(number).ok());
-        let (nx, ny) = (axis(nx)?, axis(ny)?);
-        (nx * ny <= samples_max).then_some((nx, ny))
+        let axis = |text| whole(text, 2, GRID_AXIS_MAX).map(|number| number as usize);
+        Some((axis(nx)?, axis(ny)?))
     })
 }
 
@@ -181,7 +181,7 @@ macro_rules! field_routes {
             path = $path,
             tag = "results",
             operation_id = $operation,
-            params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldQuery),
+            params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlaceQuery, ValuesQuery, FieldQuery),
             responses((status = 200, description = $described, content(
                 ($schema = "application/json"),
                 (String = "text/csv"),
@@ -211,7 +211,10 @@ field_routes! {
 }
 
 async fn answer(request: &PartRequest, output: Output) -> Result<Response> {
-    let selection = Selection::read(request)?;
+    let (values, FieldQuery { format }) =
+        <((PlaceQuery, ValuesQuery), FieldQuery)>::read(&request.uri)?;
+    let format = choose(&request.headers, format, FORMATS)?;
+    let selection = Selection::new(request, values, format)?;
     let answer = async {
         if let Some(picture) = selection.picture(request, output).await? {
             return Ok(picture);
@@ -227,7 +230,7 @@ async fn answer(request: &PartRequest, output: Output) -> Result<Response> {
     request.unless_known(selection.format, answer).await
 }
 
-/// The values of these outputs, or of all that there are if none is named.
+/// Answers with the values of these outputs; with all that are stored if none is named.
 async fn write_parts(
     request: &PartRequest,
     rendering: Rendering,
@@ -250,56 +253,46 @@ async fn write_parts(
         values,
         members,
     };
-    field.write(rendering, selection, name).await
+    let written = rendering.run(move || field.write(selection, name), Written::bytes);
+    let (written, share) = written.await?;
+    let body = match written {
+        Written::Json(table, members) => json_body(table, &members),
+        Written::Csv(table) => csv_body(table),
+        Written::File(bytes) => Body::from(bytes),
+    };
+    let name = format!("{name}-{}-{}", selection.patch, selection.point);
+    Ok(hold_while_sent(selection.format.answer(&name, body), share))
 }
 
-/// The values of a field, and what its JSON has besides.
-pub(crate) struct FieldValues {
+/// The values of a field, and further members of its JSON.
+struct FieldValues {
     /// The outputs that are written.
-    pub outputs: Vec<Output>,
-    pub cells: PatchCells,
-    pub values: PointFields,
-    /// Members of the JSON before `outlines`, each with a comma before it.
-    pub members: String,
+    outputs: Vec<Output>,
+    cells: PatchCells,
+    values: PointFields,
+    /// Members of the JSON before `outlines`, each preceded by a comma.
+    members: String,
 }
 
+/// A field in the requested format. JSON and CSV are written from the table while the client receives them.
 enum Written {
-    /// The text is made from the table when the client takes it.
     Json(CellTable, String),
     Csv(CellTable),
     File(Vec<u8>),
 }
 
-impl FieldValues {
-    /// Writes the field in the format of the selection when its turn has come. Its memory is held until it has been sent.
-    ///
-    /// # Errors
-    /// `internal` if the field cannot be written.
-    pub(crate) async fn write(
-        self,
-        rendering: Rendering,
-        selection: Selection,
-        name: &'static str,
-    ) -> Result<Response> {
-        let size = |written: &Written| match written {
+impl Written {
+    /// Size in memory in bytes.
+    fn bytes(&self) -> usize {
+        match self {
             Written::Json(table, _) | Written::Csv(table) => table.bytes(),
             Written::File(bytes) => bytes.len(),
-        };
-        let make = move || self.written(selection, name);
-        let (written, share) = rendering.run(make, size).await?;
-        let body = match written {
-            Written::Json(table, members) => json_body(table, &members),
-            Written::Csv(table) => csv_body(table),
-            Written::File(bytes) => Body::from(bytes),
-        };
-        let (patch, point) = (selection.patch, selection.point);
-        let response = selection
-            .format
-            .answer(&format!("{name}-{patch}-{point}"), body);
-        Ok(hold_while_sent(response, share))
+        }
     }
+}
 
-    fn written(self, selection: Selection, name: &str) -> Result<Written> {
+impl FieldValues {
+    fn write(self, selection: Selection, name: &str) -> Result<Written> {
         let (patch, point) = (selection.patch, selection.point);
         let with_zones = self.outputs.contains(&Output::Zones);
         let outlines = Outlines::of(&self.cells, &self.values, with_zones);
@@ -308,23 +301,18 @@ impl FieldValues {
         Ok(match selection.format {
             Format::Csv => Written::Csv(table),
             Format::Npz => {
-                let zones = [("stick", &outlines.stick), ("slip", &outlines.slip)];
-                let zones = zones.into_iter();
-                let zones = zones.filter_map(|(name, zone)| Some((name, zone.as_ref()?)));
-                let named: Vec<_> = [("patch", &outlines.patch)]
-                    .into_iter()
-                    .chain(zones)
-                    .collect();
+                let mut named = vec![("patch", &outlines.patch)];
+                named.extend(outlines.stick.iter().map(|zone| ("stick", zone)));
+                named.extend(outlines.slip.iter().map(|zone| ("slip", zone)));
                 let file = npz::write(&table, &named);
-                Written::File(file.map_err(|error| ApiError::internal(&error))?)
+                Written::File(file.map_err(ApiError::internal)?)
             }
             Format::Vtk => {
                 let title = format!("{name}, patch {patch}, motion {point}; mm, N, MPa");
                 Written::File(vtk::write(&table, &title))
             }
             _ => {
-                let outlines = serde_json::to_string(&outlines);
-                let outlines = outlines.map_err(|error| ApiError::internal(&error))?;
+                let outlines = serde_json::to_string(&outlines).map_err(ApiError::internal)?;
                 let members = self.members;
                 let members =
                     format!("\"patch\":{patch},\"point\":{point}{members},\"outlines\":{outlines}");
@@ -334,36 +322,25 @@ impl FieldValues {
     }
 }
 
-/// The forms that the fields come in.
+/// The formats of all fields together.
 const PART_FORMATS: &[Format] = &[Format::Json, Format::Csv, Format::Npz, Format::Vtk];
 
 query! {
     /// The parameters of all fields of a motion.
-    FieldsQuery(samples_max => usize) {
-        /// Index of the motion, from 0; default 0
-        point: usize as u32 = index();
-        /// Index of the patch, from 0; default 0
-        patch: usize as u32 = index();
+    FieldsQuery {
         /// Comma-separated parts, each among the `outputs` of the case; default: all of them
         #[param(pattern = "^(pressure|tractions|slip|temperature|zones)(,(pressure|tractions|slip|temperature|zones))*$", example = "pressure,tractions")]
         parts: Vec<Output> as String = parts();
-        /// `NXxNY`: resample on a regular grid over the bounding box of the patch; 2 to 1000 samples along each axis, by default at most
-        /// 250 000 in all
-        #[param(example = "60x40")]
-        grid: (usize, usize) as String = grid(*samples_max);
-        /// `double` (default) or `single`: 32-bit numbers, which are enough for a picture. VTK is always `double`
-        #[param(pattern = "^(single|double)$", example = "single")]
-        precision: Precision as String = precision();
         /// `json`, `csv`, `npz` or `vtk`; overrides `Accept`
         #[param(pattern = "^(json|csv|npz|vtk)$", example = "npz")]
         format: Format as String = one_of(PART_FORMATS);
     }
 }
 
-/// Names of parts with commas between.
+/// Returns the reader of a comma-separated list of parts.
 fn parts() -> Reader<Vec<Output>> {
     let names = PARTS.map(|part| format!("`{}`", part.name()));
-    let allowed = format!("{} with commas between, each once", names.join(", "));
+    let allowed = format!("a comma-separated list of {}, each once", names.join(", "));
     reader(allowed, |text| {
         let part = |name: &str| PARTS.into_iter().find(|part| part.name() == name);
         let mut parts = Vec::new();
@@ -387,7 +364,7 @@ fn parts() -> Reader<Vec<Output>> {
     path = "/v1/jobs/{id}/fields",
     tag = "results",
     operation_id = "get_fields",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid"), FieldsQuery),
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlaceQuery, ValuesQuery, FieldsQuery),
     responses((status = 200, description = "The values per cell, or on a regular grid", content(
         (Field = "application/json"),
         (String = "text/csv"),
@@ -396,20 +373,15 @@ fn parts() -> Reader<Vec<Output>> {
     )), FieldProblems)
 )]
 pub(crate) async fn fields(request: PartRequest) -> Result<Response> {
-    let query = FieldsQuery::read(&request.uri, &request.shared.options.grid_max_samples)?;
-    let selection = Selection {
-        patch: query.patch.unwrap_or(0),
-        point: query.point.unwrap_or(0),
-        grid: query.grid,
-        format: choose(&request.headers, query.format, PART_FORMATS)?,
-        precision: query.precision.unwrap_or_default(),
-    };
+    let (values, query) = <((PlaceQuery, ValuesQuery), FieldsQuery)>::read(&request.uri)?;
+    let format = choose(&request.headers, query.format, PART_FORMATS)?;
+    let selection = Selection::new(&request, values, format)?;
     let answer = async {
         let most = query.parts.as_ref().map_or(PARTS.len(), Vec::len);
         let rendering = request.rendering(most * selection.bytes()).await?;
         let wanted = query.parts.unwrap_or_default();
-        let told = (String::new(), "fields");
-        write_parts(&request, rendering, selection, wanted, told).await
+        let (members, name) = (String::new(), "fields");
+        write_parts(&request, rendering, selection, wanted, (members, name)).await
     };
     request.unless_known(selection.format, answer).await
 }
@@ -446,7 +418,10 @@ pub(crate) struct ZoneCells {
     cells: Cells,
 }
 
-/// The areas and numbers of cells of the zones as members of JSON; `None` if the case did not ask for zones.
+/// Returns areas and numbers of cells of the zones as members of JSON, without a grid.
+///
+/// # Errors
+/// `output-not-asked` if the case does not request zones.
 async fn sizes_of_zones(jobs: &Jobs, id: Uuid, selection: Selection) -> Result<String> {
     let solution = jobs.solution(id).await?;
     let (_, point) = motion_of(&solution, [selection.patch, selection.point])?;

@@ -1,4 +1,4 @@
-//! `/v1/jobs`: submission, and the case as it was submitted.
+//! `/v1/jobs`: submission of a case, and the submitted case.
 
 use axum::extract::State;
 use axum::http::header;
@@ -12,7 +12,7 @@ use crate::routes::submission::{JobAccepted, Submission, SubmitParameters};
 use railhead_contact::case::words::solver::Case;
 
 problems! {
-    /// What `POST /v1/jobs` can fail with.
+    /// Problems of `POST /v1/jobs`.
     SubmitProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase,
     IdempotencyConflict, QuotaExceeded, StoredQuotaExceeded, QueueFull, Draining, StorageFull, StorageUnwritable, StorageUnreachable
 }
@@ -49,7 +49,7 @@ pub(crate) async fn submit(
 }
 
 problems! {
-    /// What asking for one job can fail with.
+    /// Problems of one job.
     GetProblems: BadQuery, JobNotFound
 }
 

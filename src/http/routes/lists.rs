@@ -1,4 +1,4 @@
-//! Lists, newest first, page by page: of jobs, batches, runs and evolutions, and what other lists share with them.
+//! Lists of jobs, batches, runs and evolutions, newest first, page by page.
 
 use std::sync::LazyLock;
 
@@ -27,10 +27,10 @@ use crate::state::AppState;
 use railhead_jobs::model::{Kind, State as JobState};
 use railhead_jobs::{Filter, Membership, PAGE_MAX, Total};
 
-/// Entries of a page for which no number is given.
+/// Default number of entries of a page.
 pub(crate) const LIMIT_DEFAULT: u32 = 50;
 
-/// Members of a job that `fields` can name: all that a list has.
+/// Members of a job in a list, which `fields` can name.
 static MEMBERS: LazyLock<Vec<String>> = LazyLock::new(|| match JobAnswer::schema() {
     RefOr::T(Schema::Object(job)) => {
         let members = job.properties.into_iter().map(|(name, _)| name);
@@ -43,7 +43,7 @@ static MEMBERS: LazyLock<Vec<String>> = LazyLock::new(|| match JobAnswer::schema
 
 query! {
     /// The page of a list.
-    PageQuery(() => ()) {
+    PageQuery {
         /// Entries per page; default 50. Batches and runs: at most 100
         #[param(minimum = 1, maximum = 1000)]
         limit: u32 as u32 = count(1, PAGE_MAX);
@@ -55,7 +55,7 @@ query! {
 
 query! {
     /// Filters of every kind of work.
-    FilterQuery(() => ()) {
+    FilterQuery {
         /// Only entries with this label, written `key:value`; if repeated, entries with all of these labels
         #[param(example = json!(["line:A12"]))]
         label: Vec<(String, String)> as Vec<String> = repeated(label());
@@ -72,8 +72,8 @@ query! {
 }
 
 query! {
-    /// Filters of jobs and evolutions, and what is shown of them.
-    StateQuery(() => ()) {
+    /// Filters of jobs and evolutions, and their members in the list.
+    StateQuery {
         /// Only entries in this state; if repeated, entries in any of these states
         state: Vec<JobState> as Vec<JobState> = repeated(reader(JobState::ALL.map(JobState::name).join(", "), JobState::from_name));
         /// Only entries that changed at or after this time (RFC 3339); a change of progress alone does not count
@@ -87,14 +87,14 @@ query! {
 
 query! {
     /// The filter by batch.
-    MemberQuery(() => ()) {
+    MemberQuery {
         /// Only jobs of this batch; `none` for jobs that were submitted alone
         #[param(pattern = "^(none|[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12})$", example = "none")]
         batch: Membership as String = member();
     }
 }
 
-/// The id of a batch, or `none`.
+/// Returns the reader of the id of a batch, or `none`.
 fn member() -> Reader<Membership> {
     reader("the id of a batch, or `none`", |text| match text {
         "none" => Some(Membership::Alone),
@@ -108,15 +108,13 @@ fn fields() -> Reader<Vec<String>> {
         |text| {
             let names = text.split(',').map(str::to_owned);
             let names: Vec<String> = names.collect();
-            names
-                .iter()
-                .all(|name| MEMBERS.contains(name))
-                .then_some(names)
+            let known = names.iter().all(|name| MEMBERS.contains(name));
+            known.then_some(names)
         },
     )
 }
 
-/// `GET` of the list of a kind.
+/// Returns `GET` of the list of a kind.
 pub(crate) fn list(kind: Kind) -> OpenApiRouter<AppState> {
     let handler = move |Caller(jobs): Caller, uri: Uri| async move {
         list_work(kind, Caller(jobs), &uri).await
@@ -157,7 +155,7 @@ fn has_states(kind: Kind) -> bool {
     matches!(kind, Kind::Case | Kind::Evolution)
 }
 
-/// The parameters of a list: their names, and what the contract says of them.
+/// Returns the names of the parameters of a list, and their descriptions in the contract.
 fn groups(kind: Kind) -> (Vec<&'static str>, Vec<utoipa::openapi::path::Parameter>) {
     fn add<P: Parameters + IntoParams>(
         (names, described): &mut (Vec<&'static str>, Vec<utoipa::openapi::path::Parameter>),
@@ -179,10 +177,10 @@ fn groups(kind: Kind) -> (Vec<&'static str>, Vec<utoipa::openapi::path::Paramete
 
 async fn list_work(kind: Kind, Caller(jobs): Caller, uri: &Uri) -> Result<Response> {
     let mut query = Query::read(uri, &groups(kind).0);
-    let PageQuery { limit, cursor } = PageQuery::take(&mut query, &());
-    let common = FilterQuery::take(&mut query, &());
-    let own = StateQuery::take(&mut query, &());
-    let MemberQuery { batch } = MemberQuery::take(&mut query, &());
+    let PageQuery { limit, cursor } = PageQuery::take(&mut query);
+    let common = FilterQuery::take(&mut query);
+    let own = StateQuery::take(&mut query);
+    let MemberQuery { batch } = MemberQuery::take(&mut query);
     query.finish()?;
     let mut states = own.state.unwrap_or_default();
     states.sort_unstable();
@@ -214,14 +212,14 @@ async fn list_work(kind: Kind, Caller(jobs): Caller, uri: &Uri) -> Result<Respon
     };
     let next = page.next_cursor.as_deref();
     let body = json!({
-        kind.nouns(): entries.map_err(|error| ApiError::internal(&error))?,
+        kind.nouns(): entries.map_err(ApiError::internal)?,
         "next_cursor": next,
         count: number,
     });
     Ok(answer(uri, next, body))
 }
 
-/// A page as an answer, with a link to the next one (RFC 8288): the same address with another cursor.
+/// Returns a page as a response, with a link to the next page (RFC 8288): the same URI with another cursor.
 pub(crate) fn answer(uri: &Uri, cursor: Option<&str>, page: impl Serialize) -> Response {
     let mut response = Json(page).into_response();
     let Some(cursor) = cursor else {
@@ -279,7 +277,7 @@ fn page_schema(kind: Kind) -> RefOr<Schema> {
         .into()
 }
 
-/// A job in a list: any of its members may have been left out. The job itself describes them.
+/// Returns the schema of a job in a list, whose members are all optional. The schema of a job describes them.
 fn listed_job() -> RefOr<Schema> {
     let mut schema = JobAnswer::schema();
     if let RefOr::T(Schema::Object(job)) = &mut schema {

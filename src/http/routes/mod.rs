@@ -1,4 +1,4 @@
-//! The resources of the API, one file each. Handlers read a request, call `jobs` and answer.
+//! Handlers of the resources of the API, one file per resource.
 
 pub(super) mod batches;
 pub(super) mod cases;

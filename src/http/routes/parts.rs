@@ -1,4 +1,4 @@
-//! What requests for parts of a result have in common.
+//! Requests for parts of a result: job, patch and motion, and the stored values.
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, Uri};
@@ -6,7 +6,7 @@ use axum::response::Response;
 use uuid::Uuid;
 
 use crate::extract::caller::{Caller, JobId};
-use crate::extract::query::require_index;
+use crate::extract::query::{index, query, require_index};
 use crate::layers::etag::{tag_of, tagged};
 use crate::limits::Rendering;
 use crate::problem::{ApiError, ProblemKind, Result, problems};
@@ -25,11 +25,11 @@ pub(crate) struct PartRequest {
     pub jobs: Jobs,
     /// The job in the path.
     pub id: Uuid,
-    /// What every handler can reach.
+    /// The state of the service.
     pub shared: AppState,
-    /// The address that was asked.
+    /// The requested URI.
     pub uri: Uri,
-    /// The head of the request.
+    /// The headers of the request.
     pub headers: HeaderMap,
 }
 
@@ -50,10 +50,10 @@ impl FromRequestParts<AppState> for PartRequest {
 }
 
 impl PartRequest {
-    /// The answer with its tag; nothing is loaded or computed for it if the client has it already.
+    /// Returns the response with its entity tag. If the client has stored it already, `answer` is not polled.
     ///
     /// # Errors
-    /// There is no such job, or those of `answer`.
+    /// The job does not exist, or `answer` fails.
     pub(crate) async fn unless_known(
         &self,
         format: Format,
@@ -67,10 +67,10 @@ impl PartRequest {
         }
     }
 
-    /// A turn and memory for an answer of so many bytes.
+    /// Waits for a turn and memory for a response of this many bytes.
     ///
     /// # Errors
-    /// As [`Memory::rendering`](crate::limits::Memory::rendering).
+    /// See [`Memory::rendering`](crate::limits::Memory::rendering).
     pub(crate) async fn rendering(&self, bytes: usize) -> Result<Rendering> {
         self.shared
             .memory
@@ -80,11 +80,28 @@ impl PartRequest {
 }
 
 problems! {
-    /// What a field can fail with.
+    /// Problems of a field.
     FieldProblems: BadQuery, JobNotFound, OutputNotAsked, ResultNotReady, JobFailed, JobCancelled
 }
 
-/// The parts that have a value per cell.
+query! {
+    /// The parameters that select one motion of one patch.
+    PlaceQuery {
+        /// Index of the motion, from 0; default 0
+        point: usize as u32 = index();
+        /// Index of the patch, from 0; default 0
+        patch: usize as u32 = index();
+    }
+}
+
+impl PlaceQuery {
+    /// Indices of the patch and the motion.
+    pub(crate) fn place(&self) -> [usize; 2] {
+        [self.patch.unwrap_or(0), self.point.unwrap_or(0)]
+    }
+}
+
+/// The outputs that have a value per cell.
 pub(crate) const PARTS: [Output; 5] = [
     Output::Pressure,
     Output::Tractions,
@@ -93,10 +110,10 @@ pub(crate) const PARTS: [Output; 5] = [
     Output::Zones,
 ];
 
-/// The cells of a patch and the values of one motion, in which these outputs are present.
+/// Returns the cells of a patch and the values of one motion, which have these outputs.
 ///
 /// # Errors
-/// `output-not-asked`, or there is no such patch or motion, or no result.
+/// `output-not-asked`, or the patch, the motion or the result does not exist.
 pub(crate) async fn stored(
     jobs: &Jobs,
     id: Uuid,
@@ -104,7 +121,7 @@ pub(crate) async fn stored(
     wanted: &[Output],
 ) -> Result<(PatchCells, PointFields)> {
     let mut fields = match jobs.point_fields(id, patch, point).await {
-        // Nothing is stored per cell when the case asked for no field at all.
+        // Without any requested field nothing is stored per cell.
         Err(JobsError::NoSuchPatch(0)) => {
             let Some(output) = wanted.first() else {
                 let names = PARTS.map(|part| format!("`{}`", part.name())).join(", ");
@@ -117,7 +134,7 @@ pub(crate) async fn stored(
         }
         fields => fields?,
     };
-    // One motion was asked for, so there is one entry, and one mesh.
+    // There is one entry and one mesh, because one motion was requested.
     let values = fields.points.pop().unwrap_or_default();
     let cells = fields.meshes.pop().unwrap_or_default();
     match wanted.iter().find(|output| !has(&cells, &values, **output)) {
@@ -126,10 +143,10 @@ pub(crate) async fn stored(
     }
 }
 
-/// One motion of a patch of a solution.
+/// Returns a patch of a solution and one of its motions.
 ///
 /// # Errors
-/// `bad-query`: there is no such patch or motion.
+/// `bad-query`: the patch or the motion does not exist.
 pub(crate) fn motion_of(
     solution: &Solution,
     [patch, point]: [usize; 2],
@@ -140,7 +157,7 @@ pub(crate) fn motion_of(
     Ok((patch, &patch.points[point]))
 }
 
-/// Is the output among what was stored?
+/// Whether the output is stored.
 #[must_use]
 pub(crate) fn has(cells: &PatchCells, values: &PointFields, output: Output) -> bool {
     match output {
@@ -154,10 +171,10 @@ pub(crate) fn has(cells: &PatchCells, values: &PointFields, output: Output) -> b
     }
 }
 
-/// The failure of a client that fetches what its case did not ask for.
+/// Fails because the case did not request an output.
 ///
 /// # Errors
-/// Always: `output-not-asked`, or what went wrong while finding out.
+/// Always: `output-not-asked`, or the error of reading the requested outputs.
 pub(crate) async fn not_asked<T>(jobs: &Jobs, id: Uuid, output: Output) -> Result<T> {
     let asked: Vec<String> = jobs
         .open_answer(id)

@@ -1,4 +1,5 @@
 //! `/v1/jobs/{id}/plot.svg` and `plot.png`: pictures of a result.
+
 use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 use railhead_macros::Names;
@@ -7,7 +8,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::extract::query::{Parameters, count, index, query, reader, word};
+use crate::extract::query::{Parameters, count, query, reader, word};
 use crate::limits::hold_while_sent;
 use crate::problem::{ApiError, Result};
 use crate::render::format::Format;
@@ -19,7 +20,7 @@ use crate::render::picture::scene::Scene;
 use crate::render::picture::section::{self, Sections};
 use crate::render::picture::svg::Svg;
 use crate::render::table::File;
-use crate::routes::parts::{FieldProblems, PartRequest, motion_of, stored};
+use crate::routes::parts::{FieldProblems, PartRequest, PlaceQuery, motion_of, stored};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
 use railhead_jobs::Jobs;
@@ -39,39 +40,39 @@ pub(crate) enum View {
     Profiles,
 }
 
-/// What a picture shows, and how wide it is.
+/// The options of a picture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlotOptions {
-    /// What is drawn.
+    /// The view.
     pub view: View,
     /// The field.
     pub shown: Output,
-    /// Number of the patch.
+    /// Index of the patch.
     pub patch: usize,
-    /// Number of the motion.
+    /// Index of the motion.
     pub point: usize,
     /// Width in pixels.
     pub width: u32,
-    /// Both ends of the scale, if they are given.
+    /// Requested ends of the scale.
     pub range: Option<[f64; 2]>,
 }
 
-/// Which patch and motion this is, where there are several.
-pub(crate) fn counted(wish: PlotOptions, patches: usize, points: usize) -> String {
+/// Returns the indices of patch and motion, if there are several.
+fn counted(options: PlotOptions, patches: usize, points: usize) -> String {
     let mut text = String::new();
     if patches > 1 {
-        text += &format!(", patch {} of 0 to {}", wish.patch, patches - 1);
+        text += &format!(", patch {} of 0 to {}", options.patch, patches - 1);
     }
     if points > 1 {
-        text += &format!(", point {} of 0 to {}", wish.point, points - 1);
+        text += &format!(", point {} of 0 to {}", options.point, points - 1);
     }
     text
 }
 
-/// Motion and forces in two lines.
-pub(crate) fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<String> {
+/// Returns motion and forces in two lines.
+fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<String> {
     let motion = point.motion;
-    // What rounding leaves of a force that is nothing.
+    // A force that is zero up to rounding is shown as zero.
     let force = |value: f64| {
         let lost = value.abs() < 1e-9 * normal;
         short(if lost { 0.0 } else { value })
@@ -93,8 +94,8 @@ pub(crate) fn remarks(point: &PointSolution, normal: f64, counted: &str) -> Vec<
     ]
 }
 
-/// A number with four digits that count.
-pub(crate) fn short(value: f64) -> String {
+/// Formats a number with four significant digits.
+fn short(value: f64) -> String {
     let size = value.abs();
     let text = if size == 0.0 {
         "0".to_owned()
@@ -117,36 +118,32 @@ pub(crate) fn short(value: f64) -> String {
     text.replace('-', "−")
 }
 
-/// Draws when its turn has come.
-pub(crate) type Drawing = Box<dyn FnOnce(u32) -> Result<Svg> + Send>;
+/// Draws a picture of a width in pixels, on a blocking thread.
+type Drawing = Box<dyn FnOnce(u32) -> Result<Svg> + Send>;
 
-/// What draws this view.
+/// Loads the data of a view, and returns the function that draws it.
 ///
 /// # Errors
-/// There is nothing of it to be drawn, or there is no result.
-pub(crate) async fn drawing(
-    request: &PartRequest,
-    title: String,
-    wish: PlotOptions,
-) -> Result<Drawing> {
+/// The case does not have this view, or there is no result.
+async fn drawing(request: &PartRequest, title: String, options: PlotOptions) -> Result<Drawing> {
     let (jobs, id) = (&request.jobs, request.id);
     let solution = jobs.solution(id).await?;
-    match wish.view {
-        View::Curve => return of_curve(title, &solution),
-        View::Profiles => return of_profiles(jobs, id, title, solution).await,
+    match options.view {
+        View::Curve => return curve_drawing(title, &solution),
+        View::Profiles => return profiles_drawing(jobs, id, title, solution).await,
         View::Section | View::Patch => {}
     }
-    let place = [wish.patch, wish.point];
+    let place = [options.patch, options.point];
     let (patch, point) = motion_of(&solution, place)?;
-    let (cells, values) = stored(jobs, id, place, &[wish.shown]).await?;
-    let counted = counted(wish, solution.patches.len(), patch.points.len());
+    let (cells, values) = stored(jobs, id, place, &[options.shown]).await?;
+    let counted = counted(options, solution.patches.len(), patch.points.len());
     let remarks = remarks(point, patch.normal_force_n, &counted);
-    if wish.view == View::Patch {
+    if options.view == View::Patch {
         let scene = Scene {
             title,
             remarks,
-            shown: wish.shown,
-            range: wish.range,
+            shown: options.shown,
+            range: options.range,
             fields: cells,
             values,
         };
@@ -165,7 +162,7 @@ pub(crate) async fn drawing(
     Ok(Box::new(move |width| Ok(section::draw(&sections, width))))
 }
 
-fn of_curve(title: String, solution: &Solution) -> Result<Drawing> {
+fn curve_drawing(title: String, solution: &Solution) -> Result<Drawing> {
     let points = solution
         .patches
         .first()
@@ -220,7 +217,8 @@ fn of_curve(title: String, solution: &Solution) -> Result<Drawing> {
     Ok(Box::new(move |width| Ok(curve::draw(&curve, width))))
 }
 
-/// The component that varies most from motion to motion, measured by what it does to the patch, and its values; of a history the distance.
+/// Returns the component of the motion with the largest spread, and its values; for a history the distance. Spin is weighted by the length of
+/// the patch.
 fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
     type Component = fn(&PointSolution) -> f64;
     let distance = |point: &PointSolution| Some(point.history?.distance_mm);
@@ -247,10 +245,15 @@ fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
     (name, points.iter().map(of).collect())
 }
 
-async fn of_profiles(jobs: &Jobs, id: Uuid, title: String, solution: Solution) -> Result<Drawing> {
+async fn profiles_drawing(
+    jobs: &Jobs,
+    id: Uuid,
+    title: String,
+    solution: Solution,
+) -> Result<Drawing> {
     let mut patches = Vec::new();
     for (number, patch) in solution.patches.iter().enumerate() {
-        // The wheelset has two wheels in every position.
+        // A wheelset has two wheels in every position.
         let Some(position) = patch.position.filter(|_| solution.wheelset.is_none()) else {
             return Err(ApiError::bad_parameter(
                 "view",
@@ -266,16 +269,13 @@ async fn of_profiles(jobs: &Jobs, id: Uuid, title: String, solution: Solution) -
     let case = jobs.case(id).await?;
     let jobs = jobs.clone();
     Ok(Box::new(move |width| {
-        let case: Value =
-            serde_json::from_slice(&case).map_err(|error| ApiError::internal(&error))?;
-        // It was sound when it was submitted.
+        let case: Value = serde_json::from_slice(&case).map_err(ApiError::internal)?;
+        // The case was checked when it was submitted.
         let checked = jobs.check(&case).map_err(ApiError::from)?;
-        let understood = checked
-            .understood()
-            .map_err(|error| ApiError::internal(&error))?;
+        let understood = checked.understood().map_err(ApiError::internal)?;
         let placed = understood
             .placement
-            .ok_or_else(|| ApiError::internal(&"a case of profiles without a placement"))?;
+            .ok_or_else(|| ApiError::internal("a case of profiles without a placement"))?;
         let pressed = match patches
             .iter()
             .any(|patch| patch.cells.pressure_mpa.is_some())
@@ -313,9 +313,9 @@ async fn of_profiles(jobs: &Jobs, id: Uuid, title: String, solution: Solution) -
     }))
 }
 
-/// Width of a picture in pixels when nothing is said.
+/// Default width of a picture in pixels.
 pub(crate) const WIDTH_DEFAULT: u32 = 800;
-/// Least width of the views other than `patch`: what is written on narrower ones cannot be read.
+/// Least width in pixels of the views other than `patch`, whose text would be unreadable on narrower ones.
 const VIEW_WIDTH_MIN: u32 = 200;
 /// Limits of the width in pixels.
 const WIDTH: [u32; 2] = [48, 2400];
@@ -331,7 +331,7 @@ const FIELDS: [(&str, Output); 5] = [
 
 query! {
     /// The parameters of a picture.
-    PlotQuery(() => ()) {
+    PlotQuery {
         /// `patch` (default): one patch from above; `section`: traction and friction bound along x and y, through the largest traction of a
         /// patch; `curve`: forces over the motions, with their errors; `profiles`: every patch on wheel and rail, with its pressure if
         /// requested
@@ -341,10 +341,6 @@ query! {
         /// `zones` is an output too, the border of the stick zone is drawn
         #[param(example = "traction")]
         field: Output as String = word(&FIELDS);
-        /// Index of the motion, from 0; default 0
-        point: usize as u32 = index();
-        /// Index of the patch, from 0; default 0
-        patch: usize as u32 = index();
         /// Width in pixels; default 800. The height follows from the patch. Below 200, only the patch is drawn, for lists
         #[param(minimum = 48, maximum = 2400)]
         width: u32 as u32 = count(WIDTH[0], WIDTH[1]);
@@ -355,19 +351,20 @@ query! {
     }
 }
 
-/// Two finite numbers with a finite way from the first up to the second.
+/// Parses two finite numbers, the second above the first.
 fn range(text: &str) -> Option<[f64; 2]> {
     let (low, high) = text.split_once(',')?;
     let (low, high): (f64, f64) = (low.trim().parse().ok()?, high.trim().parse().ok()?);
     let wide = high - low;
-    // Ticks of a narrower range could not be told apart.
+    // The ticks of a narrower range would have equal labels.
     let apart = wide > 1e-9 * low.abs().max(high.abs());
     (low.is_finite() && high.is_finite() && wide.is_finite() && apart).then_some([low, high])
 }
 
 impl PlotOptions {
     fn read(uri: &Uri) -> Result<PlotOptions> {
-        let query = PlotQuery::read(uri, &())?;
+        let (place, query) = <(PlaceQuery, PlotQuery)>::read(uri)?;
+        let [patch, point] = place.place();
         let shown = query.field.unwrap_or(Output::Tractions);
         if shown == Output::Zones && query.range.is_some() {
             return Err(ApiError::bad_parameter(
@@ -394,8 +391,8 @@ impl PlotOptions {
             view,
             shown,
             range: query.range,
-            patch: query.patch.unwrap_or(0),
-            point: query.point.unwrap_or(0),
+            patch,
+            point,
             width: query.width.unwrap_or(WIDTH_DEFAULT),
         })
     }
@@ -410,7 +407,7 @@ impl PlotOptions {
     path = "/v1/jobs/{id}/plot.svg",
     tag = "results",
     operation_id = "get_plot_svg",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlaceQuery, PlotQuery),
     responses((status = 200, description = "The picture", content((String = "image/svg+xml"))), FieldProblems)
 )]
 pub(crate) async fn svg(request: PartRequest) -> Result<Response> {
@@ -423,7 +420,7 @@ pub(crate) async fn svg(request: PartRequest) -> Result<Response> {
     path = "/v1/jobs/{id}/plot.png",
     tag = "results",
     operation_id = "get_plot_png",
-    params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlotQuery),
+    params(("id" = String, Path, description = "Id of the job", format = "uuid"), PlaceQuery, PlotQuery),
     responses((status = 200, description = "The picture", content((File = "image/png"))), FieldProblems)
 )]
 pub(crate) async fn png(request: PartRequest) -> Result<Response> {
@@ -431,8 +428,8 @@ pub(crate) async fn png(request: PartRequest) -> Result<Response> {
 }
 
 async fn plot(request: &PartRequest, format: Format) -> Result<Response> {
-    let wish = PlotOptions::read(&request.uri)?;
-    let drawn = picture(request, wish, format);
+    let options = PlotOptions::read(&request.uri)?;
+    let drawn = picture(request, options, format);
     request.unless_known(format, drawn).await
 }
 
@@ -442,27 +439,25 @@ async fn plot(request: &PartRequest, format: Format) -> Result<Response> {
 /// The output was not asked for, there is no such patch or motion, or there is no result.
 pub(crate) async fn picture(
     request: &PartRequest,
-    wish: PlotOptions,
+    options: PlotOptions,
     format: Format,
 ) -> Result<Response> {
-    // Its pixels are there during its turn only; what is sent is small.
+    // The pixels exist only while the picture is drawn; the response is small.
     let rendering = request.rendering(0).await?;
     let (jobs, id) = (&request.jobs, request.id);
     let job = jobs.get(id).await?;
     let title = job.name.unwrap_or_else(|| format!("job {id}"));
-    let drawing = drawing(request, title, wish).await?;
+    let drawing = drawing(request, title, options).await?;
     let draw = move || {
-        let svg = drawing(wish.width)?;
+        let svg = drawing(options.width)?;
         match format {
-            Format::Png => {
-                raster::png(&svg, wish.width).map_err(|error| ApiError::internal(&error))
-            }
+            Format::Png => raster::png(&svg, options.width).map_err(ApiError::internal),
             _ => Ok(svg.finish().into_bytes()),
         }
     };
     let (body, share) = rendering.run(draw, Vec::len).await?;
     let mut response = ([(header::CONTENT_TYPE, format.media_type())], body).into_response();
-    // A picture is opened in browsers: whatever a client managed to write into a name, nothing in it may run.
+    // Browsers open pictures: scripts must not run even if a name contains one.
     response.headers_mut().insert(
         header::CONTENT_SECURITY_POLICY,
         HeaderValue::from_static("default-src 'none'; style-src 'unsafe-inline'; sandbox"),

@@ -1,7 +1,7 @@
-//! `/v1/profiles`: cross-sections kept once, which cases name by their digest.
+//! `/v1/profiles`: stored cross-sections, which cases name by their digest.
 
 use axum::Json;
-use axum::extract::{FromRequestParts, Path};
+use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
@@ -10,11 +10,12 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::dto::rfc3339;
-use crate::extract::caller::Caller;
+use crate::extract::caller::{Caller, path_text};
 use crate::extract::json::JsonBody;
 use crate::extract::query::Parameters;
 use crate::problem::{ApiError, ProblemKind, Result, problems};
 use crate::routes::lists::{LIMIT_DEFAULT, PageQuery, answer};
+use crate::state::AppState;
 use railhead_contact::case::words::cross_section::CrossSection;
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::damage::SectionQuality;
@@ -23,15 +24,11 @@ use railhead_contact::solution::words::damage::SectionQuality;
 #[derive(Debug, Clone)]
 pub(crate) struct Digest(String);
 
-impl<S: Send + Sync> FromRequestParts<S> for Digest {
+impl FromRequestParts<AppState> for Digest {
     type Rejection = ApiError;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self> {
-        let Path(text) = Path::<String>::from_request_parts(parts, state)
-            .await
-            .map_err(|rejection| {
-                ApiError::new(ProblemKind::ProfileNotFound, rejection.body_text())
-            })?;
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
+        let text = path_text(parts, state, ProblemKind::ProfileNotFound).await?;
         Ok(Digest(text))
     }
 }
@@ -53,7 +50,7 @@ pub(crate) struct KeptProfile {
 }
 
 problems! {
-    /// What `POST /v1/profiles` can fail with.
+    /// Problems of `POST /v1/profiles`.
     KeepProfileProblems: BadQuery, MalformedJson, UnreadableBody, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding, FaultyCase,
     ProfilesFull, Draining, StorageFull, StorageUnwritable
 }
@@ -81,10 +78,9 @@ pub(crate) async fn keep(
     let (kept, report, before) = jobs.keep_profile(value).await?;
     drop(room);
     let location = [(header::LOCATION, format!("/v1/profiles/{}", kept.digest))];
-    let status = if before {
-        StatusCode::OK
-    } else {
-        StatusCode::CREATED
+    let status = match before {
+        true => StatusCode::OK,
+        false => StatusCode::CREATED,
     };
     let body = Json(KeptProfile {
         digest: kept.digest,
@@ -120,7 +116,7 @@ pub(crate) struct ProfileList {
 }
 
 problems! {
-    /// What listing profiles can fail with.
+    /// Problems of the list of profiles.
     ListProfilesProblems: BadQuery, Forbidden
 }
 
@@ -138,7 +134,7 @@ problems! {
     )), ListProfilesProblems)
 )]
 pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response> {
-    let PageQuery { limit, cursor } = PageQuery::read(&uri, &())?;
+    let PageQuery { limit, cursor } = PageQuery::read(&uri)?;
     let limit = limit.unwrap_or(LIMIT_DEFAULT);
     let page = jobs.profiles(cursor.as_deref(), limit).await?;
     let entries = page.entries.into_iter().map(|entry| ProfileEntry {
@@ -155,7 +151,7 @@ pub(crate) async fn list(Caller(jobs): Caller, uri: Uri) -> Result<Response> {
 }
 
 problems! {
-    /// What asking for a profile can fail with.
+    /// Problems of one profile.
     ProfileProblems: BadQuery, ProfileNotFound
 }
 
@@ -171,7 +167,7 @@ problems! {
 pub(crate) async fn get(Caller(jobs): Caller, Digest(digest): Digest) -> Result<Json<Value>> {
     let kept = jobs.profile(&digest).await?;
     let value = serde_json::from_slice(&kept.body);
-    Ok(Json(value.map_err(|error| ApiError::internal(&error))?))
+    Ok(Json(value.map_err(ApiError::internal)?))
 }
 
 /// Removes a stored cross-section. Jobs and runs that refer to it are not affected.

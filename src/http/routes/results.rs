@@ -9,14 +9,14 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use crate::dto::{JobResult, Resultants, sum};
+use crate::dto::{JobResult, PointResultants, Resultants};
 use crate::extract::accept::{choose, one_of};
 use crate::extract::query::{Parameters, index, query, require_index};
 use crate::limits::{Memory, Permit, SMALL_BYTES, hold_while_sent};
 use crate::problem::{ApiError, Result, problems};
 use crate::render::format::Format;
 use crate::render::{resultants, stresses};
-use crate::routes::parts::{FieldProblems, PartRequest, motion_of, not_asked, stored};
+use crate::routes::parts::{FieldProblems, PartRequest, PlaceQuery, motion_of, not_asked, stored};
 use crate::routes::wait::{Wait, WaitQuery};
 use crate::routes::work::await_end;
 use railhead_contact::case::words::solver::Output;
@@ -31,7 +31,7 @@ use railhead_tables::table::RowTable;
 use railhead_tables::write::RowWriter;
 
 problems! {
-    /// What every part of a result can fail with.
+    /// Problems of every part of a result.
     ResultProblems: BadQuery, JobNotFound, ResultNotReady, JobFailed, JobCancelled
 }
 
@@ -62,8 +62,8 @@ pub(crate) async fn result(request: PartRequest, wait: Wait) -> Result<Response>
     request.unless_known(Format::Json, answer).await
 }
 
-/// The text of the result of a succeeded job between two other texts, and the memory for what is held of it. A large result is
-/// read from where it is stored while the client takes it.
+/// Returns the result of a succeeded job as JSON between two other texts, and the permit for its memory. A large result is read from its
+/// store while the client receives it.
 ///
 /// # Errors
 /// The job is unknown, has not ended or has no result; or there is no memory.
@@ -91,17 +91,12 @@ pub(crate) async fn result_text(
     Ok((body, share))
 }
 
-problems! {
-    /// What parts of a result can fail with.
-    PartProblems: BadQuery, JobNotFound, ResultNotReady, JobFailed, JobCancelled
-}
-
-/// The forms that resultants come in.
+/// The formats of resultants and of stresses below the surface.
 const FORMS: &[Format] = &[Format::Json, Format::Csv];
 
 query! {
     /// Parameters of resultants.
-    ResultantsQuery(() => ()) {
+    ResultantsQuery {
         /// Only this motion, by its index from 0
         point: usize as u32 = index();
         /// Only this patch, by its index from 0; `total` remains the sum over all patches
@@ -122,31 +117,30 @@ query! {
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
         ResultantsQuery
     ),
-    responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` in place of the patch", content((Resultants = "application/json"), (String = "text/csv"))), PartProblems)
+    responses((status = 200, description = "Forces and moments on the lower body. CSV: one line per patch and motion, then one per motion with `total` in place of the patch", content((Resultants = "application/json"), (String = "text/csv"))), ResultProblems)
 )]
 pub(crate) async fn resultants(request: PartRequest) -> Result<Response> {
-    let query = ResultantsQuery::read(&request.uri, &())?;
+    let query = ResultantsQuery::read(&request.uri)?;
     let format = choose(&request.headers, query.format, FORMS)?;
     let (point, patch) = (query.point, query.patch);
     let answer = async {
         let (jobs, id) = (&request.jobs, request.id);
-        // The stored text is read whole and cut to what was asked for.
+        // The whole stored text is read, then the requested part is selected.
         let stored = jobs.open_answer(id).await?;
         let turn = request.rendering(2 * stored.bytes).await?;
         let text = stored.text().await?;
         let read = move || {
-            let solution: Solution =
-                serde_json::from_slice(&text).map_err(|error| ApiError::internal(&error))?;
+            let solution: Solution = serde_json::from_slice(&text).map_err(ApiError::internal)?;
             drop(text);
             require_index("point", point, solution.total.len())?;
             require_index("patch", patch, solution.patches.len())?;
-            let sums: Vec<_> = (0..solution.total.len())
-                .map(|motion| sum(&solution, motion))
-                .collect();
+            let motions = point.map_or(0..solution.total.len(), |point| point..point + 1);
+            let totals = motions.filter_map(|motion| PointResultants::total(&solution, motion));
+            let totals: Vec<PointResultants> = totals.collect();
             let resultants = Resultants::select(solution, point, patch);
             match format {
-                Format::Csv => csv(resultants::table(&resultants, point.unwrap_or(0), &sums)),
-                _ => serde_json::to_vec(&resultants).map_err(|error| ApiError::internal(&error)),
+                Format::Csv => csv(resultants::table(&resultants, &totals)),
+                _ => serde_json::to_vec(&resultants).map_err(ApiError::internal),
             }
         };
         let (body, share) = turn.run(read, Vec::len).await?;
@@ -157,19 +151,15 @@ pub(crate) async fn resultants(request: PartRequest) -> Result<Response> {
 }
 
 fn csv(table: RowTable) -> Result<Vec<u8>> {
-    RowWriter::whole(TableForm::Csv, table).map_err(|error| ApiError::internal(&error))
+    RowWriter::whole(TableForm::Csv, table).map_err(ApiError::internal)
 }
 
-/// What a point takes as text, in bytes.
+/// Bytes of a point as text.
 const POINT_BYTES: usize = 900;
 
 query! {
-    /// Parameters of stresses below the surface.
-    SubsurfaceQuery(() => ()) {
-        /// Index of the motion, from 0; default 0
-        point: usize as u32 = index();
-        /// Index of the patch, from 0; default 0
-        patch: usize as u32 = index();
+    /// The format of stresses below the surface.
+    SubsurfaceQuery {
         /// `json` or `csv`; overrides `Accept`
         #[param(pattern = "^(json|csv)$", example = "csv")]
         format: Format as String = one_of(FORMS);
@@ -207,13 +197,14 @@ pub(crate) struct SubsurfaceAnswer {
     operation_id = "get_subsurface",
     params(
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
+        PlaceQuery,
         SubsurfaceQuery
     ),
     responses((status = 200, description = "Stresses at the requested points in the order of the case, and the worst point. CSV: one line per requested point", content((SubsurfaceAnswer = "application/json"), (String = "text/csv"))), FieldProblems)
 )]
 pub(crate) async fn subsurface(request: PartRequest) -> Result<Response> {
-    let query = SubsurfaceQuery::read(&request.uri, &())?;
-    let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
+    let (place, query) = <(PlaceQuery, SubsurfaceQuery)>::read(&request.uri)?;
+    let [patch, point] = place.place();
     let format = choose(&request.headers, query.format, FORMS)?;
     let answer = async {
         let (jobs, id) = (&request.jobs, request.id);
@@ -240,23 +231,13 @@ pub(crate) async fn subsurface(request: PartRequest) -> Result<Response> {
                 worst: summary.worst,
                 passage: summary.passage,
             };
-            serde_json::to_vec(&answer).map_err(|error| ApiError::internal(&error))
+            serde_json::to_vec(&answer).map_err(ApiError::internal)
         };
         let (text, share) = turn.await?.run(write, Vec::len).await?;
         let response = format.answer("subsurface", text);
         Ok(hold_while_sent(response, share))
     };
     request.unless_known(format, answer).await
-}
-
-query! {
-    /// Parameters of damage.
-    DamageQuery(() => ()) {
-        /// Index of the motion, from 0; default 0
-        point: usize as u32 = index();
-        /// Index of the patch, from 0; default 0
-        patch: usize as u32 = index();
-    }
 }
 
 /// Damage of one pass over one patch for one motion.
@@ -266,7 +247,7 @@ pub(crate) struct PatchDamage {
     patch: usize,
     /// Index of the motion, from 0.
     point: usize,
-    /// The models that the case asked for.
+    /// The models that the case requests.
     #[serde(flatten)]
     damage: Damage,
     /// The parameters that the models were evaluated with.
@@ -281,13 +262,12 @@ pub(crate) struct PatchDamage {
     operation_id = "get_damage",
     params(
         ("id" = String, Path, description = "Id of the job", format = "uuid"),
-        DamageQuery
+        PlaceQuery
     ),
     responses((status = 200, description = "The models that the case requested", body = PatchDamage), FieldProblems)
 )]
 pub(crate) async fn damage(request: PartRequest) -> Result<Response> {
-    let query = DamageQuery::read(&request.uri, &())?;
-    let (patch, point) = (query.patch.unwrap_or(0), query.point.unwrap_or(0));
+    let [patch, point] = PlaceQuery::read(&request.uri)?.place();
     let answer = async {
         let (jobs, id) = (&request.jobs, request.id);
         let solution = jobs.solution(id).await?;

@@ -1,4 +1,5 @@
-//! `/v1/runs`: many rows over one case, their answers and totals.
+//! `/v1/runs`: many rows that vary one case, their results and statistics.
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -35,14 +36,14 @@ use railhead_tables::titles::{NamedColumns, named_column};
 use railhead_tables::write::{RowWriter, WriteError};
 
 problems! {
-    /// What `POST /v1/runs` can fail with.
+    /// Problems of `POST /v1/runs`.
     SubmitRunProblems: MalformedJson, UnreadableBody, BadQuery, BadHeader, BodyTimeout, BodyTooLarge, UnsupportedMediaType, UnsupportedEncoding,
     FaultyCase, FaultyTable, JobNotFound, IdempotencyConflict, QuotaExceeded, StoredQuotaExceeded, QueueFull, Overloaded, Draining, StorageFull, StorageUnwritable
 }
 
 query! {
-    /// What the query of a submission says about the run itself.
-    RunQuery(() => ()) {
+    /// Parameters of the submission of a run.
+    RunQuery {
         /// Id of the job whose case is the template of a table; not with `multipart/form-data`, which contains the template
         #[param(format = "uuid")]
         template: Uuid as String = id("job");
@@ -106,12 +107,12 @@ pub(crate) async fn submit(
     reply.send(&jobs, &memory, (run, replayed), None).await
 }
 
-/// What a reader of answers holds: a chunk as columns and as text.
+/// Memory of a response, in bytes: a chunk as columns and as text.
 const STREAM_BYTES: usize = 12 << 20;
 
 query! {
     /// Parameters of the results of a run.
-    RunResultsQuery(() => ()) {
+    RunResultsQuery {
         /// Comma-separated columns, such as `row,force_y_n,status`; default: all
         #[param(example = "row,status,force_y_n")]
         columns: Vec<String> as String = names("comma-separated names of columns");
@@ -124,7 +125,7 @@ query! {
     }
 }
 
-/// Reads names with commas between.
+/// Returns the reader of a comma-separated list of names.
 fn names(allowed: &'static str) -> Reader<Vec<String>> {
     reader(allowed, |text| {
         let names = text.split(',').map(|name| name.trim().to_owned());
@@ -143,13 +144,13 @@ fn row_range(text: &str) -> Option<Range<u64>> {
 }
 
 problems! {
-    /// What the results of a run can fail with.
+    /// Problems of the results of a run.
     RunResultProblems: BadQuery, RunNotFound, ResultNotReady, Overloaded
 }
 
 /// One row of the results, in NDJSON. `answers` of the run lists the other columns.
 #[derive(Debug, Serialize, ToSchema)]
-#[allow(dead_code, reason = "the contract; rows are written column by column")]
+#[allow(dead_code, reason = "describes rows that are written column by column")]
 pub(crate) struct RunRow {
     /// Index of the row in the request, from 0.
     row: u64,
@@ -194,7 +195,7 @@ pub(crate) async fn results(
     key: Option<Extension<Credential>>,
     headers: HeaderMap,
 ) -> Result<Response> {
-    let (query, _) = <(RunResultsQuery, WaitQuery)>::read(&uri, &())?;
+    let (query, _) = <(RunResultsQuery, WaitQuery)>::read(&uri)?;
     let format = choose(&headers, query.format, RESULT_FORMATS)?;
     await_end(&jobs.of_kind(Kind::Rows), id, &wait).await?;
     let run = jobs.run(id).await?;
@@ -204,7 +205,7 @@ pub(crate) async fn results(
     let rows = query.rows.unwrap_or(0..u64::MAX);
     let wanted = columns.iter().map(|(name, _)| name.clone()).collect();
     let mut answers = Box::pin(answers(jobs.clone(), run, rows, wanted));
-    // Answers that cannot be read are an error as long as the head has not been sent.
+    // Unreadable results are a problem as long as the head has not been sent.
     let first = answers.try_next().await?;
     let rest = answers.inspect_err(
         move |error| tracing::error!(%error, run = %id, "answers of a run cannot be read"),
@@ -222,7 +223,7 @@ pub(crate) async fn results(
     Ok(hold_while_sent(wait.tell_applied(response), share))
 }
 
-/// A run has answers once it has ended.
+/// Requires that a run has ended.
 fn require_ended(run: &Run) -> Result<()> {
     match run.state() {
         state if state.ended() => Ok(()),
@@ -238,7 +239,7 @@ fn require_ended(run: &Run) -> Result<()> {
     }
 }
 
-/// The columns that are wanted, in their order; without any, all of them.
+/// Returns the requested columns in order, or all columns.
 fn selected(run: &Run, wanted: Option<Vec<String>>) -> Result<Vec<(String, TableKind)>> {
     let mut columns = run.head.answers();
     let Some(wanted) = wanted else {
@@ -263,7 +264,7 @@ fn selected(run: &Run, wanted: Option<Vec<String>>) -> Result<Vec<(String, Table
     Ok(columns)
 }
 
-/// The answers to these rows of a run, a chunk at a time.
+/// Returns the results of these rows of a run, a chunk at a time.
 fn answers(
     jobs: Jobs,
     run: Run,
@@ -351,7 +352,7 @@ pub(crate) async fn manifest(Caller(jobs): Caller, RunId(id): RunId) -> Result<J
 }
 
 problems! {
-    /// What one row of a run can fail with.
+    /// Problems of one row of a run.
     RunRowProblems: BadQuery, RunNotFound, RowNotFound, Expired
 }
 
@@ -397,28 +398,28 @@ pub(crate) async fn row(
     Ok(Json(RunRowAlone { row, case, answer }))
 }
 
-/// The only row of a table as the lines of the results have it.
+/// Returns the only row of a table as a line of the results.
 fn members(table: RowTable) -> Result<Map<String, Value>> {
     let line = RowWriter::Ndjson.write(table);
-    let line = line.map_err(|error| ApiError::internal(&error))?;
-    serde_json::from_slice(&line).map_err(|error| ApiError::internal(&error))
+    let line = line.map_err(ApiError::internal)?;
+    serde_json::from_slice(&line).map_err(ApiError::internal)
 }
 
-/// Columns whose totals are made when none are named.
+/// Default columns of statistics.
 const COLUMNS: [&str; 4] = [
     "force_x_n",
     "force_y_n",
     "friction_power_n",
     "pressure_max_mpa",
 ];
-/// Percentiles when none are named.
+/// Default percentiles.
 const PERCENTILES: [f64; 4] = [50.0, 90.0, 99.0, 100.0];
-/// Most sections.
+/// Largest number of sections.
 const SECTIONS_MAX: usize = 10_000;
 
 query! {
     /// Parameters of the totals of a run.
-    RunTotalsQuery(() => ()) {
+    RunTotalsQuery {
         /// Comma-separated columns of numbers; default: forces, power and pressure
         #[param(example = "force_y_n,friction_power_n")]
         columns: Vec<String> as String = names("comma-separated names of columns");
@@ -429,7 +430,7 @@ query! {
         });
         /// Comma-separated thresholds: counts the rows whose absolute value is at least each threshold
         #[param(example = "20000,30000")]
-        above: Vec<f64> as String = reader("numbers with commas between", numbers);
+        above: Vec<f64> as String = reader("comma-separated numbers", numbers);
         /// A column copied from the request: statistics for each of its values, or of its intervals if it contains numbers
         #[param(example = "section")]
         by: String as String = reader("the name of a column", |text| Some(text.to_owned()));
@@ -512,7 +513,7 @@ pub(crate) async fn totals(
     uri: Uri,
     State(memory): State<Memory>,
 ) -> Result<Json<RunTotals>> {
-    let query = RunTotalsQuery::read(&uri, &())?;
+    let query = RunTotalsQuery::read(&uri)?;
     let run = jobs.run(id).await?;
     require_ended(&run)?;
     let named = query.columns;
@@ -525,7 +526,7 @@ pub(crate) async fn totals(
     }
     let section = section_of(&run.head.answers(), query.by, query.width)?;
     let rows = usize::try_from(run.head.rows).unwrap_or(usize::MAX);
-    // Every number is kept once for all rows and once for its section.
+    // Every number is held once for all rows and once for its section.
     let bytes = rows.saturating_mul(16 * names.len());
     let share = memory.rows(jobs.tenant(), bytes).await?;
     let mut wanted = names.clone();
@@ -550,10 +551,10 @@ pub(crate) async fn totals(
     Ok(Json(totals.await?))
 }
 
-/// How rows are told apart.
+/// The column that assigns rows to sections.
 struct RowSection {
     name: String,
-    /// Length of an interval; texts have none.
+    /// Length of an interval; `None` for a column of texts.
     width: Option<f64>,
 }
 
@@ -587,7 +588,7 @@ fn section_of(
     }
 }
 
-/// What tells a section from others: the number of its interval, or its text.
+/// Identifies a section: the index of its interval, or its text.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum SectionKey {
     Interval(i64),
@@ -613,7 +614,7 @@ struct Numbers {
 impl Gathered {
     fn add(&mut self, table: &RowTable) -> Result<()> {
         let Some(TableColumn::Texts(statuses)) = table.column("status") else {
-            return Err(ApiError::internal(&"answers without a status"));
+            return Err(ApiError::internal("answers without a status"));
         };
         let columns = self.names.iter();
         let columns = columns.filter_map(|name| match table.column(name)? {

@@ -1,4 +1,5 @@
-//! What the service can do and how it is: methods, remarks, examples, problems, the tenant, probes and metrics.
+//! Capabilities and state of the service: methods, remarks, examples, problems, the tenant, probes and metrics.
+
 use std::collections::BTreeMap;
 
 use axum::Json;
@@ -11,11 +12,12 @@ use utoipa::ToSchema;
 
 use crate::contract::EXAMPLES;
 use crate::dto::TenantLimits;
-use crate::extract::caller::{AnyTenant, Caller, Operator};
+use crate::extract::caller::{Caller, Operator};
 use crate::layers::metrics::Metrics;
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, PlainProblems, ProblemKind, ProblemMeaning, Result, problems};
 use crate::routes::wait::WAIT_MAX_SECONDS;
+use crate::state::AnyTenant;
 use railhead_contact::case::words::solver::{Case, MethodName, Output};
 use railhead_contact::remark::kind::RemarkKind;
 use railhead_contact::remark::list::Remark;
@@ -23,7 +25,7 @@ use railhead_jobs::PAGE_MAX;
 use railhead_jobs::error::JobsError;
 use railhead_jobs::model::State as JobState;
 
-/// What the service can do.
+/// The capabilities of the service.
 #[derive(Debug, Serialize, ToSchema)]
 #[schema(as = Abilities)]
 pub(crate) struct Capabilities {
@@ -127,28 +129,25 @@ pub(crate) async fn methods(
     State(AnyTenant(jobs)): State<AnyTenant>,
 ) -> Json<Capabilities> {
     let own = jobs.options();
+    let method = |(name, summary)| MethodCapability {
+        name,
+        default: name == MethodName::default(),
+        summary,
+    };
+    let contact = |(name, needs_load, summary)| ContactCapability {
+        name,
+        needs_load,
+        summary,
+    };
+    let output = |(name, default, summary)| OutputCapability {
+        name,
+        default,
+        summary,
+    };
     Json(Capabilities {
-        methods: METHODS
-            .map(|(name, summary)| MethodCapability {
-                name,
-                default: name == MethodName::default(),
-                summary,
-            })
-            .into(),
-        contacts: CONTACTS
-            .map(|(name, needs_load, summary)| ContactCapability {
-                name,
-                needs_load,
-                summary,
-            })
-            .into(),
-        outputs: OUTPUTS
-            .map(|(name, default, summary)| OutputCapability {
-                name,
-                default,
-                summary,
-            })
-            .into(),
+        methods: METHODS.map(method).into(),
+        contacts: CONTACTS.map(contact).into(),
+        outputs: OUTPUTS.map(output).into(),
         limits: RequestLimits {
             body_max_bytes: options.body_max_bytes,
             wait_max_seconds: WAIT_MAX_SECONDS,
@@ -169,7 +168,7 @@ pub(crate) async fn methods(
     })
 }
 
-/// A list whose entries stand in a line each.
+/// An array of tuples, one per line.
 macro_rules! entries {
     ($($($part:expr),+;)*) => {
         [$(($($part),+)),*]
@@ -243,18 +242,15 @@ pub(crate) struct ExampleCase {
 pub(crate) async fn examples() -> Result<Json<Vec<ExampleCase>>> {
     let read = |(name, summary, text): (&'static str, &'static str, &str)| {
         let case = serde_json::from_str(text);
-        let case = case.map_err(|error| ApiError::internal(&error))?;
+        let case = case.map_err(ApiError::internal)?;
         Ok(ExampleCase {
             name,
             summary,
             case,
         })
     };
-    EXAMPLES
-        .into_iter()
-        .map(read)
-        .collect::<Result<_, _>>()
-        .map(Json)
+    let examples = EXAMPLES.into_iter().map(read);
+    examples.collect::<Result<_>>().map(Json)
 }
 
 /// Response of a healthy service.
@@ -290,7 +286,7 @@ pub(crate) async fn alive() -> Json<Health> {
 }
 
 problems! {
-    /// What `GET /readyz` can fail with.
+    /// Problems of `GET /readyz`.
     ReadyProblems: NotReady, Draining, StorageFull, StorageUnwritable, StorageUnreachable
 }
 
@@ -320,14 +316,14 @@ pub(crate) async fn ready(State(AnyTenant(jobs)): State<AnyTenant>) -> Result<Js
     }
 }
 
-/// The text form that Prometheus asks for first.
+/// Content type of OpenMetrics text, which Prometheus prefers.
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// The form before it.
+/// Content type of the older text format of Prometheus.
 const PLAIN: &str = "text/plain; version=0.0.4; charset=utf-8";
 
 problems! {
-    /// What `GET /metrics` can fail with.
+    /// Problems of `GET /metrics`.
     MetricsProblems: Unauthorized, Forbidden, TooManyRequests
 }
 
@@ -348,16 +344,14 @@ pub(crate) async fn metrics(
 ) -> Result<Response> {
     jobs.refresh_metrics().await?;
     let mut text = String::new();
-    metrics
-        .write(&mut text)
-        .map_err(|error| ApiError::internal(&error))?;
+    metrics.write(&mut text).map_err(ApiError::internal)?;
     if wants_plain_text(&headers) {
         return Ok(([(header::CONTENT_TYPE, PLAIN)], plain(&text)).into_response());
     }
     Ok(([(header::CONTENT_TYPE, OPEN_METRICS)], text).into_response())
 }
 
-/// Older tools name the text form and not OpenMetrics.
+/// Whether `Accept` names plain text and not OpenMetrics, as older tools do.
 fn wants_plain_text(headers: &HeaderMap) -> bool {
     let names = |wanted: &str| {
         let values = headers.get_all(header::ACCEPT).iter();
@@ -367,7 +361,7 @@ fn wants_plain_text(headers: &HeaderMap) -> bool {
     names("text/plain") && !names("application/openmetrics-text")
 }
 
-/// OpenMetrics text in the older form: counters and infos are called as their samples are, and there is no end mark.
+/// Converts OpenMetrics text to the older text format: counters and infos have the names of their samples, and there is no end mark.
 fn plain(text: &str) -> String {
     let mut lines: Vec<String> = Vec::new();
     let mut samples = text.lines().peekable();
@@ -379,7 +373,7 @@ fn plain(text: &str) -> String {
         let mut words = about.splitn(3, ' ');
         let (kind, name, rest) = (words.next(), words.next(), words.next());
         let (Some("HELP"), Some(name), Some(help)) = (kind, name, rest) else {
-            // Units and the end mark; types are taken with their help.
+            // Units and the end mark are dropped; types are read with their help text.
             continue;
         };
         let of_type = samples.next().and_then(|line| line.rsplit(' ').next());
@@ -397,7 +391,7 @@ fn plain(text: &str) -> String {
 }
 
 problems! {
-    /// What `GET /problems/{name}` can fail with.
+    /// Problems of `GET /problems/{name}`.
     ExplainProblems: BadQuery, UnknownRoute
 }
 
@@ -410,13 +404,8 @@ problems! {
     responses((status = 200, description = "All kinds of problems", body = Vec<ProblemMeaning>), PlainProblems)
 )]
 pub(crate) async fn list_problems() -> Json<Vec<ProblemMeaning>> {
-    Json(
-        ProblemKind::ALL
-            .iter()
-            .copied()
-            .map(ProblemMeaning::from)
-            .collect(),
-    )
+    let kinds = ProblemKind::ALL.iter().copied();
+    Json(kinds.map(ProblemMeaning::from).collect())
 }
 
 /// Explains one kind of problem; the `type` of a problem is this path.

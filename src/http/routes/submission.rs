@@ -1,4 +1,4 @@
-//! What submissions of every kind have in common: name, labels, priority, deadline, idempotency key and wait, and the answer to them.
+//! Submissions of every kind: name, labels, priority, deadline, idempotency key, wait, and the response.
 
 use std::collections::BTreeMap;
 
@@ -35,8 +35,8 @@ const IDEMPOTENCY_REPLAYED: HeaderName = HeaderName::from_static("idempotency-re
 const IDEMPOTENCY_KEY: HeaderName = HeaderName::from_static("idempotency-key");
 
 query! {
-    /// Name and labels of work whose body has none.
-    NamedQuery(() => ()) {
+    /// Name and labels of work whose body does not contain them.
+    NamedQuery {
         /// Free text given by the client
         #[param(min_length = 1, max_length = 200, example = "timetable 2026")]
         name: String as String = name();
@@ -47,10 +47,10 @@ query! {
 }
 
 impl NamedQuery {
-    /// Reads the name and the labels into the options, with the labels of the key of the request.
+    /// Sets the name and the labels of the options, with the labels of the API key.
     ///
     /// # Errors
-    /// There are too many labels, two have the same key, or one contradicts the key of the request.
+    /// There are too many labels, two have the same key, or one contradicts the API key.
     pub(crate) fn read_into(self, options: &mut WorkOptions, jobs: &Jobs) -> Result<()> {
         let given = self.label.unwrap_or_default();
         let number = given.len();
@@ -68,7 +68,7 @@ impl NamedQuery {
     }
 }
 
-/// What the query and the headers of a submission say; `P` are the parameters of its own.
+/// The query and the headers of a submission; `P` are the parameters of its kind.
 pub(crate) struct Submission<P> {
     pub(crate) jobs: Jobs,
     pub(crate) own: P,
@@ -76,17 +76,17 @@ pub(crate) struct Submission<P> {
     pub(crate) reply: Reply,
 }
 
-/// How a submission is answered.
+/// The response to a submission, after a wait.
 pub(crate) struct Reply(Wait);
 
-impl<P: Parameters<Limits = ()>> FromRequestParts<AppState> for Submission<P> {
+impl<P: Parameters> FromRequestParts<AppState> for Submission<P> {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
         let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
         let wait = Wait::from_request_parts(parts, state).await?;
         let idempotency_key = idempotency_key(&parts.headers)?;
-        let ((own, submit), _) = <((P, SubmitQuery), WaitQuery)>::read(&parts.uri, &())?;
+        let ((own, submit), _) = <((P, SubmitQuery), WaitQuery)>::read(&parts.uri)?;
         Ok(Submission {
             own,
             options: WorkOptions {
@@ -99,18 +99,18 @@ impl<P: Parameters<Limits = ()>> FromRequestParts<AppState> for Submission<P> {
     }
 }
 
-/// Work that was submitted.
+/// The JSON of submitted work.
 #[derive(Serialize)]
 struct Submitted {
     #[serde(flatten)]
     work: WorkAnswer,
-    /// Of cases that were left out.
+    /// Faults of skipped cases.
     #[serde(skip_serializing_if = "Option::is_none")]
     errors: Option<Vec<Fault>>,
 }
 
 impl Reply {
-    /// Answers with the work, after the wait that the request asks for; a job that has succeeded by then with its result.
+    /// Answers with the work after the requested wait. The response for a job that succeeded in time contains its result.
     ///
     /// # Errors
     /// The work cannot be written as JSON.
@@ -124,7 +124,7 @@ impl Reply {
         let Reply(wait) = self;
         let jobs = jobs.of_kind(work.kind());
         let (id, ended) = (work.id(), work.ended());
-        // The work is stored: whatever ends the wait early, the client must learn its id.
+        // The work is stored. The client must learn its id even if the wait ends early.
         let waited = wait.hold(&jobs, async |at_most| match ended {
             true => Ok(None),
             false => jobs.wait_for(id, at_most).await.map(Some),
@@ -159,7 +159,7 @@ impl Reply {
     }
 }
 
-/// Work as JSON, with the result of a job if it can be read, and the memory for what is held of it.
+/// Returns work as JSON, with the result of a job if it can be read, and the permit for its memory.
 async fn text(
     jobs: &Jobs,
     memory: &Memory,
@@ -174,9 +174,9 @@ async fn text(
     let id = work.id();
     let work = work.into();
     let text = serde_json::to_string(&Submitted { work, errors });
-    let text = text.map_err(|error| ApiError::internal(&error))?;
+    let text = text.map_err(ApiError::internal)?;
     if solved && let Some(open) = text.strip_suffix('}') {
-        // A client that submitted a job must learn its id, whatever became of the result.
+        // The client must learn the id of the job even if the result cannot be read.
         match result_text(jobs, memory, id, [&format!("{open},\"result\":"), "}"]).await {
             Ok(answer) => return Ok(answer),
             Err(error) => tracing::error!(?error, job = %id, "a result cannot be read"),
@@ -185,7 +185,7 @@ async fn text(
     Ok((Body::from(text), None))
 }
 
-/// The idempotency key of a request, if it has one.
+/// Returns the idempotency key of a request.
 fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>> {
     let Some(value) = headers.get(&IDEMPOTENCY_KEY) else {
         return Ok(None);
@@ -207,7 +207,7 @@ fn idempotency_key(headers: &HeaderMap) -> Result<Option<String>> {
     ))
 }
 
-/// The parameters of every submission, in the contract.
+/// Describes the parameters of every submission in the contract.
 pub(crate) struct SubmitParameters;
 
 impl IntoParams for SubmitParameters {
@@ -239,7 +239,7 @@ impl IntoParams for SubmitParameters {
     }
 }
 
-/// The answers to every submission that is accepted, in the contract.
+/// Declares the responses to accepted submissions in the contract.
 macro_rules! accepted {
     ($name:ident: $schema:literal) => {
         pub(crate) struct $name;

@@ -1,4 +1,5 @@
-//! How requests wait and follow: `Prefer: wait=N`, `?wait=N`, and streams of events.
+//! Waiting requests (`Prefer: wait=N`, `?wait=N`) and event streams.
+
 use std::convert::Infallible;
 use std::time::Duration;
 
@@ -26,8 +27,8 @@ const PREFER: HeaderName = HeaderName::from_static("prefer");
 const PREFERENCE_APPLIED: HeaderName = HeaderName::from_static("preference-applied");
 
 query! {
-    /// The parameter that asks to wait; [`Wait`] reads it.
-    WaitQuery(() => ()) {
+    /// The parameter for a wait, which [`Wait`] reads.
+    WaitQuery {
         /// Respond when the work has ended, or after this many seconds. `Prefer: wait=N` means the same, but is ignored while too many
         /// requests wait
         #[param(minimum = 0, maximum = 3600, example = 10)]
@@ -35,7 +36,7 @@ query! {
     }
 }
 
-/// The wait that a request asks for, and its place among the requests that wait. Handlers take it after the [`Caller`].
+/// The requested wait, and the permit to wait. Handlers extract it after the [`Caller`].
 pub(crate) struct Wait {
     seconds: Option<u32>,
     preferred: bool,
@@ -45,13 +46,13 @@ pub(crate) struct Wait {
 }
 
 impl Wait {
-    /// The wait, if there is one.
+    /// Returns the longest time to wait.
     pub(crate) fn at_most(&self) -> Option<Duration> {
         self.seconds
             .map(|seconds| Duration::from_secs(seconds.into()))
     }
 
-    /// The place among the requests that wait, for an answer that waits while it is sent.
+    /// Returns the permit to wait, for a response that waits while it is sent.
     pub(crate) fn into_place(self) -> Option<Permit> {
         if let (Some(_), Some(held)) = (self.seconds, &self.held) {
             held.release();
@@ -59,10 +60,10 @@ impl Wait {
         self.place
     }
 
-    /// Runs what waits at most the time it is given. Returns `None` if the request does not ask to wait.
+    /// Runs `waiting` with the longest time to wait. Returns `None` if the request does not ask to wait.
     ///
     /// # Errors
-    /// The key of the request is revoked meanwhile.
+    /// The key of the request is revoked in the meantime.
     pub(crate) async fn hold<T>(
         &self,
         jobs: &Jobs,
@@ -71,7 +72,7 @@ impl Wait {
         let Some(at_most) = self.at_most() else {
             return Ok(None);
         };
-        // From here on the request only waits, which is counted apart.
+        // A waiting request is counted separately.
         if let Some(held) = &self.held {
             held.release();
         }
@@ -81,7 +82,7 @@ impl Wait {
         }
     }
 
-    /// Tells in a response that the preferred wait was applied.
+    /// Adds the header `Preference-Applied` for an applied `Prefer: wait`.
     pub(crate) fn tell_applied(&self, mut response: Response) -> Response {
         let applied = self.seconds.filter(|_| self.preferred);
         let value =
@@ -98,24 +99,15 @@ impl FromRequestParts<AppState> for Wait {
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
         let concurrency = &state.concurrency;
-        let tenant = parts.extensions.get::<Tenant>().cloned();
-        let Tenant(tenant) = tenant.unwrap_or_else(|| Tenant("".into()));
-        let (seconds, preferred, place) =
-            match (wait_of(&parts.uri)?, preferred_wait(&parts.headers)) {
-                (Some(seconds), _) => (
-                    Some(seconds),
-                    false,
-                    Some(concurrency.require_wait(&tenant)?),
-                ),
-                (None, Some(seconds)) => match concurrency.wait(&tenant) {
-                    Some(place) => (Some(seconds), true, Some(place)),
-                    None => (None, false, None),
-                },
-                (None, None) => (None, false, None),
-            };
+        let tenant = Tenant::of(&parts.extensions);
+        let (asked, preferred) = (wait_of(&parts.uri)?, preferred_wait(&parts.headers));
+        let place = match asked {
+            Some(_) => Some(concurrency.require_wait(&tenant)?),
+            None => preferred.and_then(|_| concurrency.wait(&tenant)),
+        };
         Ok(Wait {
-            seconds,
-            preferred,
+            seconds: asked.or(preferred).filter(|_| place.is_some()),
+            preferred: asked.is_none(),
             place,
             held: parts.extensions.get().cloned(),
             key: parts.extensions.get().cloned(),
@@ -123,17 +115,17 @@ impl FromRequestParts<AppState> for Wait {
     }
 }
 
-/// The parameter `wait` of an address; others are for the route to read.
+/// Returns the parameter `wait` of a URI; the route reads the others.
 fn wait_of(uri: &Uri) -> Result<Option<u32>> {
     let mut query = Query::part_of(uri, &WaitQuery::names());
-    let WaitQuery { wait } = WaitQuery::take(&mut query, &());
+    let WaitQuery { wait } = WaitQuery::take(&mut query);
     query.finish()?;
     Ok(wait)
 }
 
-/// The wait that the client prefers, in s, capped. Preferences that are not understood are ignored (RFC 7240,
-/// section 2); the first `wait` counts.
-pub(crate) fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
+/// Returns the wait that the client prefers in s, at most [`WAIT_MAX_SECONDS`]. Unknown preferences are ignored (RFC 7240, section 2); the
+/// first `wait` counts.
+fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
     let values = headers
         .get_all(&PREFER)
         .iter()
@@ -149,18 +141,18 @@ pub(crate) fn preferred_wait(headers: &HeaderMap) -> Option<u32> {
     waits.next().map(|seconds| seconds.min(WAIT_MAX_SECONDS))
 }
 
-/// A comment is sent when nothing has happened for this long, so that no one in between closes the connection.
+/// Interval of comments on an idle stream, which keep proxies from closing the connection.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
-/// When a client should connect again after the connection was lost.
+/// Time after which a client should reconnect.
 const RETRY: Duration = Duration::from_secs(1);
 
 const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 
-/// A client that asks for a stream of events.
+/// A request for an event stream.
 pub(crate) struct EventRequest {
-    /// Its jobs.
+    /// The jobs of the tenant.
     pub jobs: Jobs,
-    /// The event that it saw last.
+    /// The id of the last event that the client received.
     pub seen: Option<String>,
     concurrency: ConcurrencyLimits,
     held: HeldPermits,
@@ -184,10 +176,10 @@ impl FromRequestParts<AppState> for EventRequest {
 }
 
 impl EventRequest {
-    /// The stream as an answer. It counts as a stream of the tenant, no longer as a request, and ends once the key was revoked.
+    /// Returns the stream as a response. It counts as a stream of the tenant instead of a request, and ends when the key is revoked.
     ///
     /// # Errors
-    /// The tenant follows as much as it may already.
+    /// The limit of event streams is reached.
     pub(crate) fn answer(
         self,
         events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static,
@@ -200,7 +192,7 @@ impl EventRequest {
     }
 }
 
-/// The change, if there is one; a failure ends the stream, and the client connects again.
+/// Returns the change, if there is one. A failure ends the stream; the client then reconnects.
 pub(crate) fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> Option<T> {
     change
         .inspect_err(|reason| tracing::debug!(%reason, "a stream of events ended early"))
@@ -208,7 +200,7 @@ pub(crate) fn changed<T>(change: Result<Option<T>, impl std::fmt::Display>) -> O
         .flatten()
 }
 
-/// An event of this name; `id` says what was seen with it.
+/// Creates an event; `id` identifies the version that it reports.
 pub(crate) fn event<T: Serialize>(name: &str, id: &str, data: &T) -> Option<Event> {
     let event = Event::default().event(name).id(id).retry(RETRY);
     event.json_data(data).ok()

@@ -1,4 +1,5 @@
-//! Jobs, batches, runs and evolutions: read, followed, cancelled and deleted by the same handlers, one router for each kind.
+//! Reading, following, cancelling and deleting jobs, batches, runs and evolutions, with the same handlers for each kind.
+
 use std::convert::Infallible;
 
 use axum::body::Body;
@@ -73,7 +74,7 @@ pub(crate) struct JobEvent {
     version: u64,
 }
 
-/// `GET` and `DELETE` of one piece of work.
+/// Returns `GET` and `DELETE` of one piece of work.
 pub(crate) fn one(kind: Kind) -> OpenApiRouter<AppState> {
     let read = move |Caller(jobs): Caller, Path(id): Path<String>, wait: Wait| async move {
         let id = work_id(kind, &id)?;
@@ -97,21 +98,15 @@ pub(crate) fn one(kind: Kind) -> OpenApiRouter<AppState> {
     let summary = format!("Removes an ended {noun} with its jobs or rows, cases and results.");
     let removing = operation(kind, "delete", &summary, &[ProblemKind::not_ended(kind)])
         .response("204", gone.build());
-    OpenApiRouter::new()
-        .routes(route(kind, "/{id}", HttpMethod::Get, reading, get(read)))
-        .routes(route(
-            kind,
-            "/{id}",
-            HttpMethod::Delete,
-            removing,
-            delete(remove),
-        ))
+    let reading = route(kind, "/{id}", HttpMethod::Get, reading, get(read));
+    let removing = route(kind, "/{id}", HttpMethod::Delete, removing, delete(remove));
+    OpenApiRouter::new().routes(reading).routes(removing)
 }
 
 /// Waits for the end of work if the request asks for it.
 ///
 /// # Errors
-/// There is none with this id, or the key of the request is revoked meanwhile.
+/// The id is unknown, or the key of the request is revoked in the meantime.
 pub(crate) async fn await_end(jobs: &Jobs, id: Uuid, wait: &Wait) -> Result<()> {
     let waited = wait.hold(jobs, async |at_most| jobs.wait_for(id, at_most).await);
     if let Some(ended) = waited.await? {
@@ -120,14 +115,14 @@ pub(crate) async fn await_end(jobs: &Jobs, id: Uuid, wait: &Wait) -> Result<()> 
     Ok(())
 }
 
-/// The forms that the results of batches and runs come in.
+/// Formats of the results of batches and runs.
 pub(crate) const RESULT_FORMATS: &[Format] =
     &[Format::Ndjson, Format::Csv, Format::Arrow, Format::Parquet];
 
-/// Answers with a table that is written as it comes, until the key of the request is revoked. `name` is that of the file.
+/// Returns a response that streams a table, until the key of the request is revoked. `name` is the name of the file.
 ///
 /// # Errors
-/// The table cannot be begun.
+/// The head of the table cannot be written.
 pub(crate) fn table_answer(
     (jobs, key): (Jobs, Option<Extension<Credential>>),
     (format, name): (Format, &str),
@@ -135,12 +130,12 @@ pub(crate) fn table_answer(
     pieces: impl Stream<Item = Result<Piece, WriteError>> + Send + 'static,
 ) -> Result<Response> {
     let text = stream(format, columns, pieces);
-    let text = text.map_err(|error| ApiError::internal(&error))?;
+    let text = text.map_err(ApiError::internal)?;
     let revoked = revoked(jobs, key.map(|Extension(key)| key));
     Ok(format.answer(name, Body::from_stream(until_revoked(text, revoked))))
 }
 
-/// `POST …/cancel`.
+/// Returns `POST …/cancel`.
 pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
     let stop = move |Caller(jobs): Caller, Path(id): Path<String>| async move {
         let work = jobs.of_kind(kind).cancel(work_id(kind, &id)?).await?;
@@ -155,28 +150,19 @@ pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
         "Cancels {}. Parts that have ended keep their results.",
         a(kind)
     );
+    let ended = answer(kind, &format!("The {noun} has ended"));
+    let stopping_soon = answer(kind, "Running solves will stop shortly");
     let stopping = operation(kind, "cancel", &summary, &[])
-        .response(
-            "200",
-            answer(kind, &format!("The {noun} has ended")).build(),
-        )
-        .response(
-            "202",
-            answer(kind, "Running solves will stop shortly").build(),
-        );
-    OpenApiRouter::new().routes(route(
-        kind,
-        "/{id}/cancel",
-        HttpMethod::Post,
-        stopping,
-        post(stop),
-    ))
+        .response("200", ended.build())
+        .response("202", stopping_soon.build());
+    let route = route(kind, "/{id}/cancel", HttpMethod::Post, stopping, post(stop));
+    OpenApiRouter::new().routes(route)
 }
 
-/// `GET …/events`: changes as they happen, as server-sent events.
+/// Returns `GET …/events`, which streams changes as server-sent events.
 ///
-/// Nothing is kept for a client: the next event is made when the connection takes it. The id of an event says what was
-/// seen, so `Last-Event-ID` resumes over lost connections and restarts of the service alike.
+/// The service has no state per client: the next event is created when the connection is ready for it. The id of an event identifies the
+/// version that it reported, so that `Last-Event-ID` resumes after lost connections and after restarts of the service.
 pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
     let follow = move |request: EventRequest, Path(id): Path<String>| async move {
         follow(request, kind, work_id(kind, &id)?).await
@@ -207,13 +193,14 @@ pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
         .parameter(seen)
         .response("200", sent.build())
         .response("204", ResponseBuilder::new().description(over).build());
-    OpenApiRouter::new().routes(route(
+    let route = route(
         kind,
         "/{id}/events",
         HttpMethod::Get,
         following,
         get(follow),
-    ))
+    );
+    OpenApiRouter::new().routes(route)
 }
 
 async fn follow(request: EventRequest, kind: Kind, id: Uuid) -> Result<Response> {
@@ -229,7 +216,7 @@ async fn follow(request: EventRequest, kind: Kind, id: Uuid) -> Result<Response>
     }))
 }
 
-/// The next event, and what has then been seen; nothing after the final one.
+/// Returns the next event and the version that it reports; `None` after the final event.
 async fn next_event(
     jobs: &Jobs,
     id: Uuid,
@@ -251,7 +238,7 @@ async fn next_event(
     Some((Ok(event?), (!ended).then_some(Some(version))))
 }
 
-/// `a job`.
+/// Returns the noun of a kind with its article, such as `a job`.
 fn a(kind: Kind) -> String {
     let article = match kind {
         Kind::Evolution => "an",
@@ -260,7 +247,7 @@ fn a(kind: Kind) -> String {
     format!("{article} {}", kind.noun())
 }
 
-/// The name of the schema of the answer.
+/// Returns the name of the schema of a response.
 pub(crate) fn answer_name(kind: Kind) -> &'static str {
     match kind {
         Kind::Case | Kind::Evolution => "Job",
@@ -273,7 +260,7 @@ fn event_name(kind: Kind) -> String {
     format!("{}EventSent", answer_name(kind))
 }
 
-/// The schemas of what these routes answer.
+/// Returns the schemas of the responses of these routes.
 pub(crate) fn schemas() -> Vec<(String, RefOr<Schema>)> {
     fn add<T: ToSchema>(all: &mut Vec<(String, RefOr<Schema>)>) {
         all.push((T::name().into_owned(), T::schema()));
@@ -295,7 +282,7 @@ pub(crate) fn schemas() -> Vec<(String, RefOr<Schema>)> {
     all
 }
 
-/// An event line by line, called so; its data is the schema `data` as JSON text.
+/// Returns the schema of an event with these names, whose data has the schema `data`.
 pub(crate) fn event_schema(data: &str, names: &str) -> RefOr<Schema> {
     let text = |what: &str| {
         let text = ObjectBuilder::new().schema_type(Type::String);
@@ -320,7 +307,7 @@ pub(crate) fn event_schema(data: &str, names: &str) -> RefOr<Schema> {
     event.into()
 }
 
-/// An operation on one piece of work, which may be unknown.
+/// Returns an operation on one piece of work.
 fn operation(kind: Kind, verb: &str, summary: &str, more: &[ProblemKind]) -> OperationBuilder {
     let id = ObjectBuilder::new()
         .schema_type(Type::String)
@@ -350,14 +337,14 @@ fn answer(kind: Kind, description: &str) -> ResponseBuilder {
         .content(Format::Json.media_type(), content)
 }
 
-/// A header of an answer, a text.
+/// Describes a response header with a text.
 pub(crate) fn text_header(description: &str) -> utoipa::openapi::Header {
     let text = ObjectBuilder::new().schema_type(Type::String);
     let header = HeaderBuilder::new().schema(Some(text));
     header.description(Some(description)).build()
 }
 
-/// A header that a request may have, a text.
+/// Describes an optional request header with a text.
 pub(crate) fn header_parameter(name: &str, about: &str) -> ParameterBuilder {
     ParameterBuilder::new()
         .name(name)
@@ -367,12 +354,12 @@ pub(crate) fn header_parameter(name: &str, about: &str) -> ParameterBuilder {
         .schema(Some(ObjectBuilder::new().schema_type(Type::String)))
 }
 
-/// `Prefer: wait=N` of a request.
+/// Describes `Prefer: wait=N` of a request.
 pub(crate) fn prefer() -> ParameterBuilder {
     header_parameter("Prefer", "`wait=N`, as `?wait=N` (RFC 7240)").example(Some("wait=10".into()))
 }
 
-/// A route below the resource of a kind.
+/// Returns a route below the resource of a kind.
 pub(crate) fn route(
     kind: Kind,
     below: &str,
@@ -386,7 +373,7 @@ pub(crate) fn route(
     (schemas(), paths, handler)
 }
 
-/// One event of the stream, in the contract.
+/// An event of the stream of a tenant, in the contract.
 pub(crate) struct TenantEventSent;
 
 impl PartialSchema for TenantEventSent {

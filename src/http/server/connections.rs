@@ -1,4 +1,4 @@
-//! The open connections of a port: how many there may be, and how long one may wait.
+//! The open connections of a port: limits of their number and of their idle time.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
@@ -15,12 +15,12 @@ use tokio_util::sync::CancellationToken;
 use crate::options::HttpOptions;
 use railhead_jobs::sync::lock;
 
-/// Connections accepted beyond the maximum, which may only ask for the probes.
+/// Number of connections accepted beyond the maximum, on which only the probes are answered.
 const RESERVE: usize = 32;
-/// Largest piece of an answer that is handed to the connection at once, in bytes. Buffered pieces are outside the memory limits.
+/// Largest piece of a response that is passed to the connection at once, in bytes. The memory limits do not count such pieces.
 pub(super) const PIECE_BYTES: usize = 16 << 10;
 
-/// The address that a request comes from, its client's if a trusted proxy passes it on; in its extensions.
+/// The address of the sender of a request, or of its client if a trusted proxy sent it, in the extensions of the request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Peer(pub IpAddr);
 
@@ -35,12 +35,12 @@ static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 ///
 /// A connection is overdue, and closed, if
 /// - its first request head is not complete within [`HttpOptions::first_head_timeout`],
-/// - the next head is not complete within [`HttpOptions::head_timeout`] after the last answer,
-/// - its client takes no piece of its answers for [`HttpOptions::write_timeout`].
+/// - the next head is not complete within [`HttpOptions::head_timeout`] after the last response,
+/// - its client reads no piece of a response for [`HttpOptions::write_timeout`].
 ///
 /// When [`HttpOptions::connections_max`] or [`HttpOptions::address_connections_max`] is reached, a new connection replaces
-/// the one that has waited longest for a head: first those without any request so far, then those kept alive. If all of
-/// them have a request in progress, a few more are accepted for the probes only.
+/// the one that has waited longest for a head: first those without any request so far, then idle ones. If all connections have
+/// active requests, a few more are accepted for the probes only.
 #[derive(Debug)]
 pub(crate) struct Connections {
     max: usize,
@@ -51,7 +51,7 @@ pub(crate) struct Connections {
     open: Mutex<HashMap<u64, Arc<Slot>>>,
 }
 
-/// One open connection; it leaves the table when dropped.
+/// An open connection. It is removed from the table on drop.
 #[derive(Debug)]
 pub(crate) struct Connection {
     slot: Arc<Slot>,
@@ -69,17 +69,17 @@ struct Slot {
 
 #[derive(Debug)]
 struct Activity {
-    /// A request head has been complete.
+    /// Whether a request head has arrived.
     used: bool,
-    /// Requests in progress; several on HTTP/2.
+    /// Number of active requests; HTTP/2 allows several.
     requests: usize,
-    /// Answers with a piece that the client has not taken yet.
+    /// Number of responses with a piece that the client has not read yet.
     unread: usize,
     /// Time of the last change.
     since: Instant,
 }
 
-/// A request in progress, until its answer has been handed over or dropped.
+/// An active request, until its response has been sent or dropped.
 #[derive(Debug)]
 pub(crate) struct ActiveRequest {
     slot: Arc<Slot>,
@@ -98,7 +98,7 @@ impl Connections {
         }
     }
 
-    /// Adds a connection from this address, `limited` in number per address; `None` if the reserve is used up too.
+    /// Adds a connection from this address. `limited` applies the limit per address. Returns `None` if the reserve is used up too.
     pub(crate) fn open(self: &Arc<Self>, address: IpAddr, limited: bool) -> Option<Connection> {
         let network = network(address);
         let mut open = lock(&self.open);
@@ -130,7 +130,7 @@ impl Connections {
         Some(Connection { slot, table })
     }
 
-    /// Closes the connections that are overdue.
+    /// Closes overdue connections.
     pub(crate) fn close_overdue(&self) {
         for slot in lock(&self.open).values() {
             let activity = lock(&slot.activity);
@@ -147,7 +147,7 @@ impl Connections {
     }
 }
 
-/// Closes the connection that has waited longest for a head, among those that count; `false` if there is none.
+/// Closes the connection that has waited longest for a head, among those selected by `counts`. Returns whether there is one.
 fn close_longest_waiting(
     open: &mut HashMap<u64, Arc<Slot>>,
     counts: impl Fn(&Slot) -> bool,
@@ -165,7 +165,7 @@ fn close_longest_waiting(
 }
 
 impl Connection {
-    /// Counts a request whose head is complete.
+    /// Counts a request whose head has arrived.
     pub(crate) fn begin_request(&self) -> ActiveRequest {
         self.slot.change(|activity| {
             activity.used = true;
@@ -202,7 +202,7 @@ impl Slot {
 }
 
 impl ActiveRequest {
-    /// The body of the answer, in small pieces; the request ends when the last one is taken.
+    /// Returns the body of the response in small pieces. The request ends when the last one is read.
     pub(crate) fn send(mut self, body: Body) -> Body {
         self.set_unread(true);
         Body::new(SentBody {
@@ -230,7 +230,7 @@ impl Drop for ActiveRequest {
     }
 }
 
-/// The body of an answer. A piece counts as unread until the connection asks for the next one.
+/// The body of a response. A piece counts as unread until the connection polls the next one.
 struct SentBody {
     body: Body,
     /// Rest of a frame larger than a piece.
@@ -278,7 +278,7 @@ impl HttpBody for SentBody {
     }
 }
 
-/// The network that counts as one address: an IPv6 customer has a whole network of 64 bits.
+/// Returns the network that counts as one address: for IPv6 the /64, which one customer has.
 #[must_use]
 pub(crate) fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {

@@ -1,8 +1,7 @@
-//! Reads the rest of a body whose request has been answered already.
+//! Reads the rest of a body whose request has already been answered.
 //!
-//! A request is refused as soon as that is known, while its body may still be arriving. If the connection were closed at
-//! once, the client would fail while it writes and never read the answer. So the rest is read and discarded. After a
-//! long rest the connection closes, which the answer announces.
+//! A request may be refused while its body is still arriving. If the connection closed at once, the client would fail to write and never
+//! read the response. The rest is therefore read and discarded. After a long rest the connection closes, as the response announces.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex};
@@ -20,16 +19,16 @@ use tokio::time::timeout;
 
 use railhead_jobs::sync::lock;
 
-/// Longest rest in bytes after which the connection is used again.
+/// Longest rest in bytes after which the connection stays open.
 const SHORT_BYTES: u64 = 1 << 20;
 /// Longest rest that is read, in bytes: the largest body that is held in memory by default.
 const REST_BYTES: usize = 64 << 20;
-/// Time for the client to send it.
+/// Time for the client to send the rest.
 const REST_WITHIN: Duration = Duration::from_secs(10);
 
 type BodySlot = Arc<Mutex<Option<Body>>>;
 
-/// Layer that discards the rest of a body; it stands around everything that reads bodies.
+/// Layer around all readers of bodies that discards the rest of a body.
 pub(crate) async fn drain_body(request: Request, next: Next) -> Response {
     if request.body().is_end_stream() {
         return next.run(request).await;
@@ -48,7 +47,7 @@ pub(crate) async fn drain_body(request: Request, next: Next) -> Response {
         }
         if !asks {
             let mut rest = Limited::new(rest, REST_BYTES);
-            // The connection stays open until this ends, so that the client can send on and then read its answer.
+            // The connection stays open until this ends, so that the client can finish sending and then read the response.
             tokio::spawn(timeout(REST_WITHIN, async move {
                 while let Some(Ok(_)) = rest.frame().await {}
             }));
@@ -57,7 +56,7 @@ pub(crate) async fn drain_body(request: Request, next: Next) -> Response {
     response
 }
 
-/// A body that goes into the slot if it is dropped before its end.
+/// A body that moves into the slot if it is dropped before its end.
 struct DrainableBody(Option<Body>, BodySlot);
 
 impl HttpBody for DrainableBody {

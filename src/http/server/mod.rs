@@ -1,4 +1,4 @@
-//! The accept loop: connections, their limits in number and time, and their end.
+//! The accept loop: limits of connections, and graceful shutdown.
 
 pub(super) mod connections;
 pub(super) mod drain_body;
@@ -29,12 +29,12 @@ use crate::server::connections::{Connection, Connections, Peer, ProbesOnly};
 const STREAMS_MAX: u32 = 100;
 /// Time in which the peer of an HTTP/2 connection must answer a ping; hyper's default.
 const PING_WITHIN: Duration = Duration::from_secs(20);
-/// Interval between two looks for overdue connections.
+/// Interval between two searches for overdue connections.
 const SWEEP: Duration = Duration::from_millis(100);
-/// Time for a connection that is closed to announce that to its peer.
+/// Time for announcing the end of a connection to its peer.
 const GOODBYE: Duration = Duration::from_secs(1);
 
-/// Serves a router until `stop`. Then it accepts no more connections, and returns when the open requests have been answered.
+/// Serves a router until `stop` is cancelled. Then it accepts no more connections, and returns when all active requests are answered.
 ///
 /// [`Connections`] states which connections are closed early. The readers of bodies enforce their own timeouts. HTTP/2 is
 /// accepted by prior knowledge (RFC 9113, section 3.3), as proxies use it.
@@ -59,11 +59,11 @@ pub async fn serve(
             // `accept` retries failures of single connections, and pauses while there are no free descriptors.
             accepted = Listener::accept(&mut listener) => accepted,
         };
-        // Events and lines are small and must not wait for more data.
+        // Events and lines are small and must be sent without delay.
         if let Err(error) = stream.set_nodelay(true) {
             tracing::debug!(%error, "TCP_NODELAY could not be set");
         }
-        // A trusted proxy connects for many clients.
+        // A trusted proxy connects on behalf of many clients.
         let mut proxies = options.trusted_proxies.iter();
         let proxy = proxies.any(|range| range.contains(address.ip()));
         let peer = Peer(address.ip());
@@ -84,7 +84,7 @@ pub async fn serve(
 
 fn protocols(options: &HttpOptions) -> Builder<TokioExecutor> {
     let mut builder = Builder::new(TokioExecutor::new());
-    // `Connections` limits the time for heads, also before the version of HTTP is known.
+    // `Connections` limits the time for heads, even before the version of HTTP is known.
     builder.http1().header_read_timeout(None);
     builder
         .http2()
@@ -96,7 +96,7 @@ fn protocols(options: &HttpOptions) -> Builder<TokioExecutor> {
     builder
 }
 
-/// Answers the requests of one connection until it ends or is closed.
+/// Answers the requests of a connection until it ends or must be closed.
 async fn answer(
     builder: Builder<TokioExecutor>,
     stream: TcpStream,
