@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good_with};
 use crate::gap_samples::GapReference;
+use crate::random::Random;
 use crate::reference::{Ellipse, HERTZ_CLASSES, assert_none, cases, median, solve};
 
 const BOUNDS: [&str; 2] = ["elliptic", "parabolic"];
@@ -74,6 +75,36 @@ fn the_stated_class_covers_every_reference_case() {
                 "{bound} {name}: {found:?}"
             );
         }
+    }
+}
+
+#[test]
+fn the_stated_error_covers_random_motions() {
+    for bound in BOUNDS {
+        let mut random = Random(20_261_130);
+        let mut part = || match random.below(3) {
+            0 => 0.0,
+            _ => random.sign() * random.decades(0.1, 10.0),
+        };
+        let motions: Vec<[f64; 3]> = (0..300).map(|_| [part(), part(), part()]).collect();
+        let mut errors = Vec::new();
+        for [x, y, spin] in motions {
+            let shape = Ellipse::steel(random.decades(0.1, 10.0), random.between(0.0, 0.5));
+            let ellipse = shape.normalised(x, y, spin);
+            let mut case = ellipse.case(1, 1);
+            case["solver"] = json!({ "method": "table" });
+            case["outputs"] = json!(["resultants"]);
+            let truth = ellipse.relative(&solve(&case).0.patches[0].points[0]);
+            let found = forces(&ellipse, bound);
+            let off = found.iter().zip(&truth).map(|(f, t)| (f - t).abs());
+            errors.push(off.fold(0.0, f64::max));
+        }
+        errors.sort_by(f64::total_cmp);
+        let covered = errors.iter().filter(|error| **error <= 0.16).count();
+        let (middle, largest) = (median(&errors), errors[errors.len() - 1]);
+        println!("{bound}: {covered} of 300 covered, median {middle:.3}, largest {largest:.3}");
+        assert!(covered >= 282, "{bound}: {covered} of 300");
+        assert!(largest < 0.32, "{bound}: {largest}");
     }
 }
 
@@ -216,7 +247,7 @@ fn nothing_moves_nothing_rubs_and_no_friction_are_exact() {
 #[test]
 fn a_target_below_the_class_is_answered_and_said_to_be_missed() {
     let contact = Ellipse::steel(1.0, 0.28).normalised(0.3, 0.0, 0.4);
-    for (target, met) in [(0.005, false), (0.11, false), (0.13, true)] {
+    for (target, met) in [(0.005, false), (0.15, false), (0.17, true)] {
         let mut case = question(&contact, "elliptic");
         case["solver"]["target_error"] = json!(target);
         let (solution, _) = solve(&case);

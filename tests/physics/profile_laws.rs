@@ -132,6 +132,19 @@ fn friction_lifts_or_presses_a_flange_by_its_direction() {
 }
 
 #[test]
+fn a_wheel_without_creepage_has_no_tractions_where_half_spaces_neglect_the_bend() {
+    let half_space = json!({ "influence": "half_space" });
+    let case = put(&generated(), "contact", half_space);
+    let (still, _) = solve(&moving(&case, 0.0, 0.0, 0.0));
+    let (creeping, _) = solve(&moving(&case, 1e-12, 0.0, 0.0));
+    for (still, creeping) in still.total.iter().zip(&creeping.total) {
+        let off =
+            (still.force_x_n - creeping.force_x_n).hypot(still.force_y_n - creeping.force_y_n);
+        assert!(off < 1e-3, "{still:?} {creeping:?}");
+    }
+}
+
+#[test]
 fn a_wheel_lowered_by_what_a_force_gave_carries_that_force() {
     let mut case = place(&generated(), -5.5, 0.0, 0.0);
     case["friction"] = json!({ "coefficient": 0.0 });

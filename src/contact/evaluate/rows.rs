@@ -403,8 +403,8 @@ fn method_of(checked: &CheckedCase) -> Option<RowMethod> {
                 Resolution::Target(_) => fastsim::MESH,
             };
             let bound = checked.run.traction_bound;
-            let class = fastsim::error_class(bound, size);
-            RowMethod::Fastsim(Box::new(EllipseMesh::new(size, bound).ok()?), class)
+            let error = fastsim::stated_error(size);
+            RowMethod::Fastsim(Box::new(EllipseMesh::new(size, bound).ok()?), error)
         }
         (method, _) => RowMethod::Table {
             auto: method == MethodName::Auto,

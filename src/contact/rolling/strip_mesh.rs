@@ -189,7 +189,8 @@ impl StripMesh {
             normalised: Arc::new(normalised),
             bound,
             layer: task.interface.layer * scale.shear_modulus / scale.length,
-            surface_slip: sum(of_pressure, own_slip),
+            surface_slip: sum(of_pressure, own_slip)
+                .filter(|slip| slip.iter().flatten().any(|part| *part != 0.0)),
             slip_by_motion,
             poisson_ratio,
             precision,

@@ -86,8 +86,8 @@ impl Estimate {
         }
         if task.method == Method::Fastsim {
             // No mesh shows what the theory leaves out.
-            let class = fastsim::error_class(task.traction_bound, finest.mesh.plan.size);
-            found.errors.fill(Some(class));
+            let error = fastsim::stated_error(finest.mesh.plan.size);
+            found.errors.fill(Some(error));
             return Some(found);
         }
         let size = finest.mesh.plan.size;

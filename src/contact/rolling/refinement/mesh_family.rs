@@ -16,6 +16,11 @@ pub const CELLS_MAX: u32 = 2048;
 pub const PATCH_CELLS_MAX_LEAST: f64 = 64.0;
 /// Fewest strips, and fewest cells in a strip, of an adaptive mesh; the meshes below an explicit one may have half as many.
 const SIDE_MIN: f64 = 4.0;
+/// Least cells of the finest mesh over those of the coarsest: an estimate needs two doublings.
+const LAST_OVER_FIRST: f64 = 4.0;
+/// Strips, and cells in a strip, of the coarsest mesh before they are rounded. Each doubling of the cells then adds to both. With fewer, the
+/// meshes of a slender patch have 4 strips one after another, and agree although their strips are too wide.
+const SIDE_FIRST: f64 = 3.6;
 /// Dimensionless spin `φ c G/(μ p_max)` from which meshes gather about the pole of the rigid slip. 1 to 4 change the work by 20 %.
 const SPIN_GRADED: f64 = 2.0;
 /// Distance from the middle of the patch, in half axes, beyond which a pole counts as outside.
@@ -60,10 +65,12 @@ impl MeshFamily {
         } else {
             1.3 * a_over_b.powf(0.3)
         };
+        let patches = patches.len().max(1) as f64;
+        let most = cells_max(patches) / LAST_OVER_FIRST / SIDE_FIRST.powi(2);
         MeshFamily {
-            shape,
+            shape: shape.clamp(1.0 / most, most),
             pole,
-            patches: patches.len().max(1) as f64,
+            patches,
         }
     }
 
@@ -82,14 +89,19 @@ impl MeshFamily {
 
     /// Cells per patch of the coarsest mesh.
     pub fn cells_first(&self) -> f64 {
-        // The estimate needs two changes, from twice and four times as many.
-        CELLS_FIRST.min(self.cells_max() / 4.0)
+        let slender = self.shape.max(1.0 / self.shape);
+        let first = CELLS_FIRST.max(SIDE_FIRST.powi(2) * slender);
+        first.min(self.cells_max() / LAST_OVER_FIRST)
     }
 
     /// Cells per patch of the finest mesh.
     pub fn cells_max(&self) -> f64 {
-        (f64::from(CELLS_MAX) / self.patches).max(PATCH_CELLS_MAX_LEAST)
+        cells_max(self.patches)
     }
+}
+
+fn cells_max(patches: f64) -> f64 {
+    (f64::from(CELLS_MAX) / patches).max(PATCH_CELLS_MAX_LEAST)
 }
 
 /// The point of the only patch about which the tractions of a motion turn, in half axes, if there is one.
