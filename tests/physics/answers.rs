@@ -24,7 +24,7 @@ fn answer(case: &Value) -> Solution {
 fn example(name: &str) -> Value {
     let file = format!(
         "{}/api/examples/{name}.case.json",
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+        concat!(env!("CARGO_MANIFEST_DIR"), "/..")
     );
     serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
 }

@@ -88,7 +88,7 @@ fn kinematics(benchmark: &Value, name: &str, pair: &Value) -> Kinematics {
 
 /// Every file of the folder has the same form; every pair of it is judged.
 fn pairs() -> Vec<(Value, String)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/en15302");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/en15302");
     let mut pairs = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("a file").path();

@@ -125,7 +125,7 @@ fn the_examples_are_reference_cases_sampled_as_a_measurement_is() {
     ] {
         let path = format!(
             "{}/api/examples/{file}",
-            concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+            concat!(env!("CARGO_MANIFEST_DIR"), "/..")
         );
         let text = std::fs::read_to_string(path).expect("an example");
         let question: Value = serde_json::from_str(&text).expect("JSON");

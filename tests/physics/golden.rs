@@ -32,7 +32,7 @@ struct Golden {
 }
 
 fn path() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/data/golden.json")
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/data/golden.json")
 }
 
 fn case(contact: Value, motion: Value, solver: Value) -> Value {
@@ -93,7 +93,7 @@ pub fn cases() -> Vec<(String, Value)> {
     for name in EXAMPLES {
         let file = format!(
             "{}/api/examples/{name}.case.json",
-            concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+            concat!(env!("CARGO_MANIFEST_DIR"), "/..")
         );
         let text = std::fs::read_to_string(file).expect("an example");
         let case = serde_json::from_str(&text).expect("an example is JSON");

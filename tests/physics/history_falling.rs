@@ -138,7 +138,7 @@ fn a_law_without_a_fall_has_the_history_of_its_coefficient() {
 /// The example of `docs/rolling.md` has the forces that are shown there.
 #[test]
 fn the_example_has_the_forces_that_are_shown() {
-    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
     let read = |file: &str| std::fs::read_to_string(format!("{root}/{file}")).unwrap();
     let example: Value = serde_json::from_str(&read("api/examples/rolling.case.json")).unwrap();
     let rolled = json!({

@@ -10,7 +10,7 @@ const BOUND: f64 = 0.3 * 120_000.0;
 fn figure(number: u32, mesh: Option<[u32; 2]>) -> Value {
     let path = format!(
         "{}/api/examples/paper-figure-{number}.case.json",
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+        concat!(env!("CARGO_MANIFEST_DIR"), "/..")
     );
     let text = std::fs::read_to_string(path).expect("an example");
     let mut case: Value = serde_json::from_str(&text).expect("an example is JSON");

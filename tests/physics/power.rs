@@ -65,7 +65,7 @@ fn cells_give_the_power_with_any_method_target_and_contact() {
         }
     }
     for name in ["two-patches", "wheel-rail"] {
-        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
         let file = format!("{root}/api/examples/{name}.case.json");
         let text = std::fs::read_to_string(file).expect("an example");
         let mut case: Value = serde_json::from_str(&text).expect("JSON");

@@ -5,7 +5,7 @@ use railhead_contact::monitor::Unmonitored;
 use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
-const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 fn read(file: &str) -> String {
     std::fs::read_to_string(format!("{ROOT}/{file}")).unwrap_or_else(|error| panic!("{error}"))

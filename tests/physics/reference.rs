@@ -120,7 +120,7 @@ impl SolvedEllipse {
 
 /// Reads a file of `tests/data`.
 pub fn read<T: DeserializeOwned>(name: &str) -> T {
-    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .join("tests/data")
         .join(name);
     let text = std::fs::read_to_string(&path)

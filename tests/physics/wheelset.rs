@@ -287,7 +287,7 @@ fn wheels_that_differ_move_the_equilibrium() {
 fn the_shipped_wheelset_answers_every_position_and_amplitude() {
     let path = concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/../../api/examples/wheelset.case.json"
+        "/../api/examples/wheelset.case.json"
     );
     let text = std::fs::read_to_string(path).expect("an example");
     let case: Value = serde_json::from_str(&text).expect("a case");

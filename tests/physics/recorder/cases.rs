@@ -60,7 +60,7 @@ fn round(value: &mut Value) {
 fn examples() -> Vec<(String, Value)> {
     let folder = format!(
         "{}/api/examples",
-        concat!(env!("CARGO_MANIFEST_DIR"), "/../..")
+        concat!(env!("CARGO_MANIFEST_DIR"), "/..")
     );
     let mut cases = Vec::new();
     for entry in std::fs::read_dir(folder).expect("the examples") {

@@ -37,7 +37,7 @@ const FOUND_ELSEWHERE: f64 = 0.01;
 const ALONE_EVERY: usize = 8;
 
 fn path() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/data/recorded.txt")
+    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/data/recorded.txt")
 }
 
 /// The answer to one case, or why there is none.
