@@ -220,8 +220,11 @@ fn estimates_on_few_given_cells_cover_the_error() {
         let squares = (3..=7).map(|side| [side, side]);
         let single = [[1, 1], [2, 2], [1, 29], [2, 29], [29, 1], [29, 2]];
         let slender = [[3, 40], [4, 40], [5, 40], [24, 3], [40, 4]];
-        for [strips, cells] in squares.chain(single).chain(slender) {
-            let coarse = forces(json!({ "mesh": { "strips": strips, "cells": cells } }));
+        let meshes = squares.chain(single).chain(slender);
+        let of_paper = [[4, 4], [6, 8], [8, 12], [12, 12]].map(|size| ("liu_hsu", size));
+        for (method, [strips, cells]) in meshes.map(|size| ("auto", size)).chain(of_paper) {
+            let mesh = json!({ "strips": strips, "cells": cells });
+            let coarse = forces(json!({ "method": method, "mesh": mesh }));
             for ((found, estimate), (truth, _)) in coarse.iter().zip(&fine) {
                 let within = |k: usize| (found[k] - truth[k]).abs() <= estimate[k];
                 all += 1;

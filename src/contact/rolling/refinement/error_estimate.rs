@@ -94,7 +94,7 @@ impl Estimate {
         let side = size.cells.min(size.strips);
         let alone = f64::from(side).powi(-2);
         let Some(middle) = coarser(solved, solved.len() - 1) else {
-            if task.method == Method::BoundaryElement && side < SIDE_FEW {
+            if side < SIDE_FEW {
                 found.errors.fill(Some(alone));
             }
             return Some(found);

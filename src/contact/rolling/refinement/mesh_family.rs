@@ -131,8 +131,10 @@ fn pole(task: &RollingTask, motion: &Motion) -> Option<[f64; 2]> {
     inside.then(|| place.map(|p| (p / POLE_GRID).round() * POLE_GRID))
 }
 
-/// The meshes that a method takes whatever the motion, coarse to fine: those of half and of a quarter of the cells before an explicit mesh,
-/// the two of Liu and Hsu's method, or the one of the simplified theory. None where the error decides.
+/// Returns the meshes of a method that are the same for every motion, from coarse to fine, or `None` where the error decides.
+///
+/// Before an explicit mesh there are meshes with a quarter of its cells and, for the boundary element method, with half of them. With a target, Liu
+/// and Hsu's method has two meshes, the simplified theory has one.
 pub fn fixed_meshes(resolution: Resolution, method: Method) -> Option<Vec<MeshSize>> {
     let size = |strips, cells| MeshSize { strips, cells };
     match (resolution, method) {
@@ -142,7 +144,12 @@ pub fn fixed_meshes(resolution: Resolution, method: Method) -> Option<Vec<MeshSi
             sizes.dedup();
             Some(sizes)
         }
-        (Resolution::Mesh(size), Method::LiuHsu | Method::Fastsim) => Some(vec![size]),
+        (Resolution::Mesh(finest), Method::LiuHsu) => {
+            let mut sizes = vec![coarser(finest, 4.0), finest];
+            sizes.dedup();
+            Some(sizes)
+        }
+        (Resolution::Mesh(size), Method::Fastsim) => Some(vec![size]),
         (Resolution::Target(_), Method::LiuHsu) => Some(vec![size(6, 12), size(12, 24)]),
         (Resolution::Target(_), Method::Fastsim) => Some(vec![fastsim::MESH]),
         // The table has no mesh.
