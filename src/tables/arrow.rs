@@ -1,4 +1,4 @@
-//! Tables of rows as Arrow: streams that are answered, streams and files that are read.
+//! Reads and writes tables of rows as Arrow: writes streams, reads streams and files.
 
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::sync::Arc;
@@ -16,20 +16,20 @@ use arrow_schema::{ArrowError, DataType, Field, Schema};
 use crate::table::{COLUMNS_MAX, RowTable, TableColumn, TableKind};
 use crate::{DAMAGED, guarded};
 
-/// The bytes that a file begins with; a stream begins otherwise.
+/// The first bytes of a file; a stream begins differently.
 const FILE_MAGIC: &[u8] = b"ARROW1";
 
-/// Writes tables with the same columns as a stream, a batch of records for each.
+/// Writes tables with equal columns as a stream, with a record batch per table.
 pub struct ArrowWriter<W: Write> {
     stream: StreamWriter<W>,
     schema: Arc<Schema>,
 }
 
 impl<W: Write> ArrowWriter<W> {
-    /// A stream of these columns.
+    /// Begins a stream of these columns.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// Writing fails.
     pub fn new(stream: W, columns: &[(String, TableKind)]) -> Result<ArrowWriter<W>, ArrowError> {
         let fields = columns.iter().map(|(name, kind)| match kind {
             TableKind::Integers => Field::new(name, DataType::Int64, false),
@@ -43,10 +43,10 @@ impl<W: Write> ArrowWriter<W> {
         })
     }
 
-    /// Appends a table as a batch of records.
+    /// Appends a table as a record batch.
     ///
     /// # Errors
-    /// It has other columns, or it cannot be written.
+    /// The table has other columns, or writing fails.
     pub fn write(&mut self, table: RowTable) -> Result<(), ArrowError> {
         let columns = table.columns.into_iter().map(|(_, column)| match column {
             TableColumn::Integers(values) => Arc::new(Int64Array::from(values)) as ArrayRef,
@@ -62,7 +62,7 @@ impl<W: Write> ArrowWriter<W> {
         self.stream.write(&batch)
     }
 
-    /// What is written to.
+    /// Returns the underlying writer.
     pub fn inner_mut(&mut self) -> &mut W {
         self.stream.get_mut()
     }
@@ -70,16 +70,16 @@ impl<W: Write> ArrowWriter<W> {
     /// Ends the stream.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// Writing fails.
     pub fn finish(&mut self) -> Result<(), ArrowError> {
         self.stream.finish()
     }
 }
 
-/// Reads the batches of a stream or of a file, one after the other. What it names itself is checked before it is believed.
+/// Reads the record batches of a stream or of a file, one after the other. Damaged bytes are errors.
 ///
 /// # Errors
-/// It is neither.
+/// The source is neither a stream nor a file, or has too many columns.
 pub fn read<R: Read + Seek + Send + 'static>(
     mut source: R,
 ) -> Result<impl Iterator<Item = Result<RowTable, ArrowError>>, ArrowError> {
@@ -107,17 +107,13 @@ pub fn read<R: Read + Seek + Send + 'static>(
         let detail = format!("{columns} columns; at most {COLUMNS_MAX} are allowed");
         return Err(ArrowError::SchemaError(detail));
     }
-    // Nothing more is read behind damage.
+    // Reading ends at the first error.
     let mut batches = Some(batches);
     Ok(std::iter::from_fn(move || {
         let mut reader = batches.take()?;
         let next = guarded(|| {
-            Some(
-                reader
-                    .next()?
-                    .map_err(explained)
-                    .and_then(|batch| table(&batch)),
-            )
+            let batch = reader.next()?.map_err(explained);
+            Some(batch.and_then(|batch| table(&batch)))
         });
         let next = next.unwrap_or_else(|| Some(Err(damaged())));
         if matches!(next, Some(Ok(_))) {
@@ -127,10 +123,10 @@ pub fn read<R: Read + Seek + Send + 'static>(
     }))
 }
 
-/// Batches of records under way.
+/// An iterator over record batches.
 type Batches = Box<dyn Iterator<Item = Result<RecordBatch, ArrowError>> + Send>;
 
-/// An error of the library, in words for the writer of the table.
+/// Replaces an error of the library by one with advice.
 fn explained(error: ArrowError) -> ArrowError {
     match error.to_string().contains("decompression requires") {
         true => ArrowError::IpcError(
@@ -160,7 +156,7 @@ fn column(field: &Field, array: &ArrayRef) -> Result<TableColumn, ArrowError> {
     fn texts<'a>(values: impl Iterator<Item = Option<&'a str>>) -> TableColumn {
         TableColumn::Texts(values.map(|text| text.map(str::to_owned)).collect())
     }
-    #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+    #[expect(clippy::cast_precision_loss, reason = "numbers of a case have 64 bits")]
     Ok(match array.data_type() {
         DataType::Float64 => numbers::<Float64Type>(array, |value| value),
         DataType::Float32 => numbers::<Float32Type>(array, f64::from),

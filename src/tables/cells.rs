@@ -1,4 +1,4 @@
-//! Values per cell of a mesh, or on a grid of samples, as columns.
+//! Tables of values per cell of a mesh, or on a grid of samples.
 
 use railhead_contact::solution::words::answer::Zone;
 
@@ -7,16 +7,16 @@ use crate::csv::{Precision, write_number};
 /// Named columns of equal length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellTable {
-    /// Whether a row is a cell or a sample of a grid.
+    /// Cells, or samples of a grid.
     pub rows: CellRows,
-    /// Its columns; on a grid without those of the axes.
+    /// The columns, without the axes of a grid.
     pub columns: Vec<CellColumn>,
-    /// How exactly its numbers are written.
+    /// Precision of written numbers.
     pub precision: Precision,
 }
 
 impl CellTable {
-    /// Number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn row_count(&self) -> usize {
         match &self.rows {
@@ -25,7 +25,7 @@ impl CellTable {
         }
     }
 
-    /// The names of the columns, those of the axes first.
+    /// Returns the names of the columns, the axes of a grid first.
     #[must_use]
     pub fn names(&self) -> Vec<&'static str> {
         let axes: &[&str] = match self.rows {
@@ -36,7 +36,7 @@ impl CellTable {
         axes.iter().copied().chain(columns).collect()
     }
 
-    /// The place of the value of a row within a column of [`CellTable::names`].
+    /// Returns the index of the value of a row in a column of [`CellTable::names`].
     pub fn index(&self, column: usize, row: usize) -> usize {
         match (&self.rows, column) {
             (CellRows::Grid { x_mm, .. }, 0) => row % x_mm.len(),
@@ -45,7 +45,7 @@ impl CellTable {
         }
     }
 
-    /// Writes a value of a column of [`CellTable::names`], `none` where there is none; zones between quotes.
+    /// Appends a value of a column of [`CellTable::names`]: `none` for a missing value, a zone between two `quote`.
     pub fn write(&self, out: &mut String, column: usize, index: usize, [none, quote]: [&str; 2]) {
         let place = match (&self.rows, column) {
             (CellRows::Grid { x_mm, .. }, 0) => {
@@ -67,13 +67,13 @@ impl CellTable {
         }
     }
 
-    /// Size in memory in bytes.
+    /// Returns the size in memory in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.row_count() * self.columns.len() * size_of::<f64>()
     }
 
-    /// The numbers of a column.
+    /// Returns the numbers of a column.
     pub fn numbers(&self, name: &str) -> Option<&[f64]> {
         self.columns.iter().find_map(|column| match &column.data {
             CellData::Numbers(values) if column.name == name => Some(&**values),
@@ -82,10 +82,10 @@ impl CellTable {
     }
 }
 
-/// Whether the rows of a table are cells of a mesh or samples of a grid.
+/// The rows of a table: cells of a mesh, or samples of a grid.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CellRows {
-    /// One row per cell. The columns [`PLACES`] and `strip` say where the cell lies.
+    /// One row per cell. The columns [`PLACES`] and `strip` give its position.
     Cells,
     /// One row per sample of a regular grid, x running fastest.
     Grid {
@@ -96,13 +96,13 @@ pub enum CellRows {
     },
 }
 
-/// The columns with the centre and the width of a cell.
+/// The columns with centre and width of a cell.
 pub const PLACES: [&str; 4] = ["x_mm", "y_mm", "dx_mm", "dy_mm"];
 
-/// One value per row.
+/// A column with a value per row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellColumn {
-    /// Name of the column, equal in all formats.
+    /// The name, equal in all formats.
     pub name: &'static str,
     /// The values.
     pub data: CellData,
@@ -119,7 +119,7 @@ pub enum CellData {
     Zones(Vec<Option<Zone>>),
 }
 
-/// The number of a zone where a format has no words: 0 stick, 1 slip, -1 outside the patch.
+/// Returns the code of a zone in formats without words: 0 stick, 1 slip, -1 outside the patch.
 #[must_use]
 pub fn zone_code(zone: Option<Zone>) -> i8 {
     match zone {

@@ -1,4 +1,4 @@
-//! CSV (RFC 4180): a header with the names, one line per row.
+//! Writes CSV (RFC 4180): a line of names, then a line per row.
 
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -7,31 +7,31 @@ use std::ops::Range;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// How exactly numbers are written.
+/// Precision of written numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Precision {
-    /// As they were computed: 64 bits.
+    /// 64 bits.
     #[default]
     Double,
-    /// 32 bits, some seven digits: enough for pictures, and half as large.
+    /// 32 bits, about seven digits, which are enough for pictures.
     Single,
 }
 
-/// The line with the names of the columns.
+/// Returns the line with the names of the columns.
 ///
 /// # Errors
-/// Never, as memory takes all that is written.
+/// Never, because writing to memory does not fail.
 pub fn head<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Vec<u8>, csv::Error> {
     let mut out = csv::Writer::from_writer(Vec::new());
     out.write_record(names.into_iter().map(|name| text_field(name).into_owned()))?;
     finish(out)
 }
 
-/// Some lines, whose fields `write` makes of column and row.
+/// Returns the lines of these rows; `write` appends the field of a column and a row.
 ///
 /// # Errors
-/// Never, as memory takes all that is written.
+/// Never, because writing to memory does not fail.
 pub fn lines(
     columns: usize,
     rows: Range<usize>,
@@ -50,12 +50,12 @@ pub fn lines(
     finish(out)
 }
 
-/// A text of a client as a field of a table. Spreadsheets run a text that begins like a formula, even behind blanks, tabs or line breaks; a
-/// leading apostrophe marks it as text. Numbers are written as they are.
+/// Returns a text of a client as a field. Spreadsheets evaluate a text that begins like a formula, even after white space; a leading
+/// apostrophe marks it as text. Numbers are not marked.
 #[must_use]
 pub fn text_field(text: &str) -> Cow<'_, str> {
     let begin = text.trim_start_matches(|mark: char| mark.is_whitespace() || mark.is_control());
-    // Spreadsheets take the wide forms for the same signs.
+    // Spreadsheets accept full-width forms of these characters.
     let formula = begin.starts_with(['=', '+', '-', '@', '＝', '＋', '－', '＠']);
     match formula && !is_number(text) {
         true => Cow::Owned(format!("'{text}")),
@@ -63,30 +63,26 @@ pub fn text_field(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// Digits with a sign, a point or a comma, and an exponent.
+/// Whether a text is a number with a decimal point or comma.
 fn is_number(text: &str) -> bool {
     let digits = |mark: char| mark.is_ascii_digit() || "+-.,eE".contains(mark);
     let text = text.trim();
     text.chars().all(digits) && text.replacen(',', ".", 1).parse::<f64>().is_ok()
 }
 
-/// What was written.
-///
-/// # Errors
-/// None that memory does not have.
 fn finish(out: csv::Writer<Vec<u8>>) -> Result<Vec<u8>, csv::Error> {
     out.into_inner()
         .map_err(|error| csv::Error::from(error.into_error()))
 }
 
-/// The nearest number of 32 bits; NaN stays NaN.
+/// Returns the nearest 32-bit number; NaN for NaN.
 #[must_use]
-#[expect(clippy::cast_possible_truncation, reason = "that is what is asked for")]
+#[expect(clippy::cast_possible_truncation, reason = "rounding is intended")]
 pub fn single(value: f64) -> f32 {
     value as f32
 }
 
-/// Writes the shortest digits that are read as the same number, or `none` where there is none.
+/// Appends the shortest digits that parse to the same number, or `none` for a number that is not finite.
 pub fn write_number(text: &mut String, number: f64, precision: Precision, none: &str) {
     // Writing to a string does not fail.
     let _ = match precision {

@@ -1,19 +1,19 @@
-//! Why a table of a client is refused.
+//! Errors of reading tables.
 
 use std::io;
 
-/// Why a table cannot be read.
+/// An error of reading a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// The table is not of its form, or some of its columns are faulty.
+    /// The table is malformed, or some of its columns are faulty.
     #[error("{detail}")]
     Faulty {
-        /// The whole refusal.
+        /// Description of the error.
         detail: String,
-        /// Each faulty column by its title, with its fault.
+        /// Title and fault of each faulty column.
         columns: Vec<(String, String)>,
     },
-    /// The table is larger than allowed, packed or unpacked.
+    /// The table is larger than allowed, compressed or decompressed.
     #[error("{0}")]
     TooLarge(String),
     /// The source of the table, such as a file, cannot be read.
@@ -21,10 +21,10 @@ pub enum TableError {
     Source(#[from] io::Error),
 }
 
-/// The result of a call that reads a table.
+/// The result of reading a table.
 pub type Result<T, E = TableError> = std::result::Result<T, E>;
 
-/// The refusal of a table as a whole.
+/// Returns the error of a malformed table.
 pub fn faulty(detail: impl Into<String>) -> TableError {
     TableError::Faulty {
         detail: detail.into(),
@@ -32,7 +32,7 @@ pub fn faulty(detail: impl Into<String>) -> TableError {
     }
 }
 
-/// The refusal of an archive that is larger than this, packed or unpacked.
+/// Returns the error of an archive that is larger than this, compressed or decompressed.
 #[must_use]
 pub fn too_large(max_bytes: usize) -> TableError {
     TableError::TooLarge(format!(

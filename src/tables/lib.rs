@@ -1,13 +1,14 @@
-//! Tables of the service: columns of numbers and texts, read and written.
+//! Reads and writes tables: columns of numbers and texts.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`table`] | a table in memory |
-//! | [`titles`] | what the titles of columns mean: pointers, short names, quantities with units |
-//! | [`read`] | tables of clients in any form, some rows at a time |
-//! | [`write`](mod@write) | tables of rows in any form |
+//! | [`titles`] | titles of columns: pointers, short names, quantities with units |
+//! | [`read`] | reads tables in any format, some rows at a time |
+//! | [`write`](mod@write) | writes tables of rows in any format |
 //! | [`cells`] | values per cell or on a grid of samples |
-//! | [`arrow`], [`csv`], [`npz`], [`parquet`], [`vtk`] | one form each; [`text`] reads CSV and NDJSON |
+//! | [`arrow`], [`csv`], [`npz`], [`parquet`], [`vtk`] | one format each; [`text`] reads CSV and NDJSON |
+//! | [`strict_json`] | JSON without repeated members |
 
 #![warn(unreachable_pub)]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
@@ -29,10 +30,10 @@ pub mod write;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Calls a library that may panic at damaged bytes; `None` if it panics.
+/// Calls a library that may panic on damaged bytes; `None` if it panics.
 fn guarded<T>(read: impl FnOnce() -> T) -> Option<T> {
     catch_unwind(AssertUnwindSafe(read)).ok()
 }
 
-/// Reason for bytes at which a library panicked.
+/// Error for bytes on which a library panicked.
 const DAMAGED: &str = "the bytes are damaged";

@@ -1,8 +1,8 @@
-//! NPZ: a ZIP archive with one NPY array per name, as `numpy.savez` writes and `numpy.load` reads it.
+//! Reads and writes NPZ: a ZIP archive with an NPY array per name, as `numpy.savez` writes and `numpy.load` reads it.
 //!
 //! NPY (numpy.lib.format): `\x93NUMPY`, the version, the length of the header, a Python literal with type and shape, padded with blanks so that
-//! the values begin at a multiple of 64 bytes, then the values in C order. Tables that are read have one axis per column. Values per cell that
-//! are written have one axis, too; on a grid the axes `x_mm` and `y_mm` have one, the values the shape `(y, x)`.
+//! the values begin at a multiple of 64 bytes, then the values in C order. Columns of tables have one axis. Values on a grid have the shape
+//! `(y, x)`.
 
 use std::io::{Cursor, Read, Write};
 
@@ -17,13 +17,13 @@ use crate::csv::{Precision, single};
 use crate::error::{Result, faulty, too_large};
 use crate::titles::require_few;
 
-/// The types of numbers that are read.
+/// Description of the accepted types of numbers.
 const KINDS: &str = "float32, float64, or integers";
 
-/// The arrays of an archive with their names, all of one length.
+/// Reads the arrays of an archive, which must have equal lengths.
 ///
 /// # Errors
-/// `faulty-table` with the array; `body-too-large`: unpacked they have more than `max_bytes`.
+/// `faulty-table` with the name of the array; `body-too-large`: the arrays have more than `max_bytes` bytes.
 pub(crate) fn read_arrays(data: Bytes, max_bytes: usize) -> Result<Vec<(String, Vec<f64>)>> {
     let unread =
         |error: &dyn std::fmt::Display| faulty(format!("the NPZ archive cannot be read: {error}"));
@@ -36,7 +36,7 @@ pub(crate) fn read_arrays(data: Bytes, max_bytes: usize) -> Result<Vec<(String, 
         let name = file.name().map_err(|error| unread(&error))?;
         let name = name.trim_end_matches(".npy").to_owned();
         let mut bytes = Vec::new();
-        // One byte more than is allowed tells that there is more.
+        // Reading one byte more than allowed detects a larger array.
         let mut limited = file.take(left + 1);
         limited
             .read_to_end(&mut bytes)
@@ -59,7 +59,7 @@ pub(crate) fn read_arrays(data: Bytes, max_bytes: usize) -> Result<Vec<(String, 
     Ok(columns)
 }
 
-/// The numbers of an NPY file.
+/// Reads the numbers of an NPY file.
 fn array(file: &[u8]) -> Result<Vec<f64>, String> {
     let broken = || "this is not an NPY file".to_owned();
     let rest = file.strip_prefix(b"\x93NUMPY").ok_or_else(broken)?;
@@ -68,10 +68,8 @@ fn array(file: &[u8]) -> Result<Vec<f64>, String> {
     };
     let wide = if *version == 1 { 2 } else { 4 };
     let (length, rest) = rest.split_at_checked(wide).ok_or_else(broken)?;
-    let length = length
-        .iter()
-        .rev()
-        .fold(0_usize, |sum, byte| (sum << 8) + usize::from(*byte));
+    let bytes = length.iter().rev();
+    let length = bytes.fold(0, |sum, byte| (sum << 8) + usize::from(*byte));
     let (header, values) = rest.split_at_checked(length).ok_or_else(broken)?;
     let header = String::from_utf8_lossy(header);
     let after = |key: &str| {
@@ -106,11 +104,11 @@ fn array(file: &[u8]) -> Result<Vec<f64>, String> {
     }
 }
 
-/// Numbers of an NPY type, such as `<f8`.
+/// Decodes numbers of an NPY type, such as `<f8`.
 #[expect(
     clippy::cast_precision_loss,
     clippy::cast_lossless,
-    reason = "one expression for every type; as every number of a case"
+    reason = "one expression for every type; numbers of a case have 64 bits"
 )]
 fn decoded(kind: &str, bytes: &[u8]) -> Option<Vec<f64>> {
     macro_rules! numbers {
@@ -135,19 +133,19 @@ fn decoded(kind: &str, bytes: &[u8]) -> Option<Vec<f64>> {
     })
 }
 
-/// The length of an NPY header, with the parts before it, is a multiple of this.
+/// The values begin at a multiple of this number of bytes.
 const ALIGNMENT: usize = 64;
-/// Bytes before the header: mark, version, length.
+/// Bytes before the header: magic number, version, length.
 const BEFORE_HEADER: usize = 10;
 
 /// Closed polygons, each a list of corners `[x, y]` in mm.
 pub type Polygons = Vec<Vec<[f64; 2]>>;
 
-/// Writes a table and its named outlines: `outline_patch_mm` has the corners of all polygons around the patch, `outline_patch_start` the place of
-/// the first corner of each, and so for other names. Zones are `int8`: 0 stick, 1 slip, -1 outside the patch; other values outside are NaN.
+/// Writes a table and its named outlines. For the name `patch`, `outline_patch_mm` has the corners of all polygons, and `outline_patch_start` the
+/// index of the first corner of each. Zones are `int8`: 0 stick, 1 slip, -1 outside the patch; other values outside are NaN.
 ///
 /// # Errors
-/// The archive would be larger than the format allows.
+/// The archive is larger than the format allows.
 pub fn write(table: &CellTable, outlines: &[(&str, &Polygons)]) -> ZipResult<Vec<u8>> {
     let mut archive = Archive {
         zip: ZipWriter::new(Cursor::new(Vec::new())),
@@ -185,15 +183,15 @@ pub fn write(table: &CellTable, outlines: &[(&str, &Polygons)]) -> ZipResult<Vec
     Ok(archive.zip.finish()?.into_inner())
 }
 
-/// Writes answers to rows: an array for each column of numbers, NaN where a row has none, and `status` as text.
+/// Writes results of rows: an array per column of numbers, NaN if a row has none, and `status` as text.
 ///
 /// # Errors
-/// The archive would be larger than the format allows.
+/// The archive is larger than the format allows.
 pub fn write_rows(answer: &RowsAnswer) -> ZipResult<Vec<u8>> {
     let mut archive = Archive {
         zip: ZipWriter::new(Cursor::new(Vec::new())),
         precision: Precision::Double,
-        // Digits of measured forces do not pack.
+        // Computed numbers hardly compress.
         method: CompressionMethod::Stored,
     };
     let rows = answer.status.len();
@@ -202,7 +200,7 @@ pub fn write_rows(answer: &RowsAnswer) -> ZipResult<Vec<u8>> {
     }
     let names = answer.status.iter().map(|status| status.name());
     let longest = names.clone().map(str::len).max().unwrap_or(1);
-    // NumPy's text: four bytes for each character, filled up with zeros.
+    // Texts of NumPy have four bytes per character, padded with zeros.
     let mut texts = Vec::with_capacity(4 * longest * rows);
     for name in names {
         let begin = texts.len();
@@ -234,7 +232,7 @@ impl Archive {
         }
     }
 
-    /// The corners of all polygons, and the place of the first corner of each.
+    /// Adds the corners of all polygons, and the index of the first corner of each.
     fn outline(&mut self, name: &str, polygons: &[Vec<[f64; 2]>]) -> ZipResult<()> {
         let corners: Vec<f64> = polygons.iter().flatten().flatten().copied().collect();
         let shape = [corners.len() / 2, 2];
@@ -254,7 +252,7 @@ impl Archive {
     }
 
     fn add(&mut self, name: &str, kind: &str, shape: &[usize], values: &[u8]) -> ZipResult<()> {
-        // The time of an entry stays that of the format's epoch: equal fields are equal files.
+        // Entries have the default time, so that equal fields give equal files.
         let options = SimpleFileOptions::default().compression_method(self.method);
         self.zip.start_file(format!("{name}.npy"), options)?;
         self.zip.write_all(&npy_header(kind, shape))?;
@@ -263,10 +261,10 @@ impl Archive {
     }
 }
 
-/// Everything of an NPY file before its values.
+/// Returns the bytes of an NPY file before its values.
 fn npy_header(kind: &str, shape: &[usize]) -> Vec<u8> {
     let axes: Vec<String> = shape.iter().map(ToString::to_string).collect();
-    // A Python tuple of one needs its comma.
+    // A Python tuple with one element ends in a comma.
     let comma = if axes.len() == 1 { "," } else { "" };
     let mut literal = format!(
         "{{'descr': '{kind}', 'fortran_order': False, 'shape': ({}{comma}), }}",

@@ -1,6 +1,6 @@
-//! Tables of rows as Parquet: how the rows of a run are stored, and how clients may send them.
+//! Reads and writes tables of rows as Parquet, which is also the format of stored rows of runs.
 //!
-//! Flat columns. Numbers and texts that a row does not have are null.
+//! Columns are flat. Missing numbers and texts are null.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -22,14 +22,14 @@ use parquet::schema::types::{ColumnDescriptor, Type};
 use crate::table::{RowTable, TableColumn, TableKind};
 use crate::{DAMAGED, guarded};
 
-/// Rows of one group that are read at most; writers make groups of 10⁵ or 10⁶ rows.
+/// Most rows of a row group; common writers make groups of 10⁵ or 10⁶ rows.
 const GROUP_ROWS_MAX: usize = 1 << 21;
-/// Values of one group that are read at most, over all columns. A file may say in a few bytes that one value stands in all rows.
+/// Most values of a row group, over all columns. A few bytes of a file can encode one value for all rows.
 const GROUP_VALUES_MAX: usize = 1 << 24;
-/// Bytes of the texts of one column of a group at most.
+/// Most bytes of the texts of a column of a row group.
 const TEXT_BYTES_MAX: usize = 1 << 27;
 
-/// The codecs of columns that are read. GZIP and Brotli are not among them, because the library does not limit the size of an unpacked page.
+/// The accepted codecs. GZIP and Brotli are not accepted, because the library does not limit the size of a decompressed page.
 const CODECS: [CompressionCodec; 4] = [
     CompressionCodec::UNCOMPRESSED,
     CompressionCodec::SNAPPY,
@@ -37,17 +37,17 @@ const CODECS: [CompressionCodec; 4] = [
     CompressionCodec::LZ4_RAW,
 ];
 
-/// The bytes that a file begins and ends with.
+/// The first and last bytes of a file.
 pub const MAGIC: &[u8] = b"PAR1";
 
-/// Writes tables with the same columns, a group of rows for each.
+/// Writes tables with equal columns, with a row group per table.
 pub struct TableWriter<W: Write + Send>(SerializedFileWriter<W>);
 
 impl<W: Write + Send> TableWriter<W> {
-    /// A file with these columns.
+    /// Begins a file with these columns.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// Writing fails.
     pub fn new(file: W, columns: &[(String, TableKind)]) -> Result<TableWriter<W>> {
         let fields = columns.iter().map(|(name, kind)| field(name, *kind));
         let schema = Type::group_type_builder("rows")
@@ -71,10 +71,10 @@ impl<W: Write + Send> TableWriter<W> {
         )?))
     }
 
-    /// Appends a table as a group of rows.
+    /// Appends a table as a row group.
     ///
     /// # Errors
-    /// It has other columns, or it cannot be written.
+    /// The table has other columns, or writing fails.
     pub fn write(&mut self, table: &RowTable) -> Result<()> {
         let mut group = self.0.next_row_group()?;
         for (_, column) in &table.columns {
@@ -95,15 +95,10 @@ impl<W: Write + Send> TableWriter<W> {
                     typed.write_batch(&values, Some(&levels), None)?;
                 }
                 TableColumn::Texts(values) => {
-                    let levels: Vec<i16> = values
-                        .iter()
-                        .map(|text| i16::from(text.is_some()))
-                        .collect();
-                    let values: Vec<ByteArray> = values
-                        .iter()
-                        .flatten()
-                        .map(|text| ByteArray::from(text.as_str()))
-                        .collect();
+                    let levels = values.iter().map(|text| i16::from(text.is_some()));
+                    let levels: Vec<i16> = levels.collect();
+                    let values = values.iter().flatten();
+                    let values: Vec<ByteArray> = values.map(|text| text.as_str().into()).collect();
                     let typed = writer.typed::<ByteArrayType>();
                     typed.write_batch(&values, Some(&levels), None)?;
                 }
@@ -114,7 +109,7 @@ impl<W: Write + Send> TableWriter<W> {
         Ok(())
     }
 
-    /// What is written to.
+    /// Returns the underlying writer.
     pub fn inner_mut(&mut self) -> &mut W {
         self.0.inner_mut()
     }
@@ -122,7 +117,7 @@ impl<W: Write + Send> TableWriter<W> {
     /// Ends the file.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// Writing fails.
     pub fn finish(&mut self) -> Result<()> {
         self.0.finish().map(drop)
     }
@@ -141,10 +136,10 @@ fn field(name: &str, kind: TableKind) -> Result<Arc<Type>> {
     field.build().map(Arc::new)
 }
 
-/// A table as one file.
+/// Returns a file with one table.
 ///
 /// # Errors
-/// It cannot be written.
+/// Writing fails.
 pub fn encode(table: &RowTable) -> Result<Vec<u8>> {
     let mut file = Vec::new();
     let mut writer = TableWriter::new(&mut file, &table.kinds())?;
@@ -154,33 +149,33 @@ pub fn encode(table: &RowTable) -> Result<Vec<u8>> {
     Ok(file)
 }
 
-/// Reads flat files.
+/// Reads a file with flat columns.
 pub struct TableReader<R: ChunkReader + 'static>(SerializedFileReader<R>);
 
 impl<R: ChunkReader + 'static> TableReader<R> {
     /// Opens a file.
     ///
     /// # Errors
-    /// It is no Parquet file.
+    /// The file is not a Parquet file.
     pub fn new(file: R) -> Result<TableReader<R>> {
         let opened = guarded(|| SerializedFileReader::new(file));
         opened.unwrap_or_else(|| Err(damaged())).map(TableReader)
     }
 
-    /// Number of groups of rows.
+    /// Returns the number of row groups.
     #[must_use]
     pub fn groups(&self) -> usize {
         self.0.num_row_groups()
     }
 
-    /// Number of rows of a group, and its size once it is unpacked.
+    /// Returns the number of rows of a row group, and its decompressed size in bytes.
     #[must_use]
     pub fn group_size(&self, group: usize) -> (i64, i64) {
         let about = self.0.metadata().row_group(group);
         (about.num_rows(), about.total_byte_size())
     }
 
-    /// Names of the columns.
+    /// Returns the names of the columns.
     #[must_use]
     pub fn names(&self) -> Vec<String> {
         let schema = self.0.metadata().file_metadata().schema_descr();
@@ -188,10 +183,10 @@ impl<R: ChunkReader + 'static> TableReader<R> {
         columns.map(|column| column.path().string()).collect()
     }
 
-    /// A group of rows: the columns that `wanted` says, in the order of the file.
+    /// Reads the columns of a row group whose names `wanted` accepts, in the order of the file.
     ///
     /// # Errors
-    /// A column is neither number nor text, nested, or cannot be read.
+    /// A column is neither of numbers nor of texts, or is nested, or cannot be read.
     pub fn read(&self, group: usize, wanted: impl Fn(&str) -> bool) -> Result<RowTable> {
         guarded(|| self.read_group(group, wanted)).unwrap_or_else(|| Err(damaged()))
     }
@@ -267,22 +262,22 @@ impl<R: ChunkReader + 'static> TableReader<R> {
     }
 }
 
-/// How the stored values of a column become numbers.
+/// The meaning of the stored values of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Meaning {
-    /// The values themselves.
+    /// The stored values.
     Plain,
-    /// Integers without a sign.
+    /// Unsigned integers.
     Unsigned,
-    /// Integers, divided by this power of ten.
+    /// Integers that are divided by this power of ten.
     Decimal(i32),
 }
 
 impl Meaning {
-    /// By the logical type of a column.
+    /// Returns the meaning by the logical type of a column.
     ///
     /// # Errors
-    /// It holds dates or times, which are no numbers of a case.
+    /// The column holds dates or times.
     fn of(column: &ColumnDescriptor) -> Result<Meaning> {
         use ConvertedType as Old;
         let logical = column.logical_type_ref();
@@ -311,8 +306,8 @@ impl Meaning {
         }
     }
 
-    /// The number of a stored integer of so many bits.
-    #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+    /// Converts a stored integer of this many bits.
+    #[expect(clippy::cast_precision_loss, reason = "numbers of a case have 64 bits")]
     fn number(self, stored: i128, bits: u32) -> f64 {
         match self {
             Meaning::Plain => stored as f64,
@@ -321,7 +316,7 @@ impl Meaning {
         }
     }
 
-    /// The number of a decimal in two's complement, the largest byte first.
+    /// Converts a big-endian decimal in two's complement.
     fn decimal(self, bytes: &[u8]) -> f64 {
         let Some(first) = bytes.first().filter(|_| bytes.len() <= size_of::<i128>()) else {
             return f64::NAN;
@@ -338,7 +333,7 @@ fn damaged() -> ParquetError {
     ParquetError::General(DAMAGED.to_owned())
 }
 
-/// The values of a column, each if it is there.
+/// Reads the values of a column; `None` for null.
 fn read<T: DataType>(mut reader: ColumnReaderImpl<T>, rows: usize) -> Result<Vec<Option<T::T>>> {
     let (mut values, mut levels) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
     let mut repeated = Vec::new();
@@ -368,12 +363,12 @@ fn numbers<T>(values: Vec<Option<T>>, number: impl Fn(T) -> f64) -> TableColumn 
     TableColumn::Numbers(values.into_iter().map(number).collect())
 }
 
-/// Whole numbers, or plain ones if some are missing.
+/// Reads integers; a column with nulls becomes one of numbers.
 fn integers(reader: ColumnReaderImpl<Int64Type>, rows: usize) -> Result<TableColumn> {
     let values = read::<Int64Type>(reader, rows)?;
     Ok(match values.iter().copied().collect::<Option<Vec<i64>>>() {
         Some(all) => TableColumn::Integers(all),
-        #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+        #[expect(clippy::cast_precision_loss, reason = "numbers of a case have 64 bits")]
         None => numbers(values, |value| value as f64),
     })
 }
@@ -387,13 +382,9 @@ fn texts(reader: ColumnReaderImpl<ByteArrayType>, rows: usize) -> Result<TableCo
         );
         return Err(ParquetError::General(detail));
     }
-    let text = |value: Option<ByteArray>| {
-        value
-            .map(|bytes| bytes.as_utf8().map(str::to_owned))
-            .transpose()
-    };
-    let texts: Result<Vec<Option<String>>> = values.into_iter().map(text).collect();
-    texts.map(TableColumn::Texts)
+    let text = |bytes: ByteArray| bytes.as_utf8().map(str::to_owned);
+    let texts = values.into_iter().map(|value| value.map(text).transpose());
+    texts.collect::<Result<_>>().map(TableColumn::Texts)
 }
 
 #[cfg(test)]

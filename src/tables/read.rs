@@ -1,4 +1,4 @@
-//! Tables of rows in every form that requests send them in: runs, batches and evaluations read them here.
+//! Reads tables of rows in every format of requests: runs, batches and evaluations.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read, Seek};
@@ -16,33 +16,33 @@ use crate::table::{Chunk, RowTable, TableColumn, TableKind, Title};
 use crate::text::{CsvRows, JsonRows};
 use crate::titles::{NamedColumns, TitledColumn, require_few};
 
-/// Largest group of rows of a Parquet file, unpacked, in bytes.
+/// Largest row group of a Parquet file, decompressed, in bytes.
 const GROUP_BYTES_MAX: i64 = 1 << 28;
 
 /// Longest row of a CSV table, in bytes.
 const ROW_BYTES_MAX: usize = 1 << 20;
 
-/// The form of a table.
+/// The format of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableForm {
-    /// A line for each row, the first names the columns.
+    /// CSV, whose first line names the columns.
     Csv,
-    /// An object for each row, one in a line.
+    /// NDJSON, an object per row.
     Ndjson,
     /// An Arrow stream or file.
     Arrow,
     /// A Parquet file.
     Parquet,
-    /// NumPy's archive of arrays.
+    /// An archive of NumPy arrays.
     Npz,
 }
 
 impl TableForm {
-    /// The forms in words, for the fault of a request in none of them.
+    /// Description of the formats, for the refusal of another one.
     pub const ALLOWED: &str = "a table with `text/csv`, `application/x-ndjson`, `application/vnd.apache.arrow.stream`, \
                                `application/vnd.apache.parquet` or `application/x-npz`, or a template and a table with `multipart/form-data`";
 
-    /// The form of this media type.
+    /// Returns the format of a media type.
     #[must_use]
     pub fn of(essence: &str) -> Option<TableForm> {
         Some(match essence {
@@ -59,7 +59,7 @@ impl TableForm {
         })
     }
 
-    /// The values may take far more bytes than the table.
+    /// Whether the format is compressed, so that the values may have many more bytes than the table.
     #[must_use]
     pub fn packed(self) -> bool {
         matches!(self, TableForm::Parquet | TableForm::Npz)
@@ -69,13 +69,13 @@ impl TableForm {
 /// The bytes of a table.
 #[derive(Debug)]
 pub enum TableSource {
-    /// In a file, from its beginning.
+    /// A file, at its beginning.
     File(File),
-    /// In memory.
+    /// Bytes in memory.
     Memory(Bytes),
 }
 
-/// A source of tables.
+/// A seekable source.
 trait Seekable: BufRead + Seek + Send {}
 
 impl<T: BufRead + Seek + Send> Seekable for T {}
@@ -89,7 +89,7 @@ impl TableSource {
     }
 }
 
-/// A table, read some rows at a time.
+/// A table that is read some rows at a time.
 pub struct TableRows {
     /// The titles of the columns.
     pub titles: Vec<Title>,
@@ -113,10 +113,10 @@ impl Iterator for TableRows {
 }
 
 impl TableRows {
-    /// Begins to read a table. Blocks, as reading its rows does. An archive of arrays is held in memory as a whole, with at most `unpacked_max` bytes.
+    /// Opens a table. Blocks, as reading its rows does. An archive of arrays is held in memory, with at most `unpacked_max` bytes.
     ///
     /// # Errors
-    /// `faulty-table`: it is not of its form, or has too many columns; `body-too-large`: an archive has more bytes.
+    /// `faulty-table`: the table is malformed or has too many columns; `body-too-large`: an archive has more bytes.
     pub fn new(form: TableForm, source: TableSource, unpacked_max: usize) -> Result<TableRows> {
         match form {
             TableForm::Csv => {
@@ -166,7 +166,7 @@ impl TableRows {
         Ok(columns)
     }
 
-    /// The rows of tables that all have the columns of the first.
+    /// Reads the rows of tables that all have the columns of the first.
     fn of_tables(
         mut tables: impl Iterator<Item = Result<RowTable>> + 'static,
     ) -> Result<TableRows> {
@@ -185,13 +185,13 @@ impl TableRows {
             rows: Rows::Other(Box::new(
                 std::iter::once(Ok(first))
                     .chain(tables)
-                    .map(|table| Ok(table?.columns.into_iter().map(plain).collect())),
+                    .map(|table| Ok(table?.columns.into_iter().map(values_of).collect())),
             )),
         })
     }
 }
 
-/// The arrays of an NPZ archive.
+/// Reads the arrays of an NPZ archive.
 fn npz_table(source: impl Read, bytes_max: usize) -> Result<RowTable> {
     let mut archive = Vec::new();
     source
@@ -208,7 +208,7 @@ fn npz_table(source: impl Read, bytes_max: usize) -> Result<RowTable> {
     })
 }
 
-/// The groups of rows of a Parquet file.
+/// Reads the row groups of a Parquet file.
 fn groups<R: ChunkReader + 'static>(
     reader: ParquetResult<TableReader<R>>,
 ) -> Result<impl Iterator<Item = Result<RowTable>>> {
@@ -224,11 +224,11 @@ fn groups<R: ChunkReader + 'static>(
     Ok((0..reader.groups()).map(move |group| reader.read(group, |_| true).map_err(damaged)))
 }
 
-fn plain((_, column): (String, TableColumn)) -> Values {
+fn values_of((_, column): (String, TableColumn)) -> Values {
     match column {
         TableColumn::Numbers(numbers) => Values::Numbers(numbers),
         TableColumn::Texts(texts) => Values::Texts(texts),
-        #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
+        #[expect(clippy::cast_precision_loss, reason = "numbers of a case have 64 bits")]
         TableColumn::Integers(values) => {
             Values::Numbers(values.into_iter().map(|value| value as f64).collect())
         }

@@ -1,20 +1,20 @@
-//! A table of rows: named columns of numbers and texts.
+//! Tables of rows: named columns of numbers and texts.
 
 use railhead_contact::evaluate::varied::Values;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-/// Most columns of a table that is read. A case has far fewer members that differ from row to row.
+/// Most columns of a table that is read. A case has far fewer members that a row can vary.
 pub const COLUMNS_MAX: usize = 1000;
 
 /// The values of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TableColumn {
-    /// Whole numbers, one for every row.
+    /// Integers, one per row.
     Integers(Vec<i64>),
-    /// Numbers; NaN where a row has none.
+    /// Numbers; NaN if a row has none.
     Numbers(Vec<f64>),
-    /// Texts; nothing where a row has none.
+    /// Texts; `None` if a row has none.
     Texts(Vec<Option<String>>),
 }
 
@@ -46,18 +46,18 @@ pub struct Title {
     pub text_if_copied: bool,
 }
 
-/// Some rows, column by column; numbers are NaN where a row has none.
+/// Some rows, column by column; a number is NaN if a row has none.
 pub type Chunk = Vec<Values>;
 
 /// Columns of the same length.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RowTable {
-    /// Names and values, in their order.
+    /// Names and values, in order.
     pub columns: Vec<(String, TableColumn)>,
 }
 
 impl TableColumn {
-    /// Number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
         match self {
@@ -67,13 +67,13 @@ impl TableColumn {
         }
     }
 
-    /// There is no row.
+    /// Whether there is no row.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Type of its values.
+    /// Returns the kind of the values.
     #[must_use]
     pub fn kind(&self) -> TableKind {
         match self {
@@ -83,7 +83,7 @@ impl TableColumn {
         }
     }
 
-    /// Only these rows.
+    /// Keeps only these rows.
     #[must_use]
     pub fn slice(self, range: std::ops::Range<usize>) -> TableColumn {
         fn cut<T>(mut values: Vec<T>, range: std::ops::Range<usize>) -> Vec<T> {
@@ -100,7 +100,7 @@ impl TableColumn {
 }
 
 impl TableKind {
-    /// A column of so many rows without values.
+    /// Returns a column of this many rows without values.
     #[must_use]
     pub fn without_values(self, rows: usize) -> TableColumn {
         match self {
@@ -112,7 +112,7 @@ impl TableKind {
 }
 
 impl RowTable {
-    /// Names of the columns with what they hold.
+    /// Returns the names of the columns with their kinds.
     #[must_use]
     pub fn kinds(&self) -> Vec<(String, TableKind)> {
         let columns = self.columns.iter();
@@ -121,13 +121,13 @@ impl RowTable {
             .collect()
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn row_count(&self) -> usize {
         self.columns.first().map_or(0, |(_, column)| column.len())
     }
 
-    /// A column by its name.
+    /// Returns a column by its name.
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&TableColumn> {
         let mut columns = self.columns.iter();
@@ -136,7 +136,7 @@ impl RowTable {
             .map(|(_, column)| column)
     }
 
-    /// Only these rows.
+    /// Keeps only these rows.
     #[must_use]
     pub fn cut(self, range: &std::ops::Range<usize>) -> RowTable {
         let columns = self.columns.into_iter();

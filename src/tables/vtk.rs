@@ -1,33 +1,30 @@
-//! Legacy VTK, version 3.0, binary (big-endian): for ParaView, PyVista and meshio.
+//! Writes legacy VTK, version 3.0, binary (big-endian), for ParaView, PyVista and meshio.
 //!
-//! Per cell: an unstructured grid with one quadrilateral per cell and the values as cell data. On a grid: structured
-//! points with the values as point data, NaN outside the patch. Pairs such as `traction_x_mpa`, `traction_y_mpa` come as
-//! one vector `traction_mpa` (z is 0), ready for glyphs; zones are 0 stick, 1 slip, -1 outside.
+//! Values per cell are cell data of an unstructured grid with a quadrilateral per cell. Values on a grid are point data of structured points,
+//! NaN outside the patch. Pairs such as `traction_x_mpa`, `traction_y_mpa` are one vector `traction_mpa` with z = 0. Zones are 0 stick, 1 slip,
+//! -1 outside the patch.
 
 use crate::cells::{CellData, CellRows, CellTable, PLACES, zone_code};
 
-/// Longest title that the format allows, its line break not counted.
+/// Longest title of the format, without its line break.
 const TITLE_MAX: usize = 255;
-/// The code of a quadrilateral.
+/// Cell type of a quadrilateral.
 const QUAD: i32 = 9;
-/// Components that come as one vector.
+/// Names of the components of a vector, and of the vector.
 const VECTORS: [(&str, &str, &str); 2] = [
     ("traction_x_mpa", "traction_y_mpa", "traction_mpa"),
     ("slip_x", "slip_y", "slip"),
 ];
 
-/// Writes a table under a title; what is not printable ASCII in the title becomes `?`.
+/// Writes a table with a title, in which `?` replaces characters other than printable ASCII.
 #[must_use]
 pub fn write(table: &CellTable, title: &str) -> Vec<u8> {
     let mut out = Vec::new();
     line(&mut out, "# vtk DataFile Version 3.0");
     let title = title.chars().take(TITLE_MAX);
-    let plain = |c: char| {
-        if c == ' ' || c.is_ascii_graphic() {
-            c
-        } else {
-            '?'
-        }
+    let plain = |c: char| match c {
+        ' ' | '!'..='~' => c,
+        _ => '?',
     };
     line(&mut out, &title.map(plain).collect::<String>());
     line(&mut out, "BINARY");
@@ -108,12 +105,12 @@ fn write_values(out: &mut Vec<u8>, table: &CellTable) {
                     doubles(out, values.iter().copied());
                     continue;
                 };
-                // Both components are written where the first one stands.
+                // The vector takes the place of the first component.
                 if column.name == *x_name
-                    && let Some(across) = table.numbers(y_name)
+                    && let Some(y) = table.numbers(y_name)
                 {
                     line(out, &format!("VECTORS {name} double"));
-                    let pairs = values.iter().zip(across);
+                    let pairs = values.iter().zip(y);
                     doubles(out, pairs.flat_map(|(x, y)| [*x, *y, 0.0]));
                 }
             }

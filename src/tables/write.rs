@@ -1,4 +1,4 @@
-//! Tables of rows in the forms that clients ask for, piece by piece.
+//! Writes tables of rows in the requested format, piece by piece.
 
 use std::error::Error;
 use std::fmt::Write;
@@ -9,26 +9,26 @@ use crate::parquet::TableWriter;
 use crate::read::TableForm;
 use crate::table::{RowTable, TableColumn, TableKind};
 
-/// Why a table cannot be written.
+/// An error of writing a table.
 pub type WriteError = Box<dyn Error + Send + Sync>;
 
-/// Writes tables with the same columns, one after the other.
+/// Writes tables with equal columns, one after the other.
 pub enum RowWriter {
-    /// A line with the names of the columns, then one for each row.
+    /// CSV: a line with the names of the columns, then a line per row.
     Csv(Vec<String>),
-    /// An object for each row.
+    /// NDJSON: an object per row.
     Ndjson,
-    /// A stream of batches of records.
+    /// An Arrow stream, with a record batch per table.
     Arrow(Box<ArrowWriter<Vec<u8>>>),
-    /// One file, a group of rows for each table.
+    /// A Parquet file, with a row group per table.
     Parquet(Box<TableWriter<Vec<u8>>>),
 }
 
 impl RowWriter {
-    /// Writes tables of these columns as CSV, an Arrow stream or a Parquet file, and as NDJSON in any other form.
+    /// Creates a writer of tables with these columns. It writes NDJSON for other formats than CSV, Arrow and Parquet.
     ///
     /// # Errors
-    /// The stream or the file cannot be begun.
+    /// The head of the format cannot be written.
     pub fn new(form: TableForm, columns: &[(String, TableKind)]) -> Result<RowWriter, WriteError> {
         Ok(match form {
             TableForm::Csv => {
@@ -42,19 +42,19 @@ impl RowWriter {
         })
     }
 
-    /// A table that is written as a whole.
+    /// Writes a whole table.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The table cannot be written.
     pub fn whole(form: TableForm, table: RowTable) -> Result<Vec<u8>, WriteError> {
         let mut writer = RowWriter::new(form, &table.kinds())?;
         Ok([writer.head()?, writer.write(table)?, writer.finish()?].concat())
     }
 
-    /// What comes before the first table.
+    /// Returns the bytes before the first table.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// They cannot be written.
     pub fn head(&mut self) -> Result<Vec<u8>, WriteError> {
         match self {
             RowWriter::Csv(names) => Ok(csv::head(names.iter().map(String::as_str))?),
@@ -62,10 +62,10 @@ impl RowWriter {
         }
     }
 
-    /// One more table.
+    /// Returns the bytes of a table.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The table cannot be written.
     pub fn write(&mut self, table: RowTable) -> Result<Vec<u8>, WriteError> {
         match self {
             RowWriter::Csv(_) => Ok(csv_lines(&table)?),
@@ -81,10 +81,10 @@ impl RowWriter {
         }
     }
 
-    /// What comes after the last table.
+    /// Returns the bytes after the last table.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// They cannot be written.
     pub fn finish(&mut self) -> Result<Vec<u8>, WriteError> {
         match self {
             RowWriter::Csv(_) | RowWriter::Ndjson => Ok(Vec::new()),
@@ -123,8 +123,8 @@ fn json_lines(table: &RowTable) -> Result<String, WriteError> {
     let mut text = String::with_capacity(32 * table.row_count() * names.len());
     for row in 0..table.row_count() {
         for (place, (name, (_, column))) in names.iter().zip(&table.columns).enumerate() {
-            let before = if place == 0 { '{' } else { ',' };
-            write!(text, "{before}{name}:")?;
+            let separator = if place == 0 { '{' } else { ',' };
+            write!(text, "{separator}{name}:")?;
             match column {
                 TableColumn::Integers(values) => write!(text, "{}", values[row])?,
                 TableColumn::Numbers(values) => {

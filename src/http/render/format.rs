@@ -1,4 +1,4 @@
-//! The formats of answers: what each is called in `?format=`, and its content type.
+//! The formats of responses: their names in `?format=`, content types and file names.
 
 use axum::body::Body;
 use axum::http::{HeaderName, HeaderValue, header};
@@ -6,7 +6,7 @@ use axum::response::{IntoResponse, Response};
 use railhead_macros::Named;
 use railhead_tables::read::TableForm;
 
-/// A form in which something can be answered.
+/// A format of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Format {
     /// `application/json`.
@@ -15,15 +15,15 @@ pub enum Format {
     Ndjson,
     /// `text/csv`.
     Csv,
-    /// NumPy's archive of arrays.
+    /// An archive of NumPy arrays.
     Npz,
     /// Legacy VTK, binary.
     Vtk,
-    /// A picture as SVG.
+    /// An SVG picture.
     Svg,
-    /// A picture as PNG.
+    /// A PNG picture.
     Png,
-    /// Arrow's stream of columns.
+    /// An Arrow stream.
     Arrow,
     /// A Parquet file.
     Parquet,
@@ -32,7 +32,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// As the form of a table; NDJSON for what is none.
+    /// Returns the form of a table in this format; NDJSON for formats that are not tables.
     pub(crate) fn table(self) -> TableForm {
         match self {
             Format::Csv => TableForm::Csv,
@@ -42,7 +42,7 @@ impl Format {
         }
     }
 
-    /// The content type of the answer.
+    /// Returns the content type.
     #[must_use]
     pub fn media_type(self) -> &'static str {
         match self {
@@ -59,7 +59,7 @@ impl Format {
         }
     }
 
-    /// An answer in this form, which `Accept` may have chosen; `name` as in [`Format::disposition`].
+    /// Returns a response in this format, which `Accept` may have selected; `name` as in [`Format::disposition`].
     pub(crate) fn answer(self, name: &str, body: impl Into<Body>) -> Response {
         let head = [
             (header::CONTENT_TYPE, self.media_type()),
@@ -70,8 +70,8 @@ impl Format {
         response
     }
 
-    /// The header `Content-Disposition` of an answer in this form, under which a browser saves it as `name` with the usual extension. Pictures are shown
-    /// where they stand, tables and archives are saved; JSON has none.
+    /// Returns the header `Content-Disposition` with the file name `name` and the usual extension. Browsers show pictures, and save tables and
+    /// archives; JSON has no such header.
     #[must_use]
     pub fn disposition(self, name: &str) -> Option<(HeaderName, HeaderValue)> {
         let kind = match self {

@@ -1,4 +1,4 @@
-//! Text of a table piece by piece, made when the client takes it: a large answer takes no more memory than its table.
+//! Streams the text of a table, which is written while the client receives it, so that a large response needs no memory beyond its table.
 
 use std::convert::Infallible;
 
@@ -8,12 +8,12 @@ use futures_util::stream;
 use railhead_tables::cells::{CellRows, CellTable};
 use railhead_tables::csv;
 
-/// Pieces are at least this large, but for the last one.
+/// Least size of a piece except the last, in bytes.
 const PIECE_BYTES: usize = 32 << 10;
-/// Rows written at once.
+/// Number of rows written at once.
 const ROWS: usize = 256;
 
-/// The table as CSV. Zones are words; what lies outside the patch is empty.
+/// Returns the table as CSV. Zones are words; values outside the patch are empty.
 pub(crate) fn csv_body(table: CellTable) -> Body {
     let names = table.names();
     let columns = names.len();
@@ -26,7 +26,7 @@ pub(crate) fn csv_body(table: CellTable) -> Body {
     body(std::iter::once(csv::head(names)).chain(lines))
 }
 
-/// The table as the JSON of a field: members written before (`"patch":0,…`), then per cell inside `cells`, or on a grid.
+/// Returns the table as the JSON of a field: these members (`"patch":0,…`), then the columns, per cell inside `cells`.
 pub(crate) fn json_body(table: CellTable, members: &str) -> Body {
     let (open, close, axes) = match &table.rows {
         CellRows::Cells => (",\"cells\":{", "}}", Vec::new()),
@@ -51,17 +51,17 @@ pub(crate) fn json_body(table: CellTable, members: &str) -> Body {
     )
 }
 
-/// A column of a JSON text.
+/// A column of JSON.
 pub(crate) struct JsonColumn {
     name: &'static str,
-    /// Number of its values.
+    /// Number of values.
     count: usize,
-    /// Values of each array inside its array; nothing if it has numbers.
+    /// Length of nested arrays; `None` for an array of values.
     inner: Option<usize>,
 }
 
 impl JsonColumn {
-    /// A column with this many numbers or texts.
+    /// Creates a column with this many values.
     pub(crate) fn new(name: &'static str, count: usize) -> JsonColumn {
         JsonColumn {
             name,
@@ -71,7 +71,7 @@ impl JsonColumn {
     }
 }
 
-/// `"name":[…],…` for each column between two texts; `write` makes the value of column and row.
+/// Streams `"name":[…],…` of each column between two texts; `write` appends the value of a column and a row.
 pub(crate) fn json_columns(
     open: String,
     columns: Vec<JsonColumn>,
@@ -88,11 +88,8 @@ pub(crate) fn json_columns(
         let mut before = format!("{comma}\"{name}\":{begin}");
         for start in (0..count).step_by(step) {
             let rows = start..(start + step).min(count);
-            parts.push((
-                std::mem::replace(&mut before, between.to_owned()),
-                place,
-                rows,
-            ));
+            let before = std::mem::replace(&mut before, between.to_owned());
+            parts.push((before, place, rows));
         }
         let begun = if count == 0 { before } else { String::new() };
         parts.push((begun + end, 0, 0..0));
@@ -110,7 +107,7 @@ pub(crate) fn json_columns(
     }))
 }
 
-/// The texts, gathered into pieces; each is made when the client has taken those before it.
+/// Joins texts to pieces. Each piece is created when the client has received those before it.
 pub(crate) fn body<E>(mut texts: impl Iterator<Item = Result<Vec<u8>, E>> + Send + 'static) -> Body
 where
     E: std::error::Error + Send + Sync + 'static,

@@ -1,4 +1,4 @@
-//! Tables of rows as CSV, NDJSON, an Arrow stream or a Parquet file, piece by piece.
+//! Streams tables of rows as CSV, NDJSON, an Arrow stream or a Parquet file.
 
 use std::ops::Range;
 
@@ -15,16 +15,16 @@ use railhead_tables::write::{RowWriter, WriteError};
 
 /// Some rows of a table.
 pub(crate) enum Piece {
-    /// As they are sent.
+    /// Text in the format of the response.
     Text(Bytes),
-    /// Yet to be written.
+    /// A table that is not yet written.
     Table(RowTable),
 }
 
-/// Writes tables of these columns piece by piece as they come, with the text before and after them.
+/// Writes tables of these columns as they arrive, with the head and the end of the format.
 ///
 /// # Errors
-/// The stream or the file cannot be begun.
+/// The head cannot be written.
 pub(crate) fn stream<P: Stream<Item = Result<Piece, WriteError>> + Send>(
     format: Format,
     columns: &[(String, TableKind)],
@@ -52,10 +52,10 @@ pub(crate) fn stream<P: Stream<Item = Result<Piece, WriteError>> + Send>(
     Ok(iter([Ok(head)]).chain(text))
 }
 
-/// Rows of a batch of Arrow records, or of a group of a Parquet file.
+/// Number of rows of an Arrow record batch or a Parquet row group.
 const BATCH_ROWS: usize = 1 << 15;
 
-/// Rows of text written at once.
+/// Number of rows of text written at once.
 const ROWS: usize = 1024;
 
 /// `{"rows": …, "columns": {"force_x_n": […], …, "status": […]}}`; null where a row has no number.
@@ -73,10 +73,10 @@ pub(crate) fn json_body(answer: RowsAnswer) -> Body {
     })
 }
 
-/// The columns as a table.
+/// Returns the columns as a table in this format.
 ///
 /// # Errors
-/// It cannot be begun.
+/// The head cannot be written.
 pub(crate) fn table_body(format: Format, answer: RowsAnswer) -> Result<Body, WriteError> {
     let columns = answer.columns().into_iter();
     let columns: Vec<_> = columns

@@ -1,4 +1,4 @@
-//! Stresses below the surface as a table: one line per point.
+//! Stresses below the surface as a table.
 
 use railhead_contact::solution::words::evolution::StressPoint;
 use railhead_tables::table::{RowTable, TableColumn};
@@ -24,7 +24,7 @@ const COLUMNS: [Column; 16] = [
     ("shear_max_mpa", |point| point.shear_max_mpa),
 ];
 
-/// The table.
+/// Returns a table with a row per point.
 #[must_use]
 pub(crate) fn table(points: &[StressPoint]) -> RowTable {
     let column = |(name, of): Column| {

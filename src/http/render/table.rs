@@ -1,4 +1,4 @@
-//! Fields as columns: per cell, or on a grid.
+//! Fields as tables, per cell or on a grid.
 
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
@@ -10,14 +10,14 @@ use crate::dto::Outlines;
 use crate::render::shape::outlines::{outlines, patch_outline};
 use crate::render::shape::resample::{Gridded, resample, resample_zone};
 
-/// A file, byte for byte.
+/// A binary body.
 #[derive(Debug, ToSchema)]
 #[schema(value_type = String, format = Binary)]
 #[expect(dead_code, reason = "names binary bodies in the contract")]
 pub(crate) struct File(Vec<u8>);
 
 impl Outlines {
-    /// The border of a patch, and those of its zones if they are wanted and known.
+    /// Returns the border of a patch, and with `with_zones` those of its zones if they are known.
     #[must_use]
     pub(crate) fn of(cells: &PatchCells, point: &PointFields, with_zones: bool) -> Outlines {
         let zones = point.zone.as_deref().filter(|_| with_zones);
@@ -30,7 +30,7 @@ impl Outlines {
     }
 }
 
-/// The values of these outputs: per cell, or resampled on a grid of `nx × ny` samples.
+/// Returns the values of these outputs, per cell or resampled on a grid of `nx × ny` samples.
 #[must_use]
 pub(crate) fn cell_table(
     outputs: &[Output],

@@ -5,7 +5,7 @@ use crate::render::picture::colour::{VIRIDIS_PLACES, at};
 use crate::render::picture::scene::Heat;
 use crate::render::picture::svg::{Anchor, Svg, px};
 
-/// The scale of the heat map, between two values.
+/// Draws the scale of the heat map between two values.
 pub(super) fn colour_bar(svg: &mut Svg, chart: &Chart, heat: &Heat, [low, high]: [f64; 2]) {
     let [left, y, width, height] = chart.area;
     let x = left + width + 26.0;
@@ -18,11 +18,8 @@ pub(super) fn colour_bar(svg: &mut Svg, chart: &Chart, heat: &Heat, [low, high]:
         ));
     }
     svg.raw("</linearGradient>\n");
-    let (px_x, px_y, px_height) = (px(x), px(y), px(height));
-    svg.element(
-        "rect",
-        &format!("x=\"{px_x}\" y=\"{px_y}\" width=\"18\" height=\"{px_height}\" fill=\"url(#scale)\" stroke=\"#333\""),
-    );
+    let bar = "fill=\"url(#scale)\" stroke=\"#333\"";
+    svg.rect([x, y, 18.0, height], bar);
     let power = exponent(low.abs().max(high.abs()));
     let factor = 10f64.powi(power);
     let (values, digits) = ticks(low / factor, high / factor, height / 45.0);
@@ -48,7 +45,7 @@ pub(super) fn colour_bar(svg: &mut Svg, chart: &Chart, heat: &Heat, [low, high]:
     svg.text((place_x, place_y), 13.0, Anchor::Middle, &turned, &text);
 }
 
-/// `10⁻³` and the like.
+/// Formats a power of ten, such as `10⁻³`.
 fn power_of_ten(power: i32) -> String {
     let raised = |c: char| match c {
         '-' => '⁻',

@@ -1,43 +1,43 @@
-//! Where things stand in a picture: axes that have a scale each, or the same, with round numbers at their ticks.
+//! The plotting area of a picture: axes with equal or different scales, and ticks at round numbers.
 
 use crate::render::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
 
 /// Width of a picture in its own units.
 pub(super) const WIDTH: f64 = 800.0;
-/// Left border, top border and width of the plotting area of a patch.
+/// Left, top and width of the plotting area of a patch.
 const PATCH_AREA: [f64; 3] = [78.0, 96.0, 560.0];
-/// Limits of its height.
+/// Least and largest height of the plotting area of a patch.
 const PATCH_HEIGHT: [f64; 2] = [220.0, 520.0];
-/// Room below it.
+/// Space below the plotting area of a patch.
 const BELOW: f64 = 88.0;
-/// Share of the patch left free around it.
+/// Margin around the patch, as a share of its size.
 const MARGIN: f64 = 0.06;
-/// Room around the patch in a picture without axes.
+/// Margin around the patch in a picture without axes.
 const ALONE_MARGIN: f64 = 2.0;
-/// Characters of a title that fit.
+/// Largest number of characters of a title.
 const TITLE_MAX: usize = 74;
-/// Distance of the ticks of an axis, about.
+/// Approximate distance of the ticks of each axis.
 const TICK_SPACING: [f64; 2] = [90.0, 55.0];
 
-/// Maps numbers to the plotting area; the second of a pair may be the smaller one.
+/// Maps coordinates to the plotting area. An axis may be reversed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Chart {
     /// Left, top, width and height.
     pub area: [f64; 4],
-    /// What stands at the left and the right end.
+    /// Coordinates of the left and the right end.
     pub x: [f64; 2],
-    /// What stands at the lower and the upper end.
+    /// Coordinates of the lower and the upper end.
     pub y: [f64; 2],
 }
 
 impl Chart {
-    /// Shows a box `[x_min, x_max, y_min, y_max]` with a margin around it, at the same scale along both axes.
+    /// Creates a chart of a box `[x_min, x_max, y_min, y_max]` with a margin and equal scales.
     #[must_use]
     pub(super) fn around(shown: [f64; 4]) -> Chart {
         Chart::fitted(shown, MARGIN, PATCH_AREA, PATCH_HEIGHT)
     }
 
-    /// Shows a box alone, `width` units wide, without room for axes.
+    /// Creates a chart of a box, `width` units wide, without space for axes.
     #[must_use]
     pub(super) fn alone(shown: [f64; 4], width: f64) -> Chart {
         let inner = width - 2.0 * ALONE_MARGIN;
@@ -45,7 +45,7 @@ impl Chart {
         Chart::fitted(shown, 0.0, place, [0.25 * inner, 1.5 * inner])
     }
 
-    /// Shows a box with a share of it as margin, in an area whose height follows within limits.
+    /// Creates a chart of a box with a margin, as a share of its size, in an area whose height follows within limits.
     fn fitted(
         [x0, x1, y0, y1]: [f64; 4],
         margin: f64,
@@ -65,25 +65,25 @@ impl Chart {
         }
     }
 
-    /// Height of a picture without axes.
+    /// Returns the height of a picture without axes.
     #[must_use]
     pub(super) fn height_alone(&self) -> f64 {
         self.area[3] + 2.0 * ALONE_MARGIN
     }
 
-    /// Height of the picture of a patch.
+    /// Returns the height of the picture of a patch.
     #[must_use]
     pub(super) fn height(&self) -> f64 {
         self.area[1] + self.area[3] + BELOW
     }
 
-    /// Units of the picture per unit of the first axis.
+    /// Returns the units of the picture per unit of the first axis.
     #[must_use]
     pub(super) fn scale(&self) -> f64 {
         self.area[2] / (self.x[1] - self.x[0])
     }
 
-    /// A place in the picture.
+    /// Returns the position of a point in the picture.
     pub(super) fn at(&self, x: f64, y: f64) -> (f64, f64) {
         let share = |value: f64, [from, to]: [f64; 2]| (value - from) / (to - from);
         let [left, top, width, height] = self.area;
@@ -93,7 +93,7 @@ impl Chart {
         )
     }
 
-    /// Thin lines at the ticks, below what is drawn.
+    /// Draws thin lines at the ticks.
     pub(super) fn grid(&self, svg: &mut Svg) {
         let [left, top, width, height] = self.area;
         let upright = self.ticks(0).0.into_iter().map(|tick| {
@@ -108,16 +108,10 @@ impl Chart {
         svg.path(&data, "fill=\"none\" stroke=\"#e6e6e6\"");
     }
 
-    /// Border, numbers and names, above what is drawn.
+    /// Draws border, numbers and names of the axes.
     pub(super) fn axes(&self, svg: &mut Svg, [x_name, y_name]: [&str; 2]) {
         let [left, top, width, height] = self.area;
-        let [x, y, w, h] = self.area.map(px);
-        svg.element(
-            "rect",
-            &format!(
-                "x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"#333\""
-            ),
-        );
+        svg.rect(self.area, "fill=\"none\" stroke=\"#333\"");
         let (values, digits) = self.ticks(0);
         for tick in values {
             let at = (self.at(tick, self.y[0]).0, top + height + 18.0);
@@ -140,7 +134,7 @@ impl Chart {
     }
 }
 
-/// Begins a picture of this height with a title, `width` pixels wide.
+/// Creates a picture of this height with a title, `width` pixels wide.
 pub(super) fn open(title: &str, remarks: &[String], width: u32, height: f64) -> Svg {
     let shown_height = px(f64::from(width) * height / WIDTH);
     let height = px(height);
@@ -160,7 +154,14 @@ pub(super) fn open(title: &str, remarks: &[String], width: u32, height: f64) -> 
     svg
 }
 
-/// A range with some room at both ends; one of a single value has room too.
+/// Draws an entry of a legend, a line of this style with a text.
+pub(super) fn legend_line(svg: &mut Svg, (x, y): (f64, f64), style: &str, text: &str) {
+    let line = format!("M{} {}h30", px(x), px(y - 4.0));
+    svg.path(&line, &format!("fill=\"none\" {style}"));
+    svg.text((x + 37.0, y), 12.0, Anchor::Start, "", text);
+}
+
+/// Returns the range of values with a margin.
 pub(super) fn roomy(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     let ends = [f64::INFINITY, f64::NEG_INFINITY];
     let [low, high] = values
@@ -176,18 +177,16 @@ pub(super) fn roomy(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     [low - room, high + room]
 }
 
-/// A number at a tick; never a minus before zero.
+/// Formats the number at a tick, without the sign of zero.
 pub(super) fn label(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
-    let text = if text.trim_start_matches(['-', '0', '.']).is_empty() {
-        text.trim_start_matches('-').to_owned()
-    } else {
-        text
-    };
-    text.replace('-', "−")
+    match text.trim_start_matches(['-', '0', '.']).is_empty() {
+        true => text.trim_start_matches('-').to_owned(),
+        false => text.replace('-', "−"),
+    }
 }
 
-/// Round numbers within `from..=to`, about `wanted` of them, with the digits after the point that they need.
+/// Returns about `wanted` round numbers within `from..=to`, and their number of decimals.
 #[must_use]
 pub(super) fn ticks(from: f64, to: f64, wanted: f64) -> (Vec<f64>, usize) {
     let rough = (to - from) / wanted.max(1.0);
@@ -203,7 +202,7 @@ pub(super) fn ticks(from: f64, to: f64, wanted: f64) -> (Vec<f64>, usize) {
         .unwrap_or(10.0 * unit);
     let mut values = Vec::new();
     let mut number = (from / step - 1e-9).ceil();
-    // The count is bounded by the choice of the step.
+    // The choice of the step limits the count.
     while number * step <= to + 1e-9 * step && values.len() < 100 {
         values.push(number * step);
         number += 1.0;
@@ -212,7 +211,7 @@ pub(super) fn ticks(from: f64, to: f64, wanted: f64) -> (Vec<f64>, usize) {
     (values, digits)
 }
 
-/// The power of ten, a multiple of 3, that brings `largest` to a number easy to read; 0 for ordinary numbers.
+/// Returns the power of ten, a multiple of 3, by which numbers up to `largest` are divided; 0 for 0.1 to 100 000.
 #[must_use]
 pub(super) fn exponent(largest: f64) -> i32 {
     if !(largest.is_finite() && largest > 0.0) || (0.1..100_000.0).contains(&largest) {

@@ -1,9 +1,9 @@
-//! Colours: a ramp whose lightness rises evenly, so that it reads the same in print without colour, and two for zones.
+//! Colours: a scale whose lightness rises evenly, so that it is readable without colour, and two colours for zones.
 
-/// Places at which the ramp is given; linear in between.
+/// Number of nodes of the scale.
 pub(super) const VIRIDIS_PLACES: usize = 17;
 
-/// The map viridis (S. van der Walt, N. Smith and E. Firing 2015, CC0) at 17 even places from 0 to 1; linear in between.
+/// The map viridis (S. van der Walt, N. Smith and E. Firing 2015, CC0) at 17 equidistant nodes; linear in between.
 const VIRIDIS: [[u8; 3]; VIRIDIS_PLACES] = [
     [68, 1, 84],
     [72, 24, 106],
@@ -24,12 +24,12 @@ const VIRIDIS: [[u8; 3]; VIRIDIS_PLACES] = [
     [253, 231, 37],
 ];
 
-/// Cells that stick.
+/// Colour of cells that stick.
 pub(super) const STICK: &str = "#31688e";
-/// Cells that slip; much lighter, so that both are told apart without colour.
+/// Colour of cells that slip, much lighter, so that both are distinct without colour.
 pub(super) const SLIP: &str = "#fde725";
 
-/// The colour at a share of the ramp from 0 to 1, as `#rrggbb`; what lies outside is brought to the ends.
+/// Returns the colour at a position on the scale from 0 to 1, as `#rrggbb`.
 #[must_use]
 pub(super) fn at(share: f64) -> String {
     let [r, g, b] = rgb(share);

@@ -1,15 +1,15 @@
-//! Draws forces over the motions of a case, with bars of their errors: a creep curve.
+//! Draws a creep curve: forces over the motions of a case, with error bars.
 
 use std::fmt::Write;
 
-use crate::render::picture::chart::{Chart, WIDTH, open, roomy};
+use crate::render::picture::chart::{Chart, WIDTH, legend_line, open, roomy};
 use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 
-/// Height of the picture in its own units.
+/// Height of the picture in its units.
 const HEIGHT: f64 = 480.0;
-/// Bars of errors nearer to each other than this cannot be told apart.
+/// Least distance of error bars, in units of the picture.
 const BAR_SPACING: f64 = 9.0;
-/// The bound of friction is drawn if a force comes as near to it as this.
+/// Share of the friction limit above which a force makes the limit visible.
 const BOUND_IN_SIGHT: f64 = 0.4;
 /// Colour and dashes of the lines, in their order.
 const STYLES: [&str; 2] = [
@@ -20,28 +20,28 @@ const STYLES: [&str; 2] = [
 /// A creep curve.
 #[derive(Debug, Clone)]
 pub(crate) struct Curve {
-    /// First line, a text of the client.
+    /// The title, a text of the client.
     pub title: String,
-    /// Smaller lines below, two at most.
+    /// At most two lines below the title.
     pub remarks: Vec<String>,
-    /// What runs along.
+    /// Name of the horizontal axis.
     pub x_name: String,
-    /// Its values.
+    /// Values of the horizontal axis.
     pub x: Vec<f64>,
-    /// What is drawn, two at most.
+    /// At most two lines.
     pub lines: Vec<CurveLine>,
-    /// Friction's bound on each, if it is known.
+    /// The friction limit in N, if it is known.
     pub bound: Option<f64>,
 }
 
 /// One line of a creep curve.
 #[derive(Debug, Clone)]
 pub(crate) struct CurveLine {
-    /// What it is.
+    /// Its name.
     pub name: &'static str,
     /// Its values.
     pub y: Vec<f64>,
-    /// Their errors; none where they are not estimated.
+    /// Estimated errors of the values.
     pub error: Vec<Option<f64>>,
 }
 
@@ -129,14 +129,10 @@ fn legend(svg: &mut Svg, curve: &Curve) {
     let y = HEIGHT - 30.0;
     let mut x = 78.0;
     for (line, style) in curve.lines.iter().zip(STYLES) {
-        let data = format!("M{} {}h30", px(x), px(y - 4.0));
-        svg.path(
-            &data,
-            &format!("fill=\"none\" {style} stroke-width=\"1.8\""),
-        );
-        svg.text((x + 37.0, y), 12.0, Anchor::Start, "", line.name);
+        let style = format!("{style} stroke-width=\"1.8\"");
+        legend_line(svg, (x, y), &style, line.name);
         x += 190.0;
     }
-    let told = "on the lower body; bars are the estimated errors";
-    svg.text((x, y), 12.0, Anchor::Start, "fill=\"#444\"", told);
+    let note = "on the lower body; bars are the estimated errors";
+    svg.text((x, y), 12.0, Anchor::Start, "fill=\"#444\"", note);
 }

@@ -1,4 +1,4 @@
-//! The layers of a picture, from the ground upward.
+//! Arrows and legend of a picture.
 
 use crate::render::picture::chart::Chart;
 use crate::render::picture::colour::{SLIP, STICK};
@@ -12,10 +12,10 @@ use railhead_contact::solution::words::answer::PatchCells;
 const ARROW_SPACING: f64 = 30.0;
 /// Length of the longest arrow.
 const ARROW_LENGTH: f64 = 27.0;
-/// Arrows shorter than this say nothing and are left out.
+/// Length below which an arrow is omitted.
 const ARROW_SHORTEST: f64 = 2.0;
 
-/// Arrows on a regular grid, each beginning at its sample; says whether there was anything to draw.
+/// Draws arrows on a regular grid, each centred on its sample. Returns whether any was drawn.
 pub(super) fn arrows(
     svg: &mut Svg,
     chart: &Chart,
@@ -42,7 +42,7 @@ pub(super) fn arrows(
             let (Some(along), Some(across)) = (along, y.values[iy][ix]) else {
                 continue;
             };
-            // The picture's second axis points downward.
+            // The second axis of the picture points downward.
             let arrow = [along, &-across].map(|part| part / longest * ARROW_LENGTH);
             if arrow[0].hypot(arrow[1]) >= ARROW_SHORTEST {
                 data.push_str(&arrow_path(chart.at(x.x_mm[ix], x.y_mm[iy]), arrow));
@@ -56,7 +56,7 @@ pub(super) fn arrows(
     true
 }
 
-/// A shaft and two strokes at its tip, centred on a place.
+/// Returns the path of an arrow centred on a position.
 fn arrow_path((x, y): (f64, f64), [dx, dy]: [f64; 2]) -> String {
     let length = dx.hypot(dy);
     let head = (0.35 * length).clamp(1.5, 6.0) / length;
@@ -72,7 +72,7 @@ fn arrow_path((x, y): (f64, f64), [dx, dy]: [f64; 2]) -> String {
     shaft + &polyline([stroke(1.0), (tip_x, tip_y), stroke(-1.0)], false)
 }
 
-/// The arrow of the rolling direction.
+/// Draws the arrow of the rolling direction.
 pub(super) fn rolling(svg: &mut Svg, chart: &Chart) {
     let [x, y, width, height] = chart.area;
     let (end, bottom) = (x + width, y + height);
@@ -82,23 +82,19 @@ pub(super) fn rolling(svg: &mut Svg, chart: &Chart) {
     svg.path(&arrow, "fill=\"none\" stroke=\"#111\" stroke-width=\"1.8\"");
 }
 
-/// What lines and arrows mean, below the axes.
+/// Draws the legend of lines and arrows below the axes.
 pub(super) fn legend(svg: &mut Svg, chart: &Chart, scene: &Scene, arrows: bool) {
     let y = chart.area[1] + chart.area[3] + 66.0;
     let mut x = chart.area[0];
     let (stick, slip) = zones_present(scene);
     if scene.shown == Output::Zones {
         for (colour, word, present) in [(STICK, "stick", stick), (SLIP, "slip", slip)] {
-            let word = if present {
-                word.to_owned()
-            } else {
-                format!("{word} (nowhere)")
+            let word = match present {
+                true => word.to_owned(),
+                false => format!("{word} (nowhere)"),
             };
-            let place = format!("x=\"{}\" y=\"{}\"", px(x), px(y - 10.0));
-            svg.element(
-                "rect",
-                &format!("{place} width=\"22\" height=\"12\" fill=\"{colour}\" stroke=\"#111\""),
-            );
+            let style = format!("fill=\"{colour}\" stroke=\"#111\"");
+            svg.rect([x, y - 10.0, 22.0, 12.0], &style);
             svg.text((x + 28.0, y), 12.0, Anchor::Start, "", &word);
             x += if present { 84.0 } else { 150.0 };
         }
@@ -107,10 +103,9 @@ pub(super) fn legend(svg: &mut Svg, chart: &Chart, scene: &Scene, arrows: bool) 
             let data = format!("M{} {}h26", px(x), px(y - 4.0));
             svg.path(&data, "stroke=\"#000\" stroke-width=\"3.4\"");
             svg.path(&data, "stroke=\"#fff\" stroke-width=\"1.6\"");
-            let text = if slip {
-                "border of the stick zone"
-            } else {
-                "stick everywhere"
+            let text = match slip {
+                true => "border of the stick zone",
+                false => "stick everywhere",
             };
             svg.text((x + 33.0, y), 12.0, Anchor::Start, "", text);
             x += 210.0;

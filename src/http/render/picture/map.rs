@@ -1,4 +1,4 @@
-//! The coloured ground of a picture: values or zones inside the border of the patch, and the lines around them.
+//! The coloured area of a picture: values or zones inside the border of the patch, and the borders.
 
 use crate::render::picture::chart::Chart;
 use crate::render::picture::colour::{SLIP, STICK, at};
@@ -8,21 +8,21 @@ use crate::render::shape::outlines::{outlines, patch_outline};
 use crate::render::shape::sheet::{AtBorder, Sheet};
 use railhead_contact::solution::words::answer::Zone;
 
-/// Where and how finely a patch is drawn.
-pub(super) struct Ground<'a> {
+/// A patch to be drawn, and the resolution of the drawing.
+pub(super) struct PatchMap<'a> {
     pub scene: &'a Scene,
-    /// Absent where the patch has gaps or very few strips: then every cell has its own colour.
+    /// The curved grid; `None` if the patch has gaps or very few strips, so that every cell has its own colour.
     pub sheet: Option<Sheet>,
-    /// Colours between both ends of the scale.
+    /// Number of colours of the scale.
     pub bands: u32,
-    /// By how much a curve may be missed, in units of the picture.
+    /// Tolerance of simplified curves in units of the picture.
     pub tolerance: f64,
 }
 
-impl<'a> Ground<'a> {
-    pub(super) fn of(scene: &'a Scene, bands: u32, tolerance: f64) -> Ground<'a> {
+impl<'a> PatchMap<'a> {
+    pub(super) fn of(scene: &'a Scene, bands: u32, tolerance: f64) -> PatchMap<'a> {
         let sheet = Sheet::new(&scene.fields);
-        Ground {
+        PatchMap {
             scene,
             sheet,
             bands,
@@ -30,7 +30,7 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// Box around the patch in mm.
+    /// Returns the bounding box `[x_min, x_max, y_min, y_max]` of the patch in mm.
     pub(super) fn extent(&self) -> [f64; 4] {
         let cells = || extent(&self.scene.fields);
         self.sheet.as_ref().map_or_else(cells, Sheet::extent)
@@ -43,7 +43,7 @@ impl<'a> Ground<'a> {
         curves(placed, self.tolerance)
     }
 
-    /// The band of a value of the scale, from 0.
+    /// Returns the index of the colour of a value.
     fn band(&self, value: f64, [low, high]: [f64; 2]) -> u32 {
         let share = ((value - low) / (high - low)).clamp(0.0, 1.0);
         let band = (share * f64::from(self.bands)) as u32;
@@ -54,7 +54,7 @@ impl<'a> Ground<'a> {
         at((f64::from(band) + 0.5) / f64::from(self.bands))
     }
 
-    /// Values between both ends of a scale; every band lies on those below it, so that there are no seams.
+    /// Draws values between the ends of a scale. Every colour is drawn over those below it, so that there are no seams.
     pub(super) fn heat(&self, svg: &mut Svg, chart: &Chart, heat: &Heat, range: [f64; 2]) {
         let Some(sheet) = &self.sheet else {
             return self.cells(
@@ -86,7 +86,7 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// Stick and slip, each in its colour.
+    /// Draws stick and slip zones.
     pub(super) fn zones(&self, svg: &mut Svg, chart: &Chart) {
         let Some(zones) = self.scene.values.zone.as_deref() else {
             return;
@@ -108,7 +108,7 @@ impl<'a> Ground<'a> {
         Some((sheet, stick))
     }
 
-    /// The cells of every class in its colour.
+    /// Draws the cells of every class in the colour of the class.
     fn cells(
         &self,
         svg: &mut Svg,
@@ -130,7 +130,7 @@ impl<'a> Ground<'a> {
         svg.raw("</g>\n");
     }
 
-    /// The border of the stick zone as a thin line, for small pictures.
+    /// Draws the border of the stick zone as a thin line, for small pictures.
     pub(super) fn border_thin(&self, svg: &mut Svg, chart: &Chart) {
         if let Some((_, stick)) = self.smooth_stick() {
             let stick = self.curves(chart, stick);
@@ -140,7 +140,7 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// The border of the patch, and of the stick zone where zones are known.
+    /// Draws the borders of the patch and of the stick zone.
     pub(super) fn borders(&self, svg: &mut Svg, chart: &Chart) {
         let scene = self.scene;
         let patch = match &self.sheet {
@@ -158,7 +158,7 @@ impl<'a> Ground<'a> {
                 polygons(chart, outlines(&scene.fields, zones, Some(Zone::Stick)))
             }
         };
-        // White within black shows on every colour of the ramp.
+        // A white line in a black one is visible on every colour of the scale.
         svg.path(
             &stick,
             "fill=\"none\" stroke=\"#000\" stroke-width=\"3.4\" stroke-linejoin=\"round\"",
@@ -170,7 +170,7 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// Closed polygons as one path.
+/// Returns the path of closed polygons.
 fn polygons(chart: &Chart, loops: Vec<Vec<[f64; 2]>>) -> String {
     let data = loops
         .into_iter()

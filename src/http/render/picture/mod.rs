@@ -1,5 +1,4 @@
-//! Pictures of a contact patch: a heat map of the cells, the border of the stick zone, arrows, axes in mm and a scale; and of sections,
-//! creep curves, and a wheel on its rail.
+//! Pictures of a patch as a heat map, of sections, of creep curves, and of a wheel on its rail.
 
 mod bar;
 mod chart;

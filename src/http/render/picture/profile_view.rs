@@ -1,16 +1,16 @@
-//! Draws a wheel on a rail as they lie in the track, seen along the rolling direction, with the pressure of every patch on the rail.
+//! Draws a wheel on a rail, seen along the rolling direction, with the pressure of every patch on the rail.
 
 use crate::render::picture::chart::{Chart, WIDTH, open};
 use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 use railhead_contact::solution::words::answer::{PatchCells, PlacedProfiles, Position};
 
-/// What is shown above and below the top of the rail, in mm.
+/// Range of z relative to the top of the rail, in mm.
 const SHOWN_Z: [f64; 2] = [-38.0, 34.0];
-/// Room beside the rail in mm: the pressure and the number of a patch at its gauge face.
+/// Space beside the rail in mm, for the pressure and the number of a patch at the gauge face.
 const BESIDE: f64 = 30.0;
 /// Height of the largest pressure in mm.
 const COMB: f64 = 16.0;
-/// Height of the numbers of patches above the rail in mm.
+/// Distance of the numbers of patches from the rail in mm.
 const TAG: f64 = 22.0;
 const LEFT: f64 = 62.0;
 const TOP: f64 = 96.0;
@@ -19,13 +19,13 @@ const BELOW: f64 = 62.0;
 /// Wheel and rail with their patches.
 #[derive(Debug, Clone)]
 pub(crate) struct ProfileView {
-    /// First line, a text of the client.
+    /// The title, a text of the client.
     pub title: String,
-    /// Smaller lines below, two at most.
+    /// At most two lines below the title.
     pub remarks: Vec<String>,
-    /// Where both lie, the wheel at first touch.
+    /// Positions of both profiles, the wheel at first contact.
     pub placed: PlacedProfiles,
-    /// How far the wheel lies below first touch, in mm.
+    /// Vertical displacement of the wheel below first contact in mm.
     pub lowering: f64,
     /// The patches.
     pub patches: Vec<ProfileViewPatch>,
@@ -34,9 +34,9 @@ pub(crate) struct ProfileView {
 /// A patch on the rail.
 #[derive(Debug, Clone)]
 pub(crate) struct ProfileViewPatch {
-    /// Where it lies.
+    /// Its position.
     pub position: Position,
-    /// Its cells, with the pressure where the case asked for it.
+    /// Its cells, with the pressure if the case requests it.
     pub cells: PatchCells,
 }
 
@@ -59,7 +59,7 @@ pub(crate) fn draw(view: &ProfileView, width: u32) -> Svg {
     let height = scale * (SHOWN_Z[1] - SHOWN_Z[0]);
     let chart = Chart {
         area: [LEFT, TOP, area_width, height],
-        // y points to the left, as one sees it who looks along the track.
+        // y points to the left, seen along the track.
         x: [left, right],
         y: SHOWN_Z.map(|z| top + z),
     };
@@ -109,7 +109,7 @@ pub(crate) fn draw(view: &ProfileView, width: u32) -> Svg {
     svg
 }
 
-/// A cross-section, raised, filled up to a height.
+/// Draws a cross-section, raised by a distance, filled up to a height.
 fn body(
     svg: &mut Svg,
     chart: &Chart,
@@ -122,7 +122,7 @@ fn body(
     let (Some(first), Some(last)) = (line.first(), line.last()) else {
         return;
     };
-    // Beyond the picture, so that the sides of the body are not drawn.
+    // The area extends beyond the picture, so that the sides of the body are not visible.
     let beyond = edge + (edge - 0.5 * (chart.y[0] + chart.y[1]));
     let corners = [chart.at(last[0], beyond), chart.at(first[0], beyond)];
     let closed = polyline(places.iter().copied().chain(corners), true);
@@ -133,7 +133,7 @@ fn body(
     );
 }
 
-/// The largest pressure of every strip, standing on the rail, and the number of each patch.
+/// Draws the largest pressure of every strip on the rail, and the number of each patch.
 fn combs(svg: &mut Svg, chart: &Chart, patches: &[ProfileViewPatch]) {
     let pressures = |patch: &ProfileViewPatch| patch.cells.pressure_mpa.clone().unwrap_or_default();
     let largest = patches.iter().flat_map(pressures).fold(0.0, f64::max);
@@ -171,7 +171,7 @@ fn combs(svg: &mut Svg, chart: &Chart, patches: &[ProfileViewPatch]) {
     }
 }
 
-/// Across the patch: the height of each strip with its largest pressure, nothing at both ends.
+/// Returns `[y, pressure]` of the strips of a patch, with the largest pressure of each strip, and zero at both ends.
 fn comb(cells: &PatchCells) -> Vec<[f64; 2]> {
     let Some(pressure) = &cells.pressure_mpa else {
         return Vec::new();

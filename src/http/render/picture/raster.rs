@@ -1,6 +1,6 @@
-//! PNG of a picture. Its lines of text are drawn as outlines of a font of its own, so that it looks the same everywhere.
+//! Renders a picture as PNG. Text is drawn as outlines of an embedded font, so that it looks the same on all systems.
 //!
-//! The font is a part of DejaVu Sans (Latin, Greek, Cyrillic and signs); its licence lies beside it.
+//! The font is a subset of DejaVu Sans (Latin, Greek, Cyrillic and symbols), with its licence in the same folder.
 
 use std::fmt::Write;
 
@@ -13,10 +13,10 @@ use crate::render::picture::svg::{Anchor, Line, Svg};
 
 const FONT: &[u8] = include_bytes!("DejaVuSans.ttf");
 
-/// Draws a picture `width` pixels wide.
+/// Renders a picture, `width` pixels wide.
 ///
 /// # Errors
-/// The picture is no SVG, or does not fit into memory.
+/// The picture is not valid SVG, or does not fit into memory.
 pub(crate) fn png(picture: &Svg, width: u32) -> Result<Vec<u8>, String> {
     let font = Face::parse(FONT, 0).map_err(|error| error.to_string())?;
     let svg = picture.with_lines(|line| outlined(line, &font));
@@ -35,10 +35,10 @@ pub(crate) fn png(picture: &Svg, width: u32) -> Result<Vec<u8>, String> {
     pixels.encode_png().map_err(|error| error.to_string())
 }
 
-/// A line of text as a path. A character that the font lacks is an empty box, the glyph 0.
+/// Returns a line of text as a path. A character that the font lacks is an empty box, the glyph 0.
 fn outlined(line: &Line, font: &Face) -> String {
     let scale = line.size / f64::from(font.units_per_em());
-    // A letter and its accent are one character in the font.
+    // The font has letters with accents as single characters.
     let glyphs = line.text.nfc();
     let glyphs: Vec<(GlyphId, f64)> = glyphs
         .map(|c| font.glyph_index(c).unwrap_or_default())
@@ -70,7 +70,7 @@ fn outlined(line: &Line, font: &Face) -> String {
 /// Path data of glyphs.
 struct Outline {
     data: String,
-    /// Origin of the present glyph.
+    /// Origin of the current glyph.
     at: (f64, f64),
     /// Units of the picture per unit of the font.
     scale: f64,
@@ -80,7 +80,7 @@ impl Outline {
     fn add<const N: usize>(&mut self, command: char, points: [(f32, f32); N]) {
         self.data.push(command);
         for (x, y) in points {
-            // The font's second axis points upward. Writing to a string cannot fail.
+            // The second axis of the font points upward. Writing to a string cannot fail.
             let x = self.at.0 + self.scale * f64::from(x);
             let y = self.at.1 - self.scale * f64::from(y);
             let _ = write!(self.data, "{x:.3} {y:.3} ");

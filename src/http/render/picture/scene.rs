@@ -1,15 +1,15 @@
-//! What a picture shows, and what follows from it: the coloured values, the box around the cells, the zones.
+//! The content of the picture of a patch: the coloured values, the bounding box of the cells, the zones.
 
 use crate::render::shape::sheet::{AtBorder, bounds};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
-/// View shown by a picture.
+/// The content of the picture of a patch.
 #[derive(Debug, Clone)]
 pub(crate) struct Scene {
-    /// First line, a text of the client.
+    /// The title, a text of the client.
     pub title: String,
-    /// Smaller lines below, two at most.
+    /// At most two lines below the title.
     pub remarks: Vec<String>,
     /// The field that is coloured.
     pub shown: Output,
@@ -17,31 +17,31 @@ pub(crate) struct Scene {
     pub fields: PatchCells,
     /// The values of one motion.
     pub values: PointFields,
-    /// The values at both ends of the scale; from 0 to the largest where nothing is said.
+    /// The ends of the scale; by default 0 and the largest value.
     pub range: Option<[f64; 2]>,
 }
 
-/// The coloured values: magnitudes per cell, their name and unit.
+/// The values of a heat map.
 pub(crate) struct Heat {
     /// Magnitude per cell.
     pub values: Vec<f64>,
-    /// What they are.
+    /// Their name.
     pub label: &'static str,
     /// Their unit; empty if they have none.
     pub unit: &'static str,
-    /// What they do at the border of the patch.
+    /// Their behaviour at the border of the patch.
     pub edge: AtBorder,
 }
 
 impl Heat {
-    /// Both ends of the scale, the second above the first.
+    /// Returns the ends of the scale, the second above the first.
     pub(crate) fn range(&self, asked: Option<[f64; 2]>) -> [f64; 2] {
         let largest = self.values.iter().copied().fold(0.0, f64::max);
         asked.unwrap_or([0.0, if largest > 0.0 { largest } else { 1.0 }])
     }
 }
 
-/// The magnitudes that a heat map shows; `None` for zones.
+/// Returns the values of the heat map; `None` for zones.
 pub(crate) fn heat(scene: &Scene) -> Option<Heat> {
     let magnitude = |x: &Option<Vec<f64>>, y: &Option<Vec<f64>>| {
         let (x, y) = (x.as_deref().unwrap_or(&[]), y.as_deref().unwrap_or(&[]));
@@ -81,21 +81,20 @@ pub(crate) fn heat(scene: &Scene) -> Option<Heat> {
     }
 }
 
-/// Box around the cells in mm.
+/// Returns the bounding box `[x_min, x_max, y_min, y_max]` of the cells in mm.
 pub(crate) fn extent(fields: &PatchCells) -> [f64; 4] {
     let shape = bounds((0..fields.x_mm.len()).flat_map(|cell| {
         let (x, y) = (fields.x_mm[cell], fields.y_mm[cell]);
         let (dx, dy) = (0.5 * fields.dx_mm[cell], 0.5 * fields.dy_mm[cell]);
         [[x - dx, y - dy], [x + dx, y + dy]]
     }));
-    if shape.iter().all(|value| value.is_finite()) {
-        shape
-    } else {
-        [-1.0, 1.0, -1.0, 1.0]
+    match shape.iter().all(|value| value.is_finite()) {
+        true => shape,
+        false => [-1.0, 1.0, -1.0, 1.0],
     }
 }
 
-/// Does any cell stick, or slip?
+/// Whether any cell sticks, and whether any cell slips.
 pub(crate) fn zones_present(scene: &Scene) -> (bool, bool) {
     let zones = scene.values.zone.as_deref().unwrap_or(&[]);
     (zones.contains(&Zone::Stick), zones.contains(&Zone::Slip))

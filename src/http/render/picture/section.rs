@@ -1,14 +1,14 @@
-//! Draws the sections of a patch through its largest traction: how large the traction is, and how much friction would carry.
+//! Draws sections of a patch through its largest traction, with traction and friction bound.
 
-use crate::render::picture::chart::{Chart, WIDTH, open};
-use crate::render::picture::svg::{Anchor, Svg, polyline, px};
+use crate::render::picture::chart::{Chart, WIDTH, legend_line, open};
+use crate::render::picture::svg::{Anchor, Svg, polyline};
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
-/// Height of the picture in its own units.
+/// Height of the picture in its units.
 const HEIGHT: f64 = 460.0;
-/// Room to the left of the first panel, between both, and to the right.
+/// Space left of the first panel, between both panels, and right of the second.
 const GAPS: [f64; 3] = [78.0, 62.0, 24.0];
-/// Steps between two cells: values go like a square root near the border.
+/// Interpolated points between two cells.
 const STEPS: u32 = 8;
 const TRACTION: &str = "stroke=\"#0b5a9e\" stroke-width=\"1.9\"";
 const BOUND: &str = "stroke=\"#555\" stroke-dasharray=\"5 4\"";
@@ -17,21 +17,21 @@ const STICK: &str = "fill=\"#d4e5f3\"";
 /// Sections of a patch.
 #[derive(Debug, Clone)]
 pub(crate) struct Sections {
-    /// First line, a text of the client.
+    /// The title, a text of the client.
     pub title: String,
-    /// Smaller lines below, two at most.
+    /// At most two lines below the title.
     pub remarks: Vec<String>,
     /// The cells.
     pub cells: PatchCells,
     /// The values of one motion.
     pub values: PointFields,
-    /// Coefficient of friction, where it is one number.
+    /// Coefficient of friction; `None` if it varies.
     pub friction: Option<f64>,
 }
 
-/// One section: places along it with the traction and the bound, its sticking parts, and what it is called.
+/// A section: its points, the parts that stick, and its names.
 struct SectionLine {
-    /// Place, |t|, μp if it is known.
+    /// Position, |t| and μp; μp is NaN if it is not known.
     points: Vec<[f64; 3]>,
     sticks: Vec<[f64; 2]>,
     name: String,
@@ -52,7 +52,7 @@ pub(crate) fn draw(sections: &Sections, width: u32) -> Svg {
         let ends = [section.points.first(), section.points.last()];
         ends[1].map_or(1.0, |end| end[0]) - ends[0].map_or(0.0, |end| end[0])
     });
-    // Millimetres are as long in one as in the other, within limits.
+    // Both panels have the same scale, within limits.
     let share = (lengths[0] / (lengths[0] + lengths[1])).clamp(0.3, 0.7);
     let mut svg = open(&sections.title, &sections.remarks, width, HEIGHT);
     let mut left = GAPS[0];
@@ -80,12 +80,7 @@ fn draw_section(svg: &mut Svg, chart: &Chart, section: &SectionLine) {
     let [_, top, _, height] = chart.area;
     for [from, to] in &section.sticks {
         let [x0, x1] = [from, to].map(|x| chart.at(*x, 0.0).0);
-        let place = [x0, top, x1 - x0, height].map(px);
-        let [x, y, width, height] = place;
-        svg.element(
-            "rect",
-            &format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" {STICK}"),
-        );
+        svg.rect([x0, top, x1 - x0, height], STICK);
     }
     chart.grid(svg);
     let line = |column: usize| {
@@ -104,23 +99,12 @@ fn draw_section(svg: &mut Svg, chart: &Chart, section: &SectionLine) {
 
 fn legend(svg: &mut Svg, bounded: bool) {
     let y = HEIGHT - 26.0;
-    svg.path(
-        &format!("M78 {}h30", px(y - 4.0)),
-        &format!("fill=\"none\" {TRACTION}"),
-    );
-    svg.text((115.0, y), 12.0, Anchor::Start, "", "traction |t|");
+    legend_line(svg, (78.0, y), TRACTION, "traction |t|");
     if bounded {
-        svg.path(
-            &format!("M230 {}h30", px(y - 4.0)),
-            &format!("fill=\"none\" {BOUND}"),
-        );
-        svg.text((267.0, y), 12.0, Anchor::Start, "", "bound of friction μp");
+        legend_line(svg, (230.0, y), BOUND, "bound of friction μp");
     }
-    let place = format!(
-        "x=\"430\" y=\"{}\" width=\"22\" height=\"12\"",
-        px(y - 10.0)
-    );
-    svg.element("rect", &format!("{place} {STICK} stroke=\"#333\""));
+    let stick = format!("{STICK} stroke=\"#333\"");
+    svg.rect([430.0, y - 10.0, 22.0, 12.0], &stick);
     svg.text((459.0, y), 12.0, Anchor::Start, "", "stick");
 }
 
@@ -130,7 +114,7 @@ impl Sections {
         part(&self.values.traction_x_mpa).hypot(part(&self.values.traction_y_mpa))
     }
 
-    /// NaN where it is not known.
+    /// Returns the friction bound; NaN if it is not known.
     fn bound(&self, cell: usize) -> f64 {
         let pressure = self.cells.pressure_mpa.as_ref().map(|values| values[cell]);
         pressure
@@ -143,7 +127,7 @@ impl Sections {
         zones.is_some_and(|zones| zones[cell] == Zone::Stick)
     }
 
-    /// The cell with the largest traction.
+    /// Returns the cell with the largest traction.
     fn peak(&self) -> usize {
         let cells = 0..self.cells.x_mm.len();
         cells
@@ -152,7 +136,7 @@ impl Sections {
     }
 }
 
-/// Along rolling: the strip of the largest traction.
+/// Returns the section along rolling, through the strip with the largest traction.
 fn along(of: &Sections) -> SectionLine {
     let (cells, peak) = (&of.cells, of.peak());
     let strip = cells.strip.get(peak).copied();
@@ -173,7 +157,7 @@ fn along(of: &Sections) -> SectionLine {
     )
 }
 
-/// Across: of every strip the cell that lies at the x of the largest traction.
+/// Returns the section across, through the cells of all strips at the x of the largest traction.
 fn across(of: &Sections) -> SectionLine {
     let (cells, peak) = (&of.cells, of.peak());
     let at = cells.x_mm.get(peak).copied().unwrap_or(0.0);
@@ -194,8 +178,8 @@ fn across(of: &Sections) -> SectionLine {
     )
 }
 
-/// The section through these cells, each with its span. Between the middles of cells the square runs straight, and to nothing at the
-/// border, as it does for Hertz's pressure there.
+/// Returns the section through these cells, each with its span. Between the centres of cells the square of a value is linear, and zero at the
+/// border, as for the pressure of Hertz.
 fn section(
     of: &Sections,
     spans: Vec<(usize, [f64; 2])>,

@@ -1,14 +1,14 @@
-//! Writes SVG text piece by piece. Every text of a client passes through [`escape`].
+//! Writes SVG. Every text of a client passes through [`escape`].
 
 use std::fmt::Write;
 
-/// Fonts that are looked for, the one that raster pictures are made with first.
+/// Fonts in order of preference; raster pictures use the first.
 pub(super) const FONTS: &str = "DejaVu Sans, Verdana, sans-serif";
 
-/// A drawing in the making.
+/// An SVG drawing.
 #[derive(Debug, Default)]
 pub(crate) struct Svg {
-    /// Markup, and the lines of text between it.
+    /// Markup and lines of text, in order.
     parts: Vec<Part>,
 }
 
@@ -21,11 +21,11 @@ enum Part {
 /// A line of text.
 #[derive(Debug)]
 pub(super) struct Line {
-    /// The place of its anchor.
+    /// Position of the anchor.
     pub at: (f64, f64),
-    /// Size of the font.
+    /// Font size.
     pub size: f64,
-    /// The end that stands at the place.
+    /// The part of the text at the position.
     pub anchor: Anchor,
     /// Further attributes.
     pub attributes: String,
@@ -33,7 +33,7 @@ pub(super) struct Line {
     pub text: String,
 }
 
-/// Which end of a text stands at its place.
+/// The part of a text that is at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
     /// The beginning.
@@ -45,9 +45,16 @@ pub(super) enum Anchor {
 }
 
 impl Svg {
-    /// Adds an element without content; `attributes` is written as it stands.
+    /// Adds an element without content; `attributes` is not escaped.
     pub(super) fn element(&mut self, name: &str, attributes: &str) {
         self.raw(&format!("<{name} {attributes}/>\n"));
+    }
+
+    /// Adds a rectangle `[x, y, width, height]`.
+    pub(super) fn rect(&mut self, area: [f64; 4], attributes: &str) {
+        let [x, y, width, height] = area.map(px);
+        let place = format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"");
+        self.element("rect", &format!("{place} {attributes}"));
     }
 
     /// Adds a path.
@@ -55,7 +62,7 @@ impl Svg {
         self.raw(&format!("<path d=\"{data}\" {attributes}/>\n"));
     }
 
-    /// Adds a line of text of the given size; `attributes` is written as it stands, `text` is escaped.
+    /// Adds a line of text; `text` is escaped, `attributes` is not.
     pub(super) fn text(
         &mut self,
         at: (f64, f64),
@@ -73,18 +80,18 @@ impl Svg {
         }));
     }
 
-    /// Adds text that is SVG already.
+    /// Adds SVG markup.
     pub(super) fn raw(&mut self, text: &str) {
         self.parts.push(Part::Markup(text.to_owned()));
     }
 
-    /// The drawing, with its lines of text as elements.
+    /// Returns the SVG, with lines of text as elements.
     #[must_use]
     pub(crate) fn finish(&self) -> String {
         self.with_lines(Line::element)
     }
 
-    /// The drawing, with its lines of text written by `element`.
+    /// Returns the SVG, with lines of text written by `element`.
     pub(super) fn with_lines(&self, element: impl Fn(&Line) -> String) -> String {
         let text = |part: &Part| match part {
             Part::Markup(text) => text.clone(),
@@ -109,7 +116,7 @@ impl Line {
     }
 }
 
-/// A length in the units of the drawing, to a hundredth.
+/// Formats a length in units of the drawing, to a hundredth.
 #[must_use]
 pub(super) fn px(value: f64) -> String {
     let mut text = format!("{value:.2}");
@@ -118,7 +125,7 @@ pub(super) fn px(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text }
 }
 
-/// A path through points; closed ones return to their beginning.
+/// Returns the path through points.
 #[must_use]
 pub(super) fn polyline(points: impl IntoIterator<Item = (f64, f64)>, closed: bool) -> String {
     let mut data = String::new();
@@ -133,7 +140,7 @@ pub(super) fn polyline(points: impl IntoIterator<Item = (f64, f64)>, closed: boo
     data
 }
 
-/// Closed curves through points, to a tenth: every point within `tolerance` of a straight line through its neighbours is left out.
+/// Returns the path of closed curves, to a tenth, without points within `tolerance` of the simplified curve.
 #[must_use]
 pub(super) fn curves(loops: impl IntoIterator<Item = Vec<(f64, f64)>>, tolerance: f64) -> String {
     let tenths = |(x, y): (f64, f64)| [(10.0 * x).round() as i64, (10.0 * y).round() as i64];
@@ -174,7 +181,7 @@ pub(super) fn curves(loops: impl IntoIterator<Item = Vec<(f64, f64)>>, tolerance
     data
 }
 
-/// A number in tenths, with what divides it from the number before.
+/// Formats a number in tenths, with a separator from the number before.
 fn step(tenths: i64) -> String {
     let sign = if tenths < 0 { "-" } else { " " };
     let (whole, rest) = (tenths.abs() / 10, tenths.abs() % 10);
@@ -185,7 +192,7 @@ fn step(tenths: i64) -> String {
     }
 }
 
-/// Adds what follows the first point, without what lies within the tolerance of the rest (D. H. Douglas and T. K. Peucker, 1973).
+/// Adds the points after the first, simplified within the tolerance (D. H. Douglas and T. K. Peucker, 1973).
 fn simplify(points: &[(f64, f64)], tolerance: f64, kept: &mut Vec<(f64, f64)>) {
     let (Some(&from), Some(&to)) = (points.first(), points.last()) else {
         return;
@@ -204,8 +211,8 @@ fn simplify(points: &[(f64, f64)], tolerance: f64, kept: &mut Vec<(f64, f64)>) {
     }
 }
 
-/// Text as XML character data. What XML cannot hold, other control characters, and marks that turn the direction of the text
-/// beyond its end are replaced by U+FFFD.
+/// Escapes text as XML character data. Characters that XML does not allow, control characters, and marks that change the direction of
+/// text are replaced by U+FFFD.
 #[must_use]
 pub(super) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
@@ -227,7 +234,7 @@ pub(super) fn escape(text: &str) -> String {
     out
 }
 
-/// At most `most` characters; a text that is cut ends in an ellipsis.
+/// Truncates a text to `most` characters, with an ellipsis.
 #[must_use]
 pub(super) fn shorten(text: &str, most: usize) -> String {
     if text.chars().count() <= most {

@@ -1,7 +1,7 @@
-//! Curves through samples that have no extreme between their nodes.
+//! Monotone cubic interpolation.
 
-/// Values at any places of the curve that has no extreme between its nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat.
-/// Comput. 5, 1984); beyond the first and the last node, the values there. Nodes must ascend; of two at the same place one counts.
+/// Interpolates between samples without extremes between the nodes (F. N. Fritsch and J. Butland, SIAM J. Sci. Stat. Comput. 5, 1984).
+/// Beyond the first and the last node, the values are constant. Nodes must ascend; of two equal nodes one is used.
 pub(super) fn monotone(axis: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
     let last = axis.len() - 1;
     if last == 0 {
@@ -25,7 +25,7 @@ pub(super) fn monotone(axis: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
     at.iter().map(value_at).collect()
 }
 
-/// Slopes after Fritsch and Butland: weighted harmonic means inside, parabolas at both ends, kept from overshooting.
+/// Returns slopes after Fritsch and Butland: weighted harmonic means inside, limited parabolas at both ends.
 fn monotone_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     let last = axis.len() - 1;
     let widths: Vec<f64> = axis.windows(2).map(|k| k[1] - k[0]).collect();

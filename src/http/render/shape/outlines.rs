@@ -1,9 +1,7 @@
-//! Outlines of the stick and slip zones and of the patch, as closed polygons.
+//! Outlines of the stick and slip zones and of the patch, as closed polygons, and the strips of stored cells.
 //!
-//! Cells are rectangles `x ± dx/2`, `y ± dy/2`. Outer loops run counter-clockwise, holes clockwise (x to the right,
-//! y up); the first point is not repeated. No loop touches itself: where two loops meet in a corner each closes alone.
-//!
-//! Recovers strips and their segments from stored cells, and finds the neighbours that continue a segment.
+//! Cells are rectangles `x ± dx/2`, `y ± dy/2`. Outer loops run counter-clockwise, holes clockwise (x to the right, y up); the first point
+//! is not repeated. No loop touches itself: two loops that meet in a corner are separate.
 
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay::IntOverlayOptions;
@@ -14,11 +12,11 @@ use i_overlay::i_shape::int::shape::IntContour;
 use railhead_contact::numerics::interpolation;
 use railhead_contact::solution::words::answer::{PatchCells, Zone};
 
-/// Outlines of the union of the cells of one zone or another class, or of all cells when `which` is `None`, in mm.
+/// Returns the outlines in mm of the union of the cells of one class, such as a zone, or of all cells if `which` is `None`.
 ///
-/// The polygons are rectilinear and enclose exactly the cells: their signed areas (holes negative) add up to the
-/// area of the cells. Edges of neighbouring cells that differ by rounding (1e-9 of the cell) count as one. Loops are
-/// sorted by their lowest, then leftmost point and start there. With `which` given and no `classes` there is no outline.
+/// The polygons are rectilinear and enclose exactly the cells: their signed areas (holes negative) add up to the area of the cells. Edges
+/// of neighbouring cells that differ by rounding (1e-9 of the cell) count as equal. Loops start at their lowest, then leftmost point, and
+/// are sorted by it. Without `classes` there is no outline of a class.
 ///
 /// # Panics
 /// If the vectors differ in length.
@@ -57,12 +55,11 @@ pub(crate) fn outlines<T: Copy + PartialEq>(
         .collect()
 }
 
-/// Outline of the patch through the ends of the chords, in mm.
+/// Returns the outline of the patch through the ends of the chords, in mm.
 ///
-/// For a patch with one segment per strip: the leading ends upward, then the trailing ends downward; at the first and
-/// last strip's outer border the chord is extrapolated (its squared half-length as a parabola in y, exact for an
-/// ellipse, where it closes in one point). Second order in the strips' width. Any other patch gets the rectilinear
-/// outline of [`outlines`].
+/// If every strip has one segment, the outline follows the leading ends upward, then the trailing ends downward. At the outer borders of
+/// the first and the last strip the chord is extrapolated: its squared half-length is a parabola in y, which is exact for an ellipse. The
+/// outline is of second order in the width of the strips. The outline of any other patch is that of [`outlines`].
 #[must_use]
 pub(crate) fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
     let strips = Strips::new(fields);
@@ -88,7 +85,7 @@ pub(crate) fn patch_outline(fields: &PatchCells) -> Vec<Vec<[f64; 2]>> {
     vec![polygon]
 }
 
-/// Distinct edges along one axis; every cell knows its two by rank.
+/// Distinct edges along one axis, and for each cell the indices of its two edges.
 struct CellBorders {
     values: Vec<f64>,
     of_cell: Vec<(i32, i32)>,
@@ -108,7 +105,7 @@ impl CellBorders {
         let mut ranks = vec![0; sides.len()];
         let mut last_tolerance = 0.0;
         for &(value, tolerance, side) in &sides {
-            // Compared with the first edge of its group, so that groups cannot creep.
+            // An edge is compared with the first one of its group, so that a group cannot spread.
             if values
                 .last()
                 .is_none_or(|&last| value - last > tolerance.min(last_tolerance))
@@ -126,13 +123,13 @@ impl CellBorders {
     }
 }
 
-/// Distance between cells, as a fraction of a cell's width, below which they count as adjacent.
-pub(crate) const JOIN: f64 = 1e-9;
+/// Distance between cells below which they are adjacent, as a fraction of the width of a cell.
+const JOIN: f64 = 1e-9;
 
-/// An unbroken run of cells of one strip.
+/// A contiguous run of cells of a strip.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StoredSegment {
-    /// Its cells, as indices into the fields, from smaller to larger x.
+    /// Indices of its cells, in ascending x.
     pub(crate) cells: std::ops::Range<usize>,
     /// Mid-line in mm.
     pub(crate) y: f64,
@@ -146,13 +143,13 @@ pub(crate) struct StoredSegment {
     pub(crate) below: Option<usize>,
     /// The segment that continues it toward larger y, if each is the only neighbour of the other on that side.
     pub(crate) above: Option<usize>,
-    /// It touches several segments below, or one that touches other segments above.
+    /// Whether it touches several segments below, or one that touches other segments above.
     pub(crate) branches_below: bool,
-    /// It touches several segments above, or one that touches other segments below.
+    /// Whether it touches several segments above, or one that touches other segments below.
     pub(crate) branches_above: bool,
 }
 
-/// The patch as strips, each a range of segments; both from smaller to larger y, then x.
+/// A patch as strips, each a range of segments, in ascending y, then x.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Strips {
     /// All segments.
@@ -162,7 +159,7 @@ pub(crate) struct Strips {
 }
 
 impl Strips {
-    /// Reads the strips from cells stored strip by strip (smaller to larger y), in each by x.
+    /// Reads the strips from cells that are stored strip by strip in ascending y, and in ascending x in each strip.
     ///
     /// # Panics
     /// If the vectors of the cells differ in length.
@@ -219,12 +216,11 @@ impl Strips {
                 .all(|segment| segment.below.is_some())
     }
 
-    /// Trailing and leading end of a segment without continuation at the border of its strip (`upper`: the border at
-    /// larger y).
+    /// Returns the trailing and the leading end of a segment without continuation at the border of its strip; `upper` selects the border at
+    /// larger y.
     ///
-    /// The squared half-length is extrapolated through up to three strips, as a parabola in y (exact for an
-    /// ellipse), the centre as a line; the half-length stays between 0 and that of the segment. Where segments
-    /// branch, the ends of the segment are returned unchanged.
+    /// The squared half-length is extrapolated through up to three strips as a parabola in y, which is exact for an ellipse, and the centre as
+    /// a line. The half-length is limited to that of the segment. If segments branch, the ends of the segment are returned unchanged.
     pub(crate) fn tip(&self, segment: usize, upper: bool) -> (f64, f64) {
         let first = &self.segments[segment];
         let branches = if upper {
@@ -260,7 +256,7 @@ impl Strips {
         let half = interpolation::polynomial_value(&squared, y)
             .clamp(0.0, squared[0].1)
             .sqrt();
-        // Rounding of the parabola gives half-lengths of this size where the true one is 0.
+        // Rounding of the parabola gives half-lengths of this size for 0.
         let half = if half < 1e-6 * squared[0].1.sqrt() {
             0.0
         } else {
@@ -298,8 +294,8 @@ impl Strips {
     }
 }
 
-/// Distance below which two edges are the same: a fraction of the cell's width, but at least the rounding of coordinates.
-pub(crate) fn join_tolerance(coordinate: f64, width: f64) -> f64 {
+/// Returns the distance below which two edges are equal: a fraction of the width of the cell, but at least the rounding of coordinates.
+fn join_tolerance(coordinate: f64, width: f64) -> f64 {
     (JOIN * width).max(8.0 * f64::EPSILON * coordinate.abs())
 }
 

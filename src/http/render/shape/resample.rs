@@ -8,7 +8,7 @@ use railhead_contact::solution::words::answer::{PatchCells, Zone};
 pub(crate) struct Gridded<T = f64> {
     /// Sample points along x in mm, ascending.
     pub(crate) x_mm: Vec<f64>,
-    /// Sample points across in mm, ascending.
+    /// Sample points along y in mm, ascending.
     pub(crate) y_mm: Vec<f64>,
     /// `values[iy][ix]` at `(x_mm[ix], y_mm[iy])`.
     pub(crate) values: Vec<Vec<Option<T>>>,
@@ -16,14 +16,14 @@ pub(crate) struct Gridded<T = f64> {
 
 /// Interpolates cell values on `nx × ny` points over the bounding box of the patch.
 ///
-/// The points are the centres of `nx × ny` equal rectangles that fill the box, so that the sum of all values times the
-/// area of a rectangle approximates the integral (with a first-order error at the patch's border). Along a strip, values are
-/// linear between the centres of cells, and constant beyond the first and last centre up to the end of the chord. Between
-/// the mid-lines of two strips, the ends of the chord are linear in y, and so is the value between those at
-/// the same relative position in both chords. Beyond the first and last mid-line the chord is extrapolated to the
-/// strip's border as in [`patch_outline`](super::outlines::patch_outline). Where segments branch, every
-/// segment is continued unchanged to its strip's borders. Constants are reproduced everywhere, linear fields between the
-/// outermost centres of a chord and between the outermost mid-lines.
+/// The points are the centres of `nx × ny` equal rectangles that fill the box, so that the sum of all values times the area of a rectangle
+/// approximates the integral, with a first-order error at the border of the patch.
+///
+/// Along a strip, values are linear between the centres of cells, and constant beyond the first and last centre. Between the mid-lines of
+/// two strips, the ends of the chord are linear in y, and so are values at equal relative positions in both chords. Beyond the first and
+/// last mid-line the chord is extrapolated as in [`patch_outline`](super::outlines::patch_outline). If segments branch, every segment
+/// continues unchanged to the borders of its strip. Constants are reproduced everywhere, linear fields between the outermost centres of a
+/// chord and between the outermost mid-lines.
 ///
 /// # Panics
 /// If `nx` or `ny` is less than 2, or the number of `values` differs from that of the cells.
@@ -42,9 +42,9 @@ pub(crate) fn resample(fields: &PatchCells, values: &[f64], nx: usize, ny: usize
     })
 }
 
-/// The zone of the nearest cell on `nx × ny` points over the bounding box of the patch.
+/// Returns the zone of the nearest cell on `nx × ny` points over the bounding box of the patch.
 ///
-/// Points and patch as in [`resample`]; the cell is the one at the same relative position in the nearest strip.
+/// Points and patch are those of [`resample`]. The cell is that at the same relative position in the nearest strip.
 ///
 /// # Panics
 /// If `nx` or `ny` is less than 2, or the number of `zones` differs from that of the cells.
@@ -68,7 +68,7 @@ pub(crate) fn resample_zone(
     })
 }
 
-/// A point of one strip: the cells of its segment and its x.
+/// A point in a segment: the cells of the segment, and x in mm.
 struct CellPosition {
     cells: std::ops::Range<usize>,
     x: f64,
@@ -78,7 +78,7 @@ struct CellPosition {
 struct SamplePoint {
     /// The point in the nearest strip.
     near: CellPosition,
-    /// The point at the same relative position in the next strip on its side, if the segment continues there.
+    /// The point at the same relative position in the adjacent strip, if the segment continues there.
     far: Option<CellPosition>,
     /// Weight of `far`, 0 to ½.
     weight: f64,
@@ -124,7 +124,7 @@ fn sample<T>(
     Gridded { x_mm, y_mm, values }
 }
 
-/// Centres of `n` equal parts of an interval.
+/// Returns the centres of `n` equal parts of an interval.
 fn centres(from: f64, to: f64, n: usize) -> Vec<f64> {
     let step = (to - from) / n as f64;
     (0..n).map(|k| from + (k as f64 + 0.5) * step).collect()
@@ -164,7 +164,7 @@ impl ChordCut {
     }
 }
 
-/// All intersections of the line at `y` with the patch.
+/// Returns the intersections of the line at `y` with the patch.
 fn chords(strips: &Strips, y: f64) -> Vec<ChordCut> {
     let covers = |strip: &&std::ops::Range<usize>| {
         let first = &strips.segments[strip.start];
@@ -204,7 +204,7 @@ fn chords(strips: &Strips, y: f64) -> Vec<ChordCut> {
         .collect()
 }
 
-/// Value of a segment at a place: linear between centres, constant beyond the outermost ones.
+/// Returns the value of a segment at a point: linear between centres, constant beyond the outermost ones.
 fn along(fields: &PatchCells, values: &[f64], place: &CellPosition) -> f64 {
     let cells = place.cells.clone();
     let after =

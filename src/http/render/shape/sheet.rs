@@ -1,10 +1,6 @@
-//! A patch of one piece as a curved grid that ends at its border, and fields on it.
+//! A simply connected patch as a curved grid that ends at its border, contours of fields on it, and the border of the stick zone.
 //!
-//! A node stands at a share of the chord at its height, so that what follows the border stays smooth beside it.
-//!
-//! Closed curves around the part of a grid whose values reach a level.
-//!
-//! The border between stick and slip, from the margin of the traction to friction's bound.
+//! A node lies at a fixed share of the chord at its y, so that contours near the border are smooth.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -13,17 +9,17 @@ use super::monotone::monotone;
 use super::outlines::{StoredSegment, Strips};
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
-/// Nodes of the grid along one axis, at least and at most; between them four per cell or strip.
+/// Least and largest number of nodes along one axis. In between, there are four per cell or strip.
 const NODES: [usize; 2] = [65, 257];
-/// Strips from which on something can be interpolated between them.
+/// Least number of strips for interpolation between them.
 const STRIPS_MIN: usize = 3;
 
-/// What a field does at the border of the patch.
+/// Behaviour of a field at the border of the patch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AtBorder {
-    /// It vanishes like the square root of the distance: pressure, and what friction bounds.
+    /// It vanishes like the square root of the distance: pressure and traction.
     Vanishes,
-    /// It goes on as in the outermost cells.
+    /// It continues as in the outermost cells.
     Continues,
 }
 
@@ -31,20 +27,20 @@ pub(crate) enum AtBorder {
 #[derive(Debug, Clone)]
 pub(crate) struct Sheet {
     pub(crate) strips: Vec<StoredSegment>,
-    /// Heights of the strips, between those of the lowest and the highest point of the border.
+    /// y of the lowest point of the border, of the strips, and of the highest point, in mm.
     heights: Vec<f64>,
-    /// Shares of the chord at which nodes stand, from 0 to 1.
+    /// Positions of the nodes on the chord, from 0 to 1.
     pub(crate) shares: Vec<f64>,
-    /// Heights of the rows.
+    /// y of the rows of nodes in mm.
     rows: Vec<f64>,
     places: Vec<[f64; 2]>,
 }
 
 impl Sheet {
-    /// The grid over a patch; `None` where it has fewer than three strips, or gaps.
+    /// Creates the grid over a patch; `None` if the patch has fewer than three strips, or gaps.
     ///
-    /// Between the middles of strips the chord's squared half-length and its centre are monotone cubics, so that the border of an
-    /// ellipse is round at few strips too; its ends are those of [`patch_outline`](super::outlines::patch_outline).
+    /// Between the mid-lines of strips, the squared half-length and the centre of the chord are monotone cubics, so that the border of an ellipse
+    /// is round even with few strips. The ends are those of [`patch_outline`](super::outlines::patch_outline).
     #[must_use]
     pub(crate) fn new(cells: &PatchCells) -> Option<Sheet> {
         let found = Strips::new(cells);
@@ -62,9 +58,9 @@ impl Sheet {
             .chain([found.tip(last, true)])
             .collect();
         let longest = segments.iter().map(|s| s.cells.len()).max().unwrap_or(0);
-        let shares = crowded(longest);
+        let shares = chebyshev(longest);
         let (from, to) = (heights[0], heights[heights.len() - 1]);
-        let rows: Vec<f64> = crowded(segments.len())
+        let rows: Vec<f64> = chebyshev(segments.len())
             .into_iter()
             .map(|share| from + share * (to - from))
             .collect();
@@ -90,7 +86,7 @@ impl Sheet {
         })
     }
 
-    /// The border of the patch in mm, counter-clockwise.
+    /// Returns the border of the patch in mm, counter-clockwise.
     #[must_use]
     pub(crate) fn border(&self) -> Vec<[f64; 2]> {
         let columns = self.shares.len();
@@ -101,15 +97,15 @@ impl Sheet {
         leading.chain(trailing).collect()
     }
 
-    /// Box around the border: x from, x to, y from, y to in mm.
+    /// Returns the bounding box `[x_min, x_max, y_min, y_max]` of the border in mm.
     #[must_use]
     pub(crate) fn extent(&self) -> [f64; 4] {
         bounds(self.places.iter().copied())
     }
 
-    /// Values of cells at the nodes: monotone cubics along every strip and from strip to strip at equal shares of their lengths.
-    /// Nothing exceeds the values of the cells. What vanishes at the border is squared before and its root taken after, which is
-    /// exact for Hertz's pressure.
+    /// Interpolates values of cells at the nodes, by monotone cubics along every strip and then between strips at equal shares of the chords.
+    /// The result never exceeds the values of the cells. A field that vanishes at the border is interpolated by its square, which is exact for
+    /// the pressure of Hertz.
     ///
     /// # Panics
     /// If there are fewer values than cells.
@@ -147,8 +143,8 @@ impl Sheet {
         nodes
     }
 
-    /// Interpolates across what is known along every strip at the shares of the nodes.
-    pub(crate) fn across(&self, strips: &[Vec<f64>], edge: AtBorder) -> Vec<f64> {
+    /// Interpolates between strips from values at the nodes of every strip.
+    fn across(&self, strips: &[Vec<f64>], edge: AtBorder) -> Vec<f64> {
         let (columns, last) = (self.shares.len(), strips.len() - 1);
         let mut nodes = vec![0.0; columns * self.rows.len()];
         for column in 0..columns {
@@ -168,7 +164,7 @@ impl Sheet {
         nodes
     }
 
-    /// Closed curves around where a field reaches a level, counter-clockwise, holes clockwise; they end at the border of the patch.
+    /// Returns closed curves around the part of the patch where a field reaches a level, counter-clockwise, holes clockwise.
     #[must_use]
     pub(crate) fn reaching(&self, nodes: &[f64], level: f64) -> Vec<Vec<[f64; 2]>> {
         let grid = CurvedGrid {
@@ -180,7 +176,7 @@ impl Sheet {
     }
 }
 
-/// Box around points: x from, x to, y from, y to; from infinity down to infinity below zero if there is none.
+/// Returns the bounding box `[x_min, x_max, y_min, y_max]` of points; `[∞, -∞, ∞, -∞]` without points.
 pub(crate) fn bounds(points: impl Iterator<Item = [f64; 2]>) -> [f64; 4] {
     let none = [
         f64::INFINITY,
@@ -193,25 +189,25 @@ pub(crate) fn bounds(points: impl Iterator<Item = [f64; 2]>) -> [f64; 4] {
     })
 }
 
-/// Shares from 0 to 1, closer to each other at both ends, where a border is round and a field steep.
-fn crowded(of: usize) -> Vec<f64> {
+/// Returns Chebyshev positions from 0 to 1, which are denser at both ends, where the border is round and a field is steep.
+fn chebyshev(of: usize) -> Vec<f64> {
     let count = (4 * of + 1).clamp(NODES[0], NODES[1]);
     let share = |k: usize| 0.5 * (1.0 - (PI * k as f64 / (count - 1) as f64).cos());
     (0..count).map(share).collect()
 }
 
-/// Values at the nodes of a grid, row by row; the grid may be curved.
-pub(crate) struct CurvedGrid<'a> {
-    /// Nodes of a row.
-    pub(crate) columns: usize,
-    /// One value per node.
-    pub(crate) values: &'a [f64],
-    /// The place of each node in mm.
-    pub(crate) places: &'a [[f64; 2]],
+/// Values at the nodes of a curved grid, row by row.
+struct CurvedGrid<'a> {
+    /// Number of nodes of a row.
+    columns: usize,
+    /// The values of the nodes.
+    values: &'a [f64],
+    /// The positions of the nodes in mm.
+    places: &'a [[f64; 2]],
 }
 
 impl CurvedGrid<'_> {
-    /// The value at a node of the grid with a ring of nodes around it that reach no level.
+    /// Returns the value at a node of the grid extended by a ring of nodes at -∞.
     fn value(&self, i: usize, j: usize) -> f64 {
         let rows = self.values.len() / self.columns;
         if i == 0 || j == 0 || i > self.columns || j > rows {
@@ -226,7 +222,7 @@ impl CurvedGrid<'_> {
         self.places[(j - 1) * self.columns + i - 1]
     }
 
-    /// Where the level is crossed between two nodes, linearly; at the border of the grid the border itself.
+    /// Returns the point where the level is crossed between two nodes, by linear interpolation; at the border of the grid its node.
     fn crossing(&self, one: (usize, usize), two: (usize, usize), level: f64) -> [f64; 2] {
         let (a, b) = (self.value(one.0, one.1), self.value(two.0, two.1));
         let (from, to) = (self.place(one.0, one.1), self.place(two.0, two.1));
@@ -241,12 +237,12 @@ impl CurvedGrid<'_> {
     }
 }
 
-/// An edge of the grid: its lower node, and whether it goes to the next row.
+/// An edge of the grid: its lower node, and whether it leads to the next row.
 type GridEdge = (usize, usize, bool);
 
-/// Closed curves with what reaches the level on their left (marching squares; W. E. Lorensen and H. E. Cline, 1987, in two dimensions).
-/// Where two parts meet in one square, the mean of its corners decides whether they are joined.
-pub(crate) fn contours(grid: &CurvedGrid, level: f64) -> Vec<Vec<[f64; 2]>> {
+/// Returns closed curves with the part that reaches the level on their left (marching squares; W. E. Lorensen and H. E. Cline, 1987, in two
+/// dimensions). If two parts meet in a square, the mean of its corners decides whether they are joined.
+fn contours(grid: &CurvedGrid, level: f64) -> Vec<Vec<[f64; 2]>> {
     let rows = grid.values.len() / grid.columns;
     let mut next: BTreeMap<GridEdge, GridEdge> = BTreeMap::new();
     for j in 0..=rows {
@@ -269,7 +265,7 @@ pub(crate) fn contours(grid: &CurvedGrid, level: f64) -> Vec<Vec<[f64; 2]>> {
     loops
 }
 
-/// Adds the pieces within the square whose lower left node is given.
+/// Adds the pieces of curves in the square with this lower left node.
 fn link_square(
     grid: &CurvedGrid,
     (i, j): (usize, usize),
@@ -289,7 +285,7 @@ fn link_square(
         if !inside[side] || inside[(side + 1) % 4] {
             continue;
         }
-        // The curve leaves the square where what is inside ends, and comes back where it begins.
+        // The curve leaves the square at the end of the part inside, and returns at its beginning.
         let begins = |step: usize| !inside[(side + step) % 4] && inside[(side + step + 1) % 4];
         let found = if joined {
             (1..4).find(|&step| begins(step))
@@ -302,20 +298,20 @@ fn link_square(
     }
 }
 
-/// Area of a closed curve, positive if it runs counter-clockwise.
-pub(crate) fn signed_area(points: &[[f64; 2]]) -> f64 {
+/// Returns the area of a closed curve, positive if it runs counter-clockwise.
+fn signed_area(points: &[[f64; 2]]) -> f64 {
     let following = points.iter().cycle().skip(1);
     let pairs = points.iter().zip(following);
     0.5 * pairs.map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum::<f64>()
 }
 
 impl Sheet {
-    /// Closed curves around the stick zone in mm, counter-clockwise, holes clockwise; `None` where zones are not known.
+    /// Returns closed curves around the stick zone in mm, counter-clockwise, holes clockwise; `None` if zones are not known.
     ///
-    /// Along every strip the border stands where the margin to friction's bound vanishes: its square, which is linear beside the border
-    /// in Carter's problem (1926), is continued from the last two cells that stick, at most to the middle of the cell that slips. Where
-    /// pressure or traction is not known it is half-way. From strip to strip a function that vanishes there is interpolated, which closes
-    /// zones that end between strips. Pieces smaller than the largest cell are left out.
+    /// Along a strip, the border is where the margin to the traction bound vanishes. Its square, which is linear near the border in Carter's
+    /// problem (1926), is extrapolated from the last two cells that stick, at most to the centre of the cell that slips. Without pressure or
+    /// traction, the border is the edge between the cells. Between strips, a function that vanishes at the border is interpolated, which
+    /// closes zones that end between strips. Pieces smaller than the largest cell are omitted.
     #[must_use]
     pub(crate) fn stick(
         &self,
@@ -347,7 +343,7 @@ impl Sheet {
     }
 }
 
-/// What is needed to find where the bound is reached.
+/// The values from which the margin to the traction bound follows.
 struct BoundMargins<'a> {
     pressure: &'a [f64],
     along: &'a [f64],
@@ -367,9 +363,9 @@ impl<'a> BoundMargins<'a> {
         self.along[cell].hypot(self.across[cell])
     }
 
-    /// Where the bound is reached beside the cell `near` that sticks, `far` behind it, toward `slipping`.
+    /// Returns the x where the bound is reached between the cell `near`, which sticks, and `slipping`; `far` is the cell beyond `near`.
     fn reached(&self, x: &[f64], far: usize, near: usize, slipping: usize) -> Option<f64> {
-        // Where it slips the bound is reached: this is the coefficient of friction here, whatever law it follows.
+        // A slipping cell reaches the bound, so that this is the local coefficient of friction, for any friction law.
         let friction = self.traction(slipping) / self.pressure[slipping];
         let square = |cell: usize| {
             let margin = friction * self.pressure[cell] - self.traction(cell);
@@ -383,10 +379,10 @@ impl<'a> BoundMargins<'a> {
     }
 }
 
-/// Where along a strip stick and slip change, as shares of its length.
+/// The changes between stick and slip along a strip, as shares of its length.
 struct ZoneChanges {
     places: Vec<f64>,
-    /// It sticks before the first change.
+    /// Whether it sticks before the first change.
     sticks_first: bool,
 }
 
@@ -423,8 +419,8 @@ impl ZoneChanges {
         }
     }
 
-    /// Positive where it sticks, negative where it slips, a parabola between two changes: then the squared width of a zone is linear from
-    /// strip to strip, and its end is round. The outermost parts reach their largest value at the end of the strip.
+    /// Returns a function that is positive in stick, negative in slip, and a parabola between two changes. The squared width of a zone is then
+    /// linear between strips, and its end is round. The outermost parts reach their largest value at the end of the strip.
     fn value(&self, share: f64, lone: f64) -> f64 {
         let passed = self.places.iter().filter(|place| **place <= share).count();
         let sign = if (passed % 2 == 0) == self.sticks_first {
@@ -442,8 +438,8 @@ impl ZoneChanges {
         }
     }
 
-    /// The size of the value of a strip without a change: as large as the opposite zone of the strips beside it, so that this zone ends
-    /// half-way.
+    /// Returns the magnitude of the value of a strip without a change: the largest value of the opposite zone in adjacent strips, so that that zone
+    /// ends half-way.
     fn lone_level(&self, strips: &[ZoneChanges], at: usize) -> f64 {
         let beside = [at.checked_sub(1), Some(at + 1)];
         let beside = beside.into_iter().flatten().filter_map(|k| strips.get(k));
