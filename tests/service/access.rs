@@ -1,4 +1,4 @@
-//! Who may do what? Keys, tenants, and what each of them sees.
+//! Keys and tenants: access to resources of the own tenant and of others.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -93,7 +93,7 @@ fn operations_on(kind: &str, id: &str) -> Vec<(Method, String)> {
     found
 }
 
-/// What a key is answered about what it may not see, and about what nobody has.
+/// Asserts that resources of another tenant are answered like unknown ones.
 async fn assert_foreign_is_unknown(
     guarded: &Guarded,
     key: &str,

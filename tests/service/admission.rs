@@ -1,4 +1,4 @@
-//! Are the bounds of the queue exact, whoever submits how much at the same time, and is nothing kept that was refused?
+//! Limits of the queue are exact under concurrent submissions, and refused work leaves nothing behind.
 
 use std::collections::BTreeSet;
 
@@ -117,7 +117,7 @@ async fn staged_bytes_are_bounded_as_expanded() {
     assert!(table.len() < 10_000);
     let refused = send(&server, &format!("?template={id}"), "text/csv", table).await;
     assert_problem(&refused, 429, "quota-exceeded", "100000 bytes");
-    // What was counted is given back.
+    // The counted jobs are released.
     let half = lines(&many(150));
     assert!(half.len() > 50_000, "two of these are too many together");
     for _ in 0..3 {

@@ -1,4 +1,4 @@
-//! Results of a batch as a narrow table: the columns asked for, the lines asked for.
+//! Results of a batch as a table with selected columns and lines.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! What the results of a batch take in memory while they are read: a bounded part for the small ones, and every large one counted.
+//! Memory of the results of a batch while they are read: bounded for small results, and counted for every large one.
 
 use axum::body::Body;
 use http_body_util::BodyExt;
@@ -9,7 +9,7 @@ use tower::ServiceExt;
 use crate::server::{Server, link};
 use crate::support::long_case;
 
-/// What one reader is counted with for small results, in bytes.
+/// Bytes counted for a reader of small results.
 const READER_BYTES: usize = 512 << 10;
 /// The part of all memory that is for answers.
 const ANSWERS: usize = 2;

@@ -39,7 +39,7 @@ async fn a_case_of_a_batch_may_have_options_of_its_own_in_every_form_of_a_batch(
     let batch = send(&server, &query, "text/csv", table).await;
     assert_eq!(options(&server, &batch.json).await, expected);
 
-    // What is kept is the case alone.
+    // Only the case is stored.
     let id = batch.json["id"].as_str().expect("an id");
     let page = server.read(&format!("/v1/jobs?batch={id}")).await;
     let job = page["jobs"][1]["id"].as_str().expect("an id");

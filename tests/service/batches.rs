@@ -1,4 +1,4 @@
-//! Batches: taken whole or not at all, solved in groups, read in order.
+//! Batches: accepted as a whole, solved in groups, read in order.
 
 use std::time::Duration;
 

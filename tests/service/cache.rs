@@ -1,4 +1,4 @@
-//! Is an identical case answered from the earlier result, and only then?
+//! An identical case, and only that, is answered by the earlier result.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

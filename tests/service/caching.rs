@@ -1,4 +1,4 @@
-//! What clients may keep, and bodies that are packed on the way.
+//! Caching by clients, and compression.
 
 use std::io::Read;
 
@@ -17,7 +17,7 @@ use crate::table_forms::kept_template;
 async fn finished_results_are_kept_for_good_and_asked_for_by_tag() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("spin.case.json")).await);
-    // The same jobs behind a service that makes no picture, grid or table any more: what a client has is not made again.
+    // A service with the same jobs that cannot render: stored responses of the client are not rendered again.
     let options = HttpOptions {
         renderings_waiting_max: 0,
         ..HttpOptions::default()
@@ -311,7 +311,7 @@ async fn tags_of_results_end_with_the_build_that_made_them() {
     let result = format!("/v1/jobs/{job}/resultants");
     let (tag, _) = tag_and_status(&service, &result, "\"none\"").await;
     service.kill();
-    // The same build, started again or on another node.
+    // The same build after a restart or on another node.
     let service = Service::start(folder.path(), &[]);
     assert_eq!(
         tag_and_status(&service, &result, &tag).await,

@@ -1,4 +1,4 @@
-//! What `cases/check` says it understood, against what is solved.
+//! The interpretation of a case by `cases/check`, compared with its solution.
 
 use std::time::Duration;
 
@@ -81,7 +81,7 @@ async fn wheel_and_rail_are_placed_where_they_touch_when_solved() {
             off[0] < 0.01 && off[1] < 0.05,
             "{file}: {off:?} mm beside the curves"
         );
-        // Nothing of the wheel is inside the rail: nearest the touch, it lies above it.
+        // The wheel does not intersect the rail.
         let above = |place: &[f64; 2]| (place[0] - at[1]).abs() < 10.0;
         for place in wheel.iter().filter(|place| above(place)) {
             let beneath = rail

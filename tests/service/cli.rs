@@ -1,4 +1,4 @@
-//! Do the commands do what they say?
+//! The commands of the program.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -225,7 +225,7 @@ async fn a_backup_of_a_working_service_can_be_started() {
     };
     let made = backup();
     assert!(made.status.success(), "{made:?}");
-    // Nothing is overwritten.
+    // No file is overwritten.
     fails(&backup(), 1, "");
     service.kill();
     std::fs::remove_dir_all(&data_dir).unwrap();

@@ -1,4 +1,4 @@
-//! Columns of tables that come in and go out: titles, units, bounds, texts, damage.
+//! Columns of tables in requests and responses: titles, units, limits, texts, damaged files.
 
 use railhead::tables::parquet::encode;
 use railhead::tables::table::{COLUMNS_MAX, RowTable, TableColumn};

@@ -1,4 +1,4 @@
-//! The contract: generated, committed, complete, and true to what the service knows.
+//! The contract: generated, committed, complete, and in agreement with the service.
 
 use std::collections::BTreeSet;
 use std::path::Path;

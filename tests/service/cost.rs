@@ -1,4 +1,4 @@
-//! What a request may cost: memory is bounded however large or clever bodies and answers are, and others are served.
+//! Cost of requests: memory is bounded for any body and response, and other clients are served.
 
 use std::process::Stdio;
 use std::time::Duration;

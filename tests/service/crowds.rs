@@ -1,4 +1,4 @@
-//! Many clients at once: silent ones make way, followers and waits have their own limits, probes are always answered.
+//! Many concurrent clients: idle connections are replaced, event streams and waits have their own limits, probes are always answered.
 
 use std::net::SocketAddr;
 use std::time::Duration;

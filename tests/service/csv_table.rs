@@ -1,4 +1,4 @@
-//! A CSV that a service has sent.
+//! Reads CSV of a response.
 
 pub struct Csv {
     pub head: Vec<String>,

@@ -1,4 +1,4 @@
-//! Is a damaged job table noticed, and said so?
+//! A damaged job table is detected and reported.
 
 use railhead::jobs::{Jobs, JobsError};
 
@@ -26,7 +26,7 @@ async fn damaged(jobs: usize, bytes: usize) -> Lab {
 #[tokio::test]
 async fn a_table_that_was_damaged_is_refused_after_an_unclean_end() {
     let lab = damaged(200, 8192).await;
-    // As after a kill: nothing says that the table was closed.
+    // As after a kill: the table is not marked as closed.
     std::fs::remove_file(lab.folder.path().join("closed")).unwrap();
     match Jobs::open(lab.options).await {
         Err(JobsError::TableDamaged(_)) => {}

@@ -1,4 +1,4 @@
-//! What a page that shows the service needs: lists, batches, one stream of events, who asks.
+//! Data of a dashboard: lists, batches, the event stream of a tenant, its identity.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! What the service says about itself: its abilities, its contract, its tour.
+//! Documents of the service about itself: capabilities, contract, tour.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! Every way to fail: the right status, the right problem, and words that help.
+//! Problems of requests: status, kind and advice.
 
 use std::collections::BTreeSet;
 use std::sync::Mutex;

@@ -1,4 +1,4 @@
-//! Rows of numbers answered at once.
+//! `POST /v1/evaluate`.
 
 use std::io::{Read, Write};
 

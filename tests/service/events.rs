@@ -1,4 +1,4 @@
-//! Server-sent events: every state once, resumed where they were left, closed at the end.
+//! Server-sent events: every state once, resumption, end of the stream.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Evolutions: submitted, followed, interrupted and answered like other work.
+//! Evolutions: submission, events, interruption and results.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! What programs can read of a fault, besides the sentence.
+//! Members of a fault for programs, besides its detail.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! Results in other forms than JSON: each form says the same numbers, to the last bit.
+//! Results in other formats than JSON have the same numbers, to the last bit.
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};

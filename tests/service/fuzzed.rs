@@ -1,4 +1,4 @@
-//! What fuzzers start from and what they once found: none of it breaks a promise.
+//! Seeds of the fuzzers and their earlier findings.
 
 #[path = "../../fuzz/src/lib.rs"]
 mod promises;

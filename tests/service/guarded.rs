@@ -1,4 +1,4 @@
-//! A service that asks for keys, with some made.
+//! A service that requires keys, with some keys.
 
 use std::collections::BTreeMap;
 

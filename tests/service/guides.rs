@@ -1,4 +1,4 @@
-//! The guides are true: their blocks run as they stand, against the real program.
+//! The code blocks of the guides run unchanged against the real program.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

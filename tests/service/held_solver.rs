@@ -23,7 +23,7 @@ async fn a_process_with_more_deaf_solvers_than_allowed_ends_to_be_started_again(
     holder.join().unwrap();
     assert_eq!(ended.code(), Some(75), "{ended}");
 
-    // Nothing is left to be repaired, and the port is served again.
+    // No repair is needed, and the port is served again.
     let service = Service::start(folder.path(), &flags);
     service.until(&id, "cancelled").await;
 }

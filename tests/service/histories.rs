@@ -1,4 +1,4 @@
-//! Rolling that changes, asked for and answered over HTTP.
+//! Histories of rolling over HTTP.
 
 use serde_json::json;
 

@@ -1,4 +1,4 @@
-//! HTTP/2 by prior knowledge: requests on one connection, and answers that its client does not take.
+//! HTTP/2 by prior knowledge: several requests on a connection, and responses that the client does not read.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Cross-sections kept once and named by cases, batches and runs.
+//! Stored cross-sections that cases, batches and runs name.
 
 use serde_json::{Value, json};
 

@@ -78,7 +78,7 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
     }
 }
 
-/// What a request with a key is answered.
+/// Sends a request with a key.
 async fn ask(
     service: &Service,
     key: &str,

@@ -1,4 +1,4 @@
-//! A service in this process whose solver does what a test says.
+//! A service in this process with a solver that a test controls.
 
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;

@@ -1,4 +1,4 @@
-//! Does nobody lose a job, or solve it twice, while the table or the results cannot be written for longer than a lease?
+//! No job is lost or solved twice while the table or the results cannot be written for longer than a lease.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Malformed bodies: each is answered as the contract says, and the service lives on.
+//! Malformed bodies are answered as in the contract, and the service continues.
 
 use reqwest::Method;
 use serde_json::Value;
@@ -13,7 +13,7 @@ const REFUSED: usize = 2000;
 /// Clients that send at the same time.
 const CLIENTS: usize = 8;
 
-/// What mutations put into a body.
+/// Texts that mutations insert into a body.
 const SPLICES: &str = r#"null true [] {} "" - -0 0 1e999 -1e308 5e-324 1e-400 99999999999999999999999999 NaN Infinity
     0x10 1. .5 " ' \u0000 \ud800 \ , : [ ] { } // é"#;
 /// White space and a byte order mark, which mutations put into a body too.

@@ -1,4 +1,4 @@
-//! Small things that make an interface pleasant: one rule for parameters, ends of lines, limits that can be read, forms for older tools.
+//! Conventions of the API: parameters, final line breaks, readable limits, formats for older tools.
 
 use reqwest::Method;
 use serde_json::json;

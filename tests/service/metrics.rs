@@ -1,4 +1,4 @@
-//! Does `/metrics` count what happened, and nothing that a client could make grow?
+//! `/metrics` counts events, with a bounded number of labels.
 
 use std::collections::{BTreeMap, BTreeSet};
 

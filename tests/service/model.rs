@@ -1,4 +1,4 @@
-//! A plain model of a job table: rows in a map, and what each call makes of them.
+//! A model of a job table: rows in a map, and the effect of each call.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -136,7 +136,7 @@ async fn opens_with_all_that_is_in_it(form: u32) {
     let row = client.get(&format!("/v1/runs/{}/rows/1", id("run"))).await;
     assert_eq!(row["case"]["load"]["normal_force_n"], json!(74000.0));
 
-    // The same requests under their keys are the same jobs.
+    // Repeated requests with their idempotency keys return the same jobs.
     let before = form;
     let form = "application/json";
     let spin = example("spin.case.json").to_string();
@@ -171,7 +171,7 @@ async fn opens_with_all_that_is_in_it(form: u32) {
         }
     }
 
-    // What waited is solved.
+    // Queued jobs are solved.
     for path in [
         format!("/v1/jobs/{}", id("running")),
         format!("/v1/jobs/{}", id("queued")),

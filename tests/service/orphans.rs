@@ -1,4 +1,4 @@
-//! Results outside the table that no job refers to: what a process left behind that was killed before it could tell of them.
+//! Orphaned results, which a process left behind when it was killed.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -23,7 +23,7 @@ fn only_solution(folder: &Path) -> PathBuf {
     path
 }
 
-/// The same result once more, as that of this job.
+/// Stores the same result again, as the result of this job.
 fn copied(kept_file: &Path, of: Uuid, to: Uuid) -> PathBuf {
     let path = kept_file.to_str().unwrap();
     let copy = PathBuf::from(path.replace(&of.to_string(), &to.to_string()));

@@ -1,4 +1,4 @@
-//! The page at `/`: its headers, and how long its files are kept.
+//! The page at `/`: headers and caching of its files.
 
 use crate::server::Server;
 

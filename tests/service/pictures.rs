@@ -1,4 +1,4 @@
-//! Pictures: well-formed, true to scale, harmless whatever a case is called, readable without colour.
+//! Pictures: well-formed, to scale, harmless for any name of a case, readable without colour.
 
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::{Options, Tree};
@@ -177,7 +177,7 @@ async fn values_are_smooth_and_end_at_the_border_of_the_patch() {
         let svg = server
             .get(&format!("{path}/plot.svg?field={field}&width=160"))
             .await;
-        // Nothing but the patch is drawn on a small picture; its ellipse of 16 mm by 8 mm is 156 wide.
+        // A small picture shows only the patch; its ellipse of 16 mm by 8 mm is 156 wide.
         let shapes = shapes(&svg.text);
         let filled: Vec<[f64; 4]> = shapes
             .iter()

@@ -1,4 +1,4 @@
-//! All fields of a motion in one answer: the same values as the parts, with the border of the patch.
+//! All fields of a motion in one response: the values of the parts, with the border of the patch.
 
 use serde_json::{Value, json};
 

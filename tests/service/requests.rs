@@ -1,4 +1,4 @@
-//! Requests that cannot be read: bodies, queries and headers.
+//! Invalid requests: bodies, queries and headers.
 
 use std::collections::BTreeSet;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! What comes out: fields, zones, grids and sweeps, against each other and against the real solver.
+//! Results: fields, zones, grids and sweeps, compared with each other and with the solver.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,4 +1,4 @@
-//! Are ended jobs kept for as long as was said, and then gone with all that belonged to them?
+//! Ended jobs are kept for their retention time, and then removed with all their data.
 
 use std::time::Duration;
 
@@ -166,6 +166,6 @@ async fn the_database_shrinks_when_its_jobs_go() {
     let jobs = Jobs::open(options).await.unwrap();
     assert_eq!(jobs.sweep_expired().await.unwrap(), JOBS as u64);
     jobs.shutdown(Duration::ZERO).await;
-    // What is left is the spare that the next jobs will use.
+    // The remaining file is the reserve for the next jobs.
     assert!(size() < full / 2, "{} of {full}", size());
 }

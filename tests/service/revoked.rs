@@ -1,4 +1,4 @@
-//! What becomes of requests under way when their key is revoked?
+//! Active requests when their key is revoked.
 
 use std::time::Duration;
 
@@ -66,7 +66,7 @@ async fn requests_that_wait_end_long_before_their_time() {
     let (job, result, submitted, ()) = ended.await.expect("answers before the 60 s are over");
     assert_problem(&job, 401, "unauthorized", "revoked");
     assert_problem(&result, 401, "unauthorized", "revoked");
-    // What was accepted is acknowledged.
+    // Accepted work is acknowledged.
     assert_eq!(submitted.status, 202, "{}", submitted.text);
     assert!(submitted.json["id"].is_string());
 }

@@ -1,4 +1,4 @@
-//! Runs: many rows over one case, as one piece of work.
+//! Runs: many rows that vary one case.
 
 use railhead::tables::arrow::read;
 use railhead::tables::parquet::TableReader;

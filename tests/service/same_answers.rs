@@ -43,7 +43,7 @@ fn of_total(total: &Value) -> [[f64; 2]; 2] {
     ]
 }
 
-/// The same of a row, whose estimate is that of the less certain force.
+/// Returns both forces of a row, and its estimate, which is that of the less certain force, for both.
 fn of_row(row: &Value) -> [[f64; 2]; 2] {
     let estimate = number(&row["error_estimate"]);
     [

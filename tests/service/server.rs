@@ -1,4 +1,4 @@
-//! A service in this process, on a port of its own with a data folder of its own, and a client for it.
+//! A service in this process, with its own port and data folder, and a client.
 
 use std::net::SocketAddr;
 use std::path::Path;
@@ -28,7 +28,7 @@ pub struct Server {
     _folder: TempDir,
 }
 
-/// What to start.
+/// The setup of a service.
 pub struct Setup {
     pub options: Options,
     pub http: HttpOptions,

@@ -1,4 +1,4 @@
-//! How much of the service may one client take? Rates, quotas, turns.
+//! Shares of tenants: rates, quotas, turns.
 
 use std::str::FromStr;
 

@@ -1,4 +1,4 @@
-//! What becomes of running jobs when the service stops or dies?
+//! Running jobs when the service stops or is killed.
 
 use std::time::Duration;
 
@@ -105,7 +105,7 @@ async fn a_stopped_service_hands_its_running_job_to_the_next_one() {
         pause().await;
     }
     service.signal("TERM");
-    // Whoever waits is answered instead of being cut off or holding up the end.
+    // A waiting request is answered and does not delay the shutdown.
     assert_eq!(waiting.await.unwrap().unwrap().status(), 202);
     assert_eq!(service.wait().code(), Some(0));
 

@@ -1,4 +1,4 @@
-//! Clients that send too slowly, read nothing, or come in too great a number: they are let go, and nobody else notices.
+//! Clients that send too slowly, do not read, or open too many connections are disconnected without effect on others.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -134,7 +134,7 @@ async fn an_answer_that_is_not_taken_is_given_up() {
     let start = Instant::now();
     until_closed(server.address, stream.local_addr().expect("an address")).await;
     let mut answer = Vec::new();
-    // What lies in the buffers of the system still comes, then the end.
+    // Buffered data of the system still arrive before the end.
     let _ = tokio::time::timeout(FOR_EVER, stream.read_to_end(&mut answer))
         .await
         .expect("an end");

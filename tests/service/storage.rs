@@ -1,4 +1,4 @@
-//! Is nothing lost, and everything said clearly, when the disk is full or cannot be written?
+//! A full or unwritable disk: nothing is lost, and the problems are clear.
 
 use std::path::PathBuf;
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! What the tests of stores share. The suite is in `store_*.rs`: does a store keep its promises?
+//! Common parts of the tests of stores, whose suite is in `store_*.rs`.
 //!
 //! A test takes the kind of store that it is to open; `conformance!` runs it with each. A new store is one more kind, and one
 //! more module in the macro.
@@ -80,7 +80,7 @@ impl Table {
         }
     }
 
-    /// The same store opened once more, as another process would.
+    /// Opens the store again, as another process does.
     pub async fn open_again(&self) -> Arc<dyn Store> {
         open_store(self.kind, self.folder.path(), self.url.as_deref()).await
     }

@@ -30,7 +30,7 @@ const TABLES: [&str; 13] = [
     "tombstones",
 ];
 
-/// What was known at a moment to which the database may go back.
+/// The state at a moment to which the database is reset.
 #[derive(Debug)]
 pub struct Saved {
     model: Model,

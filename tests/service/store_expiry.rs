@@ -1,4 +1,4 @@
-//! What is removed together once its time is over?
+//! Removal of expired work with all its data.
 
 use railhead::jobs::model::Kind;
 use railhead::jobs::store::{Claim, NewBatch, NewJob, RetentionRule};

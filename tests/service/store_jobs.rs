@@ -1,4 +1,4 @@
-//! Does a store keep its promises about single jobs, claims and leases?
+//! Single jobs, claims and leases of a store.
 
 use bytes::Bytes;
 use railhead::jobs::State;

@@ -1,4 +1,4 @@
-//! Do lists of jobs show every job once, whatever the filter and whatever happens meanwhile?
+//! Lists of jobs show every job once, for any filter and during changes.
 
 use railhead::jobs::store::{Filter, NewJob};
 use serde_json::{Value, json};

@@ -1,4 +1,4 @@
-//! Does a store keep its promises to several that ask at the same moment, through connections of their own?
+//! Concurrent calls of a store through separate connections.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use crate::store::*;
 
-/// The same store twice, as two processes have it.
+/// A store opened twice, as by two processes.
 async fn two(kind: StoreKind) -> (Table, [Arc<dyn Store>; 2]) {
     let table = Table::new(kind).await;
     let other = table.open_again().await;

@@ -1,4 +1,4 @@
-//! Are jobs and batches found by several states, labels and words, and told when they change?
+//! Searches for jobs and batches by states, labels and names, and notification of their changes.
 
 use railhead::jobs::State;
 use railhead::jobs::model::Kind;

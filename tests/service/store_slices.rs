@@ -1,4 +1,4 @@
-//! Does the job table keep the slices of a sweep for as long as the sweep is not whole?
+//! The job table keeps the slices of a sweep until the sweep is complete.
 
 use std::time::Duration;
 

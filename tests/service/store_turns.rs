@@ -1,4 +1,4 @@
-//! In which order are jobs claimed, and what is held against them when their process dies?
+//! The order in which jobs are claimed, and the attempts counted when their process dies.
 
 use railhead::jobs::model::Kind;
 use railhead::jobs::store::{
@@ -44,7 +44,7 @@ async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
     assert_eq!(taken, [(ids[0], State::Failed), (beside, State::Queued)]);
     let job = store.job("anonymous", beside).await.unwrap().unwrap();
     assert_eq!(job.attempt, 0);
-    // What was all that was running counts its attempt, suspect or not.
+    // A job that ran alone counts its attempt, suspect or not.
     assert_eq!(claim_up_to(store, 4, 1000, 1).await[0].id, ids[1]);
     assert_eq!(
         store.reap(Reap::Dead, 5, 1).await.unwrap(),

@@ -1,4 +1,4 @@
-//! Is what a tenant stores counted, bounded where the operator says so, and are templates stored once?
+//! Stored bytes of a tenant are counted and limited, and templates are stored once.
 
 use railhead::jobs::store::{BatchBegun, NewBatch, QueueBounds};
 use reqwest::Method;
@@ -100,7 +100,7 @@ async fn beyond_its_stored_bytes_a_tenant_submits_nothing_and_loses_nothing() {
     let first = paths[0].rsplit('/').next().unwrap();
     refuse(&table(&guarded, &format!("/v1/batches?template={first}"), "0.1").await);
     refuse(&table(&guarded, &format!("/v1/runs?template={first}"), "0.1").await);
-    // What is stored stays, others go on, and room that is made can be used.
+    // Stored work remains, other tenants continue, and freed space can be used.
     for path in &paths {
         guarded.get(key, &format!("{path}/result")).await.is(200);
     }

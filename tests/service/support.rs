@@ -1,4 +1,4 @@
-//! Starting what is under test: the jobs room in this process, or the real program beside it.
+//! Starts the service in this process, or the real program.
 
 use std::io::{BufRead, BufReader, Read};
 use std::net::SocketAddr;

@@ -1,4 +1,4 @@
-//! Do long sweeps go on where their last slice ended, whatever ends the process, and give the same answer?
+//! Long sweeps continue after their last slice when the process ends, with the same result.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -269,7 +269,7 @@ async fn a_killed_process_costs_a_sweep_no_more_than_the_slice_it_was_at() {
     );
     service.kill();
 
-    // What the dead process did not come to say is in its table.
+    // The table has the progress that the killed process did not report.
     let store = open_beside(folder.path()).await;
     let stored = store.slices(id.parse().unwrap()).await.unwrap().len();
     store.close().await;

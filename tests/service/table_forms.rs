@@ -1,4 +1,4 @@
-//! Rows in every form of table, sent and answered, and more of them than is allowed.
+//! Rows in every format of tables, in requests and responses, and limits of their number.
 
 use std::io::Cursor;
 
@@ -157,7 +157,7 @@ async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
             }
         }
     }
-    // What is carried along by a run has no place here.
+    // Only runs copy columns.
     let (csv, carried) = forms(&rows(Some("section"))).remove(0);
     let refused = server.post_as(&path, csv, carried).await;
     let words = "only runs copy further columns";

@@ -20,7 +20,7 @@ fn fastsim() -> Value {
     template
 }
 
-/// What a tenant may send as a table: a batch and a run over a template, a batch of lines, an evaluation.
+/// Requests of a tenant with a table: a batch and a run with a template, a batch of lines, an evaluation.
 async fn every_table(guarded: &Guarded, key: &str, template: &str) -> Vec<(&'static str, Answer)> {
     let line = format!("{}\n", case("line"));
     let evaluate =

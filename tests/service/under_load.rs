@@ -42,7 +42,7 @@ fn distinct(number: usize) -> Value {
     case
 }
 
-/// What a client knows: the id answered for each of its idempotency keys, and the keys that were never answered.
+/// State of a client: the id answered for each idempotency key, and the keys without a response.
 #[derive(Default)]
 struct Known {
     answered: BTreeMap<String, String>,

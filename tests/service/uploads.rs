@@ -65,7 +65,7 @@ async fn a_run_takes_every_form_of_table_with_its_template() {
     let template = ("name=\"template\"", case.as_str());
     let mut answers = vec![answers_of(&server, &expected).await];
     for table in [
-        // As programs send files whose form they do not know.
+        // Content types of programs that do not know the format of a file.
         (
             "name=\"table\"; filename=\"rows.CSV\"\r\nContent-Type: application/octet-stream",
             csv,

@@ -1,7 +1,7 @@
-// What an element was given before its class was loaded.
+// Properties that an element got before its class was loaded.
 
 /**
- * What was given to an element before its class was there lies in front of the property of the class; it is given again.
+ * A property that was set on an element before its class was defined hides the accessor of the class. It is set again.
  * @param {HTMLElement} element One with a property `shown`.
  */
 export function adoptShown(element) {

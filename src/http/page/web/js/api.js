@@ -82,7 +82,7 @@ export async function request(path, asked = {}) {
  */
 const json = async (path, asked) => (await request(path, asked)).json();
 
-/** @param {Record<string, string | number | undefined | readonly string[]>} members Those that are undefined or empty are left out. */
+/** @param {Record<string, string | number | undefined | readonly string[]>} members Undefined and empty members are omitted. */
 function search(members) {
   const pairs = Object.entries(members).flatMap(([name, value]) =>
     (Array.isArray(value) ? value : [value ?? '']).filter((item) => item !== '').map((item) => [name, String(item)]));

@@ -93,7 +93,7 @@ export const equal = (one, two, body) =>
 /** @type {{ key: string, wear: ReturnType<typeof wearBetween> } | null} */
 let wearBefore = null;
 
-/** What the cross-section of the second lacks against that of the first; null where one of them has none. @param {Comparison} of */
+/** Returns the area that the second cross-section lacks against the first; null if one of them has no cross-section. @param {Comparison} of */
 export function wearOf({ sides, other, body, fitted }) {
   const [one, two] = [sides[0], sides[other]];
   if (!one?.sections || !two?.sections) return null;

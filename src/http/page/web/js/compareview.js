@@ -44,7 +44,7 @@ const OF_WHEEL = [
 /** @param {Side} side */
 const strongest = ({ result }) => result.patches.reduce((most, patch) => (patch.pressure_max_mpa > most.pressure_max_mpa ? patch : most));
 
-/** What the profiles leave open of the largest pressure. @param {import('./api.js').Patch} patch @param {number} point */
+/** Returns the uncertainty of the largest pressure due to the profiles. @param {import('./api.js').Patch} patch @param {number} point */
 const openPressure = ({ points }, point) => points[Math.min(point, points.length - 1)].profile_uncertainty?.pressure_max_mpa;
 
 /** @param {readonly number[]} values */

@@ -50,7 +50,7 @@ export function compose(app) {
     </div>`;
 }
 
-/** What the page is for, and the two ways to begin: files of one's own, or an example. @param {App} app @param {Compose} state */
+/** Introduction, and the two ways to begin: own files, or an example. @param {App} app @param {Compose} state */
 function intro(app, state) {
   const chosen = (/** @type {Event} */ event) => {
     const input = /** @type {HTMLInputElement} */ (event.target);
@@ -81,7 +81,7 @@ function examplePicker(app) {
 /** @type {{ of: unknown, drawn: ReturnType<typeof placed> } | null} */
 let placedBefore = null;
 
-/** What the case is about: what the service understood of it, or the numbers that it brings. @param {Compose} state @param {JsonObject} document */
+/** Summary of the case: its interpretation by the service, or its numbers. @param {Compose} state @param {JsonObject} document */
 export function drawing({ understood, lone }, document) {
   const type = at(document, '/contact/type');
   if (lone && hasSections(type)) return drawSection(lone.body, lone.line);

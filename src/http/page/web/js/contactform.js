@@ -204,11 +204,11 @@ function pointsOf(app, pointer) {
 /**
  * A place for a file: dropped on it, or chosen.
  * @param {string} title
- * @param {string} what What is there already.
+ * @param {string} what Description of the present value.
  * @param {string} pointer
  * @param {App} app
  * @param {(file: File) => void} take
- * @param {string} [wanted] What is wanted where nothing is there yet, which is then no fault.
+ * @param {string} [wanted] Description of the required value; without a value yet, this is not a fault.
  */
 function dropZone(title, what, pointer, app, take, wanted) {
   const fault = wanted ? undefined : faultAt(app, pointer);
@@ -254,7 +254,7 @@ async function takeGrid(app, file, member) {
   editDocument(app, put(document, '/contact', { type, x_mm: grid.x_mm, y_mm: grid.y_mm, [member]: grid.values }));
 }
 
-/** What a case is called after its files. @param {import('./state.js').Compose['files']} files */
+/** Returns the name of a case made of files. @param {import('./state.js').Compose['files']} files */
 function nameOf({ wheel, rail }) {
   const names = [wheel, rail].map((file) => file?.name.replace(/\.[^.]*$/, ''));
   return names.filter(Boolean).join(' on ');

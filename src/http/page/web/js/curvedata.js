@@ -27,7 +27,7 @@ const MOTIONS = /** @type {const} */ ([
 export const isHistory = ({ points }) => points.every(({ history }) => history);
 
 /**
- * What stands on the axis: the motions in their order with their places.
+ * Returns the motions in the order of the axis, with their positions.
  * @param {Patch} patch
  * @returns {{ xLabel: string, x: number[], order: number[] }}
  */

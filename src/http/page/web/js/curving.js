@@ -1,4 +1,4 @@
-// What a curve and its cant do to the load of a wheel or an axle, in axes of the canted track.
+// Effect of a curve and its cant on the load of a wheel or an axle, in axes of the canted track.
 
 import { at, isObject, numberAt, put } from './document.js';
 import { parse } from './written.js';

@@ -196,7 +196,7 @@ function temperatureCard(looked, { at, point }) {
     <p class="hint">Within 2 % where heat flows into the depth only (Péclet number ${number(heat.peclet, 2)}, to be well above 10); ${number(100 * heat.heat_share_lower, 2)} % of the heat flows into the rail.</p></div>`;
 }
 
-/** What the sources are of, by the names of the API. @type {Record<string, string>} */
+/** Descriptions of the sources, by the names of the API. @type {Record<string, string>} */
 const SOURCES = { usfd: 'wear, Tγ/A law', archard: 'wear, Archard', wlrm: 'RCF damage', shear_yield_mpa: 'yield in shear', hardness_mpa: 'hardness' };
 
 /** @param {Schemas['DamageFiguresUsed']} figures */

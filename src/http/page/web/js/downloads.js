@@ -1,4 +1,4 @@
-// What can be downloaded of a result: pictures, tables and arrays of the chosen part.
+// Downloads of a result: pictures, tables and arrays of the chosen part.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { download, save } from './api.js';

@@ -1,4 +1,4 @@
-// What happens to the case that is being written: changes, checks while writing, the result while typing, solving.
+// Editing of a case: changes, checks while typing, the live result, solving.
 
 import { cancel, checkCase, examples as examplesOf, Refused, remove, result as resultOf, submit } from './api.js';
 import { withLoadOfCurve } from './curving.js';

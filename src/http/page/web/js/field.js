@@ -12,12 +12,12 @@ import { parse, parseList, textOf } from './written.js';
 
 /**
  * @typedef {object} FieldLook
- * @property {number} [factor] What one of the shown units is in the unit of the API.
+ * @property {number} [factor] Factor from the shown unit to the unit of the API.
  * @property {string} [hint]
  * @property {string} [empty] Shown where nothing is given.
  * @property {boolean} [text] Takes any text, not only numbers.
  * @property {boolean} [list] Takes one number or several.
- * @property {(value: JsonValue | undefined) => string} [format] What is shown of the value, where a unit does not say it.
+ * @property {(value: JsonValue | undefined) => string} [format] Formats a value without a unit.
  * @property {(written: string) => JsonValue | undefined} [read] The value of what was written.
  * @property {(value: JsonValue | undefined) => void} [take] Changes the case where more than this value follows from it.
  */
@@ -86,7 +86,7 @@ export function choice(app, pointer, label, options, { hint, take = (value) => c
 }
 
 /**
- * What is wrong, in the unit of the field where the limits are known.
+ * Describes a fault, in the unit of the field if its limits are known.
  * @param {Fault} fault
  * @param {number | undefined} factor
  * @param {string} unit

@@ -26,7 +26,7 @@ import { drawSections } from './field/sections.js';
  * @property {{ x: number, y: number } | null} [held] Where the crosshair is held.
  * @property {number} [tallest] Most pixels of the map's height.
  * @property {boolean} [bent] Across is the arc length along the rail.
- * @property {string} [name] What it is, for those who do not see it.
+ * @property {string} [name] Accessible name.
  */
 
 /** @typedef {CustomEvent<{ x: number, y: number, held: boolean }>} CrosshairEvent */
@@ -67,7 +67,7 @@ export class FieldMap extends HTMLElement {
     this.#scheme.removeEventListener('change', this.#redraw);
   }
 
-  /** What is shown; drawn anew only if something of it changed. @param {Shown | null} shown */
+  /** The shown data; the map is drawn again only if they change. @param {Shown | null} shown */
   set shown(shown) {
     const before = this.#shown;
     const keys = /** @type {(keyof Shown)[]} */ ([...new Set([...Object.keys(before ?? {}), ...Object.keys(shown ?? {})])]);

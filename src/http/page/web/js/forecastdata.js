@@ -1,4 +1,4 @@
-// What is drawn of a forecast: sections with their wear, and curves over the traffic.
+// Data of the drawings of a forecast: sections with their wear, and curves over the traffic.
 
 /** @typedef {import('./forecast.js').Answer} Answer */
 /** @typedef {import('./forecast.js').WornRecord} WornRecord */

@@ -81,7 +81,7 @@ const chosen = (take) => (/** @type {Event} */ { target }) => {
   input.value = '';
 };
 
-/** What a row without a value has. @type {Partial<Record<import('./traffic.js').ColumnKey, string>>} */
+/** The value of a row without a value of its own. @type {Partial<Record<import('./traffic.js').ColumnKey, string>>} */
 const EMPTY = { passes: '1', radius: 'straight', shift: '0', yaw: '0' };
 
 /** Rows of the traffic, written by hand. @param {App} app @param {Forecast['form']} form @param {import('./document.js').JsonObject | null} document */
@@ -95,7 +95,7 @@ function rowsOf(app, { rows }, document) {
     <p><button class="small" ?disabled=${rows.length >= ROWS_MAX} @click=${() => writeForm(app, { rows: [...rows, { ...rows[rows.length - 1] }] })}>Add a row</button> <span class="hint">Passes are shares or numbers: only their ratios count. On the right rail a shift to the right, below 0, brings the flange to the gauge. Radii are positive to the left.</span></p>`;
 }
 
-/** What was read of a table. @param {App} app @param {NonNullable<Forecast['form']['table']>} table */
+/** Describes a table that was read. @param {App} app @param {NonNullable<Forecast['form']['table']>} table */
 function tableOf(app, { name, rows, values, others, unused }) {
   const range = (/** @type {readonly number[]} */ list) => list.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]).map((value) => number(value, 3)).join(' … ');
   const lacking = COLUMNS.filter(({ key }) => !values[key] && key !== 'passes').map(({ label }) => label);
@@ -272,7 +272,7 @@ function lossText(record, key, body) {
   return error >= 5e-4 ? plusMinus(loss, error) : fixed(loss, 3);
 }
 
-/** Numbers of the step. @param {readonly WornRecord[]} records @param {readonly ('rail' | 'wheel')[]} bodies Those that wear. @param {boolean} compared */
+/** Numbers of the step. @param {readonly WornRecord[]} records @param {readonly ('rail' | 'wheel')[]} bodies The bodies that wear. @param {boolean} compared */
 function numbersPanel(records, bodies, compared) {
   /** @type {[string, (record: WornRecord) => unknown][]} */
   const rows = [

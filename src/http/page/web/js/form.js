@@ -1,4 +1,4 @@
-// The form: fields for the common parts of a case, in engineers' units. Whatever it does not show stays in the JSON untouched.
+// The form: fields for the common parts of a case, in engineers' units. Members that it does not show stay unchanged in the JSON.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { CANT, curving, GRAVITY_MM_PER_S2, labelsWithCant, normalLoad, staticLoad } from './curving.js';
@@ -162,7 +162,7 @@ function wheelFields(app, type) {
 }
 
 /**
- * What a curve and its cant ask of a wheelset and its load.
+ * Inputs of a curve and its cant for a wheelset and its load.
  * @param {JsonObject | null} document
  * @param {number} radius In mm.
  * @param {import('./curving.js').Curving} curve
@@ -182,7 +182,7 @@ function curveNotes(document, radius, { base, cant, left, roll, balancing, later
     ...(cant ? ['Track and wheelset roll together; load that shifts from one wheel to the other is not included.'] : [])];
 }
 
-/** What the rotation of the wheel means for its longitudinal force. @param {App} app @param {string | undefined} member @param {boolean} free @param {number} radius */
+/** Describes the effect of the rotation of the wheel on its longitudinal force. @param {App} app @param {string | undefined} member @param {boolean} free @param {number} radius */
 function turningNote(app, member, free, radius) {
   const { document, checked, understood } = app.store.get().compose;
   const nominal = numberAt(document ?? undefined, '/contact/rolling_radius_mm');
@@ -221,7 +221,7 @@ function chooseMotion(app, kind, type) {
 
 /**
  * @param {string} kind
- * @param {string} type That of the contact.
+ * @param {string} type Type of the contact.
  * @param {JsonValue | undefined} before
  * @returns {JsonObject}
  */

@@ -21,7 +21,7 @@ const COURSES = /** @type {const} */ ([
 /** A history to begin with: a creepage that begins at once. */
 export const FIRST_HISTORY = /** @type {JsonObject} */ ({ history: { distance_mm: [0.5, 1, 2, 3, 5, 8, 12, 20], creepage_x: 0.001 }, start: 'rest' });
 
-/** @param {App} app @param {string} type That of the contact; patches of a wheel on a rail share creepages, and do not grow similar to themselves. */
+/** @param {App} app @param {string} type Type of the contact; patches of a wheel on a rail share creepages, and do not grow similar to themselves. */
 export function historyFields(app, type) {
   const wheel = type === 'profiles';
   const courses = COURSES.filter(({ key }) => !wheel || !key.startsWith('force'));

@@ -26,7 +26,7 @@ export function jobsView(app) {
   const queue = queueSeen();
   const jobs = jobsShown();
   const newest = [...queue.batches.values()].filter(isThere).sort((one, two) => (one.id < two.id ? 1 : -1));
-  // Those that go on are always in sight; of the others the newest few.
+  // Unfinished jobs are always shown; of the others, the newest few.
   const shown = newest.filter((batch, at) => !batch.ended || at < ENDED_SHOWN);
   const number = queue.loaded ? html` <span class="quiet n">${count(Math.max(queue.total, jobs.length))}${queue.more ? ' or more' : ''}</span>` : nothing;
   return html`<h1 class="visually-hidden">Jobs</h1>
@@ -40,7 +40,7 @@ export function jobsView(app) {
     </section>`;
 }
 
-/** What the tenant uses, where it waits or is nobody's. @param {import('./api.js').Schemas['Me'] | null} me */
+/** Returns the usage of the tenant, if it waits or is anonymous. @param {import('./api.js').Schemas['Me'] | null} me */
 function usage(me) {
   if (!me || (me.tenant === 'anonymous' && !me.used.queued)) return nothing;
   const share = me.used.queued / Math.max(1, me.quota.queued);
@@ -84,7 +84,7 @@ function allMark(app, jobs) {
   return html`<input type="checkbox" aria-label="Choose all jobs of the list" .checked=${all} @change=${() => mark(app, all ? [] : ids)}>`;
 }
 
-/** What can be done with the ticked jobs. @param {App} app @param {readonly Job[]} shown */
+/** Returns the actions on the selected jobs. @param {App} app @param {readonly Job[]} shown */
 function chosenBar(app, shown) {
   const jobs = marked().size ? shown.filter(({ id }) => marked().has(id)) : [];
   if (!jobs.length) return nothing;

@@ -23,7 +23,7 @@ export const STRIPS = [
  * @property {number} count
  * @property {Row[]} rows
  * @property {boolean} done
- * @property {string[]} labels Those that are numbers.
+ * @property {string[]} labels Labels with numbers.
  * @property {string} by The label along which the rows stand; empty for their order.
  * @property {string} worst The strip whose largest values are listed.
  * @property {Partial<Record<StripKey, number>>} limits
@@ -79,7 +79,7 @@ export async function openLine(app, id, query) {
   }
 }
 
-/** What the strips need of every patch, besides labels. */
+/** Columns of every patch that the strips need, besides labels. */
 const COLUMNS = ['id', 'index', 'point', 'patch', 'normal_force_n', 'force_x_n', 'force_y_n', 'friction_power_n', 'pressure_max_mpa', 'area_mm2', 'stick_share'];
 
 /** The narrow table of the batch arrives in pieces, one line for each patch and motion. @param {App} app @param {Line} mine */

@@ -16,7 +16,7 @@ const WORST = 8;
 /** @type {{ rows: readonly import('./line.js').Row[], by: string, x: number[], strips: import('./strips.js').Strip[] } | null} */
 let made = null;
 
-/** What the strips show, made once for the rows in their order. @param {Line} of */
+/** The data of the strips, computed once for the rows in order. @param {Line} of */
 function stripsOf({ rows, by }) {
   if (made?.rows !== rows || made.by !== by) {
     const strips = STRIPS.map(({ key, label, unit, colour }) => ({ key, label, unit, colour, lines: [{ label, values: rows.map((row) => row[key]) }] }));
@@ -48,7 +48,7 @@ export function lineView(app) {
     : html`<progress max=${line.count || 1} .value=${line.rows.length} aria-label="Loading"></progress>`}</div>`;
 }
 
-/** Nothing is chosen yet. @param {import('./line.js').Offered | null} offered */
+/** The view before a choice. @param {import('./line.js').Offered | null} offered */
 function choice(offered) {
   if (!offered) return html`<p class="pad quiet">Loading …</p>`;
   const { batches, runs } = offered;

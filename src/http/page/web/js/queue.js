@@ -30,7 +30,7 @@ const MORE = 1000;
 const BATCHES = 20;
 /** Events of batches say nothing of their jobs: these are looked at again, but not more often than this. */
 const REFRESH_MS = 1000;
-/** What was deleted elsewhere is told by no event. */
+/** Deletions by other clients are not reported by events. */
 const SELDOM_MS = 20_000;
 
 /** @type {Queue} */

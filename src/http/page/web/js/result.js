@@ -36,7 +36,7 @@ import { firstPatch, flangeAngle, oneWheel, sideOf } from './wheelloads.js';
  * @property {JsonObject | null} document The case.
  * @property {import('./placing.js').Placed | null} placed Its cross-sections.
  * @property {Map<string, Promise<Field>>} asked Fields by patch and motion.
- * @property {(Field | undefined)[]} fields Those of the chosen motion, by patch.
+ * @property {(Field | undefined)[]} fields Fields of the chosen motion, by patch.
  * @property {Map<string, Stresses | null>} stresses Below the surface, by patch and motion; null while they are being loaded.
  * @property {Partial<Record<'left' | 'right', Standing>>} wheels Wheels of a wheelset.
  * @property {Partial<Record<'left' | 'right', number>>} flange Angle of the flange of each wheel in rad, where it has one.
@@ -246,7 +246,7 @@ export function rememberView(app) {
   app.remember(formatRoute('result', [job.id], { patch, point, field: quantity, ...place, cells: mesh ? 1 : undefined }));
 }
 
-/** What friction bounds: its coefficient, NaN where the case has another law. @param {Looked} of */
+/** Returns the coefficient of friction; NaN if the case has another law. @param {Looked} of */
 export const frictionOf = ({ document }) => numberAt(document ?? undefined, '/friction/coefficient');
 
 /** The range of colours: of the chosen patch and motion alone, or one for all of them. @param {Looked} of @param {Quantity} quantity */

@@ -22,7 +22,7 @@ import { nearest } from './wheelsetdata.js';
 
 /**
  * @typedef {object} Carried
- * What a wheel carries at a shift; forces on the rail.
+ * The load of a wheel at a shift, as forces on the rail.
  * @property {number} normal_n
  * @property {number} y_n Lateral force, positive to the field side.
  * @property {number} x_n
@@ -119,7 +119,7 @@ async function compute(app, of, document, place) {
 }
 
 /**
- * What a wheel carries and the pressures of its patches. The job does not stay.
+ * Returns the load of a wheel and the pressures of its patches. The job is deleted.
  * @param {JsonObject} document
  * @param {Side} side
  * @returns {Promise<{ carried: Carried, pressed: Pressed[] } | null>} Null where it cannot be solved, as off the rail.

@@ -28,7 +28,7 @@ export const PROFILES = /** @type {JsonObject} */ ({ type: 'profiles', rail: {},
 /** One motion to begin with. */
 export const ONE_MOTION = /** @type {JsonObject} */ ({ creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0, ...SPEED });
 
-/** A wheel that rolls freely: the rail carries no longitudinal force. @param {unknown} type That of the contact. @returns {JsonObject} */
+/** A wheel that rolls freely: the rail carries no longitudinal force. @param {unknown} type Type of the contact. @returns {JsonObject} */
 export const freeRolling = (type) => ({ wheelset: { ...SPEED, ...(type === 'wheelset' ? { drive_torque_n_mm: 0 } : { force_x_n: 0 }) } });
 
 /** @type {Record<string, { contact: JsonObject, load?: JsonObject, motion: JsonObject }>} */

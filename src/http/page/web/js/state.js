@@ -1,4 +1,4 @@
-// What the page knows, and what every view may ask of the shell.
+// State of the page, and functions of the shell for all views.
 
 /** @typedef {import('./api.js').Job} Job */
 /** @typedef {import('./api.js').JobResult} JobResult */
@@ -22,16 +22,16 @@
 /**
  * @typedef {object} Compose
  * @property {JsonObject | null} document The case; null as long as the text is no JSON.
- * @property {string} text The same as text.
+ * @property {string} text The document as text.
  * @property {string} unreadable Why the text is no JSON.
  * @property {{ pointer: string, text: string } | null} typing The field that is being written in, as it is written.
- * @property {CheckedCase | null} checked What the service says of a sound case.
- * @property {{ type: unknown, of: NonNullable<CheckedCase['understood']> } | null} understood What the last sound case was understood as, by its
+ * @property {CheckedCase | null} checked Report of the service on a valid case.
+ * @property {{ type: unknown, of: NonNullable<CheckedCase['understood']> } | null} understood Interpretation of the last valid case, by its
  *   kind of contact: the drawing stays while faults are being corrected.
  * @property {{ body: 'rail' | 'wheel', line: readonly (readonly number[])[] | null } | null} lone The only cross-section of a case that lacks the other.
  * @property {readonly Fault[]} faults
  * @property {string} refusal Why it could not be checked, where that is no fault of the case.
- * @property {readonly import('./api.js').Schemas['ExampleCase'][]} examples Those of the service.
+ * @property {readonly import('./api.js').Schemas['ExampleCase'][]} examples Examples of the service.
  * @property {string} example The one that is chosen; empty for none.
  * @property {Partial<Record<'rail' | 'wheel', { name: string, text: string }>>} files The files that cross-sections were taken from.
  * @property {boolean} solving
@@ -48,7 +48,7 @@
  * @property {{ ready: boolean, version: string } | null} health
  * @property {boolean} keyLine Is the line for the API key open?
  * @property {string} toast
- * @property {Action | null} action What the toast offers.
+ * @property {Action | null} action Action of the toast.
  * @property {string} absent Why what the address names is not there; empty where it is.
  * @property {Compose} compose
  * @property {number} turn Counts changes of what the views keep themselves.

@@ -85,7 +85,7 @@ export function isTraffic(text) {
 /**
  * The columns of the rows that were written, or of the table; those without any value are left to the case.
  * @param {{ rows: readonly Row[], table: Table | null }} form
- * @param {number} speed That of the case, in mm/s, for radii without a speed.
+ * @param {number} speed Speed of the case in mm/s, for radii without a speed.
  */
 export function trafficOf({ rows, table }, speed) {
   const written = (/** @type {ColumnKey} */ key) => {
@@ -113,7 +113,7 @@ export function trafficOf({ rows, table }, speed) {
  * The table of a traffic that was computed.
  * @param {Record<string, number[]>} columns
  * @param {number[] | undefined} passes
- * @param {number} speed That of the case, in mm/s.
+ * @param {number} speed Speed of the case in mm/s.
  * @returns {Table}
  */
 export function tableOf(columns, passes, speed) {

@@ -9,7 +9,7 @@ const VALUE = 'typing';
 /** Nobody waits for the answer any longer. */
 const FORGOTTEN_MS = 60_000;
 
-/** What the page writes into such a case; neither changes its answer. */
+/** Members that the page writes into such a case. They do not change its result. */
 export const TYPED = { name: 'result while typing', labels: { [KEY]: VALUE } };
 
 /** @param {Pick<Job, 'labels'>} job */

@@ -7,8 +7,8 @@
  * @typedef {object} Wear
  * @property {readonly Place[]} moved The second cross-section, aligned with the first.
  * @property {readonly [number, number][]} curve Length along the first cross-section in mm, and what the second lacks there in mm.
- * @property {number} area What it lacks altogether, in mm².
- * @property {number} added What it has more, in mm².
+ * @property {number} area Total missing area, in mm².
+ * @property {number} added Additional area, in mm².
  * @property {{ depth: number, at: Place } | null} most Where it lacks most.
  */
 
@@ -127,7 +127,7 @@ function metAlong(line, [y, z], [ny, nz]) {
 }
 
 /**
- * What the second cross-section lacks against the first.
+ * Returns the area that the second cross-section lacks against the first.
  * @param {readonly Place[]} one
  * @param {readonly Place[]} two
  * @param {Body} body The material of a rail is below its line, that of a wheel above.

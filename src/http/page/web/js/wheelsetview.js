@@ -52,7 +52,7 @@ export function wheelsetPanel(app, looked, wheelset) {
 /** @type {{ wheelset: Wheelset, window: string, there: number, part: unknown } | null} */
 let printed = null;
 
-/** What the screen shows one after another: contact lines and all curves, for paper. @param {Looked} looked @param {Wheelset} wheelset @param {Kinematics} kinematics @param {Shifting} moving */
+/** Contact lines and all curves together, for print; the screen shows them one at a time. @param {Looked} looked @param {Wheelset} wheelset @param {Kinematics} kinematics @param {Shifting} moving */
 function paperPart(looked, wheelset, kinematics, moving) {
   const { window, wheels } = looked;
   const there = SIDES.filter((side) => wheels[side]).length;

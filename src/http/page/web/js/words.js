@@ -1,4 +1,4 @@
-// What the form calls the values of a case, by JSON pointer.
+// Names of the values of a case in the form, by JSON pointer.
 
 import { at, isObject } from './document.js';
 import { inclinationText, textOf } from './written.js';

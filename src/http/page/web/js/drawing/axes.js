@@ -1,4 +1,4 @@
-// What drawings share: paths, and lines of a grid with their numbers.
+// Paths, and grid lines with numbers, for all drawings.
 
 import { nothing, svg } from '../../vendor/lit-html.js';
 import { smoothLine } from '../field/cells.js';
@@ -63,7 +63,7 @@ export function grid(axes, labels) {
 
 /**
  * @typedef {object} Chart
- * @property {string} name What it shows, for those who do not see it.
+ * @property {string} name Accessible name.
  * @property {string} x
  * @property {string} y
  * @property {readonly ChartLine[]} lines

@@ -62,7 +62,7 @@ export function drawProfiles(placed, standing) {
   </svg>`;
 }
 
-/** What is drawn of the whole head: across and up. @param {readonly Point[]} rail @param {readonly Patch[]} patches @returns {[Point, Point]} */
+/** Ranges of the drawing of the whole head, across and up. @param {readonly Point[]} rail @param {readonly Patch[]} patches @returns {[Point, Point]} */
 function wholeHead(rail, patches) {
   const ys = rail.map(([y]) => y);
   const [y0, y1] = [Math.min(...ys) - 12, Math.max(...ys) + 12];
@@ -71,7 +71,7 @@ function wholeHead(rail, patches) {
   return [[Math.min(y0, ...tips), Math.max(y1, ...tips)], [low, TOP_MM]];
 }
 
-/** What is drawn around the patches, with room for the pressure on them: across and up. @param {Placed} placed @param {Standing} standing @returns {[Point, Point]} */
+/** Ranges of the drawing around the patches, with space for their pressure, across and up. @param {Placed} placed @param {Standing} standing @returns {[Point, Point]} */
 function aroundPatches({ rail }, standing) {
   const places = standing.patches.flatMap((patch) => {
     const on = surfaceOf(patch, rail, standing.bent);

@@ -22,7 +22,7 @@ import { path } from './axes.js';
  */
 
 const WIDTH = 900;
-/** What is drawn beside the rail: to the field side, and to the track centre, where the flange is. */
+/** Space drawn beside the rail: to the field side, and to the track centre, where the flange is. */
 const FIELD_MM = 12;
 const FLANGE_MM = 40;
 const BETWEEN = 26;

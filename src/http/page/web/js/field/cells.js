@@ -187,7 +187,7 @@ export function smoothLoop(loop) {
 }
 
 /**
- * The same for a line with two ends.
+ * Smooths a line with two ends.
  * @param {[number, number][]} line
  * @returns {[number, number][]}
  */

@@ -18,7 +18,7 @@
  * @property {Box | null} along The section along rolling, below the map.
  * @property {Box | null} across The section across, on the right.
  * @property {number} scale Pixels per mm, the same in both directions.
- * @property {number} x0 What the map shows, in mm.
+ * @property {number} x0 Least x of the map, in mm.
  * @property {number} y1
  * @property {boolean} narrow
  * @property {(x: number) => number} X From mm to pixels.
@@ -29,8 +29,8 @@ const MARGIN = { left: 50, top: 48, right: 14, bottom: 42 };
 const NARROW = 560;
 
 /**
- * @param {Extent} extent What has to be seen.
- * @param {number} width What there is.
+ * @param {Extent} extent The visible extent.
+ * @param {number} width The available width.
  * @param {{ sections: boolean, tallest: number }} wish
  * @returns {Layout}
  */
@@ -42,7 +42,7 @@ export function layoutMap(extent, width, { sections, tallest }) {
   const least = beside ? Math.min(200, width * 0.24) : 0;
   const free = width - MARGIN.left - MARGIN.right - gap;
   const scale = Math.min((free - least) / (x1 - x0), tallest / (y1 - y0));
-  // What a tall patch leaves beside it goes to the section across, then to the margin of the map.
+  // The space beside a tall patch goes to the section across, then to the margin of the map.
   const mapWidth = beside ? Math.max(scale * (x1 - x0), Math.min(free - least, free * 0.6)) : free;
   const map = { left: MARGIN.left, top: MARGIN.top, width: mapWidth, height: scale * (y1 - y0) };
   const left = x0 - (mapWidth / scale - (x1 - x0)) / 2;

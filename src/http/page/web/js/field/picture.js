@@ -435,7 +435,7 @@ export function inkOf(element) {
 }
 
 /**
- * What a field says at a cell: names and values with units, for the readout.
+ * Returns names and values with units of a field at a cell, for the readout.
  * @param {Scene} scene
  * @param {{ x: number, y: number }} place
  * @param {number} cell -1 outside.

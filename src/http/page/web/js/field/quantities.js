@@ -1,4 +1,4 @@
-// What can be shown of a field: which values, in which unit, by which scale.
+// The quantities of a field that can be shown: values, units and scales.
 
 /** @typedef {import('../fields.js').Cells} Cells */
 /** @typedef {import('./palette.js').Scale} Scale */

@@ -95,7 +95,7 @@ function reachOut(line, { strips }) {
 }
 
 /**
- * Which line goes on at which place of the next strip: in order where there are as many, else the nearest.
+ * Assigns lines to positions of the next strip: in order if their numbers are equal, else the nearest.
  * @param {readonly Line[]} open
  * @param {readonly number[]} places
  * @returns {number[]} The line of every place; -1 where one begins.
