@@ -180,8 +180,8 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
             return Err(CaseError(vec![Fault { pointer, ..fault }]));
         }
     };
-    let grain = checked_case::grain(&profile);
-    let advised = advised_smoothing([grain; 2], STEEL_MPA, checked_case::PRESSURE_USUAL);
+    let noise_level = checked_case::noise_level(&profile);
+    let advised = advised_smoothing([noise_level; 2], STEEL_MPA, checked_case::PRESSURE_USUAL);
     Ok(SectionReport {
         body: body.name(),
         quality: checked_case::section(&profile, advised[0]),

@@ -52,10 +52,10 @@ fn normal_seconds(task: &NormalTask, patches: usize) -> f64 {
 /// Time in s to bring a wheel to rest on its rail, with the other readings of its profiles where they are smoothed or should be.
 fn at_rest(task: &WheelTask) -> f64 {
     let profiles = task.geometry.profiles();
-    let grains = profiles.map(checked_case::grain);
+    let levels = profiles.map(checked_case::noise_level);
     let read_again = task.trust.auto.contains(&true)
         || profiles.iter().any(|profile| profile.smoothing() > 0.0)
-        || advised_smoothing(grains, task.contact_modulus, PRESSURE_USUAL) != [0.0; 2];
+        || advised_smoothing(levels, task.contact_modulus, PRESSURE_USUAL) != [0.0; 2];
     WHEEL_SECONDS * if read_again { HARD_TIMES } else { 1.0 }
 }
 

@@ -1,6 +1,6 @@
-//! Places on the reference curve of a rail.
+//! Points on the reference curve of a rail.
 
-/// A place on the reference curve.
+/// A point on the reference curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CurvePlace {
     /// Arc length in mm.
@@ -9,7 +9,7 @@ pub struct CurvePlace {
     pub at: [f64; 2],
     /// Angle α of the tangent in rad.
     pub angle: f64,
-    /// Parameter of the rail's curve.
+    /// Parameter of the curve of the rail's profile.
     pub rail: f64,
 }
 
@@ -26,7 +26,7 @@ impl CurvePlace {
         [-sin, cos]
     }
 
-    /// The point `[x, y, z]` in track axes at a distance along the normal, in mm.
+    /// The point `[x, y, z]` in track axes at the distance `gap` along the normal, in mm.
     pub fn point(&self, x: f64, gap: f64) -> [f64; 3] {
         let normal = self.normal();
         [

@@ -1,21 +1,23 @@
-//! The upper edge of a plane curve over equally spaced places.
+//! The upper envelope of a plane curve, sampled at equally spaced y.
 
-/// Upper edge of a curve on the lines `k step`: height and parameter.
+use crate::numerics::roots::bounds;
+
+/// The upper envelope of a curve at `y = k·step`: height and parameter of the curve.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Envelope {
-    /// Distance of the lines in mm.
+    /// Spacing in mm.
     pub(crate) step: f64,
-    /// k of the first line.
+    /// The first k.
     pub(crate) first: i64,
+    /// `None` where the curve has no point.
     pub(crate) points: Vec<Option<[f64; 2]>>,
 }
 
-/// `curve` lists `[y, height, parameter]`; lines over a part without points have none. Between two points the curve is a parabola that bends as the
-/// points around do.
+/// Finds the upper envelope of a curve, given as `[y, height, parameter]` with `None` where it is interrupted. Between two points the curve is
+/// taken as a parabola with the mean second derivative of the points around.
 pub(crate) fn envelope(curve: &[Option<[f64; 3]>], step: f64) -> Envelope {
-    let y = || curve.iter().flatten().map(|point| point[0] / step);
-    let first = y().fold(f64::INFINITY, f64::min).ceil() as i64;
-    let last = y().fold(f64::NEG_INFINITY, f64::max).floor() as i64;
+    let [least, largest] = bounds(curve.iter().flatten().map(|point| point[0] / step));
+    let (first, last) = (least.ceil() as i64, largest.floor() as i64);
     let mut points: Vec<Option<[f64; 2]>> =
         vec![None; usize::try_from(last - first + 1).unwrap_or(0)];
     let mut bend_before: Option<[f64; 2]> = None;
@@ -28,7 +30,7 @@ pub(crate) fn envelope(curve: &[Option<[f64; 3]>], step: f64) -> Envelope {
         let bend_after = after.and_then(|after| bend([*from, *to, after]));
         let bends = [std::mem::replace(&mut bend_before, bend_after), bend_after];
         let (low, high) = (from[0].min(to[0]) / step, from[0].max(to[0]) / step);
-        // Casts cut toward zero, which costs less than a call that rounds.
+        // A cast truncates toward zero, which is faster than a rounding function.
         let (lowest, highest) = (low as i64, high as i64);
         let lowest = lowest + i64::from((lowest as f64) < low);
         let highest = highest - i64::from(highest as f64 > high);
@@ -36,7 +38,7 @@ pub(crate) fn envelope(curve: &[Option<[f64; 3]>], step: f64) -> Envelope {
             continue;
         }
         let span = to[0] - from[0];
-        // Where the two bends differ in sign the curve has a corner or hardly bends, and is taken to be straight.
+        // If the two second derivatives differ in sign, the curve has a corner or hardly bends, and is taken as straight.
         let bends = [0, 1].map(|part| match bends {
             [Some(a), Some(b)] if a[part] * b[part] > 0.0 => 0.5 * (a[part] + b[part]),
             _ => 0.0,
@@ -63,7 +65,7 @@ pub(crate) fn envelope(curve: &[Option<[f64; 3]>], step: f64) -> Envelope {
     }
 }
 
-/// Second derivatives of height and parameter by y through three points, if y goes on in one direction.
+/// Second derivatives of height and parameter with respect to y through three points, if y is monotone.
 fn bend([a, b, c]: [[f64; 3]; 3]) -> Option<[f64; 2]> {
     let (before, after) = (b[0] - a[0], c[0] - b[0]);
     (before * after > 0.0).then(|| {

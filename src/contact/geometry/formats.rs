@@ -1,24 +1,14 @@
-//! The formats of profile files, and how the format of a text is recognised.
+//! Reads profile files: plain columns, Simpack and MiniProf.
 //!
-//! Simpack's rail and wheel profiles, `.prr` and `.prw`.
+//! All formats share the reading of lines: comments, separators, decimal commas, keywords. Columns and MiniProf files are a header followed by
+//! rows of numbers ([`Table`]).
 //!
-//! A header with the type, a spline block with settings `name = value`, and points between `point.begin` and
-//! `point.end`, in any order and in any case. The settings are applied in the order of their numbers in the file:
-//! shift, rotation, mirroring; lengths are divided by `units.len.f` per metre.
-//!
-//! MiniProf's rail and wheel profiles, `.ban` and `.whl`.
-//!
-//! A header of lines `Name=value`, or of free words in files of older versions, then one point per line. `ColumnDef` names the columns:
-//! its `X` is y here and its `Y` is z; without it they are the first two. Instruments differ in the sense of both: `X` usually
-//! points to the track centre, the sense of z is found from the shape.
-//!
-//! The contents of a profile file.
-//!
-//! The lines of a text file: numbers, remarks and words, as instruments, programs and people write them.
-//!
-//! Columns of numbers: y and z, one point per line.
-//!
-//! A header and rows of numbers.
+//! - **Columns**: y and z, one point per line.
+//! - **Simpack** (`.prr`, `.prw`): a header with the type, a spline block with settings `name = value`, and points between `point.begin` and
+//!   `point.end`, in any order of blocks. Shift, rotation and mirroring are applied in this order. `units.len.f` is the number of length units
+//!   in a metre.
+//! - **MiniProf** (`.ban`, `.whl`): header lines `Name=value`, or free words in old versions, then one point per line. `ColumnDef` names the
+//!   columns; its `X` is y here and its `Y` is z. `X` usually points to the track centre. The direction of z is found from the shape.
 
 use std::borrow::Cow;
 use std::f64::consts::TAU;
@@ -27,7 +17,9 @@ use railhead_macros::{Named, Words};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::geometry::plane_curve::{chords, distance};
 use crate::geometry::profile::{LengthUnit, POINTS_MIN};
+use crate::geometry::profile_quality::median;
 
 /// A file format of cross-sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words, Named)]
@@ -41,23 +33,21 @@ pub enum Format {
     Miniprof,
 }
 
-/// Length below which a text may be a path.
-const PATH_LENGTH_MAX: usize = 1000;
-/// Starts of a text that was decoded in another encoding than its own.
+/// Byte order marks, as correct and as wrong decoders leave them.
 const BYTE_ORDER_MARKS: [&str; 4] = ["\u{feff}", "\u{fffd}", "ï»¿", "ÿþ"];
 
 /// Reads a profile from the text of a file.
 ///
 /// # Errors
-/// A sentence that names the line that cannot be read, or what is missing.
+/// Returns a sentence that names the line that cannot be read, or the part that is missing.
 pub fn read(format: Format, text: &str) -> Result<ProfileFile, String> {
     if is_path(text) {
         return Err(format!(
-            "{:?} given, which looks like a path; text must be the content of the file",
-            text.trim()
+            "{} given, which looks like a path; text must be the content of the file",
+            shown(text.trim())
         ));
     }
-    // Bytes of UTF-16 that were taken for single characters.
+    // UTF-16 that was decoded byte by byte has nulls between its characters.
     let without_nulls = text.contains('\0').then(|| text.replace('\0', ""));
     let mut text = without_nulls.as_deref().unwrap_or(text);
     for mark in BYTE_ORDER_MARKS {
@@ -66,29 +56,23 @@ pub fn read(format: Format, text: &str) -> Result<ProfileFile, String> {
     if let Some(refused) = other_kind(text) {
         return Err(refused);
     }
-    let looks_like = looks_like(text);
-    let other = looks_like.filter(|other| *other != format);
+    let other = looks_like(text).filter(|other| *other != format);
     let contents = match format {
-        // Columns would be read from files of the other formats too, without their settings.
+        // Files of the other formats can be read as columns too, but without their settings.
         Format::Columns if other.is_some() => Err("no plain columns".to_owned()),
         Format::Columns => read_columns(text),
         Format::Simpack => read_simpack(text),
         Format::Miniprof if other.is_some() => Err("no file of MiniProf".to_owned()),
         Format::Miniprof => read_miniprof(text),
     };
-    contents.map_err(|reason| match other {
-        Some(other) => {
-            format!(
-                "{reason}; this looks like a file of the format {}",
-                other.name()
-            )
-        }
+    contents.map_err(|reason| match other.map(Format::name) {
+        Some(other) => format!("{reason}; this looks like a file of the format {other}"),
         None => reason,
     })
 }
 
-/// Why a text holds something else than one cross-section: a list of cross-sections along the track or around the wheel, or both sides of a
-/// track.
+/// The refusal of a text that does not contain a single cross-section: a list of cross-sections along the track or around the wheel, or a
+/// file with both sides of the track.
 fn other_kind(text: &str) -> Option<String> {
     let word = text.split_whitespace().next().unwrap_or_default();
     if ["wheelprofile", "railprofile"].contains(&word.to_ascii_lowercase().as_str()) {
@@ -98,7 +82,7 @@ fn other_kind(text: &str) -> Option<String> {
                 .to_owned(),
         );
     }
-    // A slice is a position and the quoted name of a file.
+    // Each line of such a list has a position and the quoted name of a file.
     let slices: Vec<&str> = text
         .lines()
         .filter_map(|line| {
@@ -136,19 +120,17 @@ fn has_extension(name: &str) -> bool {
     })
 }
 
-/// Whether a text is a single line that ends like a file name.
+/// Returns whether a text is a single line that ends like a file name.
 fn is_path(text: &str) -> bool {
     let line = text.trim();
-    line.len() < PATH_LENGTH_MAX && !line.contains(['\n', '\r']) && has_extension(line)
+    !line.contains(['\n', '\r']) && has_extension(line)
 }
 
 /// The format whose keywords begin lines of a text.
 fn looks_like(text: &str) -> Option<Format> {
-    let first = text.trim_start().get(..14).unwrap_or_default();
-    if ["#miniwheelprof", "#minirailprof\n"]
-        .iter()
-        .any(|mark| first.eq_ignore_ascii_case(mark))
-    {
+    let first = text.lines().find(|line| !line.trim().is_empty());
+    let first = first.unwrap_or_default().trim().to_ascii_lowercase();
+    if first.starts_with("#miniwheelprof") || first == "#minirailprof" {
         return Some(Format::Miniprof);
     }
     each_line(text).find_map(|line| {
@@ -164,13 +146,15 @@ fn looks_like(text: &str) -> Option<Format> {
     })
 }
 
+/// The settings of a Simpack file.
 #[derive(Debug, Clone, Default)]
 struct SimpackSettings {
     wheel: Option<bool>,
+    /// Whether the current line is inside the spline block.
     in_spline: bool,
     shift: [f64; 2],
     rotate: f64,
-    /// Allowed range of y and of z; not applied if the lower bound is not below the upper one.
+    /// Allowed ranges of y and z. A range whose lower bound is not below the upper one is ignored.
     bounds: [[f64; 2]; 2],
     mirror: [bool; 2],
     per_metre: Option<f64>,
@@ -180,8 +164,8 @@ struct SimpackSettings {
     file: Option<String>,
 }
 
-/// Reads the points; their weights are ignored.
-pub(crate) fn read_simpack(text: &str) -> Result<ProfileFile, String> {
+/// Reads a Simpack file. The weights of the points are ignored.
+fn read_simpack(text: &str) -> Result<ProfileFile, String> {
     let mut settings = SimpackSettings::default();
     let mut points: Vec<[f64; 2]> = Vec::new();
     let lines = lines(text)?;
@@ -204,8 +188,8 @@ pub(crate) fn read_simpack(text: &str) -> Result<ProfileFile, String> {
             "spline.end" => settings.in_spline = false,
             _ if in_points => {
                 let mixed = comma == Comma::Separator && has_decimal_commas(&line.bare);
-                match held(&line.bare, comma) {
-                    Held::Row(numbers) if !mixed => points.push([numbers[0], numbers[1]]),
+                match content(&line.bare, comma) {
+                    Content::Row(numbers) if !mixed => points.push([numbers[0], numbers[1]]),
                     _ => {
                         let needed = "a point y, z with an optional weight";
                         return Err(unreadable(line, needed, comma));
@@ -233,10 +217,10 @@ pub(crate) fn read_simpack(text: &str) -> Result<ProfileFile, String> {
 }
 
 impl SimpackSettings {
-    /// Stores one setting; `None` if a known setting has no valid number.
+    /// Stores one setting. Returns `None` if a known setting has no valid number. Other settings are ignored.
     fn take(&mut self, name: &str, value: &str) -> Option<()> {
-        let number = || match held(&format!("0 {value}"), Comma::Separator) {
-            Held::Row(numbers) => Some(numbers[1]),
+        let number = || match content(&format!("0 {value}"), Comma::Separator) {
+            Content::Row(numbers) => Some(numbers[1]),
             _ => None,
         };
         let flag = || number().map(|number| number != 0.0);
@@ -289,7 +273,7 @@ impl SimpackSettings {
         Ok(ProfileFile {
             points,
             unit_mm,
-            // After the file's own mirroring, y is positive to the field side and z down.
+            // After the file's own mirroring, y is positive to the field side and z is positive down.
             mirror_y: Some(false),
             mirror_z: Some(false),
             wheel: self.wheel,
@@ -298,15 +282,15 @@ impl SimpackSettings {
     }
 }
 
-/// Reads the points.
-pub(crate) fn read_miniprof(text: &str) -> Result<ProfileFile, String> {
+/// Reads a MiniProf file.
+fn read_miniprof(text: &str) -> Result<ProfileFile, String> {
     let table = read_table(text)?;
     let mut columns = [0, 1];
     let mut stated = None;
     for line in &table.header {
         match keyword(line) {
             Some((name, value)) if name == "columndef" => {
-                columns = places(&value).ok_or_else(|| {
+                columns = columns_x_and_y(&value).ok_or_else(|| {
                     table.refuse(line, "a list with X and Y, such as ColumnDef=X,Y,A,C,")
                 })?;
             }
@@ -316,7 +300,7 @@ pub(crate) fn read_miniprof(text: &str) -> Result<ProfileFile, String> {
     }
     let mm = table.stated_unit().map(LengthUnit::mm);
     let points = table.points(columns, mm)?;
-    let counts = [points.len(), points.len() + table.remarked];
+    let counts = [points.len(), points.len() + table.commented_out];
     Ok(ProfileFile {
         points,
         unit_mm: mm,
@@ -327,16 +311,16 @@ pub(crate) fn read_miniprof(text: &str) -> Result<ProfileFile, String> {
     })
 }
 
-fn places(value: &str) -> Option<[usize; 2]> {
-    let names: Vec<&str> = value
-        .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
-        .filter(|name| !name.is_empty())
-        .collect();
-    let place = |name: &str| names.iter().position(|own| own.eq_ignore_ascii_case(name));
-    Some([place("X")?, place("Y")?])
+/// The numbers of the columns X and Y in the value of `ColumnDef`.
+fn columns_x_and_y(value: &str) -> Option<[usize; 2]> {
+    let column = |wanted: &str| {
+        let mut names = words(value, Comma::Separator);
+        names.position(|name| name.eq_ignore_ascii_case(wanted))
+    };
+    Some([column("X")?, column("Y")?])
 }
 
-/// The contents of a file.
+/// The contents of a profile file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProfileFile {
     /// Points `[y, z]` in mm, with the file's own shifts, rotation and mirroring applied.
@@ -349,61 +333,63 @@ pub struct ProfileFile {
     pub mirror_z: Option<bool>,
     /// Whether the file describes a wheel, if it states the body.
     pub wheel: Option<bool>,
-    /// The count of points that the header states, if it differs from the rows of the file, commented-out rows included.
+    /// The number of points that the header states, if the file has another number of rows, with and without commented-out rows.
     pub wrong_count: Option<usize>,
-    /// Rows of numbers that were read as a part of the header: their count and the line of the first.
+    /// Rows of numbers that were read as a part of the header: their number and the line of the first one.
     pub header_rows: Option<(usize, usize)>,
 }
 
-/// Signs that begin a remark anywhere in a line.
-const REMARK: [char; 5] = ['#', '%', '!', '$', '"'];
-/// Signs that begin a remark at the start of a line; elsewhere they separate or quote.
-const REMARK_AT_START: [char; 2] = [';', '\''];
-/// Lines of a text that are not empty: five for each point that a cross-section may have.
+/// Characters that begin a comment anywhere in a line.
+const COMMENT: [char; 5] = ['#', '%', '!', '$', '"'];
+/// Characters that begin a comment only at the start of a line. Elsewhere they separate or quote.
+const COMMENT_AT_START: [char; 2] = [';', '\''];
+/// Maximum number of non-empty lines of a text: five for each point that a cross-section may have.
 const LINES_MAX: usize = 100_000;
-/// Signs of a line that a message shows.
+/// Maximum number of characters of a line that a message shows.
 const SHOWN_MAX: usize = 300;
 
 /// One line of a text.
 #[derive(Debug, Clone)]
-pub(crate) struct Line<'a> {
-    /// Its number, from 1.
-    pub(crate) place: usize,
-    /// The line as it stands.
-    pub(crate) text: &'a str,
-    /// The line without its remark, without the quotes of quoted cells, and without blanks around it.
-    pub(crate) bare: Cow<'a, str>,
-    /// Whether an empty line is above it.
-    pub(crate) after_empty: bool,
+struct Line<'a> {
+    /// Its number, counted from 1.
+    place: usize,
+    /// The line as given.
+    text: &'a str,
+    /// The line without its comment, the quotes of quoted cells and surrounding blanks.
+    bare: Cow<'a, str>,
+    /// Whether the line above it is empty.
+    after_empty: bool,
 }
 
-/// Whether a comma separates numbers or stands before their decimals.
+/// The meaning of a comma.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Comma {
+enum Comma {
+    /// It separates numbers.
     Separator,
+    /// It is the decimal sign.
     Decimal,
 }
 
-/// What a line holds.
+/// The contents of a line.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Held {
-    /// A remark alone.
+enum Content {
+    /// Only a comment.
     Nothing,
-    /// Two numbers or more, possibly with words behind them.
+    /// At least two numbers, possibly followed by words.
     Row(Vec<f64>),
-    /// Less than a row: a single number, or a word that begins like a number but is none.
+    /// A single number, or a word that begins like a number but is not one.
     Broken {
-        /// The word that is no number; `None` for a single number.
+        /// The word that is not a number; `None` for a single number.
         word: Option<String>,
         /// Whether at least one word is a number.
         has_number: bool,
     },
-    /// Words.
+    /// Words only.
     Words,
 }
 
-/// The lines of a text that are not empty, whatever ends them.
-pub(crate) fn each_line(text: &str) -> impl Iterator<Item = Line<'_>> {
+/// The non-empty lines of a text, which end with LF, CR LF or CR.
+fn each_line(text: &str) -> impl Iterator<Item = Line<'_>> {
     let mut after_empty = false;
     text.split('\n')
         .flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'))
@@ -420,11 +406,11 @@ pub(crate) fn each_line(text: &str) -> impl Iterator<Item = Line<'_>> {
         })
 }
 
-/// The lines of a text, if there are no more than allowed.
+/// The non-empty lines of a text.
 ///
 /// # Errors
-/// A sentence with the limit.
-pub(crate) fn lines(text: &str) -> Result<Vec<Line<'_>>, String> {
+/// Returns a sentence with the limit if there are too many lines.
+fn lines(text: &str) -> Result<Vec<Line<'_>>, String> {
     let lines: Vec<Line> = each_line(text).take(LINES_MAX + 1).collect();
     if lines.len() > LINES_MAX {
         return Err(format!(
@@ -434,24 +420,24 @@ pub(crate) fn lines(text: &str) -> Result<Vec<Line<'_>>, String> {
     Ok(lines)
 }
 
-/// A line without its remark.
+/// Returns a line without its comment.
 fn bare(text: &str) -> Cow<'_, str> {
     let line = text.trim();
     if let Some(cells) = quoted_cells(line) {
         return Cow::Owned(cells);
     }
-    if line.starts_with(REMARK_AT_START) {
+    if line.starts_with(COMMENT_AT_START) {
         return Cow::Borrowed("");
     }
-    // `1.#QNAN` is a number that failed, not a remark.
-    let sign = |(at, _): &(usize, &str)| !line[..*at].ends_with('.');
-    let remark = line.match_indices(REMARK).find(sign).map(|(at, _)| at);
-    let end = remark.into_iter().chain(line.find("//")).min();
+    // `1.#QNAN` is an invalid number, not a comment.
+    let begins = |(at, _): &(usize, &str)| !line[..*at].ends_with('.');
+    let comment = line.match_indices(COMMENT).find(begins).map(|(at, _)| at);
+    let end = comment.into_iter().chain(line.find("//")).min();
     Cow::Borrowed(line[..end.unwrap_or(line.len())].trim_end())
 }
 
-/// The cells of a line that is quoted as in CSV, `"1.0","2.0"` or `"Name=value"`, separated by semicolons; `None` for any other
-/// line, in which a quote begins a remark.
+/// The cells of a line that is quoted as in CSV, `"1.0","2.0"` or `"Name=value"`, joined by semicolons. Returns `None` for any other
+/// line, in which a quote begins a comment.
 fn quoted_cells(line: &str) -> Option<String> {
     let mut cells = Vec::new();
     let mut rest = line;
@@ -472,7 +458,7 @@ fn quoted_cells(line: &str) -> Option<String> {
     quoted.then(|| cells.join(";"))
 }
 
-/// A finite number, also with the exponents of Fortran, the minus sign of typography, or a decimal comma.
+/// Parses a finite number, also with the exponents of Fortran (`1.0D0`), a typographic minus sign, or a decimal comma.
 fn number(word: &str, comma: Comma) -> Option<f64> {
     let parsed = word.parse::<f64>().or_else(|_| {
         let plain = |c: char| match c {
@@ -486,17 +472,18 @@ fn number(word: &str, comma: Comma) -> Option<f64> {
     parsed.ok().filter(|number: &f64| number.is_finite())
 }
 
-/// Whether a word would be a number if it were written correctly.
+/// Returns whether a word looks like a number, valid or not.
 fn begins_like_number(word: &str) -> bool {
     let unsigned = word.trim_start_matches(['+', '-', '\u{2212}', '.', ',']);
     unsigned.starts_with(|c: char| c.is_ascii_digit()) || word.parse::<f64>().is_ok()
 }
 
+/// The words of a line.
 fn words(bare: &str, comma: Comma) -> impl Iterator<Item = &str> {
     let separates =
         move |c: char| c.is_whitespace() || c == ';' || c == ',' && comma == Comma::Separator;
     bare.split(separates)
-        // `1,5, 2,5`: the comma behind a number separates.
+        // In `1,5, 2,5` a comma after a number separates.
         .map(move |word| match comma {
             Comma::Separator => word,
             Comma::Decimal => word.trim_end_matches(','),
@@ -504,10 +491,10 @@ fn words(bare: &str, comma: Comma) -> impl Iterator<Item = &str> {
         .filter(|word| !word.is_empty())
 }
 
-/// What a line holds.
-pub(crate) fn held(bare: &str, comma: Comma) -> Held {
+/// Parses a line.
+fn content(bare: &str, comma: Comma) -> Content {
     if bare.is_empty() {
-        return Held::Nothing;
+        return Content::Nothing;
     }
     if comma == Comma::Separator
         && let Some(word) = mixed_word(bare)
@@ -520,7 +507,7 @@ pub(crate) fn held(bare: &str, comma: Comma) -> Held {
         match number(word, comma) {
             Some(number) if malformed.is_none() => numbers.push(number),
             Some(_) => return broken(malformed, true),
-            // Behind two numbers it is a word: `2nd measurement`, `12:30`.
+            // After two numbers it is a word, such as `2nd measurement` or `12:30`.
             None if begins_like_number(word) && numbers.len() < 2 => {
                 malformed = malformed.or(Some(word));
             }
@@ -529,13 +516,13 @@ pub(crate) fn held(bare: &str, comma: Comma) -> Held {
     }
     match numbers.len() {
         _ if malformed.is_some() => broken(malformed, !numbers.is_empty()),
-        0 => Held::Words,
+        0 => Content::Words,
         1 => broken(None, true),
-        _ => Held::Row(numbers),
+        _ => Content::Row(numbers),
     }
 }
 
-/// The second word of a line such as `1.5 2,5`, in which blanks separate and the comma is within a number.
+/// The second word of a line such as `1.5 2,5`, in which blanks separate and the comma lies within a number.
 fn mixed_word(bare: &str) -> Option<&str> {
     let mut words = bare.split_whitespace();
     let _first = number(words.next()?, Comma::Separator)?;
@@ -545,15 +532,15 @@ fn mixed_word(bare: &str) -> Option<&str> {
     is_mixed.then_some(second)
 }
 
-fn broken(word: Option<&str>, has_number: bool) -> Held {
-    Held::Broken {
+fn broken(word: Option<&str>, has_number: bool) -> Content {
+    Content::Broken {
         word: word.map(str::to_owned),
         has_number,
     }
 }
 
-/// Whether a line has two numbers or more, at least one of them with a decimal comma and none with a decimal point.
-pub(crate) fn has_decimal_commas(bare: &str) -> bool {
+/// Returns whether a line has at least two numbers, at least one of them with a decimal comma and none with a decimal point.
+fn has_decimal_commas(bare: &str) -> bool {
     let mut with_comma = 0;
     let is_number = |word: &&str| {
         !word.contains('.')
@@ -567,11 +554,11 @@ pub(crate) fn has_decimal_commas(bare: &str) -> bool {
     count >= 2 && with_comma > 0
 }
 
-/// How the rows of a text use the comma: one use for all rows. It is decimal if some rows have decimal commas and no row has decimal points.
-pub(crate) fn comma_of(lines: &[Line]) -> Comma {
+/// The meaning of the comma in all rows of a text. It is decimal if some rows have decimal commas and no row has decimal points.
+fn comma_of(lines: &[Line]) -> Comma {
     let has_points = |line: &Line| {
         let is_number = |word: &&str| number(word, Comma::Separator).is_some();
-        matches!(held(&line.bare, Comma::Separator), Held::Row(_))
+        matches!(content(&line.bare, Comma::Separator), Content::Row(_))
             && words(&line.bare, Comma::Separator)
                 .take_while(is_number)
                 .any(|word| word.contains('.'))
@@ -584,15 +571,15 @@ pub(crate) fn comma_of(lines: &[Line]) -> Comma {
     }
 }
 
-/// A line `name = value`, `name: value` or `name value`: the name in lower case, and the value without quotes.
-pub(crate) fn keyword(line: &Line) -> Option<(String, String)> {
+/// Splits a line `name = value`, `name: value` or `name value` into the name in lower case and the value without quotes.
+fn keyword(line: &Line) -> Option<(String, String)> {
     let begins = line.bare.starts_with(|c: char| c.is_alphabetic());
     let end = line
         .bare
         .find(|c: char| c == '=' || c == ':' || c.is_whitespace())
         .filter(|_| begins)?;
     let name = line.bare[..end].trim().to_ascii_lowercase();
-    // Signs of remarks may stand in a quoted value.
+    // A quoted value may contain characters that begin a comment elsewhere.
     let quoted = line
         .text
         .split('\'')
@@ -603,16 +590,16 @@ pub(crate) fn keyword(line: &Line) -> Option<(String, String)> {
     Some((name, quoted.unwrap_or(value).trim().to_owned()))
 }
 
-/// The words of a row that is no point but was one before its line became a remark.
-pub(crate) fn is_remarked_row(line: &Line, comma: Comma) -> bool {
+/// Returns whether a line is a row that was commented out.
+fn is_commented_out(line: &Line, comma: Comma) -> bool {
     let inner = line.text.trim_start_matches(|c: char| {
-        c.is_whitespace() || c == '/' || REMARK.contains(&c) || REMARK_AT_START.contains(&c)
+        c.is_whitespace() || c == '/' || COMMENT.contains(&c) || COMMENT_AT_START.contains(&c)
     });
-    line.bare.is_empty() && matches!(held(&bare(inner), comma), Held::Row(_))
+    line.bare.is_empty() && matches!(content(&bare(inner), comma), Content::Row(_))
 }
 
-/// A text in quotes as a message shows it, with its end left out if it is long.
-pub(crate) fn shown(text: &str) -> String {
+/// Quotes a text for a message, shortened if it is long.
+fn shown(text: &str) -> String {
     let mut shown: String = text.chars().take(SHOWN_MAX).collect();
     if shown.len() < text.len() {
         shown.push('…');
@@ -620,8 +607,8 @@ pub(crate) fn shown(text: &str) -> String {
     format!("{shown:?}")
 }
 
-/// A refusal of a line: the line, the word in it that cannot be read, and what is allowed.
-pub(crate) fn unreadable(line: &Line, needed: &str, comma: Comma) -> String {
+/// The refusal of a line. It states the line, the word that cannot be read, and what is allowed.
+fn unreadable(line: &Line, needed: &str, comma: Comma) -> String {
     let place = |word: &str| {
         let at = line.text.find(word)?;
         let column = line.text[..at].chars().count() + 1;
@@ -630,13 +617,13 @@ pub(crate) fn unreadable(line: &Line, needed: &str, comma: Comma) -> String {
             shown(word)
         ))
     };
-    let word = match held(&line.bare, comma) {
-        Held::Broken {
+    let word = match content(&line.bare, comma) {
+        Content::Broken {
             word: Some(word), ..
         } => place(&word),
-        Held::Broken { word: None, .. } => words(&line.bare, comma).nth(1).and_then(place),
-        Held::Words => words(&line.bare, comma).next().and_then(place),
-        Held::Nothing | Held::Row(_) => None,
+        Content::Broken { word: None, .. } => words(&line.bare, comma).nth(1).and_then(place),
+        Content::Words => words(&line.bare, comma).next().and_then(place),
+        Content::Nothing | Content::Row(_) => None,
     };
     let is_mixed = has_decimal_commas(&line.bare) || mixed_word(&line.bare).is_some();
     let hint = if comma == Comma::Separator && is_mixed {
@@ -652,9 +639,9 @@ pub(crate) fn unreadable(line: &Line, needed: &str, comma: Comma) -> String {
     )
 }
 
-/// Reads the points. A line of titles before them says which columns are y and z and may name their unit; without it they are the
-/// first two. Further columns are ignored.
-pub(crate) fn read_columns(text: &str) -> Result<ProfileFile, String> {
+/// Reads columns. The titles above them choose the columns y and z and may name their unit. Without titles they are the first two columns.
+/// Other columns are ignored.
+fn read_columns(text: &str) -> Result<ProfileFile, String> {
     let table = read_table(text)?;
     let (columns, unit) = titles(&table);
     if columns.is_none() && counts_rows(&table) {
@@ -673,7 +660,7 @@ pub(crate) fn read_columns(text: &str) -> Result<ProfileFile, String> {
     })
 }
 
-/// Whether there are three columns or more and the first holds 0, 1, 2, … or 1, 2, 3, …
+/// Returns whether there are at least three columns and the first one counts the rows from 0 or 1.
 fn counts_rows(table: &Table) -> bool {
     let first = table.rows[0].numbers[0];
     table.rows.len() >= POINTS_MIN
@@ -683,7 +670,7 @@ fn counts_rows(table: &Table) -> bool {
         })
 }
 
-/// The columns of y and z, or of x and y, or of x and z, and their unit, by the last lines of the header: titles, units, or both.
+/// The columns y and z, x and y, or x and z, and their unit, from the last lines of the header: titles, units, or both.
 fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
     let mut lines = table
         .header
@@ -731,6 +718,7 @@ fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
     (columns, unit)
 }
 
+/// The cells of a line of titles or units, separated by commas, semicolons or tabs if it has any, otherwise by blanks.
 fn cells<'a>(line: &'a Line<'_>) -> impl Iterator<Item = &'a str> {
     let separated = line.bare.contains([',', ';', '\t']);
     line.bare
@@ -745,53 +733,52 @@ fn cells<'a>(line: &'a Line<'_>) -> impl Iterator<Item = &'a str> {
         .filter(|cell| !cell.is_empty())
 }
 
-/// What a line of points has to be.
-const NEEDED: &str = "a row of finite numbers";
-/// A row of the header is this many usual chords or more from the first point, while neighbouring points are one or two apart.
+/// Least distance between a row of the header and the first point, in median chords. Neighbouring points are one or two chords apart.
 const CHORDS_APART: f64 = 10.0;
 
 /// A row of numbers.
 #[derive(Debug, Clone)]
-pub(crate) struct Row<'a> {
-    pub(crate) line: Line<'a>,
-    pub(crate) numbers: Vec<f64>,
+struct Row<'a> {
+    line: Line<'a>,
+    numbers: Vec<f64>,
 }
 
 /// A header and rows of numbers.
 #[derive(Debug, Clone)]
-pub(crate) struct Table<'a> {
+struct Table<'a> {
     /// The lines before the first row.
-    pub(crate) header: Vec<Line<'a>>,
-    pub(crate) rows: Vec<Row<'a>>,
-    /// Rows that were commented out.
-    pub(crate) remarked: usize,
-    /// Rows of numbers in the header: their count and the line of the first.
-    pub(crate) header_rows: Option<(usize, usize)>,
+    header: Vec<Line<'a>>,
+    rows: Vec<Row<'a>>,
+    /// The number of rows that were commented out.
+    commented_out: usize,
+    /// Rows of numbers in the header: their number and the line of the first one.
+    header_rows: Option<(usize, usize)>,
     comma: Comma,
 }
 
-/// The lines of a text with what they hold.
+/// The lines of a text with their contents.
 struct Scanned<'a> {
     lines: Vec<Line<'a>>,
-    held: Vec<Held>,
+    contents: Vec<Content>,
     comma: Comma,
 }
 
 impl Scanned<'_> {
+    /// The numbers of the lines with rows in a range of lines.
     fn rows(&self, from: usize, to: usize) -> impl Iterator<Item = usize> {
-        (from..to).filter(|k| matches!(self.held[*k], Held::Row(_)))
+        (from..to).filter(|k| matches!(self.contents[*k], Content::Row(_)))
     }
 
     fn refuse(&self, k: usize) -> String {
-        unreadable(&self.lines[k], NEEDED, self.comma)
+        unreadable(&self.lines[k], "a row of finite numbers", self.comma)
     }
 
-    /// The stretch between lines of words that has the most rows.
+    /// The range of lines with the most rows among the ranges that lines of words separate.
     ///
     /// # Errors
-    /// Words between rows.
+    /// Returns a refusal if words separate rows of points.
     fn longest_stretch(&self) -> Result<[usize; 2], String> {
-        let words = |k: &usize| self.held[*k] == Held::Words;
+        let words = |k: &usize| self.contents[*k] == Content::Words;
         let ends: Vec<usize> = (0..self.lines.len()).filter(words).collect();
         let starts = [0].into_iter().chain(ends.iter().map(|end| end + 1));
         let ends = ends.iter().copied().chain([self.lines.len()]);
@@ -812,21 +799,20 @@ impl Scanned<'_> {
         Ok(behind[0].0)
     }
 
-    /// How many of the rows at the begin of a stretch belong to the header: those before its first empty line, or one of another length than
-    /// all others, if they lie apart from the next row.
+    /// The number of rows at the beginning of a range that belong to the header. These are the rows before its first empty line, or a single
+    /// row of another length than all others, provided that their numbers are far from those of the next row.
     fn header_rows(&self, [from, to]: [usize; 2], points: &[[f64; 2]]) -> usize {
         let rows: Vec<usize> = self.rows(from, to).collect();
         let blank = (from..to).find(|k| self.lines[*k].after_empty);
         let is_attached = |k: &&usize| blank.is_some_and(|blank| **k < blank);
         let attached = rows.iter().take_while(is_attached).count();
-        let length = |k: &usize| match &self.held[*k] {
-            Held::Row(numbers) => numbers.len(),
+        let length = |k: &usize| match &self.contents[*k] {
+            Content::Row(numbers) => numbers.len(),
             _ => 0,
         };
         let lone = rows.len() > 2
             && length(&rows[0]) != length(&rows[1])
             && rows[2..].iter().all(|k| length(k) == length(&rows[1]));
-        let chord = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
         let count = if (1..POINTS_MIN).contains(&attached) {
             attached
         } else {
@@ -835,23 +821,20 @@ impl Scanned<'_> {
         if count == 0 || 2 * count >= rows.len() {
             return 0;
         }
-        let chords = points[count..].windows(2).map(chord);
-        let mut chords: Vec<f64> = chords.collect();
-        let middle = chords.len() / 2;
-        let usual = *chords.select_nth_unstable_by(middle, f64::total_cmp).1;
-        let apart = chord(&points[count - 1..=count]) > CHORDS_APART * usual;
+        let usual = median(&mut chords(&points[count..]).collect::<Vec<f64>>());
+        let apart = distance(points[count - 1], points[count]) > CHORDS_APART * usual;
         if apart { count } else { 0 }
     }
 
-    /// A broken row directly above the first row: it is no header.
+    /// A broken row directly above the first row, which cannot be part of the header.
     fn broken_row(&self, from: usize, first: usize) -> Option<usize> {
         let above = (from..first)
             .rev()
             .take_while(|k| !self.lines[*k + 1].after_empty);
         let is_row = |k: &usize| {
             matches!(
-                self.held[*k],
-                Held::Broken {
+                self.contents[*k],
+                Content::Broken {
                     word: Some(_),
                     has_number: true
                 }
@@ -860,33 +843,33 @@ impl Scanned<'_> {
         above.filter(is_row).last()
     }
 
-    /// The first line that may not stand behind the rows or between them. Words may: they are the end of a file.
+    /// The first line that is not allowed between or after the rows. Words are allowed, as the end of a file.
     fn bad_line(&self, first: usize) -> Option<usize> {
-        let is_bad = |k: &usize| match self.held[*k] {
-            Held::Broken { .. } => true,
-            Held::Words => !self.lines[*k].bare.starts_with(is_end),
-            Held::Row(_) => {
+        let is_bad = |k: &usize| match self.contents[*k] {
+            Content::Broken { .. } => true,
+            Content::Words => !self.lines[*k].bare.starts_with(is_end),
+            Content::Row(_) => {
                 self.comma == Comma::Separator && has_decimal_commas(&self.lines[*k].bare)
             }
-            Held::Nothing => false,
+            Content::Nothing => false,
         };
         (first..self.lines.len()).find(is_bad)
     }
 
-    /// Rows that are remarks.
-    fn remarked(&self, first: usize) -> usize {
+    /// The number of rows from a line on that were commented out.
+    fn commented_out(&self, first: usize) -> usize {
         let lines = self.lines[first..].iter();
         lines
-            .filter(|line| is_remarked_row(line, self.comma))
+            .filter(|line| is_commented_out(line, self.comma))
             .count()
     }
 
     fn nothing_found(&self) -> String {
-        let is_broken = |k: &usize| matches!(self.held[*k], Held::Broken { .. });
-        if let Some(k) = (0..self.held.len()).find(is_broken) {
+        let is_broken = |k: &usize| matches!(self.contents[*k], Content::Broken { .. });
+        if let Some(k) = (0..self.contents.len()).find(is_broken) {
             return self.refuse(k);
         }
-        match self.remarked(0) {
+        match self.commented_out(0) {
             0 => "no points found".to_owned(),
             count => format!(
                 "no points found; {count} rows are remarks, since they begin with #, %, !, \", ' or ;"
@@ -898,18 +881,22 @@ impl Scanned<'_> {
 /// Reads the header and the rows of a text.
 ///
 /// # Errors
-/// A sentence that names the line that cannot be read, or that there are no rows.
-pub(crate) fn read_table(text: &str) -> Result<Table<'_>, String> {
+/// Returns a sentence that names the line that cannot be read, or says that there are no rows.
+fn read_table(text: &str) -> Result<Table<'_>, String> {
     let lines = lines(text)?;
     let comma = comma_of(&lines);
-    let held = lines.iter().map(|line| held(&line.bare, comma)).collect();
-    let scanned = Scanned { lines, held, comma };
+    let contents = lines.iter().map(|line| content(&line.bare, comma));
+    let scanned = Scanned {
+        contents: contents.collect(),
+        lines,
+        comma,
+    };
     let [from, to] = scanned.longest_stretch()?;
     let places: Vec<usize> = scanned.rows(from, to).collect();
     let points: Vec<[f64; 2]> = places
         .iter()
-        .filter_map(|k| match &scanned.held[*k] {
-            Held::Row(numbers) => Some([numbers[0], numbers[1]]),
+        .filter_map(|k| match &scanned.contents[*k] {
+            Content::Row(numbers) => Some([numbers[0], numbers[1]]),
             _ => None,
         })
         .collect();
@@ -924,43 +911,38 @@ pub(crate) fn read_table(text: &str) -> Result<Table<'_>, String> {
     let in_header: Vec<usize> = scanned.rows(0, first).collect();
     let first_of = |k: &usize| (in_header.len(), scanned.lines[*k].place);
     let header_rows = in_header.first().map(first_of);
-    let remarked = scanned.remarked(first);
+    let commented_out = scanned.commented_out(first);
     let mut header = scanned.lines;
-    let body = header.split_off(first);
-    let rows = body.into_iter().zip(scanned.held.into_iter().skip(first));
-    let rows = rows.filter_map(|(line, held)| match held {
-        Held::Row(numbers) => Some(Row { line, numbers }),
+    let body = header.split_off(first).into_iter();
+    let rows = body.zip(scanned.contents.into_iter().skip(first));
+    let rows = rows.filter_map(|(line, content)| match content {
+        Content::Row(numbers) => Some(Row { line, numbers }),
         _ => None,
     });
     Ok(Table {
         header,
         rows: rows.collect(),
-        remarked,
+        commented_out,
         header_rows,
         comma,
     })
 }
 
-/// Whether a line of words that begins with this may end a file: `END`, `[END]`, `}`, a DOS end of file.
+/// Returns whether a line of words that begins with `c` may end a file: `END`, `[END]`, `}`, a DOS end of file.
 fn is_end(c: char) -> bool {
     c.is_alphabetic() || "[]{}()<>=-_\u{1a}".contains(c)
 }
 
 impl Table<'_> {
-    /// A refusal of a line of the header.
-    pub(crate) fn refuse(&self, line: &Line, needed: &str) -> String {
+    fn refuse(&self, line: &Line, needed: &str) -> String {
         unreadable(line, needed, self.comma)
     }
 
     /// The values in two columns of every row, in mm.
     ///
     /// # Errors
-    /// The first row that is too short.
-    pub(crate) fn points(
-        &self,
-        columns: [usize; 2],
-        unit_mm: Option<f64>,
-    ) -> Result<Vec<[f64; 2]>, String> {
+    /// Returns the refusal of the first row that is too short.
+    fn points(&self, columns: [usize; 2], unit_mm: Option<f64>) -> Result<Vec<[f64; 2]>, String> {
         let scale = unit_mm.unwrap_or(1.0);
         let point = |row: &Row| {
             let value = |column: usize| row.numbers.get(column).copied();
@@ -976,8 +958,8 @@ impl Table<'_> {
         self.rows.iter().map(point).collect()
     }
 
-    /// The unit that a line of the header names, such as `Units=mm` or `LENGTH = 'm'`.
-    pub(crate) fn stated_unit(&self) -> Option<LengthUnit> {
+    /// The unit named by a line of the header such as `Units=mm` or `LENGTH = 'm'`.
+    fn stated_unit(&self) -> Option<LengthUnit> {
         self.header.iter().find_map(|line| {
             let (name, value) = keyword(line)?;
             let is_unit = name.contains("unit") || name == "length";

@@ -1,37 +1,38 @@
-//! Stretches without points in which the bodies may touch.
+//! Stretches of a profile without points in which the bodies may touch.
 
 use crate::geometry::contact_locus::ContactLocus;
 use crate::geometry::profile::Body;
 
-/// Length in mm below which a chord is not a hole and fine enough for any patch, and over which the direction of the profile at the end of a hole is taken.
+/// Length in mm up to which a chord is short enough for any patch. The direction of the profile at the end of a hole is taken over this length
+/// too.
 pub(crate) const LENGTH_MIN: f64 = 1.0;
-/// Length relative to the width of the contact above which a chord may hold the whole contact, so that a job fails.
+/// Length relative to the width of the contact above which a chord may contain the whole contact, so that a job fails.
 pub(crate) const WIDE: f64 = 1.5;
-/// Distance in mm of the places at which the other body is compared with a chord.
+/// Spacing in mm of the points of the other body that are compared with a chord.
 const STEP: f64 = 0.1;
-/// Largest slope of a tangent at the end of a chord; a steeper one bounds nothing.
+/// Largest slope of a tangent at the end of a chord. Steeper tangents are cut to it.
 const SLOPE_MAX: f64 = 1e3;
 
-/// A chord without points over which the bodies may touch.
+/// A chord over which the bodies may touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hole {
-    /// Whose profile.
+    /// The body whose profile has no points there.
     pub body: Body,
     /// Its ends along the profile in mm.
     pub chord: [f64; 2],
-    /// Whether it is wide enough to hold the whole contact.
+    /// Whether it may contain the whole contact.
     pub wide: bool,
 }
 
 impl Hole {
-    /// Length in mm below which chords can be ignored beside a contact of the given width in mm.
+    /// Length in mm below which chords can be ignored near a contact of the given width in mm.
     pub fn least(width: f64) -> f64 {
         LENGTH_MIN.max(width)
     }
 }
 
-/// The chords over which the other body comes within the largest bulge that the tangents at their ends allow, with the wheel lowered by
-/// `lowering` mm below first touch; `width` in mm is that of the widest patch.
+/// Finds the chords that the other body approaches within the largest bulge that the tangents at their ends allow. The wheel is `lowering` mm
+/// below first touch, and `width` in mm is that of the widest patch.
 pub fn holes(search: &ContactLocus, lowering: f64, width: f64) -> Vec<Hole> {
     let geometry = search.geometry;
     let sign = geometry.placement.side.sign();
@@ -76,20 +77,19 @@ pub fn holes(search: &ContactLocus, lowering: f64, width: f64) -> Vec<Hole> {
     found
 }
 
-/// The region between a chord and the tangents at its ends: whatever the surface is between two points, it lies there if its curvature has
-/// one sign.
+/// The region between a chord and the tangents at its ends. The surface between two points lies in it if its curvature has one sign.
 struct Bulge {
     start: [f64; 2],
     /// Unit vectors along the chord and away from the body.
     axes: [[f64; 2]; 2],
     length: f64,
-    /// Slopes of the tangents away from the body, seen from both ends of the chord.
+    /// Slopes of the tangents away from the body, each in the direction from its end into the chord.
     slopes: [f64; 2],
 }
 
 impl Bulge {
-    /// The bulge of a chord, with the points before and after it where there are any. The tangents are those of the chords before and after,
-    /// which are steeper than the surface itself.
+    /// The bulge of a chord with the points before and after it, if there are any. The chords to these points stand for the tangents; they
+    /// are steeper than the surface itself.
     fn new(
         [start, end]: [[f64; 2]; 2],
         [before, after]: [Option<[f64; 2]>; 2],
@@ -119,8 +119,8 @@ impl Bulge {
         }
     }
 
-    /// Height in mm that the surface may have over a place `t` from 0 to 1 of the chord. Where only one tangent leads away from the body, it
-    /// is that of the cubic that leaves along this tangent and arrives along the chord.
+    /// Largest height in mm of the surface above the chord at `t` from 0 to 1. If only one tangent leads away from the body, it is the height
+    /// of the cubic that leaves along this tangent and arrives along the chord.
     fn height(&self, t: f64) -> f64 {
         let [start, end] = self.slopes.map(|slope| slope * self.length);
         if start > 0.0 && end > 0.0 {
@@ -130,7 +130,7 @@ impl Bulge {
         }
     }
 
-    /// Whether a point of the other body lies in the bulge, or overlaps the chord by no more than `overlap` mm.
+    /// Returns whether a point of the other body lies in the bulge, or overlaps the chord by no more than `overlap` mm.
     fn holds(&self, at: [f64; 2], overlap: f64) -> bool {
         let from = [at[0] - self.start[0], at[1] - self.start[1]];
         let [along, up] = self.axes.map(|axis| axis[0] * from[0] + axis[1] * from[1]);

@@ -1,4 +1,4 @@
-//! Where do the bodies touch? Cross-sections of wheel and rail, their placement, and the gaps of their patches.
+//! Cross-sections of wheel and rail: reading, quality, placement, first touch, and the distance between the bodies.
 
 pub mod conicity;
 pub mod contact_locus;

@@ -1,12 +1,15 @@
-//! Recognises how the points of a cross-section lie: the senses of y and z, the flange of a wheel and its back, the head of a rail.
+//! Recognises the directions of y and z of the points of a cross-section, the flange of a wheel and its back, and the head of a rail.
 //!
-//! A section is compared in all four senses with the shape of its body. A wheel has a flange: a lobe of 15 to 45 mm height on one side of its
-//! tread. A rail has a head: a convex crown whose sides fall off. Extremes decide nothing, since the face of a rim, the back of a flange, a groove
-//! or a foot may reach farther than flange or head.
+//! A section is compared in all four combinations of directions with the shape of its body. A wheel has a flange: a lobe of 15 to 45 mm height
+//! on one side of its tread. A rail has a head: a convex crown whose sides fall off. Extreme values are not used, because the face of a rim,
+//! the back of a flange, a groove or a foot may reach farther than flange or head.
 
 use std::f64::consts::FRAC_PI_2;
 
-/// How the points of a section are given.
+use crate::geometry::plane_curve::distance;
+use crate::numerics::roots::bounds;
+
+/// The directions of the axes of the points of a section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Senses {
     /// y is positive to the track centre.
@@ -21,7 +24,7 @@ impl Senses {
     }
 }
 
-/// Senses as far as they are stated.
+/// Directions as far as they are stated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StatedSenses {
     /// Whether y is positive to the track centre.
@@ -30,27 +33,27 @@ pub struct StatedSenses {
     pub mirror_z: Option<bool>,
 }
 
-/// What the format of the points specifies about their senses.
+/// The directions that the format of the points specifies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FormatSenses {
-    /// The senses that the format usually has.
+    /// The usual directions of the format. There is a remark if they are others.
     pub usual: Senses,
-    /// The senses that hold where the shape shows none.
+    /// The directions to use if the shape does not show them.
     pub fixed: StatedSenses,
 }
 
-/// The senses of a section, and how they were found.
+/// The directions found for a section.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FoundSenses {
     pub(crate) senses: Senses,
-    /// Whether the statements for y and for z contradict the shape.
+    /// Whether the stated directions of y and of z contradict the shape.
     pub(crate) contradicted: [bool; 2],
 }
 
-/// The senses of the points of a wheel.
+/// Finds the directions of the points of a wheel.
 ///
 /// # Errors
-/// A sentence that names the members to state, if neither the shape nor a statement shows the senses.
+/// Returns a sentence that names the members to state if neither the shape nor a statement shows the directions.
 pub(crate) fn orient_wheel(
     points: &[[f64; 2]],
     stated: StatedSenses,
@@ -64,7 +67,7 @@ pub(crate) fn orient_wheel(
     let agreeing = |with: StatedSenses, among: &[Senses]| -> Vec<Senses> {
         among.iter().copied().filter(|s| agree(s, with)).collect()
     };
-    // A part of a flange does not refute a format.
+    // Only a whole flange can contradict a format.
     if !whole && agreeing(fixed, &found).is_empty() {
         found.clear();
     }
@@ -120,10 +123,10 @@ fn wheel_unclear(points: &[[f64; 2]], several: bool, y: Option<bool>, z: Option<
     format!("{reason}; state {members}")
 }
 
-/// The senses of the points of a rail. Its y is never found from the shape, since most heads are nearly symmetric.
+/// Finds the directions of the points of a rail. The direction of y is never found from the shape, because most heads are nearly symmetric.
 ///
 /// # Errors
-/// A sentence that names the member to state, if neither the shape nor a statement shows the sense of z.
+/// Returns a sentence that names the member to state if neither the shape nor a statement shows the direction of z.
 pub(crate) fn orient_rail(
     points: &[[f64; 2]],
     stated: StatedSenses,
@@ -131,7 +134,7 @@ pub(crate) fn orient_rail(
 ) -> Result<FoundSenses, String> {
     let sure = sure_rail_mirror_z(points);
     let shown = match fixed.mirror_z {
-        // Grooves and other sections of test rigs are no reason to doubt a format.
+        // Grooves and other sections of test rigs do not contradict a format.
         Some(usual) => Some(sure.unwrap_or(usual)),
         None => rail_mirror_z(points),
     };
@@ -150,7 +153,7 @@ pub(crate) fn orient_rail(
     })
 }
 
-/// All senses, the documented one first.
+/// All combinations of directions, the documented one first.
 const ALL: [Senses; 4] = [
     Senses::new(false, false),
     Senses::new(true, false),
@@ -160,74 +163,75 @@ const ALL: [Senses; 4] = [
 
 /// Spacing in mm at which a section is sampled along its length.
 const STEP: f64 = 0.5;
-/// Samples to either side of a place from which its inclination is taken: 3 mm of the section, so that noise of 50 µm turns it by 1°.
+/// Number of samples on either side from which the inclination at a sample is taken. They span 3 mm, so that noise of 50 µm changes it by 1°.
 const SIDE: usize = 3;
-/// Largest inclination in rad of treads and crowns (20°). Wheels of standards stay below 0.2 up to the flange root, flanges exceed 1.
+/// Largest inclination in rad of treads and crowns (20°). Standard wheels stay below 0.2 up to the flange root, and flanges exceed 1.
 const FLAT: f64 = 0.35;
-/// Inclination in rad of the back of a flange, of a rim and of the faces of a head (75°).
+/// Least inclination in rad of the back of a flange, a rim and the faces of a head (75°).
 const STEEP: f64 = 1.3;
-/// Depth in mm of the piece that is taken as the tip of a flange.
+/// Height in mm of the piece that is taken as the tip of a flange.
 const TIP_DEPTH: f64 = 2.0;
-/// Least and largest width in mm of that piece; the back of the flange is no farther from the tip than the second (15 mm in EN 13715; in a groove
-/// beside a second rail the section continues farther). Flanges of EN 13715 and AAR have 12 to 18 mm; the edge of a rim has less than 1 mm.
+/// Range of the width in mm of the tip. Flanges of EN 13715 and AAR have 12 to 18 mm; the edge of a rim has less than 1 mm. The back of the
+/// flange is no farther from the tip than the upper bound. It is 15 mm in EN 13715, while a groove beside a second rail continues farther.
 const TIP_WIDTH: [f64; 2] = [4.0, 25.0];
-/// Least and largest height of a flange above its tread in mm: trams have 18 mm, worn wheels up to 40 mm.
+/// Range of the height in mm of a flange above its tread. Trams have 18 mm, worn wheels up to 40 mm.
 const FLANGE_HEIGHT: [f64; 2] = [15.0, 45.0];
-/// Least and largest distance in mm from the beginning of the flange's root to its tip. Wheels of EN 13715 have 24 mm.
+/// Range of the distance in mm from the beginning of the flange root to the tip. Wheels of EN 13715 have 24 mm.
 const ROOT_TO_TIP: [f64; 2] = [8.0, 45.0];
 /// Least length in mm of a tread.
 const TREAD: f64 = 20.0;
-/// Least height in mm of a flange that ends before its tip.
+/// Least height in mm of a flange whose points end before its tip.
 const PART_HEIGHT: f64 = 12.0;
-/// Steepest place in rad of a flange that ends before its tip. Flange faces have 60 to 78°; the face of a rim is steeper.
+/// Range of the largest inclination in rad of a flange whose points end before its tip. Flange faces have 60 to 78°; the face of a rim is
+/// steeper.
 const PART_SLOPE: [f64; 2] = [0.87, 1.38];
-/// Least length in mm of the crown of a head: the nose of a crossing has 15 mm where wheels reach it.
+/// Least length in mm of the crown of a head. The nose of a crossing has 15 mm where wheels reach it.
 const CROWN: f64 = 15.0;
-/// Least fall in mm at one side of a head, and at its other side. By the second a section may rise again within one descent: lips and steps of worn
-/// profiles.
-const FALL: [f64; 2] = [6.0, 1.0];
-/// Inclination in rad toward a cut end that a crown may have, and from the vertical that the back of a flange may have (6°): rails are canted by up
-/// to 0.05, feet of rails slope by 0.25; of a rounding of 20.5 mm, 2 mm lie within this angle.
+/// Least fall in mm at one side of a head.
+const FALL: f64 = 6.0;
+/// Least fall in mm at the other side of a head. Within one descent, lips and steps of worn profiles may rise by this much.
+const FALL_LEAST: f64 = 1.0;
+/// Largest inclination in rad of a crown toward a cut end, and of the back of a flange from the vertical (6°). Rails are canted by up to 0.05,
+/// and feet of rails slope by 0.25. Of a rounding of 20.5 mm, 2 mm lie within this angle.
 const CUT_SLOPE: f64 = 0.1;
-/// Least turn in rad of a crown that is measured without either side: 35 mm of a radius of 300 mm turn by 0.12.
+/// Least turn in rad of a crown that is measured without its sides. 35 mm with a radius of 300 mm turn by 0.12.
 const CROWN_TURN: f64 = 0.05;
-/// Least length in mm of the crown, least fall in mm of both faces, and range of the width in mm of a section that can only be a rail. Heads
-/// of EN 13674 are 65 to 75 mm wide.
+/// Least length in mm of the crown of a section that can only be a rail.
 const SURE_CROWN: f64 = 30.0;
-/// Least fall of each face of such a section in mm.
+/// Least fall in mm of each face of such a section.
 const SURE_FALL: f64 = 10.0;
-/// Largest turn of such a section within 2 mm beside its crown, in rad: corners of rails have radii of 9 mm or more, edges of rollers are sharp.
+/// Largest turn in rad of such a section within 2 mm beside its crown. Corners of rails have radii of at least 9 mm; edges of rollers are sharp.
 const SURE_CORNER: f64 = 0.3;
-/// Width of such a section over its faces in mm.
+/// Range of the width in mm over the faces of such a section. Heads of EN 13674 are 65 to 75 mm wide.
 const SURE_WIDTH: [f64; 2] = [50.0, 90.0];
-/// Least length in mm of the back of a flange, and distance between the three points at a steep end that the rounding of the back is continued from.
+/// Least length in mm of the back of a flange, and distance between the three points from which the rounding of a back is continued.
 const BACK: f64 = 3.0;
-/// Largest radius in mm of that rounding; it is 20.5 mm in EN 13715.
+/// Largest radius in mm of that rounding. It is 20.5 mm in EN 13715.
 const ROUNDING_MAX: f64 = 50.0;
-/// Least inclination in rad at such an end (72°): the rounding of 20.5 mm is continued by at most 1.0 mm.
+/// Least inclination in rad at the end of the points (72°), so that a rounding of 20.5 mm is continued by at most 1.0 mm.
 const ROUNDING_SLOPE: f64 = 1.25;
 
-/// The flange of a wheel, in the sense in which it was found.
+/// The flange of a wheel, in the directions in which it was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flange {
-    /// Least and largest y of the tip, within 2 mm of its height; `None` if the points end before the tip.
+    /// Least and largest y of the tip; `None` if the points end before the tip.
     pub tip: Option<[f64; 2]>,
-    /// y of the back, if it was measured or at least its rounding.
+    /// y of the back, if the back or at least its rounding was measured.
     pub back: Option<f64>,
-    /// y of the last point on the flange's side.
+    /// y of the last point on the side of the flange.
     pub end: f64,
 }
 
-/// The body that a shape shows without doubt.
+/// A body whose shape cannot be confused with that of the other body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SureBody {
-    /// A head of a rail with both of its faces.
+    /// A head of a rail with both faces.
     Rail,
     /// A wheel with its whole flange.
     Wheel,
 }
 
-/// The points with y to the field side, z up, in order from the track centre to the field side.
+/// Returns points given in the directions `senses` with y to the field side and z up, in order from the track centre to the field side.
 pub fn in_senses(points: &[[f64; 2]], senses: Senses) -> Vec<[f64; 2]> {
     let y_sign = if senses.mirror_y { -1.0 } else { 1.0 };
     let z_sign = if senses.mirror_z { 1.0 } else { -1.0 };
@@ -243,8 +247,9 @@ pub fn in_senses(points: &[[f64; 2]], senses: Senses) -> Vec<[f64; 2]> {
     turned
 }
 
-/// The senses in which points of a wheel show a flange, and whether it is a whole one. Whole flanges count before parts of one.
-pub fn wheel_senses(points: &[[f64; 2]]) -> (Vec<Senses>, bool) {
+/// The directions in which the points of a wheel show a flange, and whether the flange is whole. Parts of a flange count only if there is no
+/// whole one.
+fn wheel_senses(points: &[[f64; 2]]) -> (Vec<Senses>, bool) {
     let found = ALL.map(|senses| flange(&in_senses(points, senses)).map(|flange| (senses, flange)));
     let found: Vec<(Senses, Flange)> = found.into_iter().flatten().collect();
     let whole = found.iter().any(|(_, flange)| flange.tip.is_some());
@@ -254,48 +259,44 @@ pub fn wheel_senses(points: &[[f64; 2]]) -> (Vec<Senses>, bool) {
     (counted.map(|(senses, _)| senses).collect(), whole)
 }
 
-/// Whether z of points of a rail is positive up; `None` if the shape does not show it.
+/// The heads of rails in points given in the directions `senses`.
+fn heads(points: &[[f64; 2]], senses: Senses) -> Vec<Head> {
+    Section::new(&in_senses(points, senses)).heads()
+}
+
+/// Returns whether z of the points of a rail is positive up, or `None` if the shape does not show it.
 pub fn rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
     let crowns = |mirror_z: bool| -> f64 {
-        let senses = Senses::new(false, mirror_z);
-        let points = in_senses(points, senses);
-        let heads = Section::new(&points).heads();
+        let heads = heads(points, Senses::new(false, mirror_z));
         heads.iter().map(|head| head.crown).sum()
     };
     let [down, up] = [false, true].map(crowns);
-    // The crowns of one sense must be more than twice as long as those of the other.
+    // The crowns in one direction must be more than twice as long as those in the other.
     (up > 2.0 * down || down > 2.0 * up).then_some(up > down)
 }
 
-/// Whether z of points is positive up, if they can only be those of a rail with at least one of its faces.
-pub fn sure_rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
+/// Returns whether z of points is positive up, if they can only be those of a rail with at least one of its faces.
+fn sure_rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
     let mirror_z = rail_mirror_z(points)?;
-    let senses = Senses::new(false, mirror_z);
-    let heads = Section::new(&in_senses(points, senses)).heads();
-    let sure = |head: &Head| {
-        let faces = head.falls.iter().flatten();
-        head.crown >= SURE_CROWN && faces.clone().any(Fall::is_face)
-    };
+    let sure =
+        |head: &Head| head.crown >= SURE_CROWN && head.falls.iter().flatten().any(Fall::is_face);
+    let heads = heads(points, Senses::new(false, mirror_z));
     heads.iter().any(sure).then_some(mirror_z)
 }
 
-/// The body that the points show in any sense; `None` where another body may have the shape.
+/// The body whose shape the points have in any directions; `None` if the other body may have this shape.
 pub fn sure_body(points: &[[f64; 2]]) -> Option<SureBody> {
-    let rail = ALL.iter().any(|senses| {
-        let points = in_senses(points, *senses);
-        let heads = Section::new(&points).heads();
-        heads.iter().any(Head::has_both_faces)
-    });
+    let head = |senses: &Senses| heads(points, *senses).iter().any(Head::has_both_faces);
     let whole =
         |senses: &Senses| flange(&in_senses(points, *senses)).is_some_and(|f| f.tip.is_some());
-    match (rail, ALL.iter().any(whole)) {
+    match (ALL.iter().any(head), ALL.iter().any(whole)) {
         (true, false) => Some(SureBody::Rail),
         (false, true) => Some(SureBody::Wheel),
         _ => None,
     }
 }
 
-/// The flange of a wheel whose points run from the track centre to the field side, z up.
+/// The flange of a wheel whose points are in order from the track centre to the field side, with z up.
 pub fn flange(points: &[[f64; 2]]) -> Option<Flange> {
     let section = Section::new(points);
     let mut treads = section.flat_runs(TREAD);
@@ -303,11 +304,11 @@ pub fn flange(points: &[[f64; 2]]) -> Option<Flange> {
     treads.iter().rev().find_map(|tread| section.flange(*tread))
 }
 
-/// A section at even spacing, with its inclination.
+/// A section sampled at even spacing.
 struct Section<'p> {
     given: &'p [[f64; 2]],
     points: Vec<[f64; 2]>,
-    /// Angle in rad from y to the direction of the section.
+    /// Angle in rad from y to the tangent at each sample.
     angles: Vec<f64>,
 }
 
@@ -315,12 +316,13 @@ struct Section<'p> {
 #[derive(Debug, Clone, Copy)]
 struct Fall {
     depth: f64,
-    /// Where it is deepest.
+    /// The lowest sample.
     lowest: usize,
     /// Length in mm of its steep stretches.
     steep: f64,
     /// Largest turn within 2 mm before the first steep stretch, in rad.
     turn: f64,
+    /// y of the lowest sample in mm.
     y: f64,
 }
 
@@ -330,9 +332,11 @@ impl Fall {
     }
 }
 
-/// A convex crown, with the falls at both sides; `None` where the points end on the crown.
+/// A convex crown with its sides.
 struct Head {
+    /// Length of the crown in mm.
     crown: f64,
+    /// The descents at both sides; `None` if the points end on the crown.
     falls: [Option<Fall>; 2],
 }
 
@@ -366,7 +370,7 @@ impl Section<'_> {
         }
     }
 
-    /// First and last sample of every flat run of at least this length in mm.
+    /// First and last sample of every flat run with at least the length `least` in mm.
     fn flat_runs(&self, least: f64) -> Vec<[usize; 2]> {
         let mut runs: Vec<[usize; 2]> = Vec::new();
         for (k, angle) in self.angles.iter().enumerate() {
@@ -374,7 +378,7 @@ impl Section<'_> {
                 continue;
             }
             match runs.last_mut() {
-                // One sample beyond the limit does not end a run.
+                // A single steeper sample does not end a run.
                 Some(run) if k - run[1] <= 2 => run[1] = k,
                 _ => runs.push([k, k]),
             }
@@ -425,17 +429,17 @@ impl Section<'_> {
                     turn,
                     y: self.points[at][0],
                 };
-            } else if depth < found.depth - FALL[1] {
+            } else if depth < found.depth - FALL_LEAST {
                 return found;
             }
         }
     }
 
-    /// The flange at the inner side of a tread.
+    /// The flange on the inner side of a tread.
     fn flange(&self, [first, last]: [usize; 2]) -> Option<Flange> {
         let inner = self.fall(first, true);
-        // What falls at both sides is a rail, or has two flanges.
-        if self.fall(last, false).depth >= FALL[0] {
+        // A section that falls on both sides is a rail, or has two flanges.
+        if self.fall(last, false).depth >= FALL {
             return None;
         }
         let mut heights: Vec<f64> = self.points[first..=last].iter().map(|at| at[1]).collect();
@@ -444,10 +448,7 @@ impl Section<'_> {
         let tip = self.tip(inner.lowest);
         let to_tip = self.points[first][0] - 0.5 * (tip[0] + tip[1]);
         let within = |[least, most]: [f64; 2], value: f64| (least..=most).contains(&value);
-        let end = self.points[..=first]
-            .iter()
-            .map(|at| at[0])
-            .fold(f64::INFINITY, f64::min);
+        let [end, _] = bounds(self.points[..=first].iter().map(|at| at[0]));
         let whole = within(TIP_WIDTH, tip[1] - tip[0])
             && within(FLANGE_HEIGHT, height)
             && within(ROOT_TO_TIP, to_tip)
@@ -473,18 +474,15 @@ impl Section<'_> {
         })
     }
 
-    /// Range of y of the piece about a sample that is at most 2 mm higher.
+    /// Range of y of the piece around a sample that is at most 2 mm higher.
     fn tip(&self, lowest: usize) -> [f64; 2] {
         let low = |at: &&[f64; 2]| at[1] < self.points[lowest][1] + TIP_DEPTH;
         let after = self.points[lowest..].iter().take_while(low);
         let before = self.points[..=lowest].iter().rev().take_while(low);
-        after.chain(before).fold(
-            [f64::INFINITY, f64::NEG_INFINITY],
-            |[least, most], [y, _]| [least.min(*y), most.max(*y)],
-        )
+        bounds(after.chain(before).map(|at| at[0]))
     }
 
-    /// y of the back of a flange with its lowest place at this sample.
+    /// y of the back of the flange whose lowest sample is given.
     fn back(&self, lowest: usize) -> Option<f64> {
         let steep = (0..lowest).filter(|k| (self.angles[*k] + FRAC_PI_2).abs() <= CUT_SLOPE);
         let mut places: Vec<f64> = steep.map(|k| self.points[k][0]).collect();
@@ -495,11 +493,12 @@ impl Section<'_> {
         self.rounding_end(lowest)
     }
 
-    /// y where the rounding of a back that ends before it is vertical would be so. Taken from the given points, between which it is curved.
+    /// y at which the rounding of a back would be vertical if the points end before that. It is found from the given points, because samples
+    /// between them lie on chords.
     fn rounding_end(&self, lowest: usize) -> Option<f64> {
         let end = *self.given.first()?;
-        let beyond = |distance: f64| {
-            let far = |at: &&[f64; 2]| (at[0] - end[0]).hypot(at[1] - end[1]) >= distance;
+        let beyond = |least: f64| {
+            let far = |at: &&[f64; 2]| distance(end, **at) >= least;
             self.given.iter().find(far).copied()
         };
         let (middle, inner) = (beyond(BACK)?, beyond(2.0 * BACK)?);
@@ -523,15 +522,15 @@ impl Section<'_> {
                 (last + SIDE < end).then(|| self.fall(last, false)),
             ];
             let [from, to] = [self.angles[first], self.angles[last]];
-            // Where the points end on the crown they must not rise to their end.
+            // If the points end on the crown, they must not rise toward the end.
             let cut_well = (falls[0].is_some() || from >= -CUT_SLOPE)
                 && (falls[1].is_some() || to <= CUT_SLOPE);
             let deepest = falls.iter().flatten().map(|fall| fall.depth);
             let deepest = deepest.fold(0.0, f64::max);
-            // A side that is cut soon after the crown falls too.
+            // A side whose points end soon after the crown may fall less.
             let falls_there =
-                |fall: &Fall| fall.depth >= FALL[1] || [0, end].contains(&fall.lowest);
-            let convex = deepest >= FALL[0] || from - to >= CROWN_TURN;
+                |fall: &Fall| fall.depth >= FALL_LEAST || [0, end].contains(&fall.lowest);
+            let convex = deepest >= FALL || from - to >= CROWN_TURN;
             let convex = convex && falls.iter().flatten().all(falls_there);
             (cut_well && convex).then_some(Head {
                 crown: (last - first) as f64 * STEP,
@@ -555,13 +554,12 @@ fn circle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<([f64; 2], f64)> {
     Some(([a[0] + centre[0], a[1] + centre[1]], radius))
 }
 
-/// Points at even spacing along the chords.
+/// Samples at even spacing along the chords.
 fn evenly(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let length = |pair: &[[f64; 2]]| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
     let mut even: Vec<[f64; 2]> = points.first().copied().into_iter().collect();
     let mut left = STEP;
     for pair in points.windows(2) {
-        let chord = length(pair);
+        let chord = distance(pair[0], pair[1]);
         let mut along = left;
         while along <= chord {
             let part = along / chord;
@@ -589,7 +587,7 @@ mod tests {
     fn the_tip_of_a_flange_is_the_piece_within_two_millimetres_of_its_lowest_point() {
         let found = flange(&wheel()).expect("a flange");
         let [from, to] = found.tip.expect("a tip");
-        // 28 exp(−(d/15)²) = 26 at d = 15 √ln(28/26), within the spacing of the samples.
+        // 28 exp(−(d/15)²) = 26 at d = 15 √ln(28/26), up to the spacing of the samples.
         let half = 15.0 * (28.0_f64 / 26.0).ln().sqrt();
         assert!((from + 45.0 + half).abs() < STEP, "{from}");
         assert!((to + 45.0 - half).abs() < STEP, "{to}");

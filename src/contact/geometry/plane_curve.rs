@@ -1,7 +1,5 @@
-//! A plane curve whose coordinates are cubics between common knots, prepared for many evaluations.
-//!
-//! Does a chain of points cross itself? The chords are searched through a tree of boxes, so that a long chain costs about as much as
-//! sorting its points.
+//! Plane curves whose coordinates are cubics between common knots, prepared for many evaluations, and chains of points: their lengths,
+//! corners and crossings.
 
 use std::cell::Cell;
 
@@ -13,7 +11,8 @@ pub struct PlaneCurve {
     /// First and last parameter.
     range: [f64; 2],
     intervals: Vec<CurveInterval>,
-    /// For equal cells of the parameter the interval in which each begins, so that a place is found without a search.
+    /// The range of the parameter is divided into equal cells. For each cell this is the interval in which it begins, so that the interval of
+    /// a parameter is found without a search.
     cells: Vec<u32>,
     cells_per_mm: f64,
 }
@@ -23,11 +22,11 @@ pub struct PlaneCurve {
 struct CurveInterval {
     /// Both knots in mm.
     ends: [f64; 2],
-    /// The coefficients `[y, z]` by powers of the distance from the first knot.
+    /// Coefficients `[y, z]` of the powers of the distance from the first knot.
     cubic: [[f64; 2]; 4],
 }
 
-/// The curve at one place: position in mm and derivatives to the parameter.
+/// The curve at one parameter: position in mm and derivatives with respect to the parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CurvePoint {
     /// Position `[y, z]`.
@@ -53,8 +52,8 @@ impl CurvePoint {
 }
 
 impl PlaneCurve {
-    /// The curve through points `at` in mm, whose parameters are `along`: splines that end at sharp corners. Waves shorter than about
-    /// `cut_wavelength` mm are smoothed away, 0 for interpolation.
+    /// Fits a curve to the points `at` in mm with the parameters `along`: splines that end at sharp corners. Waves shorter than about
+    /// `cut_wavelength` mm are smoothed away; with 0 the curve passes through all points.
     pub fn through(at: &[[f64; 2]], along: &[f64], cut_wavelength: f64) -> PlaneCurve {
         let last = at.len() - 1;
         let corners = (1..last).filter(|k| is_corner(at, *k));
@@ -69,7 +68,7 @@ impl PlaneCurve {
         PlaneCurve::new(&pieces)
     }
 
-    /// Akima's curve through points `at` in mm, whose parameters are `along`; only its first derivative is continuous.
+    /// Akima's curve through the points `at` in mm with the parameters `along`. Only its first derivative is continuous.
     pub fn akima(at: &[[f64; 2]], along: &[f64]) -> PlaneCurve {
         let [y, z] = [0, 1].map(|part| {
             let values: Vec<f64> = at.iter().map(|at| at[part]).collect();
@@ -95,7 +94,7 @@ impl PlaneCurve {
         PlaneCurve::of((0..along.len() - 1).map(between).collect())
     }
 
-    /// The curve of pieces, each two splines with the same knots, one after the other.
+    /// Joins pieces, each of two splines with the same knots.
     fn new(pieces: &[[Spline; 2]]) -> PlaneCurve {
         let cubics = |[y, z]: &[Spline; 2]| {
             let knots = y.knots().windows(2).enumerate();
@@ -112,7 +111,7 @@ impl PlaneCurve {
     }
 
     fn of(intervals: Vec<CurveInterval>) -> PlaneCurve {
-        // Two cells an interval: on evenly spaced knots hardly any place is more than one interval beyond that of its cell.
+        // With two cells per interval and evenly spaced knots, hardly any parameter is more than one interval beyond that of its cell.
         let count = 2 * intervals.len();
         let range = [intervals[0].ends[0], intervals[intervals.len() - 1].ends[1]];
         let length = range[1] - range[0];
@@ -137,7 +136,7 @@ impl PlaneCurve {
         self.range
     }
 
-    /// The curve at a parameter; beyond the ends the tangent there.
+    /// The curve at a parameter. Beyond its ends the curve continues along the tangent.
     #[inline]
     pub fn at(&self, s: f64) -> CurvePoint {
         let [first, last] = self.range();
@@ -166,12 +165,12 @@ impl PlaneCurve {
         [0, 1].map(|k| c0[k] + d * (c1[k] + d * (c2[k] + d * c3[k])))
     }
 
-    /// The interval of knots that a place within the range lies in.
+    /// The interval that contains a parameter within the range.
     #[inline]
     fn interval(&self, s: f64) -> &CurveInterval {
         let cell = ((s - self.range[0]) * self.cells_per_mm) as usize;
         let mut i = self.cells[cell.min(self.cells.len() - 1)] as usize;
-        // Rounding may have put the place into the cell after its own.
+        // Rounding may have chosen the next cell.
         while i > 0 && self.intervals[i].ends[0] > s {
             i -= 1;
         }
@@ -181,7 +180,7 @@ impl PlaneCurve {
         &self.intervals[i]
     }
 
-    /// The curve turned by an angle in rad from y to z about the origin, then moved by `[y, z]`, and mirrored in y where `sign` is −1.
+    /// Returns the curve rotated about the origin by an angle in rad from y to z, then shifted by `[y, z]`, then mirrored in y if `sign` is −1.
     #[must_use]
     pub fn placed(&self, angle: f64, by: [f64; 2], sign: f64) -> PlaneCurve {
         let (sin, cos) = angle.sin_cos();
@@ -211,15 +210,35 @@ impl PlaneCurve {
     }
 }
 
-/// Tangent of the turn of the chords at a corner (30°). A chain that is fine enough for its shape turns less.
-const TURN: f64 = 0.573;
-/// A corner turns by more than this multiple of both neighbouring points: next to a displaced point it is 2, and on a coarse arc all turn
-/// alike.
-const CONCENTRATED: f64 = 2.5;
-/// A neighbour beyond a chord longer than this multiple of the chord on the other side does not count: a chamfer has corners at both ends.
-const FAR: f64 = 4.0;
+/// Tangent of the least turn at a corner (30°). Points that are dense enough for their shape turn less.
+const CORNER_TANGENT: f64 = 0.573;
+/// Least ratio of the turn at a corner to the turns at the two neighbouring points. At a displaced point the ratio is 2, on a coarse arc it
+/// is 1.
+const CORNER_CONCENTRATION: f64 = 2.5;
+/// A neighbour is ignored if the chord to it is longer than this multiple of the other chord, because a chamfer has corners at both ends.
+const CORNER_CHORD_RATIO: f64 = 4.0;
 
-/// Sine and cosine of the angle between the chords before and after a point, times the lengths of both; the angle is positive to the left.
+/// Distance between two points.
+pub(crate) fn distance(from: [f64; 2], to: [f64; 2]) -> f64 {
+    (to[0] - from[0]).hypot(to[1] - from[1])
+}
+
+/// Lengths of the chords of a chain of points.
+pub(crate) fn chords(points: &[[f64; 2]]) -> impl Iterator<Item = f64> {
+    points.windows(2).map(|pair| distance(pair[0], pair[1]))
+}
+
+/// Length of a chain of points from its first point to each point.
+pub(crate) fn arc_lengths(points: &[[f64; 2]]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let sums = chords(points).map(|chord| {
+        sum += chord;
+        sum
+    });
+    std::iter::once(0.0).chain(sums).collect()
+}
+
+/// Sine and cosine of the angle between the chords before and after a point, times both lengths. The angle is positive to the left.
 fn turning(points: &[[f64; 2]], k: usize) -> [f64; 2] {
     let [before, after] = [chord(points, k - 1), chord(points, k)];
     [
@@ -237,47 +256,48 @@ pub(crate) fn turn(points: &[[f64; 2]], k: usize) -> f64 {
     sine.atan2(cosine)
 }
 
-/// Whether the points have a sharp corner at this one, which is not the first or the last.
+/// Returns whether there is a sharp corner at a point, which must not be the first or the last one.
 pub(crate) fn is_corner(points: &[[f64; 2]], k: usize) -> bool {
     let [sine, cosine] = turning(points, k);
-    if sine.abs() <= TURN * cosine {
+    if sine.abs() <= CORNER_TANGENT * cosine {
         return false;
     }
     let own = turn(points, k).abs();
-    let length = |k: usize| {
-        let [y, z] = chord(points, k);
-        y.hypot(z)
-    };
-    let (before, after) = (length(k - 1), length(k));
+    let before = distance(points[k - 1], points[k]);
+    let after = distance(points[k], points[k + 1]);
     let smooth = |neighbour: usize, chord: f64, other: f64| {
-        chord > FAR * other || own > CONCENTRATED * turn(points, neighbour).abs()
+        chord > CORNER_CHORD_RATIO * other
+            || own > CORNER_CONCENTRATION * turn(points, neighbour).abs()
     };
     smooth(k - 1, before, after) && smooth(k + 1, after, before)
 }
 
-/// The chord from a point to the next.
+/// The vector from a point to the next.
 fn chord(points: &[[f64; 2]], k: usize) -> [f64; 2] {
     [0, 1].map(|part| points[k + 1][part] - points[k][part])
 }
 
-/// Two chords that are no neighbours and cross, by their first points.
-pub fn first(points: &[[f64; 2]]) -> Option<[[f64; 2]; 2]> {
+/// Finds two chords that cross and are not neighbours, and returns their first points.
+///
+/// The chords are searched through a tree of bounding boxes, so that a long chain costs about as much as sorting its points.
+pub fn crossing(points: &[[f64; 2]]) -> Option<[[f64; 2]; 2]> {
     let chords = points.len().checked_sub(1).filter(|count| *count > 2)?;
     let tree = Tree::new(points, chords);
     let (i, j) = tree.within(points, 1, 0..tree.leaves)?;
     Some([points[i], points[j]])
 }
 
-/// Range of x and y.
+/// Ranges of y and z.
 type Box = [[f64; 2]; 2];
 
-/// Boxes around halves of the chain, their halves and so on, as in a heap: node `k` holds `2k` and `2k + 1`.
+/// Binary tree of the bounding boxes of the chords, stored as a heap: the children of node `k` are `2k` and `2k + 1`.
 struct Tree {
     boxes: Vec<Box>,
-    /// Chords, and their number rounded up to a power of 2.
+    /// Number of chords.
     chords: usize,
+    /// Number of chords rounded up to a power of 2.
     leaves: usize,
-    /// Pairs of boxes that were compared.
+    /// Number of pairs of boxes that were compared.
     looks: Cell<usize>,
 }
 
@@ -303,7 +323,7 @@ impl Tree {
         }
     }
 
-    /// Two chords of one node that cross.
+    /// Two crossing chords below one node.
     fn within(
         &self,
         points: &[[f64; 2]],
@@ -320,7 +340,7 @@ impl Tree {
             .or_else(|| self.between(points, 2 * node, 2 * node + 1))
     }
 
-    /// A chord of one node and one of a later node of the same size that cross.
+    /// A chord below one node and a chord below a later node of the same level that cross.
     fn between(&self, points: &[[f64; 2]], one: usize, other: usize) -> Option<(usize, usize)> {
         self.looks.set(self.looks.get() + 1);
         let (a, b) = (&self.boxes[one], &self.boxes[other]);
@@ -338,7 +358,7 @@ impl Tree {
     }
 }
 
-/// Do the chords that begin at two points cross?
+/// Returns whether the chords that begin at two points cross.
 fn cross(points: &[[f64; 2]], i: usize, j: usize) -> bool {
     let [a, b, c, d] = [i, i + 1, j, j + 1].map(|k| points[k]);
     let left = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
@@ -384,16 +404,12 @@ mod tests {
         let mut at: Vec<[f64; 2]> = (-40..=40).map(tread).collect();
         let edge = at[80];
         at.extend((1..=5).map(|k| [edge[0], edge[1] + 4.0 * f64::from(k)]));
-        let mut along = vec![0.0];
-        for pair in at.windows(2) {
-            let chord = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-            along.push(along[along.len() - 1] + chord);
-        }
+        let along = arc_lengths(&at);
         for smoothing in [0.0, 3.0] {
             let curve = PlaneCurve::through(&at, &along, smoothing);
             let corner = curve.at(along[80]).at;
             assert!((corner[0] - edge[0]).hypot(corner[1] - edge[1]) < 1e-9);
-            // Smoothing straightens the free end.
+            // Near its free end a smoothed curve is straighter.
             for s in curve.parameters(0.01).into_iter().filter(|s| *s > 10.0) {
                 let [y, z] = curve.at(s).at;
                 let off = if s < along[80] {
@@ -476,13 +492,13 @@ mod tests {
 mod crossing_tests {
     use super::*;
 
-    /// Every pair.
+    /// Compares every pair of chords.
     fn by_pairs(points: &[[f64; 2]]) -> bool {
         let chords = points.len() - 1;
         (0..chords).any(|i| (i + 2..chords).any(|j| cross(points, i, j)))
     }
 
-    /// A walk whose turns grow with `unrest`, from a fixed sequence.
+    /// A pseudo-random walk whose turns grow with `unrest`.
     fn walk(seed: u64, count: usize, unrest: f64) -> Vec<[f64; 2]> {
         let mut state = seed;
         let mut angle = 0.0_f64;
@@ -505,7 +521,7 @@ mod crossing_tests {
         for seed in 0..300 {
             let unrest = 0.06 * (seed % 100) as f64;
             let points = walk(seed, 3 + (seed as usize * 7) % 90, unrest);
-            let found = first(&points);
+            let found = crossing(&points);
             assert_eq!(found.is_some(), by_pairs(&points), "{seed}: {found:?}");
             crossed += usize::from(found.is_some());
         }
@@ -514,7 +530,7 @@ mod crossing_tests {
 
     #[test]
     fn a_long_chain_costs_little_more_than_its_points() {
-        // Turns of a spiral lie in each other's boxes, as badly as a section can.
+        // The boxes of the turns of a spiral overlap, which is the worst case.
         let spiral = |k: usize| {
             let turn = 0.01 * k as f64;
             [turn * turn.cos(), turn * turn.sin()]
@@ -524,9 +540,9 @@ mod crossing_tests {
         assert_eq!(tree.within(&points, 1, 0..tree.leaves), None);
         let looks = tree.looks.get() / points.len();
         assert!(looks < 60, "{looks} looks a point");
-        // One more chord, through all turns.
+        // One more chord crosses all turns.
         let mut crossed = points;
         crossed.push([0.0, 0.1]);
-        assert!(first(&crossed).is_some());
+        assert!(crossing(&crossed).is_some());
     }
 }

@@ -1,9 +1,7 @@
-//! One cross-section of a rail or a wheel: checked points and the smooth curve through them.
+//! Cross-sections of a rail or a wheel: checked points, the smooth curve through them, and units of length.
 //!
-//! Input follows the habit of the field: y positive to the field side, z positive down, mm. From here on z is positive
+//! Input follows the convention of the field: mm, y positive to the field side, z positive down. From here on z is positive
 //! up. The curve runs from the track centre to the field side, with the rail below and the wheel above it.
-//!
-//! Units of length in which cross-sections are given.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -15,37 +13,38 @@ use utoipa::ToSchema;
 use crate::geometry::orientation::{
     self, Flange, FormatSenses, FoundSenses, Senses, StatedSenses, SureBody,
 };
-use crate::geometry::plane_curve::{CurvePoint, PlaneCurve};
-use crate::geometry::profile_quality::{Points, PointsRead};
-use crate::geometry::{plane_curve, profile_quality};
+use crate::geometry::plane_curve::{
+    CurvePoint, PlaneCurve, arc_lengths, chords, crossing, distance,
+};
+use crate::geometry::profile_quality::{self, Points, PointsRead};
 use crate::lazy_field::LazyField;
+use crate::numerics::roots::bounds;
 use crate::remark::list::Remark;
 
-/// Length of the whole curve in mm that a profile may have; anything else is in another unit.
+/// Allowed range of the arc length of a profile in mm. Other lengths suggest another unit.
 pub const ARC_LENGTH: [f64; 2] = [5.0, 500.0];
-/// Points of one profile.
+/// Fewest points of a profile.
 pub const POINTS_MIN: usize = 8;
-/// Most points of one profile.
+/// Most points of a profile.
 pub const POINTS_MAX: usize = 20_000;
-/// Distance in mm of the points of a section that is drawn or wears: a twentieth of a narrow patch, and what measured sections have at the gauge
-/// corner.
+/// Spacing in mm of the points of a section that is drawn or wears: a twentieth of a narrow patch, and usual for measured gauge corners.
 pub(crate) const POINT_SPACING: f64 = 0.25;
-/// Length in mm of profile needed beyond a contact; with less there is a remark.
+/// Length in mm of the profile needed beyond a contact. With less there is a remark.
 pub(crate) const NEEDED_BEYOND: f64 = 5.0;
-/// Least depth in mm of the groove beside a guard rail below the highest point of the running rail: twice the height of a flange.
+/// Least depth in mm of the groove beside a guard rail, below the highest point of the running rail: twice the height of a flange.
 const GROOVE_DEPTH: f64 = 60.0;
 /// Least depth in mm of the groove below the points at its sides.
 const GROOVE_WALL: f64 = 5.0;
-/// Points nearer to each other than this are one, in mm.
+/// Distance in mm below which two points are merged.
 pub(crate) const NEAR: f64 = 1e-3;
-/// Cosine of the turn from which on a point runs back against its neighbours: 102°, which no corner of a measured profile has, while points
-/// at a joint of two measurements turn by up to 180°. Chosen by judgement; how much it matters was not measured.
-const FLANGE_BACK_TURN: f64 = -0.2;
-/// Part of the points that may run back; more are no joint, but points out of order. Chosen by judgement; how much it matters was not
+/// Cosine of the turn from which a point runs backwards (102°). No corner of a measured profile turns as much, while points at a joint of two
+/// measurements turn by up to 180°. Chosen by judgement; its influence was not measured.
+const BACKWARD_COSINE: f64 = -0.2;
+/// Largest share of points that run backwards at joints. With more, the points are out of order. Chosen by judgement; its influence was not
 /// measured.
-const ZIGZAG_SHARE_MAX: f64 = 0.05;
+const BACKWARD_SHARE_MAX: f64 = 0.05;
 
-/// Which body a profile belongs to.
+/// The body to which a profile belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Body {
     /// The lower body.
@@ -54,12 +53,12 @@ pub enum Body {
     Wheel,
 }
 
-/// How the points of a profile are to be read.
+/// Options for reading the points of a profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reading {
-    /// The y of the points is positive to the track centre. Without a statement the flange of a wheel decides.
+    /// Whether y of the points is positive to the track centre. If absent, the flange of a wheel decides.
     pub mirror_y: Option<bool>,
-    /// The z of the points is positive up. Without a statement the shape decides.
+    /// Whether z of the points is positive up. If absent, the shape decides.
     pub mirror_z: Option<bool>,
     /// Cut wavelength of the smoothing in mm; 0 for none.
     pub smoothing: f64,
@@ -70,16 +69,16 @@ pub struct Reading {
 pub struct Profile {
     curve: PlaneCurve,
     measured: Arc<MeasuredCurve>,
-    /// Remarks on what was found and changed when it was read.
+    /// Remarks on the points, including those that were merged or dropped.
     pub remarks: Vec<Remark>,
 }
 
-/// The points that a curve was made from.
+/// The points of a curve.
 #[derive(Debug, Clone, PartialEq)]
 struct MeasuredCurve {
-    /// z up, in order from the track centre to the field side.
+    /// The points with z up, in order from the track centre to the field side.
     points: Vec<[f64; 2]>,
-    /// Length of the chords up to each point: the knots of the splines.
+    /// Length of the chords up to each point, which is the knot of the splines.
     along: Vec<f64>,
     /// Cut wavelength of the smoothing in mm.
     smoothing: f64,
@@ -87,31 +86,30 @@ struct MeasuredCurve {
     rounding: Option<f64>,
     /// Step of which all given coordinates are multiples, in mm.
     digits: f64,
-    /// The senses of the given points.
+    /// The directions of the given points.
     senses: Senses,
-    /// Number of points of the guard rail and the groove, which come before those of the running rail.
+    /// Number of points of the guard rail and the groove, which precede those of the running rail.
     beside: usize,
     flange: Option<Flange>,
     sure_body: LazyField<Option<SureBody>>,
 }
 
 impl Profile {
-    /// The curve through points `[y, z]` in mm, y to the field side and z down unless `reading` says otherwise, in
-    /// either order.
+    /// Makes the curve through points `[y, z]` in mm, in either order.
     ///
-    /// Points nearer than 1 µm are merged, single points that run back are dropped; both leave a remark.
+    /// Points nearer than 1 µm are merged, and single points that run backwards are dropped. Both leave a remark.
     ///
     /// # Errors
-    /// A sentence: too few or too many points, numbers that are not finite, a total arc length outside 5 to 500 mm, loops, more than 5 %
-    /// of the points running back, or senses that are neither stated nor shown by the shape.
+    /// Returns a sentence if there are too few or too many points, numbers that are not finite, an arc length outside 5 to 500 mm, loops, more
+    /// than 5 % of the points running backwards, or directions that are neither stated nor shown by the shape.
     pub fn new(body: Body, points: &[[f64; 2]], reading: Reading) -> Result<Profile, String> {
         Profile::in_format(body, points, reading, FormatSenses::default())
     }
 
-    /// The curve through points of a format that specifies their senses.
+    /// Makes the curve through points of a format that specifies their directions.
     ///
     /// # Errors
-    /// As [`Profile::new`].
+    /// Returns the same errors as [`Profile::new`].
     pub fn in_format(
         body: Body,
         points: &[[f64; 2]],
@@ -119,43 +117,35 @@ impl Profile {
         format: FormatSenses,
     ) -> Result<Profile, String> {
         let mut remarks = Vec::new();
-        let (rounding, digits) = (
-            profile_quality::rounding(points),
-            profile_quality::digits(points),
-        );
-        let mut points = checked(points)?;
-        let length = arc_length(&points);
-        let [shortest, longest] = ARC_LENGTH;
-        if !(shortest..=longest).contains(&length) {
-            let hint = match likely_unit(body, &points) {
-                Some((width, unit)) => {
-                    let unit = unit.name();
-                    format!(
-                        "the section is {width:.4} mm wide; if its numbers are in {unit} and not in mm, state unit: \"{unit}\""
-                    )
-                }
-                None => "is another unit than mm used, or are the points not in order?".to_owned(),
-            };
-            return Err(format!(
-                "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed ({hint})"
-            ));
-        }
-        if let Some((width_mm, unit)) = likely_unit(body, &points) {
-            remarks.push(Remark::ProfileSizeUnusual {
-                profile: body.name(),
-                width_mm,
-                unit: unit.name(),
-            });
-        }
-        let (senses, flange) = orient(body, &mut points, reading, format, &mut remarks)?;
-        straighten(body, &mut points, &mut remarks)?;
+        let given = checked(points)?;
+        let likely = likely_unit(body, given);
+        check_length(given).map_err(|reason| match likely {
+            Some((width, unit)) => {
+                let unit = unit.name();
+                format!(
+                    "{reason} (the section is {width:.4} mm wide; if its numbers are in {unit} and not in mm, state unit: \"{unit}\")"
+                )
+            }
+            None => format!(
+                "{reason} (is another unit than mm used, or are the points not in order?)"
+            ),
+        })?;
+        remarks.extend(likely.map(|(width_mm, unit)| Remark::ProfileSizeUnusual {
+            profile: body.name(),
+            width_mm,
+            unit: unit.name(),
+        }));
+        let scale = likely.map_or(1.0, |(_, unit)| unit.mm());
+        let (senses, flange) = orient(body, given, scale, reading, format, &mut remarks)?;
+        let mut points = orientation::in_senses(given, senses);
+        drop_backward_points(body, &mut points, &mut remarks)?;
         cut_stray_ends(body, &mut points, &mut remarks);
-        let given = points.len();
+        let before = points.len();
         points.dedup_by(|after, before| distance(*after, *before) < NEAR);
-        if points.len() < given {
+        if points.len() < before {
             remarks.push(Remark::ProfilePointsMerged {
                 profile: body.name(),
-                count: given - points.len(),
+                count: before - points.len(),
                 nearer_than_mm: NEAR,
             });
         }
@@ -169,8 +159,8 @@ impl Profile {
             along: lengths(&points)?,
             points,
             smoothing: reading.smoothing,
-            rounding,
-            digits,
+            rounding: profile_quality::rounding(given),
+            digits: profile_quality::digits(given),
             senses,
             beside: 0,
             flange,
@@ -179,35 +169,26 @@ impl Profile {
         Ok(Profile::of(measured, remarks))
     }
 
-    /// The profile of a rail together with a guard rail at the side of the track centre, whose points are given in the same senses. A groove joins the two,
-    /// so deep that no wheel reaches its bottom.
+    /// Adds a guard rail on the side of the track centre, whose points are given in the directions of those of the rail. A groove joins the
+    /// two, so deep that no wheel reaches its bottom.
     ///
     /// # Errors
-    /// Returns a sentence if a number is not finite, the arc length is outside 5 to 500 mm, the points form a loop, or the guard rail is not beside the rail.
+    /// Returns a sentence if a number is not finite, the arc length is outside 5 to 500 mm, the points form a loop, or the guard rail is not
+    /// beside the rail.
     pub fn with_guard_rail(&self, points: &[[f64; 2]]) -> Result<Profile, String> {
         let own = &self.measured;
-        let mut joined = orientation::in_senses(&checked(points)?, own.senses);
-        let length = arc_length(&joined);
-        let [shortest, longest] = ARC_LENGTH;
-        if !(shortest..=longest).contains(&length) {
-            return Err(format!(
-                "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed"
-            ));
-        }
+        check_length(checked(points)?)?;
+        let mut joined = orientation::in_senses(points, own.senses);
         joined.dedup_by(|after, before| distance(*after, *before) < NEAR);
         let [end, _] = self.width();
-        let reach = joined
-            .iter()
-            .map(|at| at[0])
-            .fold(f64::NEG_INFINITY, f64::max);
+        let [_, reach] = bounds(joined.iter().map(|at| at[0]));
         if reach >= end {
             return Err(format!(
                 "the guard rail reaches y = {reach:.2} mm (positive to the field side), and the running rail begins at {end:.2} mm; a \
                  guard rail lies beside the running rail, on the side of the track centre"
             ));
         }
-        let heights = own.points.iter().map(|at| at[1]);
-        let top = heights.fold(f64::NEG_INFINITY, f64::max);
+        let [_, top] = bounds(own.points.iter().map(|at| at[1]));
         let [from, to] = [joined[joined.len() - 1], own.points[0]];
         let bottom = from[1].min(to[1]).min(top - GROOVE_DEPTH) - GROOVE_WALL;
         joined.extend([[from[0], bottom], [to[0], bottom]]);
@@ -230,7 +211,7 @@ impl Profile {
         }
     }
 
-    /// The curve of the same points with another smoothing, its cut wavelength in mm (0: none).
+    /// Makes the curve of the same points with another smoothing. Its cut wavelength is in mm; 0 for none.
     #[must_use]
     pub fn smoothed(&self, smoothing: f64) -> Profile {
         let measured = MeasuredCurve {
@@ -240,7 +221,7 @@ impl Profile {
         Profile::of(measured, self.remarks.clone())
     }
 
-    /// The body that its points show without doubt.
+    /// The body whose shape the points have, if it cannot be confused with that of the other body.
     pub(crate) fn sure_body(&self) -> Option<SureBody> {
         let points = &self.measured.points[self.measured.beside..];
         *self
@@ -249,32 +230,28 @@ impl Profile {
             .get_or_make(|| orientation::sure_body(points))
     }
 
-    /// The flange of a wheel, if the points show one at the side of the track centre.
+    /// The flange of a wheel, if the points show one on the side of the track centre.
     pub(crate) fn flange(&self) -> Option<Flange> {
         self.measured.flange
     }
 
-    /// The parameter at which the running rail begins, after the guard rail and the groove; 0 without a guard rail.
+    /// The parameter at which the running rail begins after the guard rail and the groove; 0 without a guard rail.
     pub(crate) fn first(&self) -> f64 {
         self.measured.along[self.measured.beside]
     }
 
-    /// The chords of the groove that joins a guard rail and its running rail; empty without a guard rail.
+    /// The indices of the chords of the groove between a guard rail and its running rail; empty without a guard rail.
     pub(crate) fn groove(&self) -> Range<usize> {
         self.measured.beside.saturating_sub(3)..self.measured.beside
     }
 
-    /// Least and largest y in mm of the points, those of a guard rail excluded.
+    /// Least and largest y in mm of the points, without those of a guard rail.
     pub(crate) fn width(&self) -> [f64; 2] {
         let points = &self.measured.points[self.measured.beside..];
-        let y = || points.iter().map(|at| at[0]);
-        [
-            y().fold(f64::INFINITY, f64::min),
-            y().fold(f64::NEG_INFINITY, f64::max),
-        ]
+        bounds(points.iter().map(|at| at[0]))
     }
 
-    /// The points the curve was made from, z up, by increasing parameter of the curve.
+    /// The points of the curve with z up, in order of the parameter.
     pub fn points(&self) -> Points<'_> {
         Points {
             at: &self.measured.points,
@@ -313,12 +290,12 @@ impl Profile {
         self.measured.smoothing
     }
 
-    /// The step in mm of which the coordinates were given as multiples, if it is 0.001 mm or more.
+    /// The step in mm of which all given heights are multiples, if it is at least 0.001 mm.
     pub fn rounding(&self) -> Option<f64> {
         self.measured.rounding
     }
 
-    /// The curve, y to the field side, z up.
+    /// The curve, with y to the field side and z up.
     pub fn curve(&self) -> &PlaneCurve {
         &self.curve
     }
@@ -328,7 +305,7 @@ impl Profile {
         self.curve.range()
     }
 
-    /// The curve at a parameter; beyond the ends the tangent there.
+    /// The curve at a parameter. Beyond its ends the curve continues along the tangent.
     pub fn at(&self, s: f64) -> CurvePoint {
         self.curve.at(s)
     }
@@ -339,7 +316,8 @@ impl Profile {
     }
 }
 
-fn checked(points: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, String> {
+/// Returns the points if their number is allowed and all are finite.
+fn checked(points: &[[f64; 2]]) -> Result<&[[f64; 2]], String> {
     if !(POINTS_MIN..=POINTS_MAX).contains(&points.len()) {
         return Err(format!(
             "{} points given; {POINTS_MIN} to {POINTS_MAX} are allowed",
@@ -351,26 +329,28 @@ fn checked(points: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, String> {
         .position(|point| !point.iter().all(|part| part.is_finite()))
     {
         Some(k) => Err(format!("point {k} is not finite")),
-        None => Ok(points.to_vec()),
+        None => Ok(points),
     }
 }
 
-fn distance(from: [f64; 2], to: [f64; 2]) -> f64 {
-    (to[0] - from[0]).hypot(to[1] - from[1])
+/// Refuses points whose arc length is not allowed.
+fn check_length(points: &[[f64; 2]]) -> Result<(), String> {
+    let length: f64 = chords(points).sum();
+    let [shortest, longest] = ARC_LENGTH;
+    if (shortest..=longest).contains(&length) {
+        return Ok(());
+    }
+    Err(format!(
+        "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed"
+    ))
 }
 
-fn arc_length(points: &[[f64; 2]]) -> f64 {
-    points
-        .windows(2)
-        .map(|pair| distance(pair[0], pair[1]))
-        .sum()
-}
-
-/// Brings the points to y toward the field side, z up, and increasing y from the first to the last. Returns the senses and the flange of a
-/// wheel.
+/// Finds the directions of the points and the flange of a wheel. The numbers are lengths in `scale` mm: a section in another unit than stated
+/// shows its directions all the same.
 fn orient(
     body: Body,
-    points: &mut Vec<[f64; 2]>,
+    points: &[[f64; 2]],
+    scale: f64,
     reading: Reading,
     format: FormatSenses,
     remarks: &mut Vec<Remark>,
@@ -381,8 +361,6 @@ fn orient(
     };
     let [first, last] =
         profile_quality::stray_ends(points).map(|stray| stray.map_or(0, |(count, _)| count));
-    // A section in another unit than stated shows its senses all the same.
-    let scale = likely_unit(body, points).map_or(1.0, |(_, unit)| unit.mm());
     let shown: Vec<[f64; 2]> = points[first..points.len() - last]
         .iter()
         .map(|point| point.map(|part| scale * part))
@@ -421,36 +399,36 @@ fn orient(
         Body::Wheel if scale == 1.0 => orientation::flange(&orientation::in_senses(&shown, senses)),
         Body::Wheel => None,
     };
-    *points = orientation::in_senses(points, senses);
     Ok((senses, flange))
 }
 
-/// The width of a section, and the unit in which it would be that of a usual rail head or wheel, if that is not mm.
+/// The width of a section, and the unit in which it would be the width of a usual rail head or wheel, if that is not mm.
 fn likely_unit(body: Body, points: &[[f64; 2]]) -> Option<(f64, LengthUnit)> {
     let usual = match body {
         // The head of a usual rail (60E1), and a usual wheel (EN 13715).
         Body::Rail => 72.0,
         Body::Wheel => 135.0,
     };
-    let y = || points.iter().map(|point| point[0]);
-    let width = y().fold(f64::NEG_INFINITY, f64::max) - y().fold(f64::INFINITY, f64::min);
+    let [least, largest] = bounds(points.iter().map(|point| point[0]));
+    let width = largest - least;
     let unit = LengthUnit::likely(width, usual)?;
     (unit != LengthUnit::Mm).then_some((width, unit))
 }
 
-/// Drops points that run back between their neighbours, as they occur where measurements were stitched.
-fn straighten(
+/// Drops points that run backwards between their neighbours, as they occur where measurements were joined.
+fn drop_backward_points(
     body: Body,
     points: &mut Vec<[f64; 2]>,
     remarks: &mut Vec<Remark>,
 ) -> Result<(), String> {
     let given = points.len();
-    let allowed = (ZIGZAG_SHARE_MAX * given as f64).ceil() as usize;
+    let allowed = (BACKWARD_SHARE_MAX * given as f64).ceil() as usize;
     loop {
         let back = points.windows(3).position(|at| {
-            let (first, second) = (step(at[0], at[1]), step(at[1], at[2]));
+            let [first, second] =
+                [0, 1].map(|k| [at[k + 1][0] - at[k][0], at[k + 1][1] - at[k][1]]);
             let lengths = first[0].hypot(first[1]) * second[0].hypot(second[1]);
-            first[0] * second[0] + first[1] * second[1] < FLANGE_BACK_TURN * lengths
+            first[0] * second[0] + first[1] * second[1] < BACKWARD_COSINE * lengths
         });
         let Some(k) = back else { break };
         points.remove(k + 1);
@@ -469,7 +447,7 @@ fn straighten(
     Ok(())
 }
 
-/// Drops one or two points at an end that a long chord separates from all others, as they occur in measurements.
+/// Drops one or two points at an end that a long chord separates from the others, as they occur in measurements.
 fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Remark>) {
     let [first, last] = profile_quality::stray_ends(points);
     let stray = |end: Option<(usize, f64)>| end.map_or(0, |(count, _)| count);
@@ -483,9 +461,12 @@ fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Rema
     remarks.extend([last, first].into_iter().flatten().map(dropped));
 }
 
-/// Lengths of the chords up to each point.
+/// Length of the chords up to each point.
+///
+/// # Errors
+/// Returns a sentence if the points form a loop.
 fn lengths(points: &[[f64; 2]]) -> Result<Vec<f64>, String> {
-    if let Some([first, second]) = plane_curve::first(points) {
+    if let Some([first, second]) = crossing(points) {
         return Err(format!(
             "the profile runs through itself near [{:.3}, {:.3}] and [{:.3}, {:.3}]; loops are refused",
             first[0], -first[1], second[0], -second[1]
@@ -497,14 +478,10 @@ fn lengths(points: &[[f64; 2]]) -> Result<Vec<f64>, String> {
             -z
         ));
     }
-    let mut along = vec![0.0];
-    for pair in points.windows(2) {
-        along.push(along[along.len() - 1] + distance(pair[0], pair[1]));
-    }
-    Ok(along)
+    Ok(arc_lengths(points))
 }
 
-/// A point that the profile comes back to. An outline may end where it begins.
+/// A point through which the profile passes twice. An outline may end where it begins.
 fn visited_again(points: &[[f64; 2]]) -> Option<[f64; 2]> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     let by_place = |a: &[f64; 2], b: &[f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
@@ -514,10 +491,6 @@ fn visited_again(points: &[[f64; 2]]) -> Option<[f64; 2]> {
         points[pair[0]] == points[pair[1]] && pair[..] != ends
     });
     again.map(|pair| points[pair[0]])
-}
-
-fn step(from: [f64; 2], to: [f64; 2]) -> [f64; 2] {
-    [to[0] - from[0], to[1] - from[1]]
 }
 
 /// A unit of length of cross-sections.
@@ -543,12 +516,12 @@ const UNITS: [(LengthUnit, f64); 4] = [
 ];
 
 impl LengthUnit {
-    /// Its length in mm.
+    /// The length of the unit in mm.
     pub fn mm(self) -> f64 {
         UNITS[self as usize].1
     }
 
-    /// The unit that a word of a file names, in any case and possibly in brackets or quotes.
+    /// Parses the name of a unit in a file, in any case, with or without brackets or quotes.
     pub fn named(word: &str) -> Option<LengthUnit> {
         let word = word
             .trim_matches(|c: char| !c.is_alphanumeric() && c != '"')
@@ -566,9 +539,9 @@ impl LengthUnit {
         }
     }
 
-    /// The unit in which `width` is nearest to a usual width in mm; none if it is far from that in every unit.
+    /// The unit in which `width` is nearest to a usual width in mm. Returns `None` if it is far from that in every unit.
     pub fn likely(width: f64, usual: f64) -> Option<LengthUnit> {
-        // Half of the smallest ratio of two units, cm and inch, so that at most one unit fits.
+        // Half of the smallest ratio of two units, those of inch and cm, so that at most one unit fits.
         let nearest = 25.4_f64.ln() - 10.0_f64.ln();
         UNITS
             .iter()

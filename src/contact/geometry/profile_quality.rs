@@ -1,22 +1,19 @@
-//! Detects measurement artefacts in the points of a profile: noise, outliers, steps, polygons, rounding.
+//! Quality of the points of a profile: noise, outliers, steps, polygons, rounding, roughness under a contact, and the smoothing that the
+//! noise requires.
 //!
-//! The points of a profile with their distance along it.
-//!
-//! Compares two readings of the same points: the spline in use with a smoother one, and with Akima's curve.
-//!
-//! The quality of a profile under a contact, and the smoothing that its noise requires.
+//! Roughness is found by comparing two curves through the same points: the spline in use with a smoother one, and with Akima's curve.
 
 use std::cell::RefCell;
 use std::f64::consts::{PI, TAU};
 
 use realfft::RealFftPlanner;
 
-use crate::geometry::plane_curve::{PlaneCurve, is_corner, turn};
+use crate::geometry::plane_curve::{PlaneCurve, chords, is_corner, turn};
 use crate::numerics::lu::first_coefficient;
 
 /// Chords in one window of the noise estimate.
 const NOISE_CHORDS: usize = 4;
-/// Largest length of a window in mm: over longer ones the shape itself differs from a cubic.
+/// Largest length of a window in mm. The shape over longer windows is not a cubic.
 const NOISE_SPAN_MAX: f64 = 3.0;
 /// Largest length of a window of coarse points in mm.
 const COARSE_SPAN_MAX: f64 = 12.0;
@@ -24,58 +21,59 @@ const COARSE_SPAN_MAX: f64 = 12.0;
 const WINDOWS_MIN: usize = 12;
 /// Fewest windows of coarse points for a quartile.
 const COARSE_WINDOWS_MIN: usize = 30;
-/// Noise in mm that the quartile finds in the shape alone, for points 1 mm apart; it grows with the fourth power of their distance.
+/// Largest noise in mm that the shape of sound profiles simulates if points are 1 mm apart. It grows with the fourth power of the spacing.
 ///
-/// Population: sound rails and wheels of the class *damaged profile* with true points 0.8 to 4 mm apart: 0.002 to 0.1 µm at 1 mm, each of them
-/// below this; noise of 1 µm at 1.7 mm, 3 µm at 2.5 mm is above it.
+/// Population: sound rails and wheels of the class *damaged profile* with true points 0.8 to 4 mm apart. They show 0.002 to 0.1 µm at 1 mm.
+/// Noise of 1 µm at 1.7 mm and of 3 µm at 2.5 mm is above this limit.
 const COARSE_SHAPE: f64 = 6e-5;
-/// Distance of the points in mm up to which the shape of sound profiles contributes less than 0.2 µm, or 1 % of a usual pressure.
-const COARSE_TELLS: f64 = 1.8;
-/// Lower quartile of the absolute value of a normal variable of deviation 1.
+/// Spacing in mm up to which the shape of sound profiles simulates less than 0.2 µm of noise, or 1 % of a usual pressure.
+const SHAPE_NEGLIGIBLE_SPACING: f64 = 1.8;
+/// Lower quartile of the absolute value of a standard normal variable.
 const QUARTILE_OF_NORMAL: f64 = 0.3186;
-/// Median of the absolute value of a normal variable of deviation 1.
+/// Median of the absolute value of a standard normal variable.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
-/// Deviation, in local medians, from which a point is an outlier. Population: seeded damage of the stress bench (class *damaged profile*);
-/// an outlier of 2 µm may cause half of the largest pressure.
-const ODD_MEDIANS: f64 = 12.0;
-/// Deviation in mm from which a point is an outlier; same population.
-const ODD_MIN: f64 = 1.2e-3;
-/// Distance of the points in mm above which the threshold grows with its square, as do the deviations where the curvature jumps: between
-/// arcs, and between the polynomials of a tread.
-const ODD_SPACING: f64 = 0.25;
-/// Points in a local median.
-const ODD_WINDOW: usize = 15;
-/// Longest stretch in mm over which a cubic is fitted to six neighbours.
-const ODD_SPAN_MAX: f64 = 3.5;
-/// Longest chord in a window of seven points, in mean chords: next to a hole the cubic says nothing.
-const ODD_CHORD_MAX: f64 = 2.0;
-/// Part of the largest deviation of a group from which a point belongs to it.
-const ODD_PART: f64 = 0.3;
-/// Most points in a group of displaced points, with those next to them; more are waves.
-const ODD_POINTS_MAX: usize = 12;
-/// Points on either side of a group that its deviations are measured from.
-const ODD_SOUND: usize = 4;
+/// Least deviation of an outlier in local medians. Population: seeded damage of the stress bench (class *damaged profile*). An outlier of 2 µm
+/// may cause half of the largest pressure.
+const OUTLIER_MEDIANS: f64 = 12.0;
+/// Least deviation of an outlier in mm; same population.
+const OUTLIER_MIN: f64 = 1.2e-3;
+/// Spacing in mm above which the least deviation grows with the square of the spacing. So do the deviations where the curvature jumps, between
+/// arcs and between the polynomials of a tread.
+const OUTLIER_SPACING: f64 = 0.25;
+/// Points on either side of a local median.
+const OUTLIER_WINDOW: usize = 15;
+/// Longest stretch in mm in which a cubic through six neighbours is used however uneven their spacing.
+const OUTLIER_SPAN_MAX: f64 = 3.5;
+/// Longest chord among seven points in mean chords. Next to a hole the cubic is undetermined.
+const OUTLIER_CHORD_MAX: f64 = 2.0;
+/// Least deviation of a point of a group, relative to the largest one of the group.
+const GROUP_SHARE: f64 = 0.3;
+/// Most points of a group. Larger groups are waves.
+const GROUP_POINTS_MAX: usize = 12;
+/// Sound points on either side of a group from which its deviations are measured.
+const GROUP_NEIGHBOURS: usize = 4;
 /// Fewest kinks of a polygon.
 const KINKS_MIN: usize = 4;
-/// Least ratio of the sum of the turns at kinks to the sum of their magnitudes: a rail or a wheel bends to one side over many chords.
+/// Least ratio of the sum of the turns at kinks to the sum of their magnitudes. A rail or a wheel bends to one side over many chords.
 const KINKS_ONE_WAY: f64 = 0.8;
-/// Most decimals that are looked for; with more the arithmetic of readers leaves none, and coordinates count as exact to the step after it.
+/// Most decimals that are looked for.
 const DIGITS_MAX: i32 = 7;
+/// Step in mm of coordinates with more decimals, which the arithmetic of a reader blurs.
 const DIGITS_LEAST: f64 = 1e-9;
-/// Share of neighbouring fourth differences with opposite signs above which they are those of white noise, for which it is 0.8: their
-/// correlation is −56/70. Of waves longer than four points it is 0.5 and less.
+/// Least share of neighbouring fourth differences with opposite signs in white noise. There the share is 0.8, because the correlation is
+/// −56/70; in waves longer than four points it is at most 0.5.
 const WHITE: f64 = 0.65;
 
-/// A defect of few points.
+/// A defect of one or a few neighbouring points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Oddity {
+pub enum LocalDefect {
     /// Points off the curve through their neighbours.
     Outliers {
         /// Index of the first and of the last one.
         points: [usize; 2],
-        /// How many of these are off.
+        /// Number of displaced points among these.
         count: usize,
-        /// Index of the farthest one.
+        /// Index of the one displaced most.
         farthest: usize,
         /// Its distance from the cubic through the sound points on both sides, in mm.
         distance: f64,
@@ -89,25 +87,25 @@ pub enum Oddity {
     },
 }
 
-impl Oddity {
-    /// How far a point is from where it belongs, in mm.
+impl LocalDefect {
+    /// Displacement of a point in mm.
     fn size(&self) -> f64 {
         match self {
-            Oddity::Outliers { distance, .. } => *distance,
-            Oddity::Step { height, .. } => 0.5 * height.abs(),
+            LocalDefect::Outliers { distance, .. } => *distance,
+            LocalDefect::Step { height, .. } => 0.5 * height.abs(),
         }
     }
 }
 
-/// Standard deviation in mm of white noise along the normal, over the points of a range; `None` if too few of them are close enough
-/// together to determine it.
+/// Standard deviation in mm of white noise along the normal in a range of points. Returns `None` if too few points are close enough together
+/// to determine it.
 ///
 /// The fourth divided difference of five neighbours, `Σ w_i h_i` with `w_i = 1/Π_{j≠i}(t_i − t_j)` and `Σ w_i² = 1`, vanishes for every
 /// cubic, and for white noise of deviation s it has the deviation s. The median of its magnitude divided by 0.6745 is therefore s,
 /// unaffected by single outliers. (Correlated noise, as left by an instrument that filters, is not detected.)
 ///
-/// For points more than 0.75 mm apart, half of the windows may contain the junction of two arcs. The lower quartile divided by 0.3186
-/// is then used, if it exceeds the contribution of the shape.
+/// If points are more than 0.75 mm apart, half of the windows may contain the junction of two arcs. Then the lower quartile divided by 0.3186
+/// is used, provided that it exceeds the contribution of the shape.
 pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
     let (mut fine, mut coarse) = (Vec::new(), Vec::new());
     let mut length = 0.0;
@@ -132,12 +130,11 @@ pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
     let spacing = length / (NOISE_CHORDS * coarse.len()) as f64;
     coarse.sort_by(f64::total_cmp);
     let found = coarse[coarse.len() / 4] / QUARTILE_OF_NORMAL;
-    // For points close enough together, the contribution of the shape is negligible.
-    (spacing <= COARSE_TELLS || found > COARSE_SHAPE * spacing.powi(4)).then_some(found)
+    (spacing <= SHAPE_NEGLIGIBLE_SPACING || found > COARSE_SHAPE * spacing.powi(4)).then_some(found)
 }
 
-/// Whether the fourth differences of the points of a range are those of white noise, whose signs alternate, and not of waves.
-pub fn is_white(points: Points, range: [usize; 2]) -> bool {
+/// Returns whether the fourth differences in a range of points are those of white noise, whose signs alternate, and not those of waves.
+fn is_white(points: Points, range: [usize; 2]) -> bool {
     let differences: Vec<f64> = (range[0]..range[1].saturating_sub(NOISE_CHORDS))
         .filter_map(|k| window_at(points, k).and_then(fourth_difference))
         .map(|(_, difference)| difference)
@@ -163,44 +160,45 @@ fn fourth_difference(window: &[[f64; 2]; NOISE_CHORDS + 1]) -> Option<(f64, f64)
     (span > 0.0 && difference.is_finite()).then_some((span, difference))
 }
 
-/// The worst defect of few points in a range: points that deviate from the least-squares cubic of their six neighbours by more than 12 local
-/// medians and by at least 1.2 µm (more where points are coarse), with those next to them that do so too.
+/// The largest defect of a few points in a range.
 ///
-/// A displaced point makes its neighbours deviate by 0.43 of its own displacement, and several displaced points disturb each other. The
-/// points of such a group are therefore compared with the cubic through the sound points on both sides of it. If that cubic and a step between
-/// two points fit all of them, it is a step. Where two arcs meet, the curvature jumps by some 0.06/mm, which makes points 0.25 mm apart
-/// deviate by 0.2 µm; for points farther apart the deviation grows with the square of the distance.
-pub fn oddity(points: Points, range: [usize; 2]) -> Option<Oddity> {
+/// A point is suspect if it deviates from the least-squares cubic of its six neighbours by more than 12 local medians and by at least 1.2 µm
+/// (more if points are coarse). Neighbouring points with similar deviations belong to the same group.
+///
+/// A displaced point makes its neighbours deviate by 0.43 of its own displacement, and several displaced points disturb each other. The group
+/// is therefore compared with the cubic through the sound points on both sides of it. If that cubic plus a step between two points fits all of
+/// them, the defect is a step. Where two arcs meet, the curvature jumps by about 0.06/mm. Points 0.25 mm apart then deviate by 0.2 µm, and the
+/// deviation grows with the square of the spacing.
+pub fn local_defect(points: Points, range: [usize; 2]) -> Option<LocalDefect> {
     let around = [
-        range[0].saturating_sub(ODD_WINDOW),
-        (range[1] + ODD_WINDOW).min(points.at.len()),
+        range[0].saturating_sub(OUTLIER_WINDOW),
+        (range[1] + OUTLIER_WINDOW).min(points.at.len()),
     ];
     let off: Vec<f64> = (around[0]..around[1])
         .map(|k| off_neighbours(points, k).unwrap_or_default())
         .collect();
     let size = |j: usize| off[j].abs();
-    let mut worst: Option<Oddity> = None;
+    let mut worst: Option<LocalDefect> = None;
     for here in range[0] - around[0]..range[1] - around[0] {
         let own = size(here);
         let near = here.saturating_sub(3)..(here + 4).min(off.len());
-        let here_spacing = spacing_around(points, around[0] + here);
-        let least = ODD_MIN * (here_spacing / ODD_SPACING).powi(2).max(1.0);
+        let spacing = spacing_around(points, around[0] + here);
+        let least = OUTLIER_MIN * (spacing / OUTLIER_SPACING).powi(2).max(1.0);
         if own < least || near.clone().any(|j| size(j) > own) {
             continue;
         }
-        let far = here.saturating_sub(ODD_WINDOW)..(here + ODD_WINDOW + 1).min(off.len());
+        let far = here.saturating_sub(OUTLIER_WINDOW)..(here + OUTLIER_WINDOW + 1).min(off.len());
         // The neighbours are excluded, because an outlier makes them deviate too.
         let mut usual: Vec<f64> = far.filter(|j| !near.contains(j)).map(size).collect();
-        if own <= ODD_MEDIANS * median(&mut usual) {
+        if own <= OUTLIER_MEDIANS * median(&mut usual) {
             continue;
         }
-        let belongs = |j: &usize| size(*j) > ODD_PART * own;
+        let belongs = |j: &usize| size(*j) > GROUP_SHARE * own;
         let first = (0..=here).rev().take_while(belongs).last().unwrap_or(here);
         let last = (here..off.len()).take_while(belongs).last().unwrap_or(here);
-        let found = explained(points, [around[0] + first, around[0] + last]);
-        let larger = |known: &Oddity, found: &Oddity| found.size() > known.size();
+        let found = group_defect(points, [around[0] + first, around[0] + last]);
         if let Some(found) = found
-            && worst.is_none_or(|known| larger(&known, &found))
+            && worst.is_none_or(|known| found.size() > known.size())
         {
             worst = Some(found);
         }
@@ -208,48 +206,42 @@ pub fn oddity(points: Points, range: [usize; 2]) -> Option<Oddity> {
     worst
 }
 
-/// What displaces the points of a group, first and last included.
-fn explained(points: Points, [first, last]: [usize; 2]) -> Option<Oddity> {
-    if last + 1 - first > ODD_POINTS_MAX {
+/// The defect of a group of points from the first to the last one; `None` if there are too many.
+fn group_defect(points: Points, [first, last]: [usize; 2]) -> Option<LocalDefect> {
+    if last + 1 - first > GROUP_POINTS_MAX {
         return None;
     }
-    let from = first.saturating_sub(ODD_SOUND);
-    let to = (last + ODD_SOUND + 1).min(points.at.len());
+    let from = first.saturating_sub(GROUP_NEIGHBOURS);
+    let to = (last + GROUP_NEIGHBOURS + 1).min(points.at.len());
     let (to_chord, length) = chord_axes(&points.at[from..to]);
     let local: Vec<[f64; 2]> = points.at[from..to].iter().map(to_chord).collect();
     let inside = |k: usize| (first..=last).contains(&(from + k));
     let off = |k: usize| {
-        let t = local[k][0];
-        let powers = |at: &[f64; 2]| {
-            let x = (at[0] - t) / length;
-            ([1.0, x, x * x, x * x * x], at[1])
-        };
         let sound = local.iter().enumerate().filter(|(j, _)| !inside(*j));
-        let sound: Vec<_> = sound.map(|(_, at)| powers(at)).collect();
-        Some(local[k][1] - first_coefficient(&sound)?)
+        above_cubic(local[k], sound.map(|(_, at)| *at), length)
     };
     let deviations: Option<Vec<f64>> = (first - from..=last - from).map(off).collect();
     let deviations = deviations?;
     let largest = deviations
         .iter()
         .fold(0.0_f64, |most, off| most.max(off.abs()));
-    // A cubic and a step after each point of the group in turn.
+    // A step after each point of the group is tried.
     let steps = (first.saturating_sub(1).max(from)..=last).filter_map(|point| {
         let [height, left] = step_after(&local, point - from, length)?;
         Some((point, height, left))
     });
     let best = steps.min_by(|a, b| a.2.total_cmp(&b.2));
     if let Some((point, height, left)) = best
-        && left < ODD_PART * largest
-        && left < ODD_PART * height.abs()
+        && left < GROUP_SHARE * largest
+        && left < GROUP_SHARE * height.abs()
     {
-        return Some(Oddity::Step { point, height });
+        return Some(LocalDefect::Step { point, height });
     }
-    let is_off = |k: &usize| deviations[*k].abs() > ODD_PART * largest;
+    let is_off = |k: &usize| deviations[*k].abs() > GROUP_SHARE * largest;
     let displaced: Vec<usize> = (0..deviations.len()).filter(is_off).collect();
     let farthest = (0..deviations.len())
         .max_by(|a, b| deviations[*a].abs().total_cmp(&deviations[*b].abs()))?;
-    Some(Oddity::Outliers {
+    Some(LocalDefect::Outliers {
         points: [first + displaced[0], first + displaced[displaced.len() - 1]],
         count: displaced.len(),
         farthest: first + farthest,
@@ -257,11 +249,11 @@ fn explained(points: Points, [first, last]: [usize; 2]) -> Option<Oddity> {
     })
 }
 
-/// Height of a step after a point in mm and the largest distance of a point from the cubic with this step, both in mm.
+/// Fits a cubic with a step after a point. Returns the height of the step and the largest distance of a point from this fit, both in mm.
 fn step_after(local: &[[f64; 2]], point: usize, length: f64) -> Option<[f64; 2]> {
     let after = |k: usize| if k > point { 1.0 } else { 0.0 };
     let middle = 0.5 * length;
-    // The step first, so that its height is the first coefficient.
+    // The height of the step is the first coefficient.
     let rows: Vec<([f64; 5], f64)> = (local.iter().enumerate())
         .map(|(k, at)| {
             let x = (at[0] - middle) / length;
@@ -269,27 +261,36 @@ fn step_after(local: &[[f64; 2]], point: usize, length: f64) -> Option<[f64; 2]>
         })
         .collect();
     let height = first_coefficient(&rows)?;
-    let left = |k: usize| {
-        let t = local[k][0];
-        let row = |(j, at): (usize, &[f64; 2])| {
-            let x = (at[0] - t) / length;
-            ([1.0, x, x * x, x * x * x], at[1] - height * after(j))
-        };
-        let rows: Vec<_> = local.iter().enumerate().map(row).collect();
-        Some((local[k][1] - height * after(k) - first_coefficient(&rows)?).abs())
-    };
-    let left: Option<Vec<f64>> = (0..local.len()).map(left).collect();
+    let lowered = local.iter().enumerate();
+    let lowered: Vec<[f64; 2]> = lowered
+        .map(|(k, at)| [at[0], at[1] - height * after(k)])
+        .collect();
+    let left = |at: &[f64; 2]| above_cubic(*at, lowered.iter().copied(), length).map(f64::abs);
+    let left: Option<Vec<f64>> = lowered.iter().map(left).collect();
     Some([height, left?.into_iter().fold(0.0, f64::max)])
 }
 
-/// Mean distance in mm of the seven points around a point, fewer at the ends.
+/// Height of a point `[t, h]` above the least-squares cubic through others. `scale` is a length of the size of their distances.
+fn above_cubic(
+    [t, h]: [f64; 2],
+    others: impl Iterator<Item = [f64; 2]>,
+    scale: f64,
+) -> Option<f64> {
+    let powers = |at: [f64; 2]| {
+        let x = (at[0] - t) / scale;
+        ([1.0, x, x * x, x * x * x], at[1])
+    };
+    Some(h - first_coefficient(&others.map(powers).collect::<Vec<_>>())?)
+}
+
+/// Mean spacing in mm of the seven points around a point; of fewer points at the ends.
 fn spacing_around(points: Points, k: usize) -> f64 {
     let (first, last) = (k.saturating_sub(3), (k + 3).min(points.along.len() - 1));
     (points.along[last] - points.along[first]) / (last - first).max(1) as f64
 }
 
-/// Height in mm of a point above the least-squares cubic of its six neighbours; `None` where these are too far away or uneven, or a corner
-/// lies between them.
+/// Height in mm of a point above the least-squares cubic of its six neighbours. Returns `None` if the neighbours are too far away or unevenly
+/// spaced, or include a corner.
 fn off_neighbours(points: Points, k: usize) -> Option<f64> {
     let first = k.checked_sub(3)?;
     let local = in_chord(window_at::<7>(points, first)?);
@@ -297,20 +298,21 @@ fn off_neighbours(points: Points, k: usize) -> Option<f64> {
     let longest = (first..first + 6)
         .map(|k| points.chord(k))
         .fold(0.0, f64::max);
-    let uneven = span > ODD_SPAN_MAX && longest > ODD_CHORD_MAX * span / 6.0;
+    let uneven = span > OUTLIER_SPAN_MAX && longest > OUTLIER_CHORD_MAX * span / 6.0;
     if span > COARSE_SPAN_MAX || uneven || (first + 1..first + 6).any(|k| is_corner(points.at, k)) {
         return None;
     }
     let others = [0, 1, 2, 4, 5, 6].map(|j| local[j]);
-    Some(local[3][1] - fitted::<4, 6>(others, local[3][0])?)
+    above_cubic(local[3], others.into_iter(), 0.5 * span)
 }
 
-/// Mean length in mm of the chords if the points of a range lie on a polygon, that is, were interpolated linearly between fewer points.
+/// Median length in mm of the sides of the polygon on which the points of a range lie, if they were interpolated linearly between fewer
+/// points.
 ///
-/// Such points lie on straight lines to the digits they are given with, and turn at the corners (or, where no point lies on a corner, at the
-/// two next to it). `digits` is the step in mm of which all coordinates are multiples: it moves a point by up to `digits/√2` and changes a
-/// turn by up to `√2 digits (1/a + 1/b)` between chords of lengths a and b. A kink turns by more than three times this, and has points
-/// that turn by no more than this on both sides. On a smooth curve the turn cannot be both.
+/// Such points lie on straight lines to the digits with which they are given. They turn at the corners, or at the two points next to a corner
+/// if no point lies on it. `digits` is the step in mm of which all coordinates are multiples. It moves a point by up to `digits/√2` and
+/// changes a turn by up to `√2 digits (1/a + 1/b)` between chords of lengths a and b. A kink turns by more than three times this, and the
+/// points on both sides turn by no more than this. A smooth curve cannot do both.
 pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
     let bound = |k: usize| {
         let [before, after] = [points.chord(k - 1), points.chord(k)];
@@ -318,7 +320,7 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
     };
     let last = range[1].min(points.at.len()).saturating_sub(1);
     let (mut kinks, mut others): (Vec<[f64; 2]>, usize) = (Vec::new(), 0);
-    // The points since the last straight one, and their turns.
+    // The points after the last straight one, and their turns.
     let mut open: Option<Vec<(usize, f64)>> = None;
     for k in range[0].max(1)..last {
         let turned = turn(points.at, k);
@@ -352,13 +354,13 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
     Some(median(&mut chords.collect::<Vec<f64>>()))
 }
 
-/// The digits that points were given with: the coarser of the steps in mm of which all y and all z are multiples, and at least 1e-9 mm.
+/// Resolution of the coordinates: the coarser of the steps in mm of which all y and all z are multiples, at least 1e-9 mm.
 pub fn digits(given: &[[f64; 2]]) -> f64 {
     let of = |part| step_of(given, part, DIGITS_MAX, 1e-4).unwrap_or(DIGITS_LEAST);
     of(0).max(of(1))
 }
 
-/// The largest power of ten, 0.1 or less, of which all coordinates in one direction are multiples.
+/// The largest power of ten, at most 0.1, of which all coordinates in one direction are multiples.
 fn step_of(given: &[[f64; 2]], part: usize, digits: i32, tolerance: f64) -> Option<f64> {
     let multiples = |places: &f64| {
         given.iter().all(|at| {
@@ -370,12 +372,12 @@ fn step_of(given: &[[f64; 2]], part: usize, digits: i32, tolerance: f64) -> Opti
     places.find(multiples).map(f64::recip)
 }
 
-/// The step in mm of which every height is a multiple (0.1, 0.01 or 0.001), if there is one.
+/// The step in mm of which all heights are multiples (0.1, 0.01 or 0.001), if there is one.
 pub fn rounding(given: &[[f64; 2]]) -> Option<f64> {
     step_of(given, 1, 3, 1e-6)
 }
 
-/// So many points from one on, if there are as many.
+/// The `N` points from an index on, if there are as many.
 fn window_at<const N: usize>(points: Points<'_>, first: usize) -> Option<&[[f64; 2]; N]> {
     points.at.get(first..)?.first_chunk()
 }
@@ -399,23 +401,7 @@ fn chord_axes(window: &[[f64; 2]]) -> (impl Fn(&[f64; 2]) -> [f64; 2] + use<>, f
     (to_chord, length)
 }
 
-/// Value at `t` of the least-squares polynomial with `N` coefficients through points `[t, h]`.
-fn fitted<const N: usize, const POINTS: usize>(points: [[f64; 2]; POINTS], t: f64) -> Option<f64> {
-    let scale = points
-        .iter()
-        .map(|at| (at[0] - t).abs())
-        .fold(0.0, f64::max);
-    let rows = points.map(|at| {
-        let mut powers = [1.0; N];
-        for k in 1..N {
-            powers[k] = powers[k - 1] * (at[0] - t) / scale;
-        }
-        (powers, at[1])
-    });
-    first_coefficient(&rows)
-}
-
-/// The median; 0 for an empty list.
+/// The median, or 0 for an empty list.
 pub fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     if values.is_empty() {
@@ -431,13 +417,9 @@ const STRAY_MEDIANS: f64 = 8.0;
 /// Most points beyond a stray chord.
 const STRAY_POINTS_MAX: usize = 2;
 
-/// Points at either end that lie beyond a stray chord, with the length of that chord in mm: `[count, length]` at the first and
-/// at the last end.
+/// The points beyond a stray chord at the first and at the last end: their number, and the length of the chord in mm.
 pub fn stray_ends(points: &[[f64; 2]]) -> [Option<(usize, f64)>; 2] {
-    let chords: Vec<f64> = points
-        .windows(2)
-        .map(|pair| (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]))
-        .collect();
+    let chords: Vec<f64> = chords(points).collect();
     let usual = median(&mut chords.clone());
     let farthest = |from_end: &mut dyn Iterator<Item = &f64>| {
         let near = (1..).zip(from_end.copied()).take(STRAY_POINTS_MAX);
@@ -455,19 +437,19 @@ pub fn stray_ends(points: &[[f64; 2]]) -> [Option<(usize, f64)>; 2] {
 pub struct Points<'a> {
     /// `[y, z]` in mm, z up.
     pub at: &'a [[f64; 2]],
-    /// Sum of the lengths of the chords up to each point.
+    /// Length of the chain from the first point to each point.
     pub along: &'a [f64],
 }
 
 impl<'a> Points<'a> {
-    /// Indices of the points in a range of the length: the first, and one past the last.
+    /// Indices of the points in a range of the length: the first one, and one past the last one.
     pub fn numbers(&self, range: [f64; 2]) -> [usize; 2] {
         let first = self.along.partition_point(|s| *s < range[0]);
         let last = self.along.partition_point(|s| *s <= range[1]);
         [first, last.max(first)]
     }
 
-    /// The points in a range of the length and one beyond on either side; at least four if there are that many.
+    /// The points in a range of the length, with two more on either side if there are any.
     #[must_use]
     pub fn within(&self, range: [f64; 2]) -> Points<'a> {
         let [first, last] = self.numbers(range);
@@ -484,26 +466,25 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Bounds of the spacing of the comparison in mm. How much the readings depend on them was not measured beyond the tests and the class *damaged profile* of
+/// Range of the spacing in mm at which curves are compared. Its influence was not measured beyond the tests and the class *damaged profile* of
 /// `docs/stability.md`.
 const STEP: [f64; 2] = [0.1, 0.2];
-/// Places of the comparison from one point to the next, within these bounds. Chosen by judgement: a cubic between two points is seen.
-const PLACES: f64 = 4.0;
-/// Distance in mm by which the comparison and the measurement of noise extend beyond twice the half width of the contact.
+/// Number of comparisons per mean chord, within this range. It resolves a cubic between two points.
+const SAMPLES_PER_CHORD: f64 = 4.0;
+/// Distance in mm by which the comparison and the noise estimate extend beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
 /// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
 const SUPPORT: f64 = 3.0;
-/// Least smoothing of the reference in mm; otherwise it is twice the length in use. A point changes the reference up to this far away.
+/// Least smoothing of the reference curve in mm. Otherwise it is twice the smoothing in use. A point affects the reference up to this
+/// distance.
 pub const REFERENCE_MIN: f64 = 3.0;
-/// Most places at which curves are compared, however wide the contact.
-const SAMPLES_MAX: usize = 4000;
 
-/// Roughness under a contact as pressures in MPa.
+/// Roughness under a contact, as pressures in MPa that flatten it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Roughness {
-    /// Root mean square over the contact of the waves between the smoothing in use and twice that, or 3 mm.
+    /// Root mean square over the contact of the waves between the smoothing in use and twice that, at least 3 mm.
     pub waviness: f64,
-    /// Deviation of the same waves, from the median in and beside the contact: small if the waviness comes from a single place.
+    /// Standard deviation of the same waves in and beside the contact, from their median. It is small if the waviness comes from a single place.
     pub everywhere: f64,
     /// Root mean square of the difference between the spline in use and Akima's curve through the same points; 0 with smoothing.
     pub ambiguity: f64,
@@ -514,18 +495,17 @@ pub struct Roughness {
 pub struct PointsRead<'a> {
     /// The points.
     pub points: Points<'a>,
-    /// The curve through them, or past them where it is smoothed.
+    /// The curve through them, or near them if it is smoothed.
     pub curve: &'a PlaneCurve,
     /// Cut wavelength of its smoothing in mm; 0 for none.
     pub smoothing: f64,
     /// Step in mm of which all coordinates are multiples.
     pub digits: f64,
-    /// Step in mm of which all heights are multiples, if it is 0.001 mm or more.
+    /// Step in mm of which all heights are multiples, if it is at least 0.001 mm.
     pub rounding: Option<f64>,
 }
 
-/// Roughness at the contact `[low, high]`, in mm along the profile. Compares the readings there and beside it, at equally spaced points.
-/// The contact modulus is in MPa.
+/// Roughness at the contact `[low, high]`, in mm along the profile, from the curves there and beside it. The contact modulus is in MPa.
 fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Roughness {
     let PointsRead {
         points,
@@ -540,8 +520,7 @@ fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Rough
     let part = points.within([first - SUPPORT * reference, last + SUPPORT * reference]);
     let spacing =
         (part.along[part.along.len() - 1] - part.along[0]) / (part.along.len() - 1) as f64;
-    let step = (spacing / PLACES).clamp(STEP[0], STEP[1]);
-    let step = step.max((last - first) / SAMPLES_MAX as f64);
+    let step = (spacing / SAMPLES_PER_CHORD).clamp(STEP[0], STEP[1]);
     let count = ((last - first) / step).floor() as usize + 1;
     let places = || (0..count).map(|k| first + step * k as f64);
     let used: Vec<([f64; 2], [f64; 2])> = places()
@@ -575,7 +554,8 @@ fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Rough
     }
 }
 
-/// Distance from a point of a curve, given with its unit tangent, to another curve along its normal, positive if the first is above.
+/// Distance along the normal from a point of a curve, given with its unit tangent, to a point of another curve; positive if the first curve is
+/// above.
 fn above((at, tangent): ([f64; 2], [f64; 2]), other: [f64; 2]) -> f64 {
     tangent[0] * (at[1] - other[1]) - tangent[1] * (at[0] - other[0])
 }
@@ -584,14 +564,14 @@ fn above((at, tangent): ([f64; 2], [f64; 2]), other: [f64; 2]) -> f64 {
 const TAPER: f64 = 2.0;
 
 thread_local! {
-    /// Plans of the transforms, which take longer to make than to use. They follow from their lengths alone; there are a dozen at most.
+    /// Plans of the Fourier transforms, of which there are about a dozen. Making a plan takes longer than using it.
     static PLANNER: RefCell<RealFftPlanner<f32>> = RefCell::new(RealFftPlanner::new());
 }
 
-/// Pressure in MPa that flattens `heights` in mm, `step` mm apart, with the contact modulus in MPa; one value per height.
-pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
+/// Pressures in MPa that flatten `heights` in mm, `step` mm apart, for a contact modulus in MPa.
+fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
     let count = heights.len();
-    // As many zeros keep the periodic transform from coupling the two ends.
+    // Zeros keep the periodic transform from coupling the two ends.
     let padded = (2 * count).max(2).next_power_of_two();
     let mut values = vec![0.0; padded];
     for (k, height) in heights.iter().enumerate() {
@@ -626,59 +606,57 @@ pub fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
     values.into_iter().map(f64::from).collect()
 }
 
-/// Pressure in MPa that white noise of deviation `noise` mm at a spacing of `spacing` mm leaves after a smoothing that halves
-/// waves of `cut` mm: `2.34 E* s √(h/L³)`, from `2 (π E*)² s² h / L³ · ∫ x²/(1+x⁴)² dx` with the integral `π√2/16`.
+/// Standard deviation in MPa of the pressure that white noise leaves after a smoothing that halves waves of `cut` mm. The noise has the
+/// standard deviation `noise` in mm at points `spacing` mm apart.
+///
+/// The value `2.34 E* s √(h/L³)` follows from `2 (π E*)² s² h / L³ · ∫ x²/(1+x⁴)² dx` with the integral `π√2/16`.
 pub fn noise_pressure(modulus: f64, noise: f64, spacing: f64, cut: f64) -> f64 {
     2.34 * modulus * noise * (spacing / cut.powi(3)).sqrt()
 }
 
-/// Range of smoothing lengths that are advised, in mm. Shorter ones do not remove the noise of neighbouring points, longer ones distort
-/// gauge corners and flange roots (radii of 13 to 20 mm; 5 mm changes the largest pressure by 2 %, 10 mm by 27 % in one of ten cases).
+/// Range of advised smoothing lengths in mm. Shorter ones do not remove the noise of neighbouring points. Longer ones distort gauge corners and
+/// flange roots with radii of 13 to 20 mm: 5 mm changes the largest pressure by 2 %, 10 mm by 27 % in one of ten cases.
 pub const SMOOTHING_ADVISED: [f64; 2] = [2.0, 8.0];
-/// Noise, as a share of the largest pressure, that remains after the advised smoothing. Between 0.05 and 0.1 neither pressures nor forces
-/// change by more than their scatter; population: 18 places on three pairs with noise of 1 to 20 µm.
+/// Noise that remains after the advised smoothing, as a share of the largest pressure. Between 0.05 and 0.1 neither pressures nor forces
+/// change by more than their scatter. Population: 18 positions on three pairs with noise of 1 to 20 µm.
 const NOISE_LEFT: f64 = 0.07;
-/// Noise without smoothing, as a share of the largest pressure, below which no smoothing is advised.
+/// Noise without smoothing, as a share of the largest pressure, up to which no smoothing is advised.
 const NOISE_HARMLESS: f64 = 0.01;
-/// Smoothing length, in chords, that turns a polygon into a smooth curve; a shorter one changes no coarse points.
+/// Smoothing length, in chords, that turns a polygon into a smooth curve. A shorter one does not change coarse points.
 pub(crate) const CHORDS: f64 = 2.0;
-/// Noise in steps of rounding: the deviation of an even distribution of width 1 is 1/√12. Up to twice this it is due to the rounding.
+/// Standard deviation of the rounding error in steps: 1/√12. Noise up to twice this is due to the rounding.
 const ROUNDED: f64 = 0.289;
-/// Waviness over that which the noise explains, up to which noise is its cause: estimates from few points scatter by a factor of 2.
+/// Largest ratio of the waviness to the noise that explains it. Estimates from few points scatter by a factor of 2.
 const EXPLAINED: f64 = 3.0;
+
 /// Quality of the points of one body under one contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnderContact {
     /// The longest chord that overlaps the contact, as its ends along the profile in mm.
     pub chord: [f64; 2],
-    /// Its length relative to the width of the contact.
+    /// Length of this chord relative to the width of the contact.
     pub over_width: f64,
-    /// Mean distance of the points around the contact, in mm.
+    /// Mean spacing of the points around the contact, in mm.
     pub spacing: f64,
     /// Standard deviation of the noise along the normal in mm, if there are enough points to determine it.
     pub noise: Option<f64>,
     /// Waviness and ambiguity, as pressures.
     pub roughness: Roughness,
-    /// Length of the chords, if the points lie on those of a polygon.
+    /// Length of the sides in mm, if the points lie on a polygon.
     pub polygon: Option<f64>,
-    /// The worst defect of few points near the contact.
-    pub oddity: Option<Oddity>,
-    /// Whether noise or rounding explain the waviness.
+    /// The largest defect of a few points near the contact.
+    pub local_defect: Option<LocalDefect>,
+    /// Whether noise or rounding explains the waviness.
     pub noisy: bool,
-    /// Step in mm to which the heights were rounded, if the noise is due to that.
+    /// Step in mm to which the heights were rounded, if the noise is due to it.
     pub rounding: Option<f64>,
 }
 
-/// Standard deviation in mm of the noise of the points in a range, along the normal; `None` if too few of them are close enough together to
-/// determine it. Heights that were rounded have at least the noise of the rounding: where a profile is level, neighbours are equal.
+/// Standard deviation in mm of the noise along the normal in a range of points. Returns `None` if too few points are close enough together to
+/// determine it. Rounded heights have at least the noise of the rounding, because neighbours are equal where a profile is level.
 pub fn noise_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
     let least = ROUNDED * reading.rounding.unwrap_or(0.0);
     Some(noise(reading.points, range)?.max(least))
-}
-
-/// Length in mm of the chords if the points of a range were interpolated linearly between fewer points.
-pub fn polygon_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
-    polygon(reading.points, range, reading.digits)
 }
 
 /// Quality of the points of a body under the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
@@ -716,34 +694,35 @@ pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> U
         spacing,
         noise,
         roughness,
-        polygon: polygon_of(reading, around),
-        oddity: oddity(points, near),
+        polygon: polygon(points, around, reading.digits),
+        local_defect: local_defect(points, near),
         noisy: white && roughness.waviness <= EXPLAINED * explained,
         rounding,
     }
 }
 
-/// Noise and spacing of one body, in mm.
+/// Noise and spacing of the points of one body, in mm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Grain {
-    /// Deviation of the noise along the normal.
+pub struct NoiseLevel {
+    /// Standard deviation of the noise along the normal.
     pub noise: f64,
-    /// Mean distance of the points.
+    /// Mean spacing of the points.
     pub spacing: f64,
-    /// Length of the chords, if the points lie on those of a polygon.
+    /// Length of the sides, if the points lie on a polygon.
     pub polygon: Option<f64>,
 }
 
 /// The smoothing advised for each of two bodies, in mm, given the largest pressure and the contact modulus in MPa; 0 if none is needed.
 ///
-/// `L = (2.34 E* √(s₁² h₁ + s₂² h₂) / (0.07 p))^(2/3)` leaves noise of 7 % of the pressure (see [`noise_pressure`]); it is limited to 2 to
-/// 8 mm. A body whose own noise without smoothing is below 1 % of the pressure is not smoothed; a polygon is smoothed by at least two
-/// chords.
-pub fn advised_smoothing(bodies: [Grain; 2], modulus: f64, pressure: f64) -> [f64; 2] {
-    let share = |body: &Grain| body.noise * body.spacing.sqrt();
+/// `L = (2.34 E* √(s₁² h₁ + s₂² h₂) / (0.07 p))^(2/3)` leaves noise of 7 % of the pressure (see [`noise_pressure`]). It is limited to 2 to
+/// 8 mm. A body whose own noise without smoothing is below 1 % of the pressure is not smoothed. A polygon is smoothed by at least two
+/// sides.
+pub fn advised_smoothing(bodies: [NoiseLevel; 2], modulus: f64, pressure: f64) -> [f64; 2] {
+    let share = |body: &NoiseLevel| body.noise * body.spacing.sqrt();
     let both = share(&bodies[0]).hypot(share(&bodies[1]));
     let [least, most] = SMOOTHING_ADVISED;
-    let length = (2.34 * modulus * both / (NOISE_LEFT * pressure)).powf(2.0 / 3.0);
+    let unsmoothed = noise_pressure(modulus, both, 1.0, 1.0);
+    let length = (unsmoothed / (NOISE_LEFT * pressure)).powf(2.0 / 3.0);
     bodies.map(|body| {
         let raw = noise_pressure(modulus, body.noise, body.spacing, 2.0 * body.spacing);
         let of_noise = if raw < NOISE_HARMLESS * pressure {
@@ -761,19 +740,11 @@ pub fn advised_smoothing(bodies: [Grain; 2], modulus: f64, pressure: f64) -> [f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::plane_curve::arc_lengths;
 
-    fn chords(at: &[[f64; 2]]) -> Vec<f64> {
-        let mut along = vec![0.0];
-        for pair in at.windows(2) {
-            let chord = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
-            along.push(along[along.len() - 1] + chord);
-        }
-        along
-    }
-
-    /// What `of` finds in all points.
+    /// Applies `of` to all points.
     fn with<T>(at: &[[f64; 2]], of: impl Fn(Points, [usize; 2]) -> T) -> T {
-        let along = chords(at);
+        let along = arc_lengths(at);
         let points = Points { at, along: &along };
         of(points, [0, at.len()])
     }
@@ -786,7 +757,7 @@ mod tests {
             .collect()
     }
 
-    /// Normally distributed numbers of deviation 1: sums of twelve even ones of a congruential generator (Knuth's MMIX).
+    /// Standard normal numbers: sums of twelve uniform ones of a linear congruential generator (Knuth's MMIX).
     fn normal(count: usize) -> Vec<f64> {
         let mut state = 7_u64;
         let mut even = || {
@@ -837,14 +808,14 @@ mod tests {
     fn one_point_off_is_an_outlier_of_its_distance_and_not_noise() {
         let mut points = arc(200);
         points[90][1] += 0.02;
-        let Some(Oddity::Outliers {
+        let Some(LocalDefect::Outliers {
             points: [90, 90],
             count: 1,
             farthest: 90,
             distance,
-        }) = with(&points, oddity)
+        }) = with(&points, local_defect)
         else {
-            panic!("{:?}", with(&points, oddity))
+            panic!("{:?}", with(&points, local_defect))
         };
         assert!((distance / 0.02 - 1.0).abs() < 0.01, "{distance}");
         assert!(with(&points, noise).expect("enough points") < 1e-6);
@@ -861,8 +832,8 @@ mod tests {
                 for (at, sign) in points[90..].iter_mut().zip(&signs) {
                     at[1] += 0.03 * sign;
                 }
-                let found = with(&points, oddity);
-                let Some(Oddity::Outliers {
+                let found = with(&points, local_defect);
+                let Some(LocalDefect::Outliers {
                     points: [first, last],
                     count,
                     distance,
@@ -882,8 +853,8 @@ mod tests {
     fn a_jump_between_two_points_is_a_step_of_its_height() {
         let mut points = arc(200);
         points.iter_mut().skip(101).for_each(|at| at[1] -= 0.03);
-        let Some(Oddity::Step { point, height }) = with(&points, oddity) else {
-            panic!("{:?}", with(&points, oddity))
+        let Some(LocalDefect::Step { point, height }) = with(&points, local_defect) else {
+            panic!("{:?}", with(&points, local_defect))
         };
         assert_eq!(point, 100);
         assert!((height / -0.03 - 1.0).abs() < 0.05, "{height}");
@@ -997,7 +968,7 @@ mod readings_tests {
     const MODULUS: f64 = 115_000.0;
     const CONTACT: [f64; 2] = [25.0, 35.0];
 
-    /// Points 0.25 mm apart on a circle of 300 mm with a height of their own each.
+    /// Points 0.25 mm apart on a circle of 300 mm radius, plus a height as a function of the length.
     fn crown(height: impl Fn(f64) -> f64) -> (Vec<[f64; 2]>, Vec<f64>) {
         let along: Vec<f64> = (0..=240).map(|k| 0.25 * f64::from(k)).collect();
         let at = along
@@ -1031,7 +1002,7 @@ mod readings_tests {
         assert!(found.ambiguity < 1.0, "{found:?}");
     }
 
-    /// A spline that halves 3 mm keeps the part `1/(1+(3/L)⁴)` of a wave of length L; the rest is seen.
+    /// A spline that halves waves of 3 mm keeps the part `1/(1+(3/L)⁴)` of a wave of length L. The rest is detected.
     #[test]
     fn a_wave_is_worth_the_pressure_that_flattens_it_as_far_as_the_reference_takes_it_away() {
         let amplitude = 0.002;

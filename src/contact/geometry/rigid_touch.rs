@@ -1,33 +1,33 @@
-//! Where a wheel touches its rail if both are rigid, for many places of the wheelset over the same rail.
+//! First touch of a rigid wheel and a rigid rail, for many positions of the wheelset on the same rail.
 
 use crate::geometry::contact_locus::rail_points;
 use crate::geometry::envelope::{Envelope, envelope};
 use crate::geometry::wheel_rail::WheelRail;
 
-/// Spacing in mm of the lines on which the rail's upper edge is kept, half of that of its points.
+/// Spacing in mm of the samples of the rail's upper envelope, half of that of the points of the rail.
 const LINE_STEP: f64 = 0.01;
-/// Spacing of the points of the wheel among which the touching one is looked for, in mm. Two places of contact whose clearances
-/// differ by less than some 3e-5 mm may be taken for each other.
+/// Spacing in mm of the points of the wheel among which the search begins. Two candidates whose clearances differ by less than about 3e-5 mm
+/// may be confused.
 const WHEEL_STEP: f64 = 0.05;
-/// The upper edge of a rail, and the points of the wheel above it.
+/// The upper envelope of a rail, and the parameters of the points of the wheel.
 #[derive(Debug, Clone)]
 pub(crate) struct RailTop {
     lines: Envelope,
     wheel: Vec<f64>,
 }
 
-/// A place where rigid bodies touch.
+/// The point at which rigid bodies touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidTouch {
-    /// Height of the wheel's centre over the top of the rail in mm.
+    /// Height of the wheel's centre above the top of the rail in mm.
     pub height: f64,
     /// Parameter of the rail's curve.
     pub rail: f64,
     /// Parameter of the wheel's curve.
     pub wheel: f64,
-    /// The place in track axes `[x, y, z]` in mm.
+    /// The point `[x, y, z]` in track axes in mm.
     pub at: [f64; 3],
-    /// Turn about x from the track's axes to those of the plane of contact, in rad.
+    /// Rotation about x from the track axes to the plane of contact, in rad.
     pub angle: f64,
     /// Radius of the wheel at the contact point in mm.
     pub radius: f64,
@@ -44,8 +44,8 @@ impl RailTop {
         }
     }
 
-    /// Height and parameter of the rail's upper edge over y.
-    fn over(&self, y: f64) -> Option<[f64; 2]> {
+    /// Height and parameter of the rail's upper envelope at y.
+    fn at(&self, y: f64) -> Option<[f64; 2]> {
         let place = y / self.lines.step - self.lines.first as f64;
         let k = place.floor();
         if k < 0.0 {
@@ -57,17 +57,20 @@ impl RailTop {
         Some([0, 1].map(|part| low[part] + t * (high[part] - low[part])))
     }
 
-    /// Where the wheel of the geometry, which has this rail, touches it first; none if no part of it is above the rail.
+    /// Finds where the wheel of a geometry with this rail touches first. Returns `None` if no part of the wheel is above the rail.
     pub(crate) fn touch(&self, geometry: &WheelRail) -> Option<RigidTouch> {
         let height = |s: &f64| {
             let [_, y, z] = geometry.lowest(*s)?;
-            Some((self.over(y)?[0] - z, *s))
+            Some((self.at(y)?[0] - z, *s))
         };
         let highest = self.wheel.iter().filter_map(height);
         let (_, mut wheel) = highest.max_by(|a, b| a.0.total_cmp(&b.0))?;
         let [first, last] = geometry.ranges()[1];
-        let value = |s: f64| self.exactly(geometry, s.clamp(first, last)).map(|at| at[0]);
-        // Refined by parabolas through points so far apart.
+        let value = |s: f64| {
+            self.touching(geometry, s.clamp(first, last))
+                .map(|at| at[0])
+        };
+        // The maximum is refined by parabolas through three points.
         for step in [WHEEL_STEP, LINE_STEP] {
             let around = [-step, 0.0, step].map(|by| value(wheel + by));
             let [Some(before), Some(here), Some(after)] = around else {
@@ -79,7 +82,7 @@ impl RailTop {
             }
         }
         let wheel = wheel.clamp(first, last);
-        let [height, rail] = self.exactly(geometry, wheel)?;
+        let [height, rail] = self.touching(geometry, wheel)?;
         let [x, y, z] = geometry.lowest(wheel)?;
         let [dy, dz] = geometry.rail_at(rail).slope;
         Some(RigidTouch {
@@ -92,17 +95,17 @@ impl RailTop {
         })
     }
 
-    /// Height of the wheel's centre at which the point of the wheel touches the rail, and the parameter of the rail there.
-    fn exactly(&self, geometry: &WheelRail, wheel: f64) -> Option<[f64; 2]> {
+    /// Height of the wheel's centre at which a point of the wheel touches the rail, and the parameter of the rail there.
+    fn touching(&self, geometry: &WheelRail, wheel: f64) -> Option<[f64; 2]> {
         let [_, y, z] = geometry.lowest(wheel)?;
-        let [_, start] = self.over(y)?;
+        let [_, start] = self.at(y)?;
         let mut rail = start;
-        // From a place on the line between two points of the rail each step of Newton's method squares the error, so that none is tested; bounds of the root,
-        // as the common root finders need, are not known on a face.
+        // The start is so close that every step of Newton's method squares the error, and four steps suffice without a test. A bracket, as
+        // the general root finder needs it, is not known on a face.
         for _ in 0..4 {
             let point = geometry.rail_at(rail);
             let step = (y - point.at[0]) / point.slope[0];
-            // On a face that is all but upright the place found from the lines is kept.
+            // On a nearly vertical face the start is kept.
             if !step.is_finite() || (rail + step - start).abs() > 2.0 * 2.0 * LINE_STEP {
                 break;
             }

@@ -1,4 +1,4 @@
-//! The boundary of a condition, and the largest value in an interval.
+//! The boundary of a condition, the largest value in an interval, and the range of some values.
 //!
 //! The root of a monotone function in a bracket: Newton's method, with bisection where a step fails, so that it always converges.
 //!
@@ -9,6 +9,13 @@
 
 /// Relative differences below this are rounding, of values that took many operations.
 pub(crate) const ROUNDING: f64 = 1e-9;
+
+/// The least and the largest of some values; `[∞, −∞]` if there are none.
+pub(crate) fn bounds(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    let widened = |[least, largest]: [f64; 2], value: f64| [least.min(value), largest.max(value)];
+    values.into_iter().fold(none, widened)
+}
 
 /// Bisects the interval between `low` and `high` (in either order) and returns the bracket after the given number of halvings, `2^-halvings` times as
 /// long. `is_low` is true on the side of `low` and false on that of `high`.

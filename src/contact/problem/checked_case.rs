@@ -11,7 +11,7 @@ use crate::case::words::contact::Contact;
 use crate::case::words::solver::MethodName;
 use crate::geometry::orientation::SureBody;
 use crate::geometry::profile::{Body, Profile};
-use crate::geometry::profile_quality::{Grain, advised_smoothing, noise_of, polygon_of};
+use crate::geometry::profile_quality::{NoiseLevel, advised_smoothing, noise_of, polygon};
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::footprint::Footprint;
 use crate::normal::gap::outcome::{APPROACH_USUAL_MAX, HALF_WIDTH_USUAL_MAX};
@@ -103,13 +103,13 @@ impl CheckedCase {
 pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
 
 /// Noise and spacing of a whole profile.
-pub fn grain(profile: &Profile) -> Grain {
+pub fn noise_level(profile: &Profile) -> NoiseLevel {
     let reading = profile.read();
     let whole = [0, reading.points.at.len()];
-    Grain {
+    NoiseLevel {
         noise: noise_of(&reading, whole).unwrap_or(0.0),
         spacing: profile.usual_chord(),
-        polygon: polygon_of(&reading, whole),
+        polygon: polygon(reading.points, whole, reading.digits),
     }
 }
 
@@ -117,13 +117,13 @@ pub fn grain(profile: &Profile) -> Grain {
 pub fn tells_noise(profile: &Profile) -> bool {
     let reading = profile.read();
     let whole = [0, reading.points.at.len()];
-    noise_of(&reading, whole).is_some() || polygon_of(&reading, whole).is_some()
+    noise_of(&reading, whole).is_some() || polygon(reading.points, whole, reading.digits).is_some()
 }
 
 /// The quality of both profiles as far as it is known before the solve, with the contact modulus in MPa.
 pub fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {
     let profiles = geometry.profiles();
-    let advised = advised_smoothing(profiles.map(grain), modulus, PRESSURE_USUAL);
+    let advised = advised_smoothing(profiles.map(noise_level), modulus, PRESSURE_USUAL);
     let [rail, wheel] = [0, 1].map(|k| section(profiles[k], advised[k]));
     PairQuality { rail, wheel }
 }

@@ -1,28 +1,30 @@
-//! Examines the points of both profiles under the patches found, and reports their defects.
-//!
-//! Defects of a profile, described so that whoever measured it can correct them.
+//! Assesses the points of both profiles under the patches found, and describes their defects so that they can be corrected.
 
 use crate::geometry::holes::{LENGTH_MIN, WIDE};
 use crate::geometry::profile::{Body, NEEDED_BEYOND, Profile};
 use crate::geometry::profile_quality::{
-    Grain, Oddity, UnderContact, advised_smoothing, noise_pressure, under_contact,
+    LocalDefect, NoiseLevel, REFERENCE_MIN, UnderContact, advised_smoothing, noise_pressure,
+    under_contact,
 };
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::wheel::WheelPatch;
+use crate::numerics::roots::bounds;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 use crate::solution::words::damage::{PatchQuality, ProfileQuality};
 
-/// Share of the roughness of both bodies from which that of one body is reported.
-const BLAMED: f64 = 0.6;
-/// Length in mm up to which a chord is judged by its ambiguity alone, however narrow the patch. The arcs of heads and treads are 10 to
+/// Least roughness of one body, relative to that of both, that is reported.
+const ROUGHNESS_SHARE: f64 = 0.6;
+/// Length in mm up to which a chord is assessed by its ambiguity alone, however narrow the patch. The arcs of heads and treads are 10 to
 /// 50 mm long, so that a longer chord may hide an arc that neither of the two curves through the points shows.
-/// Population: holes and coarse points at 384 places on the pairs of the thresholds, seeds 1001 to 1004 and 2001 to 2012 of the class *damaged
-/// profile*: with this bound 38 of 487 correct and 165 of 174 wrong answers get the remark, with 0 mm 43 and 166.
+///
+/// Population: holes and coarse points at 384 positions on the pairs of the thresholds, seeds 1001 to 1004 and 2001 to 2012 of the class
+/// *damaged profile*. With this bound 38 of 487 correct and 165 of 174 wrong answers get the remark, with 0 mm 43 and 166.
 const CHORD_HIDES_ARC: f64 = 10.0;
-/// Pressure in MPa below which errors do no harm and no job fails because of them.
+/// Pressure in MPa below which errors of a profile are harmless, so that no job fails because of them.
 const PRESSURE_LIGHT: f64 = 200.0;
-/// What the assessment needs to know of a patch.
+
+/// A patch to assess.
 #[derive(Debug, Clone, Copy)]
 pub struct FoundPatch<'a> {
     /// The patch.
@@ -68,13 +70,14 @@ impl<'a> Under<'a> {
         found.waviness.hypot(found.ambiguity)
     }
 
+    /// The cause of the roughness. Noise counts only if it needs a smoothing, as `harmful` says.
     fn cause(&self, harmful: bool) -> Cause {
         let found = &self.found;
         if let Some(chord) = found.polygon {
             return Cause::Polygon { chord };
         }
-        match found.oddity {
-            Some(Oddity::Outliers {
+        match found.local_defect {
+            Some(LocalDefect::Outliers {
                 points,
                 count,
                 farthest,
@@ -85,7 +88,7 @@ impl<'a> Under<'a> {
                 between: points.map(|point| self.y_of_point(point)),
                 count,
             },
-            Some(Oddity::Step { point, height }) => Cause::Step {
+            Some(LocalDefect::Step { point, height }) => Cause::Step {
                 y: self.y_of_point(point),
                 height,
             },
@@ -110,30 +113,23 @@ impl<'a> Under<'a> {
         }
     }
 
-    /// A finding under a patch that refuses nothing.
-    fn finding(&self, patch: FoundPatch, cause: Cause) -> Finding {
+    /// A defect under a patch because of which no job fails.
+    fn defect(&self, patch: FoundPatch, cause: Cause) -> Defect {
         let found = &self.found;
-        Finding {
-            body: self.body,
-            patch: patch.number,
+        Defect {
             y: self.contact.map(|s| self.y(s)),
             pressure: self.rough(),
-            share: 0.0,
-            left: 0.0,
             load_share: patch.load_share,
-            everywhere: 0.0,
             chord: found.chord.map(|s| self.y(s)),
             chord_length: found.chord[1] - found.chord[0],
             over_width: found.over_width,
             smoothing: self.profile.smoothing(),
-            advised: 0.0,
-            refused: false,
-            cause,
+            ..Defect::new(self.body, patch.number, cause)
         }
     }
 
-    fn grain(&self) -> Grain {
-        Grain {
+    fn noise_level(&self) -> NoiseLevel {
+        NoiseLevel {
             noise: self.found.noise.unwrap_or(0.0),
             spacing: self.found.spacing,
             polygon: self.found.polygon,
@@ -141,20 +137,15 @@ impl<'a> Under<'a> {
     }
 }
 
-/// Two ends in increasing order.
-pub(crate) fn sorted([a, b]: [f64; 2]) -> [f64; 2] {
-    [a.min(b), a.max(b)]
-}
-
-/// The quality of both profiles under a patch, and the findings. Roughness is always among them, however small. `auto` says whose smoothing
-/// is chosen automatically.
+/// The quality of both profiles under a patch, and their defects. Roughness is always among the defects, however small. `auto` states whose
+/// smoothing is chosen automatically.
 pub fn judge(
     geometry: &WheelRail,
     patch: FoundPatch,
     modulus: f64,
     auto: [bool; 2],
-) -> (PatchQuality, Vec<Finding>) {
-    let contacts = [0, 1].map(|body| sorted(patch.patch.ends.map(|end| end[body])));
+) -> (PatchQuality, Vec<Defect>) {
+    let contacts = [0, 1].map(|body| bounds(patch.patch.ends.map(|end| end[body])));
     let [rail, wheel] = geometry.profiles();
     let both = [
         Under::new(Body::Rail, rail, contacts[0], modulus),
@@ -162,18 +153,19 @@ pub fn judge(
     ];
     // Without the lower bound, a lightly loaded patch would need far more smoothing than the one that carries the load.
     let pressure = patch.pressure.max(PRESSURE_LIGHT);
-    let advised = advised_smoothing([both[0].grain(), both[1].grain()], modulus, pressure);
-    let mut findings = Vec::new();
+    let levels = both.each_ref().map(Under::noise_level);
+    let advised = advised_smoothing(levels, modulus, pressure);
+    let mut defects = Vec::new();
     let rough = both[0].rough().hypot(both[1].rough());
     for (k, own) in both.iter().enumerate() {
-        if own.rough() >= BLAMED * rough {
-            findings.push(roughness(own, rough, advised[k], auto[k], patch, modulus));
+        if own.rough() >= ROUGHNESS_SHARE * rough {
+            defects.push(roughness(own, rough, advised[k], auto[k], patch, modulus));
         }
-        findings.extend(spacing(own, patch));
-        findings.extend(place(own, patch));
+        defects.extend(spacing(own, patch));
+        defects.extend(place(own, patch));
     }
     let quality = |own: &Under, advised: f64| ProfileQuality {
-        y_mm: sorted(own.contact.map(|s| own.y(s))),
+        y_mm: bounds(own.contact.map(|s| own.y(s))),
         spacing_mm: own.found.chord[1] - own.found.chord[0],
         spacing_over_width: own.found.over_width,
         noise_um: own.found.noise.map(|noise| 1e3 * noise),
@@ -187,7 +179,7 @@ pub fn judge(
         rail: quality(&both[0], advised[0]),
         wheel: quality(&both[1], advised[1]),
     };
-    (quality, findings)
+    (quality, defects)
 }
 
 /// The roughness of a profile with its cause.
@@ -198,27 +190,22 @@ fn roughness(
     auto: bool,
     patch: FoundPatch,
     modulus: f64,
-) -> Finding {
-    let smoothing = own.profile.smoothing();
+) -> Defect {
     let found = &own.found;
-    let more = if auto || advised <= smoothing {
-        0.0
-    } else {
-        advised
-    };
-    Finding {
-        share: both / patch.pressure.max(PRESSURE_LIGHT),
+    let pressure = patch.pressure.max(PRESSURE_LIGHT);
+    let more = !auto && advised > own.profile.smoothing();
+    Defect {
+        share: both / pressure,
         left: own.noise_left(modulus) / patch.pressure,
         everywhere: found.roughness.everywhere / patch.pressure,
-        advised: more,
-        refused: patch.load_share > LIGHT
-            && found.roughness.ambiguity > AMBIGUOUS_MAX * patch.pressure.max(PRESSURE_LIGHT),
-        ..own.finding(patch, own.cause(advised > 0.0))
+        advised: if more { advised } else { 0.0 },
+        refused: patch.load_share > LIGHT && found.roughness.ambiguity > AMBIGUOUS_MAX * pressure,
+        ..own.defect(patch, own.cause(advised > 0.0))
     }
 }
 
 /// Points too far apart for the width of the patch.
-fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
+fn spacing(own: &Under, patch: FoundPatch) -> Option<Defect> {
     let found = &own.found;
     let length = found.chord[1] - found.chord[0];
     let hides_arc = length > CHORD_HIDES_ARC;
@@ -228,18 +215,18 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Finding> {
         AMBIGUOUS
     };
     let open = found.roughness.ambiguity > least * patch.pressure;
-    // Only a lightly loaded flange, which touches over some tenths of a mm, has patches that shorter chords are too long for.
+    // Chords up to this length are too long only for the patch of a lightly loaded flange, which touches over some tenths of a mm.
     let wide = length > LENGTH_MIN
         && (found.over_width > 1.0 && open || found.over_width > WIDE && hides_arc);
-    wide.then(|| Finding {
+    wide.then(|| Defect {
         share: own.rough() / patch.pressure,
         refused: patch.load_share > LIGHT && found.over_width > WIDE,
-        ..own.finding(patch, Cause::Spacing)
+        ..own.defect(patch, Cause::Spacing)
     })
 }
 
 /// A contact at the end of a profile, or on the tip of the flange.
-fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
+fn place(own: &Under, patch: FoundPatch) -> Option<Defect> {
     let [first, last] = own.profile.range();
     let [low, high] = own.contact;
     let middle = own.y(0.5 * (low + high));
@@ -257,40 +244,39 @@ fn place(own: &Under, patch: FoundPatch) -> Option<Finding> {
     } else {
         return None;
     };
-    // Where the contact is does not depend on its points: this is no worse than another place.
-    Some(Finding {
+    // The length of a chord is no measure of this defect.
+    Some(Defect {
         chord_length: 0.0,
-        ..own.finding(patch, cause)
+        ..own.defect(patch, cause)
     })
 }
 
-/// Ambiguity, relative to the pressure, below which the distance of points does not matter, as on a straight stretch.
+/// Ambiguity, relative to the pressure, up to which the spacing does not matter, as on a straight stretch.
 const AMBIGUOUS_LEAST: f64 = 0.02;
 /// Ambiguity of both bodies together, relative to the largest pressure, from which coarse points get a remark.
 ///
-/// Population: as for `CHORD_HIDES_ARC` of `judge.rs`. At 0.08, 47 of 487 correct and 166 of 174 wrong answers get the remark, at 0.09 38 and
-/// 165, at 0.10 34 and 163.
+/// Population: that of [`CHORD_HIDES_ARC`]. At 0.08, 47 of 487 correct and 166 of 174 wrong answers get the remark, at 0.09 38 and 165, at
+/// 0.10 34 and 163.
 const AMBIGUOUS: f64 = 0.09;
-/// Ambiguity relative to the largest pressure that makes a job fail.
+/// Ambiguity, relative to the largest pressure, from which a job fails.
 const AMBIGUOUS_MAX: f64 = 0.5;
-/// Waviness, relative to the largest pressure, above which it is a defect even without noise, outlier or step. Two arcs that meet have
+/// Waviness, relative to the largest pressure, from which it is a defect even without noise, outlier or step. Two arcs that meet have
 /// some too: an unworn 60E1 reaches 0.12 at its gauge corner.
 const WAVES_BEYOND_SHAPE: f64 = 0.3;
-/// Waves and noise below this share of the largest pressure are harmless; a larger median waviness extends beyond the contact and indicates waves.
+/// Share of the largest pressure up to which waves and noise are harmless. A larger median waviness indicates waves beyond the contact.
 pub(crate) const HARMLESS: f64 = 0.03;
-/// Share of the load below which a patch may lie entirely where two arcs meet: its pressure then says nothing of the profiles, and the forces do not depend
-/// on it.
+/// Share of the load up to which a patch may lie entirely where two arcs meet. Its pressure does not show the quality of the profiles, and the
+/// forces do not depend on it.
 pub const LIGHT: f64 = 0.02;
-/// Roughness, relative to the largest pressure, that gets a remark even if other readings of the points change the answer little.
+/// Roughness, relative to the largest pressure, that gets a remark even if other readings of the points hardly change the answer.
 const ROUGH_IN_ANY_CASE: f64 = 0.15;
-/// Noise, relative to the largest pressure, that may remain on each body after smoothing; the advised smoothing leaves 0.07 on both
-/// together.
+/// Noise, relative to the largest pressure, that may remain on each body after smoothing. The advised smoothing leaves 0.07 on both together.
 const NOISE_LEFT_MAX: f64 = 0.08;
 
-/// One thing that is wrong with a profile under a patch.
+/// A defect of a profile under a patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Finding {
-    /// Which profile.
+pub struct Defect {
+    /// The body whose profile it is.
     pub body: Body,
     /// Index of the patch in the answer.
     pub patch: usize,
@@ -314,9 +300,9 @@ pub struct Finding {
     pub over_width: f64,
     /// Smoothing in use, in mm.
     pub smoothing: f64,
-    /// Smoothing advised, in mm; 0 if no more is advised than is in use, or if the smoothing is chosen automatically.
+    /// Smoothing advised, in mm; 0 if it is not more than the one in use, or if the smoothing is chosen automatically.
     pub advised: f64,
-    /// Whether the answer would mislead, so that the job fails unless rough profiles are accepted.
+    /// Whether the answer would be unreliable, so that the job fails unless rough profiles are accepted.
     pub refused: bool,
     /// The kind of defect.
     pub cause: Cause,
@@ -327,13 +313,13 @@ pub struct Finding {
 pub enum Cause {
     /// One point or a few neighbours are displaced.
     Outliers {
-        /// y of the point farthest off, in mm.
+        /// y of the point displaced most, in mm.
         y: f64,
         /// Displacement of that point in mm.
         distance: f64,
-        /// y of the first and of the last of them, in mm.
+        /// y of the first and of the last displaced point, in mm.
         between: [f64; 2],
-        /// How many there are.
+        /// Number of displaced points.
         count: usize,
     },
     /// The profile jumps between two points.
@@ -345,14 +331,14 @@ pub enum Cause {
     },
     /// The points were interpolated linearly between fewer points.
     Polygon {
-        /// Length of the chords in mm.
+        /// Length of the sides in mm.
         chord: f64,
     },
     /// Noise of the measurement or of rounding.
     Noise {
         /// Standard deviation in mm.
         noise: f64,
-        /// Mean distance of the points in mm.
+        /// Mean spacing of the points in mm.
         spacing: f64,
         /// Step of rounding in mm.
         rounding: Option<f64>,
@@ -363,7 +349,7 @@ pub enum Cause {
     Coarse,
     /// The points are far apart for the width of the patch.
     Spacing,
-    /// A stretch without points near the patch, where the bodies may touch as well.
+    /// A stretch without points near the patch, where the bodies may touch too.
     Hole,
     /// The contact is on the tip of the flange.
     FlangeTip,
@@ -374,9 +360,30 @@ pub enum Cause {
     },
 }
 
-impl Finding {
-    /// Whether this is a kind of roughness, which matters only above a threshold.
-    pub fn of_roughness(&self) -> bool {
+impl Defect {
+    /// A defect without any measures.
+    pub(crate) fn new(body: Body, patch: usize, cause: Cause) -> Defect {
+        Defect {
+            body,
+            patch,
+            y: [0.0; 2],
+            pressure: 0.0,
+            share: 0.0,
+            load_share: 0.0,
+            left: 0.0,
+            everywhere: 0.0,
+            chord: [0.0; 2],
+            chord_length: 0.0,
+            over_width: 0.0,
+            smoothing: 0.0,
+            advised: 0.0,
+            refused: false,
+            cause,
+        }
+    }
+
+    /// Returns whether this is a kind of roughness, which matters only above a threshold.
+    pub fn is_roughness(&self) -> bool {
         matches!(
             self.cause,
             Cause::Outliers { .. }
@@ -388,45 +395,41 @@ impl Finding {
         )
     }
 
-    /// Whether it exceeds what the shape of a sound profile, such as two arcs that meet, can cause.
+    /// Returns whether it exceeds the effect of the shape of a sound profile, such as two arcs that meet.
     pub fn has_evidence(&self) -> bool {
         match self.cause {
-            Cause::Outliers { .. }
-            | Cause::Step { .. }
-            | Cause::Polygon { .. }
-            | Cause::Noise { .. } => true,
             Cause::Waves => {
                 self.smoothing > 0.0
                     || self.everywhere > HARMLESS
                     || self.share > WAVES_BEYOND_SHAPE && self.load_share > LIGHT
             }
             Cause::Coarse => self.smoothing > 0.0 || self.share > AMBIGUOUS,
-            Cause::Spacing | Cause::Hole | Cause::FlangeTip | Cause::End { .. } => true,
+            _ => true,
         }
     }
 
-    /// Whether `other` would give the same remark about another place.
-    pub fn is_like(&self, other: &Finding) -> bool {
+    /// Returns whether `other` gives the same remark about another place.
+    pub fn is_like(&self, other: &Defect) -> bool {
         let kind = std::mem::discriminant::<Cause>;
         self.body == other.body && kind(&self.cause) == kind(&other.cause)
     }
 
-    /// Whether it becomes a remark; `changes` is whether another reading of the points changes the patch much.
+    /// Returns whether it becomes a remark. `changes` states whether another reading of the points changes the patch much.
     pub fn is_reported(&self, changes: bool) -> bool {
         match self.cause {
             Cause::Coarse => self.has_evidence(),
             Cause::Noise { .. } | Cause::Waves | Cause::Polygon { .. } if self.smoothing > 0.0 => {
                 self.share > ROUGH_IN_ANY_CASE || self.left > NOISE_LEFT_MAX
             }
-            _ if self.of_roughness() && !self.refused => {
+            _ if self.is_roughness() && !self.refused => {
                 self.has_evidence() && (changes || self.share > ROUGH_IN_ANY_CASE)
             }
             _ => true,
         }
     }
 
-    /// Whether it is worse than another finding of its kind.
-    pub fn worse_than(&self, other: &Finding) -> bool {
+    /// Returns whether it is worse than another defect of its kind.
+    pub fn worse_than(&self, other: &Defect) -> bool {
         [self.share, self.chord_length] > [other.share, other.chord_length]
     }
 
@@ -443,17 +446,6 @@ impl Finding {
         RemarkEntry {
             patch: Some(self.patch),
             ..self.report().at_pointer(self.pointer())
-        }
-    }
-
-    /// The remark on points that are far apart.
-    fn spacing(&self) -> Remark {
-        Remark::ProfileSpacing {
-            profile: self.body.name(),
-            y_mm: self.chord,
-            spacing_mm: self.chord_length,
-            spacing_over_width: self.over_width,
-            ambiguity_mpa: self.pressure,
         }
     }
 
@@ -508,11 +500,17 @@ impl Finding {
             Cause::Waves => Remark::ProfileWaves {
                 profile,
                 y_mm,
-                shorter_than_mm: 3.0_f64.max(2.0 * self.smoothing),
+                shorter_than_mm: REFERENCE_MIN.max(2.0 * self.smoothing),
                 waviness_mpa,
                 share,
             },
-            Cause::Coarse | Cause::Spacing => self.spacing(),
+            Cause::Coarse | Cause::Spacing => Remark::ProfileSpacing {
+                profile,
+                y_mm: self.chord,
+                spacing_mm: self.chord_length,
+                spacing_over_width: self.over_width,
+                ambiguity_mpa: self.pressure,
+            },
             Cause::Hole => Remark::ProfileHole {
                 profile,
                 y_mm: self.chord,

@@ -6,12 +6,13 @@ use crate::error::SolveError;
 use crate::geometry::contact_locus::ContactLocus;
 use crate::geometry::holes::{Hole, holes};
 use crate::geometry::profile::{Body, NEEDED_BEYOND, Profile};
-use crate::geometry::profile_quality::{Grain, advised_smoothing, under_contact};
+use crate::geometry::profile_quality::{NoiseLevel, advised_smoothing, under_contact};
 use crate::monitor::Monitor;
 use crate::normal::wheel::{ReferenceSurface, WheelContact, WheelPatch, WheelTask};
+use crate::numerics::roots::bounds;
 use crate::problem::checked_case;
 use crate::problem::checked_case::{CheckedCase, PRESSURE_USUAL};
-use crate::profile_assessment::judge::{Cause, Finding, FoundPatch, HARMLESS, judge, sorted};
+use crate::profile_assessment::judge::{Cause, Defect, FoundPatch, HARMLESS, judge};
 use crate::profile_assessment::uncertainty;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
@@ -24,8 +25,8 @@ use crate::wheel_on_rail::SolvedWheel;
 /// Solves a wheel on a rail and assesses its profiles.
 ///
 /// # Errors
-/// Why there is no answer; [`SolveError::RoughProfile`] where the points of a profile do not allow one and rough profiles are not
-/// accepted.
+/// Returns the reason why there is no answer: [`SolveError::RoughProfile`] if the points of a profile do not allow one and rough profiles are
+/// not accepted.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -40,10 +41,10 @@ pub(crate) fn solve(
     Ok((found.solution, found.fields))
 }
 
-/// Solves a wheel on a rail and refuses profiles that allow no answer; how far the others can be trusted is not assessed.
+/// Solves a wheel on a rail and refuses profiles that allow no answer, without assessing the uncertainty of the others.
 ///
 /// # Errors
-/// As [`solve`].
+/// Returns the errors of [`solve`].
 pub(crate) fn judged(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -53,10 +54,11 @@ pub(crate) fn judged(
     Judgement::new(contact).solve(operators, case, monitor)
 }
 
-/// Whether a wheel comes to rest on the curve of its rail without tractions, on profiles that allow an answer. There is no such question on planes.
+/// Checks that a wheel without tractions has an equilibrium on the curve of its rail, on profiles that allow an answer. On planes nothing is
+/// checked.
 ///
 /// # Errors
-/// Why it does not.
+/// Returns the reason why it has none.
 pub(crate) fn comes_to_rest(
     case: &CheckedCase,
     contact: &WheelTask,
@@ -73,10 +75,10 @@ pub(crate) fn comes_to_rest(
     Ok(())
 }
 
-/// Assesses the profiles under the patches of a wheel that was solved.
+/// Assesses the profiles under the patches of a solved wheel.
 ///
 /// # Errors
-/// As [`solve`].
+/// Returns the errors of [`solve`].
 pub(crate) fn trusted(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -95,62 +97,56 @@ fn assessed(
     monitor: &dyn Monitor,
 ) -> Result<SolvedWheel, SolveError> {
     let contact = judgement.contact;
-    let (qualities, findings) = judgement.assess(&found.wheel);
+    let (qualities, defects) = judgement.assess(&found.wheel);
     let solution = &mut found.solution;
     for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
         patch.quality = Some(quality);
     }
-    let rough = findings.iter().any(|finding| {
-        finding.of_roughness() && finding.has_evidence() && finding.share > HARMLESS
-    });
+    let rough = defects
+        .iter()
+        .any(|defect| defect.is_roughness() && defect.has_evidence() && defect.share > HARMLESS);
     let suspicious = rough || undecided(contact);
     let changes = uncertainty::add(operators, case, contact, suspicious, solution, monitor)?;
-    let reported = findings
+    let reported = defects
         .into_iter()
-        .filter(|finding| finding.is_reported(changes[finding.patch]));
-    let reported = worst_of_each(reported);
+        .filter(|defect| defect.is_reported(changes[defect.patch]));
+    let worst = worst_of_each(reported);
     solution.remarks.extend(remarks(contact));
-    solution
-        .remarks
-        .extend(reported.iter().map(Finding::remark));
-    solution
-        .remarks
-        .extend(uncertainty::target_below(case, solution));
+    solution.remarks.extend(worst.iter().map(Defect::remark));
+    let target_below = uncertainty::target_below(case, solution);
+    solution.remarks.extend(target_below);
     Ok(found)
 }
 
-/// The worst finding of each kind and body. A rough profile has dozens of patches, of which one remark each would be too many.
-fn worst_of_each(findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
-    let mut worst: Vec<Finding> = Vec::new();
-    for finding in findings {
-        let same = |other: &&mut Finding| finding.is_like(other);
+/// The worst defect of each kind and body. A rough profile may have dozens of patches, too many for one remark each.
+fn worst_of_each(defects: impl Iterator<Item = Defect>) -> Vec<Defect> {
+    let mut worst: Vec<Defect> = Vec::new();
+    for defect in defects {
+        let same = |other: &&mut Defect| defect.is_like(other);
         match worst.iter_mut().find(same) {
-            None => worst.push(finding),
-            Some(other) if finding.worse_than(other) => *other = finding,
+            None => worst.push(defect),
+            Some(other) if defect.worse_than(other) => *other = defect,
             Some(_) => {}
         }
     }
     worst
 }
 
-/// Assesses the profiles under the patches of a wheel at rest.
+/// The assessment of the profiles under the patches of a wheel in equilibrium.
 struct Judgement<'a> {
     contact: &'a WheelTask,
-    /// Findings of the last wheel that was judged.
-    last: Option<Assessed>,
+    /// Defects found for the last wheel.
+    last: Vec<Defect>,
 }
 
-/// The quality of the profiles under every patch, and the findings.
-type Assessed = (Vec<PatchQuality>, Vec<Finding>);
-
-/// Advice that ends the error about a refused profile.
+/// Advice at the end of the error about a refused profile.
 const ACCEPT: &str = "; to solve it anyway, give accept_rough_profiles: true";
 
-/// The error that a finding causes, with a further clause.
-fn rough(finding: &Finding, more: &str) -> SolveError {
+/// The error that a defect causes, with a further clause.
+fn rough(defect: &Defect, more: &str) -> SolveError {
     SolveError::RoughProfile {
-        pointer: finding.pointer().to_owned(),
-        reason: finding.remark().detail + more,
+        pointer: defect.pointer().to_owned(),
+        reason: defect.remark().detail + more,
     }
 }
 
@@ -158,7 +154,7 @@ impl<'a> Judgement<'a> {
     fn new(contact: &'a WheelTask) -> Judgement<'a> {
         Judgement {
             contact,
-            last: None,
+            last: Vec::new(),
         }
     }
 
@@ -174,44 +170,39 @@ impl<'a> Judgement<'a> {
         found.map_err(|error| self.explained(error))
     }
 
-    /// Fails before the tangential problem is solved if the answer would mislead: on the ridge under an outlier, for example, that
-    /// solve would fail with an error that does not mention the outlier.
+    /// Fails before the tangential problem is solved if the answer would be unreliable. That solve could fail with an error that does not
+    /// mention the cause, such as an outlier and the ridge on it.
     fn before(&mut self, wheel: &WheelContact) -> Result<(), SolveError> {
-        let assessed = self.assess(wheel);
-        let (_, findings) = self.last.insert(assessed);
-        if self.contact.trust.accept_rough {
-            return Ok(());
+        (_, self.last) = self.assess(wheel);
+        let refused = self.last.iter().find(|defect| defect.refused);
+        match refused.filter(|_| !self.contact.trust.accept_rough) {
+            Some(defect) => Err(rough(defect, ACCEPT)),
+            None => Ok(()),
         }
-        let refused = findings.iter().find(|finding| finding.refused);
-        refused.map_or(Ok(()), |finding| Err(rough(finding, ACCEPT)))
     }
 
-    /// The error of a motion that was not solved, with what the wheel at rest says of its cause.
+    /// The error of a motion that was not solved. If the profiles have defects, they are named as the cause of a failure of the mesh.
     fn explained(&self, error: SolveError) -> SolveError {
         let of_mesh = matches!(
             error,
             SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }
         );
-        let Some((_, findings)) = self.last.as_ref().filter(|_| of_mesh) else {
-            return error;
-        };
-        let worst = findings
-            .iter()
-            .filter(|finding| finding.refused || finding.is_reported(false))
+        let worst = (self.last.iter())
+            .filter(|defect| of_mesh && (defect.refused || defect.is_reported(false)))
             .reduce(|worst, other| match other.worse_than(worst) {
                 true => other,
                 false => worst,
             });
         match worst {
-            Some(finding) => rough(finding, &format!("; {error}")),
+            Some(defect) => rough(defect, &format!("; {error}")),
             None => error,
         }
     }
 
-    /// The quality of the profiles under every patch, and the findings.
-    fn assess(&self, wheel: &WheelContact) -> Assessed {
+    /// The quality of the profiles under every patch, and their defects.
+    fn assess(&self, wheel: &WheelContact) -> (Vec<PatchQuality>, Vec<Defect>) {
         let contact = self.contact;
-        let (mut qualities, mut findings) = (Vec::new(), Vec::new());
+        let (mut qualities, mut defects) = (Vec::new(), Vec::new());
         let mut width: f64 = 0.0;
         let load = wheel.normal_force();
         for found in &wheel.patches {
@@ -227,27 +218,25 @@ impl<'a> Judgement<'a> {
             let (quality, own) = judge(&contact.geometry, place, modulus, auto);
             width = width.max(to - from);
             qualities.push(quality);
-            findings.extend(own);
+            defects.extend(own);
         }
-        let hidden = self.hidden(wheel, width, &mut qualities);
-        findings.extend(hidden);
-        (qualities, findings)
+        defects.extend(self.hidden(wheel, width, &mut qualities));
+        (qualities, defects)
     }
 
-    /// Stretches without points where the bodies may touch in addition to the patches found; `width` in mm is that of the widest
-    /// patch.
+    /// Stretches without points outside all patches where the bodies may touch. `width` in mm is that of the widest patch.
     fn hidden(
         &self,
         wheel: &WheelContact,
         width: f64,
         qualities: &mut [PatchQuality],
-    ) -> Vec<Finding> {
+    ) -> Vec<Defect> {
         let geometry = &self.contact.geometry;
         let longest = geometry.profiles().map(Profile::longest_chord);
         if longest[0].max(longest[1]) < Hole::least(width) {
             return Vec::new();
         }
-        // Searched only if there are long chords, because the search takes a considerable part of a solve's time.
+        // The search takes a considerable part of the time of a solve.
         let Ok(search) = ContactLocus::new(geometry) else {
             return Vec::new();
         };
@@ -257,19 +246,19 @@ impl<'a> Judgement<'a> {
             .collect()
     }
 
-    /// The finding about a hole outside all patches, attributed to the nearest one.
+    /// The defect of a hole, attributed to the nearest patch; `None` if a patch overlaps it.
     fn beside(
         &self,
         hole: &Hole,
         wheel: &WheelContact,
         width: f64,
         qualities: &mut [PatchQuality],
-    ) -> Option<Finding> {
+    ) -> Option<Defect> {
         let body = hole.body as usize;
         let profile = self.contact.geometry.profiles()[body];
         let [from, to] = hole.chord;
         let distance = |patch: &WheelPatch| {
-            let [low, high] = sorted(patch.ends.map(|end| end[body]));
+            let [low, high] = bounds(patch.ends.map(|end| end[body]));
             (low - to).max(from - high)
         };
         let distances = wheel.patches.iter().map(distance);
@@ -284,33 +273,26 @@ impl<'a> Judgement<'a> {
             Body::Wheel => &mut qualities[nearest].wheel,
         };
         quality.hole_mm = Some(quality.hole_mm.unwrap_or(0.0).max(length));
-        Some(Finding {
-            body: hole.body,
-            patch: nearest,
+        Some(Defect {
             y,
-            pressure: 0.0,
-            share: 0.0,
-            left: 0.0,
-            load_share: 0.0,
-            everywhere: 0.0,
             chord: y,
             chord_length: length,
             over_width: length / width,
             smoothing: profile.smoothing(),
-            advised: 0.0,
             refused: hole.wide,
-            cause: Cause::Hole,
+            ..Defect::new(hole.body, nearest, Cause::Hole)
         })
     }
 }
 
-/// Noise and spacing of a profile near a place in mm along it. A few displaced points are no noise: smoothing only spreads their error.
-fn grain_near(profile: &Profile, place: f64, modulus: f64) -> Grain {
-    // About the width of a usual patch.
+/// Noise and spacing of a profile near a place in mm along it. Near a few displaced points no noise is reported, because smoothing would only
+/// spread their error.
+fn noise_level_near(profile: &Profile, place: f64, modulus: f64) -> NoiseLevel {
+    // A usual patch is about as wide.
     let contact = [place - NEEDED_BEYOND, place + NEEDED_BEYOND];
     let found = under_contact(&profile.read(), contact, modulus);
-    let noise = found.noise.filter(|_| found.oddity.is_none());
-    Grain {
+    let noise = found.noise.filter(|_| found.local_defect.is_none());
+    NoiseLevel {
         noise: noise.unwrap_or(0.0),
         spacing: found.spacing,
         polygon: found.polygon,
@@ -343,7 +325,7 @@ pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
         .collect()
 }
 
-/// Whether an automatic smoothing was requested for points from which the noise cannot be determined.
+/// Returns whether an automatic smoothing was requested for points from which the noise cannot be determined.
 pub(crate) fn undecided(contact: &WheelTask) -> bool {
     let profiles = contact.geometry.profiles().into_iter();
     profiles
@@ -351,12 +333,13 @@ pub(crate) fn undecided(contact: &WheelTask) -> bool {
         .any(|(profile, auto)| auto && !checked_case::tells_noise(profile))
 }
 
-/// The contact with every automatic smoothing replaced by a length: first the one for a pressure of 1200 MPa, then the one for the largest
-/// pressure that a solve on a coarse grid finds with the first. Where the noise of a whole profile asks for none, that of its points near the
-/// first touch decides.
+/// Replaces every automatic smoothing by a length. Returns `None` if the case has none.
+///
+/// The first length suits a pressure of 1200 MPa. The final one suits the largest pressure that a solve on a coarse grid finds with the first.
+/// If the noise of a whole profile needs no smoothing, the points near the first touch decide.
 ///
 /// # Errors
-/// The wheel does not come to rest on the rail, or the monitor stopped the work.
+/// Returns an error if the wheel has no equilibrium on the rail or the monitor stopped the work.
 pub(crate) fn settled(
     case: &CheckedCase,
     contact: &WheelTask,
@@ -367,27 +350,26 @@ pub(crate) fn settled(
         return Ok(None);
     }
     let modulus = contact.contact_modulus;
-    let mut grains = contact.geometry.profiles().map(checked_case::grain);
-    let advised = advised_smoothing(grains, modulus, PRESSURE_USUAL);
+    let mut levels = contact.geometry.profiles().map(checked_case::noise_level);
+    let advised = advised_smoothing(levels, modulus, PRESSURE_USUAL);
     if let Ok(search) = ContactLocus::new(&contact.geometry) {
         let touch = search.first_touch();
         for k in [0, 1] {
             if auto[k] && advised[k] == 0.0 {
-                grains[k] = grain_near(contact.geometry.profiles()[k], touch[k], modulus);
+                levels[k] = noise_level_near(contact.geometry.profiles()[k], touch[k], modulus);
             }
         }
     }
     let chosen = |pressure: f64| {
-        let advised = advised_smoothing(grains, modulus, pressure);
+        let advised = advised_smoothing(levels, modulus, pressure);
         let [rail, wheel] = contact.geometry.profiles();
         let own = [rail.smoothing(), wheel.smoothing()];
         [0, 1].map(|k| if auto[k] { advised[k] } else { own[k] })
     };
-    let with = |smoothing: [f64; 2]| contact.smoothed(smoothing);
-    let first = chosen(PRESSURE_USUAL);
-    if first == [0.0; 2] {
-        return Ok(Some(with(first)));
+    let mut smoothing = chosen(PRESSURE_USUAL);
+    if smoothing != [0.0; 2] {
+        let smoothed = contact.smoothed(smoothing);
+        smoothing = chosen(wheel_on_rail::largest_pressure(case, &smoothed, monitor)?);
     }
-    let main = wheel_on_rail::largest_pressure(case, &with(first), monitor)?;
-    Ok(Some(with(chosen(main))))
+    Ok(Some(contact.smoothed(smoothing)))
 }

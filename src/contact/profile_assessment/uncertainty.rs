@@ -1,8 +1,8 @@
-//! The uncertainty due to the measurement of the profiles, from solving the same contact with other readings of its profiles.
+//! The uncertainty due to the measurement of the profiles, from solving the same contact with other smoothings.
 //!
 //! With the smoothing L the contact is solved again with L/2.5, which shows how much noise remains, and with 2 L, which shows how much of
 //! the shape is lost. The uncertainty is the largest difference, plus 1 % of the pressure and 0.3 % of μN respectively. Population: noise
-//! of 1 to 20 µm with L = 5 mm; the errors of 97 % of the pressures and 93 % of the forces are within it.
+//! of 1 to 20 µm with L = 5 mm. The errors of 97 % of the pressures and 93 % of the forces are within it.
 
 use std::sync::Arc;
 
@@ -21,28 +21,31 @@ use crate::solution::words::answer::{PatchSolution, Solution};
 use crate::solution::words::damage::{ProfileQuality, ProfileUncertainty};
 use crate::wheel_on_rail;
 
-/// The companion solves use the smoothing multiplied by these factors.
+/// Factors of the smoothing in the companion solves.
 pub(crate) const COMPANIONS: [f64; 2] = [0.4, 2.0];
-/// Added to the differences, relative to the largest pressure and to μN.
+/// Part of the uncertainty of the pressure in any case, relative to the largest pressure.
 const PRESSURE_FLOOR: f64 = 0.01;
+/// Part of the uncertainty of the forces in any case, relative to μN.
 const FORCE_FLOOR: f64 = 0.003;
-/// Uncertainty without companions: of the pressure, as a multiple of the roughness; of the force relative to μN, as a multiple of the
-/// roughness relative to the pressure.
+/// Uncertainty of the pressure due to the points, as a multiple of their roughness.
 const BY_ROUGHNESS: f64 = 2.0;
+/// Uncertainty of the forces due to the points, relative to μN, as a multiple of that of the pressure relative to the pressure.
 const FORCE_BY_PRESSURE: f64 = 0.1;
-/// Smallest target of companions, relative to μN, and most motions that they are solved for.
+/// Target error of the companions relative to μN.
 const TARGET: f64 = 0.01;
+/// Most motions for which companions are solved.
 const MOTIONS_MAX: usize = 5;
-/// Uncertainty, relative to the largest pressure and to μN, from which there is a remark.
-const PRESSURE_OPEN: f64 = 0.06;
-const FORCE_OPEN: f64 = 0.02;
-/// Largest distance across the track, in mm, between corresponding patches of a solve and its companion.
-const SAME_PLACE: f64 = 6.0;
+/// Change of the pressure, relative to the largest pressure, from which there is a remark.
+const PRESSURE_CHANGE: f64 = 0.06;
+/// Change of a force, relative to μN, from which there is a remark.
+const FORCE_CHANGE: f64 = 0.02;
+/// Largest lateral distance in mm between corresponding patches of a solve and its companion.
+const SAME_PATCH: f64 = 6.0;
 
-/// Writes the uncertainty into every point and total, and returns which patches another reading changes so much that a remark is due.
+/// Writes the uncertainty into every point and total. Returns for each patch whether another reading changes it so much that a remark is due.
 ///
 /// # Errors
-/// The monitor stopped the work.
+/// Returns an error if the monitor stopped the work.
 pub(crate) fn add(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -52,7 +55,7 @@ pub(crate) fn add(
     monitor: &dyn Monitor,
 ) -> Result<Vec<bool>, SolveError> {
     let motions = case.problem.motions.len();
-    // The points of a history follow from each other.
+    // The points of a history depend on each other.
     let chosen: Vec<usize> = if motions <= MOTIONS_MAX || case.problem.history.is_some() {
         (0..motions).collect()
     } else {
@@ -69,9 +72,9 @@ pub(crate) fn add(
                 operators,
                 &companion(case, &chosen),
                 &other,
-                // Companions are solved without an assessment of their profiles.
+                // The profiles of companions are not assessed.
                 &mut |_| Ok(()),
-                // They can be stopped, but report no progress, because that of the solve is complete.
+                // Companions can be stopped, but report no progress, because that of the solve is complete.
                 &MonitorPart {
                     inner: monitor,
                     before: 1.0,
@@ -82,7 +85,7 @@ pub(crate) fn add(
                 Err(stop @ (SolveError::Cancelled | SolveError::OutOfTime { .. })) => {
                     return Err(stop);
                 }
-                // The companion has no answer; the uncertainty then follows from roughness alone.
+                // Without companions, the uncertainty follows from the roughness alone.
                 Err(_) => {}
             }
         }
@@ -105,12 +108,10 @@ pub(crate) fn target_below(case: &CheckedCase, solution: &Solution) -> Option<Re
         .iter()
         .map(|patch| case.problem.friction.largest() * patch.normal_force_n)
         .sum();
-    let open = solution
-        .total
-        .iter()
-        .filter_map(|total| total.profile_uncertainty);
-    let largest = open
-        .map(|open| open.force_x_n.max(open.force_y_n))
+    let totals = solution.total.iter();
+    let uncertainties = totals.filter_map(|total| total.profile_uncertainty);
+    let largest = uncertainties
+        .map(|own| own.force_x_n.max(own.force_y_n))
         .reduce(f64::max)?;
     let uncertainty = largest / limit;
     (limit > 0.0 && uncertainty > target.max(2.0 * FORCE_FLOOR)).then(|| {
@@ -122,7 +123,7 @@ pub(crate) fn target_below(case: &CheckedCase, solution: &Solution) -> Option<Re
     })
 }
 
-/// Whether the noise that remains after smoothing is a significant share of the pressure.
+/// Returns whether the noise that remains after smoothing is a significant share of the pressure.
 fn noisy(patch: &PatchSolution, modulus: f64) -> bool {
     let Some(quality) = &patch.quality else {
         return false;
@@ -137,8 +138,8 @@ fn noisy(patch: &PatchSolution, modulus: f64) -> bool {
     both > HARMLESS * patch.pressure_max_mpa
 }
 
-/// Ambiguity of both bodies in MPa, including waviness that is not due to the shape.
-fn open_by_points(patch: &PatchSolution, rough: bool) -> f64 {
+/// Roughness of both bodies in MPa: their ambiguity, and their waviness if it is not due to the shape.
+fn roughness(patch: &PatchSolution, rough: bool) -> f64 {
     let Some(quality) = &patch.quality else {
         return 0.0;
     };
@@ -193,26 +194,21 @@ fn companion(case: &CheckedCase, chosen: &[usize]) -> CheckedCase {
     }
 }
 
-/// Differences between two answers, in forces and in the largest pressure.
+/// Differences between answers, in forces (N) and in the largest pressure (MPa).
 #[derive(Debug, Clone, Copy, Default)]
-struct Open {
+struct Differences {
     force: [f64; 2],
     pressure: f64,
 }
 
-/// Uncertainty of a patch: from the differences between readings, and from the spacing of its points.
-struct OfPatch {
-    between: Open,
-    all: Open,
-}
-
-impl Open {
+impl Differences {
+    /// Enlarges the differences to at least these.
     fn widen(&mut self, force: [f64; 2], pressure: f64) {
         self.force = [0, 1].map(|k| self.force[k].max(force[k]));
         self.pressure = self.pressure.max(pressure);
     }
 
-    /// The uncertainty with its lower bounds added, for a given μN and largest pressure.
+    /// The uncertainty for a friction limit μN and a largest pressure.
     fn report(self, limit: f64, pressure: f64) -> ProfileUncertainty {
         ProfileUncertainty {
             force_x_n: self.force[0] + FORCE_FLOOR * limit,
@@ -223,7 +219,7 @@ impl Open {
 }
 
 impl ProfileUncertainty {
-    /// Of a motion with these shares of the load and of the largest pressure that it was found for.
+    /// The uncertainty in another motion, given its load and its largest pressure relative to those of the first one.
     fn in_proportion(self, [load, pressure]: [f64; 2]) -> ProfileUncertainty {
         ProfileUncertainty {
             force_x_n: self.force_x_n * load,
@@ -233,7 +229,7 @@ impl ProfileUncertainty {
     }
 }
 
-/// Writes the uncertainties of the first motion, and those of the others in proportion to their loads and pressures.
+/// Writes the uncertainties of all motions, in proportion to their loads and pressures.
 fn write(
     friction: f64,
     chosen: &[usize],
@@ -242,21 +238,16 @@ fn write(
 ) -> Vec<bool> {
     let rough = !companions.is_empty();
     let patches = solution.patches.iter();
-    let of_patches: Vec<OfPatch> = patches
+    let of_patches: Vec<[Differences; 2]> = patches
         .map(|patch| {
-            of_patch(
-                patch,
-                chosen,
-                companions,
-                friction * patch.normal_force_n,
-                rough,
-            )
+            let limit = friction * patch.normal_force_n;
+            of_patch(patch, chosen, companions, limit, rough)
         })
         .collect();
-    let mut of_all = Open::default();
-    for own in &of_patches {
-        of_all.pressure = of_all.pressure.max(own.all.pressure);
-        of_all.force = [0, 1].map(|k| of_all.force[k] + own.all.force[k]);
+    let mut of_all = Differences::default();
+    for [_, all] in &of_patches {
+        of_all.pressure = of_all.pressure.max(all.pressure);
+        of_all.force = [0, 1].map(|k| of_all.force[k] + all.force[k]);
     }
     if rough {
         of_all.force = [0.0; 2];
@@ -293,18 +284,14 @@ fn write(
         total.profile_uncertainty = Some(reported.in_proportion(share));
     }
     let mut changes = Vec::with_capacity(of_patches.len());
-    for (patch, open) in solution.patches.iter_mut().zip(of_patches) {
-        let limit = FORCE_OPEN * friction * patch.normal_force_n;
+    for (patch, [between, all]) in solution.patches.iter_mut().zip(of_patches) {
+        let limit = FORCE_CHANGE * friction * patch.normal_force_n;
+        let is_large = |force: &f64| *force > limit && limit > 0.0;
         changes.push(
-            open.between.pressure > PRESSURE_OPEN * patch.pressure_max_mpa
-                || open
-                    .between
-                    .force
-                    .iter()
-                    .any(|force| *force > limit && limit > 0.0),
+            between.pressure > PRESSURE_CHANGE * patch.pressure_max_mpa
+                || between.force.iter().any(is_large),
         );
-        let open = open.all;
-        let reported = open.report(friction * patch.normal_force_n, patch.pressure_max_mpa);
+        let reported = all.report(friction * patch.normal_force_n, patch.pressure_max_mpa);
         for point in &mut patch.points {
             let share = point.region.as_deref().map_or([1.0; 2], |region| {
                 [
@@ -323,17 +310,18 @@ fn largest(solution: &Solution) -> f64 {
     all.fold(0.0, f64::max)
 }
 
-/// The uncertainty of a patch, `limit` being its μN: from its points, and from the differences to the nearest patch of each companion.
+/// The differences of a patch, whose friction limit μN is `limit`, from the nearest patch of each companion; and the same including the effect
+/// of the roughness of its points.
 fn of_patch(
     patch: &PatchSolution,
     chosen: &[usize],
     companions: &[Solution],
     limit: f64,
     rough: bool,
-) -> OfPatch {
-    let by_points = BY_ROUGHNESS * open_by_points(patch, rough);
+) -> [Differences; 2] {
+    let by_points = BY_ROUGHNESS * roughness(patch, rough);
     let force = FORCE_BY_PRESSURE * limit * by_points / patch.pressure_max_mpa;
-    let mut open = Open::default();
+    let mut between = Differences::default();
     let across = |patch: &PatchSolution| patch.position.map_or(0.0, |place| place.track_mm[1]);
     let far = |other: &PatchSolution| (across(other) - across(patch)).abs();
     for companion in companions {
@@ -341,10 +329,10 @@ fn of_patch(
             .patches
             .iter()
             .min_by(|a, b| far(a).total_cmp(&far(b)))
-            .filter(|same| far(same) < SAME_PLACE);
+            .filter(|same| far(same) < SAME_PATCH);
         let Some(same) = same else {
-            // The companion has no such patch, so nothing of it is certain.
-            open.widen([limit; 2], patch.pressure_max_mpa);
+            // The companion has no such patch, so that the patch is entirely uncertain.
+            between.widen([limit; 2], patch.pressure_max_mpa);
             continue;
         };
         let pressure = (same.pressure_max_mpa - patch.pressure_max_mpa).abs();
@@ -354,10 +342,10 @@ fn of_patch(
                 (other.force_x_n - own.force_x_n).abs(),
                 (other.force_y_n - own.force_y_n).abs(),
             ];
-            open.widen(force, pressure);
+            between.widen(force, pressure);
         }
     }
-    let mut all = open;
+    let mut all = between;
     all.widen([force; 2], by_points);
-    OfPatch { between: open, all }
+    [between, all]
 }

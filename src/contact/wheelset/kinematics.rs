@@ -202,8 +202,8 @@ fn halve(
 /// A wheel over its rail with the other reading of both cross-sections: smoother, as their noise and spacing advise at least.
 fn other_reading(side: &WheelTask) -> WheelRail {
     let profiles = side.geometry.profiles();
-    let grains = profiles.map(checked_case::grain);
-    let advised = advised_smoothing(grains, side.contact_modulus, PRESSURE_USUAL);
+    let levels = profiles.map(checked_case::noise_level);
+    let advised = advised_smoothing(levels, side.contact_modulus, PRESSURE_USUAL);
     let other = |k: usize, profile: &Profile| {
         let chords = CHORDS * profile.usual_chord();
         let least = (COMPANIONS[1] * profile.smoothing()).max(chords.min(SMOOTHING_ADVISED[1]));
