@@ -1,4 +1,4 @@
-//! Chooses planes of contact where a case leaves the reference surface open and the curve of the rail has no answer.
+//! Falls back to planes of contact if a case does not choose the reference surface and the curve of the rail has no answer.
 
 use std::sync::Arc;
 
@@ -10,13 +10,13 @@ use crate::profile_assessment::trust;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 
-/// Solves a wheel on its reference surface, or on planes where the curve has no answer and the case does not ask for it.
+/// Solves a wheel on its reference surface, or on planes if the curve has no answer and the case does not ask for it.
 ///
-/// Of several motions, all are solved on planes if the wheel without tractions does not come to rest on the curve; so each part of a sweep makes the same
-/// choice. A history has no parts.
+/// Several motions are all solved on planes if the wheel without tractions has no equilibrium on the curve, so that each part of a sweep makes the
+/// same choice. A history has no parts.
 ///
 /// # Errors
-/// That of `solve` on the surface that was tried last.
+/// Returns the error of `solve` on the surface that was tried last.
 pub(crate) fn solve_wheel<T>(
     case: &CheckedCase,
     contact: &WheelTask,
@@ -45,10 +45,10 @@ pub(crate) fn solve_wheel<T>(
     Ok((solve(&case, &planes)?, Some(remark)))
 }
 
-/// The remark that planes answer in place of the curve.
+/// The remark that planes were used instead of the curve.
 ///
 /// # Errors
-/// Planes are no alternative: the case asks for its surface, or the work was stopped.
+/// Returns the given error if planes are no alternative, because the case asks for its surface or the work was stopped.
 pub(crate) fn fallback(contact: &WheelTask, error: SolveError) -> Result<RemarkEntry, SolveError> {
     let of_surface = matches!(
         error,

@@ -1,12 +1,12 @@
-//! Solves a wheel whose rail is to carry a longitudinal or a lateral force, or both: the creepages, or the angular and the lateral velocity of the
-//! wheelset, that give them are found.
+//! Solves a wheel with a prescribed longitudinal or lateral force, or both: finds the creepages, or the angular and the lateral velocity of the
+//! wheelset, that give these forces.
 //!
-//! Everything is in the search: where the wheel rests, its patches, and how the load is shared between them depend on the force of friction, so
-//! that every trial brings the wheel to rest and solves all patches. The unknown is a place, as in the search for the creepages of one
-//! patch: by the cubic law with the stiffness of all patches the creepage at r gives about the force r μN.
+//! The position of the wheel, its patches and the sharing of the load depend on friction, so that every evaluation finds the equilibrium of the wheel
+//! and solves all patches. The unknown r is a dimensionless creepage: by the cubic law with the stiffness of all patches, it gives roughly the force
+//! r μN.
 //!
-//! A lateral force contains the lateral part of the normal forces, which grow and shrink with friction under a vertical load: between which forces it lies
-//! is found by two coarse solves in full slip, to the right and to the left.
+//! A lateral force includes the lateral component of the normal forces, which depend on friction under a vertical load. Its range is found by two
+//! coarse solves in full slip, to the right and to the left.
 
 use std::sync::Arc;
 
@@ -27,22 +27,21 @@ use crate::solution::words::answer::{Fields, PatchSolution, Solution};
 use crate::vertical_equilibrium::tolerance;
 use crate::wheel_on_rail::SolvedWheel;
 
-/// A force may be missed by this part of μN at least: what the normal problem leaves open from trial to trial is noise to the search. Chosen by
-/// judgement; how much it matters was not measured.
+/// Least tolerance of a force relative to μN, because the error of the normal problem is noise to the search. Chosen by judgement; its influence
+/// was not measured.
 const MISSED_LEAST: f64 = 5e-5;
-/// Allowed error of the resultants in the first estimate, which tells patches, loads and radii.
-/// Chosen by judgement; how much it matters was not measured.
+/// Target error of the resultants in the first estimate, which gives patches, loads and radii. Chosen by judgement; its influence was not
+/// measured.
 const TARGET_FIRST: f64 = 0.05;
-/// Progress of the first estimate and of the search; the rest is the answer.
+/// Progress after the first estimate and after the search.
 const PROGRESS: [f64; 2] = [0.1, 0.8];
-/// Trials after which the progress of the search stands still.
-/// Chosen by judgement; how much it matters was not measured.
+/// Number of trials after which the reported progress of the search no longer grows.
 const TRIALS_USUAL: f64 = 6.0;
 
-/// Solves a wheel on a rail that carries `forces`, at the creepages or the velocities of the wheelset that give them.
+/// Solves a wheel on a rail with prescribed forces.
 ///
 /// # Errors
-/// Why there is no answer: the rail cannot carry the force, or a trial failed.
+/// Returns the reason why there is no answer: the rail cannot carry the forces, or a trial failed.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -64,27 +63,27 @@ pub(crate) fn solve(
     search.to(&first, &reach)
 }
 
-/// What the first estimate says of the contact.
+/// The first estimate of the contact.
 struct FirstEstimate {
     /// Friction limit of all patches in N.
     limit: f64,
     law: CubicLaw,
     rolling: FreeRollingState,
-    /// Lateral force in N about without lateral creepage, normal forces included.
+    /// Approximate lateral force in N without lateral creepage, normal forces included.
     lateral: f64,
-    /// Sum of the magnitudes of the lateral parts of the normal forces in N.
+    /// Sum of the magnitudes of the lateral components of the normal forces in N.
     lateral_normal: f64,
 }
 
-/// Where a search starts, and what is known of the forces it may meet.
+/// The start of the search and the range of the forces.
 struct Reach {
-    /// Places to start from.
+    /// Start of the unknowns.
     start: [f64; 2],
-    /// Forces in N by which the forces change about when their places change by 1.
+    /// Approximate changes of the forces in N per unit of the unknowns.
     units: [f64; 2],
-    /// Lateral force in N that the balance of the vertical force leaves open.
+    /// Error of the lateral force in N due to the tolerance of the vertical force.
     open: f64,
-    /// Lateral forces in N in full slip to the right and to the left, where the wheel comes to rest there.
+    /// Lateral forces in N in full slip to the right and to the left, if the wheel has an equilibrium there.
     ends: [Option<f64>; 2],
 }
 
@@ -105,7 +104,7 @@ impl FirstEstimate {
     }
 }
 
-/// Friction limit in N of patches together, and their cubic law.
+/// Friction limit in N of some patches together, and their cubic law.
 pub(crate) fn limit_and_law<'p>(
     problem: &Problem,
     patches: impl Iterator<Item = &'p PatchSolution> + Clone,
@@ -130,7 +129,7 @@ struct ForceSearch<'a> {
 }
 
 impl ForceSearch<'_> {
-    /// The case at creepages in the directions of the forces, which a wheelset has by its angular and its lateral velocity.
+    /// The case with creepages in the directions of the forces. A wheelset gets them by its angular and its lateral velocity.
     fn at(&self, creepages: [f64; 2], rolling: FreeRollingState, run: &Run) -> CheckedCase {
         let problem = &self.case.problem;
         let wheelset = problem.wheelset;
@@ -175,7 +174,7 @@ impl ForceSearch<'_> {
         Ok(FirstEstimate::of(&found.solution, self.case, rolling))
     }
 
-    /// Where the search starts, if the forces may be within reach.
+    /// The start of the search. Fails if the forces are out of range.
     fn reach(&self, first: &FirstEstimate) -> Result<Reach, SolveError> {
         let limit = first.limit;
         if limit <= 0.0 {
@@ -205,8 +204,8 @@ impl ForceSearch<'_> {
         Ok(reach)
     }
 
-    /// Adds to a reach where the search for a lateral force in N starts. Both forces share the friction: in full slip they lie on an
-    /// ellipse, or on a sum of such, that is as wide as the range of the lateral force and not longer.
+    /// Adds the start of the search for a lateral force in N. Both forces share the friction. In full slip they lie on an ellipse, or on a sum of
+    /// ellipses, that is as wide as the range of the lateral force and not longer.
     fn reach_across(
         &self,
         force: f64,
@@ -238,7 +237,7 @@ impl ForceSearch<'_> {
         Ok(())
     }
 
-    /// The lateral force in N at a place in full slip; nothing where the wheel does not come to rest.
+    /// The lateral force in N in full slip at one end; `None` if the wheel has no equilibrium there.
     fn end(&self, place: f64, first: &FirstEstimate) -> Result<Option<f64>, SolveError> {
         let part = MonitorPart {
             inner: self.monitor,
@@ -254,7 +253,7 @@ impl ForceSearch<'_> {
         }
     }
 
-    /// The forces asked for, in words.
+    /// Description of the prescribed forces.
     fn asked(&self) -> String {
         match self.forces {
             [Some(along), None] => format!("a longitudinal force force_x_n of {along} N"),
@@ -270,7 +269,7 @@ impl ForceSearch<'_> {
         }
     }
 
-    /// The error of a lateral force that the rail does not carry, or not beside the longitudinal one.
+    /// The error of a lateral force that the rail does not carry, or not together with the longitudinal one.
     fn unreached(&self, ends: [Option<f64>; 2]) -> SolveError {
         let asked = self.asked();
         let reach = match ends {
@@ -305,7 +304,7 @@ impl ForceSearch<'_> {
         }
     }
 
-    /// The answer at the forces.
+    /// Searches for the forces and solves the case there.
     fn to(&self, first: &FirstEstimate, reach: &Reach) -> Result<(Solution, Fields), SolveError> {
         let target = self.case.run.resolution.target_or_usual();
         let wanted = self.forces.map(Option::unwrap_or_default);
@@ -315,9 +314,9 @@ impl ForceSearch<'_> {
         };
         let along = (NEGLIGIBLE_OF_TARGET * target).max(MISSED_LEAST);
         let allowed = along.max(reach.open / first.limit);
-        // The balance of the vertical force leaves only the lateral force open.
+        // The tolerance of the vertical force affects only the lateral force.
         let units = [along / allowed * first.limit, first.limit];
-        // Outputs never change forces, so that trials need none.
+        // Outputs never change forces, so that trials have none.
         let run = self.case.run.for_resultants(0.0);
         let mut trials = 0.0;
         let creepages_at = |place: [f64; 2]| [0, 1].map(|k| first.law.creepage(k, place[k]));
@@ -340,7 +339,7 @@ impl ForceSearch<'_> {
                     value: (),
                 })
             })?;
-        // Where the trials alternate between two meshes the force jumps by what both are allowed to miss.
+        // If the trials alternate between two meshes, the force jumps by up to the target errors of both.
         if !root.converged() && (root.end == Termination::AtLimit || root.residual > target) {
             return Err(self.missed(root.end, reach));
         }
@@ -365,19 +364,19 @@ impl ForceSearch<'_> {
     }
 }
 
-/// The motion of a wheelset without mean creepage, weighted with the loads of the patches.
+/// The motion of a wheelset whose mean creepage, weighted with the loads of the patches, is 0.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FreeRollingState {
     /// Rolling radius in mm.
     radius: f64,
     /// Lateral velocity over the speed.
     drift: f64,
-    /// Lateral creepage over the rest of the lateral velocity: the cosine of the contact angle.
+    /// Lateral creepage over the relative lateral velocity: the cosine of the contact angle.
     across: f64,
 }
 
 impl FreeRollingState {
-    /// What is known before patches are: near the tread lateral creepage is that of the yaw.
+    /// The estimate before patches are known. Near the tread, the lateral creepage is that of the yaw.
     pub(crate) fn about(placement: &Placement) -> FreeRollingState {
         FreeRollingState {
             radius: placement.rolling_radius,
@@ -386,7 +385,7 @@ impl FreeRollingState {
         }
     }
 
-    /// The same from patches at the motion of this one.
+    /// The state from the patches that were solved with the motion of this one.
     pub(crate) fn of(self, patches: &[PatchSolution]) -> FreeRollingState {
         let (mut load, mut moment, mut sliding, mut across) = (0.0, 0.0, 0.0, 0.0);
         for patch in patches {
@@ -404,7 +403,7 @@ impl FreeRollingState {
         }
     }
 
-    /// A motion with creepages on the mean where its forces are prescribed.
+    /// The motion with these mean creepages in the directions of the prescribed forces.
     pub(crate) fn at(
         &self,
         mut wheelset: WheelsetMotion,
@@ -428,7 +427,7 @@ pub(crate) fn angle_of(patch: &PatchSolution) -> f64 {
     position.map_or(0.0, |position| position.contact_angle_rad)
 }
 
-/// A force in N to three digits. A coarse solve does not know more of it.
+/// Rounds a force in N to three digits, the accuracy of a coarse solve.
 fn rounded(force: f64) -> f64 {
     let step = 10_f64.powf(force.abs().max(1.0).log10().floor() - 2.0);
     (force / step).round() * step

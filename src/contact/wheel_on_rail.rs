@@ -1,11 +1,11 @@
 //! The contact of a wheel and a rail.
 //!
-//! Pressures need the height of the wheel, of which friction carries a part, and the gap that tractions open; tractions need the pressures and the slip that
-//! these cause. [`rounds`] solves one with the other of the round before, until both agree. Coordinates of the surface are x and the arc length s of the
-//! rail's cross-section; the rigid slip of a point is that of the wheel's undeformed surface above it.
+//! The pressures depend on the height of the wheel, because friction carries a part of the load, and on the gap that tractions open. The tractions
+//! depend on the pressures and on the slip that these cause. [`rounds`] solves both in turn until they agree. The coordinates of the surface are x
+//! and the arc length s of the rail's cross-section. The rigid slip of a point is that of the wheel's undeformed surface above it.
 //!
-//! Planes of contact replace parts of the curve. Each has tractions of its own, under the slip of a plane, which any method solves. There pressures depend on
-//! tractions under a vertical load alone; under other loads several motions share the pressures.
+//! Planes of contact replace parts of the curve. The tractions of each plane are solved separately, under the slip of a plane and by any method.
+//! On planes, pressures depend on tractions only under a vertical load. Under other loads several motions share the pressures.
 
 use std::sync::Arc;
 
@@ -33,24 +33,25 @@ mod answer;
 mod rounds;
 mod tractions;
 
-/// Length over width at most, of patches with more than this share of the load. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide, a
-/// contact at the root of a flange 20 times, and a single point that is off makes a ridge a hundred times as long.
+/// Largest ratio of length to width of a patch. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide, a contact at the root of a
+/// flange 20 times. A single displaced point makes a ridge a hundred times as long as wide.
 const SLENDER_MAX: f64 = 40.0;
+/// Share of the load up to which a patch may have any shape.
 const SLENDER_SHARE: f64 = 0.02;
-/// The length allowed on a steep face no longer grows where the cosine of its angle is less than this.
+/// Cosine of the contact angle below which the allowed length of a patch on a steep face no longer grows.
 const COSINE_LEAST: f64 = 0.01;
 
-/// The wheel at rest with the answer for all its patches.
+/// The wheel in equilibrium, with the answer for all its patches.
 pub(crate) struct SolvedWheel {
     pub(crate) wheel: WheelContact,
     pub(crate) solution: Solution,
     pub(crate) fields: Fields,
 }
 
-/// Asked of a wheel at rest before its motions are solved: is there any point in it, and if not, why.
+/// Called with a wheel in equilibrium before its motions are solved. An error ends the solve.
 pub(crate) type BeforeMotions<'a> = dyn FnMut(&WheelContact) -> Result<(), SolveError> + 'a;
 
-/// The surface that a contact is solved on, and how its strips act on each other.
+/// The reference surface of a contact, and the influence of its strips on each other.
 struct Surface<'a> {
     curve: ReferenceCurve<'a>,
     influence: Influence,
@@ -58,12 +59,12 @@ struct Surface<'a> {
 
 /// Solves a wheel on a rail.
 ///
-/// Where tractions change the pressures, on the curve and on planes under a vertical load, every motion has pressures of its own; `before` is then asked once,
-/// about the wheel without tractions, and the wheel and the list of patches are those of the first motion. All points of a history have the pressures that
-/// belong to its last point.
+/// If tractions change the pressures, on the curve and on planes under a vertical load, every motion has its own pressures. Then `before` is called
+/// once, with the wheel without tractions, and the returned wheel and patches are those of the first motion. All points of a history have the
+/// pressures of its last point.
 ///
 /// # Errors
-/// A named reason why there is no answer.
+/// Returns the reason why there is no answer.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -109,8 +110,8 @@ pub(crate) fn solve(
     Ok(whole)
 }
 
-/// Solves one of several motions. All motions of an answer have the same number of patches: where tractions change it, or leave no answer, the pressures are
-/// those without tractions.
+/// Solves one of several motions. All motions of an answer have the same number of patches. If tractions change this number, or if there is no
+/// answer with them, the pressures without tractions are used.
 fn one_of_several(
     operators: &Arc<OperatorStore>,
     part: &CheckedCase,
@@ -134,14 +135,14 @@ fn one_of_several(
     Ok(solved)
 }
 
-/// Whether a vertical force presses the wheel, of which friction carries a part.
+/// Returns whether the load is a vertical force, of which friction carries a part.
 fn friction_lifts(case: &CheckedCase, contact: &WheelTask) -> bool {
     let frictionless = case.problem.friction.is_frictionless();
     matches!(contact.loading, WheelLoad::Vertical(_)) && !frictionless
 }
 
-/// Finds the reference surface of a contact. Planes are placed at the height that the wheel has without tractions, or `with_friction` under those of the last
-/// motion.
+/// Finds the reference surface of a contact. Planes are placed at the height of the wheel without tractions, or with those of the last motion if
+/// `with_friction`.
 fn surface<'a>(
     case: &CheckedCase,
     contact: &'a WheelTask,
@@ -196,10 +197,10 @@ fn coarse(
     found.map_err(|failure| watch.explained(failure.into(), case))
 }
 
-/// About the largest pressure in MPa of the patch with the largest load.
+/// Estimates the largest pressure in MPa of the patch with the largest load.
 ///
 /// # Errors
-/// The wheel does not come to rest on the rail, or the monitor stopped the work.
+/// Returns an error if the wheel has no equilibrium on the rail or the monitor stopped the work.
 pub(crate) fn largest_pressure(
     case: &CheckedCase,
     contact: &WheelTask,
@@ -212,10 +213,10 @@ pub(crate) fn largest_pressure(
     Ok(coarse(case, contact, &of_curve, contact.loading, monitor)?.main_pressure())
 }
 
-/// Finds a wheel without tractions.
+/// Finds the equilibrium of a wheel without tractions.
 ///
 /// # Errors
-/// Why the wheel does not come to rest; or what `before` says.
+/// Returns the reason why the wheel has no equilibrium, or the error of `before`.
 pub(crate) fn at_rest<'a>(
     case: &CheckedCase,
     contact: &'a WheelTask,
@@ -240,13 +241,13 @@ pub(crate) fn at_rest<'a>(
     })
 }
 
-/// A wheel without tractions.
+/// The equilibrium of a wheel without tractions: its reference surface and the number of its patches.
 pub(crate) struct WheelAtRest<'a> {
     surface: Surface<'a>,
     patches: usize,
 }
 
-/// A wheel on a rail, in one motion, or in motions that share its pressures.
+/// The solve of a wheel on a rail in one motion, or in motions that share its pressures.
 #[derive(Clone, Copy)]
 struct WheelSolve<'a> {
     operators: &'a Arc<OperatorStore>,
@@ -296,7 +297,7 @@ impl<'a> WheelSolve<'a> {
         }
     }
 
-    /// The wheel at rest, and the answer to its motions; with pressures that belong to the tractions of the last motion, or without tractions.
+    /// Solves the motions, with the pressures that belong to the tractions of the last motion, or without tractions.
     fn motions(
         &self,
         with_friction: bool,
@@ -334,7 +335,7 @@ impl<'a> WheelSolve<'a> {
         })
     }
 
-    /// Whether factors for the turn of the surface apply.
+    /// Returns whether the influence is corrected for the turn of the surface.
     fn is_corrected(&self) -> bool {
         self.influence == Influence::AngleCorrected
     }
@@ -343,14 +344,14 @@ impl<'a> WheelSolve<'a> {
         friction_lifts(self.case, self.contact)
     }
 
-    /// The remark that the effect of tractions on pressures is left out, if bodies differ enough for it to matter.
+    /// The remark that the effect of tractions on pressures is neglected, if the bodies differ enough for it to matter.
     fn first_order(&self) -> Option<RemarkEntry> {
         let CheckedCase { problem, run, .. } = self.case;
         let matters = problem.first_order_error(run.method) > negligible(run);
         matters.then(|| problem.first_order_remark(run.method).into())
     }
 
-    /// The place of a load centre `[x, s]` and the wheel over it.
+    /// The point of the curve at a load centre `[x, s]`, and the wheel above it.
     fn load_centre(
         &self,
         contact: &CurveContact,
@@ -368,7 +369,7 @@ impl<'a> WheelSolve<'a> {
         Ok((place, over))
     }
 
-    /// Fails where a profile ends beside a patch, or the rail turns away from a plane.
+    /// Fails if a profile ends beside a patch, or the rail turns away from a plane there.
     fn check_ends(&self, contact: &CurveContact) -> Result<(), SolveError> {
         let beyond = contact.grid.step[1];
         let known = self.curve.range();
@@ -391,7 +392,7 @@ impl<'a> WheelSolve<'a> {
         Ok(())
     }
 
-    /// The patches with their places on both bodies; without `edges`, they end at their outermost samples.
+    /// The patches with their positions on both bodies. Without `edges`, they end at their outermost samples.
     fn patches(&self, contact: &CurveContact, edges: bool) -> Result<Vec<WheelPatch>, SolveError> {
         let mut patches = Vec::new();
         for strips in contact.parts(self.influence) {
@@ -418,11 +419,11 @@ impl<'a> WheelSolve<'a> {
         Ok(patches)
     }
 
-    /// The wheel at rest.
+    /// The wheel in equilibrium.
     fn wheel(&self, contact: &CurveContact) -> Result<WheelContact, SolveError> {
         let patches = self.patches(contact, true)?;
         self.check_ends(contact)?;
-        // On a steep face, the wheel's curvature along x falls with the cosine of the angle.
+        // On a steep face, the wheel's curvature along x decreases with the cosine of the angle.
         let slender_max = |angle: f64| {
             let steep = STEEP / angle.cos().clamp(COSINE_LEAST, STEEP);
             SLENDER_MAX * steep.powf(2.0 / 3.0)

@@ -1,18 +1,19 @@
-//! The wear of one pass of a state on both sections, from its solved contact.
+//! The wear of both sections in one pass of a state, from its solved contact.
 
 use std::f64::consts::PI;
 
 use crate::case::words::subsurface::DamageModel;
 use crate::error::SolveError;
-use crate::evolution::section::{add, along, lengths, smoothed};
+use crate::evolution::section::{add, lengths, smoothed};
 use crate::evolution::task::{Evolution, Sections, SolveContext};
+use crate::geometry::plane_curve::arc_lengths;
 use crate::monitor::Monitor;
 use crate::normal::footprint::NormalTask;
 use crate::post::local_power::NANOMETRES;
 use crate::solution::words::answer::PatchSolution;
 use crate::solution::words::evolution::{StateContact, StatePatch};
 
-/// Wear of one body: of the rail in one pass, of the wheel over 1 mm rolled.
+/// Wear of one body: of the rail in one pass, of the wheel per mm rolled.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct BodyWear {
     /// Area in mm² that is lost at each point.
@@ -21,12 +22,12 @@ pub(crate) struct BodyWear {
     pub(crate) damage: Vec<f64>,
     /// Area by regimes of wear.
     pub(crate) regimes: [f64; 3],
-    /// Area that the errors of the contact leave open.
+    /// Error of the area due to the errors of the contact.
     pub(crate) open: f64,
 }
 
 impl BodyWear {
-    /// No wear of rail and wheel.
+    /// Rail and wheel without wear.
     pub(crate) fn none(on: Sections) -> [BodyWear; 2] {
         on.points.map(|points| BodyWear {
             area: vec![0.0; points.len()],
@@ -58,10 +59,10 @@ pub(crate) struct Pass {
     pub(crate) contact: StateContact,
 }
 
-/// Solves a state. One without an answer wears nothing and says why.
+/// Solves a state. A state without an answer causes no wear and reports the reason.
 ///
 /// # Errors
-/// [`SolveError::Cancelled`] and [`SolveError::OutOfTime`] only.
+/// Returns [`SolveError::Cancelled`] and [`SolveError::OutOfTime`] only.
 pub(crate) fn pass(
     task: &Evolution,
     context: &SolveContext,
@@ -105,7 +106,7 @@ pub(crate) fn pass(
             pressure_max_mpa: patch.pressure_max_mpa,
             t_gamma_n: patch.points[0].friction_power_n,
         });
-        // A line of the wheel is passed once in a turn.
+        // Each line of the wheel is in contact once in a revolution.
         let turn = 2.0 * PI * position.rolling_radius_mm;
         let places = [(position.rail_mm, 1.0), (position.wheel_mm, 1.0 / turn)];
         for (k, (at, share)) in places.into_iter().enumerate() {
@@ -125,7 +126,7 @@ pub(crate) fn pass(
     })
 }
 
-/// Adds a share of the wear of a pass of a patch.
+/// Adds a share of the wear of one pass of a patch.
 fn add_patch(
     model: DamageModel,
     patch: &PatchSolution,
@@ -165,20 +166,20 @@ struct PatchArc {
     /// Arc length at which the coordinate is 0.
     zero: f64,
     to_left: f64,
-    /// Length of the part of the section that each point stands for.
+    /// Length of the part of the section that each point represents.
     lengths: Vec<f64>,
-    /// Arc length at which it ends; no end for the last one.
+    /// Arc length at which this part ends; infinite for the last point.
     ends: Vec<f64>,
 }
 
 impl PatchArc {
-    /// Of a patch whose load centre lies at a place.
+    /// The arc of a patch whose load centre is at `at`.
     fn new(points: &[[f64; 2]], at: [f64; 2], to_left: f64) -> PatchArc {
         let from_point = |k: usize| [0, 1].map(|i| at[i] - points[k][i]);
         let off = |k: &usize| from_point(*k).iter().map(|d| d * d).sum::<f64>();
         let nearest = (0..points.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
         let nearest = nearest.unwrap_or(0);
-        let along = along(points);
+        let along = arc_lengths(points);
         let (low, high) = (nearest.saturating_sub(1), nearest + 1);
         let high = high.min(points.len() - 1);
         let chord = [0, 1].map(|k| points[high][k] - points[low][k]);
@@ -193,8 +194,8 @@ impl PatchArc {
         }
     }
 
-    /// Calls `take` with each point whose part meets an interval of the coordinate, and the share of the interval there. What lies beyond the ends
-    /// goes to the last points.
+    /// Calls `take` with each point whose part overlaps an interval of the coordinate, and the share of the interval there. Parts of the interval
+    /// beyond the ends are assigned to the last points.
     fn share_out(&self, interval: [f64; 2], mut take: impl FnMut(usize, f64)) {
         let [from, to] = interval.map(|y| self.zero + self.to_left * y);
         let (from, to) = (from.min(to), from.max(to));

@@ -1,4 +1,4 @@
-//! What is answered of an evolution: records, losses, uncertainties, limits.
+//! The answer of an evolution: records, losses, uncertainties and limits.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -11,6 +11,7 @@ use crate::geometry::profile::{Body, Profile, Reading};
 use crate::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 use crate::geometry::wheelset_pose::PairOfRails;
 use crate::numerics::quadrature::halton;
+use crate::numerics::roots::bounds;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 use crate::solution::words::evolution::{
@@ -18,15 +19,15 @@ use crate::solution::words::evolution::{
     StateContact, WearUncertainty, WornBody,
 };
 
-/// Depth of W2 below the top of the rail in mm.
+/// Depth below the top of the rail in mm at which the loss of the gauge face (W2) is measured.
 const GAUGE_DEPTH: f64 = 14.0;
-/// Depth of the flange's thickness below the tread in mm.
+/// Depth below the tread in mm at which the thickness of the flange is measured.
 const FLANGE_DEPTH: f64 = 10.0;
-/// Amplitude of the conicity in mm, as EN 15302 has it.
+/// Amplitude in mm for which EN 15302 defines the conicity.
 const AMPLITUDE: f64 = 3.0;
-/// Reach and step in mm of the shifts that are sampled for it.
+/// Reach and step in mm of the shifts at which the radius difference is sampled.
 const SHIFTS: [f64; 2] = [8.0, 0.25];
-/// Samples of the wear coefficients.
+/// Number of samples of the wear coefficients.
 const SAMPLES: u32 = 2000;
 
 /// The record of a state.
@@ -66,10 +67,10 @@ fn with_uncertainty(task: &Evolution, state: &EvolutionState, k: usize) -> WornB
     }
 }
 
-/// Factors of the worn area that bound 90 % of the samples of the coefficients.
+/// Factors of the worn area that bound 90 % of the samples of the wear coefficients.
 ///
-/// Archard's coefficients are sampled between the ends of their ranges, uniformly in their logarithm and independently in each regime, at the points
-/// of Halton's sequence. The wear map has no published scatter; its factor is stated. The sections are those of the mean coefficients.
+/// Archard's coefficients are sampled within their ranges, uniformly in their logarithm and independently in each regime, at the points of Halton's
+/// sequence. The wear map has no published scatter, so that its factor is given in the plan. The sections are those of the mean coefficients.
 fn coefficients(task: &Evolution, areas: &[f64; 3]) -> [f64; 2] {
     let all: f64 = areas.iter().sum();
     if task.plan.wear_model != DamageModel::ArchardWear || all <= 0.0 {
@@ -95,8 +96,7 @@ fn losses(bodies: &[BodyState; 2]) -> WearLosses {
         let now = distance(&body.worn.points_mm, from, direction);
         Some(now? - distance(&body.start_mm, from, direction)?)
     };
-    let heights = rail.start_mm.iter().map(|at| at[1]);
-    let top = heights.fold(f64::INFINITY, f64::min);
+    let [top, _] = bounds(rail.start_mm.iter().map(|at| at[1]));
     let gauge = [-1e3, top + GAUGE_DEPTH];
     let face = distance(&rail.start_mm, gauge, [1.0, 0.0]);
     let below = [0.0, 1e3];
@@ -172,7 +172,7 @@ fn range(states: &[StateContact]) -> ContactRange {
 }
 
 impl Evolution {
-    /// The answer of an evolution that is over, from all its records.
+    /// The answer of a finished evolution, from all its records.
     pub fn answer(&self, state: &EvolutionState, records: Vec<EvolutionRecord>) -> EvolutionAnswer {
         EvolutionAnswer {
             limits: self.limits_reached(&records),
@@ -218,7 +218,7 @@ impl Evolution {
         let reached = limits.filter_map(|(k, (name, limit))| {
             let limit_mm = limit?;
             let at = |factor: &dyn Fn(&WearUncertainty) -> f64| {
-                // Between two records at one time maintenance removes material, whose depth is not uncertain.
+                // Between two records at the same time, maintenance removes a known depth of material.
                 let (mut machined, mut last) = (0.0, None);
                 let losses = records.iter().filter_map(|record| {
                     let body = if k < 3 { &record.rail } else { &record.wheel };
@@ -248,7 +248,7 @@ impl Evolution {
     }
 }
 
-/// Where a line through points first reaches a limit.
+/// The abscissa at which a line through points first reaches a limit.
 fn crossing(points: &[[f64; 2]], limit: f64) -> Option<f64> {
     let pair = points.windows(2).find(|pair| pair[1][1] >= limit)?;
     let [[from, low], [to, high]] = [pair[0], pair[1]];

@@ -1,36 +1,28 @@
-//! A section as points that move along their normals.
+//! Sections that wear: points that move along their normals.
 //!
-//! Points are `[y, z]` in mm, y to the field side and z down, in order of increasing y as a [`Profile`] has them. A point stands for the part
-//! of the section up to the middles to its neighbours.
+//! Points are `[y, z]` in mm, y to the field side and z down, in the order of a [`Profile`]. A point represents the part of the section up to the
+//! middles of the chords to its neighbours.
 
+use crate::geometry::plane_curve::arc_lengths;
 use crate::geometry::profile::{Body, POINT_SPACING, Profile};
+use crate::numerics::roots::bounds;
 
-/// Points along the curve of a profile, at most [`POINT_SPACING`] apart.
+/// Samples the curve of a profile at points at most [`POINT_SPACING`] apart.
 pub(crate) fn sampled(profile: &Profile) -> Vec<[f64; 2]> {
     let places = profile.parameters(POINT_SPACING).into_iter();
     let points = places.map(|s| profile.at(s).at);
     points.map(|[y, z]| [y, -z]).collect()
 }
 
-/// Length of the section from the first point to each.
-pub(crate) fn along(points: &[[f64; 2]]) -> Vec<f64> {
-    let mut sum = vec![0.0];
-    for pair in points.windows(2) {
-        let step = [pair[1][0] - pair[0][0], pair[1][1] - pair[0][1]];
-        sum.push(sum[sum.len() - 1] + step[0].hypot(step[1]));
-    }
-    sum
-}
-
-/// Length that each point stands for.
+/// Length that each point represents.
 pub(crate) fn lengths(points: &[[f64; 2]]) -> Vec<f64> {
-    let along = along(points);
+    let along = arc_lengths(points);
     let last = along.len() - 1;
     let length = |k: usize| 0.5 * (along[(k + 1).min(last)] - along[k.saturating_sub(1)]);
     (0..=last).map(length).collect()
 }
 
-/// Depths of areas.
+/// Depths of the areas at all points.
 pub(crate) fn depths(points: &[[f64; 2]], areas: &[f64]) -> Vec<f64> {
     let lengths = lengths(points);
     let depths = areas.iter().zip(lengths);
@@ -71,11 +63,11 @@ pub(crate) fn area_between(body: Body, before: &[[f64; 2]], after: &[[f64; 2]]) 
     inward(body) * 0.5 * parts.sum::<f64>()
 }
 
-/// Moves points along their normals by so much that the section loses the sum of `areas`, in mm² for each point. Returns the points and how far
-/// each moved into the body, in mm.
+/// Moves points along their normals so that the section loses the sum of `areas`, given in mm² for each point. Returns the points and the
+/// displacement of each into the body in mm.
 ///
-/// A convex section is shorter below its surface, so that the depths are larger than areas over lengths, by half of the depth times the
-/// curvature; the factor is found from the outlines.
+/// A convex section is shorter below its surface. The depths are therefore larger than areas over lengths, by half of the depth times the curvature.
+/// The factor is found from the outlines.
 pub(crate) fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> (Vec<[f64; 2]>, Vec<f64>) {
     let wanted: f64 = areas.iter().sum();
     let normals = normals(body, points);
@@ -97,9 +89,9 @@ pub(crate) fn moved(body: Body, points: &[[f64; 2]], areas: &[f64]) -> (Vec<[f64
     (after, depth)
 }
 
-/// Spreads areas along the section by a kernel of this standard deviation in mm; their sum is kept.
+/// Spreads areas along the section by a kernel of this standard deviation in mm. Their sum is preserved.
 pub(crate) fn smoothed(areas: &[f64], deviation: f64) -> Vec<f64> {
-    // One pass of ¼, ½, ¼ has half the square of the spacing as its variance; a pass with a smaller share makes up the rest.
+    // One pass with the weights ¼, ½, ¼ has the variance of half the square of the spacing. The last pass has smaller weights.
     let passes = 2.0 * (deviation / POINT_SPACING).powi(2);
     let mut areas = areas.to_vec();
     for k in 0..passes.ceil() as usize {
@@ -114,12 +106,12 @@ pub(crate) fn smoothed(areas: &[f64], deviation: f64) -> Vec<f64> {
     areas
 }
 
-/// Deepest cut along a normal in mm.
+/// Largest cut along a normal in mm.
 const CUT_MAX: f64 = 20.0;
 
-/// Cuts a section down to another one, which is moved in z into the body until it lies nowhere outside, and by `depth` mm more.
+/// Cuts a section to a target section. The target is first shifted in z into the body until it is nowhere outside, and then by `depth` mm more.
 ///
-/// That distance is measured where the present section is less steep than 70°. Every point that is then outside is cut along its normal.
+/// The shift is measured where the present section is less steep than 70°. Every point outside the shifted target is cut along its normal.
 pub(crate) fn machined(
     body: Body,
     points: &[[f64; 2]],
@@ -132,7 +124,7 @@ pub(crate) fn machined(
     let pairs = points.iter().zip(&normals);
     let flat = pairs.filter(|(_, normal)| normal[1].abs() >= steep);
     let outside = flat.filter_map(|(at, _)| Some(sign * (at[1] - height_at(target, at[0])?)));
-    let by = outside.fold(f64::NEG_INFINITY, f64::max) + depth;
+    let by = bounds(outside)[1] + depth;
     if by == f64::NEG_INFINITY {
         return points.to_vec();
     }
@@ -146,7 +138,7 @@ pub(crate) fn machined(
     points.iter().zip(&normals).map(cut).collect()
 }
 
-/// z of a section at y: the first place that has it.
+/// z of a section at y, on the first chord that contains it.
 fn height_at(points: &[[f64; 2]], y: f64) -> Option<f64> {
     let mut pairs = points.windows(2).map(|pair| (pair[0], pair[1]));
     let (from, to) = pairs.find(|(from, to)| from[0] <= y && y <= to[0])?;
@@ -159,7 +151,7 @@ fn height_at(points: &[[f64; 2]], y: f64) -> Option<f64> {
     Some(from[1] + t * (to[1] - from[1]))
 }
 
-/// Distance in mm from a place to the section in a direction, of unit length; the nearest place ahead.
+/// Distance in mm from a point to the section in the direction of a unit vector, to the nearest intersection ahead.
 pub(crate) fn distance(points: &[[f64; 2]], from: [f64; 2], direction: [f64; 2]) -> Option<f64> {
     let seen = |at: &[f64; 2]| {
         let ([y, z], [dy, dz]) = ([at[0] - from[0], at[1] - from[1]], direction);

@@ -1,15 +1,15 @@
-//! A coefficient of friction by its place: across the rail, along it, or in temperature.
+//! A coefficient of friction as a function of one variable: the lateral or longitudinal position, or the temperature.
 
 use std::sync::Arc;
 
-/// Coefficients in the order of their places, at least one.
+/// At least one coefficient, in the order of the variable: linear between points, constant outside. Two points with the same value are a jump.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoefficientTable {
     points: Arc<[(f64, f64)]>,
 }
 
 impl CoefficientTable {
-    /// A table of as many places, in order, as coefficients, of which there is at least one.
+    /// Makes a table from values of the variable, in order, and as many coefficients, at least one.
     pub fn new(at: &[f64], coefficient: &[f64]) -> CoefficientTable {
         let points = at.iter().copied().zip(coefficient.iter().copied());
         CoefficientTable {
@@ -17,12 +17,12 @@ impl CoefficientTable {
         }
     }
 
-    /// Places with their coefficients.
+    /// The values of the variable with their coefficients.
     pub fn points(&self) -> &[(f64, f64)] {
         &self.points
     }
 
-    /// The coefficient at a place and its slope there; on a jump those of the side of larger places.
+    /// The coefficient at a value and its slope there. At a jump, those of the side of larger values are returned.
     pub fn at(&self, place: f64) -> (f64, f64) {
         let table = &self.points;
         let above = table.partition_point(|(at, _)| *at <= place);
@@ -50,14 +50,14 @@ impl CoefficientTable {
         }
     }
 
-    /// The mean coefficient between two places, of which the second lies beyond the first.
+    /// The mean coefficient between two values, of which the second is the larger one.
     pub fn mean_between(&self, from: f64, to: f64) -> f64 {
         let first = self.points.partition_point(|(at, _)| *at <= from);
         let inside = self.points[first..].iter().map(|(at, _)| *at);
         let ends = inside.take_while(|at| *at < to).chain([to]);
         let (mut sum, mut before) = (0.0, from);
         for end in ends {
-            // Of a straight line, the mean is the value in the middle.
+            // The mean of a straight line is its value in the middle.
             sum += (end - before) * self.at(0.5 * (before + end)).0;
             before = end;
         }

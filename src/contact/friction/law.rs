@@ -1,24 +1,20 @@
 //! Coulomb friction: the largest traction of a cell and the largest tangential force of a patch.
 //!
-//! A law that varies over the contact is one more variant of [`FrictionLaw`], and the compiler asks for its value on a strip, its largest
-//! value and what a patch carries with it. Levels take their bounds strip by strip from [`FrictionLaw::share`]; what is relative to μN
-//! takes it from [`FrictionLaw::limit`]. Where the bound of a cell falls with its slip, these are the bounds at rest, and the method
-//! follows [`FrictionLaw::bound_fall`] from there.
-//!
-//! Friction of a rail in the axes of its patches.
-//!
-//! Coefficients of friction by a place, across and along: linear between points, constant outside; two points at one place are a jump.
+//! A law that varies over the contact is a variant of [`FrictionLaw`]. Meshes take their traction bounds strip by strip from
+//! [`FrictionLaw::share`], and values relative to μN use [`FrictionLaw::limit`]. If the bound of a cell decreases with its slip, these are the bounds
+//! without slip, and the method applies [`FrictionLaw::bound_fall`].
 
 use std::borrow::Borrow;
 
 use crate::friction::coefficient_table::CoefficientTable;
 use crate::friction::path_dependent::HeatedLaw;
-use crate::friction::velocity_weakening::{FallingLaw, Softening};
+use crate::friction::velocity_weakening::{FallingLaw, STABILITY_MAX, Softening};
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::footprint::{Footprint, LoadAcross};
 use crate::normal::hertz::Patch;
+use crate::numerics::roots::bounds;
 
-/// How the coefficient of friction varies over the contact.
+/// The coefficient of friction over the contact.
 #[derive(Debug, Clone, PartialEq)]
 pub enum FrictionLaw {
     /// One coefficient μ everywhere.
@@ -29,8 +25,8 @@ pub enum FrictionLaw {
     Across(AcrossLaw),
     /// A coefficient that falls with the temperature of the contact.
     Heated(HeatedLaw),
-    /// A coefficient that varies along the track, which a history passes over. Bounds and limits told here are those of the largest one; the
-    /// history takes its part of them step by step.
+    /// A coefficient that varies along the track, over which a history passes. Bounds and limits are those of the largest coefficient; the history
+    /// scales them step by step.
     Along(CoefficientTable),
 }
 
@@ -46,13 +42,13 @@ impl FrictionLaw {
         }
     }
 
-    /// Is there no friction at all?
+    /// Returns whether there is no friction at all.
     pub fn is_frictionless(&self) -> bool {
         self.largest() == 0.0
     }
 
-    /// How the bounds of cells fall with their slip at a rolling speed in mm/s, for slips counted in `slip_unit`; nothing where they
-    /// do not.
+    /// The decrease of the bounds of cells with their slip at a rolling speed in mm/s, for slips in units of `slip_unit`. Returns `None` if they are
+    /// constant or the speed is unknown.
     pub fn bound_fall(&self, rolling_speed: Option<f64>, slip_unit: f64) -> Option<Softening> {
         match self {
             FrictionLaw::Falling(law) => Some(law.bound_fall(rolling_speed?, slip_unit)),
@@ -60,13 +56,13 @@ impl FrictionLaw {
         }
     }
 
-    /// Do bounds depend on slips, at once or by the heat that they make?
+    /// Returns whether bounds depend on the slip, directly or through the heat.
     pub fn depends_on_slip(&self) -> bool {
         matches!(self, FrictionLaw::Falling(_) | FrictionLaw::Heated(_))
     }
 
-    /// Why friction falls too fast for one reliable answer on patches at rolling speeds, if it does: by the largest stability number, see
-    /// [`FallingLaw::stability`] and [`HeatedLaw::stability`]; nothing for other laws, without patches or without speeds.
+    /// The reason if friction falls too fast for one reliable answer at these rolling speeds, by the largest stability number of the patches; see
+    /// [`FallingLaw::stability`] and [`HeatedLaw::stability`]. Returns `None` for other laws, without patches and without speeds.
     pub fn too_fast(
         &self,
         patches: &[Patch],
@@ -79,19 +75,24 @@ impl FrictionLaw {
             FrictionLaw::Constant(_) | FrictionLaw::Across(_) | FrictionLaw::Along(_) => None,
             FrictionLaw::Falling(law) => {
                 let of = |patch: &Patch| law.stability(speed, patch.pressure_max, shear_modulus);
-                FallingLaw::too_fast(most(&of)?)
+                too_fast(
+                    most(&of)?,
+                    "slip",
+                    "rolling speed, fall and largest pressure",
+                )
             }
             FrictionLaw::Heated(law) => {
                 let of = |patch: &Patch| {
                     let half_length = 0.5 * (patch.extent[1] - patch.extent[0]);
                     law.stability(speed, patch.pressure_max, half_length, shear_modulus)
                 };
-                HeatedLaw::too_fast(most(&of)?)
+                let factors = "the fall per K, to the square of the largest pressure and to the root of the rolling speed";
+                too_fast(most(&of)?, "temperature", factors)
             }
         }
     }
 
-    /// The law by temperature, where the coefficient falls with it.
+    /// The law by temperature, if the coefficient depends on it.
     pub fn heated(&self) -> Option<&HeatedLaw> {
         match self {
             FrictionLaw::Heated(law) => Some(law),
@@ -99,7 +100,7 @@ impl FrictionLaw {
         }
     }
 
-    /// The table of a coefficient that varies across, where it does.
+    /// The table of a coefficient that varies laterally.
     pub fn across(&self) -> Option<&AcrossLaw> {
         match self {
             FrictionLaw::Across(law) => Some(law),
@@ -107,7 +108,7 @@ impl FrictionLaw {
         }
     }
 
-    /// The table of a coefficient that varies along the track, where it does.
+    /// The table of a coefficient that varies along the track.
     pub fn along(&self) -> Option<&CoefficientTable> {
         match self {
             FrictionLaw::Along(law) => Some(law),
@@ -115,8 +116,8 @@ impl FrictionLaw {
         }
     }
 
-    /// The mean coefficient over loads at places y of a strip, relative to the largest. Exactly 1 where it does not vary across, so that
-    /// bounds keep the last digit of the pressure and a contact without friction has bounds too.
+    /// The mean coefficient over the loads `(y, load)` of a strip, relative to the largest one. It is exactly 1 if the coefficient does not vary
+    /// laterally, so that bounds keep the last digit of the pressure and a contact without friction has bounds too.
     pub fn share(&self, loads: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
         self.across()
             .map_or(1.0, |law| law.mean(loads) / law.largest())
@@ -128,7 +129,7 @@ impl FrictionLaw {
         self.limit_under(force, || footprint.load_across(patch))
     }
 
-    /// The same of a patch with a normal force in N and a load, which is asked for where the coefficient varies across.
+    /// Friction limit in N of a patch with a normal force in N. `load` is called if the coefficient varies laterally.
     pub fn limit_under<L: Borrow<LoadAcross>>(
         &self,
         normal_force: f64,
@@ -150,12 +151,25 @@ impl FrictionLaw {
     }
 }
 
-/// Samples of a coefficient that varies over the rail, across all patches.
+/// The message about a stability number that is too large for one reliable answer. The number describes how fast friction falls with `variable`,
+/// and is proportional to `factors`.
+fn too_fast(stability: f64, variable: &str, factors: &str) -> Option<String> {
+    (stability > STABILITY_MAX).then(|| {
+        format!(
+            "friction falls too fast with {variable} for one reliable answer: the stability number is {stability:.3}, at most {STABILITY_MAX} \
+             is allowed; it is proportional to {factors}"
+        )
+    })
+}
+
+/// Number of samples of a coefficient that varies over the rail, across all patches.
 const SAMPLES: usize = 129;
 
-/// Friction in the axes of the surface of a rail whose patches have these extents `[x_min, x_max, s_min, s_max]` in mm along its cross-section: a
-/// coefficient by the y of the rail's profile, or by the inclination of its surface, becomes one by the arc length from an origin `[x, s]`, and one by
-/// the place along the track becomes one by x. `rail` gives the parameter of the rail's curve by the arc length.
+/// Friction in the coordinates of the surface of a rail, from an origin `[x, s]`.
+///
+/// A coefficient by y of the rail's profile or by the inclination of its surface becomes one by the arc length, and one by the position along the
+/// track becomes one by x. The patches have the extents `[x_min, x_max, s_min, s_max]` in mm. `rail` returns the parameter of the rail's curve at an
+/// arc length.
 pub(crate) fn on_rail(
     friction: &FrictionLaw,
     geometry: &WheelRail,
@@ -169,10 +183,7 @@ pub(crate) fn on_rail(
     let Some(law) = friction.across() else {
         return friction.clone();
     };
-    let nothing = (f64::INFINITY, f64::NEG_INFINITY);
-    let (low, high) = extents.fold(nothing, |(low, high), e| {
-        (low.min(e[2] - s), high.max(e[3] - s))
-    });
+    let [low, high] = bounds(extents.flat_map(|[.., low, high]| [low - s, high - s]));
     let step = (high - low) / (SAMPLES - 1) as f64;
     let found = (0..SAMPLES).map(|k| {
         let y = low + k as f64 * step;
@@ -190,25 +201,25 @@ pub(crate) fn on_rail(
     FrictionLaw::Across(AcrossLaw::new(AcrossPlace::Y, &y, &coefficient))
 }
 
-/// What the places of a table are.
+/// The variable of a table that varies laterally.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AcrossPlace {
     /// y in mm: of the axes of the footprint, or of the rail's profile until the frame of a patch is known.
     Y,
-    /// Inclination of the rail's surface in rad; a patch has to bring it to its own y first.
+    /// Inclination of the rail's surface in rad. It is converted to y in the frame of a patch.
     Angle,
 }
 
-/// A coefficient of friction by its place across: linear between points, constant outside; two points at one place are a jump.
+/// A coefficient of friction that varies laterally.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AcrossLaw {
-    /// What the places are.
+    /// The variable of the table.
     pub place: AcrossPlace,
     table: CoefficientTable,
 }
 
 impl AcrossLaw {
-    /// A law from as many places, in order, as coefficients, of which there is at least one.
+    /// Makes a law from values of the variable, in order, and as many coefficients, at least one.
     pub fn new(place: AcrossPlace, at: &[f64], coefficient: &[f64]) -> AcrossLaw {
         AcrossLaw {
             place,
@@ -216,7 +227,7 @@ impl AcrossLaw {
         }
     }
 
-    /// The coefficient at a place; on a jump that of the side of larger places.
+    /// The coefficient at a value. At a jump, that of the side of larger values is returned.
     pub fn at(&self, place: f64) -> f64 {
         self.table.at(place).0
     }
@@ -226,7 +237,7 @@ impl AcrossLaw {
         self.table.largest()
     }
 
-    /// The mean coefficient of loads at places; the plain mean where nothing is carried.
+    /// The mean coefficient weighted with loads, or the plain mean if all loads are 0.
     pub fn mean(&self, loads: impl Iterator<Item = (f64, f64)> + Clone) -> f64 {
         let weighted = |weight: fn(f64) -> f64| {
             let sums = loads.clone().map(|(y, load)| (weight(load), self.at(y)));

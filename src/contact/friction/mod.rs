@@ -1,4 +1,4 @@
-//! The law of friction: how large a traction can become.
+//! Laws of friction: the largest traction of a cell.
 
 pub mod coefficient_table;
 pub mod law;

@@ -1,31 +1,30 @@
-//! Bounds that depend on what a point meets on its way through the contact: heat, and plastic shear of the layer between the bodies.
+//! Traction bounds that depend on the path of a point through the contact: heat, and plastic shear of the layer between the bodies.
 //!
-//! Both only look ahead, to where the point has been: along a strip every bound follows from the slips of the cells ahead and of its own.
-//! The method solves with bounds that are given, finds the bounds that belong to the slips, and repeats until they agree.
+//! Along a strip every bound follows from the slips of its own cell and of the cells ahead, where the point has been. The method solves with given
+//! bounds, finds the bounds that belong to the slips, and repeats until they agree.
 
 use crate::friction::coefficient_table::CoefficientTable;
-use crate::friction::velocity_weakening::{SLIP_OF_CELL, STABILITY_MAX};
+use crate::friction::velocity_weakening::SLIP_OF_CELL;
 use crate::mesh::Mesh;
 use crate::numerics::roots::{self, CloseEnough, Course};
 
-/// Largest temperature in K by which the temperature of a cell may be missed; bounds change by some 10⁻⁴ per K. Keeps the numbers safe; not tuned.
+/// Tolerance of the temperature of a cell in K. Bounds change by about 10⁻⁴ per K. Not tuned.
 const KELVIN: f64 = 1e-6;
 
-/// A coefficient that falls with the temperature of the contact: linear between points, constant outside.
+/// A coefficient that decreases with the temperature of the contact.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeatedLaw {
     /// Temperatures in °C, rising, with coefficients that never rise.
     table: CoefficientTable,
     /// Temperature in °C without friction heat.
     base: f64,
-    /// Temperature rise in K, at a rolling speed of 1 mm/s, per unit of `∫ q/√(x′ − x) dx′` with q in MPa times relative slip and
-    /// lengths in mm; it grows as the root of the speed.
+    /// Temperature rise in K at a rolling speed of 1 mm/s per unit of `∫ q/√(x′ − x) dx′`, with q in MPa times relative slip and lengths in mm.
+    /// It is proportional to the root of the speed.
     rise: f64,
 }
 
 impl HeatedLaw {
-    /// A law from temperatures, rising, with as many coefficients, never rising, of which there is at least one; see the members for the
-    /// others.
+    /// Makes a law from increasing temperatures with as many non-increasing coefficients, at least one. See the fields for `base` and `rise`.
     pub fn new(at: &[f64], coefficient: &[f64], base: f64, rise: f64) -> HeatedLaw {
         HeatedLaw {
             table: CoefficientTable::new(at, coefficient),
@@ -34,7 +33,7 @@ impl HeatedLaw {
         }
     }
 
-    /// The coefficient of the coldest contact, which is the largest.
+    /// The coefficient of the coldest contact, which is the largest one.
     pub fn largest(&self) -> f64 {
         self.table.largest()
     }
@@ -44,8 +43,8 @@ impl HeatedLaw {
         self.rise * speed.sqrt()
     }
 
-    /// Stability number `1.7 max|dμ/dT| (dT/ds) p_max/G` at a rolling speed in mm/s, with dT/ds the largest temperature rise per relative slip
-    /// of a patch of this half-length in mm: how fast bounds fall with slip, compared with how fast slips fall as tractions grow.
+    /// Stability number `1.7 max|dμ/dT| (dT/ds) p_max/G` at a rolling speed in mm/s. dT/ds is the largest temperature rise per relative slip of a
+    /// patch with this half-length in mm. It compares the decrease of bounds with slip with the decrease of slips with traction.
     pub fn stability(
         &self,
         speed: f64,
@@ -60,33 +59,23 @@ impl HeatedLaw {
             .windows(2)
             .map(slope)
             .fold(0.0, f64::max);
-        // 2.188: the largest of ∫ √(1 − s²)/√(s − ξ) ds.
+        // The largest value of ∫ √(1 − s²)/√(s − ξ) ds is 2.188.
         let rise = self.rise_at(speed) * self.largest() * pressure_max * 2.188 * half_length.sqrt();
         SLIP_OF_CELL * steepest * rise * pressure_max / shear_modulus
     }
-
-    /// Why there is no answer one can rely on at this stability number, if it is too large.
-    pub fn too_fast(stability: f64) -> Option<String> {
-        (stability > STABILITY_MAX).then(|| {
-            format!(
-                "friction falls too fast with temperature for one reliable answer: the stability number is {stability:.3}, at most {STABILITY_MAX} \
-                 is allowed; it is proportional to the fall per K, to the square of the largest pressure and to the root of the rolling speed"
-            )
-        })
-    }
 }
 
-/// What changes the bounds of one motion.
+/// The path-dependent laws of one motion.
 #[derive(Debug, Clone, Copy)]
 pub struct PathDependentLaws<'a> {
-    /// A coefficient that falls with temperature, and the rolling speed in mm/s.
+    /// A coefficient that decreases with the temperature, and the rolling speed in mm/s.
     pub heated: Option<(&'a HeatedLaw, f64)>,
     /// The yield of the layer between the bodies.
     pub yielding: Option<LayerYield>,
 }
 
 impl<'a> PathDependentLaws<'a> {
-    /// The laws in the units of a level: of slip, of length in mm and of traction in MPa.
+    /// The laws in the units of a mesh: of slip, of length in mm and of traction in MPa.
     pub fn on_level(&self, slip: f64, length: f64, traction: f64) -> PathDependentFriction<'a> {
         PathDependentFriction {
             heated: self.heated.map(|(law, speed)| CellHeat {
@@ -101,7 +90,7 @@ impl<'a> PathDependentLaws<'a> {
     }
 }
 
-/// The same for dimensionless bounds and slips.
+/// Path-dependent laws for dimensionless bounds and slips.
 #[derive(Debug, Clone, Copy)]
 pub struct PathDependentFriction<'a> {
     heated: Option<CellHeat<'a>>,
@@ -118,7 +107,7 @@ struct CellHeat<'a> {
 /// Heat of cells along a strip, from the leading end.
 #[derive(Debug, Default)]
 struct Heated {
-    /// Trailing and leading edge, and heat.
+    /// Trailing edge, leading edge and heat of each cell.
     cells: Vec<(f64, f64, f64)>,
 }
 
@@ -133,13 +122,13 @@ impl Heated {
 }
 
 impl PathDependentFriction<'_> {
-    /// The bounds of the first cells of a mesh, as many as there are slips, that belong to these slips. `rest` are the bounds of a cold
-    /// contact whose layer does not yield; cells that stick have the slip 0.
+    /// The bounds that belong to the slips of the first cells of a mesh. `rest` has the bounds of a cold contact whose layer does not yield. Cells
+    /// that stick have the slip 0.
     pub fn bounds(&self, mesh: &Mesh, rest: &[f64], slip: &[f64]) -> Vec<f64> {
         let mut bounds = rest.to_vec();
         let mut heated = Heated::default();
         let (mut strip, mut plastic) = (None, 0.0);
-        // Segments of a strip follow each other from behind; what a point met it met ahead.
+        // The segments of a strip are in order from its trailing end. A point passes them from its leading end.
         let segments = mesh.segments.iter().rev();
         for segment in segments.filter(|segment| segment.cells.end <= slip.len()) {
             let of = (segment.chord.patch, segment.chord.strip);
@@ -154,7 +143,7 @@ impl PathDependentFriction<'_> {
                     bounds[i] = heat.bound(rest[i], slip[i], ahead, right - left);
                 }
                 if let Some(law) = self.yielding {
-                    // Where friction holds less than the layer, it slides on the layer and leaves it as it is.
+                    // If friction is weaker than the layer, the surface slides on the layer, which does not yield.
                     let room = match law.hardening > 0.0 {
                         true => (bounds[i] - law.stress) / law.hardening - plastic,
                         false if law.stress < bounds[i] => f64::INFINITY,
@@ -173,11 +162,11 @@ impl PathDependentFriction<'_> {
 }
 
 impl CellHeat<'_> {
-    /// The bound of a cell of a length at the temperature that the heat ahead and its own give it.
+    /// The bound of a cell at its temperature, from the heat of the cells ahead and its own.
     fn bound(&self, rest: f64, slip: f64, ahead: f64, length: f64) -> f64 {
         let largest = self.law.largest();
         let fixed = self.law.base + self.rise * ahead;
-        // Own heat reaches the middle from the leading half.
+        // Only the heat of the leading half of the cell reaches its middle.
         let own = self.rise * 2.0 * (0.5 * length).sqrt() * rest * slip / largest;
         let hottest = fixed + own * largest;
         let close = CloseEnough {
@@ -198,21 +187,21 @@ impl CellHeat<'_> {
 /// The interface of the two surfaces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interface {
-    /// Kalker's reduction factor k, more than 0 and at most 1: tractions displace the surfaces 1/k times as far.
+    /// Kalker's reduction factor k, more than 0 and at most 1. Tractions displace the surfaces 1/k times as far.
     pub reduction: f64,
-    /// Flexibility of an elastic layer in mm³/N, its thickness over its shear modulus: the displacement difference of the surfaces grows
-    /// by this times the traction of the same place. 0 without a layer.
+    /// Flexibility of an elastic layer in mm³/N, its thickness over its shear modulus; 0 without a layer. The displacement difference of the
+    /// surfaces grows by this times the local traction.
     pub layer: f64,
-    /// The stress at which the layer yields, where it does.
+    /// The yield of the layer, if it yields.
     pub yielding: Option<LayerYield>,
 }
 
-/// A layer that yields: it transmits no more than a stress that grows with its plastic shear.
+/// The yield of a layer, which transmits at most a stress that grows with its plastic shear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerYield {
     /// Shear stress in MPa at which it begins to yield.
     pub stress: f64,
-    /// Growth of that stress in MPa per mm of plastic displacement, not negative.
+    /// Increase of that stress in MPa per mm of plastic displacement, not negative.
     pub hardening: f64,
 }
 
@@ -245,8 +234,8 @@ mod tests {
         Mesh::new(&[chord], &Grading::cosine(cells))
     }
 
-    /// With μ = 1 − c T, uniform pressure and slip: T = R s ∫ μ/√(x′ − x) dx′, whose solution is μ = exp(z²) erfc(z) with z = c R s √(π d)
-    /// at the distance d from the leading end (Abel's equation of the second kind).
+    /// With μ = 1 − c T and uniform pressure and slip, T = R s ∫ μ/√(x′ − x) dx′. The solution is μ = exp(z²) erfc(z) with z = c R s √(π d) at the
+    /// distance d from the leading end (Abel's equation of the second kind).
     #[test]
     fn uniform_slip_heats_as_abels_equation_says() {
         let law = HeatedLaw::new(&[0.0, 1000.0], &[1.0, 0.0], 0.0, 1.0);
@@ -291,11 +280,11 @@ mod tests {
         for (i, bound) in found.iter().enumerate() {
             let way = 1.0 - 0.5 * (mesh.left[i] + mesh.right[i]);
             let known = (0.5 + 0.25 * way).min(0.8);
-            // The layer stops hardening inside one cell, whose bound is that of the mean of its way.
+            // The layer stops hardening inside one cell, whose bound is the mean over the cell.
             let within = if known > 0.78 { 0.011 } else { 1e-12 };
             assert!((bound - known).abs() < within, "{i}: {bound} {known}");
         }
-        // Nothing slips: the whole layer has its first strength.
+        // Without slip, the whole layer keeps its initial strength.
         let still = laws
             .on_level(1.0, 1.0, 1.0)
             .bounds(&mesh, &[0.8; 40], &[0.0; 40]);

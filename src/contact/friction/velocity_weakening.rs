@@ -1,4 +1,4 @@
-//! Friction that falls with the speed of slip: the law, and the bound of a cell as a function of its slip.
+//! Friction that decreases with the slip velocity: the law, and the traction bound of a cell as a function of its slip.
 
 use std::f64::consts::LN_2;
 
@@ -8,14 +8,13 @@ use utoipa::ToSchema;
 
 use crate::numerics::roots::{CloseEnough, Course, find};
 
-/// Rounding of the slip of [`Softening::resolvent`], relative to that of a cell without traction.
+/// Tolerance of the slip of [`Softening::resolvent`], relative to that of a cell without traction.
 const ROUNDING: f64 = 1e-14;
 
-/// Largest slip that a unit of traction over G on one cell takes from it: `max |M_ii|` of the three-point rule on ellipses with a/b from
-/// 0.5 to 1.2, meshes from 6 × 12 to 12 × 24, is 1.5 to 1.8 (`cargo test --test physics -- friction_as_it_is --nocapture` prints it).
+/// Largest reduction of the slip of one cell by a unit of traction over G: `max |M_ii|` of the three-point rule. On ellipses with a/b from 0.5 to 1.2
+/// and meshes from 6 × 12 to 12 × 24 it is 1.5 to 1.8 (`cargo test --test physics -- friction_as_it_is --nocapture` prints it).
 pub(crate) const SLIP_OF_CELL: f64 = 1.7;
-/// Largest stability number that is answered, for slip and for heat. Up to 1.0 no second state was found in 360 random motions from two starts,
-/// at 1.5 one.
+/// Largest allowed stability number, for slip and for heat. Up to 1.0 no second state was found in 360 random motions from two starts, at 1.5 one.
 pub(crate) const STABILITY_MAX: f64 = 1.0;
 
 /// How a coefficient falls with the slip speed v. In the formulas, f₀ is `limit`; f₁, f₂ are the `coefficient` and v₁, v₂ the
@@ -32,41 +31,41 @@ pub enum FallForm {
     Linear,
 }
 
-/// One term of a law: what it adds at rest, and the speed of slip at which half of that is left.
+/// One term of a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SofteningTerm {
-    /// Part of the coefficient that falls, not negative.
+    /// Contribution to the coefficient without slip, not negative.
     pub coefficient: f64,
-    /// Speed of slip in mm/s at which half of it is left, positive.
+    /// Slip velocity in mm/s at which half of it is left, positive.
     pub half_speed: f64,
 }
 
 impl SofteningTerm {
-    /// A term that is not there.
+    /// A term without effect.
     pub const NONE: SofteningTerm = SofteningTerm {
         coefficient: 0.0,
         half_speed: 1.0,
     };
 }
 
-/// A coefficient of friction that falls with the speed of slip v in mm/s, as in CONTACT (Vollebregt, user guide, section 3.2).
+/// A coefficient of friction that decreases with the slip velocity v in mm/s, as in CONTACT (Vollebregt, user guide, section 3.2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FallingLaw {
     /// The form of its terms.
     pub form: FallForm,
-    /// What is left at the highest speeds, f₀, not negative.
+    /// The limit f₀ at high velocities, not negative.
     pub limit: f64,
-    /// Its terms; a term that is not there has the coefficient 0.
+    /// Its terms; unused ones have the coefficient 0.
     pub terms: [SofteningTerm; 2],
 }
 
 impl FallingLaw {
-    /// The coefficient at rest, which is the largest.
+    /// The coefficient without slip, which is the largest one.
     pub fn at_rest(&self) -> f64 {
         self.limit + self.terms.iter().map(|term| term.coefficient).sum::<f64>()
     }
 
-    /// The coefficient at a speed of slip in mm/s, and its derivative in s/mm, which is never positive.
+    /// The coefficient at a slip velocity in mm/s, and its derivative in s/mm, which is never positive.
     pub fn at(&self, speed: f64) -> (f64, f64) {
         let mut sum = (self.limit, 0.0);
         for (k, term) in self.terms.iter().enumerate() {
@@ -90,9 +89,9 @@ impl FallingLaw {
         sum
     }
 
-    /// A bound in s/mm of the size of the derivative, which is reached unless two terms are steepest at different speeds.
+    /// An upper bound in s/mm of the magnitude of the derivative. It is attained unless two terms are steepest at different velocities.
     pub fn steepest(&self) -> f64 {
-        // 3√3/8: the largest slope of 1/(1 + x²).
+        // The largest slope of 1/(1 + x²) is 3√3/8.
         let second = 3.0 * 3.0_f64.sqrt() / 8.0;
         let factors = match self.form {
             FallForm::Exponential => [LN_2, LN_2],
@@ -105,23 +104,13 @@ impl FallingLaw {
             .sum()
     }
 
-    /// Stability number `1.7 V max|μ′| p_max/G` at a rolling speed in mm/s, pressure and shear modulus in MPa: how fast bounds fall with
-    /// slip, compared with how fast slips fall as tractions grow. Up to 1 the contact has one state.
+    /// Stability number `1.7 V max|μ′| p_max/G` at a rolling speed in mm/s, with pressure and shear modulus in MPa. It compares the decrease of
+    /// bounds with slip with the decrease of slips with traction. Up to 1 the contact has one state.
     pub fn stability(&self, rolling_speed: f64, pressure_max: f64, shear_modulus: f64) -> f64 {
         SLIP_OF_CELL * rolling_speed * self.steepest() * pressure_max / shear_modulus
     }
 
-    /// Why there is no answer one can rely on at this stability number, if it is too large.
-    pub fn too_fast(stability: f64) -> Option<String> {
-        (stability > STABILITY_MAX).then(|| {
-            format!(
-                "friction falls too fast with slip for one reliable answer: the stability number is {stability:.3}, at most {STABILITY_MAX} \
-                 is allowed; it is proportional to rolling speed, fall and largest pressure"
-            )
-        })
-    }
-
-    /// The bounds of cells that roll at a speed in mm/s, for slips counted in `slip_unit`.
+    /// The bounds of cells at a rolling speed in mm/s, for slips in units of `slip_unit`.
     pub fn bound_fall(&self, rolling_speed: f64, slip_unit: f64) -> Softening {
         Softening {
             law: *self,
@@ -130,29 +119,29 @@ impl FallingLaw {
     }
 }
 
-/// The bound of a cell over its bound at rest, as a function of its dimensionless slip.
+/// The bound of a cell over its bound without slip, as a function of its dimensionless slip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Softening {
     law: FallingLaw,
-    /// Speed of slip in mm/s for one unit of slip.
+    /// Slip velocity in mm/s per unit of slip.
     speed: f64,
 }
 
 impl Softening {
-    /// Bound over the bound at rest at a slip, and its derivative.
+    /// The relative bound at a slip, and its derivative.
     pub fn at(&self, slip: f64) -> (f64, f64) {
         let rest = self.law.at_rest();
         let (value, slope) = self.law.at(self.speed * slip);
         (value / rest, self.speed * slope / rest)
     }
 
-    /// The largest size of the derivative.
+    /// An upper bound of the magnitude of the derivative.
     pub fn steepest(&self) -> f64 {
         self.speed * self.law.steepest() / self.law.at_rest()
     }
 
-    /// The slip σ with `g(σ) + r σ = length`, where `g` is the bound of a cell whose bound at rest is `rest`, for a `length` above
-    /// that; with it `g(σ)` and `g′(σ)`. There is one such σ if r exceeds the largest `|g′|`.
+    /// Solves `g(σ) + r σ = length` for the slip σ. `g` is the bound of a cell whose bound without slip is `rest`, and `length` is larger than that.
+    /// The solution is unique if r exceeds the largest `|g′|`.
     pub fn resolvent(&self, rest: f64, r: f64, length: f64) -> Slipping {
         let ends = [(length - rest) / r, length / r];
         let close = CloseEnough {
@@ -172,10 +161,10 @@ impl Softening {
     }
 }
 
-/// A slipping cell: its slip, and bound with derivative there.
+/// The state of a slipping cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slipping {
-    /// Size of the slip.
+    /// Magnitude of the slip.
     pub slip: f64,
     /// The bound at this slip.
     pub bound: f64,
@@ -230,7 +219,7 @@ mod tests {
 
     #[test]
     fn the_resolvent_solves_its_equation() {
-        // g(σ) = 0.5 (0.6 + 0.4 exp(−σ/0.5)), r = 1.2, length 1.1: a value computed independently.
+        // An independently computed value for g(σ) = 0.5 (0.6 + 0.4 exp(−σ/0.5)), r = 1.2 and length 1.1.
         let law = FallingLaw {
             form: FallForm::Exponential,
             limit: 0.6,

@@ -1,26 +1,26 @@
-//! Equivalent conicity after EN 15302: that of the cone whose wheelset has the same wavelength at the same amplitude.
+//! Equivalent conicity after EN 15302: the conicity of a cone whose wheelset has the same wavelength at the same amplitude.
 //!
-//! A free wheelset on a straight track moves by `y'' = −Δr(y) / (e r₀)` over the distance run (Klingel 1883 for a cone, whose
-//! `Δr = 2 tan γ y` gives `λ = 2π √(e r₀ / (2 tan γ))`). With `S(y) = ∫ Δr dy` from the place at rest, the motion that turns at two
-//! places with `S = E` has the wavelength `λ = 2 ∫ dy / √(2 (E − S) / (e r₀))` between them, and the equivalent conicity is
-//! `tan γ = 2 e r₀ (π / λ)²`: e and r₀ drop out. This is the integration of the differential equation of EN 15302 in closed form over
-//! a Δr that is linear between its samples; the amplitude is half the distance of the turning points. Where Δr is 0 over the whole amplitude,
-//! as of a flat tread, nothing steers and the conicity is 0.
+//! A free wheelset on a straight track moves by `y'' = −Δr(y) / (e r₀)`, with derivatives with respect to the distance run. For a cone,
+//! `Δr = 2 tan γ y` gives `λ = 2π √(e r₀ / (2 tan γ))` (Klingel 1883). Let `S(y) = ∫ Δr dy` from the equilibrium. The motion between two turning
+//! points with `S = E` has the wavelength `λ = 2 ∫ dy / √(2 (E − S) / (e r₀))`, and the equivalent conicity is `tan γ = 2 e r₀ (π / λ)²`. e and r₀
+//! cancel. This integrates the differential equation of EN 15302 in closed form for a Δr that is linear between its samples. The amplitude is
+//! half the distance of the turning points. If Δr is 0 over the whole amplitude, as on a flat tread, the wheelset is not steered and the conicity
+//! is 0.
 
 use std::f64::consts::PI;
 use std::fmt;
 
-use crate::numerics::roots::bisect;
+use crate::numerics::roots::{bisect, bounds};
 
-/// Places of the quadrature between the turning points, equally spaced in the angle: with linear Δr it is exact.
-const PLACES: usize = 2000;
-/// Halvings of a bracket; more change nothing.
+/// Number of points of the quadrature between the turning points, equally spaced in the angle. For a linear Δr it is exact.
+const QUADRATURE_POINTS: usize = 2000;
+/// Number of bisections of a bracket, enough for the last bit.
 const HALVINGS: u32 = 60;
-/// Radii that differ by less than this in mm are equal, and so small a conicity is none: at an amplitude of 1 mm the difference is a conicity of
-/// 0.00005, a twentieth of the last digit that the standard gives.
+/// Difference in mm up to which two radii are equal. At an amplitude of 1 mm it is a conicity of 0.00005, a twentieth of the last digit of the
+/// standard. Conicities below that are 0.
 const EQUAL: f64 = 1e-4;
 
-/// Difference of the rolling radii over the lateral shift of a wheelset, linear between samples.
+/// Difference of the rolling radii as a function of the lateral shift of a wheelset, linear between samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RadiusDifference {
     shift: Vec<f64>,
@@ -36,18 +36,18 @@ pub struct Conicity {
     pub conicity: f64,
     /// tan γ by harmonic linearisation: the first harmonic of Δr over a sine between the same turning points.
     pub harmonic: f64,
-    /// The turning points in mm; none where the wheelset is not steered back.
+    /// The turning points in mm; `None` if the wheelset is not steered back.
     pub turns: Option<[f64; 2]>,
 }
 
-/// Why there is no conicity at an amplitude; shifts and amplitudes in mm.
+/// The reason why there is no conicity at an amplitude; shifts and amplitudes in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoConicity {
     /// Δr does not rise through 0 between these shifts.
     NoEquilibrium([f64; 2]),
     /// The turning points lie beyond these shifts.
     BeyondShifts([f64; 2]),
-    /// No motion about the equilibrium has an amplitude between these two: it passes an unstable equilibrium.
+    /// No motion about the equilibrium has an amplitude between these two, because there is an unstable equilibrium.
     PassesUnstable([f64; 2]),
 }
 
@@ -71,7 +71,7 @@ impl fmt::Display for NoConicity {
     }
 }
 
-/// Where a wheelset is at rest.
+/// An equilibrium of the wheelset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Rest {
     shift: f64,
@@ -80,7 +80,7 @@ struct Rest {
 }
 
 impl RadiusDifference {
-    /// From shifts in mm, strictly increasing and at least two, and differences `left − right` in mm, both as long.
+    /// Makes the function from at least two strictly increasing shifts in mm, and as many differences `left − right` in mm.
     pub fn new(shift: Vec<f64>, difference: Vec<f64>) -> RadiusDifference {
         let mut integral = vec![0.0; shift.len()];
         for k in 1..shift.len() {
@@ -99,8 +99,8 @@ impl RadiusDifference {
         [self.shift[0], self.shift[self.shift.len() - 1]]
     }
 
-    /// The shift in mm at which the radii are equal and to which a free wheelset steers back, the nearest to 0; the middle of the shifts with
-    /// equal radii if there are several. None if there is no such shift.
+    /// The stable equilibrium nearest to 0: the shift in mm at which the radii are equal and to which a free wheelset steers back. If the radii
+    /// are equal over a range of shifts, its middle is returned. Returns `None` if there is no such shift.
     pub fn rest(&self) -> Option<f64> {
         let sign = |k: usize| {
             let difference = self.difference[k];
@@ -111,7 +111,7 @@ impl RadiusDifference {
             self.shift[k] + (value - low) / (high - low) * (self.shift[k + 1] - self.shift[k])
         };
         let mut nearest: Option<[f64; 2]> = None;
-        // Where the radii have been equal since; the beginning of the shifts counts as steered back from outside.
+        // The beginning of the current range of equal radii. Below the first shift the wheelset is taken to steer back.
         let mut since = (sign(0) == 0.0).then_some(self.shift[0]);
         let mut consider = |[from, to]: [f64; 2]| {
             let off = |[from, to]: [f64; 2]| from.max(-to).max(0.0);
@@ -151,12 +151,12 @@ impl RadiusDifference {
         ]
     }
 
-    /// The places on both sides of the rest where the integral first exceeds that of the rest by `energy`; the end of the shifts where it does
-    /// not.
+    /// The shifts on both sides of the equilibrium at which the integral first exceeds that of the equilibrium by `energy`, or the ends of the
+    /// known shifts.
     fn turns(&self, rest: Rest, energy: f64) -> [f64; 2] {
         let level = rest.integral + energy;
         let after = self.shift.partition_point(|shift| *shift <= rest.shift);
-        let turn = |mut beyond: std::vec::IntoIter<usize>| {
+        let turn = |mut beyond: Box<dyn Iterator<Item = usize>>| {
             let mut inside = rest.shift;
             let outside = beyond.find(|k| {
                 let exceeds = self.integral[*k] >= level;
@@ -169,23 +169,22 @@ impl RadiusDifference {
                 bisect([inside, self.shift[k]], HALVINGS, |y| self.at(y)[1] < level)[1]
             })
         };
-        let left: Vec<usize> = (0..after).rev().collect();
-        let right: Vec<usize> = (after..self.shift.len()).collect();
-        [turn(left.into_iter()), turn(right.into_iter())]
+        let right = after..self.shift.len();
+        [turn(Box::new((0..after).rev())), turn(Box::new(right))]
     }
 
-    /// Most that the integral rises above that of the rest on the side where it rises less.
+    /// The largest rise of the integral above that of the equilibrium, on the side where it rises less.
     fn highest(&self, rest: Rest) -> f64 {
         let after = self.shift.partition_point(|shift| *shift <= rest.shift);
-        let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let most = |values: &[f64]| bounds(values.iter().copied())[1];
         let [left, right] = [&self.integral[..after], &self.integral[after..]].map(most);
         (left.min(right) - rest.integral).max(0.0)
     }
 
-    /// The conicity at an amplitude in mm, more than 0.
+    /// The conicity at a positive amplitude in mm.
     ///
     /// # Errors
-    /// Why there is none.
+    /// Returns the reason why there is none.
     pub fn conicity(&self, amplitude: f64) -> Result<Conicity, NoConicity> {
         let Some(shift) = self.rest() else {
             return Err(NoConicity::NoEquilibrium(self.range()));
@@ -195,7 +194,7 @@ impl RadiusDifference {
             integral: self.at(shift)[1],
         };
         let wide = |[left, right]: [f64; 2]| right - left >= 2.0 * amplitude;
-        // The cone of conicity γ has the energy γ A². Rises of the integral up to that of an unnoticeable cone are none.
+        // A cone of the conicity γ has the energy γ A². Rises of the integral up to that of a negligible cone are ignored.
         let least = EQUAL * amplitude.powi(2);
         let flat = self.turns(rest, least);
         if wide(flat) {
@@ -221,14 +220,14 @@ impl RadiusDifference {
         }
         let [left, right] = outside;
         let (middle, half) = (0.5 * (left + right), 0.5 * (right - left));
-        let step = PI / PLACES as f64;
+        let step = PI / QUADRATURE_POINTS as f64;
         let mut length = 0.0;
-        for k in 0..PLACES {
+        for k in 0..QUADRATURE_POINTS {
             let (sin, cos) = (step * (k as f64 + 0.5) - 0.5 * PI).sin_cos();
             let integral = self.at(middle + half * sin)[1] - rest.integral;
             length += half * cos * step / (2.0 * (high - integral)).sqrt();
         }
-        // The wavelength over √(e r₀) is twice this length. On top of an unstable equilibrium the motion takes for ever.
+        // The wavelength over √(e r₀) is twice this length. It is infinite if the motion ends at an unstable equilibrium.
         let conicity = 0.5 * (PI / length).powi(2);
         Ok(Conicity {
             conicity: if conicity.is_finite() { conicity } else { 0.0 },
@@ -239,12 +238,12 @@ impl RadiusDifference {
 
     /// First harmonic of Δr over a sine about `middle`, relative to that of a cone.
     fn harmonic(&self, middle: f64, half: f64) -> f64 {
-        let step = PI / PLACES as f64;
+        let step = PI / QUADRATURE_POINTS as f64;
         let first = |k: usize| {
             let sin = (step * (k as f64 + 0.5) - 0.5 * PI).sin();
             self.at(middle + half * sin)[0] * sin * step
         };
-        (0..PLACES).map(first).sum::<f64>() / (PI * half)
+        (0..QUADRATURE_POINTS).map(first).sum::<f64>() / (PI * half)
     }
 }
 
@@ -296,7 +295,7 @@ mod tests {
         assert_eq!(unstable.rest(), None);
         let missing = unstable.conicity(3.0).unwrap_err();
         assert!(matches!(missing, NoConicity::NoEquilibrium(_)), "{missing}");
-        // A jump through 0 is a rest, and left and right need not be alike.
+        // A jump through 0 is an equilibrium, and the motion need not be symmetric.
         let jump = sampled(|y| if y > 1.05 { 2.0 } else { -1.0 });
         let found = jump.conicity(3.0).unwrap();
         assert!((jump.rest().unwrap() - 1.05).abs() < 0.05);
@@ -323,7 +322,7 @@ mod tests {
                 assert_eq!((found.conicity, found.turns), (0.0, None), "{found:?}");
                 assert!(found.harmonic.abs() < 1e-4, "{found:?}");
             }
-            // With the flat tread of half width w the motion runs π/2 √(1/0.3) mm in each flange and w/v straight on, v = √(0.3) (A − w).
+            // With a flat tread of the half width w, each flange takes π/2 √(1/0.3) mm of the way, and the tread takes w/v with v = √0.3 (A − w).
             for amplitude in [2.0_f64, 4.0, 8.0] {
                 let beyond = amplitude - 1.7;
                 let half = PI / 0.3_f64.sqrt() + 2.0 * 1.7 / (0.3_f64.sqrt() * beyond);

@@ -1,29 +1,30 @@
-//! Finds where a wheel touches its rail first, and about how far it is lowered under a load.
+//! Finds the first touch of a wheel and its rail, and estimates how far the wheel is lowered under a load.
 //!
-//! The rail is straight along x, so that the wheel meets it where its normal has no part along x: the wheel is
-//! replaced by the curve of those points, and the search is one in the plane across.
+//! The rail is straight along x, so that the wheel touches it where the wheel's normal has no component along x. The wheel is
+//! therefore replaced by the curve of these points, and the search takes place in the cross-section.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use crate::geometry::envelope::Envelope;
-use crate::geometry::envelope::envelope;
+use crate::geometry::envelope::{Envelope, envelope};
 use crate::geometry::locus_lines::{LocusLines, LocusPoint};
 use crate::geometry::wheel_rail::{WheelCircle, WheelRail};
+use crate::numerics::roots::bounds;
 
-/// Spacing of the search across the track, in mm, half of that of the points along the curves. The height of first touch is as exact as the rail is straight over half of it.
+/// Lateral spacing of the lines in mm, half of that of the points along the curves. The height of first touch is exact as far as the rail is
+/// straight over half of it.
 pub(crate) const STEP: f64 = 0.04;
-/// Largest lowering of a wheel in mm; more is no contact of wheel and rail.
+/// Largest lowering of a wheel in mm.
 const LOWERING_MAX: f64 = 16.0;
-/// Lowering in mm under a light load, where the estimate for others begins.
+/// Lowering in mm at which the estimate starts, usual under a light load.
 const LOWERING_FIRST: f64 = 0.032;
-/// Lowerings that are tried for an estimate at most, and part of the force to the power 2/3 that ends it: where one patch carries the force, two or
-/// three tries do. Like the one before they decide which height is tried first. Chosen by judgement: the estimate itself is some per cent off, and
-/// whether a looser end is as good was not measured.
-const LOWERINGS_TRIED: usize = 10;
-const ESTIMATED: f64 = 2e-3;
+/// Most evaluations of an estimate. If one patch carries the force, two or three suffice. The estimate only decides at which height the solver
+/// starts.
+const EVALUATIONS_MAX: usize = 10;
+/// Relative tolerance of the force to the power 2/3. Chosen by judgement: the estimate itself is some per cent off.
+const TOLERANCE: f64 = 2e-3;
 
-/// Rail and wheel above each other, line by line along x.
+/// The lines along x on which the wheel lies above the rail.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactLocus<'g> {
     pub(crate) geometry: &'g WheelRail,
@@ -44,17 +45,12 @@ pub(crate) fn rail_points(
     parameters.into_iter().map(point).collect()
 }
 
-/// The rail's upper edge.
-fn edge_of(geometry: &WheelRail) -> &Envelope {
-    geometry.rail_edge.get_or_make(|| {
-        let [rail, _] = geometry.parameters(2.0 * STEP);
-        envelope(&rail_points(geometry, rail), STEP)
-    })
-}
-
 /// Places the wheel above the rail and finds the height of first touch.
 fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
-    let rail = edge_of(geometry);
+    let rail: &Envelope = geometry.rail_edge.get_or_make(|| {
+        let [rail, _] = geometry.parameters(2.0 * STEP);
+        envelope(&rail_points(geometry, rail), STEP)
+    });
     let circles = geometry.circles.get_or_make(|| {
         let [_, wheel] = geometry.parameters(2.0 * STEP);
         wheel.into_iter().map(|s| geometry.circle(s)).collect()
@@ -89,8 +85,7 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
     if lines.len() < 3 {
         return Err(nothing_above());
     }
-    let clearances = lines.iter().map(|line| line.clearance);
-    let least = clearances.fold(f64::INFINITY, f64::min);
+    let [least, _] = bounds(lines.iter().map(|line| line.clearance));
     for line in &mut lines {
         line.clearance -= least;
     }
@@ -105,10 +100,10 @@ fn nothing_above() -> String {
 }
 
 impl<'g> ContactLocus<'g> {
-    /// Places the wheel above the rail and finds the height of first touch; the second time for the same geometry they are known.
+    /// Places the wheel above the rail and finds the height of first touch. The result is cached in the geometry.
     ///
     /// # Errors
-    /// A sentence, if no part of the wheel lies above the rail.
+    /// Returns a sentence if no part of the wheel lies above the rail.
     pub fn new(geometry: &'g WheelRail) -> Result<ContactLocus<'g>, String> {
         let found = geometry.locus.get_or_make(|| Arc::new(lines_of(geometry)));
         let found = found.as_ref().as_ref().map_err(String::clone)?;
@@ -119,18 +114,15 @@ impl<'g> ContactLocus<'g> {
         })
     }
 
-    /// Parameters of rail and wheel where they touch first; of several such places, the one at the smallest y.
+    /// Parameters of rail and wheel at first touch. Of several such points, the one at the smallest y is returned.
     pub fn first_touch(&self) -> [f64; 2] {
         let mut lines = self.lines.iter();
         let first = lines.find(|line| line.clearance <= 0.0);
         first.map_or([0.0; 2], |line| [line.rail, line.wheel])
     }
 
-    /// About how far below first touch the wheel comes to rest under a vertical force, given in mm² as the force divided by
-    /// the contact modulus.
-    ///
-    /// Every patch is taken for a circle of the area that half the lowering makes overlap, pressed by a sphere, as if
-    /// horizontal: `N = 4/3 E* √(A/π) δ`, exact for paraboloids. Near ones act on each other.
+    /// Estimates how far below first touch the wheel is in equilibrium under a vertical force, which is given in mm² as the force divided by
+    /// the contact modulus. See [`estimated_force`].
     pub fn estimated_lowering(&self, force: f64) -> f64 {
         let below = |lowering: f64| -> Vec<LocusPoint> {
             let inside = |line: &&LocusPoint| line.clearance < 0.5 * lowering;
@@ -138,7 +130,7 @@ impl<'g> ContactLocus<'g> {
         };
         let mut deepest = 4.0 * LOWERING_FIRST;
         let mut near = below(deepest);
-        // Grows about in proportion to the lowering.
+        // This power of the force is roughly proportional to the lowering.
         let mut power = |lowering: f64| {
             if lowering > deepest {
                 deepest = 1.5 * lowering;
@@ -147,12 +139,12 @@ impl<'g> ContactLocus<'g> {
             estimated_force(&near, STEP, self.rolling_radius(), lowering).powf(2.0 / 3.0)
         };
         let wanted = force.powf(2.0 / 3.0);
-        // The estimate jumps where one more line overlaps: the bracket is kept.
+        // The estimate jumps when one more line overlaps, so that the bracket is kept.
         let (mut low, mut high) = ([0.0_f64; 2], None::<[f64; 2]>);
         let mut lowering = LOWERING_FIRST;
-        for _ in 0..LOWERINGS_TRIED {
+        for _ in 0..EVALUATIONS_MAX {
             let found = power(lowering);
-            if (found / wanted - 1.0).abs() < ESTIMATED {
+            if (found / wanted - 1.0).abs() < TOLERANCE {
                 break;
             }
             if found < wanted {
@@ -177,9 +169,9 @@ impl<'g> ContactLocus<'g> {
         lowering
     }
 
-    /// Weighted mean of the overlap between wheel and rail: the parameter of the rail's curve at the mean position, and the mean inclination of the rail in
-    /// rad. The wheel is `lowering` mm below first touch. Only lines whose rail parameter lies between `from` and `to` count; the weight is the square of the
-    /// overlap, integrated over the area. `None` if the bodies do not overlap there.
+    /// Weighted mean of the overlap between wheel and rail: the parameter of the rail's curve at the mean position, and the mean inclination of
+    /// the rail in rad. The wheel is `lowering` mm below first touch. Only lines with a rail parameter between `from` and `to` count. The weight
+    /// is the square of the overlap, integrated over the area. Returns `None` if the bodies do not overlap there.
     pub(crate) fn mean_overlap(&self, lowering: f64, [from, to]: [f64; 2]) -> Option<[f64; 2]> {
         let inside =
             |line: &&LocusPoint| line.clearance < lowering && (from..to).contains(&line.rail);
@@ -202,11 +194,11 @@ impl<'g> ContactLocus<'g> {
     }
 }
 
-/// Force over the contact modulus, in mm², that lines `step` mm apart, in the order of y, carry at a lowering of a wheel of this radius, both in
-/// mm. Lines that do not overlap may be missing.
+/// Estimates the force over the contact modulus, in mm², of a wheel with this radius at this lowering, both in mm. The lines are `step` mm apart
+/// and in the order of y; lines that do not overlap may be missing.
 ///
-/// Every patch is taken for a circle of the area that half the lowering makes overlap, pressed by a sphere, as if horizontal:
-/// `N = 4/3 E* √(A/π) δ`, exact for paraboloids.
+/// Every patch is replaced by a horizontal circle of the area that overlaps at half the lowering, pressed by a sphere:
+/// `N = 4/3 E* √(A/π) δ`, exact for paraboloids. Neighbouring patches influence each other.
 pub(crate) fn estimated_force(lines: &[LocusPoint], step: f64, radius: f64, lowering: f64) -> f64 {
     let inside = |line: &LocusPoint| line.clearance < 0.5 * lowering;
     let runs = lines.chunk_by(|a, b| inside(a) == inside(b) && b.y - a.y < 1.5 * step);
@@ -214,36 +206,35 @@ pub(crate) fn estimated_force(lines: &[LocusPoint], step: f64, radius: f64, lowe
         |line: &LocusPoint| 2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt();
     let carried = |run: &[LocusPoint]| {
         let area: f64 = run.iter().map(|line| length(line) * step).sum();
-        let clearances = run.iter().map(|line| line.clearance);
+        let [least, _] = bounds(run.iter().map(|line| line.clearance));
         EstimatedPatch {
             middle: 0.5 * (run[0].y + run[run.len() - 1].y),
-            depth: lowering - clearances.fold(f64::INFINITY, f64::min),
+            depth: lowering - least,
             force: 4.0 / 3.0 * (area / PI).sqrt() * lowering,
         }
     };
     let mut patches: Vec<EstimatedPatch> =
         runs.filter(|run| inside(&run[0])).map(carried).collect();
-    // The order decides what few rounds leave; so a mirror image has the same.
+    // The result of few rounds depends on the order. This order is the same for a mirror image.
     patches.sort_by(|a, b| b.force.total_cmp(&a.force));
     coupled_force(&patches)
 }
 
-/// A patch as [`estimated_force`] finds it.
+/// A patch in [`estimated_force`].
 struct EstimatedPatch {
-    /// Its middle across, in mm.
+    /// y of its middle in mm.
     middle: f64,
-    /// Deepest overlap in mm.
+    /// Largest overlap in mm.
     depth: f64,
-    /// What it would carry alone, over the contact modulus, in mm².
+    /// Force of the patch alone, over the contact modulus, in mm².
     force: f64,
 }
 
-/// Force over the contact modulus of all patches. Patches press each other out of contact: one that carries the force F lets the
-/// surface at the distance r sink by `F / (π E* r)` (Boussinesq 1885), and forces grow as the power 3/2 of the depth.
+/// Force over the contact modulus of all patches. Patches reduce each other's overlap: the force F lowers the surface at the distance r by
+/// `F / (π E* r)` (Boussinesq 1885), and forces grow as the power 3/2 of the depth.
 fn coupled_force(patches: &[EstimatedPatch]) -> f64 {
     let mut forces: Vec<f64> = patches.iter().map(|patch| patch.force).collect();
-    // Two rounds in which forces and what they let sink are found from each other leave less than 2 % (see the test). They decide which height is tried
-    // first.
+    // Two rounds leave an error of less than 2 % (see the test).
     let rounds = if patches.len() > 1 { 2 } else { 0 };
     for _ in 0..rounds {
         for (k, patch) in patches.iter().enumerate() {
@@ -263,7 +254,7 @@ fn coupled_force(patches: &[EstimatedPatch]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Lines over bumps of 300 mm at these places, all of which touch at once.
+    /// The force on bumps with a radius of 300 mm at these y, which all touch at once.
     fn carried(places: &[f64]) -> f64 {
         const STEP: f64 = 0.01;
         let line = |k: i32| {
@@ -291,7 +282,7 @@ mod tests {
         let alone = carried(&[0.0]);
         for apart in [12.0, 40.0] {
             let both = carried(&[-0.5 * apart, 0.5 * apart]);
-            // Each sinks by what the other one carries: w = N / (π r), N = N₀ (1 − w/δ)^(3/2).
+            // Each is lowered by the force of the other one: w = N / (π r), N = N₀ (1 − w/δ)^(3/2).
             let half = 0.5 * both;
             let left = 1.0 - half / (PI * apart * 0.05);
             let expected = alone * left.powf(1.5);

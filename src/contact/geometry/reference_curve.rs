@@ -1,11 +1,11 @@
-//! The reference curve of a wheel on a rail: the rail's cross-section by its arc length, and the wheel over it.
+//! The reference curve of a wheel on a rail: the rail's cross-section by its arc length, and the distance of the wheel from it.
 //!
-//! In track axes the curve has the place `(y, z)`, the tangent `(cos α, sin α)` and the normal out of the rail `(−sin α, cos α)` at the arc length
-//! s, which grows to the left. The gap is measured from the rail along that normal to the wheel, a surface of revolution about its axle; both are
-//! undeformed. Contact solved on this curve needs no plane of contact: x and s are the coordinates of the surface, unfolded.
+//! At the arc length s, which grows to the left, the curve has the position `(y, z)` in track axes, the tangent `(cos α, sin α)` and the normal out
+//! of the rail `(−sin α, cos α)`. The gap is measured from the rail along that normal to the wheel, a surface of revolution about its axle. Both
+//! are undeformed. A contact on this curve needs no plane of contact: x and s are the coordinates of the developed surface.
 //!
-//! Planes of contact are a special case. Each replaces a part of the curve: there s is the distance along the plane from its origin, the angle is that of
-//! the plane, and the gap is measured along its normal.
+//! Planes of contact are a special case. Each replaces a part of the curve. There s is the distance along the plane from its origin, the angle is
+//! that of the plane, and the gap is measured along its normal.
 
 use std::borrow::Cow;
 use std::cell::Cell;
@@ -15,48 +15,50 @@ use crate::geometry::plane_curve::CurvePoint;
 use crate::geometry::wheel_rail::WheelRail;
 use crate::geometry::wheelset_pose::WheelsetMotion;
 use crate::numerics::quadrature::{GaussPoints, integral};
+use crate::numerics::roots::bounds;
 
 pub use crate::geometry::curve_place::CurvePlace;
 
-/// Largest spacing in mm of the places of the rail where overlaps are looked for, and of the wheel's circles among which the one over a place is looked
-/// for.
+/// Largest spacing in mm of the tabulated points of the rail and of the wheel's circles.
 pub const SPACING: f64 = 0.25;
-/// A place between two that are nearer to the wheel than this, in mm, may be overlapped although both are not.
+/// Gap in mm below which the bodies may overlap between two tabulated points without overlapping at them.
 const BETWEEN: f64 = 3e-3;
-/// Intervals between neighbouring circles, or places of the rail, that are looked at together.
+/// Number of intervals between neighbouring circles, or points of the rail, in one bounding circle.
 const BLOCK: usize = 16;
-/// Where the wheel's polygon comes nearer to the rail than this, in mm, the distance is computed exactly.
-const LOOKED_AT: f64 = 0.02;
-/// A polygon of either body lies within this distance, in mm, of what it stands for where the bodies may overlap.
+/// Gap in mm between the rail and the polygon of the wheel below which the gap is computed exactly.
+const POLYGON_GAP_MAX: f64 = 0.02;
+/// Largest distance in mm between the polygons of both bodies where the bodies may overlap.
 const DEEPEST: f64 = 2.0;
-/// A wheel farther from the rail than this along the normal, in mm, does not touch it.
+/// Distance in mm along the normal beyond which the wheel does not touch the rail.
 const FAR: f64 = 8.0;
-/// Least cosine between the outward normal of the wheel and the inward normal of the rail where they face each other.
+/// Least cosine of the angle between surfaces that face each other: between the outward normal of the wheel and the inward normal of the rail,
+/// and between the rail and a plane of contact, which ends where the rail turns away from it.
 const FACING_LEAST: f64 = 0.1;
-/// Least cosine between the tangent of the rail and a plane of contact. The plane ends where it is smaller.
-const PLANE_COSINE_LEAST: f64 = 0.1;
-/// Intervals between the points along x at which the gap is computed, for a wheel without yaw, and at most; and the distance in mm across the
-/// wheel's profile for which there is one more.
+/// Number of intervals between the points along x at which the gap is computed, for a wheel without yaw.
 const INTERVALS: usize = 4;
+/// Largest number of these intervals.
 const INTERVALS_MAX: usize = 15;
+/// Distance in mm across the wheel's profile that adds one interval.
 const NODE_DISTANCE: f64 = 0.1;
-/// Sections in which the least gap between two places is looked for.
+/// Number of golden sections in the search for the least gap between two points.
 const SECTIONS: usize = 16;
-/// Circles searched from the last result on, before all are searched.
+/// Number of circles searched near the last result before all are searched.
 const NEIGHBOURS: usize = 8;
-/// Newton's method for the wheel's surface: steps at most, the last step in mm, and the longest one allowed in mm.
+/// Most steps of Newton's method for the wheel's surface.
 const STEPS_MAX: usize = 25;
+/// Length in mm of a step that ends Newton's method.
 const STEP_LAST: f64 = 1e-10;
+/// Length in mm to which a step of Newton's method is limited.
 const STEP_LONGEST: f64 = 1.0;
 
-/// A plane of contact across the track.
+/// A plane of contact, parallel to x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactPlane {
     /// Its origin on the rail.
     pub origin: CurvePlace,
     /// Its angle in rad.
     pub angle: f64,
-    /// Arc lengths in mm between which it replaces the curve.
+    /// Range of arc lengths in mm in which it replaces the curve.
     pub range: [f64; 2],
 }
 
@@ -67,7 +69,7 @@ impl ContactPlane {
         self.origin.s + (at[0] - self.origin.at[0]) * cos + (at[1] - self.origin.at[1]) * sin
     }
 
-    /// The part of a tangent at an angle in rad that lies along the plane.
+    /// Cosine of the angle between the plane and a tangent at an angle in rad.
     fn follows(&self, angle: f64) -> f64 {
         (angle - self.angle).cos()
     }
@@ -77,21 +79,21 @@ impl ContactPlane {
 #[derive(Debug, Clone)]
 pub struct ReferenceCurve<'g> {
     geometry: &'g WheelRail,
-    /// The rail's curve, from its first point to its last.
+    /// Points of the rail's curve, from the first to the last.
     rail: Cow<'g, [CurvePlace]>,
-    /// Planes of contact in place of the curve, with increasing arc length; none on the curve itself.
+    /// Planes of contact that replace the curve, by increasing arc length; empty on the curve itself.
     planes: Vec<ContactPlane>,
     /// Lowest points of the wheel's circles.
     circles: Vec<LowestPoint>,
-    /// Circles around [`BLOCK`] intervals between neighbouring lowest points each.
+    /// Bounding circles of [`BLOCK`] intervals between neighbouring lowest points each.
     blocks: Vec<Circle>,
-    /// The place asked for last: cells of a strip ask for the same one after the other.
+    /// The last result of [`ReferenceCurve::at`], because the cells of a strip have the same arc length.
     last: Cell<CurvePlace>,
-    /// Number of the circle after the point of the wheel that was found last: the next one is near.
+    /// Number of the circle after the last point of the wheel that was found, near which the next search begins.
     after: Cell<usize>,
 }
 
-/// The lowest point of a circle of the wheel, with z from the height of the wheel's centre; not a number where the yaw hides it.
+/// The lowest point of a circle of the wheel, with z from the height of the wheel's centre; NaN if there is none because of the yaw.
 #[derive(Debug, Clone, Copy)]
 struct LowestPoint {
     /// Parameter of the wheel's profile.
@@ -108,16 +110,12 @@ struct Circle {
 }
 
 impl Circle {
-    /// A circle around points; those that are not numbers are left out.
+    /// A circle around some points.
     fn around(points: impl Iterator<Item = [f64; 2]> + Clone) -> Circle {
-        let nothing = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        let [low, high] = points.clone().fold(nothing, |[low, high], at| {
-            [
-                [0, 1].map(|k| low[k].min(at[k])),
-                [0, 1].map(|k| high[k].max(at[k])),
-            ]
+        let centre = [0, 1].map(|k| {
+            let [low, high] = bounds(points.clone().map(|at| at[k]));
+            0.5 * (low + high)
         });
-        let centre = [0, 1].map(|k| 0.5 * (low[k] + high[k]));
         let far = points.map(|at| (at[0] - centre[0]).hypot(at[1] - centre[1]));
         Circle {
             centre,
@@ -125,7 +123,7 @@ impl Circle {
         }
     }
 
-    /// Whether another circle, raised by a height, comes within a distance.
+    /// Returns whether another circle, raised by a height, comes within a distance.
     fn is_near(&self, other: &Circle, height: f64, distance: f64) -> bool {
         let across = self.centre[0] - other.centre[0];
         let up = self.centre[1] - other.centre[1] - height;
@@ -134,10 +132,10 @@ impl Circle {
     }
 }
 
-/// A place where the wheel is nearest to the rail on the line along x: x in mm, and the wheel there.
+/// The point of a line along x at which the wheel is nearest to the rail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
-    /// The place.
+    /// The point of the curve through which the line passes.
     pub place: CurvePlace,
     /// x in mm.
     pub x: f64,
@@ -145,21 +143,21 @@ pub struct Nearest {
     pub wheel: WheelOver,
 }
 
-/// The wheel's surface over a place of the curve.
+/// The wheel's surface above a point of the rail's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelOver {
     /// Distance from the rail along its normal in mm; negative where the bodies overlap.
     pub gap: f64,
     /// Parameter of the wheel's profile.
     pub wheel: f64,
-    /// Change of the gap with the height of the wheel's centre.
+    /// Derivative of the gap with respect to the height of the wheel's centre.
     pub lift: f64,
-    /// Angle in rad that the rail would have if it followed the wheel there.
+    /// Angle in rad of a rail that is parallel to the wheel there.
     pub angle: f64,
 }
 
 impl<'g> ReferenceCurve<'g> {
-    /// The curve of a rail, with the wheel in its pose.
+    /// The curve of a rail, with the wheel in its position.
     pub fn new(geometry: &'g WheelRail) -> ReferenceCurve<'g> {
         let [_, wheel] = geometry.parameters(SPACING);
         let circles: Vec<LowestPoint> = wheel
@@ -189,13 +187,13 @@ impl<'g> ReferenceCurve<'g> {
         }
     }
 
-    /// Returns this curve with its stretches replaced by planes of contact, which are given by increasing arc length. Returns the curve itself if fewer than two
-    /// of its points face a plane.
+    /// Returns this curve with parts replaced by planes of contact, which are given by increasing arc length. Returns the curve itself if fewer
+    /// than two of its points face a plane.
     #[must_use]
     pub fn on_planes(&self, planes: Vec<ContactPlane>) -> ReferenceCurve<'g> {
         let mut rail = Vec::new();
         for plane in &planes {
-            let facing = |place: &CurvePlace| plane.follows(place.angle) > PLANE_COSINE_LEAST;
+            let facing = |place: &CurvePlace| plane.follows(place.angle) > FACING_LEAST;
             let inside = |place: &CurvePlace| {
                 (plane.range[0]..plane.range[1]).contains(&place.s) && facing(place)
             };
@@ -216,7 +214,7 @@ impl<'g> ReferenceCurve<'g> {
             });
             rail.extend(places);
         }
-        // The planes are in order of the arc length, the places in order of the rail's points.
+        // The planes are in order of the arc length, but the points in the order of the rail's points.
         if self.sign() < 0.0 {
             rail.sort_by(|a: &CurvePlace, b| b.s.total_cmp(&a.s));
         }
@@ -239,12 +237,12 @@ impl<'g> ReferenceCurve<'g> {
             .min(last)
     }
 
-    /// Whether planes replace the curve.
+    /// Returns whether planes replace the curve.
     pub fn is_flat(&self) -> bool {
         !self.planes.is_empty()
     }
 
-    /// Least and largest arc length in mm. On a right rail, whose points run to the right, arc lengths are negative.
+    /// Least and largest arc length in mm. Arc lengths are negative on a right rail, whose points run to the right.
     pub fn range(&self) -> [f64; 2] {
         let last = self.rail[self.rail.len() - 1].s;
         [last.min(0.0), last.max(0.0)]
@@ -254,7 +252,7 @@ impl<'g> ReferenceCurve<'g> {
         self.geometry.placement.side.sign()
     }
 
-    /// The place at an arc length; beyond the ends the tangent there.
+    /// The point at an arc length. Beyond its ends the curve continues along the tangent.
     pub fn at(&self, s: f64) -> CurvePlace {
         if self.last.get().s == s {
             return self.last.get();
@@ -266,7 +264,7 @@ impl<'g> ReferenceCurve<'g> {
         let next = next.clamp(1, self.rail.len() - 1);
         let [from, to] = [self.rail[next - 1], self.rail[next]];
         let mut rail = from.rail + (to.rail - from.rail) * (s - from.s) / (to.s - from.s);
-        // The table is so fine that a step squares an error of some thousandths of its spacing.
+        // The table is so fine that one Newton step squares an error of some thousandths of its spacing.
         let CurvePoint {
             at, slope: [y, z], ..
         } = self.geometry.rail_at(rail);
@@ -289,7 +287,7 @@ impl<'g> ReferenceCurve<'g> {
         found
     }
 
-    /// The place at a parameter of the rail's curve; not on planes.
+    /// The point at a parameter of the rail's curve. It is not defined on planes.
     pub(crate) fn at_rail(&self, rail: f64) -> CurvePlace {
         let next = self.rail.partition_point(|known| known.rail <= rail);
         let from = self.rail[next.clamp(1, self.rail.len()) - 1];
@@ -297,15 +295,15 @@ impl<'g> ReferenceCurve<'g> {
         place(self.geometry, rail, from.s + self.sign() * along)
     }
 
-    /// Where the wheel is nearest to the rail on the line along x through a place, with the wheel's centre at a height in mm: x, and the wheel there as
-    /// a start for [`over`](Self::over). None where the wheel does not face the rail within 8 mm.
+    /// Finds where the wheel is nearest to the rail on the line along x through a point of the curve, with the wheel's centre at a height in mm.
+    /// Returns x and the wheel there, a start for [`over`](Self::over). Returns `None` if the wheel does not face the rail within 8 mm.
     pub fn nearest(&self, place: &CurvePlace, centre: f64) -> Option<(f64, WheelOver)> {
         let (x, start) = self.about(place, centre, FAR)?;
         Some((x, self.over(place, x, centre, &start)?))
     }
 
-    /// About where the wheel is nearest to the rail on the line along x through a place, if that is within a distance in mm: x, and the wheel's polygon
-    /// there. The search begins at the last result.
+    /// Estimates [`nearest`](Self::nearest) from the polygon of the wheel's lowest points, if that is within a distance in mm. The search begins
+    /// at the last result.
     fn about(&self, place: &CurvePlace, centre: f64, far: f64) -> Option<(f64, WheelOver)> {
         let (tangent, normal) = (place.tangent(), place.normal());
         let here = Circle {
@@ -360,8 +358,8 @@ impl<'g> ReferenceCurve<'g> {
         Some((x, start))
     }
 
-    /// The stretches of the rail in which the bodies overlap with the wheel's centre at a height in mm: overlapped places at most [`SPACING`] apart,
-    /// with increasing arc length. Where the bodies overlap between two places only, the place at which they overlap most.
+    /// The parts of the rail in which the bodies overlap with the wheel's centre at a height in mm: points at most [`SPACING`] apart, by
+    /// increasing arc length. If the bodies overlap only between two tabulated points, the part has the single point at which they overlap most.
     pub fn overlaps(&self, centre: f64) -> Vec<Vec<Nearest>> {
         let seen = self.close_places(centre);
         let gap = |k: usize| seen[k].map_or(f64::INFINITY, |seen| seen.wheel.gap);
@@ -390,7 +388,7 @@ impl<'g> ReferenceCurve<'g> {
         stretches
     }
 
-    /// A place of the table, counted with increasing arc length.
+    /// A point of the table, counted by increasing arc length.
     fn ordered(&self, k: usize) -> &CurvePlace {
         match self.sign() > 0.0 {
             true => &self.rail[k],
@@ -405,7 +403,7 @@ impl<'g> ReferenceCurve<'g> {
         Some(Nearest { place, x, wheel })
     }
 
-    /// The wheel over the places of the table that it may overlap, with increasing arc length.
+    /// The wheel above the points of the table that it may overlap, by increasing arc length.
     fn close_places(&self, centre: f64) -> Vec<Option<Nearest>> {
         let mut close = vec![None; self.rail.len()];
         for block in blocks(self.rail.len()) {
@@ -421,19 +419,17 @@ impl<'g> ReferenceCurve<'g> {
             for k in block {
                 let place = *self.ordered(k);
                 let about = self.about(&place, centre, DEEPEST);
-                close[k] =
-                    about
-                        .filter(|(_, wheel)| wheel.gap < LOOKED_AT)
-                        .and_then(|(x, start)| {
-                            let wheel = self.over(&place, x, centre, &start)?;
-                            Some(Nearest { place, x, wheel })
-                        });
+                let about = about.filter(|(_, wheel)| wheel.gap < POLYGON_GAP_MAX);
+                close[k] = about.and_then(|(x, start)| {
+                    let wheel = self.over(&place, x, centre, &start)?;
+                    Some(Nearest { place, x, wheel })
+                });
             }
         }
         close
     }
 
-    /// The place with the least gap within a distance of one, by golden sections.
+    /// The point with the least gap within a distance of another point, by golden sections.
     fn deepest_near(&self, start: Nearest, centre: f64, distance: f64) -> Nearest {
         let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
         let (mut low, mut high) = (start.place.s - distance, start.place.s + distance);
@@ -457,8 +453,8 @@ impl<'g> ReferenceCurve<'g> {
         best
     }
 
-    /// The wheel over a place, at x and with its centre at a height in mm, by Newton's method from a start nearby. None where the search leaves the
-    /// wheel's profile, or finds a surface that does not face the rail.
+    /// The wheel above a point of the rail's surface at x, with its centre at a height in mm, by Newton's method from a start nearby. Returns
+    /// `None` if the search leaves the wheel's profile or finds a surface that does not face the rail.
     pub fn over(
         &self,
         place: &CurvePlace,
@@ -517,8 +513,8 @@ impl<'g> ReferenceCurve<'g> {
         None
     }
 
-    /// Points along x at which the gap of a strip is computed, so that a polynomial through them has it between two ends in mm: more where the yaw
-    /// moves the contact across the wheel's profile.
+    /// Points along x between two ends in mm at which the gap of a strip is computed, so that a polynomial interpolates it. There are more if the
+    /// yaw moves the contact across the wheel's profile.
     pub fn nodes(&self, [first, last]: [f64; 2]) -> Vec<f64> {
         let across = self.geometry.axle()[0].abs() * (last - first);
         let intervals = (INTERVALS + (across / NODE_DISTANCE) as usize).min(INTERVALS_MAX);
@@ -529,8 +525,8 @@ impl<'g> ReferenceCurve<'g> {
             .collect()
     }
 
-    /// The wheel over the points of a line along x with its centre at a height in mm, from that over a place beside it if that is known. None
-    /// where one of the points is not below the wheel.
+    /// The wheel above the points of a line along x, with its centre at a height in mm. The results on a neighbouring line serve as the start if
+    /// they are given. Returns `None` if one of the points is not below the wheel.
     pub fn over_line(
         &self,
         place: &CurvePlace,
@@ -562,21 +558,21 @@ impl<'g> ReferenceCurve<'g> {
         Some(line)
     }
 
-    /// Half of the length in mm on which the bodies overlap along x, where the wheel is nearest to a place at x.
+    /// Half of the length in mm on which the bodies overlap along x, given the wheel where it is nearest.
     pub fn half_length(&self, wheel: &WheelOver) -> f64 {
         let radius = self.geometry.meridian(wheel.wheel).radius;
         (2.0 * radius * (-wheel.gap).max(0.0) / wheel.lift.abs().max(0.1)).sqrt()
     }
 }
 
-/// Ranges of points over [`BLOCK`] intervals each; neighbours share a point.
+/// Ranges of points with [`BLOCK`] intervals each. Neighbouring ranges share a point.
 fn blocks(points: usize) -> impl Iterator<Item = Range<usize>> {
     (0..points.saturating_sub(1))
         .step_by(BLOCK)
         .map(move |first| first..(first + BLOCK + 1).min(points))
 }
 
-/// Places along a rail's curve, from its first point to its last.
+/// Points along a rail's curve, from the first to the last.
 fn rail_places(geometry: &WheelRail) -> Vec<CurvePlace> {
     let [parameters, _] = geometry.parameters(SPACING);
     let sign = geometry.placement.side.sign();
@@ -589,7 +585,7 @@ fn rail_places(geometry: &WheelRail) -> Vec<CurvePlace> {
     places
 }
 
-/// The place at a parameter of the rail's curve, with its arc length.
+/// The point at a parameter of the rail's curve with a known arc length.
 fn place(geometry: &WheelRail, rail: f64, s: f64) -> CurvePlace {
     let point = geometry.rail_at(rail);
     let [y, z] = point
@@ -611,18 +607,19 @@ fn length(geometry: &WheelRail, from: f64, to: f64) -> f64 {
     })
 }
 
-/// The motion of the wheel as a rigid body, divided by the rolling speed: in track axes, about a point in mm.
+/// The motion of the wheel as a rigid body, divided by the rolling speed, in track axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidMotion {
+    /// A point of the body in mm.
     point: [f64; 3],
-    /// Velocity of the point relative to the rail.
+    /// Velocity of this point relative to the rail.
     velocity: [f64; 3],
     /// Angular velocity in 1/mm.
     turn: [f64; 3],
 }
 
 impl RigidMotion {
-    /// That of a wheelset with its centre at a height in mm.
+    /// The motion of a wheelset with its centre at a height in mm.
     pub fn of_wheelset(geometry: &WheelRail, centre: f64, motion: &WheelsetMotion) -> RigidMotion {
         let mut turn = geometry.axle().map(|part| motion.angular_velocity * part);
         turn[0] += motion.roll_rate;
@@ -634,7 +631,8 @@ impl RigidMotion {
         }
     }
 
-    /// The one that has these creepages and this spin in 1/mm at a point of the wheel's surface over a place, and turns about the normal there alone.
+    /// The motion with these creepages and this spin in 1/mm at a point of the wheel's surface, which rotates only about the normal of the rail
+    /// below it.
     pub fn of_creepages(point: [f64; 3], place: &CurvePlace, creepages: [f64; 3]) -> RigidMotion {
         let [along, across, spin] = creepages;
         let (tangent, normal) = (place.tangent(), place.normal());
@@ -645,7 +643,7 @@ impl RigidMotion {
         }
     }
 
-    /// Rigid slip along x and along the tangent of a place, at a point of the wheel in mm.
+    /// Rigid slip along x and along the tangent of the curve, at a point of the wheel in mm.
     pub fn slip(&self, point: [f64; 3], place: &CurvePlace) -> [f64; 2] {
         let arm = [0, 1, 2].map(|k| point[k] - self.point[k]);
         let turn = &self.turn;
@@ -661,7 +659,7 @@ impl RigidMotion {
         ]
     }
 
-    /// Turn about the normal of a place in 1/mm.
+    /// Angular velocity about the normal of the curve in 1/mm.
     pub fn spin(&self, place: &CurvePlace) -> f64 {
         let normal = place.normal();
         self.turn[1] * normal[0] + self.turn[2] * normal[1]

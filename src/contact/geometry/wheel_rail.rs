@@ -7,7 +7,7 @@
 //! flange-back position p. Conventions of the Manchester contact benchmark (Shackleton and Iwnicki 2008).
 
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use railhead_macros::Words;
 use serde::Serialize;
@@ -19,6 +19,7 @@ use crate::geometry::locus_lines::LocusLines;
 use crate::geometry::plane_curve::{CurvePoint, PlaneCurve};
 use crate::geometry::profile::Profile;
 use crate::lazy_field::LazyField;
+use crate::numerics::roots::bounds;
 
 /// Left or right rail, seen in the rolling direction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
@@ -40,22 +41,22 @@ impl Side {
     }
 }
 
-/// How a rail is placed across the track; lengths in mm.
+/// The lateral position of a rail; lengths in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RailPlace {
-    /// By its gauge face.
+    /// The rail is placed by its gauge face.
     Gauge {
         /// Distance of the gauge faces of the two rails.
         gauge: f64,
         /// Depth below the highest point of the rail at which the gauge is measured.
         height: f64,
     },
-    /// By the distance of the origin of its cross-section from the middle of the track.
+    /// Distance of the origin of the rail's cross-section from the middle of the track.
     Origin(f64),
 }
 
 impl RailPlace {
-    /// From the members of a case: the origin if it is given, else gauge and height, 1435 and 14 when left out.
+    /// The position from the members of a case: the origin if it is given, otherwise gauge and height with the defaults 1435 and 14.
     pub(crate) fn of(gauge: Option<f64>, height: Option<f64>, origin: Option<f64>) -> RailPlace {
         origin.map_or(
             RailPlace::Gauge {
@@ -67,7 +68,7 @@ impl RailPlace {
     }
 }
 
-/// Why a wheel and a rail cannot be placed; lengths in mm.
+/// The reason why a wheel and a rail cannot be placed; lengths in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NotPlaced {
     /// The rail ends on the gauge side before the depth at which the gauge is measured.
@@ -79,7 +80,7 @@ pub enum NotPlaced {
     },
     /// The wheel's profile reaches its axle.
     ReachesAxle {
-        /// How far the profile reaches toward the axle.
+        /// Greatest height of the profile toward the axle.
         reach: f64,
         /// Radius of the wheel.
         radius: f64,
@@ -103,20 +104,20 @@ impl fmt::Display for NotPlaced {
     }
 }
 
-/// How wheelset and rail are placed relative to each other; lengths in mm, angles in rad.
+/// The position of a wheelset relative to a rail; lengths in mm, angles in rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// Which wheel and rail.
+    /// The side of wheel and rail.
     pub side: Side,
-    /// Radius of the wheel where z of its profile is 0.
+    /// Radius of the wheel at z = 0 of its profile.
     pub rolling_radius: f64,
-    /// The place of the rail across the track.
+    /// Lateral position of the rail.
     pub rail: RailPlace,
-    /// Turn of the rail about its profile's origin, positive with its top toward the track centre.
+    /// Rotation of the rail about the origin of its profile, positive with its top toward the track centre.
     pub cant: f64,
-    /// Distance of the backs of the two flanges.
+    /// Distance between the backs of the two flanges.
     pub flange_back_distance: f64,
-    /// y of the flange's back in the wheel's profile.
+    /// y of the back of the flange in the wheel's profile.
     pub flange_back_position: f64,
     /// Shift of the wheelset to the left.
     pub lateral_shift: f64,
@@ -126,7 +127,7 @@ pub struct Placement {
     pub roll: f64,
 }
 
-/// A wheel and a rail in place, except for the height of the wheel.
+/// A wheel and a rail in position, except for the height of the wheel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WheelRail {
     /// Their placement.
@@ -138,15 +139,13 @@ pub struct WheelRail {
     rail: Arc<PlaneCurve>,
     wheel: Arc<Profile>,
     axes: AxleAxes,
-    /// The rail's upper edge.
+    /// Upper envelope of the rail, independent of the position of the wheelset.
     pub(crate) rail_edge: Arc<LazyField<Envelope>>,
-    /// Places along the rail's curve, the same for every place of the wheelset.
+    /// Points along the rail's curve, independent of the position of the wheelset.
     pub(crate) rail_places: Arc<LazyField<Vec<CurvePlace>>>,
-    /// Circles of the wheel, which are the same for every place of the wheelset.
+    /// Circles of the wheel, independent of the position of the wheelset.
     pub(crate) circles: Arc<LazyField<Vec<WheelCircle>>>,
-    /// The same pair with other smoothings, somewhere over the rail, which are the same for every place of the wheelset too.
-    readings: Arc<OtherReadings>,
-    /// Rail and wheel line by line, or why there are no lines.
+    /// The lines on which the wheel lies above the rail, or the reason why there are none.
     pub(crate) locus: LazyField<Arc<Result<LocusLines, String>>>,
 }
 
@@ -155,10 +154,11 @@ pub struct WheelRail {
 struct AxleAxes {
     /// Along the axle, to the left.
     axle: [f64; 3],
-    /// Length of the axle's part across the track.
+    /// Length of the axle's component in the cross-section.
     across: f64,
-    /// At right angles to the axle: nearly forward, and nearly down (without a part along x).
+    /// Perpendicular to the axle and nearly forward.
     forward: [f64; 3],
+    /// Perpendicular to the axle, without a component along x, and nearly down.
     down: [f64; 3],
 }
 
@@ -180,38 +180,7 @@ impl AxleAxes {
     }
 }
 
-/// Most readings of a pair that are kept. Keeps the memory small; it changes times, no answer.
-const READINGS_MAX: usize = 4;
-
-/// Pairs with other smoothings of rail and wheel in mm, the one asked for last at the end. They follow from the pair, so that two of them never make
-/// pairs differ.
-#[derive(Debug, Default)]
-struct OtherReadings(Mutex<Vec<([f64; 2], WheelRail)>>);
-
-impl PartialEq for OtherReadings {
-    fn eq(&self, _: &OtherReadings) -> bool {
-        true
-    }
-}
-
-impl OtherReadings {
-    fn find_or_make(&self, smoothing: [f64; 2], make: impl FnOnce() -> WheelRail) -> WheelRail {
-        // A panic while it was held leaves the list as it is: only whole pairs are put there.
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        match kept.iter().position(|(of, _)| *of == smoothing) {
-            Some(place) => kept[place..].rotate_left(1),
-            None => {
-                if kept.len() == READINGS_MAX {
-                    kept.remove(0);
-                }
-                kept.push((smoothing, make()));
-            }
-        }
-        kept[kept.len() - 1].1.clone()
-    }
-}
-
-/// A point of the wheel's meridian: position along the axle and radius, with their derivatives to the profile's parameter.
+/// A point of the wheel's meridian: position along the axle and radius, with their derivatives with respect to the parameter of the profile.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meridian {
     /// Distance from the centre along the axle.
@@ -233,28 +202,25 @@ pub(crate) struct WheelCircle {
     along: f64,
     /// Radius in mm.
     radius: f64,
-    /// Change of the radius along the axle.
+    /// Derivative of the radius along the axle.
     widening: f64,
 }
 
 impl WheelRail {
-    /// Places the rail by its top and by its gauge point or its origin, the wheel by the wheelset.
+    /// Places the rail by its top and by its gauge point or its origin, and the wheel by the wheelset.
     ///
     /// # Errors
-    /// The rail has no gauge point; or the wheel's profile reaches its axle or is all beyond it.
+    /// Returns an error if the rail has no gauge point or the wheel's profile reaches its axle.
     pub fn new(
         rail: Profile,
         wheel: Profile,
         placement: Placement,
     ) -> Result<WheelRail, NotPlaced> {
-        let lowest = wheel
-            .parameters(0.2)
-            .into_iter()
-            .map(|s| wheel.at(s).at[1])
-            .fold(f64::NEG_INFINITY, f64::max);
-        if lowest >= 0.9 * placement.rolling_radius {
+        let parameters = wheel.parameters(0.2).into_iter();
+        let [_, reach] = bounds(parameters.map(|s| wheel.at(s).at[1]));
+        if reach >= 0.9 * placement.rolling_radius {
             return Err(NotPlaced::ReachesAxle {
-                reach: lowest,
+                reach,
                 radius: placement.rolling_radius,
             });
         }
@@ -282,7 +248,6 @@ impl WheelRail {
             rail_edge: Arc::default(),
             rail_places: Arc::default(),
             circles: Arc::default(),
-            readings: Arc::default(),
             locus: LazyField::default(),
         }
     }
@@ -292,24 +257,15 @@ impl WheelRail {
         self.origin[0]
     }
 
-    /// The same rail and wheel with the wheelset elsewhere: shift to the left in mm, yaw and roll in rad.
+    /// Returns the same rail and wheel with another position of the wheelset: shift to the left in mm, yaw and roll in rad.
     #[must_use]
     pub fn posed(&self, lateral_shift: f64, yaw: f64, roll: f64) -> WheelRail {
-        let placement = Placement {
-            lateral_shift,
-            yaw,
-            roll,
-            ..self.placement
-        };
-        WheelRail {
-            axes: AxleAxes::new(&placement),
-            placement,
-            locus: LazyField::default(),
-            ..self.clone()
-        }
+        let mut posed = self.clone();
+        posed.pose(lateral_shift, yaw, roll);
+        posed
     }
 
-    /// Moves the wheelset in place; what was found of the places of contact is forgotten.
+    /// Moves the wheelset and clears the cached lines.
     pub(crate) fn pose(&mut self, lateral_shift: f64, yaw: f64, roll: f64) {
         self.placement.lateral_shift = lateral_shift;
         self.placement.yaw = yaw;
@@ -318,29 +274,18 @@ impl WheelRail {
         self.locus = LazyField::default();
     }
 
-    /// The profiles of rail (before cant) and wheel.
+    /// The profiles of the rail (before cant) and the wheel.
     pub fn profiles(&self) -> [&Profile; 2] {
         [&self.rail_given, &self.wheel]
     }
 
-    /// The same with other smoothings of rail and wheel, in mm.
+    /// Returns the same bodies with other smoothings of rail and wheel, in mm. If the gauge face is smoothed away, the rail keeps its position.
     #[must_use]
     pub fn smoothed(&self, smoothing: [f64; 2]) -> WheelRail {
-        let Placement {
-            lateral_shift,
-            yaw,
-            roll,
-            ..
-        } = self.placement;
-        let reading = self.readings.find_or_make(smoothing, || {
-            let rail = self.rail_given.smoothed(smoothing[0]);
-            let wheel = Arc::new(self.wheel.smoothed(smoothing[1]));
-            // What a wheel's profile may reach was checked; a smoothed one reaches hardly farther. A rail whose gauge face is smoothed away
-            // stays where it is.
-            let origin = origin(&rail, &self.placement).unwrap_or(self.origin);
-            WheelRail::placed(rail, wheel, self.placement, origin)
-        });
-        reading.posed(lateral_shift, yaw, roll)
+        let rail = self.rail_given.smoothed(smoothing[0]);
+        let wheel = Arc::new(self.wheel.smoothed(smoothing[1]));
+        let origin = origin(&rail, &self.placement).unwrap_or(self.origin);
+        WheelRail::placed(rail, wheel, self.placement, origin)
     }
 
     /// Unit vector along the axle, to the left.
@@ -358,7 +303,7 @@ impl WheelRail {
         [self.rail.parameters(step), self.wheel.parameters(step)]
     }
 
-    /// The rail's curve in track axes `[y, z]`, with derivatives to the parameter.
+    /// The rail's curve in track axes `[y, z]`, with derivatives with respect to the parameter.
     pub fn rail_at(&self, s: f64) -> CurvePoint {
         self.rail.at(s)
     }
@@ -387,13 +332,13 @@ impl WheelRail {
         }
     }
 
-    /// The point of a wheel circle where the surface's normal has no part along x, relative to the wheel's centre but
-    /// shifted sideways with it: where the circle meets a rail that is straight along x. None where the yaw hides it.
+    /// The point of a wheel circle at which the normal of the surface has no component along x, so that it can touch a rail that is straight
+    /// along x. x and z are relative to the wheel's centre, y is in track axes. Returns `None` if there is no such point because of the yaw.
     pub fn lowest(&self, s: f64) -> Option<[f64; 3]> {
         self.lowest_of(&self.circle(s))
     }
 
-    /// The same of a circle.
+    /// The lowest point of a circle; see [`WheelRail::lowest`].
     pub(crate) fn lowest_of(&self, circle: &WheelCircle) -> Option<[f64; 3]> {
         let AxleAxes {
             axle,
@@ -412,30 +357,30 @@ impl WheelRail {
         Some(point)
     }
 
-    /// The wheel's cross-section below its axle in track axes `[y, z]`, z from the height of the wheelset's centre.
+    /// The wheel's cross-section below its axle in track axes `[y, z]`, with z from the height of the wheelset's centre.
     pub fn wheel_section(&self, s: f64) -> [f64; 2] {
         let circle = self.meridian(s);
         let at = |k: usize| circle.along * self.axes.axle[k] + circle.radius * self.axes.down[k];
         [at(1) + self.placement.lateral_shift, at(2)]
     }
 
-    /// Position on the rail's profile as it was given (before cant): y to the field side, z down.
+    /// Position on the rail's profile before cant, with y to the field side and z down.
     pub fn on_rail(&self, s: f64) -> [f64; 2] {
         let [y, z] = self.rail_given.at(s).at;
         [y, -z]
     }
 
-    /// Position on the wheel's profile: y to the field side, z down.
+    /// Position on the wheel's profile, with y to the field side and z down.
     pub fn on_wheel(&self, s: f64) -> [f64; 2] {
         let [y, z] = self.wheel.at(s).at;
         [y, -z]
     }
 }
 
-/// The end of the points may lie above the height of the gauge by this much in mm: rounding of a rail measured down to it.
+/// Height in mm by which the points may end above the depth of the gauge, because of rounding.
 const GAUGE_ROUNDING: f64 = 1e-6;
 
-/// Where the origin of a running rail's profile lies, `[y, z]` in mm, y from the middle of the track to the field side.
+/// Position `[y, z]` of the origin of a running rail's profile in mm, with y from the middle of the track to the field side.
 fn origin(rail: &Profile, placement: &Placement) -> Result<[f64; 2], NotPlaced> {
     let canted = rail.curve().placed(placement.cant, [0.0; 2], 1.0);
     let places: Vec<[f64; 2]> = canted
@@ -444,10 +389,7 @@ fn origin(rail: &Profile, placement: &Placement) -> Result<[f64; 2], NotPlaced> 
         .filter(|s| *s >= rail.first())
         .map(|s| canted.at(s).at)
         .collect();
-    let top = places
-        .iter()
-        .map(|at| at[1])
-        .fold(f64::NEG_INFINITY, f64::max);
+    let [_, top] = bounds(places.iter().map(|at| at[1]));
     let y = match placement.rail {
         RailPlace::Origin(y) => y,
         RailPlace::Gauge { gauge, height } => {
@@ -458,16 +400,17 @@ fn origin(rail: &Profile, placement: &Placement) -> Result<[f64; 2], NotPlaced> 
     Ok([y, -top])
 }
 
-/// Least y of the head of a rail from its top down to a depth on the gauge side, or the greatest depth there if that is less. Points run from the
-/// gauge side to the field side; what lies beyond the place where the head first falls to the depth is not part of the head.
+/// Least y of the head of a rail from its top down to a depth on the gauge side. Returns the greatest depth of the rail there as the error if
+/// it is less. Points are in order from the gauge side to the field side. Points beyond the first descent to the depth do not belong to the
+/// head.
 fn gauge_point(places: &[[f64; 2]], top: f64, depth: f64) -> Result<f64, f64> {
     let height = top - depth;
     let of_top = places.iter().position(|at| at[1] >= top).unwrap_or(0);
     let below = places[..=of_top].iter().rposition(|at| at[1] < height);
     let head = &places[below.map_or(0, |below| below + 1)..=of_top];
-    let least = head.iter().map(|at| at[0]).fold(f64::INFINITY, f64::min);
+    let [least, _] = bounds(head.iter().map(|at| at[0]));
     let Some(below) = below else {
-        let lowest = head.iter().map(|at| at[1]).fold(f64::INFINITY, f64::min);
+        let [lowest, _] = bounds(head.iter().map(|at| at[1]));
         return if lowest - height <= GAUGE_ROUNDING {
             Ok(least)
         } else {

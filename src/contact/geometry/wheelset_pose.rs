@@ -1,11 +1,9 @@
-//! A rigid wheelset on both rails: the roll and the height at which both wheels touch.
+//! A rigid wheelset on both rails: the roll and the height at which both wheels touch, and its motion.
 //!
-//! From the motion of a wheelset to the creepages of a patch.
-//!
-//! The material of the wheel at the patch moves with `v = (V, v_y, 0) + ω × r`, where `ω = Ω e + (roll rate, 0, yaw
-//! rate)`, e is the axle and r runs from the wheelset's centre to the wheel's surface at the origin of the patch; the
-//! rail is at rest. In the frame of the patch (tangent t, normal n) and with the rolling speed V:
-//! `ν_x = v_x / V`, `ν_y = v · t / V`, `φ = ω · n / V`. Free rolling at the radius r has `Ω = V / r`, positive.
+//! The material of the wheel at a patch moves with `v = (V, v_y, 0) + ω × r`. Here `ω = Ω e + (roll rate, 0, yaw rate)`, e is the axle, and r
+//! leads from the wheelset's centre to the wheel's surface at the origin of the patch. The rail is at rest. In the frame of the patch with the
+//! tangent t and the normal n, the rolling speed V gives the creepages `ν_x = v_x / V`, `ν_y = v · t / V` and the spin `φ = ω · n / V`. Free
+//! rolling at the radius r has the positive angular velocity `Ω = V / r`.
 //! Source: Kalker 1990, section 1.3; the same as in the Manchester contact benchmark.
 
 use std::f64::consts::FRAC_PI_2;
@@ -15,10 +13,10 @@ use crate::geometry::rigid_touch::{RailTop, RigidTouch};
 use crate::geometry::wheel_rail::WheelRail;
 use crate::numerics::equilibrium::{Search, Trial};
 
-/// The wheels' heights may differ by so much in mm, 1e-10 rad of roll.
+/// Tolerance of the difference of the two heights in mm, about 1e-10 rad of roll.
 const LEVEL: f64 = 1e-7;
 
-/// Both wheels over both rails, to be placed again and again.
+/// Both wheels on both rails, for any position of the wheelset.
 #[derive(Debug, Clone)]
 pub struct PairOfRails {
     /// Left and right.
@@ -26,7 +24,7 @@ pub struct PairOfRails {
     tops: [RailTop; 2],
 }
 
-/// A wheelset at rest on its rails, all rigid; left and right where there are two.
+/// The position of a rigid wheelset on rigid rails.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigidPose {
     /// Shift to the left in mm.
@@ -35,9 +33,9 @@ pub struct RigidPose {
     pub yaw: f64,
     /// Roll in rad at which both wheels touch.
     pub roll: f64,
-    /// Height of the wheelset's centre over the top of the rails in mm.
+    /// Height of the wheelset's centre above the top of the rails in mm.
     pub height: f64,
-    /// Where they touch.
+    /// Contact points of the left and the right wheel.
     pub touches: [RigidTouch; 2],
 }
 
@@ -47,26 +45,26 @@ impl RigidPose {
         self.touches[0].radius - self.touches[1].radius
     }
 
-    /// Distance of the places of contact across the track in mm.
+    /// Lateral distance of the contact points in mm.
     pub fn contact_distance(&self) -> f64 {
         self.touches[0].at[1] - self.touches[1].at[1]
     }
 }
 
 impl PairOfRails {
-    /// Left and right side.
+    /// Makes a pair from the left and the right side.
     pub fn new(sides: [WheelRail; 2]) -> PairOfRails {
         let tops = [RailTop::new(&sides[0]), RailTop::new(&sides[1])];
         PairOfRails { sides, tops }
     }
 
-    /// The wheelset at a shift to the left in mm and a yaw in rad, from a roll nearby.
+    /// Finds the position of the wheelset at a shift to the left in mm and a yaw in rad, starting from a roll nearby.
     ///
     /// # Errors
-    /// A sentence, if a wheel is not over its rail or the roll is not found.
+    /// Returns a sentence if a wheel is not above its rail or the roll is not found.
     pub fn pose(&mut self, lateral_shift: f64, yaw: f64, roll: f64) -> Result<RigidPose, String> {
-        // The right wheel's height above the left one grows with the roll by about the distance between them, with a kink where a wheel changes
-        // its place of contact.
+        // The difference of the heights grows with the roll by about the distance of the contact points. It has a kink where a contact point
+        // jumps.
         let start = self.touches(lateral_shift, yaw, roll)?;
         let distance = start[0].at[1] - start[1].at[1];
         let mut search = Search::new([Some(1.0 / distance)], [FRAC_PI_2]);
@@ -92,10 +90,10 @@ impl PairOfRails {
         }
     }
 
-    /// The wheelset at a shift to the left in mm and a yaw in rad with its axle level, as if one wheel could hang in the air.
+    /// The position at a shift to the left in mm and a yaw in rad with the axle level, so that only one wheel touches.
     ///
     /// # Errors
-    /// A sentence, if a wheel is not over its rail.
+    /// Returns a sentence if a wheel is not above its rail.
     pub fn pose_without_roll(&mut self, lateral_shift: f64, yaw: f64) -> Result<RigidPose, String> {
         let touches = self.touches(lateral_shift, yaw, 0.0)?;
         Ok(RigidPose {
@@ -107,10 +105,10 @@ impl PairOfRails {
         })
     }
 
-    /// That neither wheel touches at the end of a cross-section.
+    /// Checks that neither wheel touches at the end of a cross-section.
     ///
     /// # Errors
-    /// A sentence, if the points of a cross-section end where the bodies touch, so that they may touch elsewhere.
+    /// Returns a sentence if the points of a cross-section end where the bodies touch, so that the true contact may be elsewhere.
     pub fn not_cut_off(&self, pose: &RigidPose) -> Result<(), String> {
         for (k, touch) in pose.touches.iter().enumerate() {
             let ranges = self.sides[k].ranges();
@@ -148,7 +146,7 @@ impl PairOfRails {
         Ok([touch(0)?, touch(1)?])
     }
 
-    /// Where the wheels touch, on the cross-sections of rail and wheel, `[y, z]` in mm, y to the field side and z down.
+    /// The contact point of a wheel on the cross-sections of rail and wheel: `[y, z]` in mm, y to the field side and z down.
     pub fn on_profiles(&self, side: usize, touch: &RigidTouch) -> [[f64; 2]; 2] {
         [
             self.sides[side].on_rail(touch.rail),
@@ -157,7 +155,7 @@ impl PairOfRails {
     }
 }
 
-/// How a wheelset moves; mm, s and rad.
+/// The motion of a wheelset in mm, s and rad.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelsetMotion {
     /// Rolling speed along x.
@@ -166,8 +164,8 @@ pub struct WheelsetMotion {
     pub angular_velocity: f64,
     /// Speed of the centre to the left.
     pub lateral_velocity: f64,
-    /// Rate of the yaw.
+    /// Yaw rate.
     pub yaw_rate: f64,
-    /// Rate of the roll.
+    /// Roll rate.
     pub roll_rate: f64,
 }

@@ -1,10 +1,11 @@
-//! The answer to a wheel on a rail from its pressures and tractions.
+//! The solution of a wheel on a rail, from its pressures and tractions.
 
 use crate::case::words::solver::Output;
 use crate::error::SolveError;
 use crate::geometry::reference_curve::{ReferenceCurve, RigidMotion};
 use crate::normal::on_curve::CurveContact;
 use crate::normal::wheel::WheelContact;
+use crate::numerics::roots::bounds;
 use crate::post::damage::{DamagedPatch, damage};
 use crate::problem::physics::Run;
 use crate::remark::entry::{RemarkEntry, merged};
@@ -20,26 +21,28 @@ use crate::wheel_on_rail::rounds::Found;
 use crate::wheel_on_rail::tractions::{Part, PatchForces, creepages, each_cell};
 use crate::wheel_on_rail::{WheelSolve, minus};
 
-/// Errors of the factors for the turn relative to μN: this times the standard deviation of the angle over the load, in rad, and at most that. Against
-/// boundary elements of seven wheels on rails with μ of 0.3 they are 0.2 to 1.5 % where the angle deviates by 0.07 to 0.5 rad; half of these the factors were
-/// fitted to.
-const OPEN_BY_TURN: f64 = 0.2;
-const OPEN_MAX: f64 = 0.035;
-/// The errors by the turn grow with the difference of the two bodies' shares of the displacement, times this. On a bent surface the stiffness of a convex and
-/// of a concave body changes in opposite directions, by boundary elements of each body alone; the factors hold for their mean. The value was derived from these
-/// single-body results (about 2 in lateral forces); it was not compared with boundary elements of unequal pairs.
-const OPEN_BY_UNEQUAL: f64 = 2.5;
-/// Lateral forces of pressures count as under this coefficient of friction at least.
-const FRICTION_OPEN: f64 = 0.3;
-/// Axes, origins and signs in words.
+/// Error of the correction for the turn of the surface, relative to μN, per rad of the standard deviation of the angle over the load.
+///
+/// Compared with boundary elements of seven wheels on rails at μ = 0.3, the errors are 0.2 to 1.5 % for standard deviations of 0.07 to 0.5 rad. The
+/// correction was fitted to half of these.
+const ERROR_BY_TURN: f64 = 0.2;
+/// Largest value of this error, relative to μN.
+const TURN_ERROR_MAX: f64 = 0.035;
+/// Growth of this error with the difference of the two bodies' shares of the displacement. On a bent surface the stiffness of a convex and of a
+/// concave body changes in opposite directions, and the correction holds for their mean. The value was derived from boundary elements of single
+/// bodies (about 2 in lateral forces). It was not compared with boundary elements of unequal pairs.
+const ERROR_BY_UNEQUAL: f64 = 2.5;
+/// Least coefficient of friction in the error of the lateral forces of pressures.
+const FRICTION_LEAST: f64 = 0.3;
+/// Description of axes, origins and signs.
 const FRAME: &str = "every patch on the surface of the rail: x along rolling (leading edge at larger x), y to the left along the cross-section, \
                      z out of the rail, origin at its load centre; forces of a patch at its mean contact angle; total in track axes: x along \
                      rolling, y to the left, z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative \
                      to the lower one";
 
 impl Part {
-    /// Adds to the estimates of all forces of a motion what is left open of them, relative to the friction limit.
-    fn leave_open(&mut self, index: usize, share: f64) {
+    /// Adds an error, relative to the friction limit, to the estimates of all forces of a motion.
+    fn add_error(&mut self, index: usize, share: f64) {
         let mut all = ErrorEstimate::default();
         for patch in &mut self.solution.patches {
             let limit = patch.friction_limit_n.unwrap_or(0.0);
@@ -50,7 +53,7 @@ impl Part {
             };
             let point = &mut patch.points[index];
             point.error_estimate = point.error_estimate.map(|error| error.plus(open));
-            let of_pressure = share * FRICTION_OPEN * patch.normal_force_n;
+            let of_pressure = share * FRICTION_LEAST * patch.normal_force_n;
             all = all.plus(ErrorEstimate {
                 force_y_n: open.force_y_n.max(of_pressure),
                 ..open
@@ -62,17 +65,17 @@ impl Part {
 }
 
 impl WheelSolve<'_> {
-    /// What the factors for the turn leave open of a force, relative to the friction limit.
-    pub(super) fn left_open(&self, contact: &CurveContact) -> f64 {
+    /// Error of the correction for the turn of the surface, relative to the friction limit.
+    fn turn_error(&self, contact: &CurveContact) -> f64 {
         if !self.is_corrected() {
             return 0.0;
         }
         let [_, deviation] = contact.angles();
         let unequal = (2.0 * self.case.problem.elasticity.lower_share - 1.0).abs();
-        (1.0 + OPEN_BY_UNEQUAL * unequal) * (OPEN_BY_TURN * deviation).min(OPEN_MAX)
+        (1.0 + ERROR_BY_UNEQUAL * unequal) * (ERROR_BY_TURN * deviation).min(TURN_ERROR_MAX)
     }
 
-    /// The answer of all parts.
+    /// The solution of all parts.
     pub(super) fn answer(
         &self,
         found: Found,
@@ -84,16 +87,15 @@ impl WheelSolve<'_> {
             parts,
             changes,
         } = found;
-        let left_open = self.left_open(&contact);
+        let error = self.turn_error(&contact);
         let of_motions: Vec<_> = (0..changes.len())
             .map(|index| self.forces(&contact, &parts, index))
             .collect();
         let mut remarks = self.case.remarks.clone();
         remarks.extend(wheel.remarks.iter().cloned());
         if let Resolution::Target(target) = self.case.run.resolution
-            && left_open > target
+            && error > target
         {
-            let error = left_open;
             remarks.push(Remark::TargetBelowCurveError { target, error }.into());
         }
         let centre = load_centre_of_all(self.curve, &parts);
@@ -114,9 +116,9 @@ impl WheelSolve<'_> {
                 ..remark.clone()
             }));
             for (index, total) in totals.iter_mut().enumerate() {
-                part.leave_open(index, left_open + changes[index]);
-                let error = self.error_of(&part, index, centre);
-                total.error_estimate = total.error_estimate.zip(error).map(|(a, b)| a.plus(b));
+                part.add_error(index, error + changes[index]);
+                let own = self.error_of(&part, index, centre);
+                total.error_estimate = total.error_estimate.zip(own).map(|(a, b)| a.plus(b));
             }
             for k in 0..part.loads.len() {
                 let forces: Vec<PatchForces> =
@@ -163,7 +165,7 @@ impl WheelSolve<'_> {
     }
 
     /// The moment of a patch in a motion about the vertical line through a point `[x, y]` of the track.
-    pub(super) fn moment(&self, part: &Part, k: usize, index: usize, about: [f64; 2]) -> f64 {
+    fn moment(&self, part: &Part, k: usize, index: usize, about: [f64; 2]) -> f64 {
         let mut moment = 0.0;
         each_cell(part, k, index, |cell, _, area, [q_x, q_s, p]| {
             let place = self.curve.at(cell[1]);
@@ -174,8 +176,8 @@ impl WheelSolve<'_> {
         moment
     }
 
-    /// Completes a patch with its position, and in every motion with its force at its mean angle and the motion at its load centre.
-    pub(super) fn add_patch(
+    /// Adds the position of a patch, and for every motion its force at its mean angle and the motion at its load centre.
+    fn add_patch(
         &self,
         contact: &CurveContact,
         part: &mut Part,
@@ -195,7 +197,7 @@ impl WheelSolve<'_> {
         let load = part.loads[k];
         let patch = &mut part.solution.patches[k];
         let limit = patch.friction_limit_n.unwrap_or(0.0);
-        // Pressures are those of all motions.
+        // All motions have the same pressures.
         let angle = forces[0].angle();
         patch.position = Some(Position {
             track_mm: [centre[0], y, z],
@@ -239,12 +241,7 @@ impl WheelSolve<'_> {
     }
 
     /// The errors of the forces of a part in a motion in track axes, and of its moment about the vertical line through a point `[x, y]`.
-    pub(super) fn error_of(
-        &self,
-        part: &Part,
-        index: usize,
-        about: [f64; 2],
-    ) -> Option<ErrorEstimate> {
+    fn error_of(&self, part: &Part, index: usize, about: [f64; 2]) -> Option<ErrorEstimate> {
         let [x, s] = part.origin;
         let arm = [x - about[0], self.curve.at(s).at[0] - about[1]];
         let error = part.solution.total[index].error_estimate?;
@@ -257,8 +254,8 @@ impl WheelSolve<'_> {
     }
 }
 
-/// Removes values per cell that were not asked for.
-pub(super) fn drop_unasked(run: &Run, fields: &mut Fields) {
+/// Removes values per cell that were not requested.
+fn drop_unasked(run: &Run, fields: &mut Fields) {
     let kept = |output| run.wants(output);
     if !run.outputs.iter().any(|output| output.is_per_cell()) {
         fields.patches.clear();
@@ -283,15 +280,12 @@ pub(super) fn turn(contact: &CurveContact) -> f64 {
     let nx = contact.grid.x.len();
     let rows = contact.pressure.chunks_exact(nx).zip(&contact.grid.places);
     let touching = rows.filter(|(row, _)| row.iter().any(|p| *p > 0.0));
-    let nothing = [f64::INFINITY, f64::NEG_INFINITY];
-    let [low, high] = touching.fold(nothing, |[low, high], (_, place)| {
-        [low.min(place.angle), high.max(place.angle)]
-    });
+    let [low, high] = bounds(touching.map(|(_, place)| place.angle));
     (high - low).max(0.0)
 }
 
-/// Mean place `[x, y]` of all patches in track axes, weighted with their normal forces.
-pub(super) fn load_centre_of_all(curve: &ReferenceCurve, parts: &[Part]) -> [f64; 2] {
+/// Mean position `[x, y]` of all patches in track axes, weighted with their normal forces.
+fn load_centre_of_all(curve: &ReferenceCurve, parts: &[Part]) -> [f64; 2] {
     let (mut load, mut sum) = (0.0, [0.0; 2]);
     for part in parts {
         for k in 0..part.solution.patches.len() {

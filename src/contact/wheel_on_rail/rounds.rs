@@ -1,4 +1,4 @@
-//! Pressures and tractions of a wheel on a rail in turn, until each belongs to the other.
+//! Fixed-point iteration between the pressures and the tractions of a wheel on a rail.
 
 use crate::case::words::solver::Output;
 use crate::error::SolveError;
@@ -17,30 +17,30 @@ use crate::vertical_equilibrium::{next_share, tolerance};
 use crate::wheel_on_rail::tractions::{Part, creepages};
 use crate::wheel_on_rail::{BeforeMotions, WheelSolve, minus};
 
-/// Allowed error of the resultants relative to μN on the coarse grid: that of the coarsest meshes, whatever the few cells of a small patch leave open.
+/// Target error of the resultants relative to μN on the coarse grid. It leads to the coarsest meshes.
 const TARGET_ROUGH: f64 = 0.2;
-/// Rounds at most; 3 to 6 suffice.
+/// Most rounds; 3 to 6 suffice.
 const ROUNDS_MAX: u32 = 16;
-/// Part by which the gap that tractions open is off if they are taken to be proportional to the pressure.
-const FORECAST_OFF: f64 = 0.3;
-/// Change of the forces relative to μN that ends the rounds with coarse tractions. The step after it leaves about a fiftieth of that.
+/// Relative error of the gap that tractions open if they are taken as proportional to the pressure.
+const OPENED_ERROR: f64 = 0.3;
+/// Change of the forces relative to μN that ends the rounds with coarse tractions. The step after it leaves about a fiftieth of this.
 const CHANGE_ROUGH: f64 = 0.05;
-/// Change of the vertical force, relative to it, that ends the rounds with the table.
+/// Relative change of the vertical force that ends the rounds with the table.
 const CHANGE_TABLE: f64 = 0.02;
-/// When the rounds are used up, a change of the forces relative to μN up to this is answered with a remark, and is part of the error estimate. Where a strip at
-/// the edge of a patch comes and goes with the tractions, these jump by the error of their mesh, and rounds do not end.
+/// Largest change of the forces, relative to μN, that is accepted with a remark after the last round. It is part of the error estimate. If a strip
+/// at the edge of a patch comes and goes with the tractions, these jump by the error of their mesh, and the rounds do not converge.
 const CHANGE_POOR: f64 = 0.03;
 
-/// The end of the rounds.
+/// The result of the rounds.
 pub(super) struct Found {
     pub(super) contact: CurveContact,
     pub(super) parts: Vec<Part>,
-    /// How much the forces of each motion would change if its tractions and the pressures agreed, relative to μN.
+    /// Change of the forces of each motion if its tractions and the pressures agreed, relative to μN.
     pub(super) changes: Vec<f64>,
 }
 
-/// What pressures do not follow of the tractions.
-pub(super) struct Neglected {
+/// The neglected effect of tractions on the pressures.
+struct Neglected {
     /// Change of the forces of each motion relative to μN.
     pub(super) changes: Vec<f64>,
     /// The largest change of the vertical force by friction, relative to it.
@@ -48,8 +48,8 @@ pub(super) struct Neglected {
 }
 
 impl WheelSolve<'_> {
-    /// Pressures and tractions in turn: on a coarse grid until friction is known about, then on the fine one. `before` is asked of the wheel at rest
-    /// on the fine grid. Unless `with_friction`, tractions are solved once, on pressures without them.
+    /// Solves pressures and tractions in turn: first on a coarse grid until friction is known roughly, then on the fine one. `before` is called with
+    /// the wheel in equilibrium on the fine grid. Unless `with_friction`, tractions are solved once, with the pressures without tractions.
     pub(super) fn rounds(
         &self,
         with_friction: bool,
@@ -143,9 +143,9 @@ impl WheelSolve<'_> {
         unreachable!("the last round ends them")
     }
 
-    /// What the tractions of each motion would change of the pressures, which belong to the tractions of the motion `reference`, or to none. The effect of the
-    /// gap comes from one more normal problem on the coarse grid, under the tractions that open it most.
-    pub(super) fn neglected(
+    /// Estimates how the tractions of each motion would change the pressures, which belong to the tractions of the motion `reference` or to none.
+    /// The effect of the gap is found from one more normal problem on the coarse grid, with the tractions that open it most.
+    fn neglected(
         &self,
         coarse: CurveContact,
         parts: &[Part],
@@ -184,7 +184,7 @@ impl WheelSolve<'_> {
             };
             share = change / most / limit;
         }
-        // Tractions change in proportion to the pressures at most.
+        // The tractions change at most in proportion to the pressures.
         let force = |index: usize| {
             let totals = parts.iter().map(|part| &part.solution.total[index]);
             let of_part = |total: &Total| total.force_x_n.hypot(total.force_y_n);
@@ -199,8 +199,8 @@ impl WheelSolve<'_> {
         })
     }
 
-    /// The wheel at rest on a coarse grid, with about the friction that it will have: by the table of creep forces where that is enough, else with coarse
-    /// tractions.
+    /// The wheel in equilibrium on a coarse grid with an estimate of the friction: from the table of creep forces if that is accurate enough,
+    /// otherwise from coarse tractions.
     pub(super) fn coarse(
         &self,
         coupled: bool,
@@ -226,8 +226,8 @@ impl WheelSolve<'_> {
             let next = if of_table {
                 let mut next = self.estimate(&coarse, workspace)?;
                 let [_, opened] = coarse.change_by(&Friction::default(), &next, self.shared());
-                // Where the table is not accurate enough, rounds with tractions begin from its first estimate.
-                by_table = opened <= negligible / FORECAST_OFF * limit;
+                // If the table is not accurate enough, the rounds with tractions begin with its first estimate.
+                by_table = opened <= negligible / OPENED_ERROR * limit;
                 // The estimate may be ten times too small.
                 if 10.0 * opened <= negligible * limit {
                     next.opened = None;
@@ -251,8 +251,8 @@ impl WheelSolve<'_> {
         Ok((friction, coarse))
     }
 
-    /// What friction does about, by the table of creep forces, with tractions proportional to the pressures.
-    pub(super) fn estimate(
+    /// Estimates the friction by the table of creep forces, with tractions proportional to the pressures.
+    fn estimate(
         &self,
         contact: &CurveContact,
         workspace: &mut Workspace,
@@ -297,8 +297,8 @@ impl WheelSolve<'_> {
         Ok(Friction { lift, opened })
     }
 
-    /// The gap in mm that tractions open; none on planes.
-    pub(super) fn opened(
+    /// The gap in mm that tractions open; `None` on planes.
+    fn opened(
         &self,
         contact: &CurveContact,
         traction: &[Vec<f64>; 2],
@@ -310,8 +310,8 @@ impl WheelSolve<'_> {
         }
     }
 
-    /// Effect of the tractions of all parts in a motion on the contact.
-    pub(super) fn friction(
+    /// The effect of the tractions of all parts in a motion on the contact.
+    fn friction(
         &self,
         contact: &CurveContact,
         parts: &[Part],
@@ -325,7 +325,7 @@ impl WheelSolve<'_> {
         }
     }
 
-    /// Vertical force on the rail in N of the tractions of all parts in a motion; 0 where the vertical force is not prescribed.
+    /// Vertical force on the rail in N of the tractions of all parts in a motion; 0 if the vertical force is not prescribed.
     fn lift(&self, contact: &CurveContact, parts: &[Part], index: usize) -> f64 {
         if !self.is_vertical() {
             return 0.0;
@@ -335,7 +335,7 @@ impl WheelSolve<'_> {
     }
 
     /// Change of the tangential forces caused by a change of the pressures, relative to the normal force; 0 for equal bodies.
-    pub(super) fn shared(&self) -> f64 {
+    fn shared(&self) -> f64 {
         let CheckedCase { problem, .. } = self.case;
         match problem.elasticity.difference == 0.0 {
             true => 0.0,
@@ -344,9 +344,9 @@ impl WheelSolve<'_> {
     }
 }
 
-/// The friction to count on in the next round, by secant steps for the vertical force and for the gap. `earlier` holds the friction that the round before counted
-/// on and found; it is replaced by that of this round.
-pub(super) fn accelerated(
+/// The friction to assume in the next round, by secant steps for the vertical force and for the gap. `earlier` has the friction that the last round
+/// assumed and found. It is replaced by that of this round.
+fn accelerated(
     counted: &Friction,
     found: Friction,
     earlier: &mut Option<[Friction; 2]>,
@@ -370,7 +370,7 @@ pub(super) fn accelerated(
 }
 
 /// A run with tractions and pressures among its outputs.
-pub(super) fn with_tractions(run: &Run, outputs: &[Output]) -> Run {
+fn with_tractions(run: &Run, outputs: &[Output]) -> Run {
     let needed = [Output::Resultants, Output::Tractions, Output::Pressure];
     let mut outputs: Vec<Output> = outputs.iter().copied().chain(needed).collect();
     outputs.sort_unstable();
@@ -381,8 +381,8 @@ pub(super) fn with_tractions(run: &Run, outputs: &[Output]) -> Run {
     }
 }
 
-/// Pressures times the sine and the cosine of the angles of their strips, in N.
-pub(super) fn resultant(contact: &CurveContact) -> [f64; 2] {
+/// Lateral and vertical resultant of the pressures in N.
+fn resultant(contact: &CurveContact) -> [f64; 2] {
     let rows = contact.pressure.chunks_exact(contact.grid.x.len());
     let rows = rows.zip(&contact.grid.places);
     let sum = rows.fold([0.0; 2], |sum, (row, place)| {
@@ -393,7 +393,7 @@ pub(super) fn resultant(contact: &CurveContact) -> [f64; 2] {
 }
 
 /// The friction limit of some parts in N.
-pub(super) fn limit(parts: &[Part]) -> f64 {
+fn limit(parts: &[Part]) -> f64 {
     let patches = parts.iter().flat_map(|part| &part.solution.patches);
     patches.filter_map(|patch| patch.friction_limit_n).sum()
 }

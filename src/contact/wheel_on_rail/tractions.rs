@@ -9,6 +9,7 @@ use crate::normal::on_curve::{CurveContact, Workspace};
 use crate::normal::pressure_field::field::PressureField;
 use crate::normal::pressure_field::grid_pressure::GridPressure;
 use crate::normal_stage::SolvedFootprint;
+use crate::numerics::roots::bounds;
 use crate::problem::checked_case::CheckedCase;
 use crate::problem::physics::Run;
 use crate::rolling::task::Motion;
@@ -18,10 +19,10 @@ use crate::time_limit::TimeLimit;
 use crate::vertical_equilibrium::tolerance;
 use crate::wheel_on_rail::{WheelSolve, minus};
 
-/// Patches at most. Rough profiles have more, each of a few points; their tractions would be solved together for minutes and mean nothing.
+/// Most patches. Rough profiles have more, each with few points. Solving their tractions together would take minutes without a meaningful result.
 const PATCHES_MAX: usize = 4;
 
-/// Patches that are solved together.
+/// Patches whose tractions are solved together.
 pub(super) struct Part {
     /// x and s in mm of the origin of its coordinates.
     pub(super) origin: [f64; 2],
@@ -33,17 +34,17 @@ pub(super) struct Part {
     pub(super) fields: Fields,
 }
 
-/// Sums over the cells of a patch, in N.
+/// Forces of a patch in N, summed over its cells.
 #[derive(Clone, Copy, Default)]
 pub(super) struct PatchForces {
-    /// Pressures times the sine and the cosine of the angle of their strips.
+    /// Sums of the pressures times the sine and the cosine of the angle of their strips.
     pub(super) pressed: [f64; 2],
-    /// Tractions along x, and those along s times the cosine and the sine.
+    /// Sums of the tractions along x, and of those along s times the cosine and the sine of the angle.
     pub(super) sheared: [f64; 3],
 }
 
 impl PatchForces {
-    /// The angle at which the pressures have no resultant along the tangent.
+    /// The angle at which the resultant of the pressures is normal.
     pub(super) fn angle(&self) -> f64 {
         self.pressed[0].atan2(self.pressed[1])
     }
@@ -94,8 +95,8 @@ impl WheelSolve<'_> {
         Ok(solved)
     }
 
-    /// Solves the tractions of some patches together; `slip` is that of the pressures.
-    pub(super) fn part(
+    /// Solves the tractions of some patches together. `slip` is the slip that the pressures cause.
+    fn part(
         &self,
         contact: &CurveContact,
         patches: Vec<GridPressure>,
@@ -199,9 +200,9 @@ impl WheelSolve<'_> {
         on_rail(friction, &self.contact.geometry, extents, origin, rail)
     }
 
-    /// The motions of a plane about an origin `[x, s]` on it: those of the case, or from a wheelset the mean of those at the load centres of its patches,
-    /// weighted with their forces.
-    pub(super) fn plane_motions(
+    /// The motions of a plane about an origin `[x, s]` on it: those of the case. For a wheelset it is the mean of the motions at the load centres of
+    /// the patches, weighted with their forces.
+    fn plane_motions(
         &self,
         contact: &CurveContact,
         field: &PressureField,
@@ -228,9 +229,9 @@ impl WheelSolve<'_> {
         Ok(vec![mean])
     }
 
-    /// The motion of the wheel as a rigid body at each patch: the same at all if the case gives that of a wheelset, else the one with these creepages
-    /// at its load centre.
-    pub(super) fn rigid(
+    /// The motion of the wheel as a rigid body at each patch. If the case gives the motion of a wheelset, it is the same at all patches. Otherwise it
+    /// has the given creepages at the load centre of the patch.
+    fn rigid(
         &self,
         contact: &CurveContact,
         field: &PressureField,
@@ -257,12 +258,13 @@ impl WheelSolve<'_> {
         patches.map(of).collect()
     }
 
-    /// The slip of the surface beyond a motion about an origin `[x, s]`.
+    /// The difference between the slip of the surface and that of a motion about an origin `[x, s]`.
     ///
-    /// The deformed surface of equal bodies lies halfway between the undeformed surfaces, that of other bodies nearer to the stiffer one. The rolling radius of a
-    /// strip is taken there, less what the deepest strip loses, so that this one keeps the radius of the undeformed wheel, to which creepages refer. Along x half-spaces lack other terms of
-    /// the size of the wheel's roundness, so that it is left out: a flat surface has the slip of a plane.
-    pub(super) fn surface_slip(
+    /// The deformed surface of equal bodies lies halfway between the undeformed surfaces, that of other bodies nearer to the stiffer one. The rolling
+    /// radius of a strip is taken there, corrected so that the deepest strip keeps the radius of the undeformed wheel, to which creepages refer.
+    /// The curvature of the wheel along x is neglected, because half-spaces lack other terms of the same size. A flat surface therefore has the slip
+    /// of a plane.
+    fn surface_slip(
         &self,
         contact: &CurveContact,
         field: &PressureField,
@@ -280,6 +282,7 @@ impl WheelSolve<'_> {
             };
             (0..extents.len()).min_by(|a, b| far(a).total_cmp(&far(b)))
         };
+        let least = |gaps: &[f64]| bounds(gaps.iter().copied())[0];
         let deepest = least(&contact.gap);
         let share = self.case.problem.elasticity.lower_share;
         let mut slip = [Vec::new(), Vec::new()];
@@ -287,7 +290,7 @@ impl WheelSolve<'_> {
             let rigid = &rigid[patch_of(place.s).unwrap_or(0)];
             let row = &contact.gap[j * grid.x.len()..(j + 1) * grid.x.len()];
             let gap = (1.0 - share) * deepest + share * least(row).min(0.0);
-            // It is linear in x.
+            // The slip is linear in x.
             let [at, by_x] = [0.0, 1.0].map(|x| rigid.slip(place.point(x, gap), place));
             for (i, x) in grid.x.iter().enumerate() {
                 let k = j * grid.x.len() + i;
@@ -314,7 +317,7 @@ impl WheelSolve<'_> {
         }
     }
 
-    /// Forces in a motion of every patch of every part: of the pressures on the grid, and of the tractions, corrected to their extrapolated resultants.
+    /// Forces in a motion of every patch of every part: of the pressures on the grid, and of the tractions, scaled to their extrapolated resultants.
     pub(super) fn forces(
         &self,
         contact: &CurveContact,
@@ -350,8 +353,8 @@ impl WheelSolve<'_> {
         parts.iter().map(of_part).collect()
     }
 
-    /// Pressures of a patch times the sine and the cosine of their angles, in N.
-    pub(super) fn pressed(&self, contact: &CurveContact, part: &Part, patch: usize) -> [f64; 2] {
+    /// Sums of the pressures of a patch times the sine and the cosine of their angles, in N.
+    fn pressed(&self, contact: &CurveContact, part: &Part, patch: usize) -> [f64; 2] {
         let grid = &contact.grid;
         let [x_min, x_max, s_min, s_max] = part.solution.patches[patch].extent_mm;
         let alone = part.solution.patches.len() == 1 && contact.parts(self.influence).len() == 1;
@@ -392,7 +395,7 @@ impl WheelSolve<'_> {
         for part in parts {
             for k in 0..part.solution.patches.len() {
                 each_cell(part, k, index, |place, size, _, [x, y, _]| {
-                    // The cells that it covers, and the part of each.
+                    // The cells of the grid that this cell covers, and the covered part of each.
                     let [along, across] = [0, 1].map(|axis| {
                         let ends = [-0.5, 0.5].map(|half| {
                             (place[axis] + half * size[axis] - low[axis]) / grid.step[axis]
@@ -416,7 +419,7 @@ impl WheelSolve<'_> {
     }
 }
 
-/// Creepages and spin at a place, at x in mm.
+/// Creepages and spin of the wheel above a point of the curve, at x in mm.
 pub(super) fn creepages(
     rigid: &RigidMotion,
     x: f64,
@@ -431,8 +434,8 @@ pub(super) fn creepages(
     }
 }
 
-/// Calls with the place `[x, s]`, the size and the area of every cell of a patch, in mm and mm², and with its pressure and its tractions in a motion in
-/// MPa.
+/// Calls a function for every cell of a patch with its position `[x, s]` and size in mm, its area in mm², and in a motion its tractions and pressure
+/// `[q_x, q_s, p]` in MPa.
 pub(super) fn each_cell(
     part: &Part,
     patch: usize,
@@ -460,17 +463,12 @@ pub(super) fn each_cell(
     }
 }
 
-/// Cells between two places counted in cells, with the part of each that lies between.
-pub(super) fn covered([from, to]: [f64; 2], cells: usize) -> Vec<(usize, f64)> {
+/// The cells between two positions, which are counted in cells, and the part of each that lies between them.
+fn covered([from, to]: [f64; 2], cells: usize) -> Vec<(usize, f64)> {
     let [first, last] = [from, to].map(|end| (end.max(0.0).floor() as usize).min(cells - 1));
     let part = |cell: usize| to.min(cell as f64 + 1.0) - from.max(cell as f64);
     (first..=last)
         .map(|cell| (cell, part(cell)))
         .filter(|(_, part)| *part > 0.0)
         .collect()
-}
-
-/// The least of some gaps in mm.
-pub(super) fn least(gaps: &[f64]) -> f64 {
-    gaps.iter().copied().fold(f64::INFINITY, f64::min)
 }

@@ -1,12 +1,8 @@
-//! Brings a wheelset to rest on both rails under its load: the roll at which both wheels agree about the height of the centre, and
-//! the angular velocity at which the rails balance a torque.
+//! Solves a wheelset on both rails in all its positions: its equilibrium under its load, and the sums over both wheels in track axes.
 //!
-//! Each wheel carries a given vertical force, so that at a given roll it has a height of its own. The difference of the two heights falls
-//! by the distance of the contacts per radian, and torques over friction limit and radius grow with the slip over that of linear theory.
-//!
-//! Gathers the answers for both wheels in all positions into one, with the sums in track axes.
-//!
-//! Solves a wheelset in all its positions.
+//! The unknowns are the roll, at which both wheels give the same height of the centre, and the angular velocity, at which the rails balance a
+//! torque. Each wheel carries a given vertical force, so that at a given roll each has its own height. The difference of the two heights decreases by
+//! the distance of the contacts per radian. Torques over friction limit and radius grow with the slip over that of linear theory.
 
 use std::sync::Arc;
 
@@ -30,15 +26,16 @@ use crate::wheel_force_control::limit_and_law;
 use crate::wheel_on_rail::SolvedWheel;
 use crate::wheelset::kinematics;
 
-/// The heights of the centre by both wheels may differ by so much in mm. It leaves a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
+/// Tolerance of the difference of the heights by both wheels in mm. It is a roll of 2e-7 rad, which moves a contact by 1e-4 mm.
 const LEVEL: f64 = 3e-4;
-/// If nothing better is found, so much is answered with a remark: it moves a contact by 5e-3 mm.
+/// Largest difference in mm that is accepted with a remark. It moves a contact by 5e-3 mm.
 const LEVEL_POOR: f64 = 1e-2;
-/// A torque is balanced to this part of the target of forces, and at least to this part of the friction limit.
+/// Tolerance of a torque relative to the target error of forces.
 const TORQUE_OF_TARGET: f64 = 0.2;
+/// Least tolerance of a torque relative to the friction limit.
 const TORQUE_LEAST: f64 = 1e-4;
 
-/// A wheelset that is to be solved in one position.
+/// A wheelset to solve in one position.
 pub(crate) struct WheelsetSolve<'a> {
     pub(crate) operators: &'a Arc<OperatorStore>,
     pub(crate) case: &'a CheckedCase,
@@ -48,7 +45,7 @@ pub(crate) struct WheelsetSolve<'a> {
     pub(crate) monitor: &'a dyn Monitor,
 }
 
-/// A wheelset at rest.
+/// A wheelset in equilibrium.
 pub(crate) struct AtRest {
     /// Shift in mm, yaw and roll in rad.
     pub(crate) pose: [f64; 3],
@@ -73,7 +70,7 @@ struct Both {
 }
 
 impl Both {
-    /// By how much the left wheel holds the centre higher than the right one, in mm.
+    /// Height of the centre by the left wheel above that by the right one, in mm.
     fn above(&self) -> f64 {
         self.found[0].wheel.centre - self.found[1].wheel.centre
     }
@@ -85,19 +82,18 @@ impl Both {
 
     /// Torque of the rails on the wheelset about its axle in N mm, positive if it drives forward.
     fn torque_of_rails(&self) -> f64 {
-        let [lateral_shift, yaw, roll] = self.pose;
-        let axle = [-yaw.sin() * roll.cos(), yaw.cos() * roll.cos(), roll.sin()];
-        let centre = [0.0, lateral_shift, self.height()];
+        let axle = self.wheels[0].geometry.axle();
+        let centre = [0.0, self.pose[0], self.height()];
         let patches = self.found.iter().flat_map(|found| &found.solution.patches);
         patches.map(|patch| torque(patch, centre, axle)).sum()
     }
 }
 
 impl WheelsetSolve<'_> {
-    /// The wheelset at rest in a position. Where the curve of a rail has no answer and the case does not ask for it, both wheels are solved on planes.
+    /// Finds the equilibrium in a position. If the curve of a rail has no answer and the case does not ask for it, both wheels are solved on planes.
     ///
     /// # Errors
-    /// As [`at_rest`](Self::at_rest).
+    /// Returns the errors of [`at_rest`](Self::at_rest).
     pub(crate) fn on_either_surface(&self, rigid: &RigidPose) -> Result<AtRest, SolveError> {
         let error = match self.at_rest(rigid) {
             Ok(found) => return Ok(found),
@@ -117,10 +113,10 @@ impl WheelsetSolve<'_> {
         Ok(found)
     }
 
-    /// The wheelset at rest in a position, from that of the rigid one.
+    /// Finds the equilibrium in a position, starting from the rigid wheelset.
     ///
     /// # Errors
-    /// Why there is no answer, with the wheel and the position.
+    /// Returns the reason why there is no answer, with the wheel and the position.
     pub(crate) fn at_rest(&self, rigid: &RigidPose) -> Result<AtRest, SolveError> {
         let problem = &self.case.problem;
         let Some(motion) = problem.wheelset else {
@@ -150,7 +146,7 @@ impl WheelsetSolve<'_> {
         })
     }
 
-    /// Both wheels at the roll at which their heights agree, and with the angular velocity at which the rails balance a torque, where there is one.
+    /// Both wheels at the roll at which their heights agree. If a torque is given, the angular velocity is that at which the rails balance it.
     fn balanced(
         &self,
         rigid: &RigidPose,
@@ -161,7 +157,7 @@ impl WheelsetSolve<'_> {
         let target = self.case.run.resolution.target_or_usual();
         let tolerance = (TORQUE_OF_TARGET * target).max(TORQUE_LEAST);
         let per_mm = tolerance / LEVEL;
-        // What the search calls 1: the slip at which linear theory reaches the limit of friction.
+        // The unit of slip in the search: the slip at which linear theory reaches the friction limit.
         let mut unit = None;
         let scale = [
             Some(-1.0 / (per_mm * rigid.contact_distance())),
@@ -231,7 +227,7 @@ impl WheelsetSolve<'_> {
                 .of_wheel(Arc::new(wheels[k].clone()), *motion),
             run: self.case.run.clone(),
             label: self.case.label.clone(),
-            // They are told of the whole wheelset.
+            // The remarks of the case are reported once for the whole wheelset.
             remarks: Vec::new(),
         };
         let cases = [case(0), case(1)];
@@ -270,7 +266,7 @@ impl WheelsetSolve<'_> {
     }
 }
 
-/// Torque of the rail on the wheelset about its axle in N mm by one patch, whose force acts at its load centre.
+/// Torque of the rail on the wheelset about its axle in N mm, due to the force of one patch at its load centre.
 fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
     let (Some(position), Some(point)) = (&patch.position, patch.points.first()) else {
         return 0.0;
@@ -280,7 +276,7 @@ fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
     };
     let (sin, cos) = position.contact_angle_rad.sin_cos();
     let arm = [0, 1, 2].map(|k| position.track_mm[k] - centre[k]);
-    // Of the wheel on the rail; the wheelset feels the opposite.
+    // This is the moment of the wheel on the rail. The moment on the wheelset is the opposite.
     let moment = [
         arm[1] * force[2] - arm[2] * force[1],
         arm[2] * force[0] - arm[0] * force[2],
@@ -290,7 +286,7 @@ fn torque(patch: &PatchSolution, centre: [f64; 3], axle: [f64; 3]) -> f64 {
     -((0..3).map(|k| axle[k] * moment[k]).sum::<f64>() + spin)
 }
 
-/// The answers so far.
+/// The combined solution of the positions solved so far.
 pub(crate) struct WheelsetGathering<'a> {
     case: &'a CheckedCase,
     task: &'a WheelsetTask,
@@ -347,7 +343,7 @@ impl<'a> WheelsetGathering<'a> {
         });
     }
 
-    /// Adds the patches of one wheel and says what it does on its rail.
+    /// Adds the patches of one wheel and returns its summary.
     fn wheel(
         &mut self,
         side: usize,
@@ -363,7 +359,7 @@ impl<'a> WheelsetGathering<'a> {
                 1 => self.task.pointer_on_right(&pointer),
                 _ => pointer,
             });
-            // A remark on all patches of a wheel is told at the first.
+            // A remark on all patches of a wheel is attached to the first one.
             let patch = Some(first + remark.patch.unwrap_or(0));
             RemarkEntry {
                 patch,
@@ -397,7 +393,7 @@ impl<'a> WheelsetGathering<'a> {
         }
     }
 
-    /// The answer, with the kinematics if they were asked for.
+    /// The combined solution, with the kinematics if they were requested.
     pub(crate) fn finish(self, kinematics: Option<Kinematics>) -> (Solution, Fields) {
         let Some((solution, fields)) = self.whole else {
             unreachable!("a wheelset has at least one position")
@@ -442,7 +438,7 @@ fn about_middle(solution: &Solution) -> Total {
     }
 }
 
-/// The sums over two wheels; their errors are added, which they do not exceed.
+/// The sums over two wheels. The sums of their errors are upper bounds.
 fn plus(one: &Total, other: &Total) -> Total {
     Total {
         force_x_n: one.force_x_n + other.force_x_n,
@@ -463,10 +459,10 @@ fn plus(one: &Total, other: &Total) -> Total {
     }
 }
 
-/// Solves a wheelset in all its positions, and its kinematics where they are asked for.
+/// Solves a wheelset in all its positions, and its kinematics if they are requested.
 ///
 /// # Errors
-/// A named reason why there is no answer, with the wheel and the position; or the monitor stopped the work.
+/// Returns the reason why there is no answer, with the wheel and the position, or an error if the monitor stopped the work.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -508,7 +504,7 @@ pub(crate) fn solve(
     Ok(gathering.finish(kinematics))
 }
 
-/// Both wheels with every automatic smoothing settled in the first position: one reading serves all positions.
+/// Both wheels with every automatic smoothing replaced by the length found in the first position.
 fn settled(
     case: &CheckedCase,
     task: &WheelsetTask,

@@ -1,7 +1,7 @@
-//! The rigid wheelset over a range of shifts: difference of the rolling radii, equilibrium, equivalent conicity, and what another
-//! reading of the cross-sections would change of them.
+//! Kinematics of the rigid wheelset over a range of shifts: difference of the rolling radii, equilibrium, equivalent conicity, and their changes with
+//! another smoothing of the cross-sections.
 //!
-//! EN 15302 holds the axle level: each wheel touches where it would without the roll. The values with the roll stand beside them.
+//! EN 15302 keeps the axle level: each wheel touches where it would without the roll. The values with the roll are reported too.
 
 use std::f64::consts::PI;
 
@@ -18,21 +18,21 @@ use crate::problem::checked_case::PRESSURE_USUAL;
 use crate::profile_assessment::uncertainty::COMPANIONS;
 use crate::solution::words::answer::{EquivalentConicity, Kinematics, TouchLine};
 
-/// Between two shifts the radius difference is known to this in mm, a fifth of the rounding of the standard's tables ...
+/// Tolerance of the radius difference between two shifts in mm, a fifth of the rounding of the tables in the standard.
 const RESOLVED: f64 = 2e-3;
-/// ... or its jump to the distance of the shifts halved this many times, 0.0001 mm for 0.1 mm.
+/// Most bisections of an interval between two shifts. They locate a jump to 0.0001 mm in an interval of 0.1 mm.
 const HALVINGS: u32 = 10;
 
-/// A radius difference as sampled, and with twice the distance of the shifts.
+/// A radius difference as sampled, and with every second shift only.
 struct Sampled {
     fine: RadiusDifference,
     coarse: RadiusDifference,
 }
 
-/// The kinematics of a wheelset, with both wheels over their rails also as contacts, for the other reading.
+/// Computes the kinematics of a wheelset. `sides` has both wheels as contacts, from which other smoothings follow.
 ///
 /// # Errors
-/// A wheel is not over its rail even without a shift; or the monitor stopped the work.
+/// Returns an error if a wheel is not above its rail without a shift, or the monitor stopped the work.
 pub(crate) fn of(
     rails: &mut PairOfRails,
     sides: &[WheelTask; 2],
@@ -71,8 +71,8 @@ pub(crate) fn of(
     };
     let radius_difference_mm: Vec<f64> = level.iter().map(RigidPose::radius_difference).collect();
     let conicity = asked.amplitudes.iter().map(|amplitude| {
-        let entry = conicity(*amplitude, [&radii, &other_radii, &rolled_radii]);
-        with_wavelength(entry, distance * mean_radius)
+        let radii = [&radii, &other_radii, &rolled_radii];
+        conicity(*amplitude, radii, distance * mean_radius)
     });
     let known = level.iter().all(|pose| at_shift(&rolled, pose).is_some());
     let unbalanced = NoConicity::NoEquilibrium(radii.fine.range()).to_string();
@@ -103,7 +103,7 @@ pub(crate) fn of(
     })
 }
 
-/// The pose at the same shift as another.
+/// The pose with the same shift as another one.
 fn at_shift<'p>(poses: &'p [RigidPose], other: &RigidPose) -> Option<&'p RigidPose> {
     poses
         .iter()
@@ -115,7 +115,8 @@ fn nearest(poses: &[RigidPose], shift: f64) -> Option<&RigidPose> {
     poses.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
-/// The wheelset at every shift it can have, in order, and why they end before the reach. `pose` has the shift and a roll nearby.
+/// The poses at all possible shifts in order, and the reason if they end before the requested reach. `pose` finds one from the shift and a roll
+/// nearby.
 fn over_shifts(
     asked: &KinematicsTask,
     monitor: &dyn Monitor,
@@ -145,13 +146,13 @@ fn over_shifts(
     Ok((poses, end))
 }
 
-/// The radius difference of poses, with more shifts where it bends or jumps.
+/// The radius difference of some poses, with more shifts where it bends or jumps.
 fn sampled(poses: &[RigidPose], mut pose: impl FnMut(f64) -> Result<RigidPose, String>) -> Sampled {
     let known: Vec<[f64; 2]> = poses
         .iter()
         .map(|pose| [pose.lateral_shift, pose.radius_difference()])
         .collect();
-    // The middle of a parabola lies an eighth of its second difference off the chord.
+    // The middle of a parabola is an eighth of its second difference away from the chord.
     let bends = |k: usize| {
         k > 0
             && k + 1 < known.len()
@@ -177,7 +178,7 @@ fn sampled(poses: &[RigidPose], mut pose: impl FnMut(f64) -> Result<RigidPose, S
     }
 }
 
-/// Samples between two, until the difference is linear between them or the jump is narrow.
+/// Adds samples between two others until the difference is linear between them or the jump is narrow.
 fn halve(
     [from, to]: [[f64; 2]; 2],
     times: u32,
@@ -199,7 +200,7 @@ fn halve(
     }
 }
 
-/// A wheel over its rail with the other reading of both cross-sections: smoother, as their noise and spacing advise at least.
+/// A wheel on its rail with both cross-sections smoothed more, at least as their noise and spacing advise.
 fn other_reading(side: &WheelTask) -> WheelRail {
     let profiles = side.geometry.profiles();
     let levels = profiles.map(checked_case::noise_level);
@@ -213,8 +214,13 @@ fn other_reading(side: &WheelTask) -> WheelRail {
         .smoothed([other(0, profiles[0]), other(1, profiles[1])])
 }
 
-/// The conicity at one amplitude, from Δr, that of the other reading and that with the roll; without the wavelength.
-fn conicity(amplitude: f64, [radii, other, rolled]: [&Sampled; 3]) -> EquivalentConicity {
+/// The conicity at one amplitude, from the radius differences as given, with the other smoothing and with the roll. `product` is the contact
+/// distance times the radius in mm².
+fn conicity(
+    amplitude: f64,
+    [radii, other, rolled]: [&Sampled; 3],
+    product: f64,
+) -> EquivalentConicity {
     let found = radii.fine.conicity(amplitude);
     let mut reasons = Vec::new();
     let mut missing = |what: &str, reason: NoConicity| reasons.push(format!("{what}: {reason}"));
@@ -230,7 +236,9 @@ fn conicity(amplitude: f64, [radii, other, rolled]: [&Sampled; 3]) -> Equivalent
     };
     let error_estimate = change("error_estimate, from twice the step", &radii.coarse);
     let profile_uncertainty = change("profile_uncertainty, from the other reading", &other.fine);
-    if own.is_some_and(|own| own.turns.is_none()) {
+    let turns = own.and_then(|own| own.turns);
+    let steers = own.filter(|_| turns.is_some());
+    if own.is_some() && turns.is_none() {
         reasons.push(
             "wavelength_mm, turns_mm: the radii are equal over the whole amplitude, so that the wheelset does not steer"
                 .to_owned(),
@@ -244,18 +252,9 @@ fn conicity(amplitude: f64, [radii, other, rolled]: [&Sampled; 3]) -> Equivalent
         conicity_harmonic: own.map(|found| found.harmonic),
         error_estimate,
         profile_uncertainty,
-        wavelength_mm: None,
-        turns_mm: own.and_then(|found| found.turns),
+        wavelength_mm: steers.map(|found| PI * (2.0 * product / found.conicity).sqrt()),
+        turns_mm: turns,
         reason: (!reasons.is_empty()).then(|| reasons.join("; ")),
-    }
-}
-
-/// The same with the wavelength; `product` is that of contact distance and radius in mm².
-fn with_wavelength(entry: EquivalentConicity, product: f64) -> EquivalentConicity {
-    let steers = entry.conicity.filter(|_| entry.turns_mm.is_some());
-    EquivalentConicity {
-        wavelength_mm: steers.map(|conicity| PI * (2.0 * product / conicity).sqrt()),
-        ..entry
     }
 }
 

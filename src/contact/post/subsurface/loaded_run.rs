@@ -7,6 +7,7 @@ use crate::half_space::kernels::LoadPack;
 use crate::mesh::{Chord, Segment};
 use crate::normal::footprint::Footprint;
 use crate::numerics::quadrature::RULES;
+use crate::numerics::roots::bounds;
 use crate::numerics::simd::LANES;
 use crate::post::subsurface::load_parts::{LoadPart, ORDERS, PartBox};
 use crate::rolling::answer::LevelAnswer;
@@ -116,16 +117,7 @@ impl<'a> LoadedRun<'a> {
                 low,
                 width: last.y + 0.5 * last.dy - low,
             },
-            extent: [
-                chords
-                    .clone()
-                    .map(|chord| chord.left)
-                    .fold(f64::INFINITY, f64::min),
-                chords
-                    .clone()
-                    .map(|chord| chord.right)
-                    .fold(f64::NEG_INFINITY, f64::max),
-            ],
+            extent: bounds(chords.clone().flat_map(|chord| [chord.left, chord.right])),
             halvings: halvings(level, footprint, segments),
             lines: chords.map(|chord| chord.y).collect(),
             nodes: nodes.iter().map(angle).collect(),

@@ -82,7 +82,7 @@ pub fn passage(
         for depth in DEPTHS {
             monitor.go_on(0.0)?;
             let at = [across, depth.ln()];
-            let states = lines.states(at, LoadResolution::COARSE, workspace);
+            let states = lines.states(&lines.stations, at, LoadResolution::COARSE, workspace);
             let stresses: Vec<Stress> = states.into_iter().map(|(_, state)| state).collect();
             for (start, measure) in starts.iter_mut().zip(&measures) {
                 let found = judge(*measure, &stresses).stress;
@@ -151,18 +151,8 @@ impl<'a> Lines<'a> {
         [self.middle + self.half * across, depth]
     }
 
-    /// x and stress at every station.
+    /// x and stress at some x in mm on a line.
     fn states(
-        &self,
-        at: [f64; 2],
-        resolution: LoadResolution,
-        workspace: &mut LoadWorkspace,
-    ) -> Vec<(f64, Stress)> {
-        self.states_at(&self.stations, at, resolution, workspace)
-    }
-
-    /// x and stress at these x in mm.
-    fn states_at(
         &self,
         stations: &[f64],
         at: [f64; 2],
@@ -182,7 +172,7 @@ impl<'a> Lines<'a> {
         at: [f64; 2],
         workspace: &mut LoadWorkspace,
     ) -> (f64, f64) {
-        let mut states = self.states(at, LoadResolution::FINE, workspace);
+        let mut states = self.states(&self.stations, at, LoadResolution::FINE, workspace);
         let judged = |states: &[(f64, Stress)]| {
             let stresses: Vec<Stress> = states.iter().map(|(_, state)| *state).collect();
             judge(measure, &stresses)
@@ -198,7 +188,7 @@ impl<'a> Lines<'a> {
             let added: Vec<f64> = between
                 .map(|k| 0.5 * (states[k].0 + states[k + 1].0))
                 .collect();
-            states.extend(self.states_at(&added, at, LoadResolution::FINE, workspace));
+            states.extend(self.states(&added, at, LoadResolution::FINE, workspace));
             states.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
         let found = judged(&states);
