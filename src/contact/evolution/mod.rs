@@ -1,11 +1,11 @@
-//! Profiles that wear under a traffic, step by step.
+//! Evolution of worn profiles under a traffic, step by step.
 //!
-//! An [`Evolution`](task::Evolution) is a case of a wheel on a rail, a traffic of many states of it, and a plan. Its
-//! [`step`](task::Evolution::step) takes a serialisable [state](crate::solution::words::evolution::EvolutionState) to the next one and
-//! depends on nothing else, so that an evolution can be left after any step and continued elsewhere to the same bits.
+//! An [`Evolution`](task::Evolution) consists of a case of a wheel on a rail, a traffic of many states of it, and a plan. Its
+//! [`step`](task::Evolution::step) computes the next serialisable [state](crate::solution::words::evolution::EvolutionState) from the present one
+//! alone. An evolution can therefore be interrupted after any step and continued elsewhere to the same bits.
 //!
-//! The first step condenses the [`traffic`]. Every other one solves all states on the present sections by the stages that every case passes,
-//! adds up their wear along the [`section`]s ([`pass`]), and moves these ([`step`]). [`record`] has what is answered.
+//! The first step condenses the [`traffic`]. Every other step solves all states on the present sections like any other case, adds up their wear along
+//! the [`section`]s ([`pass`]), and moves these ([`step`]). [`record`] makes the answer.
 
 pub mod pass;
 pub mod record;
@@ -28,7 +28,7 @@ mod tests {
     use crate::monitor::Unmonitored;
     use crate::solution::words::evolution::{EvolutionRecord, EvolutionState};
 
-    /// A wheel on a rail, by the shipped example.
+    /// The shipped example of a wheel on a rail.
     fn template() -> Value {
         let text = include_str!("../../../api/examples/wheel-rail.case.json");
         let mut case: Value = serde_json::from_str(text).expect("an example is JSON");
@@ -38,7 +38,7 @@ mod tests {
         case
     }
 
-    /// An evolution of the example over some shifts.
+    /// An evolution of the example with some lateral shifts.
     fn request(shifts: &[f64], passes: &[f64], records: u32) -> Value {
         json!({
             "template": template(),
@@ -88,7 +88,7 @@ mod tests {
                 "contact": {
                     "type": "profiles", "rail": section(rail), "wheel": section(wheel), "side": "left", "rolling_radius_mm": 460,
                     "rail_origin_mm": 750, "flange_back_distance_mm": 1360, "flange_back_position_mm": -70,
-                    // On the curve of the rail strips slip without creepage, since their radii differ.
+                    // On the curve of the rail, strips slip without creepage because their radii differ.
                     "reference_surface": "plane",
                 },
                 "load": { "vertical_force_n": 80e3 },
@@ -112,7 +112,7 @@ mod tests {
             .iter()
             .zip(depth.iter().rev())
             .map(|(a, b)| (a - b).abs());
-        // The cells of the pressures do not lie symmetrically about the middle, and a step so large leaves edges with peaks of pressure.
+        // The cells of the pressures are not symmetric about the middle, and the large step leaves edges with peaks of pressure.
         let off = off.fold(0.0, f64::max);
         assert!(off < 0.15 * most, "{off} {most}");
         let lost = area_between(
@@ -193,7 +193,7 @@ mod tests {
         }
     }
 
-    /// Creepages of both signs with mean 0 beside widely spread loads: the reported error covers the true one, which falls with the number of states.
+    /// With creepages of mean 0 and widely spread loads, the reported error covers the true one, which decreases with the number of states.
     #[test]
     fn the_error_of_a_condensed_traffic_covers_what_all_rows_wear() {
         let rows = 48;
@@ -236,8 +236,8 @@ mod tests {
         assert!(last < 0.05, "{last}");
     }
 
-    /// A wheel that rolls about its axle's end touches the round head at R sin(roll): the wear of few states is spread by R times the standard
-    /// deviation of the roll of their rows, and differs from that of all rows by no more than the error says.
+    /// The wheel touches the round head at R sin(roll). The wear of few states is spread by R times the standard deviation of the roll of their rows,
+    /// and differs from that of all rows by no more than the reported error.
     #[test]
     fn the_wear_of_a_state_is_spread_over_the_places_of_its_rows() {
         let rolls: Vec<f64> = (0..25).map(|k| 1e-3 * f64::from(k - 12)).collect();
@@ -272,7 +272,7 @@ mod tests {
         }
     }
 
-    /// Left after any step and continued from its text by other threads, an evolution gives the same bits.
+    /// An evolution that is interrupted after any step and continued from its text by other threads gives the same bits.
     #[test]
     fn an_evolution_is_continued_to_the_same_bits() {
         let mut plan = request(&[-2.0, 1.0], &[1.0, 3.0], 2);
@@ -306,7 +306,7 @@ mod tests {
         );
     }
 
-    /// An evolution of half the extent, and another one that starts from its sections, wear as one of the whole.
+    /// An evolution of half the extent and another one that starts from its sections give the wear of one over the whole extent.
     #[test]
     fn an_evolution_in_two_parts_wears_as_a_whole() {
         let (whole, _) = run(&checked(&symmetric(2, 4e4)));
@@ -390,7 +390,7 @@ mod tests {
         );
     }
 
-    /// Means and variances of the samples are those of the distributions, columns are uncorrelated, and a table of the same rows is the same traffic.
+    /// Samples have the means and variances of the distributions, columns are uncorrelated, and a table of the same rows is the same traffic.
     #[test]
     fn distributions_are_sampled_evenly_and_independently() {
         let mut sampled = request(&[0.0], &[1.0], 1);
@@ -410,7 +410,7 @@ mod tests {
             (mean, (squares.sum::<f64>() / 3000.0).sqrt())
         };
         let ((shift, shift_spread), (load, load_spread)) = (moments(shifts), moments(loads));
-        // The ends cut off 1e-3 of the normal distribution.
+        // The bounds cut off 1e-3 of the normal distribution.
         assert!(
             (shift - 1.0).abs() < 0.02 && (shift_spread - 1.5).abs() < 0.02,
             "{shift} {shift_spread}"

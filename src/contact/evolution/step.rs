@@ -1,12 +1,12 @@
-//! The steps of an evolution: each a pure function of the state before it.
+//! The steps of an evolution. Each is a pure function of the state before it.
 //!
-//! A step is the midpoint rule: the wear of the present sections moves them by half a step, the wear of the sections found there moves the present
-//! ones by the whole step. The wear changed by half a step is the difference to two steps of half the length without it: it accepts the step, chooses
-//! the next, and its sum with signs is the error of the steps that is answered.
+//! A step is the midpoint rule: the wear of the present sections moves them by half a step, and the wear of these sections moves the present ones by
+//! the whole step. The change of the wear over half a step estimates the error. It decides whether the step is accepted and how long the next one
+//! is. Its signed sum is the reported error of the steps.
 //!
-//! Waves shorter than a patch are worn down within a fraction of its depth: a wave of the length λ changes the pressure by π E* / λ per amplitude.
-//! Explicit steps stay stable where the wear of a step is smoothed over a length of about a tenth of what E* over the pressure makes of its
-//! depth; the defaults of `smoothing_mm` and `step_depth_mm` belong together.
+//! Waves shorter than a patch are worn down within a fraction of its depth, because a wave of the length λ changes the pressure by π E* / λ per
+//! amplitude. Explicit steps are stable if the wear of a step is smoothed over a length of at least about a tenth of its depth times E* over the
+//! pressure. The defaults of `smoothing_mm` and `step_depth_mm` are chosen together.
 
 use rayon::ThreadPoolBuilder;
 use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
@@ -27,18 +27,18 @@ use crate::solution::words::evolution::{
     BodyState, EvolutionRecord, EvolutionState, StateContact, WornBody,
 };
 
-/// Shortest step as a share of the extent.
+/// Length of the shortest step relative to the extent.
 const SHORTEST: f64 = 1e-7;
-/// Attempts at one step.
+/// Most attempts at one step.
 const ATTEMPTS: u32 = 8;
-/// Largest share of the traffic that may be without an answer.
+/// Largest share of the traffic that may have no answer.
 const UNSOLVED: f64 = 0.1;
 /// Stack of a thread that solves states.
 const STACK_BYTES: usize = 16 << 20;
 const BODIES: [Body; 2] = [Body::Rail, Body::Wheel];
 
 impl Evolution {
-    /// An evolution before its first step.
+    /// The state before the first step.
     pub fn begin(&self) -> EvolutionState {
         EvolutionState {
             next: 1.0 / f64::from(self.plan.records),
@@ -57,22 +57,23 @@ impl Evolution {
         }
     }
 
-    /// Is everything done?
+    /// Returns whether the evolution is finished.
     pub fn is_over(&self, state: &EvolutionState) -> bool {
         state.share >= 1.0 && state.recorded && self.due(state).is_none()
     }
 
-    /// The event that is due.
+    /// The next event, if it is due.
     fn due(&self, state: &EvolutionState) -> Option<&PlannedEvent> {
         let next = state.events_done as usize;
         let event = self.events.get(next);
         event.filter(|_| self.share_of_event(next) <= state.share + ROUNDING)
     }
 
-    /// One step: condenses the traffic, lets an event happen, or advances the sections. Returns the record of the state before, if one is due.
+    /// Does one step: condenses the traffic, applies the events that are due, or advances the sections. Returns the new state, and the record of the
+    /// state before if one is due.
     ///
     /// # Errors
-    /// The monitor stopped the work; a tenth of the traffic or more has no answer; or there are too many steps.
+    /// Returns an error if the monitor stopped the work, more than a tenth of the traffic has no answer, or there are too many steps.
     pub fn step(
         &self,
         context: &SolveContext,
@@ -110,10 +111,10 @@ impl Evolution {
         Ok((state, found))
     }
 
-    /// Takes steps until there is a record, all is done or `most` are taken. Returns the state after them, and the record.
+    /// Does steps until there is a record, the evolution is finished or `most` steps are done. Returns the new state, and the record.
     ///
     /// # Errors
-    /// As [`Evolution::step`].
+    /// Returns the errors of [`Evolution::step`].
     pub fn steps(
         &self,
         context: &SolveContext,
@@ -155,7 +156,7 @@ impl Evolution {
         let left = stop - begin;
         let mut length = state.next.min(allowed).max(SHORTEST);
         for attempt in 1..=ATTEMPTS {
-            // Not to end just before the stop.
+            // The step must not end just before the stop.
             let step = if length >= left {
                 left
             } else if length > 0.6 * left {
@@ -196,7 +197,7 @@ impl Evolution {
         Ok(())
     }
 
-    /// The next share with a record or an event.
+    /// The next share of the extent with a record or an event.
     fn next_stop(&self, share: f64) -> f64 {
         let records = f64::from(self.plan.records);
         let record = ((share + ROUNDING) * records).floor() + 1.0;
@@ -206,7 +207,7 @@ impl Evolution {
     }
 }
 
-/// What solves the states of a step.
+/// Solves the states of a step.
 struct Solver<'a> {
     task: &'a Evolution,
     context: &'a SolveContext,
@@ -216,7 +217,7 @@ struct Solver<'a> {
 }
 
 impl Solver<'_> {
-    /// The wear of all states of an evolution on sections, over the extent and smoothed.
+    /// The wear of all states of an evolution on some sections, over the whole extent and smoothed.
     fn evaluate(
         &self,
         of: &EvolutionState,
@@ -253,7 +254,7 @@ impl Solver<'_> {
         Ok((all, states))
     }
 
-    /// Solves the states of these values, each on its own, on the threads of the context.
+    /// Solves the states with these values independently, on the threads of the context.
     fn passes(&self, on: Sections, states: &[&[f64]]) -> Result<Vec<Pass>, SolveError> {
         let solve = |values: &&[f64]| {
             let monitor = MonitorPart {
@@ -267,7 +268,7 @@ impl Solver<'_> {
         let pool = ThreadPoolBuilder::new().num_threads(threads);
         match pool.stack_size(STACK_BYTES).build() {
             Ok(pool) if threads > 1 => pool.install(|| states.par_iter().map(solve).collect()),
-            // With one thread, or if no pool can be built, the calling thread solves all states.
+            // With one thread, or without a pool, the calling thread solves all states.
             _ => states.iter().map(solve).collect(),
         }
     }
@@ -279,7 +280,7 @@ fn happen((planned, sections): &PlannedEvent, state: &mut EvolutionState) {
         let before = &body.worn.points_mm;
         let after = machined(kind, before, target, planned.depth_mm);
         body.worn.machined_area_mm2 += area_between(kind, before, &after);
-        // Cracks go with the material that they are in.
+        // Cracks are removed with the material.
         for (k, damage) in body.worn.damage.iter_mut().enumerate() {
             if after[k] != before[k] {
                 *damage = 0.0;
@@ -299,7 +300,7 @@ fn sections(bodies: &[BodyState; 2], friction: Option<f64>, radius: f64) -> Sect
     }
 }
 
-/// y on the wheel's section of the patch that carries most, of each state; where it was not solved, the one before.
+/// y on the wheel's section of the patch with the largest load in each state. For a state that was not solved, the value before is kept.
 fn touched(states: &[StateContact], before: &[f64]) -> Vec<f64> {
     let of_state = |(k, state): (usize, &StateContact)| {
         let patches = state.patches.iter();
@@ -310,8 +311,7 @@ fn touched(states: &[StateContact], before: &[f64]) -> Vec<f64> {
     states.iter().enumerate().map(of_state).collect()
 }
 
-/// Change of the wheel's radius in mm where the states touch it, the mean over the traffic: the radius at which it rolls freely changes by
-/// as much.
+/// Mean change of the wheel's radius in mm at the contacts of all states. The free rolling radius changes by this.
 fn radius_change(of: &EvolutionState, wheel: &BodyState) -> f64 {
     let up = |points: &[[f64; 2]], y: f64| distance(points, [y, 1e3], [0.0, -1.0]);
     let parts = of.traffic.states.iter().zip(&of.wheel_y).map(|(state, y)| {
@@ -322,7 +322,7 @@ fn radius_change(of: &EvolutionState, wheel: &BodyState) -> f64 {
     parts.sum()
 }
 
-/// Difference of two distributions over the second.
+/// Sum of the absolute differences of two distributions, relative to the sum of the second.
 fn change(now: &[f64], then: &[f64]) -> f64 {
     let all: f64 = then.iter().sum();
     let pairs = now.iter().zip(then);

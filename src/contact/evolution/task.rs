@@ -19,66 +19,66 @@ use crate::rolling::operator_store::OperatorStore;
 use crate::solution::words::damage::DamageFiguresUsed;
 use crate::solution::words::evolution::Progress;
 
-/// Steps of an evolution of usual length.
+/// Usual number of steps of an evolution.
 const STEPS_USUAL: f64 = 50.0;
-/// Target of the contacts' forces where the template has none: wear coefficients are known far less well.
+/// Default of the target error of forces. Wear coefficients are known far less accurately.
 const TARGET: f64 = 0.02;
-/// Wheel load in N of a million gross tonnes on an axle with one wheel of that load on each rail.
+/// Sum of the wheel loads in N on one rail per million gross tonnes, half of the weight.
 const NEWTONS_PER_MGT: f64 = 1e9 * 9.80665 / 2.0;
 
-/// Sections and friction that a state is solved with.
+/// Sections and friction with which a state is solved.
 #[derive(Debug, Clone, Copy)]
 pub struct Sections<'a> {
     /// Rail and wheel.
     pub points: [&'a [[f64; 2]]; 2],
-    /// Coefficient of friction in place of that of the state.
+    /// Coefficient of friction that replaces that of the state.
     pub friction: Option<f64>,
     /// Change of the wheel's radius in mm.
     pub radius: f64,
 }
 
-/// An event with the sections that it leaves, rail and wheel.
+/// An event with the target sections of rail and wheel.
 pub type PlannedEvent = (EvolutionEvent, [Option<Vec<[f64; 2]>>; 2]);
 
 /// State shared by the solves of an evolution.
 #[derive(Debug, Default)]
 pub struct SolveContext {
-    /// Threads that solve the states of a step, the calling one included; 0 counts as 1.
+    /// Number of threads that solve the states of a step, including the calling one. 0 is treated as 1.
     pub threads: usize,
-    /// Operators of patches of one shape.
+    /// Cache of operators.
     pub operators: Arc<OperatorStore>,
-    /// Profiles that were read last.
+    /// Cache of the last profiles.
     pub known: Arc<KnownPair>,
 }
 
 /// A checked evolution.
 #[derive(Debug, Clone)]
 pub struct Evolution {
-    /// A case whose sections and traffic are put in.
+    /// A case into which sections and traffic are inserted.
     template: Value,
-    /// Places of the columns.
+    /// JSON pointers of the columns.
     pub pointers: Vec<String>,
     /// Their values, column by column.
     pub columns: Vec<Vec<f64>>,
-    /// Shares of the rows, their sum 1.
+    /// Shares of the rows in the traffic, with the sum 1.
     pub shares: Vec<f64>,
     /// The plan: bodies that wear, extent, limits and accuracy.
     pub plan: EvolutionWords,
-    /// The events in their order.
+    /// The events in order.
     pub events: Vec<PlannedEvent>,
     /// Rail and wheel at the start.
     pub geometry: WheelRail,
-    /// Figures of wear and damage.
+    /// Parameters of wear and damage.
     pub figures: DamageFiguresUsed,
-    /// Axles, and distance of the wheel in mm, over the extent.
+    /// Number of axles, and distance of the wheel in mm, over the extent.
     pub amounts: [f64; 2],
     /// Million gross tonnes over the extent.
     mgt: f64,
-    /// Those of the service.
+    /// Limits of the service.
     pub limits: Limits,
-    /// Hexadecimal digest of the evolution and of the solver.
+    /// Hexadecimal digest of the evolution and the solver.
     pub digest: String,
-    /// Memory in bytes that one thread takes to solve a state.
+    /// Memory in bytes that one thread needs to solve a state.
     pub memory_bytes: u64,
     state_seconds: f64,
 }
@@ -87,7 +87,7 @@ impl Evolution {
     /// Checks an evolution whose columns are named by JSON pointers into the template.
     ///
     /// # Errors
-    /// Every fault, with its JSON pointer.
+    /// Returns all faults with their JSON pointers.
     pub fn check(value: &Value, limits: &Limits) -> Result<Evolution, CaseError> {
         let mut plan = EvolutionWords::read(value)?;
         let template = template(&plan)?;
@@ -114,7 +114,7 @@ impl Evolution {
             return Err(not_profiles());
         };
         let cost = first.cost();
-        // That of the case contains the revision of the solver.
+        // The digest of the case includes the revision of the solver.
         let mut digest = blake3::Hasher::new();
         digest.update(first.label.digest.as_bytes());
         digest.update(value.to_string().as_bytes());
@@ -141,7 +141,7 @@ impl Evolution {
         Ok(evolution)
     }
 
-    /// The rail stays where its gauge puts it at the start, and the wheel on its flange back, however they wear.
+    /// Fixes the initial positions of the rail by its gauge and of the wheel by its flange back, so that wear does not change them.
     fn place_rail(&mut self) {
         let contact = &mut self.template["contact"];
         for name in ["gauge_mm", "gauge_height_mm"] {
@@ -151,7 +151,7 @@ impl Evolution {
         contact["flange_back_position_mm"] = self.geometry.placement.flange_back_position.into();
     }
 
-    /// Checks of each column the rows with the least and the largest value, and the first row with the friction of each event.
+    /// Checks the rows with the least and the largest value of each column, and the first row with the friction of each event.
     fn check_rows(&self) -> Result<(), CaseError> {
         let known = KnownPair::default();
         let [rail, wheel] = self.start();
@@ -179,7 +179,7 @@ impl Evolution {
         Ok(())
     }
 
-    /// Axles and tonnes over the extent.
+    /// Computes axles and tonnes over the extent.
     fn weigh(&mut self) -> Result<(), CaseError> {
         let place = "/load/vertical_force_n";
         let column = self.pointers.iter().position(|pointer| pointer == place);
@@ -205,7 +205,7 @@ impl Evolution {
         Ok(())
     }
 
-    /// Rough solve time in s on one core: two solves of each state for each step that the records need.
+    /// Rough estimate of the solve time in s on one core, with two solves of each state per step.
     pub fn expected_seconds(&self) -> f64 {
         let states = f64::from(self.plan.accuracy.states_max).min(self.shares.len() as f64);
         2.0 * states * f64::from(self.plan.records).max(STEPS_USUAL) * self.state_seconds
@@ -221,7 +221,7 @@ impl Evolution {
         self.events[event].0.at / self.plan.end()
     }
 
-    /// How far an evolution has come at a share of its extent.
+    /// The progress of the evolution at a share of its extent.
     pub(crate) fn progress(&self, share: f64) -> Progress {
         let [rail, wheel] = self.plan.wearing.flags();
         Progress {
@@ -232,10 +232,10 @@ impl Evolution {
         }
     }
 
-    /// The case of these values on these sections.
+    /// The case with these values on these sections.
     ///
     /// # Errors
-    /// A column leads nowhere in the template.
+    /// Returns a fault if a column points nowhere in the template.
     pub(crate) fn case(&self, on: Sections, values: &[f64]) -> Result<Value, CaseError> {
         let mut case = filled(&self.template, &self.pointers, values, on.friction)?;
         for (body, points) in ["rail", "wheel"].into_iter().zip(on.points) {
@@ -257,7 +257,7 @@ fn not_profiles() -> CaseError {
     Fault::new("/template/contact/type", detail).into()
 }
 
-/// The fault of a section with a guard rail, whose wear is not computed.
+/// The fault of a section with a guard rail, which cannot wear.
 fn guard_rail(section: &str) -> Fault {
     let detail = "given for an evolution; only a running rail and a wheel wear, leave it out";
     Fault::new(format!("{section}/guard_rail_points_mm"), detail)
@@ -292,7 +292,7 @@ fn template(plan: &EvolutionWords) -> Result<Value, CaseError> {
     if template.get("solver").is_none() {
         template["solver"] = json!({ "target_error": TARGET });
     }
-    // The quality of the given points is judged at the first contact only; later points are computed.
+    // The points of later steps are computed, so that their quality must not make a solve fail.
     template["contact"]["accept_rough_profiles"] = true.into();
     Ok(template)
 }
@@ -314,7 +314,7 @@ fn filled(
     Ok(case)
 }
 
-/// Faults of the case of a row, with pointers into the evolution. A fault outside of all columns gets the pointer of the column `tested`.
+/// Converts the pointers of the faults of a row to pointers into the evolution. A fault outside all columns gets the pointer of the column `tested`.
 fn located(
     error: CaseError,
     pointers: &[String],
@@ -327,7 +327,7 @@ fn located(
     })
 }
 
-/// The events in their order, with the sections that they leave.
+/// The events in order, with their target sections.
 fn events(plan: &mut EvolutionWords) -> Result<Vec<PlannedEvent>, CaseError> {
     let mut faults = Vec::new();
     let end = plan.end();

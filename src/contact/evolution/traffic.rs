@@ -1,9 +1,9 @@
 //! Condenses a traffic to a few representative states.
 //!
-//! Rows are parted into groups, each represented by the mean of its rows. Both halves of every group along each column in which its rows differ are
-//! solved too. Halves touch at different places, so that their wear reaches further than that of their mean: the wear of a state is spread by the
-//! variance along the section that its halves add. The change of the wear that is left, summed over the columns, is the error of the groups. Until it
-//! meets the tolerance, the groups that change most are replaced by the halves that change most.
+//! Rows are divided into groups, each represented by the mean of its rows. Both halves of every group along each column in which its rows differ are
+//! solved too. Halves touch at different positions, so that their wear extends further than that of their mean. The wear of a state is therefore
+//! spread by the variance along the section that its halves add. The remaining change of the wear, summed over the columns, is the error of the
+//! groups. Until it meets the tolerance, the groups with the largest change are replaced by their halves along the column with the largest change.
 
 use crate::error::SolveError;
 use crate::evolution::pass::Pass;
@@ -12,12 +12,12 @@ use crate::evolution::task::Evolution;
 use crate::geometry::profile::POINT_SPACING;
 use crate::solution::words::evolution::{CondensedTraffic, TrafficState};
 
-/// In each round the groups that change most are parted, this share of all.
+/// Share of the groups that are divided in each round.
 const PARTED: f64 = 0.25;
-/// A column in which the rows of a group differ by less than this part of the variance of the widest one is not parted.
+/// Variance of a column, relative to that of the column with the largest variance, up to which a group is not divided along it.
 const VARIANCE_SMALL: f64 = 0.01;
 
-/// Rows with the wear of their mean.
+/// A group of rows, with the wear of their mean.
 #[derive(Debug)]
 struct Group {
     rows: Vec<usize>,
@@ -25,23 +25,23 @@ struct Group {
     values: Vec<f64>,
     /// Area in mm² that one pass of all rows removes at each point of the rail and of the wheel. Empty for a body that does not wear.
     area: [Vec<f64>; 2],
-    /// The halves were solved.
+    /// Whether the halves were solved.
     parted: bool,
     /// Change of the areas by halving, after spreading, summed over the columns.
     change: [Vec<f64>; 2],
     /// Variance in mm² along rail and wheel that the rows add to the wear of their mean.
     variance: [f64; 2],
-    /// The halves that change most; none where the rows are alike.
+    /// The halves along the column with the largest change; empty if all rows are equal.
     halves: Vec<Group>,
 }
 
-/// Solves the states of these values, one pass for each.
+/// Solves the states with these values, each for one pass.
 pub(crate) type SolveStates<'a> = dyn FnMut(&[&[f64]]) -> Result<Vec<Pass>, SolveError> + 'a;
 
-/// A traffic of a few states.
+/// Condenses a traffic to a few states.
 ///
 /// # Errors
-/// Errors of `solve`.
+/// Returns the errors of `solve`.
 pub(crate) fn condensed(
     task: &Evolution,
     solve: &mut SolveStates,
@@ -95,7 +95,7 @@ pub(crate) fn condensed(
     }
 }
 
-/// Solves the halves of the groups that have not been parted yet.
+/// Solves the halves of the groups whose halves were not solved yet.
 fn part(
     task: &Evolution,
     scales: &[f64],
@@ -106,7 +106,7 @@ fn part(
     let unparted = groups.iter_mut().enumerate();
     for (k, group) in unparted.filter(|(_, group)| !group.parted) {
         group.parted = true;
-        // 0 where all values of a column are equal.
+        // The variance relative to that of all rows; 0 if all values of a column are equal.
         let relative =
             |column: usize| variance(task, column, group) / scales[column].max(f64::MIN_POSITIVE);
         let spreads: Vec<f64> = (0..scales.len()).map(relative).collect();
@@ -126,7 +126,7 @@ fn part(
     for (k, column) in owners {
         let halves: Vec<Group> = solved.by_ref().take(2).collect();
         let group = &mut groups[k];
-        // Halves along a column have a part of the variance of its values, and of that along the sections.
+        // Halves along a column have a part of the variance of its values, and the same part of the variance along the sections.
         let off = |half: &Group| half.values[column] - group.values[column];
         let between = halves.iter().map(|half| half.share * off(half).powi(2));
         let factor = variance(task, column, group) / between.sum::<f64>();
@@ -139,7 +139,7 @@ fn part(
             add(&mut spread, -1.0, &smoothed(mean, added.sqrt()));
             let mut change = both;
             add(&mut change, -1.0, mean);
-            // Halves that touch at two places far apart have little in between.
+            // Halves that touch far apart have little wear in between, so that spreading may not help.
             if size(&spread) < size(&change) {
                 group.variance[body] += factor * added;
                 change = spread;
@@ -189,12 +189,12 @@ fn groups_of(
     Ok(groups.collect())
 }
 
-/// Sum of the sizes.
+/// Sum of the absolute values.
 fn size(areas: &[f64]) -> f64 {
     areas.iter().map(|area| area.abs()).sum()
 }
 
-/// Variance in mm² of the place along the section at which areas lie; 0 where there are none.
+/// Variance in mm² of the positions of areas along the section; 0 if all areas are 0.
 fn along_variance(areas: &[f64]) -> f64 {
     let moments = areas.iter().enumerate().fold([0.0; 3], |sums, (k, area)| {
         let s = POINT_SPACING * k as f64;
@@ -205,10 +205,10 @@ fn along_variance(areas: &[f64]) -> f64 {
     second / all - (first / all).powi(2)
 }
 
-/// Mean of a column over rows.
+/// Mean of a column over some rows, weighted with their shares.
 fn mean(task: &Evolution, rows: &[usize], column: &[f64]) -> f64 {
     let first = column[rows[0]];
-    // About the first value, so that equal values have it as their mean to the last bit.
+    // Differences from the first value are summed, so that the mean of equal values is exact.
     let (mut share, mut sum) = (0.0, 0.0);
     for row in rows {
         share += task.shares[*row];
@@ -217,7 +217,7 @@ fn mean(task: &Evolution, rows: &[usize], column: &[f64]) -> f64 {
     first + sum / share
 }
 
-/// Sum over the rows of a group of share times squared distance from the mean of a column.
+/// Sum of the squared deviations of a column from its mean over the rows of a group, weighted with their shares.
 fn variance(task: &Evolution, column: usize, group: &Group) -> f64 {
     let off = |row: &usize| task.columns[column][*row] - group.values[column];
     let rows = group.rows.iter();

@@ -881,7 +881,7 @@ impl Scanned<'_> {
 /// Reads the header and the rows of a text.
 ///
 /// # Errors
-/// Returns a sentence that names the line that cannot be read, or says that there are no rows.
+/// Returns a sentence that names the line that cannot be read, or states that there are no rows.
 fn read_table(text: &str) -> Result<Table<'_>, String> {
     let lines = lines(text)?;
     let comma = comma_of(&lines);

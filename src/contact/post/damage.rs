@@ -1,8 +1,4 @@
-//! The damage models as functions of one number, and of an interval of it.
-//!
-//! Figures of the damage models: the named sets, and what a client puts in their place.
-//!
-//! The damage of one pass over a patch, from its resultants alone.
+//! Damage models: their functions, also of intervals, their parameters, and the damage of one pass over a patch.
 
 use crate::case::words::subsurface::{
     ArchardFigures, DamageModel, DamageParameterWords, DamageSetName, DamageWords, UsfdFigures,
@@ -33,8 +29,7 @@ pub fn usfd_regime(map: &UsfdFigures, x: f64) -> WearRegime {
     }
 }
 
-/// Archard's coefficient and its regime at a sliding speed in mm/s and a pressure over hardness: the geometric mean of the range, and
-/// the range.
+/// Archard's regime and coefficient at a sliding speed in mm/s and a pressure over hardness. The value is the geometric mean of the range.
 pub fn archard_coefficient(
     map: &ArchardFigures,
     speed: f64,
@@ -73,8 +68,8 @@ pub fn wlrm_damage(function: &WlrmFigures, t_gamma: f64) -> f64 {
     }
 }
 
-/// A function of a number that is known up to an interval: its value, and the least and the largest over the interval; `turns` are
-/// places where the function may turn.
+/// Applies a function to a number with an interval: its value, and its least and largest value over the interval. `turns` are the arguments at which
+/// the function may have extrema.
 pub fn over(x: Ranged, turns: &[f64], function: impl Fn(f64) -> f64) -> Ranged {
     let value = function(x.value);
     let (Some(low), Some(high)) = (x.low, x.high) else {
@@ -99,7 +94,7 @@ pub fn over(x: Ranged, turns: &[f64], function: impl Fn(f64) -> f64) -> Ranged {
     }
 }
 
-/// A number with the same error in both directions, not below 0.
+/// A number with a symmetric error, cut at 0.
 pub fn about(value: f64, error: Option<f64>) -> Ranged {
     Ranged {
         value,
@@ -118,11 +113,11 @@ pub fn times(a: Ranged, b: Ranged) -> Ranged {
     }
 }
 
-/// Subsurface limit of elastic shakedown, largest pressure over yield in shear (Johnson 1985, chapter 9, for a line contact, less than for
-/// any ellipse).
+/// Subsurface limit of elastic shakedown: largest pressure over yield stress in shear (Johnson 1985, chapter 9, for a line contact; less than for any
+/// ellipse).
 pub const SHAKEDOWN_LIMIT: f64 = 4.0;
 
-/// Where the figures of the named sets are from.
+/// Sources of the parameters of the named sets.
 const SOURCES: [&str; 6] = [
     "usfd: Lewis and Olofsson 2004, Braghin et al. 2006 (wheel R8T on rail UIC 900A), slopes and limits as programs in use have them; without the step that published offsets leave at the second limit",
     "archard: Jendel 2002; not confirmed against the source",
@@ -132,19 +127,19 @@ const SOURCES: [&str; 6] = [
     "limits of shakedown: Johnson 1985, chapter 9: 4.0 for a line contact, less than for any ellipse, and 1 over the utilisation at the surface",
 ];
 
-/// What is asked of the damage.
+/// The requested damage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DamageTask {
     /// The models.
     pub models: Vec<DamageModel>,
-    /// Strip by strip too?
+    /// Whether wear is also computed strip by strip.
     pub across: bool,
-    /// The figures, as they are answered.
+    /// The parameters, as reported in the answer.
     pub figures: DamageFiguresUsed,
 }
 
 impl DamageTask {
-    /// The task that a case asks for.
+    /// Makes the task from the members of a case.
     pub fn new(words: &DamageWords) -> DamageTask {
         let (named, own) = match &words.parameters {
             None => (DamageSetName::default(), None),
@@ -153,7 +148,7 @@ impl DamageTask {
         };
         let named = named_figures(named);
         let own = own.copied().unwrap_or_default();
-        // It was not confirmed, and it does not belong to the client.
+        // The parameter was not confirmed, and the client did not replace it.
         let doubtful = |model: &DamageModel| match model {
             DamageModel::TGamma | DamageModel::UsfdWear => false,
             DamageModel::ArchardWear => own.archard.is_none(),
@@ -178,13 +173,13 @@ impl DamageTask {
         }
     }
 
-    /// Is this model asked for?
+    /// Returns whether a model is requested.
     pub fn wants(&self, model: DamageModel) -> bool {
         self.models.contains(&model)
     }
 }
 
-/// The figures of a named set.
+/// The parameters of a named set.
 fn named_figures(set: DamageSetName) -> DamageFiguresUsed {
     match set {
         DamageSetName::Rail900aWheelR8t => DamageFiguresUsed {
@@ -226,11 +221,11 @@ pub struct DamagedPatch<'a> {
     pub point: &'a PointSolution,
     /// Friction limit in N.
     pub limit: f64,
-    /// Rolling speed in mm/s, where it is known.
+    /// Rolling speed in mm/s, if it is known.
     pub speed: Option<f64>,
 }
 
-/// The damage that the task asks for, but for wear strip by strip.
+/// The requested damage, without wear strip by strip.
 pub fn damage(task: &DamageTask, of: DamagedPatch) -> Damage {
     let (figures, wanted) = (&task.figures, |model| task.wants(model));
     let t_gamma = t_gamma(of);
@@ -256,7 +251,7 @@ pub fn damage(task: &DamageTask, of: DamagedPatch) -> Damage {
     }
 }
 
-/// The errors of the forces times the creepages.
+/// Tγ with its errors: those of the forces times the creepages.
 fn t_gamma(of: DamagedPatch) -> TGamma {
     let (point, motion) = (of.point, &of.point.motion);
     let errors = point.error_estimate;
@@ -277,7 +272,7 @@ fn scaled(x: Ranged, factor: f64) -> Ranged {
     over(x, &[], |x| x * factor)
 }
 
-/// Area over width in mm: the mean length that a point of the surface is in contact.
+/// Area over width in mm: the mean length over which a point of the surface is in contact.
 fn mean_length(patch: &Patch) -> f64 {
     patch.area / (patch.extent[3] - patch.extent[2])
 }
@@ -295,7 +290,7 @@ fn usfd(figures: &DamageFiguresUsed, of: DamagedPatch, t_gamma: TGamma) -> UsfdW
     }
 }
 
-/// Volume per length rolled: K ∬ p |s| dA/H, where p |s| is the power over μ.
+/// Archard's wear. The volume per length rolled is K ∬ p |s| dA/H, where p |s| is the power over μ.
 fn archard(figures: &DamageFiguresUsed, of: DamagedPatch, t_gamma: TGamma) -> Option<ArchardWear> {
     let (patch, force) = (of.patch, of.patch.normal_force);
     if of.limit <= 0.0 {
@@ -330,7 +325,7 @@ fn utilisation(of: DamagedPatch) -> Ranged {
 
 fn surface_fatigue(figures: &DamageFiguresUsed, of: DamagedPatch) -> SurfaceFatigue {
     let utilisation = utilisation(of);
-    // 2π a b k/(3 N), with the area in the place of π a b.
+    // The limit is 2π a b k/(3 N), with π a b replaced by the area.
     let limit = 2.0 * of.patch.area * figures.shear_yield_mpa / (3.0 * of.patch.normal_force);
     let traction = of.point.traction_max_mpa;
     SurfaceFatigue {
@@ -359,17 +354,17 @@ fn shakedown(figures: &DamageFiguresUsed, of: DamagedPatch) -> ShakedownPlace {
 /// The power of every cell over the rolling speed in N, and the size of its slip.
 #[derive(Debug, Clone, Copy)]
 pub struct CellWear<'a> {
-    /// The level.
+    /// The mesh.
     pub level: &'a StripMesh,
     /// Tractions times slips and areas, in N.
     pub power: &'a [f64],
     /// Slips over the rolling speed.
     pub slip: &'a [f64],
-    /// Rolling speed in mm/s, where it is known.
+    /// Rolling speed in mm/s, if it is known.
     pub speed: Option<f64>,
 }
 
-/// Wear of the strips of a patch. Segments of one strip are added up.
+/// Wear of the strips of a patch. The segments of a strip are added up.
 pub fn across(task: &DamageTask, of: CellWear, patch: usize) -> WearAcross {
     let figures = &task.figures;
     let mut found = WearAcross::default();
@@ -413,7 +408,7 @@ pub fn across(task: &DamageTask, of: CellWear, patch: usize) -> WearAcross {
     found
 }
 
-/// Place of a regime among mild, severe, and catastrophic or seizure.
+/// Index of a regime: mild, severe, and catastrophic or seizure.
 fn regime(regime: WearRegime) -> usize {
     match regime {
         WearRegime::Mild => 0,

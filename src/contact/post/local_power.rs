@@ -1,17 +1,15 @@
-//! Friction power cell by cell: never negative, and adding up to the power of the patch.
+//! Friction power of each cell, and the flash temperature.
 //!
-//! For tractions that are constant in every cell, `∬ T·∂u/∂x dA` of their exact displacements is 0, because the x-derivative of the
-//! influence is odd. So the *mean* slip of a cell, taken from the displacements at its two **edges**,
-//! `s̄ = w + [u(leading edge) − u(trailing edge)]/h`, gives powers `A T·s̄` that add up to `ν_x F_x + ν_y F_y + φ M_z`, whatever rule or
-//! method the tractions come from. Strips of different widths see each other at their mid-lines only, which breaks the symmetry by
-//! some 0.1 %; half of the derivative less half of its transpose restores it to rounding.
+//! **Power.** For tractions that are constant in every cell, `∬ T·∂u/∂x dA` of their exact displacements is 0, because the x-derivative of the
+//! influence is odd. The *mean* slip of a cell follows from the displacements at its two **edges**:
+//! `s̄ = w + [u(leading edge) − u(trailing edge)]/h`. The powers `A T·s̄` then add up to `ν_x F_x + ν_y F_y + φ M_z` for any method. Strips of
+//! different widths are evaluated at their mid-lines only, which breaks the symmetry by about 0.1 %. Half of the derivative minus half of its
+//! transpose restores it to rounding.
 //!
-//! Flash temperature: how hot the surfaces get in the contact.
-//!
-//! Heat flows only into the depth and the contact passes quickly (large Péclet number), so that every line along rolling is a half-space
-//! heated from its leading edge on: `θ(x) = 1/(B√(πV)) ∫_x^lead q(x′)/√(x′ − x) dx′` with the heat q per area and time and
-//! `B = β₁ + β₂`, `β = √(λρc)` of each body. Both surfaces have one temperature in the contact; without heat that is the mean of the
-//! bulk temperatures weighted with β, which is also how q is shared (Jaeger 1942; Carslaw and Jaeger 1959, §2.4 and 10.7).
+//! **Temperature.** Heat flows only into the depth and the contact passes quickly (large Péclet number). Every line along rolling is therefore a
+//! half-space heated from its leading edge: `θ(x) = 1/(B√(πV)) ∫_x^lead q(x′)/√(x′ − x) dx′` with the heat q per area and time and `B = β₁ + β₂`,
+//! `β = √(λρc)` of each body. Both surfaces have the same temperature in the contact. Without heat it is the mean of the bulk temperatures weighted
+//! with β. The heat is shared in the same proportion (Jaeger 1942; Carslaw and Jaeger 1959, §2.4 and 10.7).
 
 use std::ops::Range;
 
@@ -27,23 +25,23 @@ use crate::rolling::answer::{LevelAnswer, LevelOutcome};
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
-/// What the power of the cells is taken from.
+/// The data from which the power of the cells is computed.
 #[derive(Debug, Clone, Copy)]
 pub struct PowerTask<'a> {
-    /// The level.
+    /// The mesh.
     pub level: &'a StripMesh,
     /// Tractions, slips and zones on it.
     pub answer: &'a LevelAnswer,
     /// The motion, about the origin of the case.
     pub motion: &'a Motion,
-    /// The method that gave the tractions.
+    /// The method of the tractions.
     pub method: Method,
-    /// Friction power of every patch over the rolling speed, in N: what the powers of its cells are scaled to.
+    /// Friction power of every patch over the rolling speed in N, to which the powers of its cells are scaled.
     pub totals: &'a [f64],
 }
 
 impl PowerTask<'_> {
-    /// Is there power in every patch?
+    /// Returns whether the power of every patch is positive.
     fn is_in_every_patch(&self, power: &[f64]) -> bool {
         let of_patch = |patch| power[self.level.patch_cells(patch)].iter().sum::<f64>();
         (0..self.totals.len()).all(|patch| of_patch(patch) > 0.0)
@@ -55,18 +53,17 @@ impl PowerTask<'_> {
 pub struct CellPower {
     /// Friction power in N.
     pub power: Vec<f64>,
-    /// Slip along x and across.
+    /// Longitudinal and lateral slip.
     pub slip: [Vec<f64>; 2],
 }
 
-/// Power of every cell, and its slip: along the traction, and as large as the power asks for.
+/// Computes the power of every cell, and its slip in the direction of the traction that corresponds to the power.
 ///
-/// A cell that sticks hands its power to the cell behind it, where the material goes, and so does one whose power is negative. The last
-/// cell of a strip keeps what reaches it: if it sticks on the whole it slips at its trailing end. Cells without traction have the slip
-/// of the method.
+/// The power of a cell that sticks or whose power is negative is moved to the cell behind it, in the direction of the material. The last cell of a
+/// strip keeps it: even if it sticks, it slips at its trailing end. Cells without traction have the slip of the method.
 ///
 /// # Errors
-/// The monitor is asked once per strip and may stop the work.
+/// Returns an error if the monitor, which is called once per strip, stops the work.
 pub fn cell_power(task: &PowerTask, monitor: &dyn Monitor) -> Result<CellPower, Stop> {
     let (level, answer) = (task.level, task.answer);
     let unit = level.scale.slip();
@@ -96,12 +93,12 @@ pub fn cell_power(task: &PowerTask, monitor: &dyn Monitor) -> Result<CellPower, 
 fn powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
     let (level, answer) = (task.level, task.answer);
     let mut power = match task.method {
-        // The simplified theory has displacements, and slips, of its own; where nothing slips it does not say where the power is.
+        // The simplified theory has its own displacements and slips. If nothing slips, it does not determine the distribution of the power.
         Method::Fastsim => match own_powers(level, answer) {
             own if task.is_in_every_patch(&own) => own,
             _ => cell_mean_powers(task, monitor)?,
         },
-        // The table has no cells to ask about.
+        // The table has no cells, so that it is never used here.
         Method::BoundaryElement | Method::LiuHsu | Method::Table => {
             cell_mean_powers(task, monitor)?
         }
@@ -113,7 +110,7 @@ fn powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
         let power = &mut power[level.patch_cells(patch)];
         power.iter_mut().for_each(|power| *power = power.max(0.0));
         let sum: f64 = power.iter().sum();
-        // A power that is not positive is an error of the resultants; there is nothing to share out then.
+        // A power that is not positive is an error of the resultants. Then all cells have the power 0.
         let factor = if sum > 0.0 { total.max(0.0) / sum } else { 0.0 };
         power.iter_mut().for_each(|power| *power *= factor);
     }
@@ -129,7 +126,7 @@ fn own_powers(level: &StripMesh, answer: &LevelAnswer) -> Vec<f64> {
     (0..level.area.len()).map(of_cell).collect()
 }
 
-/// Traction times mean slip on a level, up to a common factor.
+/// Traction times mean slip on a mesh, up to a common factor.
 fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
     let (level, traction) = (task.level, &task.answer.traction);
     let (mesh, nu) = (&level.normalised, level.poisson_ratio());
@@ -151,8 +148,8 @@ fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>,
     Ok(power)
 }
 
-/// Traction times the mean slip of an elastic layer, whose displacement at an edge is that of the mean of the two tractions beside it and
-/// nothing at the ends of a strip. It adds up to 0.
+/// Adds traction times the mean slip of an elastic layer. Its displacement at an edge follows from the mean of the two adjacent tractions, and is 0
+/// at the ends of a strip. The sum is 0.
 fn add_layer_powers(mesh: &Mesh, flexibility: f64, traction: &[Vec<f64>; 2], power: &mut [f64]) {
     if flexibility == 0.0 {
         return;
@@ -177,7 +174,7 @@ fn add_layer_powers(mesh: &Mesh, flexibility: f64, traction: &[Vec<f64>; 2], pow
 fn rigid_powers(mesh: &Mesh, motion: &Motion, traction: &[Vec<f64>; 2]) -> Vec<f64> {
     let mut power = Vec::with_capacity(mesh.cells());
     for (segment, load_y) in mesh.segments.iter().zip(&mesh.load_y) {
-        // The lever arm that the resultants sum the moment with.
+        // The resultants use the same lever arm.
         let y = 0.5 * (segment.chord.y + load_y);
         for i in segment.cells.clone() {
             let x = 0.5 * (mesh.left[i] + mesh.right[i]);
@@ -190,14 +187,14 @@ fn rigid_powers(mesh: &Mesh, motion: &Motion, traction: &[Vec<f64>; 2]) -> Vec<f
     power
 }
 
-/// `D T` and `Dᵀ dy T`, along x and across.
+/// `D T` and `Dᵀ dy T`, longitudinal and lateral.
 struct Differences {
     applied: [Vec<f64>; 2],
     transposed: [Vec<f64>; 2],
 }
 
 impl Differences {
-    /// The rows of `D` are computed strip by strip and used at once; none is kept.
+    /// Computes the rows of `D` strip by strip, without storing them.
     fn of<T: Float + Into<f64>>(
         mesh: &Mesh,
         nu: f64,
@@ -281,8 +278,8 @@ fn edges_of(mesh: &Mesh, segment: &Segment) -> Vec<f64> {
     edges
 }
 
-/// From the leading cell backwards, cells that stick or whose power is negative hand it to the cell behind. What is missing at the
-/// trailing end is taken from the cells ahead. The sum is kept, and if it is not negative no cell is.
+/// Moves the power of cells that stick or whose power is negative to the cell behind, beginning at the leading cell. A negative power at the trailing
+/// end is balanced by the cells ahead. The sum is preserved, and if it is not negative, neither is any cell.
 fn carry(power: &mut [f64], slips: &[bool], cells: Range<usize>) {
     let mut carried = 0.0;
     for i in cells.clone().rev() {
@@ -309,7 +306,7 @@ impl ThermalBodyWords {
         (self.conductivity_w_per_mk * self.density_kg_per_m3 * self.specific_heat_j_per_kgk).sqrt()
     }
 
-    /// Péclet number `V L/(2 κ)` of a contact of half-length L in mm, rolled over at V in mm/s.
+    /// Péclet number `V L/(2 κ)` of a contact of half-length L in mm at the rolling speed V in mm/s.
     pub fn peclet(&self, speed: f64, half_length: f64) -> f64 {
         let diffusivity =
             self.conductivity_w_per_mk / (self.density_kg_per_m3 * self.specific_heat_j_per_kgk);
@@ -317,7 +314,7 @@ impl ThermalBodyWords {
     }
 }
 
-/// What is asked of the heat.
+/// The thermal properties of both bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThermalTask {
     /// The lower body.
@@ -347,10 +344,10 @@ impl ThermalTask {
     }
 }
 
-/// `∫ q(x′)/√(x′ − x) dx′` ahead of every point x, for heat that is linear in every cell of a line.
+/// Computes `∫ q(x′)/√(x′ − x) dx′` ahead of every point x, for heat that is linear in every cell of a line.
 ///
-/// `edges` has one value more than `heat`, from the trailing to the leading end; `heat` are means of the cells. Slopes are those of the
-/// neighbours, 0 at extrema and at most twice the one-sided ones, so that no cell gets a negative heat.
+/// `edges` has one value more than `heat`, from the trailing to the leading end. `heat` has the means of the cells. Slopes follow from the neighbours.
+/// They are 0 at extrema and at most twice the one-sided ones, so that no cell has a negative heat.
 pub fn heating(edges: &[f64], heat: &[f64], points: &[f64]) -> Vec<f64> {
     let slopes = slopes(edges, heat);
     let at = |x: f64| {
@@ -373,7 +370,7 @@ pub fn heating(edges: &[f64], heat: &[f64], points: &[f64]) -> Vec<f64> {
     points.iter().map(|x| at(*x)).collect()
 }
 
-/// Limited slopes of cell means; beyond both ends there is no heat.
+/// Limited slopes of cell means. Beyond both ends the heat is 0.
 fn slopes(edges: &[f64], heat: &[f64]) -> Vec<f64> {
     let n = heat.len();
     let middle = |k: usize| 0.5 * (edges[k] + edges[k + 1]);
@@ -398,9 +395,9 @@ fn slopes(edges: &[f64], heat: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// m in a mm.
+/// A millimetre in m.
 pub(crate) const METRES: f64 = 1e-3;
-/// nm in a mm.
+/// A millimetre in nm.
 pub(crate) const NANOMETRES: f64 = 1e6;
 
 #[cfg(test)]
@@ -410,7 +407,7 @@ mod tests {
     use crate::mesh::{Grading, strips_about};
     use crate::monitor::Unmonitored;
 
-    /// Whatever the tractions: the cells give the power of the forces, on strips of one width and of many.
+    /// For any tractions, the powers of the cells add up to the power of the forces, on strips of equal and of different widths.
     #[test]
     fn cell_means_add_up_to_the_power_of_the_forces() {
         let motion = Motion {
@@ -465,7 +462,7 @@ mod tests {
         for (found, known) in power.iter().zip([0.3, 0.0, 0.2, 0.0, 0.0]) {
             assert!((found - known).abs() < 1e-15, "{power:?}");
         }
-        // A strip that sticks has its power at the trailing end, and takes a debt from ahead.
+        // A strip that sticks has its power at the trailing end. A negative power there is balanced from ahead.
         let mut power = [-0.5, 0.3, 0.4];
         carry(&mut power, &[false; 3], 0..3);
         assert!((power[0] - 0.2).abs() < 1e-15 && power[1..] == [0.0, 0.0]);
@@ -485,15 +482,14 @@ mod heat_tests {
     fn a_uniform_source_heats_as_a_root() {
         let edges = [-1.0, -0.4, 0.1, 1.0];
         for x in [-1.0, -0.7, 0.0, 0.5, 0.99] {
-            // One cell more on each side keeps the slopes of the inner ones 0.
+            // The inner slopes are 0 because the neighbours are equal, and the outer ones because they are extrema.
             let found = heating(&edges, &[3.0, 3.0, 3.0], &[x])[0];
-            // The outer cells have the slope 0 too: an extremum.
             let known = 2.0 * 3.0 * (1.0 - x).sqrt();
             assert!((found - known).abs() < 1e-12, "{x}: {found} {known}");
         }
     }
 
-    /// Heat of Hertz's pressure under uniform slip, `√(1 − s²)`: the largest is 2.18831 at −0.6522, and 4√2/3 at the trailing end.
+    /// The heat of Hertz's pressure under uniform slip, `√(1 − s²)`, has the maximum 2.18831 at −0.6522, and the value 4√2/3 at the trailing end.
     #[test]
     fn a_semi_elliptic_source_has_its_known_peak() {
         let edges = Grading::cosine(40).edges;
@@ -510,7 +506,7 @@ mod heat_tests {
         );
     }
 
-    /// Far behind a short source everything comes from one point: `q h/√distance`.
+    /// Far behind a short source, the heat is that of a point: `q h/√distance`.
     #[test]
     fn a_short_source_acts_as_a_point() {
         let found = heating(&[0.0, 1e-3], &[5.0], &[-4.0])[0];

@@ -296,7 +296,7 @@ pub struct Defect {
     pub chord: [f64; 2],
     /// Length of that chord in mm.
     pub chord_length: f64,
-    /// That length relative to the width of the patch.
+    /// Length of that chord relative to the width of the patch.
     pub over_width: f64,
     /// Smoothing in use, in mm.
     pub smoothing: f64,

@@ -1,35 +1,32 @@
-//! The parts of regions that were looked at, and their point loads, kept from point to point.
+//! The tree of parts of the loaded regions with their point loads, cached for all points below the surface, and the choice of the quadrature.
 //!
-//! A part is halved along its larger side, whatever the point: only how far the halving goes depends on the distance. So the parts of a region
-//! are a tree that is the same for all points, and each part is worked out once.
-//!
-//! Chooses the quadrature of each part of the loads by its size and its distance from a point: how many points along and across.
+//! A part is always halved along its larger side. Only the depth of the halving depends on the distance of a point. The tree is therefore the same for
+//! all points, and each part is computed once. The number of quadrature points of a part depends on its size and its distance.
 
 use std::ops::Range;
 
 use crate::half_space::kernels::LoadPack;
 use crate::numerics::quadrature::RULES;
 
-/// Parts, and packs of point loads, that are kept, in 45 MB together; only memory depends on it.
+/// Most cached parts, and most cached packs of point loads, with 45 MB together. Only memory depends on it.
 const KEPT_MAX: usize = 100_000;
 
-/// A region is halved across at most so often: of a patch a hundred times as wide as long a part is then a third of the least depth that is
-/// answered wide.
+/// Most lateral halvings of a region. A part of a patch that is a hundred times as wide as long is then a third of the least allowed depth wide.
 const HALVINGS_MAX: u32 = 16;
 
 /// A part of a loaded region.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadPart {
-    /// The region.
+    /// Number of the region.
     pub region: usize,
-    /// The piece of it along: of the angles of the outline, or of the length of a rectangle.
+    /// The longitudinal piece: of the angles of the outline, or of the length of a rectangle.
     pub along: Piece,
-    /// The piece across.
+    /// The lateral piece.
     pub across: Piece,
 }
 
 impl LoadPart {
-    /// The parts of a region after so many halvings along and across.
+    /// The parts of a region after `along` longitudinal and `across` lateral halvings.
     pub fn pieces(region: usize, along: u32, across: u32) -> impl Iterator<Item = LoadPart> {
         Piece::all(along).flat_map(move |along| {
             Piece::all(across).map(move |across| LoadPart {
@@ -40,7 +37,7 @@ impl LoadPart {
         })
     }
 
-    /// Its halves, along the strips or across them.
+    /// The halves of the part, longitudinal or lateral ones.
     pub fn halves(self, along: bool) -> [LoadPart; 2] {
         if along {
             return self.along.halves().map(|along| LoadPart { along, ..self });
@@ -51,21 +48,21 @@ impl LoadPart {
     }
 }
 
-/// Packs that were not asked for.
+/// Marks packs that were not computed yet.
 const NONE: [u32; 2] = [u32::MAX; 2];
 
-/// A part with what was worked out for it.
+/// A part with the values computed for it.
 #[derive(Debug)]
 struct Node {
     part: LoadPart,
     seen: PartBox,
-    /// The first and the end of its packs, by the rules along and across; [`NONE`] where they were not asked for.
+    /// Range of its packs, by the longitudinal and the lateral rule; [`NONE`] if they were not computed yet.
     packs: [[[u32; 2]; ORDERS]; ORDERS],
-    /// The first of its halves, of which the second is the next node.
+    /// The number of its first half. The second half is the next node.
     halves: Option<u32>,
 }
 
-/// The parts of all regions; the first ones are those to begin with.
+/// The tree of the parts of all regions. The roots come first.
 #[derive(Debug)]
 pub struct LoadParts {
     nodes: Vec<Node>,
@@ -74,7 +71,7 @@ pub struct LoadParts {
 }
 
 impl LoadParts {
-    /// The parts to begin with.
+    /// Makes a tree with these roots.
     pub fn new(first: impl Iterator<Item = (LoadPart, PartBox)>) -> LoadParts {
         let nodes: Vec<Node> = first.map(|(part, seen)| Node::new(part, seen)).collect();
         LoadParts {
@@ -84,7 +81,7 @@ impl LoadParts {
         }
     }
 
-    /// Forgets all later parts and all packs if there are too many. Called between points.
+    /// Removes all parts except the roots, and all packs, if there are too many. It is called between points.
     pub fn trim(&mut self) {
         if self.nodes.len() > KEPT_MAX.max(2 * self.first) || self.packs.len() > KEPT_MAX {
             self.nodes.truncate(self.first);
@@ -95,7 +92,7 @@ impl LoadParts {
         }
     }
 
-    /// Number of parts to begin with.
+    /// Number of roots.
     pub fn first(&self) -> usize {
         self.first
     }
@@ -105,12 +102,12 @@ impl LoadParts {
         self.nodes[number].part
     }
 
-    /// How large a part is.
+    /// Bounds of a part.
     pub fn seen(&self, number: usize) -> PartBox {
         self.nodes[number].seen
     }
 
-    /// Can only halving along the strips make a part smaller?
+    /// Returns whether a part can only be halved longitudinally.
     pub fn narrow(&self, number: usize) -> bool {
         self.nodes[number].part.across.level >= HALVINGS_MAX
     }
@@ -141,7 +138,7 @@ impl LoadParts {
         [first, first + 1]
     }
 
-    /// The packs of a part for these rules along and across.
+    /// The packs of a part for a longitudinal and a lateral rule.
     pub fn quadrature(
         &mut self,
         number: usize,
@@ -174,19 +171,19 @@ impl Node {
 /// The `index`-th of the `2^level` equal pieces of an interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Piece {
-    /// How often the interval was halved.
+    /// Number of halvings of the interval.
     pub level: u32,
-    /// Which piece, counted from the beginning of the interval.
+    /// Number of the piece, counted from the beginning of the interval.
     pub index: u32,
 }
 
 impl Piece {
-    /// All pieces after so many halvings.
+    /// All pieces after `level` halvings.
     pub fn all(level: u32) -> impl Iterator<Item = Piece> {
         (0..1 << level).map(move |index| Piece { level, index })
     }
 
-    /// Its halves.
+    /// The halves of the piece.
     pub fn halves(self) -> [Piece; 2] {
         [0, 1].map(|k| Piece {
             level: self.level + 1,
@@ -194,51 +191,55 @@ impl Piece {
         })
     }
 
-    /// A place in the piece, from 0 to 1, as one in the interval.
+    /// Converts a position in the piece, from 0 to 1, to a position in the interval.
     pub fn share(self, inside: f64) -> f64 {
         (f64::from(self.index) + inside) * self.width()
     }
 
-    /// Its width over that of the interval.
+    /// Width relative to that of the interval.
     pub fn width(self) -> f64 {
         1.0 / f64::from(1_u32 << self.level)
     }
 }
 
-/// Number of rules; one above the last asks for a division of the part.
+/// Number of quadrature rules. This number instead of that of a rule means that a part has to be halved.
 pub const ORDERS: usize = RULES.len();
-/// How finely the loads are resolved.
+
+/// The resolution of the loads.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadResolution {
-    /// Sizes over distance from which on the rule with the next number of points is used, and from the last on a part is halved. Errors of
-    /// Gauss's rule fall with the distance to the power of twice its points.
+    /// Ratios of size to distance from which the next rule is used; from the last one a part is halved. Errors of Gauss's rule decrease with the
+    /// distance to the power of twice its number of points.
     pub sizes: [f32; ORDERS],
 }
 
 impl LoadResolution {
-    /// For stresses that are answered: within 0.0016 of the largest pressure of those with sizes of 0.05 to 0.67 and a quadrature cell by cell, and within
-    /// 0.0001 in the median, on the 18 ellipses of `cargo bench --bench stress -- --only after`, three in full slip and four at other targets; within
-    /// 0.0009 on two gaps; at 3500 random points each in depths from 0.012 to 4 half-widths. Of a constant load on a square, 0.62, 1.4 and 3 leave 0.001.
+    /// Resolution of reported stresses.
+    ///
+    /// They differ by up to 0.0016 of the largest pressure, and by 0.0001 in the median, from those with ratios of 0.05 to 0.67 and a quadrature cell by
+    /// cell. This holds on the 18 ellipses of `cargo bench --bench stress -- --only after`, three in full slip and four at other targets. On two gaps
+    /// the difference is up to 0.0009. There were 3500 random points each, in depths from 0.012 to 4 half-widths. For a constant load on a square,
+    /// ratios of 0.62, 1.4 and 3 give errors of 0.001.
     pub const FINE: LoadResolution = LoadResolution {
         sizes: [0.5, 1.0, 2.6],
     };
-    /// For scans before a search: within 0.001 in the median on the same points, and 0.08 at the worst.
+    /// Resolution of scans before a search. The errors at the same points are 0.001 in the median and at most 0.08.
     pub const COARSE: LoadResolution = LoadResolution {
         sizes: [1.2, 2.5, 5.5],
     };
 }
 
-/// What decides how a part is seen.
+/// The bounds of a part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartBox {
     /// `[x0, x1, y0, y1]` in mm.
     pub sides: [f32; 4],
-    /// Squares of its lengths along and across in mm².
+    /// Squares of its longitudinal and lateral size in mm².
     pub squares: [f32; 2],
 }
 
 impl LoadResolution {
-    /// Which rules a part needs along and across as seen from a point `[x, y, z]` in mm; [`ORDERS`] where it has to be divided.
+    /// The longitudinal and the lateral rule of a part for a point `[x, y, z]` in mm; [`ORDERS`] if the part has to be halved.
     pub fn orders(&self, PartBox { sides, squares }: PartBox, [x, y, z]: [f32; 3]) -> [usize; 2] {
         let [x0, x1, y0, y1] = sides;
         let dx = (x0 - x).max(x - x1).max(0.0);
@@ -272,7 +273,7 @@ mod seen_parts_tests {
         for pair in seen.windows(2) {
             assert!(pair[0][0] >= pair[1][0] && pair[0][1] >= pair[1][1]);
         }
-        // Along it is twice as long as across.
+        // The part is twice as long as wide.
         assert!(seen.iter().all(|[along, across]| along >= across));
     }
 }

@@ -1,4 +1,4 @@
-//! What neighbouring strips carry that cross the patch once each: pressure on the true outline, tractions over pressure between the nodes.
+//! The loads of neighbouring strips that each cross the patch once: pressure on the true outline, and tractions over pressure between the nodes.
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -13,19 +13,19 @@ use crate::post::subsurface::load_parts::{LoadPart, ORDERS, PartBox};
 use crate::rolling::answer::LevelAnswer;
 use crate::rolling::strip_mesh::StripMesh;
 
-/// Points of the rule with most of them.
+/// Number of points of the largest rule.
 const POINTS_MAX: usize = RULES[ORDERS - 1].len();
 
-/// How often cells are halved along and across under a smooth pressure, see [`halvings`]. With no halvings across, errors on ellipses with a pole of spin
-/// grow from 0.0015 of the largest pressure to 0.0055, where friction jumps from 0.4 to 0.1 across from 0.0009 to 0.0055, and on a gap of two radii from
-/// 0.001 to 0.004.
+/// Number of longitudinal and lateral halvings in any case: first for smooth patches, then for patches with a rough pressure or with hollows.
 ///
-/// The second pair is for patches with a rough pressure or with hollows. Without it, errors where the pressure jumps grow from 0.007 of the largest pressure
-/// to 0.02.
+/// Without lateral halvings, errors relative to the largest pressure grow from 0.0015 to 0.0055 on ellipses with a pole of spin, from 0.0009 to 0.0055
+/// if friction jumps laterally from 0.4 to 0.1, and from 0.001 to 0.004 on a gap of two radii. Without the second pair, they grow from 0.007 to 0.02
+/// where the pressure jumps.
 const HALVINGS: [[u32; 2]; 2] = [[0, 4], [4, 4]];
-/// See [`steepest`]: it is 0.30 at most on ellipses and gaps, where the last cells differ by their width alone, and 0.54 and more where the pressure jumps,
-/// at hollows, and where a gap opens so steeply that the pressure rises towards the edge.
+/// Value of [`steepest`] above which a pressure is rough. It is at most 0.30 on ellipses and gaps, where the outermost cells differ only by their
+/// width. It is at least 0.54 where the pressure jumps, at hollows, and where a gap opens so steeply that the pressure rises toward the edge.
 const STEEP: f64 = 0.4;
+
 /// The loads on a run of strips.
 #[derive(Debug)]
 pub(crate) struct LoadedRun<'a> {
@@ -34,7 +34,7 @@ pub(crate) struct LoadedRun<'a> {
     extent: [f64; 2],
     /// y of the mid-lines of the strips.
     lines: Vec<f64>,
-    /// Angles of the nodes, the same in all strips: they are divided alike.
+    /// Angles of the nodes, which are the same in all strips.
     nodes: Vec<f64>,
     /// See [`LoadedRun::halvings`].
     halvings: [u32; 2],
@@ -42,7 +42,7 @@ pub(crate) struct LoadedRun<'a> {
     ratios: Vec<[f32; 2]>,
 }
 
-/// A place between two of a list: their numbers, and the share of the second. Beyond the outermost it is the outermost.
+/// A position between two entries of a list: their numbers, and the weight of the second. Beyond the ends it is the outermost entry.
 #[derive(Debug, Clone, Copy, Default)]
 struct Between {
     pair: [usize; 2],
@@ -50,7 +50,7 @@ struct Between {
 }
 
 impl Between {
-    /// Where `at` lies in a rising list, of which `passed` are known to lie below; moves this number on.
+    /// The position of `at` in an increasing list. At least `passed` entries must lie below it; this number is updated.
     fn new(list: &[f64], at: f64, passed: &mut usize) -> Between {
         while *passed < list.len() && list[*passed] < at {
             *passed += 1;
@@ -70,12 +70,12 @@ impl Between {
     }
 }
 
-/// How many of a rising list lie below a place.
+/// The number of entries of an increasing list below a value.
 fn below(list: &[f64], at: f64) -> usize {
     list.partition_point(|place| *place < at)
 }
 
-/// The points of a rule along the strips; those that it does not have are 0.
+/// The points of a longitudinal rule. Unused entries are 0.
 struct Turns {
     count: usize,
     sines: [f64; POINTS_MAX],
@@ -84,11 +84,11 @@ struct Turns {
     nodes: [Between; POINTS_MAX],
 }
 
-/// Tractions over pressure along and across at the points of a rule along a strip.
+/// Longitudinal and lateral traction over pressure at the points of a rule on a strip.
 type StripRatios = [[f32; POINTS_MAX]; 2];
 
 impl<'a> LoadedRun<'a> {
-    /// The run of these segments, the `number`-th of the mesh, with the tractions of an answer, which are in `unit` MPa.
+    /// The run of these segments, the `number`-th of the mesh, with the tractions of an answer in units of `unit` MPa.
     pub(crate) fn new(
         level: &StripMesh,
         footprint: &'a Footprint,
@@ -129,13 +129,13 @@ impl<'a> LoadedRun<'a> {
         }
     }
 
-    /// How often it is halved along and across in any case.
+    /// Number of longitudinal and lateral halvings in any case.
     pub(crate) fn halvings(&self) -> [u32; 2] {
         self.halvings
     }
 
-    /// The rule with fewest points along a part: the load along a chord is nearly that of sin² u, of whose integral over all angles four points
-    /// leave 0.1 %.
+    /// The least longitudinal rule of a part. The load on a chord is nearly proportional to sin² u, whose integral over all angles has an error of 0.1 %
+    /// with four points.
     pub(crate) fn least_rule(part: LoadPart) -> usize {
         match part.along.level {
             0 => ORDERS - 1,
@@ -144,7 +144,7 @@ impl<'a> LoadedRun<'a> {
         }
     }
 
-    /// How large a part is, in mm from `origin`.
+    /// The bounds of a part, in mm from `origin`.
     pub(crate) fn seen(
         &self,
         part: &LoadPart,
@@ -155,11 +155,11 @@ impl<'a> LoadedRun<'a> {
         let [y0, y1] = [0.0, 1.0].map(|side| self.outline.y(part.across.share(side)));
         let [low, middle, high] =
             [0.0, 0.5, 1.0].map(|side| self.outline.chord(part.across.share(side), known));
-        // By how much x changes over the part as it does in its middle: points of quadrature are equally far apart in the angle.
+        // Change of x over the part if it changed everywhere as in its middle, over the length of the chord.
         let slope = 0.5 * PI * part.along.width() * (PI * part.along.share(0.5)).sin();
         let (x, length, skew) = match middle {
             Some(chord) => {
-                // Where the region ends inside the part, its end stands for the missing chord.
+                // If the region ends inside the part, the middle of the chord replaces the missing chord.
                 let end = [0.5 * (chord.left + chord.right); 2];
                 let ends = |chord: Chord| cosines.map(|cosine| chord.along(cosine));
                 let own = ends(chord);
@@ -191,7 +191,7 @@ impl<'a> LoadedRun<'a> {
         }
     }
 
-    /// Appends what a part carries as point loads, for rules along and across; x and y count from `origin`.
+    /// Appends the point loads of a part for a longitudinal and a lateral rule, with x and y from `origin`.
     pub(crate) fn quadrature(
         &self,
         part: &LoadPart,
@@ -242,7 +242,7 @@ impl<'a> LoadedRun<'a> {
         }
     }
 
-    /// The points of a rule along a part.
+    /// The points of a longitudinal rule on a part.
     fn turns(&self, part: &LoadPart, rule: usize) -> Turns {
         let mut turns = Turns {
             count: RULES[rule].len(),
@@ -280,8 +280,8 @@ impl<'a> LoadedRun<'a> {
     }
 }
 
-/// How often a run is halved along and across in any case: points of quadrature have to see what loads do between strips and cells, also from far
-/// away.
+/// Number of longitudinal and lateral halvings of a run in any case. They resolve the changes of the loads between strips and cells even at a large
+/// distance.
 fn halvings(level: &StripMesh, footprint: &Footprint, segments: &[Segment]) -> [u32; 2] {
     let patch = segments[0].chord.patch;
     let all = level.mesh.segments.iter();
@@ -292,8 +292,8 @@ fn halvings(level: &StripMesh, footprint: &Footprint, segments: &[Segment]) -> [
     }
 }
 
-/// The largest relative change from cell to cell along a strip of the pressure over that of an ellipse, which is proportional to sin u; strips with less
-/// than a tenth of the largest pressure do not count.
+/// The largest relative change from cell to cell along a strip of the pressure divided by that of an ellipse, which is proportional to sin u. Strips with
+/// less than a tenth of the largest pressure are ignored.
 fn steepest(level: &StripMesh, segments: &[Segment]) -> f64 {
     let cells = segments[0].cells.start..segments[segments.len() - 1].cells.end;
     let pressures = &level.pressure;
@@ -316,10 +316,10 @@ fn steepest(level: &StripMesh, segments: &[Segment]) -> f64 {
     steepest
 }
 
-/// Lines that are kept, at 80 bytes each; only memory depends on it.
+/// Most cached lines, with 80 bytes each. Only memory depends on it.
 const LINES_MAX: usize = 200_000;
 
-/// Lines across the runs of one mesh that were looked up, by the run and the place in it. Hertz's ellipse is asked again each time.
+/// Cache of the chords on lines across the runs of one mesh, by the run and the position in it. It is not used for Hertz's ellipse.
 #[derive(Debug, Default)]
 pub(crate) struct KnownLines(HashMap<(usize, u64), Option<Chord>>);
 
@@ -328,23 +328,23 @@ pub(crate) struct KnownLines(HashMap<(usize, u64), Option<Chord>>);
 pub(crate) struct RunOutline<'a> {
     /// The region.
     pub footprint: &'a Footprint,
-    /// Which of its patches.
+    /// Number of the patch.
     pub patch: usize,
-    /// Which run of the mesh.
+    /// Number of the run in the mesh.
     pub number: usize,
-    /// Smaller y of the run, and its width, in mm.
+    /// Least y of the run in mm.
     pub low: f64,
-    /// See `low`.
+    /// Width of the run in mm.
     pub width: f64,
 }
 
 impl RunOutline<'_> {
-    /// y in mm of a place in the run, from 0 to 1.
+    /// y in mm of a position in the run, from 0 to 1.
     pub(crate) fn y(&self, share: f64) -> f64 {
         self.low + self.width * share
     }
 
-    /// The chord on the line at a place from 0 to 1, if there is exactly one.
+    /// The chord on the line at a position from 0 to 1, if there is exactly one.
     pub(crate) fn chord(&self, share: f64, known: &mut KnownLines) -> Option<Chord> {
         let look = || {
             let line = (self.y(share), self.width);

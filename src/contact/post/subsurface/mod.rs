@@ -1,4 +1,4 @@
-//! Stresses below the surface: tensors at chosen points, the worst point of a patch, and what a passage of the contact does.
+//! Stresses below the surface: tensors at chosen points, the worst point of a patch, and the effect of a passage of the contact.
 
 pub mod load_parts;
 pub(crate) mod loaded_run;

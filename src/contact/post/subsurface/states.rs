@@ -1,10 +1,10 @@
-//! From a stress tensor to what is read off it.
+//! Values derived from a stress tensor: von Mises stress, principal stresses and directions.
 
 use crate::case::words::subsurface::{BodyName, PassageWords};
 use crate::half_space::kernels::Stress;
 use crate::solution::words::evolution::{StressPoint, StressTensor};
 
-/// Numbers that a stored point has: `x, y, depth`, then the stress in axes of the patch.
+/// Number of values of a stored point: `x, y, depth`, then the stress in the axes of the patch.
 pub const STORED: usize = 9;
 
 /// Von Mises' stress.
@@ -14,7 +14,7 @@ pub fn von_mises([xx, yy, zz, xy, xz, yz]: Stress) -> f64 {
     (0.5 * normal + 3.0 * shear).sqrt()
 }
 
-/// A stress in axes with z into the body becomes one in the axes of the patch, with z up.
+/// Transforms a stress from axes with z into the body to the axes of the patch, with z up.
 pub fn in_patch_axes(stress: Stress, body: BodyName) -> Stress {
     let [xx, yy, zz, xy, xz, yz] = stress;
     match body {
@@ -23,7 +23,7 @@ pub fn in_patch_axes(stress: Stress, body: BodyName) -> Stress {
     }
 }
 
-/// A point as it is stored.
+/// The stored values of a point.
 pub fn stored(at: [f64; 3], stress: Stress) -> [f64; STORED] {
     let [x, y, depth] = at;
     let [xx, yy, zz, xy, xz, yz] = stress;
@@ -38,7 +38,7 @@ pub fn points(stored: &[f64]) -> Vec<StressPoint> {
         .collect()
 }
 
-/// Everything that is answered of a stress in the axes of the patch.
+/// The reported values of a stress in the axes of the patch.
 pub fn point(at: [f64; 3], stress: Stress) -> StressPoint {
     let [xx, yy, zz, xy, xz, yz] = stress;
     let Principal {
@@ -76,12 +76,12 @@ pub struct Principal {
     pub direction: [[f64; 3]; 3],
 }
 
-/// Of a tensor `xx, yy, zz, xy, xz, yz`, by Jacobi's rotations.
+/// Principal stresses of a tensor `xx, yy, zz, xy, xz, yz`, by Jacobi rotations.
 pub fn principal([xx, yy, zz, xy, xz, yz]: Stress) -> Principal {
     let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let size = a.iter().flatten().map(|x| x.abs()).fold(0.0, f64::max);
-    // It is diagonal to rounding after five sweeps.
+    // Five sweeps suffice to rounding.
     for _ in 0..12 {
         let off = a[0][1].abs().max(a[0][2].abs()).max(a[1][2].abs());
         if off <= f64::EPSILON * 1e-3 * size {
@@ -99,7 +99,7 @@ pub fn principal([xx, yy, zz, xy, xz, yz]: Stress) -> Principal {
     }
 }
 
-/// The rotation in the plane of p and q that makes `a[p][q]` 0.
+/// Applies the rotation in the plane of p and q that makes `a[p][q]` 0.
 fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
     if a[p][q] == 0.0 {
         return;
@@ -121,12 +121,12 @@ fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
     }
 }
 
-/// Where stresses are asked for.
+/// The points of the requested stresses.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StressPlaces {
-    /// At `[x, y, depth]` in mm.
+    /// Points `[x, y, depth]` in mm.
     Points(Vec<[f64; 3]>),
-    /// At these depths in mm below the worst point of every patch.
+    /// Depths in mm below the worst point of every patch.
     BelowWorst(Vec<f64>),
 }
 
@@ -140,18 +140,18 @@ impl StressPlaces {
     }
 }
 
-/// What is asked of the stresses below the surface of one body.
+/// The requested stresses below the surface of one body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SubsurfaceTask {
-    /// Where.
+    /// Points of the stresses.
     pub places: StressPlaces,
-    /// In which body.
+    /// The body.
     pub body: BodyName,
     /// Poisson's ratio of that body.
     pub poisson_ratio: f64,
-    /// Is the worst point of every patch to be found?
+    /// Whether the worst point of every patch is requested.
     pub worst: bool,
-    /// What is judged of a passage of the contact, if anything.
+    /// Options for the assessment of a passage of the contact, if it is requested.
     pub passage: Option<PassageWords>,
 }
 

@@ -1,11 +1,12 @@
 //! The loads on the surface of a body, and the stresses that they cause at points below it.
 //!
-//! Neighbouring strips that cross their patch once are one region, between the angles 0 and π of the true outline; cells of other strips are
-//! regions of their own. What a part of a region carries acts as point loads at the points of Gauss's quadrature, in the angle along and in y
-//! across, where the pressure of a smooth patch is smooth up to its edge; traction over pressure is interpolated between the nodes of the cells. How
-//! many points there are follows from the size of the part over its distance; parts that are too near for the rule with most points are halved until
-//! they are not. The shift of its ends between its two sides counts as width, so that refined parts fill the outline. The loads that a point
-//! feels are taken side by side.
+//! Neighbouring strips that cross their patch once are one region, between the angles 0 and π of the true outline. Each cell of other strips is a
+//! separate region. The load of a part of a region acts as point loads at the points of Gauss's quadrature, in the angle along x and in y. In these
+//! coordinates the pressure of a smooth patch is smooth up to its edge. Traction over pressure is interpolated between the nodes of the cells.
+//!
+//! The number of points depends on the size of the part over its distance. Parts that are too near for the rule with most points are halved. The shift
+//! of the ends of a part between its two sides counts as width, so that refined parts fill the outline. The loads for a point are evaluated in SIMD
+//! lanes.
 
 use std::ops::Range;
 
@@ -24,20 +25,20 @@ use crate::rolling::strip_mesh::StripMesh;
 pub struct SurfaceLoad<'a> {
     regions: Vec<LoadedRegion<'a>>,
     poisson_ratio: f64,
-    /// Where single precision counts x and y from, in mm.
+    /// Origin of x and y in single precision, in mm.
     origin: [f64; 2],
-    /// The parts to begin with.
+    /// The roots of the tree of parts.
     first_parts: Vec<(LoadPart, PartBox)>,
 }
 
-/// What carries loads.
+/// A region with loads.
 #[derive(Debug)]
 enum LoadedRegion<'a> {
     Run(LoadedRun<'a>),
     Cell(LoadedCell),
 }
 
-/// What is kept from point to point of one [`SurfaceLoad`]. The caller owns it.
+/// The cache of one [`SurfaceLoad`] for all points.
 #[derive(Debug)]
 pub struct LoadWorkspace {
     parts: LoadParts,
@@ -46,7 +47,7 @@ pub struct LoadWorkspace {
 }
 
 impl<'a> SurfaceLoad<'a> {
-    /// The pressures and tractions of a level on a body; tractions on the lower body times `sign` act on it.
+    /// The pressures and tractions of a mesh on a body. The tractions on it are those on the lower body times `sign`.
     pub fn new(
         level: &StripMesh,
         footprint: &'a Footprint,
@@ -96,7 +97,7 @@ impl<'a> SurfaceLoad<'a> {
         }
     }
 
-    /// A workspace for this load, which serves no other.
+    /// Makes a workspace, which can be used for this load only.
     pub fn workspace(&self) -> LoadWorkspace {
         LoadWorkspace {
             parts: LoadParts::new(self.first_parts.iter().copied()),
@@ -105,7 +106,7 @@ impl<'a> SurfaceLoad<'a> {
         }
     }
 
-    /// The stresses at places, see [`SurfaceLoad::stress`].
+    /// The stresses at some points; see [`SurfaceLoad::stress`].
     pub fn stresses(
         &self,
         places: &[[f64; 3]],
@@ -118,7 +119,7 @@ impl<'a> SurfaceLoad<'a> {
             .collect()
     }
 
-    /// The stress at a place `[x, y, depth]` in mm, in axes with z into the body.
+    /// The stress at a point `[x, y, depth]` in mm, in axes with z into the body.
     pub fn stress(
         &self,
         [x, y, depth]: [f64; 3],
@@ -146,7 +147,7 @@ impl<'a> SurfaceLoad<'a> {
         stress(parts.packs(), felt, point, self.poisson_ratio)
     }
 
-    /// How large a part is.
+    /// The bounds of a part.
     fn seen(&self, part: &LoadPart, known: &mut KnownLines) -> PartBox {
         match &self.regions[part.region] {
             LoadedRegion::Run(run) => run.seen(part, self.origin, known),
@@ -154,7 +155,7 @@ impl<'a> SurfaceLoad<'a> {
         }
     }
 
-    /// The rule with fewest points along a part, whatever the distance.
+    /// The least longitudinal rule of a part at any distance.
     fn least_rule(&self, part: LoadPart) -> usize {
         match &self.regions[part.region] {
             LoadedRegion::Run(_) => LoadedRun::least_rule(part),
@@ -162,7 +163,7 @@ impl<'a> SurfaceLoad<'a> {
         }
     }
 
-    /// Appends what a part carries as point loads, for rules along and across.
+    /// Appends the point loads of a part for a longitudinal and a lateral rule.
     fn quadrature(
         &self,
         part: &LoadPart,
@@ -177,7 +178,7 @@ impl<'a> SurfaceLoad<'a> {
     }
 }
 
-/// Divides the segments into runs of neighbouring strips that have one each, and the segments of strips that have several.
+/// Divides the segments into runs of neighbouring strips with one segment each, and strips with several segments.
 fn runs(segments: &[Segment]) -> Vec<&[Segment]> {
     let strips: Vec<&[Segment]> = segments.chunk_by(one_strip).collect();
     let mut runs = Vec::new();
@@ -206,14 +207,14 @@ fn one_strip(a: &Segment, b: &Segment) -> bool {
 /// The loads on a rectangle.
 #[derive(Debug)]
 pub(crate) struct LoadedCell {
-    /// `[from, to]` along and across, in mm.
+    /// Ranges of x and y in mm.
     sides: [[f64; 2]; 2],
-    /// Along, across and into the body, in MPa.
+    /// Longitudinal and lateral load and load into the body, in MPa.
     loads: [f64; 3],
 }
 
 impl LoadedCell {
-    /// The cell `i` of a strip, with the traction of an answer, which is in `unit` MPa.
+    /// The cell `i` of a strip, with the traction of an answer in units of `unit` MPa.
     pub(crate) fn new(
         level: &StripMesh,
         answer: &LevelAnswer,
@@ -237,7 +238,7 @@ impl LoadedCell {
         from + (to - from) * piece.share(inside)
     }
 
-    /// How large a part is, in mm from `origin`.
+    /// The bounds of a part, in mm from `origin`.
     pub(crate) fn seen(&self, part: &LoadPart, origin: [f64; 2]) -> PartBox {
         let [x, y] =
             [0, 1].map(|axis| [0.0, 1.0].map(|end| self.side(part, axis, end) - origin[axis]));
@@ -247,7 +248,7 @@ impl LoadedCell {
         }
     }
 
-    /// Appends what a part carries as point loads, for rules along and across; x and y count from `origin`.
+    /// Appends the point loads of a part for a longitudinal and a lateral rule, with x and y from `origin`.
     pub(crate) fn quadrature(
         &self,
         part: &LoadPart,

@@ -1,17 +1,15 @@
-//! The lines along x below a patch on which a passage of the contact is worst.
+//! The worst lines along x below a patch for a passage of the contact.
 //!
-//! A scan over y and depth; from its worst place a search in `(y/b, ln depth)` with more states beside those that decide.
+//! While a contact in steady rolling passes over a point of a body, the point has the stresses on a line along x, and none before and after. The worst
+//! line is found by a scan over y and depth, and a search in `(y/b, ln depth)` with additional states beside the decisive ones.
 //!
-//! What a point of a body lives through while a contact in steady rolling passes over it: the stresses on a line along x, and none
-//! before and after.
+//! **Dang Van's criterion** (Dang Van, Cailletaud, Flavenot, Le Douaron, Lieurade 1989): a grain shakes down to the residual stress in the centre of the
+//! smallest ball that encloses the stress deviators. The criterion is the largest value over time of half of Tresca's stress of the remaining
+//! deviator, plus the hydrostatic stress times a slope.
 //!
-//! Dang Van's criterion (Dang Van, Cailletaud, Flavenot, Le Douaron, Lieurade 1989): a grain shakes down to the residual stress
-//! in the centre of the smallest ball about the stress deviators; what decides is the largest over time of half of Tresca's stress of what is
-//! left, plus the hydrostatic stress times a slope.
-//!
-//! Shakedown by the theorem of Melan (Johnson 1985, section 9.2): yielding ends if some residual stress, constant in time, keeps the
-//! stresses below yield. What is the same all along the rolling direction and across, as a body keeps it that is rolled over
-//! everywhere, has only σ_xx, σ_yy and σ_xy. Each depth is judged by itself.
+//! **Shakedown by the theorem of Melan** (Johnson 1985, section 9.2): yielding ends if some residual stress, constant in time, keeps the stresses below
+//! yield. In a body that is rolled over everywhere, the residual stress does not depend on x and y, and has only σ_xx, σ_yy and σ_xy. Each depth is
+//! assessed separately.
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
@@ -25,27 +23,29 @@ use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 use crate::post::subsurface::worst::{DEPTHS, Deviator, STEPS, climb, enclosing_ball};
 use crate::solution::words::evolution::{PassagePlace, PassageSummary};
 
-// The numbers below are chosen by judgement; `cargo test --test physics -- shakes_down` holds what they give against closed forms.
+// These constants are chosen by judgement. `cargo test --test physics -- shakes_down` compares the results with closed forms.
 
-/// Places across, relative to the half width.
+/// Lateral positions of the scanned lines, relative to the half width.
 const ACROSS: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
-/// States: so many on each side of the middle up to 1.5 half-lengths, and these further out.
+/// Number of equally spaced states on each side of the middle.
 const NEAR: usize = 16;
+/// Position of the outermost of these, relative to the half-length.
 const NEAR_REACH: f64 = 1.5;
+/// Positions of the states farther out, relative to the half-length.
 const FAR: [f64; 4] = [1.8, 2.3, 3.2, 5.0];
-/// How often the spaces beside states that decide are halved.
+/// Number of times that the intervals beside decisive states are halved.
 const HALVINGS: usize = 4;
 /// Evaluations of the search.
 const EVALUATIONS: usize = 24;
-/// The outermost line.
+/// Lateral position of the outermost line, relative to the half width.
 const OUTERMOST: f64 = 0.95;
 
-/// The loads, and the patch below which passages are judged.
+/// The loads, and the patch below which passages are assessed.
 #[derive(Debug, Clone, Copy)]
 pub struct PassagesOf<'a> {
     /// The loads on the body.
     pub load: &'a SurfaceLoad<'a>,
-    /// Where they act.
+    /// The loaded region.
     pub footprint: &'a Footprint,
     /// Number of the patch.
     pub patch: usize,
@@ -53,7 +53,7 @@ pub struct PassagesOf<'a> {
     pub least: f64,
 }
 
-/// What is found below a patch, and what is left of the searches for smallest balls about the stresses.
+/// The worst passages below a patch, and the accuracy of the enclosing balls.
 #[derive(Debug, Clone, Copy)]
 pub struct JudgedPassage {
     /// The worst of the passages.
@@ -62,11 +62,11 @@ pub struct JudgedPassage {
     pub gap: f64,
 }
 
-/// What passages below a patch amount to at their worst, with the worst point `[x, y, depth]` of von Mises' stress.
+/// Finds the worst passages below a patch. `worst` is the point `[x, y, depth]` with the largest von Mises stress.
 ///
 /// # Errors
 ///
-/// The monitor wants an end.
+/// Returns an error if the monitor stopped the work.
 pub fn passage(
     task: PassageWords,
     of: PassagesOf,
@@ -114,9 +114,11 @@ pub fn passage(
 /// The lines below a patch.
 struct Lines<'a> {
     of: PassagesOf<'a>,
-    /// Middle and half width across in mm, half of the smaller extent.
+    /// y of the middle in mm.
     middle: f64,
+    /// Half width in mm.
     half: f64,
+    /// Half of the smaller extent in mm.
     small: f64,
     /// x of the states in mm.
     stations: Vec<f64>,
@@ -165,7 +167,7 @@ impl<'a> Lines<'a> {
         stations.iter().copied().zip(stresses).collect()
     }
 
-    /// The measure of one line and the gap of its ball, with states added beside those that decide.
+    /// The measure of one line and the gap of its ball, with states added beside the decisive ones.
     fn value(
         &self,
         measure: PassageMeasure,
@@ -195,7 +197,7 @@ impl<'a> Lines<'a> {
         (found.stress, found.gap)
     }
 
-    /// The worst line that a search from a start finds.
+    /// Searches for the worst line from a start.
     fn search(
         &self,
         measure: PassageMeasure,
@@ -215,10 +217,10 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Weights of points that hold the ball, from which on the places beside them are looked at. Chosen by judgement.
+/// Weight in the enclosing ball from which a state is decisive. Chosen by judgement.
 const HOLDING: f64 = 0.02;
 
-/// What is judged.
+/// The criterion for a passage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PassageMeasure {
     /// Dang Van's stress with the weight of the hydrostatic stress.
@@ -230,15 +232,15 @@ pub enum PassageMeasure {
 /// The largest stress of a passage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PassageValue {
-    /// In the unit of the stresses.
+    /// The largest stress, in the unit of the stresses.
     pub stress: f64,
-    /// States that decide it.
+    /// Indices of the decisive states.
     pub deciding: Vec<usize>,
-    /// State of the search for the smallest enclosing ball, see [`EnclosingBall`](crate::post::subsurface::worst::EnclosingBall).
+    /// Duality gap of the smallest enclosing ball; see [`EnclosingBall`](crate::post::subsurface::worst::EnclosingBall).
     pub gap: f64,
 }
 
-/// What stresses on a line along x amount to; the stress-free state before and after is added.
+/// Assesses the stresses on a line along x. The stress-free state before and after the contact is added.
 pub fn judge(measure: PassageMeasure, states: &[Stress]) -> PassageValue {
     let mut points: Vec<Deviator> = states.iter().map(|state| deviator(*state)).collect();
     points.push([0.0; 5]);
@@ -278,7 +280,7 @@ pub fn judge(measure: PassageMeasure, states: &[Stress]) -> PassageValue {
     }
 }
 
-/// First the coordinates that residual stresses change, then those of the shears σ_xz and σ_yz.
+/// The deviator of a stress. The coordinates that residual stresses change come first, then those of the shear stresses σ_xz and σ_yz.
 fn deviator([xx, yy, zz, xy, xz, yz]: Stress) -> Deviator {
     let out = (2.0 * zz - xx - yy) / 6_f64.sqrt();
     [
@@ -312,7 +314,7 @@ mod passage_tests {
         judge(PassageMeasure::DangVan(0.3), states).stress
     }
 
-    /// Rotating bending S: S/2 + slope S/3; torsion T: T; tension from 0 to S: S/4 + slope S/3; a pressure to and fro: nothing from shear.
+    /// Rotating bending S gives S/2 + slope S/3, torsion T gives T, tension from 0 to S gives S/4 + slope S/3. A hydrostatic pressure has no shear.
     #[test]
     fn tension_and_torsion_give_what_the_criterion_says() {
         let tension = |s: f64| [s, 0.0, 0.0, 0.0, 0.0, 0.0];
