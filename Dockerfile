@@ -1,10 +1,10 @@
-# Both bases are arguments, so that a mirror or a stand-in can be put in their place.
+# Both base images are arguments, so that a mirror can replace them.
 ARG BUILDER=docker.io/library/rust:1.95-slim-bookworm
 ARG RUNTIME=gcr.io/distroless/cc-debian12:nonroot
 
 FROM ${BUILDER} AS build
 WORKDIR /src
-# The dependencies are a layer of their own, compiled for an empty program: a change in src does not build them again.
+# The dependencies are a separate layer, compiled for an empty program, so that a change in src does not build them again.
 COPY Cargo.toml Cargo.lock ./
 COPY src/contact/Cargo.toml src/contact/
 COPY src/tables/Cargo.toml src/tables/
@@ -17,8 +17,8 @@ RUN echo 'fn main() {}' > src/main.rs \
     && cargo build --profile image --features cluster,otlp,gs,az --locked --bin railhead
 COPY api ./api
 COPY src ./src
-# Copied files keep their dates, which may be older than the empty program's: cargo must see that they are new.
-# The profile of the image is slower to build and makes a smaller program.
+# Copied files keep their dates, which may be older than those of the empty program. Touching them makes cargo build them.
+# The profile `image` takes longer to build and gives a smaller program.
 RUN touch src/main.rs src/lib.rs src/*/lib.rs \
     && cargo build --profile image --features cluster,otlp,gs,az --locked --bin railhead \
     && install -d /out/data \
@@ -30,7 +30,7 @@ LABEL org.opencontainers.image.title="railhead" \
       org.opencontainers.image.licenses="MIT OR Apache-2.0"
 COPY --from=build /out/railhead /usr/local/bin/railhead
 COPY --from=build --chown=65532:65532 /out/data /data
-# A running job gets less time to end than the 10 s after which most container engines kill.
+# A running job has less time to end than the 10 s after which most container engines kill the process.
 ENV RAILHEAD_LISTEN=0.0.0.0:8080 \
     RAILHEAD_DATA_DIR=/data \
     RAILHEAD_LOG_FORMAT=json \
@@ -38,7 +38,7 @@ ENV RAILHEAD_LISTEN=0.0.0.0:8080 \
 USER 65532:65532
 VOLUME ["/data"]
 EXPOSE 8080
-# The image has no shell and no curl: the program asks itself, at the address it listens on.
+# The image has no shell and no curl, so the program probes the address on which it listens itself.
 HEALTHCHECK --interval=30s --timeout=5s --start-period=10s CMD ["/usr/local/bin/railhead", "healthcheck"]
 ENTRYPOINT ["/usr/local/bin/railhead"]
 CMD ["serve"]
