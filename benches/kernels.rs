@@ -1,4 +1,4 @@
-//! What the pieces of a solve cost: rows of the influence, one product, a whole level, by mesh and storage.
+//! Cost of the parts of a solve: rows of the influence, one product, a whole level, by mesh and storage.
 
 use std::hint::black_box;
 

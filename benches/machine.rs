@@ -1,4 +1,4 @@
-//! What benches share: a clock that ignores other processes, medians, and the unit of machine speed.
+//! Shared by the benches: a clock that ignores other processes, medians, and the unit of machine speed.
 
 #![allow(dead_code, reason = "every bench uses its part")]
 

@@ -44,7 +44,7 @@ impl Service {
         Service::start_on(folder, data, flags)
     }
 
-    /// The same with this data folder.
+    /// Starts `railhead serve` on an existing data folder.
     pub fn start_on(folder: tempfile::TempDir, data: PathBuf, flags: &[&str]) -> Service {
         let log = folder.path().join("log");
         let child = program()

@@ -61,7 +61,7 @@ impl PatchAnswer {
     }
 }
 
-/// What the factors for the turn leave open of the forces of an answer on the curve of the rail, relative to μN: a fifth of the standard deviation of the
+/// Error of the forces on the curve of the rail due to the factors for its turn, relative to μN: a fifth of the standard deviation of the
 /// angle over the load in rad, and at most 3.5 % (`docs/wheel-rail.md`).
 pub fn left_open(case: &CheckedCase, solution: &Solution, fields: &Fields) -> f64 {
     let NormalTask::Wheel(contact) = &case.problem.task else {

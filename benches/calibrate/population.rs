@@ -331,7 +331,7 @@ fn curve(setting: &Setting, random: &mut Random) -> Value {
     };
     let mut case = setting.case(contact, motion);
     case["load"] = json!({ "vertical_force_n": force });
-    // What the factors for the turn leave open follows from the pressures.
+    // The error due to the factors for the turn follows from the pressures.
     case["outputs"] = json!(["resultants", "pressure"]);
     case
 }

@@ -135,11 +135,11 @@ fn relative(question: &Value, solution: &Solution, k: usize) -> Option<([f64; 3]
     Some((frame.relative(sum), total.error_estimate?.force_x_n / limit))
 }
 
-/// What is counted of the sweeps of one form at one target.
+/// Counts over the sweeps of one form at one target.
 #[derive(Default)]
 struct Sum {
     found: Vec<Judged>,
-    /// The same of these motions alone.
+    /// The values of these motions solved alone.
     alone: Vec<Judged>,
     motions: usize,
     /// Motions with an estimate from their neighbours.

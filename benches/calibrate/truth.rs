@@ -1,4 +1,4 @@
-//! What the resultants of a case truly are, kept in a file, and how far resultants are from it.
+//! Converged resultants of cases, kept in a file, and the distance of other resultants from them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use railhead_contact::rolling::answer::Resultants;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// What is known of a case.
+/// The converged resultants of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Truth {
     /// Fingerprint of the case.
@@ -25,7 +25,7 @@ pub struct Truth {
 pub struct TrueResultants {
     /// F_x, F_y over μN and M_z over μN times `length`.
     pub value: [f64; 3],
-    /// What they may be off by.
+    /// Their uncertainty.
     pub uncertainty: f64,
     /// Where moments are about; zero for a wheel on a rail, where it is the load centre that the answer gives.
     pub centre: [f64; 2],
@@ -125,8 +125,8 @@ impl Frame {
 pub struct Judged {
     /// Largest difference of the resultants from the truth.
     pub error: f64,
-    /// What the answer says of it.
+    /// The estimate of the answer.
     pub estimate: f64,
-    /// What the truth may be off by.
+    /// The uncertainty of the truth.
     pub uncertainty: f64,
 }

@@ -76,7 +76,7 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
     next.into_inner() as f64 / start.elapsed().as_secs_f64()
 }
 
-/// As a worker does it, operators kept by the process included.
+/// Solves like a worker, with the operators that the process keeps.
 fn solve_one(engine: &Engine, case: &Value) {
     let problem = check(case, &Limits::default()).expect("a case");
     for slice in (engine.slices)(&problem) {

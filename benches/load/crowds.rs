@@ -15,7 +15,7 @@ use crate::service::Service;
 
 /// How long anybody else may wait, in s.
 const WITHIN: f64 = 1.0;
-/// What the process may take, in MB.
+/// Largest memory of the process in MB.
 const MEMORY_MB: f64 = 1024.0;
 /// How long each crowd is watched.
 const WATCHED: Duration = Duration::from_secs(10);

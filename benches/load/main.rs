@@ -1,4 +1,4 @@
-//! What does the service do under load, against the bare solver on the same machine in the same run?
+//! Measures the service under load against the bare solver on the same machine in the same run.
 //!
 //! `cargo bench --bench load [-- PART … [workers=N] [jobs=N]]` starts the real program on loopback with a data folder of its own and
 //! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
@@ -24,7 +24,7 @@ mod shared;
 mod soak;
 mod table;
 
-/// What can be measured; see above.
+/// The parts of the bench; see above.
 const PARTS: [&str; 10] = [
     "mixed",
     "soak",
@@ -65,7 +65,7 @@ fn main() {
         let mut values = arguments.iter().filter_map(|one| one.strip_prefix(name));
         values.find_map(|value| value.parse::<usize>().ok())
     };
-    // As the service has by default.
+    // The default of the service.
     let workers = number("workers=").unwrap_or((cores - 1).max(1));
     let jobs = number("jobs=").unwrap_or(20_000);
     let wanted = |part: &str| {

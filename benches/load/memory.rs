@@ -1,4 +1,4 @@
-//! What four workers keep of the memory of mixed cases. With `MALLOC_ARENA_MAX=16` in the environment the C library's own settings apply.
+//! Memory that four workers keep after mixed cases. With `MALLOC_ARENA_MAX=16` in the environment the C library's own settings apply.
 
 use reqwest::Method;
 use serde_json::{Value, json};

@@ -26,7 +26,7 @@ const SAMPLE: Duration = Duration::from_millis(500);
 /// Jobs of one page of the list.
 const PAGE: usize = 1000;
 
-/// What one client did.
+/// Counts and times of one client.
 #[derive(Default)]
 struct Record {
     accepted: Vec<String>,
@@ -39,7 +39,7 @@ struct Record {
 }
 
 impl Record {
-    /// What another client has done as well.
+    /// Adds the counts and times of another client.
     fn add(&mut self, other: Record) {
         self.accepted.extend(other.accepted);
         self.done += other.done;
@@ -121,7 +121,7 @@ pub async fn run(workers: usize) -> Vec<Row> {
     ]
 }
 
-/// What the service uses, from time to time.
+/// Resources that the service uses, sampled from time to time.
 async fn usage_until(service: &Service, end: Instant) -> Vec<Usage> {
     let mut samples = Vec::new();
     while Instant::now() < end {

@@ -22,7 +22,7 @@ pub struct Service {
     _folder: tempfile::TempDir,
 }
 
-/// What the service uses at one moment.
+/// Resources that the service uses at one moment.
 #[derive(Debug, Clone, Copy)]
 pub struct Usage {
     /// Resident memory in MB.
@@ -71,7 +71,7 @@ impl Service {
         self.child.id()
     }
 
-    /// What it uses now.
+    /// Returns the resources in use now.
     pub fn usage(&self) -> Usage {
         let process = PathBuf::from(format!("/proc/{}", self.pid()));
         let status = std::fs::read_to_string(process.join("status")).expect("the process lives");

@@ -105,7 +105,7 @@ async fn emptied(service: &Service, watch: &mut Client) -> Usage {
         assert!(last.elapsed() < ENDS_WITHIN, "expired jobs are removed");
         tokio::time::sleep(SAMPLE).await;
     }
-    // What the log of the table and its free pages take goes back in portions.
+    // The log of the table and its free pages are given back in portions.
     let mut after = service.usage();
     while after.stored_mb > 90.0 && last.elapsed() < ENDS_WITHIN {
         tokio::time::sleep(SAMPLE).await;

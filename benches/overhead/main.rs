@@ -1,4 +1,4 @@
-//! What does the service cost beside the solver?
+//! Measures the cost of the service beside the solver.
 //!
 //! `cargo bench --bench overhead [-- program=PATH]` starts the real program with one worker on loopback and prints a table: processor time of the
 //! server for a job (300 sequential `POST /v1/jobs` with `Prefer: wait`) and for a case of a batch, the time of one row by `/v1/evaluate`, and

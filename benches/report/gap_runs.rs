@@ -79,7 +79,7 @@ fn run(cases: &[&Value], solver: &Value) -> (f64, f64) {
     (median(times), median(errors))
 }
 
-/// The same of CONTACT's own runs, if every case has one of this fineness.
+/// The errors of CONTACT's own runs, if every case has one of this fineness.
 fn of_contact(cases: &[&Value], run: usize, lu: f64) -> Option<(f64, f64)> {
     let runs: Option<Vec<&Value>> = cases
         .iter()

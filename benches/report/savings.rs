@@ -1,4 +1,4 @@
-//! What is saved by skipping what a case does not need.
+//! Savings from skipping work that a case does not need.
 
 use std::fmt::Write as _;
 use std::hint::black_box;
@@ -182,7 +182,7 @@ fn one_shape() -> String {
     )
 }
 
-/// What one solve costs.
+/// Cost of one solve.
 struct Cost {
     seconds: f64,
     products: u32,

@@ -1,4 +1,4 @@
-//! What a target costs, whether it is met, and whether the estimate is honest.
+//! Cost of a target, whether it is met, and whether the estimate covers the error.
 
 use std::fmt::Write as _;
 

@@ -135,7 +135,7 @@ impl Cluster {
         self.submit_to("/v1/jobs", case, key, place).await
     }
 
-    /// The same for what is submitted elsewhere.
+    /// Like the above, for jobs submitted to another node.
     pub async fn submit_to(
         &self,
         path: &str,

@@ -18,7 +18,7 @@ pub enum Cut {
     BlackHole,
     /// The cable is pulled: to send fails at once.
     Cable,
-    /// What the host sends arrives, what is sent to it does not.
+    /// Messages from the host arrive; messages to it do not.
     OneWay,
     /// Only connections to this port of others are swallowed.
     Port(u16),

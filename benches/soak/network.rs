@@ -39,7 +39,7 @@ const OPEN: &str = "SELECT COUNT(*) FROM jobs WHERE ended_at IS NULL";
 const AS_THEY_ARE: &str = "SELECT COALESCE(md5(string_agg(concat_ws(',', id, state, ended_at, lease_token, blob_id, attempt, version), ' ' ORDER BY id)), '') \
     FROM jobs WHERE ended_at IS NOT NULL";
 
-/// What is taken away from the node.
+/// A resource that the node loses.
 #[derive(Debug, Clone, Copy)]
 enum Away {
     Cut(Cut),
@@ -168,7 +168,7 @@ impl Network {
         .await;
         let lost = Instant::now();
         self.take_away(how);
-        // What it held at that moment; it may have ended some in the meantime.
+        // The jobs that it held at that moment; it may have ended some since.
         let held = self.held().await;
         let (ids, tokens): (Vec<_>, Vec<_>) = held.into_iter().unzip();
         until("its jobs are free", async || {

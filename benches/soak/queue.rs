@@ -61,7 +61,7 @@ fn solution() -> Vec<u8> {
     text
 }
 
-/// What the workers did in some time: jobs, and the seconds of each claim with its end.
+/// Jobs that the workers ended in some time, and the seconds of each claim and of each end.
 #[derive(Default)]
 struct Work {
     jobs: usize,
@@ -118,7 +118,7 @@ async fn measure(store: &Arc<PostgresStore>, how_long: Duration) -> Work {
     measure_as(store, how_long, WORKERS, GROUP).await
 }
 
-/// The same with so many workers and jobs in a group.
+/// Runs the measurement with a number of workers and of jobs in a group.
 async fn measure_as(
     store: &Arc<PostgresStore>,
     how_long: Duration,
@@ -127,7 +127,7 @@ async fn measure_as(
 ) -> Work {
     let until = Instant::now() + how_long;
     let mut workers = JoinSet::new();
-    // As nodes do.
+    // Nodes do this too.
     let folding = tokio::spawn({
         let store = store.clone();
         async move {
@@ -198,7 +198,7 @@ pub async fn depth() {
     };
     let few = 10_000;
     fill(&pool, 0, few).await;
-    // As many again as are ended meanwhile, in short pieces.
+    // Submits as many jobs as end meanwhile, in small groups.
     let mut shallow = Work::default();
     let (mut next, mut rounds) = (few, 0);
     while rounds < 20 {
@@ -315,7 +315,7 @@ async fn server_seconds(pool: &PgPool) -> f64 {
     ticks.sum::<f64>() / 100.0
 }
 
-/// What a claim with its end costs the server, and what one more job in it.
+/// Cost of a claim and its end for the server, and of each further job of the claim.
 pub async fn costs() -> Option<Costs> {
     let (store, pool, _) = open().await?;
     fill(&pool, 0, 300_000).await;

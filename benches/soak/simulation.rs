@@ -10,7 +10,7 @@ use std::collections::BinaryHeap;
 
 use crate::row;
 
-/// What a statement keeps a core of the server busy with, and how long its round trip takes, in µs.
+/// Time in µs for which a statement occupies a core of the server, and the time of its round trip.
 #[derive(Debug, Clone, Copy)]
 pub struct Costs {
     /// Of a claim and the end that follows, whatever is claimed.
@@ -20,14 +20,14 @@ pub struct Costs {
     pub round_trip_us: f64,
 }
 
-/// What is solved: units of a claim, their number, and how long each takes.
+/// The work: units of a claim, their number, and the time of each.
 #[derive(Debug, Clone, Copy)]
 struct Work {
     name: &'static str,
     /// Units that are claimed and ended together.
     group: usize,
     unit_us: f64,
-    /// What a unit counts for: a job, or the rows of a chunk.
+    /// Number of results of a unit: one job, or the rows of a chunk.
     counts: usize,
 }
 
@@ -72,7 +72,7 @@ impl Ord for At {
     }
 }
 
-/// What came out: units per second, and the part of the workers' and of the server's time that is used.
+/// The outcome: units per second, and the share of the time of the workers and of the server that is used.
 struct Figures {
     per_s: f64,
     workers: f64,

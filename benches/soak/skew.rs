@@ -20,7 +20,7 @@ use crate::{postgres, row};
 
 const JOBS: usize = 3000;
 
-/// What a version adds to tables in use: a column, an index, a table. The last does not lock out those who write.
+/// Objects that a version adds to tables in use: a column, an index, a table. Adding a table does not block writers.
 const NEXT: [&str; 4] = [
     "SET lock_timeout = '2s'",
     "ALTER TABLE jobs ADD COLUMN later bigint NOT NULL DEFAULT 0; CREATE TABLE later (id bigint PRIMARY KEY)",

@@ -1,4 +1,4 @@
-//! What outputs for maintenance cost beside the solve at a target of 0.005, on ellipses of many shapes.
+//! Cost of outputs for maintenance relative to the solve at a target of 0.005, on ellipses of many shapes.
 
 use std::fmt::Write as _;
 use std::time::Instant;

@@ -10,7 +10,7 @@ use super::random::Random;
 pub struct Sample {
     /// The row of the report it belongs to.
     pub kind: &'static str,
-    /// What to call it when it fails.
+    /// Name for messages.
     pub number: usize,
     /// The question.
     pub case: Value,

@@ -30,13 +30,13 @@ pub struct Pair {
 /// A wheelset on a pair.
 pub struct Place {
     pub case: Value,
-    /// The same with sound profiles.
+    /// The case with sound profiles.
     pub sound: Solution,
     /// The contact of the main patch along rail and wheel, as number of the nearest point.
     pub at: [[f64; 2]; 2],
 }
 
-/// What happened to the points.
+/// The damage to the points.
 #[derive(Debug, Clone, Copy)]
 pub enum Damage {
     /// Points this far apart.

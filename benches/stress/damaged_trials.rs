@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::damaged::{Damage, Pair, Place, answer, blamed, pressure_max, with};
 use crate::random::Random;
 
-/// What the trials of one kind, or of all, showed.
+/// Results of the trials of one kind, or of all.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Counts {
     /// Places with sound profiles, and how many of them were blamed.
@@ -66,7 +66,7 @@ impl Counts {
     }
 }
 
-/// What one damaged case showed: errors of the largest pressure (relative) and of the force (relative to μN), and what the answer says of
+/// Result of one damaged case: errors of the largest pressure (relative) and of the force (relative to μN), and what the answer says of
 /// them.
 enum Trial {
     Refused,

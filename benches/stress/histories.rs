@@ -42,7 +42,7 @@ const FORCES: [f64; 2] = [0.02, TARGET];
 /// Target of the histories: a finer one takes seconds each.
 const TARGET: f64 = 0.02;
 
-/// What a history showed.
+/// Result of a history.
 struct Shown {
     target_met: bool,
     /// Distance of the last point from steady rolling over the sum of their estimates, where it is one.

@@ -1,4 +1,4 @@
-//! What every answer must obey, whatever the case.
+//! Laws that every answer must obey.
 
 use railhead_contact::case::words::solver::MethodName;
 use railhead_contact::rolling::answer::Resultants;
@@ -9,7 +9,7 @@ use serde_json::Value;
 
 /// Rounding, relative to the largest value of its kind.
 const ROUNDING: f64 = 1e-9;
-/// What the sums over cells in single precision may lose.
+/// Allowed error of sums over cells in single precision.
 const SUMS: f64 = 1e-6;
 
 /// The target of a case that names none.

@@ -45,7 +45,7 @@ const SEED: u64 = 20_261_121;
 /// Names of cases in the report.
 const NAMED_MAX: usize = 40;
 
-/// What the cases of one kind showed.
+/// Results of the cases of one kind.
 #[derive(Default)]
 struct Row {
     cases: usize,
@@ -61,7 +61,7 @@ struct Row {
     times: times::Times,
 }
 
-/// What went wrong, in words.
+/// Messages of failures.
 #[derive(Default)]
 struct Troubles {
     failed: Vec<String>,

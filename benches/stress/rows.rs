@@ -30,7 +30,7 @@ const SAME: f64 = 1e-9;
 /// The same by the simplified theory, whose rows share the mesh of a circle.
 const SAME_FASTSIM: f64 = 3e-3;
 
-/// What a class showed: rows, rows with an answer, figures of its own, and what went wrong.
+/// Results of a class: rows, rows with an answer, further figures, and failures.
 #[derive(Default)]
 struct Class {
     rows: usize,
@@ -56,7 +56,7 @@ impl Draw {
         let modulus = random.decades(1e3, 3e5);
         let friction = random.decades(0.005, 1.0);
         let load = random.decades(10.0, 3e5);
-        // What saturates, and spin alike, for C = 4.
+        // The creepage of saturation, and the spin with the same effect, for C = 4.
         let unit = friction * load / (4.0 * modulus * size * size);
         let mut column = |pointer: &str, draw: &mut dyn FnMut(&mut Random) -> f64| VariedColumn {
             pointer: pointer.to_owned(),

@@ -88,7 +88,7 @@ pub fn creep_maps() -> String {
     text
 }
 
-/// What asking for values per cell changes: nothing but what is stored.
+/// Checks that a request for values per cell changes only the stored fields.
 pub fn with_zones() -> String {
     let mut text = "## Sweeps with zones\n\nThe same contact, seven longitudinal creepages to 0.006 at the same spin. *Apart*: largest distance of the sum of the tractions from the force, relative\n\
          to the estimated error.\n\n| target | met, resultants only | met, all outputs | forces differ | apart | meshes |\n|---|---|---|---|---|---|\n"

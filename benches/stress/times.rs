@@ -26,15 +26,15 @@ const SWEEPS: usize = 60;
 pub struct CaseTimes {
     /// Processor time of the solve in s.
     pub taken: f64,
-    /// What the formulas expect alone, in s.
+    /// Time by the formulas alone, in s.
     pub formulas: f64,
-    /// What `cases/check` tells.
+    /// Time that `cases/check` returns.
     pub told: ProbedTime,
 }
 
 pub type Times = Vec<CaseTimes>;
 
-/// What `cases/check` tells of a case.
+/// Returns the times that `cases/check` gives for a case.
 ///
 /// # Panics
 /// It is no case.

@@ -43,7 +43,7 @@ pub enum End {
     Failed(String),
 }
 
-/// What one case showed.
+/// Result of one case.
 pub struct Trial {
     pub end: End,
     pub iterations: Option<u32>,

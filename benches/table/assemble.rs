@@ -72,7 +72,7 @@ pub fn values() -> Vec<f32> {
     values
 }
 
-/// What the table stores of an answer: forces over their growth without the part of linear theory, and the share that sticks.
+/// Values of an answer that the table stores: forces over their growth without the part of linear theory, and the share that sticks.
 fn stored(step: u8, answer: Answer, kalker: [f64; 4], direction: [f64; 3]) -> [f32; OUTPUTS] {
     let sigma = f64::from(step) / SIZE_STEPS;
     let stick = answer[3] as f32;

@@ -1,4 +1,4 @@
-//! What error to expect where: how far each node is from a cubic through its neighbours, and a factor from held-out motions.
+//! Error bound of the table: how far each node is from a cubic through its neighbours, and a factor from held-out motions.
 
 use std::ops::Range;
 

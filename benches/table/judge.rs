@@ -27,7 +27,7 @@ impl Judged {
     }
 }
 
-/// All that are solved.
+/// All solved motions.
 pub fn all(table: &CreepTable) -> Vec<Judged> {
     let mut all = Vec::new();
     for number in 0..CONTACTS {
@@ -176,7 +176,7 @@ impl Law {
         self.factor * f64::from(indicator).max(self.floor).powf(self.power)
     }
 
-    /// As the file of the table names it.
+    /// Its name in the file of the table.
     pub fn described(&self) -> Value {
         json!({ "floor": self.floor, "power": self.power, "factor": self.factor })
     }

@@ -1,4 +1,4 @@
-//! What must hold for any bytes that a client may send. The fuzzers look for bytes for which it does not; the tests of the
+//! Laws for arbitrary bytes from a client. The fuzzers look for bytes for which it does not; the tests of the
 //! service try those that were interesting once (`fuzz/seeds`).
 
 use railhead::contact;
@@ -39,7 +39,7 @@ fn check(case: &Value) {
                 assert!(!fault.detail.is_empty());
                 let pointer = &fault.pointer;
                 assert!(pointer.is_empty() || pointer.starts_with('/'), "{pointer}");
-                // What is missing has no place of its own.
+                // A missing member has no position.
                 let holder = pointer.rsplit_once('/').map_or("", |(holder, _)| holder);
                 assert!(
                     case.pointer(pointer).is_some()
@@ -130,7 +130,7 @@ pub fn batch(data: &[u8]) {
         true => read_elements(text, CASE_MAX, add),
         false => read_lines(text, CASE_MAX, add),
     };
-    // Whatever is an array is cut at its commas.
+    // Arrays are cut at their commas.
     if array
         && let Ok(Value::Array(items)) = read_strict(text)
         && text.len() < CASE_MAX
