@@ -1,4 +1,4 @@
-//! Laws for arbitrary bytes from a client. The fuzzers look for bytes for which it does not; the tests of the
+//! Laws for arbitrary bytes from a client. The fuzzers look for bytes that break a law; the tests of the
 //! service try those that were interesting once (`fuzz/seeds`).
 
 use railhead::contact;
