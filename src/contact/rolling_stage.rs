@@ -7,6 +7,7 @@ use crate::error::SolveError;
 use crate::method::Method;
 use crate::normal_stage::SolvedFootprint;
 use crate::problem::checked_case::CheckedCase;
+use crate::remark::list::Remark;
 use crate::rolling::answer::{MotionAnswer, Skip};
 use crate::rolling::history::plan::HistoryTask;
 use crate::rolling::methods::table::solve as table;
@@ -155,7 +156,12 @@ impl StagedMotion<'_> {
             point.take_resultants(found);
         }
         if self.case.run.wants(Output::Gradients) && point.gradients.is_none() {
-            add_gradients(task, state, self.index, &mut point, self.watch)?;
+            match add_gradients(task, state, self.index, &mut point, self.watch) {
+                Err(SolveError::NotConverged { .. }) => {
+                    point.remarks.push(Remark::GradientsNotConverged {});
+                }
+                other => other?,
+            }
         }
         add_coupling_error(&mut point, self.solved.coupling_error);
         if assembly.is_empty() {

@@ -1,5 +1,6 @@
 //! Derivatives of forces and moment: Kalker's coefficients at rest, and secants of finer answers, each within the stated error.
 
+use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
 use railhead_contact::solution::words::answer::{Gradients, PointSolution};
 use serde_json::{Value, json};
@@ -208,4 +209,23 @@ fn a_history_has_no_gradients() {
     let mut case = good_with("/outputs", json!(["gradients"]));
     case["motion"] = json!({ "history": { "distance_mm": [1.0], "creepage_x": [0.001] } });
     assert_fault(&case, "/outputs", &["gradients", "history"]);
+}
+
+#[test]
+fn forces_are_answered_where_a_solve_for_the_gradients_does_not_converge() {
+    // Newton's method of the paper diverges on one of the motions nearby.
+    let case = json!({
+        "material": { "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 },
+        "friction": { "coefficient": 0.3 },
+        "contact": { "type": "ellipse", "a_mm": 17.93230868023767, "b_mm": 1.3941317008194984 },
+        "load": { "normal_force_n": 60_000 },
+        "motion": { "creepage_x": 0.0, "creepage_y": -6.465087797765299e-4, "spin_per_mm": 1.9395263393295894e-4 },
+        "outputs": ["resultants", "gradients"],
+        "solver": { "method": "liu_hsu", "mesh": { "strips": 8, "cells": 10 } },
+    });
+    let (solution, _) = solve(&case);
+    let point = &solution.patches[0].points[0];
+    assert!(point.gradients.is_none() && point.force_y_n > 0.0);
+    let told = |remark: &RemarkEntry| remark.code == "gradients-not-converged";
+    assert!(solution.remarks.iter().any(told), "{:?}", solution.remarks);
 }

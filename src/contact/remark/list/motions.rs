@@ -29,6 +29,11 @@ macro_rules! motion_remarks {
             advice: "Use the forces with their larger error estimate, or try another mesh or target.",
             detail: "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger".to_owned(),
 
+            /// A solve for the gradients of a motion did not converge.
+            Warning GradientsNotConverged {}
+            advice: "The forces are not affected. Without gradients, take differences between motions.",
+            detail: "a solve for the gradients of this motion did not converge; they are missing".to_owned(),
+
             /// Friction falls so fast with slip that the contact has a second state.
             Warning SeveralSolutions {
                 /// Difference of the two forces relative to the friction limit.
