@@ -1,4 +1,4 @@
-//! Every command with its flags and environment variables.
+//! All commands with their flags and environment variables.
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
@@ -50,7 +50,7 @@ pub(super) enum Anonymous {
 }
 
 impl Anonymous {
-    /// Are requests without a key answered on this address?
+    /// Whether requests without a key are answered on this address.
     #[must_use]
     pub(super) fn on(self, address: SocketAddr) -> bool {
         match self {
@@ -61,7 +61,7 @@ impl Anonymous {
     }
 }
 
-/// Reads an origin: scheme and authority, nothing else.
+/// Parses an origin: scheme and authority.
 pub(super) fn origin(text: &str) -> Result<String, String> {
     let rest = text
         .strip_prefix("https://")
@@ -81,7 +81,7 @@ pub(super) fn origin(text: &str) -> Result<String, String> {
     )
 }
 
-/// Reads an address to listen on.
+/// Parses an address to listen on.
 pub(super) fn address(text: &str) -> Result<SocketAddr, String> {
     text.parse().map_err(|_| {
         "allowed is an IP address with a port, such as `127.0.0.1:8080`, `0.0.0.0:8080` or `[::1]:8080`; names are not looked up"
@@ -89,12 +89,12 @@ pub(super) fn address(text: &str) -> Result<SocketAddr, String> {
     })
 }
 
-/// Reads a label of a key, by the rule for labels of cases.
+/// Parses a label of a key, by the rule for labels of cases.
 pub(super) fn bound_label(text: &str) -> Result<(String, String), String> {
     query::new_label().read(text).map_err(str::to_owned)
 }
 
-/// What one case may use.
+/// Limits of one case.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Solver")]
 pub(super) struct CaseArgs {
@@ -126,12 +126,12 @@ impl CaseArgs {
     }
 }
 
-/// The variable of the data folder.
+/// Environment variable of the data folder.
 pub(super) const DATA_DIR_VARIABLE: &str = "RAILHEAD_DATA_DIR";
-/// The data folder where none is named.
+/// Default data folder.
 pub(super) const DATA_DIR_DEFAULT: &str = "./railhead-data";
 
-/// The data folder of a command that works beside the service.
+/// The data folder of a command that runs beside the service.
 #[derive(Debug, Clone, Args)]
 pub(super) struct DataFolderArgs {
     /// Data folder of the service.
@@ -144,7 +144,7 @@ pub(super) struct DataFolderArgs {
     pub(crate) data_dir: PathBuf,
 }
 
-/// The database of several nodes.
+/// The shared database.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Shared database")]
 pub(super) struct DatabaseArgs {
@@ -176,7 +176,7 @@ pub(super) struct DatabaseArgs {
     pub results: ResultsArgs,
 }
 
-/// The place of large results beside a database.
+/// The location of large results with a shared database.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Shared database")]
 pub(super) struct ResultsArgs {
@@ -199,7 +199,7 @@ pub(super) struct ResultsArgs {
 }
 
 impl ResultsArgs {
-    /// The place, if one is named.
+    /// The location, if given.
     #[must_use]
     pub(super) fn place(&self) -> Option<ResultsPlace> {
         Some(ResultsPlace {
@@ -210,7 +210,7 @@ impl ResultsArgs {
 }
 
 impl DatabaseArgs {
-    /// The database, if one is named.
+    /// The database, if given.
     #[must_use]
     pub(super) fn database(&self) -> Option<Database> {
         Some(Database {
@@ -225,7 +225,7 @@ impl DatabaseArgs {
     }
 }
 
-/// The database that a command is about.
+/// The database of a command.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Shared database")]
 pub(super) struct DatabaseUrlArgs {
@@ -239,7 +239,7 @@ pub(super) struct DatabaseUrlArgs {
     pub database_url: String,
 }
 
-/// What `doctor` looks at.
+/// Settings of `doctor`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct DoctorArgs {
     #[command(flatten)]
@@ -369,7 +369,7 @@ pub(super) struct ServeArgs {
     pub log: LogArgs,
 }
 
-/// How to log.
+/// Settings of the log.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Log and traces")]
 pub(super) struct LogArgs {
@@ -387,7 +387,7 @@ pub(super) struct LogArgs {
 }
 
 impl ServeArgs {
-    /// Workers as asked for, or one less than there are cores.
+    /// Number of workers as given, or one less than the number of cores.
     #[must_use]
     pub(super) fn worker_count(&self) -> usize {
         self.workers.map_or_else(
@@ -396,14 +396,13 @@ impl ServeArgs {
         )
     }
 
-    /// How long running jobs may go on after the signal.
+    /// How long running jobs may continue after a stop signal.
     #[must_use]
     pub(super) fn shutdown_grace(&self) -> Duration {
         Duration::from_secs(u64::from(self.shutdown_grace_s))
     }
 
-    /// How long connections are still accepted after a signal: whoever stops a service at a terminal does not want to
-    /// wait for a load balancer.
+    /// How long connections are accepted after a signal. A stop from a terminal does not wait for load balancers.
     #[must_use]
     pub(super) fn drain_delay(&self, signal: &str) -> Duration {
         match signal {
@@ -421,7 +420,7 @@ pub(super) struct Cli {
     pub command: Command,
 }
 
-/// What can be started.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Serve the HTTP API and solve the submitted jobs.
@@ -495,7 +494,7 @@ pub(super) struct KeysArgs {
     pub action: KeysAction,
 }
 
-/// What can be done with API keys.
+/// Actions on API keys.
 #[derive(Debug, Clone, Subcommand)]
 pub(super) enum KeysAction {
     /// Create a key and print it; it is not shown again.
@@ -567,7 +566,7 @@ pub(super) struct HealthcheckArgs {
     pub listen: SocketAddr,
 }
 
-/// Variables named `RAILHEAD_…` that no command reads: most likely misspelt.
+/// Variables named `RAILHEAD_…` that no command reads; most likely misspelt.
 #[must_use]
 pub(super) fn unknown_variables() -> Vec<String> {
     let command = Cli::command();
@@ -641,7 +640,7 @@ mod tests {
 
     #[test]
     fn every_setting_of_a_service_is_in_the_manual() {
-        // Read and not compiled in: the image is built without the documents.
+        // Read at run time, because the image is built without the documents.
         let manual = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operations.md");
         let manual = std::fs::read_to_string(manual).expect("the manual");
         let command = Cli::command();

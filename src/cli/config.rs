@@ -1,4 +1,4 @@
-//! `railhead config`: prints the settings that `serve` would run with, and where each comes from.
+//! `railhead config`: prints the settings of `serve` and the source of each.
 
 use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
@@ -9,8 +9,8 @@ use crate::cli::commands::ServeArgs;
 /// Printed instead of a secret.
 const MASK: &str = "***";
 
-/// Every setting with its value, its source (`default`, `environment`, `flag`) and its variable, as JSON. The values
-/// of settings that hide their variable's value in the help are secrets and masked.
+/// Every setting with its value, its source (`default`, `environment`, `flag`) and its variable, as JSON. Settings whose
+/// variable is hidden in the help are secrets, whose values are masked.
 pub(super) fn describe(command: &Command, given: &ArgMatches, args: &ServeArgs) -> String {
     let mut settings = Map::new();
     for arg in command.get_arguments() {

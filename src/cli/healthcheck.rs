@@ -1,4 +1,4 @@
-//! `railhead healthcheck`: asks a running service whether it is ready, for containers without other tools.
+//! `railhead healthcheck`: checks that a running service is ready, for containers without other tools.
 
 use std::io::{Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpStream, ToSocketAddrs};
@@ -11,10 +11,10 @@ use crate::cli::commands::HealthcheckArgs;
 
 /// Time limit of each step.
 const STEP_TIMEOUT: Duration = Duration::from_secs(3);
-/// Bytes of the answer that are read: enough for the status line.
+/// Number of bytes of the response that are read, which include the status line.
 const ANSWER_BYTES: u64 = 1024;
 
-/// Asks whether the service is ready; succeeds if the answer is 200.
+/// Checks that the service is ready; succeeds if the status is 200.
 pub(super) fn run(args: &HealthcheckArgs) -> anyhow::Result<ExitCode> {
     let own = || url(args.probe_listen.unwrap_or(args.listen));
     let url = &args.url.clone().unwrap_or_else(own);
@@ -26,8 +26,8 @@ pub(super) fn run(args: &HealthcheckArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Where a service that listens on this address says whether it is ready. One that listens on every address does so on
-/// loopback too.
+/// The URL of the readiness probe of a service that listens on this address. The unspecified address is replaced by the
+/// loopback address.
 fn url(listen: SocketAddr) -> String {
     let mut address = listen;
     match listen.ip() {
@@ -50,7 +50,7 @@ fn parse(url: &str) -> anyhow::Result<(String, String)> {
     if authority.is_empty() || url.contains(|c: char| c.is_whitespace() || c.is_control()) {
         bail!("{url:?} is not a URL");
     }
-    // A colon inside brackets belongs to an IPv6 address, not to a port.
+    // A colon inside brackets belongs to an IPv6 address.
     let has_port = authority.rfind(':') > authority.rfind(']');
     let authority = if has_port {
         authority.to_owned()

@@ -1,4 +1,4 @@
-//! `railhead keys`: creates, lists and revokes the API keys of a data folder or of a database, also while services use it.
+//! `railhead keys`: creates, lists and revokes API keys, also while services run.
 
 use std::process::ExitCode;
 
@@ -63,7 +63,7 @@ async fn act(args: &KeysArgs) -> anyhow::Result<ExitCode> {
     done
 }
 
-/// The labels of a new key, each key once.
+/// The labels of a new key, which must have different keys.
 fn bound_labels(given: &[(String, String)]) -> anyhow::Result<Labels> {
     let labels: Labels = given.iter().cloned().collect();
     if labels.len() < given.len() || labels.len() > BOUND_MAX {
@@ -99,7 +99,7 @@ fn table(keys: &[Key]) -> String {
             key.revoked_at.map_or_else(|| "-".to_owned(), time),
             if key.read_only { "read" } else { "all" },
             labels_text(&key.labels),
-            // Escaped, so that a name cannot send control sequences to the operator's terminal.
+            // Escaped, so that a name cannot send control sequences to the terminal.
             key.name.as_deref().unwrap_or("-").escape_debug()
         )
     }));

@@ -1,20 +1,16 @@
-//! What can be started, and with which settings? Every command, flag and environment variable.
+//! The command line: commands, flags and environment variables.
 //!
-//! | to find | look in |
-//! |---|---|
-//! | a command or flag | [`commands`], [`Options`](crate::jobs::Options), [`HttpOptions`](crate::http::HttpOptions) |
-//! | in which order a service starts and stops | [`serve`] |
+//! [`commands`], [`Options`](crate::jobs::Options) and [`HttpOptions`](crate::http::HttpOptions) declare the flags;
+//! [`serve`] starts and stops a service.
 
 mod backup;
 mod commands;
 mod config;
+#[cfg(feature = "cluster")]
+mod database;
 mod healthcheck;
 mod keys;
-#[cfg(feature = "cluster")]
-mod migrate;
 mod output;
-#[cfg(feature = "cluster")]
-mod relocate;
 mod serve;
 mod solve;
 
@@ -29,7 +25,7 @@ use crate::http;
 #[cfg(not(feature = "cluster"))]
 use crate::jobs::JobsError;
 
-/// Reads the command line, does what it says, and returns the exit code.
+/// Parses the command line, runs the command, and returns the exit code.
 #[must_use]
 pub fn run() -> ExitCode {
     let mut command = Cli::command();
@@ -39,9 +35,9 @@ pub fn run() -> ExitCode {
         Command::Serve(args) => serve::run(&args, Role::Serve),
         Command::Worker(args) => serve::run(&args, Role::Work),
         #[cfg(feature = "cluster")]
-        Command::Migrate(args) => migrate::run(&args),
+        Command::Migrate(args) => database::migrate(&args),
         #[cfg(feature = "cluster")]
-        Command::Doctor(args) => migrate::doctor(&args),
+        Command::Doctor(args) => database::doctor(&args),
         Command::Solve(args) => solve::run(&args),
         Command::Config(args) => match (
             command.find_subcommand("config"),
@@ -51,9 +47,9 @@ pub fn run() -> ExitCode {
             _ => unreachable!("the subcommand was read from these"),
         },
         #[cfg(feature = "cluster")]
-        Command::Move(args) => relocate::run(&args),
+        Command::Move(args) => database::move_folder(&args),
         #[cfg(feature = "cluster")]
-        Command::MoveResults(args) => relocate::run_results(&args),
+        Command::MoveResults(args) => database::move_results(&args),
         #[cfg(not(feature = "cluster"))]
         Command::Migrate(_) | Command::Doctor(_) | Command::Move(_) | Command::MoveResults(_) => {
             Err(JobsError::NotBuilt {

@@ -1,9 +1,9 @@
-//! What the commands print: results to standard output, errors to standard error.
+//! Output of the commands: results to standard output, errors to standard error.
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// Writes to standard output. A closed pipe is not an error: the reader has seen enough.
+/// Writes to standard output. A closed pipe is not an error.
 pub(super) fn print(text: &str) -> anyhow::Result<ExitCode> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{}", text.trim_end()).and_then(|()| out.flush()) {
@@ -12,7 +12,7 @@ pub(super) fn print(text: &str) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// An error and its causes in one line; a cause that the text already contains is left out.
+/// An error and its causes in one line. A cause that the text already contains is omitted.
 pub(super) fn reasons(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain() {
@@ -28,7 +28,7 @@ pub(super) fn reasons(error: &anyhow::Error) -> String {
 
 /// Writes one line to standard error.
 pub(super) fn print_error(text: &str) {
-    // If standard error is closed as well, there is nowhere left to report to.
+    // If standard error is closed too, the error cannot be reported.
     let _ = writeln!(std::io::stderr(), "railhead: {text}");
 }
 

@@ -1,4 +1,4 @@
-//! The runtime of commands that end by themselves.
+//! `railhead serve` and `railhead worker`: start and stop of a service.
 use std::net::SocketAddr;
 use std::process::{ExitCode, exit};
 use std::time::Duration;
@@ -19,7 +19,7 @@ use crate::jobs::{Jobs, Options};
 use crate::otlp::Traces;
 use crate::telemetry;
 
-/// Runs `work` to its end on this thread.
+/// Runs a future to its end on this thread.
 pub(super) fn block_on<T>(work: impl Future<Output = T>) -> anyhow::Result<T> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
@@ -28,27 +28,27 @@ pub(super) fn block_on<T>(work: impl Future<Output = T>) -> anyhow::Result<T> {
     Ok(runtime.block_on(work))
 }
 
-/// How long open requests may take to end once the port is closed, at least and at most.
+/// Minimum and maximum time for open requests to end after the port is closed.
 const REQUESTS_END_WITHIN: [Duration; 2] = [Duration::from_secs(1), Duration::from_secs(5)];
-/// What the steps may take beyond the grace period.
+/// Additional time of the steps after the grace period.
 const BEYOND_GRACE: Duration = Duration::from_secs(5);
-/// What the steps need at least after the port is closed.
+/// Minimum time of the steps after the port is closed.
 const BEYOND_DRAIN: Duration = Duration::from_secs(3);
-/// Kept for the last step: the exit itself.
+/// Time of the last step, the exit.
 const LAST_STEP: Duration = Duration::from_millis(500);
-/// Exit code of a process that was told to stop twice, as shells count a SIGINT.
+/// Exit code of a process that was stopped twice, which shells use for SIGINT.
 const STOPPED_AT_ONCE: i32 = 130;
 
-/// When which step of a stop is over.
+/// The times at which the steps of a stop end.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Schedule {
-    /// The port closes.
+    /// Time at which the port closes.
     pub port_closes: Instant,
-    /// Open requests are cut off.
+    /// Time at which open requests are aborted.
     pub requests_end: Instant,
-    /// Running jobs go back to the queue.
+    /// Time at which running jobs return to the queue.
     pub grace_ends: Instant,
-    /// Waiting for the data folder to close ends.
+    /// Time limit of closing the data folder.
     pub folder_closed: Instant,
     last_moment: Instant,
 }
@@ -69,7 +69,7 @@ impl Schedule {
         }
     }
 
-    /// Ends the process with this exit code at the last moment, from a thread that needs nothing of the async runtime.
+    /// Ends the process with this exit code at the last moment, from a thread outside the async runtime.
     pub(super) fn enforce(self, code: u8) {
         let enforced = std::thread::Builder::new().name("railhead-stop".to_owned());
         let enforced = enforced.spawn(move || {
@@ -96,7 +96,7 @@ impl Signals {
         })
     }
 
-    /// The name of the next one.
+    /// Waits for the next signal and returns its name.
     pub(super) async fn next(&mut self) -> &'static str {
         tokio::select! {
             _ = self.terminate.recv() => "SIGTERM",
@@ -104,7 +104,7 @@ impl Signals {
         }
     }
 
-    /// Ends the process at the next one.
+    /// Ends the process at the next signal.
     pub(super) fn end_at_next(mut self) {
         tokio::spawn(async move {
             let name = self.next().await;
@@ -114,25 +114,26 @@ impl Signals {
     }
 }
 
+/// Minimum number of request threads.
 const REQUEST_THREADS_MIN: usize = 4;
-/// Files that the process opens besides connections: job table, results, logs.
+/// Number of files that the process opens besides connections: job table, results, logs.
 const OTHER_FILES: u64 = 256;
-/// Exit code of a process that ends because it has to be restarted (EX_TEMPFAIL).
+/// Exit code of a process that has to be restarted (EX_TEMPFAIL).
 const START_AGAIN: u8 = 75;
-/// Most connections of the listener for probes.
+/// Maximum number of connections of the listener for probes.
 const PROBE_CONNECTIONS: usize = 64;
 
-/// What a process is for.
+/// The role of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Role {
-    /// It answers requests, and solves if it has workers.
+    /// Answers requests, and solves if it has workers.
     Serve,
-    /// It solves what other nodes accept, and answers probes.
+    /// Solves the jobs that other nodes accept, and answers probes.
     Work,
 }
 
 impl Role {
-    /// Refuses settings that make no sense for it.
+    /// Rejects settings that do not fit the role.
     fn require(self, args: &ServeArgs) -> anyhow::Result<()> {
         let shared = args.database.database_url.is_some();
         match self {
@@ -154,7 +155,7 @@ impl Role {
     }
 }
 
-/// Serves until a signal says stop.
+/// Serves until a signal arrives.
 pub(super) fn run(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     attempt::bound_heap();
     let log = telemetry::start(args.log.log_format, &args.log.log)?;
@@ -171,20 +172,20 @@ pub(super) fn run(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
         .build()
         .context("the async runtime could not be started")?;
     let served = runtime.block_on(serve(args, role));
-    // The data folder is closed; computations that still run are for clients that have been cut off.
+    // The data folder is closed; remaining computations belong to requests that were aborted.
     runtime.shutdown_background();
     // Writes the last log lines.
     drop(log);
     served
 }
 
-/// Threads for requests: one per core, but at least four, so that a blocked one does not hold up all others.
+/// Number of request threads: one per core, but at least four, so that a blocked one does not delay all others.
 fn request_threads() -> usize {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     cores.max(REQUEST_THREADS_MIN)
 }
 
-/// Starts a service, waits until it is to stop, and stops it.
+/// Starts a service, waits for a signal, and stops it.
 async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     role.require(args)?;
     let mut signals = Signals::listen()?;
@@ -222,7 +223,7 @@ async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
         name = signals.next() => name,
         () = jobs.broken().cancelled() => "too many solver threads that do not stop",
         ended = &mut server => {
-            // The listener never ends by itself; if it does the jobs are still handed back.
+            // The listener never ends by itself; if it fails, the jobs still return to the queue.
             jobs.shutdown(args.shutdown_grace()).await;
             ended.context("the listener failed")?;
             return Ok(ExitCode::SUCCESS);
@@ -241,7 +242,7 @@ async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::from(code.max(exit_code(&jobs))))
 }
 
-/// How a service that stops now ends: in good order, or to be started again.
+/// The exit code of a service that stops now.
 fn exit_code(jobs: &Jobs) -> u8 {
     match jobs.broken().is_cancelled() {
         true => START_AGAIN,
@@ -249,7 +250,7 @@ fn exit_code(jobs: &Jobs) -> u8 {
     }
 }
 
-/// Opens the data folder with the settings of the workers.
+/// Opens the data folder.
 async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<Jobs> {
     let options = Options {
         data_dir: args.data_dir.clone(),
@@ -270,7 +271,7 @@ async fn bind(address: SocketAddr) -> anyhow::Result<TcpListener> {
     listener.with_context(|| format!("cannot listen on {address}"))
 }
 
-/// Answers requests until `stop`. Probes with a port of their own are answered until the process ends.
+/// Answers requests until `stop` is cancelled. A separate listener for probes runs until the process ends.
 async fn start_listening(
     args: &ServeArgs,
     role: Role,
@@ -288,7 +289,7 @@ async fn start_listening(
     let probe_address = probe_address.transpose()?;
     let probes_anonymous = match role {
         Role::Serve => probe_address.is_some_and(|address| args.anonymous.on(address)),
-        // They are all that it answers, on both addresses.
+        // On both addresses a worker node answers probes only.
         Role::Work => anonymous && probe_address.is_none_or(|address| args.anonymous.on(address)),
     };
     let [router, probes] = http::routers(
@@ -313,7 +314,7 @@ async fn start_listening(
     Ok(tokio::spawn(http::serve(listener, router, options, stop)))
 }
 
-/// Stops step by step: not ready, port closed, requests ended, jobs handed back, data folder closed.
+/// Stops step by step: not ready, port closed, requests ended, jobs returned, data folder closed.
 async fn stop_service(
     jobs: &Jobs,
     schedule: Schedule,
@@ -323,7 +324,7 @@ async fn stop_service(
     jobs.drain();
     sleep_until(schedule.port_closes).await;
     stop.cancel();
-    // Requests first, for they need the job table; running jobs go on meanwhile.
+    // Requests end first, because they need the job table; running jobs continue in the meantime.
     match timeout_at(schedule.requests_end, &mut server).await {
         Ok(ended) => ended.context("the listener failed")?,
         Err(_) => {
@@ -343,7 +344,7 @@ async fn stop_service(
     Ok(())
 }
 
-/// The limits of requests and the origins of other pages.
+/// The options of the HTTP server, and the allowed origins.
 fn http_options(
     args: &ServeArgs,
     anonymous: bool,
@@ -359,7 +360,7 @@ fn http_options(
         allowed_hosts: args.allowed_host.as_slice().into(),
         ..args.http.clone()
     };
-    // A connection is a file. Many systems allow few at first and more to those who ask.
+    // Each connection is an open file. The soft limit is often lower than the hard limit.
     match rlimit::increase_nofile_limit(u64::MAX) {
         Ok(files) => {
             let most =

@@ -88,8 +88,8 @@ fn read(file: &Path) -> std::io::Result<Vec<u8>> {
     std::fs::read(file)
 }
 
-/// One entry per patch, with the names the API uses: the meshes, and for every motion its mesh and values; what was not computed is
-/// absent.
+/// One entry per patch, with the names of the API: its meshes, and for every motion its mesh and values. Arrays that were
+/// not computed are absent.
 fn fields_json(fields: &Fields) -> Value {
     fields.patches.iter().map(patch_json).collect()
 }

@@ -1,33 +1,29 @@
-//! A copy of a data folder that a service may be using at the same time.
+//! `railhead backup`: copies a data folder, also while a service uses it.
 
 use std::fs::DirBuilder;
 use std::io;
 use std::os::unix::fs::DirBuilderExt;
 use std::path::Path;
 
-use crate::disk_reserve::make_private_folder;
+use crate::data_dir::make_private_folder;
+use crate::data_dir::table_file;
 use crate::error::{JobsError, Result};
-use crate::open_store::table_file;
 use crate::store::Store;
 use crate::store::sqlite::database::SqliteStore;
 use crate::sync::blocking;
 
-/// Copies the jobs and their results into a new folder, from which a service can be started.
+/// Copies jobs and results into a new folder, from which a service can be started.
 ///
-/// The job table first, as it is at one moment, then the results outside it: they never change, and every result that
-/// the copied table names was there before. Only a job that is deleted while the copy is made can lose its result in it.
+/// The job table is copied first, as a snapshot. Results never change, and all results of the snapshot exist already. Only
+/// a job that is deleted during the copy can lose its result.
 ///
 /// # Errors
-/// The folder `to` exists already, or something cannot be read or written.
+/// The folder `to` exists already, or a read or write failed.
 pub async fn backup(data_dir: &Path, to: &Path) -> Result<()> {
-    let failed = |path: &Path, source| JobsError::DataDir {
-        path: path.to_owned(),
-        source,
-    };
     let table = table_file(data_dir);
     let store = SqliteStore::open_existing(&table).await?;
     let made = DirBuilder::new().mode(0o700).create(to);
-    made.map_err(|source| failed(to, source))?;
+    made.map_err(JobsError::at(to))?;
     let copied = store.copy_into(&table_file(to)).await;
     store.close().await;
     copied?;
@@ -37,10 +33,10 @@ pub async fn backup(data_dir: &Path, to: &Path) -> Result<()> {
     }
     let source = from.clone();
     let copied = blocking(move || copy_folder(&source, &to)).await?;
-    copied.map_err(|source| failed(&from, source))
+    copied.map_err(JobsError::at(&from))
 }
 
-/// Copies what is there; what goes away meanwhile is left out.
+/// Copies a folder; files that disappear in the meantime are skipped.
 fn copy_folder(from: &Path, to: &Path) -> io::Result<()> {
     make_private_folder(to)?;
     let entries = match std::fs::read_dir(from) {

@@ -1,9 +1,8 @@
-//! Stored results: blobs outside the job table, in a folder of the data folder or in the object store that comes with a
-//! database.
+//! Results outside the job table, in a folder of the data folder or in an object store.
 //!
-//! Keys are `results/{yyyy}/{mm}/{job}/{lease token}/{name}`, year and month those of the job's submission (UTC). The
-//! lease token in the key makes a late write of a worker that lost its lease harmless. Blobs are written, and
-//! synced to the disk, before the job is called succeeded.
+//! Keys are `results/{yyyy}/{mm}/{job}/{lease token}/{name}`, with year and month of the job's submission (UTC). The lease
+//! token in the key makes a late write of a worker that lost its lease harmless. Results are durable before their job
+//! succeeds.
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path as FilePath, PathBuf};
@@ -17,49 +16,72 @@ use object_store::path::Path;
 use object_store::{GetOptions, ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
-use crate::codec::fields::{Header, PREFIX_BYTES, header_length};
+use crate::codec::fields::{Header, PREFIX_BYTES};
 use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
 use crate::store::Claim;
 use crate::sync::blocking;
 use railhead_contact::solution::words::answer::PatchFields;
 
-/// The folder of the data folder in which results lie.
+/// The folder of the data folder that contains results.
 pub(crate) const ROOT: &str = "results";
 
-/// Bytes that one request reads of a solution whose size is not known; larger ones take three. Chosen by judgement: solutions of single
-/// motions have some kilobytes, those of sweeps pass this at a few hundred motions.
+/// Bytes that the first request for a solution reads; larger solutions take three requests. Chosen by judgement: solutions
+/// of single motions have some kilobytes, those of sweeps exceed this at a few hundred motions.
 const READ_AT_ONCE: u64 = 256 << 10;
 
-/// Bytes that the first request reads of fields: their header, which is rarely longer. Chosen by judgement; a longer one takes another
-/// request.
+/// Bytes that the first request for fields reads: usually the whole header. Chosen by judgement; a longer header takes
+/// another request.
 const FIELDS_AT_ONCE: u64 = 16 << 10;
 
 const SOLUTION: &str = "solution.json";
 
 const FIELDS: &str = "fields.bin";
 
-/// The answers of a chunk of rows, in place of fields: other programs know the file by its name.
+/// Name of the answers of a chunk of rows, which other programs read too.
 const ROWS: &str = "rows.parquet";
 
-/// The place where results are kept.
+/// Store of results.
 #[derive(Debug, Clone)]
 pub struct Blobs {
     pub(crate) objects: Arc<dyn ObjectStore>,
-    /// The folder, if it is one.
+    /// The local folder, if it is one.
     root: Option<PathBuf>,
 }
 
+/// Number of results that were copied to another store.
+#[cfg(feature = "cluster")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Copied {
+    /// Number of copied results.
+    pub results: u64,
+    /// Total size of these results in bytes.
+    pub bytes: u64,
+    /// Number of missing results, whose jobs stay without a result.
+    pub missing: u64,
+}
+
+#[cfg(feature = "cluster")]
+impl Copied {
+    /// Adds the outcome of [`Blobs::copy`].
+    pub(crate) fn add(&mut self, copied: Option<u64>) {
+        match copied {
+            Some(bytes) => {
+                self.results += 1;
+                self.bytes += bytes;
+            }
+            None => self.missing += 1,
+        }
+    }
+}
+
 impl Blobs {
-    /// Keeps results below `root`, which is created if it is not there.
+    /// Opens the store below the folder `root`, which is created if it does not exist.
     ///
     /// # Errors
     /// The folder cannot be created or read.
     pub fn open(root: &FilePath) -> Result<Blobs> {
-        std::fs::create_dir_all(root).map_err(|source| JobsError::DataDir {
-            path: root.to_owned(),
-            source,
-        })?;
+        std::fs::create_dir_all(root).map_err(JobsError::at(root))?;
         let objects = LocalFileSystem::new_with_prefix(root)?.with_fsync(true);
         Ok(Blobs {
             objects: Arc::new(objects),
@@ -67,17 +89,17 @@ impl Blobs {
         })
     }
 
-    /// Keeps results in an object store, which is the folder `root` if there is one.
+    /// A store of results in an object store; `root` is its folder if it is local.
     #[must_use]
     pub fn at(objects: Arc<dyn ObjectStore>, root: Option<PathBuf>) -> Blobs {
         Blobs { objects, root }
     }
 
-    /// Stores a result and returns its key; durable once it returns. For a slice of a sweep, `{lease token}-{number of the slice}` stands in
-    /// place of the lease token.
+    /// Stores a result and returns its key; durable once it returns. For a slice of a sweep, `{lease token}-{number of the
+    /// slice}` replaces the lease token.
     ///
     /// # Errors
-    /// The result could not be written.
+    /// The write failed.
     pub async fn put(
         &self,
         claim: &Claim,
@@ -102,10 +124,10 @@ impl Blobs {
         Ok(folder.to_string())
     }
 
-    /// Reads a stored solution as JSON text.
+    /// Reads a solution as JSON text.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// The read failed.
     pub async fn solution(&self, folder: &str) -> Result<Bytes> {
         let path = Path::from(folder).join(SOLUTION);
         Ok(self.objects.get(&path).await?.bytes().await?)
@@ -114,22 +136,22 @@ impl Blobs {
     /// Reads the answers of a chunk of rows.
     ///
     /// # Errors
-    /// They cannot be read.
+    /// The read failed.
     pub async fn chunk_answers(&self, folder: &str) -> Result<Bytes> {
         let path = Path::from(folder).join(ROWS);
         Ok(self.objects.get(&path).await?.bytes().await?)
     }
 
-    /// Size of a stored solution, and its text without the closing brace, read while it is taken.
+    /// Opens a solution: its size, and a stream of its text without the closing brace.
     ///
     /// # Errors
-    /// It cannot be read, or is no object.
+    /// The read failed, or the solution is no object.
     pub async fn open_solution(
         &self,
         folder: &str,
     ) -> Result<(usize, BoxStream<'static, Result<Bytes>>)> {
         let path = Path::from(folder).join(SOLUTION);
-        // One request brings all of a solution that is not large, and the size of one that is.
+        // One request reads a small solution, and the size of a large one.
         let first = GetOptions {
             range: Some((0..READ_AT_ONCE).into()),
             ..GetOptions::default()
@@ -159,10 +181,10 @@ impl Blobs {
         Ok((bytes, pieces.map_err(JobsError::from).boxed()))
     }
 
-    /// Reads a whole stored result.
+    /// Reads a whole result.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// The read failed.
     pub async fn whole(&self, folder: &str) -> Result<EncodedResult> {
         let solution = self.solution(folder).await?;
         let path = Path::from(folder).join(FIELDS);
@@ -174,7 +196,7 @@ impl Blobs {
         Ok(EncodedResult { solution, fields })
     }
 
-    /// Reads the cells of one patch, with the values of one motion or of all of them, and nothing else.
+    /// Reads the cells of one patch, with the values of one motion or of all motions.
     ///
     /// # Errors
     /// There is no such motion, or the fields cannot be read.
@@ -187,16 +209,14 @@ impl Blobs {
         let path = Path::from(folder).join(FIELDS);
         let damaged = |error: String| JobsError::Damaged(format!("{path}: {error}"));
         let start = self.objects.get_range(&path, 0..FIELDS_AT_ONCE).await?;
-        let body = PREFIX_BYTES
-            + header_length(&start[..start.len().min(PREFIX_BYTES)]).map_err(damaged)?;
-        let header = match start.get(PREFIX_BYTES..body) {
-            Some(header) => Header::read(header),
+        let (header, body) = Header::of_file(&start).map_err(damaged)?;
+        let header = match header {
+            Some(header) => header,
             None => {
                 let range = PREFIX_BYTES as u64..body as u64;
-                Header::read(&self.objects.get_range(&path, range).await?)
+                Header::read(&self.objects.get_range(&path, range).await?).map_err(damaged)?
             }
         };
-        let header = header.map_err(damaged)?;
         let body = body as u64;
         let points = header.points(patch);
         if point.is_some_and(|point| point >= points) {
@@ -208,15 +228,15 @@ impl Blobs {
             .map(|range| range.start + body..range.end + body)
             .collect();
         let pieces = self.objects.get_ranges(&path, &ranges).await?;
-        // Decompression is arithmetic; it stays off the threads that answer requests.
+        // Decompression takes CPU time, so it runs outside the request threads.
         let decoded = blocking(move || header.decode(patch, point, &pieces.concat()));
         decoded.await?.map_err(damaged)
     }
 
-    /// Writes so many bytes and removes them again.
+    /// Writes and removes an object of this size.
     ///
     /// # Errors
-    /// They could not be written.
+    /// The write failed.
     pub(crate) async fn try_write(&self, bytes: usize) -> Result<()> {
         let path = Path::from(ROOT).join(format!("probe-{}", Uuid::now_v7()));
         let written = self.objects.put(&path, vec![0; bytes].into()).await;
@@ -224,14 +244,14 @@ impl Blobs {
         Ok(self.objects.delete(&path).await?)
     }
 
-    /// Copies the result under a key to another place, where it has the same key; its bytes, or `None` if it is not there.
+    /// Copies the result with this key to another store; returns its size in bytes, or `None` if it does not exist.
     ///
     /// # Errors
-    /// It cannot be read or written.
+    /// A read or write failed.
     pub async fn copy(&self, key: &str, to: &Blobs) -> Result<Option<u64>> {
         let folder = Path::from(key);
         let mut bytes = 0;
-        // The solution last, as it is written.
+        // The solution last, as in `put`.
         for name in [FIELDS, ROWS, SOLUTION] {
             let path = folder.clone().join(name);
             let body = match self.objects.get(&path).await {
@@ -247,10 +267,10 @@ impl Blobs {
         Ok(Some(bytes))
     }
 
-    /// Removes the result under a key; one that is gone already is no error.
+    /// Removes the result with this key; no error if it does not exist.
     ///
     /// # Errors
-    /// Something could not be removed.
+    /// The removal failed.
     pub async fn remove(&self, key: &str) -> Result<()> {
         let folder = Path::from(key);
         for name in [SOLUTION, FIELDS, ROWS] {
@@ -262,8 +282,8 @@ impl Blobs {
         self.scrub(&folder).await
     }
 
-    /// Removes an emptied local folder with what a killed process may have left half-written in it, which the blob
-    /// store does not show, and the folder of its job once that is empty.
+    /// Removes a local folder with partial files of a killed process, which the object store does not list, and the folder
+    /// of the job if it is empty.
     async fn scrub(&self, folder: &Path) -> Result<()> {
         let Some(root) = &self.root else {
             return Ok(());
@@ -271,32 +291,28 @@ impl Blobs {
         let path = root.join(folder.as_ref());
         match tokio::fs::remove_dir_all(&path).await {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                return Err(JobsError::DataDir { path, source });
+                return Err(JobsError::at(&path)(source));
             }
             _ => {}
         }
         if let Some(job) = path.parent() {
-            // It stays as long as another attempt lies in it.
+            // Fails while it contains another attempt.
             let _ = tokio::fs::remove_dir(job).await;
         }
         Ok(())
     }
 
-    /// Keeps what was just written from everybody else on this machine.
+    /// Restricts access to new local files to the owner.
     async fn make_private(&self, folder: &Path) -> Result<()> {
         let Some(root) = &self.root else {
             return Ok(());
         };
         let path = root.join(folder.as_ref());
-        let failed = |source| JobsError::DataDir {
-            path: path.clone(),
-            source,
-        };
         for name in [SOLUTION, FIELDS, ROWS] {
             let mode = Permissions::from_mode(0o600);
             match tokio::fs::set_permissions(path.join(name), mode).await {
                 Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
-                    return Err(failed(source));
+                    return Err(JobsError::at(&path)(source));
                 }
                 _ => {}
             }
@@ -305,7 +321,7 @@ impl Blobs {
     }
 }
 
-/// Where everything stored for a job lies.
+/// The folder of the results of a job.
 fn job_folder(id: Uuid) -> Path {
     let seconds = id.get_timestamp().map_or(0, |time| time.to_unix().0);
     let time = i64::try_from(seconds)
@@ -323,7 +339,7 @@ fn job_folder(id: Uuid) -> Path {
 }
 
 impl Blobs {
-    /// Everything that is stored, in the order of the keys: the job, the key, and when it was written, in epoch milliseconds.
+    /// Lists all results in the order of their keys: job, key, and time of the write in epoch milliseconds.
     pub fn listed(&self) -> BoxStream<'static, Result<(Uuid, String, i64)>> {
         let listed = self.objects.list(Some(&Path::from(ROOT)));
         let read = listed
@@ -340,10 +356,10 @@ impl Blobs {
         read.boxed()
     }
 
-    /// The keys of everything that is stored, job by job, month by month.
+    /// The keys of all results of a month, by job.
     ///
     /// # Errors
-    /// The store cannot be listed.
+    /// Listing failed.
     pub async fn keys(&self, month: &Path) -> Result<Vec<(Uuid, String)>> {
         let mut keys = Vec::new();
         for job in self.below(month).await? {
@@ -356,10 +372,10 @@ impl Blobs {
         Ok(keys)
     }
 
-    /// The months in which something is stored.
+    /// The months that have results.
     ///
     /// # Errors
-    /// The store cannot be listed.
+    /// Listing failed.
     pub async fn months(&self) -> Result<Vec<Path>> {
         let mut months = Vec::new();
         for year in self.below(&Path::from(ROOT)).await? {

@@ -1,4 +1,4 @@
-//! The clocks of the service: those of the system, or those that a test sets.
+//! Wall clock and steady clock of the service, of the system or of a test.
 use std::fmt;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use crate::sync::lock;
 
-/// A wall clock, and beside it a steady clock, which is never set. Clones show the same times.
+/// A wall clock and a steady clock, which is never set. Clones share the clocks.
 #[derive(Clone)]
 pub struct Clock {
     wall: Arc<dyn Fn() -> i64 + Send + Sync>,
@@ -14,7 +14,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// The system's clocks.
+    /// The clocks of the system.
     #[must_use]
     pub fn system() -> Clock {
         let start = Instant::now();
@@ -26,7 +26,7 @@ impl Clock {
         }
     }
 
-    /// A clock that shows what `now_ms` says, in epoch milliseconds; time passes as it says.
+    /// Both clocks return `now_ms`, in epoch milliseconds.
     #[must_use]
     pub fn new(now_ms: impl Fn() -> i64 + Send + Sync + 'static) -> Clock {
         let wall: Arc<dyn Fn() -> i64 + Send + Sync> = Arc::new(now_ms);
@@ -36,7 +36,7 @@ impl Clock {
         }
     }
 
-    /// A wall clock that shows what `now_ms` says, beside the steady clock of the system: as when the wall clock is set.
+    /// The wall clock returns `now_ms`, and the steady clock is that of the system, as if the wall clock were set.
     #[must_use]
     pub fn that_is_set(now_ms: impl Fn() -> i64 + Send + Sync + 'static) -> Clock {
         Clock {
@@ -45,7 +45,7 @@ impl Clock {
         }
     }
 
-    /// The same clocks, the wall clock ahead by what `offset_ms` says at the time.
+    /// The same clocks with the variable offset `offset_ms` of the wall clock.
     #[must_use]
     pub fn ahead(self, offset_ms: Arc<AtomicI64>) -> Clock {
         let wall = self.wall;
@@ -55,13 +55,13 @@ impl Clock {
         }
     }
 
-    /// Epoch milliseconds.
+    /// The time of the wall clock, epoch milliseconds.
     #[must_use]
     pub fn now_ms(&self) -> i64 {
         (self.wall)()
     }
 
-    /// Milliseconds since some moment, whatever becomes of the wall clock.
+    /// The time of the steady clock in ms, since an arbitrary moment.
     #[must_use]
     pub fn steady_ms(&self) -> i64 {
         (self.steady)()
@@ -74,31 +74,31 @@ impl fmt::Debug for Clock {
     }
 }
 
-/// A smaller difference between the clocks, in ms, is no leap.
+/// Minimum change of the difference between the clocks that counts as a jump, in ms.
 const LEAP_MS: i64 = 60_000;
 
-/// The steps of the wall clock, as seen so far.
+/// Detects jumps of the wall clock.
 #[derive(Debug, Default)]
 pub(crate) struct ClockSteps(Mutex<Seen>);
 
 #[derive(Debug, Default)]
 struct Seen {
-    /// Wall clock less steady clock when they were read last.
+    /// Difference of wall clock and steady clock at the last measurement.
     offset: Option<i64>,
     leap: ClockStep,
 }
 
-/// How far the wall clock is ahead.
+/// Offset of the wall clock after jumps.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct ClockStep {
-    /// All leaps together, in ms; 0: there was none, or it was undone.
+    /// Sum of the jumps forward in ms; 0 if there was none, or it was undone.
     pub(crate) ms: i64,
-    /// The wall clock after the last of them.
+    /// Wall clock after the last jump.
     pub(crate) at: i64,
 }
 
 impl ClockStep {
-    /// The present for something that began at a time, both in epoch milliseconds.
+    /// The current time to compare with `began`: without the jump if `began` precedes it. Both in epoch milliseconds.
     pub(crate) fn now_for(self, began: i64, now: i64) -> i64 {
         if began < self.at {
             now.saturating_sub(self.ms)
@@ -109,7 +109,7 @@ impl ClockStep {
 }
 
 impl ClockSteps {
-    /// Reads the clocks and notes whether the wall clock was set.
+    /// Reads the clocks and records a jump of the wall clock.
     pub(crate) fn measure(&self, clock: &Clock) -> ClockStep {
         let mut seen = lock(&self.0);
         let wall = clock.now_ms();

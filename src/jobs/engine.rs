@@ -1,4 +1,4 @@
-//! What the workers do with a case: check it, solve it. Production uses `contact`; tests may put in their own.
+//! The functions that check and solve a case: those of `contact`, or those of a test.
 
 use std::fmt;
 use std::ops::Range;
@@ -16,41 +16,41 @@ use railhead_contact::slices::slices;
 use railhead_contact::solution::words::answer::{Fields, Solution};
 use railhead_contact::solve_slice;
 
-/// Checks a case against limits, with pairs of cross-sections that were read before.
+/// Checks a case against limits, with a cache of parsed profile pairs.
 pub type Check =
     dyn Fn(&KnownPair, &Value, &Limits) -> Result<CheckedCase, CaseError> + Send + Sync;
 
-/// Where a checked case is cut: ranges of motions, one after the other.
+/// Divides a checked case into slices: consecutive ranges of motions.
 pub type Slices = dyn Fn(&CheckedCase) -> Vec<Range<usize>> + Send + Sync;
 
-/// Solves one of these ranges of a checked case under a monitor.
+/// Solves a slice of a checked case.
 pub type Solve = dyn Fn(&CheckedCase, Range<usize>, &dyn Monitor) -> Result<(Solution, Fields), SolveError>
     + Send
     + Sync;
 
-/// How a case becomes an answer.
+/// The functions that check and solve a case.
 #[derive(Clone)]
 pub struct Engine {
-    /// The first step, done at submission and again before solving.
+    /// Called at submission and again before solving.
     pub check: Arc<Check>,
-    /// Where the second step is cut, by the case alone.
+    /// Depends on the case alone.
     pub slices: Arc<Slices>,
-    /// The second step, done on a solver thread, slice by slice.
+    /// Called on a solver thread for each slice.
     pub solve: Arc<Solve>,
-    /// What all solver threads share.
+    /// Mesh operators that all solver threads share.
     pub operators: Arc<OperatorStore>,
-    /// Pairs of cross-sections that were read before, for all checks.
+    /// Cache of parsed profile pairs for all checks.
     pub known: Arc<KnownPair>,
 }
 
 impl Engine {
-    /// The real physics, with operators kept in a store of the usual size.
+    /// The engine of `contact`, with an operator store of the default size.
     #[must_use]
     pub fn contact() -> Engine {
         Engine::with_operators(OperatorStore::default())
     }
 
-    /// The real physics with this store.
+    /// The engine of `contact` with this operator store.
     #[must_use]
     pub fn with_operators(operators: OperatorStore) -> Engine {
         let operators = Arc::new(operators);
@@ -69,7 +69,7 @@ impl Engine {
     /// Solves a checked case, slice by slice.
     ///
     /// # Errors
-    /// Those of the solver.
+    /// Errors of the solver.
     pub fn solve_whole(
         &self,
         checked: &CheckedCase,
@@ -86,7 +86,7 @@ impl Engine {
         whole.ok_or(SolveError::Cancelled)
     }
 
-    /// The same with another solver, which solves every case at once.
+    /// The same engine with another solver, which solves each case as a single slice.
     #[must_use]
     pub fn solving<F>(self, solve: F) -> Engine
     where

@@ -1,8 +1,8 @@
-//! When are two submitted cases the same? When their JSON values are, whatever the order of their members.
+//! Digests of JSON values, which do not depend on the order of members.
 
 use serde_json::Value;
 
-/// BLAKE3 digest of a JSON value; members of objects are taken in sorted order.
+/// BLAKE3 digest of a JSON value. Members of objects are taken in sorted order.
 #[must_use]
 pub fn digest(case: &Value) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
@@ -10,7 +10,7 @@ pub fn digest(case: &Value) -> [u8; 32] {
     *hasher.finalize().as_bytes()
 }
 
-/// Feeds one value, each part led by a letter for its kind and its length, so that no two values read alike.
+/// Hashes one value. A letter for the type and the length precede each part, so that different values differ in their bytes.
 fn feed(hasher: &mut blake3::Hasher, value: &Value) {
     match value {
         Value::Null => feed_part(hasher, b'n', b""),

@@ -1,32 +1,30 @@
-//! API keys: which tenant a request belongs to.
+//! API keys, which assign requests to tenants.
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::clock::Clock;
+use crate::data_dir::table_file;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
-use crate::model::{Key, Labels, MARK, is_tenant};
-use crate::open_store::{open_beside, open_shared, table_file};
+use crate::model::{KEY_PREFIX, Key, Labels, is_tenant};
 use crate::store::Store;
+use crate::store::open::{open_beside, open_shared};
 use crate::sync::lock;
 
-/// The keys of a data folder, also beside a running service.
+/// The keys of a data folder or database; also usable while a service runs.
 #[derive(Debug)]
 pub struct Keyring {
     store: Arc<dyn Store>,
 }
 
 impl Keyring {
-    /// Opens the keys of a data folder. The folder must be there; a new one gets its job table.
+    /// Opens the keys of an existing data folder, whose job table is created if necessary.
     ///
     /// # Errors
-    /// There is no such folder, or it cannot be used.
+    /// The folder does not exist or cannot be used.
     pub async fn open(data_dir: &Path) -> Result<Keyring> {
-        std::fs::read_dir(data_dir).map_err(|source| JobsError::DataDir {
-            path: data_dir.to_owned(),
-            source,
-        })?;
+        std::fs::read_dir(data_dir).map_err(JobsError::at(data_dir))?;
         let store = open_beside(data_dir).await?;
         Ok(Keyring { store })
     }
@@ -34,22 +32,22 @@ impl Keyring {
     /// Opens the keys in a database.
     ///
     /// # Errors
-    /// It cannot be reached, has no job table, or one of another version.
+    /// The database cannot be reached, has no job table, or one of another version.
     pub async fn open_shared(url: &str) -> Result<Keyring> {
         let store = open_shared(url).await?;
         Ok(Keyring { store })
     }
 
-    /// Is this the data folder of a service?
+    /// Whether this is the data folder of a service.
     #[must_use]
     pub fn is_there(data_dir: &Path) -> bool {
         table_file(data_dir).is_file()
     }
 
-    /// Makes a key of a tenant. The secret, returned second, is shown this one time and kept nowhere.
+    /// Creates a key of a tenant and returns it with its secret, which is not stored.
     ///
     /// # Errors
-    /// [`JobsError::BadTenant`], no randomness, or a failed database.
+    /// [`JobsError::BadTenant`], no source of randomness, or a failed database.
     pub async fn create(
         &self,
         tenant: &str,
@@ -66,7 +64,7 @@ impl Keyring {
             .and_then(|()| getrandom::fill(&mut secret))
             .map_err(|error| JobsError::Damaged(format!("no randomness: {error}")))?;
         let id = hex(&id);
-        let text = format!("{MARK}{id}_{}", hex(&secret));
+        let text = format!("{KEY_PREFIX}{id}_{}", hex(&secret));
         let key = Key {
             id,
             hash: blake3::hash(text.as_bytes()),
@@ -81,7 +79,7 @@ impl Keyring {
         Ok((key, text))
     }
 
-    /// All keys, oldest first, the revoked ones included.
+    /// Lists all keys, oldest first, including revoked ones.
     ///
     /// # Errors
     /// The database failed.
@@ -89,7 +87,7 @@ impl Keyring {
         Ok(self.store.keys().await?)
     }
 
-    /// Revokes a key by its id; `None` if there is none.
+    /// Revokes the key with this id; `None` if it does not exist.
     ///
     /// # Errors
     /// The database failed.
@@ -97,29 +95,24 @@ impl Keyring {
         Ok(self.store.revoke_key(id, Clock::system().now_ms()).await?)
     }
 
-    /// Closes the data folder.
+    /// Closes the job table.
     pub async fn close(self) {
         self.store.close().await;
     }
 }
 
 fn hex(bytes: &[u8]) -> String {
-    use std::fmt::Write;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// How long a valid key is not read again; a revoked one stops working within this time.
+/// How long a valid key is cached; a revoked key stops working within this time.
 const TRUSTED_FOR: Duration = Duration::from_secs(1);
 
-/// Keys remembered at most.
+/// Maximum number of cached keys.
 const REMEMBERED: usize = 4096;
 
 impl Jobs {
-    /// The key that `text` is, if it was found a moment ago.
+    /// The key with this text, if it is cached.
     #[must_use]
     pub fn remembered_key(&self, text: &str) -> Option<Key> {
         let id = id_of(text)?;
@@ -129,7 +122,7 @@ impl Jobs {
         good.then(|| key.clone())
     }
 
-    /// The key that `text` is, if it is one that is not revoked. Hashes are compared in constant time.
+    /// The key with this text, unless it is unknown or revoked. Hashes are compared in constant time.
     ///
     /// # Errors
     /// The database failed.
@@ -143,7 +136,7 @@ impl Jobs {
         {
             return Ok((key.hash == hash).then(|| key.clone()));
         }
-        // Taken before the read: a key that is revoked meanwhile is not trusted for longer.
+        // Taken before the read, so that a key that is revoked meanwhile is not cached for longer.
         let now = Instant::now();
         let found = self.shared.store.key(id).await?;
         let good = found.filter(|key| key.hash == hash && key.revoked_at.is_none());
@@ -162,7 +155,7 @@ impl Jobs {
         Ok(good)
     }
 
-    /// Is there any key that is not revoked?
+    /// Whether there is a key that is not revoked.
     ///
     /// # Errors
     /// The database failed.
@@ -172,8 +165,8 @@ impl Jobs {
     }
 }
 
-/// The part of a key that is no secret.
+/// The public part of a key.
 fn id_of(text: &str) -> Option<&str> {
-    let (id, _) = text.strip_prefix(MARK)?.split_once('_')?;
+    let (id, _) = text.strip_prefix(KEY_PREFIX)?.split_once('_')?;
     Some(id)
 }

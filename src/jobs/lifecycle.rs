@@ -1,8 +1,5 @@
-//! How [`Jobs`] is opened, started and stopped.
+//! Opening, starting and stopping of [`Jobs`].
 
-use std::fs::{File, TryLockError};
-use std::os::unix::fs::OpenOptionsExt;
-use std::path::Path;
 use std::sync::atomic::{AtomicI64, AtomicUsize};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::available_parallelism;
@@ -19,32 +16,30 @@ use crate::attempts::attempt::AllLeases;
 use crate::attempts::fair_scheduler::FairScheduler;
 use crate::blobs::Blobs;
 use crate::clock::ClockSteps;
-use crate::disk_reserve::{self, make_private_folder};
+use crate::data_dir::{self, lock_folder, note_closed};
 use crate::engine::Engine;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::maintenance;
 use crate::metrics::Metrics;
 use crate::model::{ANONYMOUS, Kind};
-use crate::open_store::{note_closed, open_for_service};
 use crate::options::Options;
-use crate::recent_reads::RecentReads;
 use crate::result_place::settle::settle;
-use crate::shared::{Shared, UnfinishedBatches};
-use crate::staged_bytes::StagedBytes;
+use crate::shared::{Shared, StagedBytes, UnfinishedBatches};
 use crate::storage_fault::StorageFaults;
+use crate::store::open::open_for_service;
 use crate::store::{Node, Store};
 use crate::sync::lock;
+use crate::work::RecentReads;
 use crate::worker::pool::Worker;
 
-/// How long a shutdown waits for workers that were told to stop.
+/// How long a shutdown waits for workers after it has stopped their solvers.
 const STOPPED_WITHIN: Duration = Duration::from_secs(10);
 
 impl Jobs {
-    /// Opens a data folder: locks it, makes the job table or asks for its form, and puts the `running` jobs of a dead
-    /// process back into the queue (or ends them, if their attempts are used up). With a database the folder is for
-    /// batches that are being received, and running jobs are those of other processes. Nothing is solved before
-    /// [`Jobs::start`].
+    /// Opens a data folder: locks it, creates or checks the job table, and returns the `running` jobs of a crashed process
+    /// to the queue, or ends them if their attempts are used up. With a database the folder only holds batches that are
+    /// being received, and running jobs belong to other processes. Nothing is solved before [`Jobs::start`].
     ///
     /// # Errors
     /// The folder is in use by another process, or cannot be used.
@@ -117,33 +112,32 @@ impl Jobs {
             jobs.shared.show_node(cluster).await?;
         }
         match jobs.shared.recover().await {
-            // What can be read is served; the rest is done once the disk accepts writes again.
+            // The service starts read-only; recovery is repeated until the disk accepts writes.
             Err(error) if error.storage_fault().is_some() => {
                 tracing::error!(%error, "the disk rejects writes; the service starts read-only");
             }
             recovered => {
                 recovered?;
-                disk_reserve::keep(&jobs.shared.options.data_dir);
+                data_dir::keep_reserve(&jobs.shared.options.data_dir);
             }
         }
         Ok(jobs)
     }
 
-    /// Starts the workers, the reaper of expired leases, the sweeps of orphaned results and of expired jobs, and the
-    /// look-out for deadlines.
+    /// Starts the workers and the periodic tasks: reaper of expired leases, deadlines, expiry and sweep of orphaned results.
     ///
     /// # Errors
     /// A solver thread could not be started.
     pub fn start(&self) -> Result<()> {
         let workers = self.shared.options.workers;
-        // A process without workers has no spare one either.
+        // A process without workers has no spare worker either.
         let threads = if workers == 0 { 0 } else { workers + 1 };
         for number in 0..threads {
             let mut worker = self.worker(&format!("solver-{number}"))?;
             worker.spare = number == workers;
             let runs = self.shared.tasks.track_future(worker.run());
             let runtime = Handle::current();
-            // A thread of its own may wait for the disk of the embedded table.
+            // A separate thread may block on the disk of the embedded table.
             std::thread::Builder::new()
                 .name(format!("worker-{number}"))
                 .spawn(move || runtime.block_on(runs))
@@ -153,7 +147,7 @@ impl Jobs {
         Ok(())
     }
 
-    /// One worker that is not part of the pool; its [`step`](Worker::step) is called by whoever holds it.
+    /// A worker that is not part of the pool; the caller calls its [`step`](Worker::step).
     ///
     /// # Errors
     /// Its thread could not be started.
@@ -161,18 +155,18 @@ impl Jobs {
         Worker::new(self.shared.clone(), name)
     }
 
-    /// Set when the process can do no better than end, in good order: too many solver threads do not stop.
+    /// Cancelled when the process should shut down because too many solver threads were abandoned.
     #[must_use]
     pub fn broken(&self) -> &CancellationToken {
         &self.shared.broken
     }
 
-    /// Begins to drain: the service is not ready, nothing is claimed, waiting calls return. Running jobs go on.
+    /// Begins to drain: the service is not ready, nothing is claimed, waiting calls return. Running jobs continue.
     pub fn drain(&self) {
         self.shared.draining.cancel();
     }
 
-    /// Stops claiming, gives running jobs `grace` to end, hands the rest back to the queue uncounted, and closes.
+    /// Stops claiming, gives running jobs `grace` to end, returns the others to the queue without counting the attempt, and closes.
     pub async fn shutdown(&self, grace: Duration) {
         self.drain();
         self.shared.tasks.close();
@@ -188,7 +182,7 @@ impl Jobs {
             }
         }
         if let Some(cluster) = self.shared.store.cluster() {
-            // Who does not say so is forgotten a moment later.
+            // Without this the other nodes notice the absence a moment later.
             let _ = timeout(STOPPED_WITHIN, cluster.leave(self.shared.node.id)).await;
         }
         self.shared.store.close().await;
@@ -196,13 +190,13 @@ impl Jobs {
             note_closed(&self.shared.options.data_dir);
         }
         if let Some(held) = lock(&self.shared.lock).take() {
-            // A program that is being started has a copy of the file for a moment, so closing it does not free the lock.
+            // Closing the file does not free the lock if a child process that is being started still has a copy of it.
             let _ = held.unlock();
         }
     }
 }
 
-/// The place of large results: a folder of the data folder, or what all nodes of a database have in common.
+/// Opens the location of large results: a folder in the data folder, or the location that all nodes of a database share.
 async fn open_blobs(store: &dyn Store, options: &Options, metrics: &Metrics) -> Result<Blobs> {
     match (store.cluster(), &options.results) {
         (Some(cluster), place) => {
@@ -213,28 +207,5 @@ async fn open_blobs(store: &dyn Store, options: &Options, metrics: &Metrics) -> 
             "--results-url requires --database-url; without a database, results are in the data folder, which `railhead backup` copies"
                 .to_owned(),
         )),
-    }
-}
-
-/// Creates the data folder if needed and takes it for this process alone. The system frees the lock when the process
-/// ends, however it ends.
-pub(crate) fn lock_folder(data_dir: &Path) -> Result<File> {
-    let failed = |path: &Path, source| JobsError::DataDir {
-        path: path.to_owned(),
-        source,
-    };
-    make_private_folder(data_dir).map_err(|source| failed(data_dir, source))?;
-    let path = data_dir.join("lock");
-    let file = File::options()
-        .create(true)
-        .truncate(false)
-        .write(true)
-        .mode(0o600)
-        .open(&path)
-        .map_err(|source| failed(&path, source))?;
-    match file.try_lock() {
-        Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(JobsError::DataDirInUse(data_dir.to_owned())),
-        Err(TryLockError::Error(source)) => Err(failed(&path, source)),
     }
 }

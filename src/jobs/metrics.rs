@@ -1,5 +1,4 @@
-//! Metrics of jobs for the operator. Labels have few values, all known beforehand: never an id, never a name
-//! that a client chose.
+//! Prometheus metrics of jobs. Labels have few, fixed values: never ids or names chosen by clients.
 
 use std::sync::atomic::AtomicU64;
 
@@ -27,7 +26,7 @@ const ITERATIONS: [f64; 9] = [2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0, 100.0, 200
 /// A label with its value.
 type Label = [(&'static str, &'static str); 1];
 
-/// A solver at work.
+/// Counts a busy worker until it is dropped.
 #[derive(Debug)]
 pub(crate) struct BusyWorker(Gauge);
 
@@ -37,10 +36,10 @@ impl Drop for BusyWorker {
     }
 }
 
-/// Declares the counters, each with its name and what it counts.
+/// Declares the metrics, each with its name and help text.
 macro_rules! metrics {
     ($($vis:vis $field:ident: $kind:ty = $make:expr, $name:literal $about:literal;)*) => {
-        /// Counters of one service; clones share them.
+        /// Metrics of one service; clones share them.
         #[derive(Debug, Clone)]
         pub(crate) struct Metrics {
             $($vis $field: $kind,)*
@@ -80,10 +79,10 @@ metrics! {
     pub(crate) store_requests: StoreRequests = Family::default(), "result_store_requests" "Requests to the object store of the results, repeated ones included, by the class of the answer";
 }
 
-/// Requests to an object store, by method and by class of the answer: `2xx` to `5xx`, or `none` if there was none.
+/// Requests to an object store, by method and by status class: `2xx` to `5xx`, or `none` without a response.
 pub(crate) type StoreRequests = Family<[(&'static str, String); 2], Counter>;
 
-/// A request was answered with this status, or not at all.
+/// Counts a request with the status of its response, if there was one.
 #[cfg(feature = "cluster")]
 pub(crate) fn count_request(requests: &StoreRequests, method: &str, status: Option<u16>) {
     let status = match status.map(|status| status / 100) {
@@ -98,13 +97,13 @@ pub(crate) fn count_request(requests: &StoreRequests, method: &str, status: Opti
 }
 
 impl Metrics {
-    /// Counters at zero, and the registry that shows them.
+    /// Creates the metrics and their registry.
     pub(crate) fn new() -> (Metrics, Registry) {
         let mut registry = Registry::with_prefix("railhead");
         let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
         registry.register("build", "The running version", version);
         let metrics = Metrics::registered(&mut registry);
-        // A series that appears only with its first event hides that event from a rate.
+        // A series that appears with its first event hides that event from a rate.
         for state in State::ALL.into_iter().filter(|state| state.ended()) {
             drop(metrics.ended.get_or_create(&state_label(state)));
         }
@@ -114,13 +113,13 @@ impl Metrics {
         (metrics, registry)
     }
 
-    /// A solver is at work as long as this is held.
+    /// Counts a busy worker until the guard is dropped.
     pub(crate) fn working(&self) -> BusyWorker {
         self.working.inc();
         BusyWorker(self.working.clone())
     }
 
-    /// A case was solved in `seconds`.
+    /// Records a case that was solved in `seconds`.
     pub(crate) fn solved(&self, asked: MethodName, solution: &Solution, seconds: f64) {
         let points = || solution.patches.iter().flat_map(|patch| &patch.points);
         let used = points().next().map_or(asked, |point| point.solver.method);
@@ -135,14 +134,14 @@ impl Metrics {
         }
     }
 
-    /// Rows of a run were answered.
+    /// Counts the rows of a chunk by status.
     pub(crate) fn rows_ended(&self, answer: &ManyAnswer) {
         for status in &answer.status {
             self.rows.get_or_create(&[("status", status.name())]).inc();
         }
     }
 
-    /// A job ended in this way.
+    /// Counts a job that ended in this way.
     pub(crate) fn ending(&self, ending: &Ending) {
         match ending {
             Ending::Succeeded { .. } | Ending::Cached { .. } => self.ended(State::Succeeded, 1),
@@ -151,24 +150,24 @@ impl Metrics {
         }
     }
 
-    /// A job failed for this reason.
+    /// Counts a job that failed for this reason.
     pub(crate) fn failed(&self, kind: FailureKind) {
         self.ended(State::Failed, 1);
         self.failures.get_or_create(&reason_label(kind)).inc();
     }
 
-    /// Jobs ended in this state.
+    /// Counts jobs that ended in this state.
     pub(crate) fn ended(&self, state: State, jobs: u64) {
         self.ended.get_or_create(&state_label(state)).inc_by(jobs);
     }
 
-    /// Cached results were asked for.
+    /// Counts lookups in the result cache.
     pub(crate) fn cache_lookup(&self, hits: u64, misses: u64) {
         self.cache_hits.inc_by(hits);
         self.cache_misses.inc_by(misses);
     }
 
-    /// The disk takes data, or does not.
+    /// Sets whether storage rejects writes.
     pub(crate) fn storage_failing(&self, failing: bool) {
         self.storage_failing.set(i64::from(failing));
     }

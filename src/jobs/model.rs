@@ -1,4 +1,4 @@
-//! Jobs, batches, keys, and how they are submitted.
+//! Data types of jobs, batches, runs and API keys, and the options of a submission.
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -18,7 +18,7 @@ pub enum Kind {
     /// One case: a job.
     #[default]
     Case,
-    /// Many cases: a batch, each case of which is a job.
+    /// Many cases: a batch. Each case is a job.
     Cases,
     /// Many rows over one case: a run, which is solved in chunks of rows.
     Rows,
@@ -27,7 +27,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// What clients call work of this kind.
+    /// The noun for one piece of work of this kind in messages.
     #[must_use]
     pub fn noun(self) -> &'static str {
         match self {
@@ -38,7 +38,7 @@ impl Kind {
         }
     }
 
-    /// The same in the plural, also the name of the resource.
+    /// The plural of [`Kind::noun`], which is also the name of the resource.
     #[must_use]
     pub fn nouns(self) -> &'static str {
         match self {
@@ -49,7 +49,7 @@ impl Kind {
         }
     }
 
-    /// The kind of a single job of this work.
+    /// The kind of the jobs that work of this kind consists of.
     #[must_use]
     pub fn of_job(self) -> Kind {
         match self {
@@ -60,7 +60,7 @@ impl Kind {
     }
 }
 
-/// A queue of jobs. The jobs of a tenant, the chunks of its runs and its evolutions wait in one each, so that none holds up the others.
+/// A queue of jobs. Each tenant has one queue per kind, so that work of one kind does not delay the others.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Queue {
     /// The tenant.
@@ -69,10 +69,10 @@ pub struct Queue {
     pub kind: Kind,
 }
 
-/// Labels that a key is bound to: it opens only what carries them, and what it makes gets them.
+/// Labels of work. An API key may be restricted to work with certain labels.
 pub type Labels = BTreeMap<String, String>;
 
-/// Most labels that a key may be bound to.
+/// The largest number of labels of a key.
 pub const BOUND_MAX: usize = 8;
 
 /// The tenant of requests without a key.
@@ -81,37 +81,37 @@ pub const ANONYMOUS: &str = "anonymous";
 /// The tenant whose keys may read the metrics of the whole service.
 pub const OPERATOR: &str = "operator";
 
-/// Longest name of a tenant in characters.
+/// The greatest length of a tenant name in characters.
 const TENANT_MAX_CHARS: usize = 64;
 
-/// What every key begins with, so that scanners for leaked secrets recognise it.
-pub(crate) const MARK: &str = "rh_";
+/// The prefix of every key, by which scanners for leaked secrets recognise it.
+pub(crate) const KEY_PREFIX: &str = "rh_";
 
-/// What is kept of a key.
+/// An API key as it is stored, without its secret.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Key {
-    /// The part of the key that is no secret; names it in lists and logs.
+    /// The public part of the key, which names it in lists and logs.
     pub id: String,
     /// BLAKE3 of the whole key. A key is 256 random bits, so a fast hash is enough.
     pub hash: blake3::Hash,
-    /// Whose jobs it opens.
+    /// The tenant whose work the key gives access to.
     pub tenant: Arc<str>,
-    /// What it is for, in the operator's words.
+    /// The purpose, as given by the operator.
     pub name: Option<String>,
     /// Time of creation, epoch milliseconds.
     pub created_at: i64,
-    /// Time since which it is refused.
+    /// Time of revocation, epoch milliseconds; `None` while the key is valid.
     pub revoked_at: Option<i64>,
-    /// It reads what is the tenant's, and changes nothing.
+    /// Whether the key may only read.
     pub read_only: bool,
-    /// It opens only what carries these labels, and gives them to what it makes; everything of the tenant without any.
+    /// Labels that restrict the key: it sees only work with these labels, and its submissions get them. Empty: no restriction.
     pub labels: Arc<Labels>,
 }
 
-/// Keys found good, with the time at which they were looked up.
+/// Recently validated keys by id, with the time of the lookup.
 pub(crate) type Trusted = std::collections::HashMap<String, (Key, Instant)>;
 
-/// 1 to 64 letters, digits, dots, dashes and underscores.
+/// Whether a text is a valid tenant name: 1 to 64 letters, digits, dots, dashes and underscores.
 pub(crate) fn is_tenant(name: &str) -> bool {
     let allowed = |byte: u8| byte.is_ascii_alphanumeric() || b"._-".contains(&byte);
     (1..=TENANT_MAX_CHARS).contains(&name.len()) && name.bytes().all(allowed)
@@ -133,7 +133,7 @@ pub enum Priority {
 }
 
 impl Priority {
-    /// The number for it in the database: its place in [`Priority::ALL`].
+    /// The rank in the database, which is the index in [`Priority::ALL`].
     pub(crate) fn rank(self) -> i64 {
         match self {
             Priority::High => 0,
@@ -152,20 +152,20 @@ impl Priority {
 pub struct SubmitOptions {
     /// Priority among the tenant's queued jobs.
     pub priority: Priority,
-    /// Time after the submission within which it must have ended; `None`: it may take any time.
+    /// Time after the submission within which the job must end; `None`: no deadline.
     pub ends_within: Option<Duration>,
-    /// It is solved even if an identical case was solved before.
+    /// Whether to solve the case even if the result of an identical case is stored.
     pub bypass_cache: bool,
 }
 
-/// The options of a submission.
+/// All options of a submission.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct WorkOptions {
-    /// Free text of the client; that of a single case is in the case.
+    /// Name given by the client. The name of a single case is part of the case.
     pub name: Option<String>,
-    /// Labels of the client; those of a single case are in the case.
+    /// Labels given by the client. The labels of a single case are part of the case.
     pub labels: Labels,
-    /// Priority, deadline and use of earlier results.
+    /// Priority, deadline and use of stored results.
     pub submit: SubmitOptions,
     /// The client's idempotency key.
     pub idempotency_key: Option<String>,
@@ -180,17 +180,17 @@ impl From<SubmitOptions> for WorkOptions {
     }
 }
 
-/// Options that one case of a batch has for itself, in place of those of the batch.
+/// Options of one case of a batch, which replace those of the batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CaseOptions {
-    /// In place of [`SubmitOptions::priority`].
+    /// Replaces [`SubmitOptions::priority`].
     pub priority: Option<Priority>,
-    /// In place of [`SubmitOptions::ends_within`], in s.
+    /// Replaces [`SubmitOptions::ends_within`], in s.
     pub deadline_s: Option<u32>,
 }
 
 impl SubmitOptions {
-    /// The options of a case with some of its own.
+    /// The options of one case of a batch.
     #[must_use]
     pub fn of_case(self, own: CaseOptions) -> SubmitOptions {
         let within = |seconds: u32| Duration::from_secs(seconds.into());
@@ -201,7 +201,7 @@ impl SubmitOptions {
         }
     }
 
-    /// The digest of a submission for its idempotency key: of the case or cases, and of these options.
+    /// The digest of a submission for its idempotency key: of the digest `asked` of the request, and of these options.
     pub(crate) fn digest(&self, asked: &[u8; 32]) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
         hasher.update(asked);
@@ -213,51 +213,51 @@ impl SubmitOptions {
     }
 }
 
-/// What is known of one job. Times are epoch milliseconds (UTC).
+/// A job as it is stored. Times are epoch milliseconds (UTC).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Job {
-    /// UUIDv7; sorts by time of submission.
+    /// UUIDv7, which sorts by time of submission.
     pub id: Uuid,
-    /// Whose it is.
+    /// The tenant that owns the job.
     pub tenant: String,
     /// [`Kind::Case`], [`Kind::Evolution`], or [`Kind::Rows`] for a chunk of a run.
     pub kind: Kind,
-    /// Where it stands.
+    /// State of the job.
     pub state: State,
-    /// Free text given by the client.
+    /// Name given by the client.
     pub name: Option<String>,
-    /// Labels of the client.
+    /// Labels given by the client.
     pub labels: BTreeMap<String, String>,
-    /// The batch it belongs to, if it was submitted in one.
+    /// The batch or run that the job belongs to; `None` if it was submitted alone.
     pub batch_id: Option<Uuid>,
     /// Priority among the tenant's queued jobs.
     pub priority: Priority,
     /// Time of submission.
     pub created_at: i64,
-    /// Time of the last change, except changes of progress.
+    /// Time of the last change, not counting progress.
     pub updated_at: i64,
-    /// Start of the current or last attempt; absent while queued.
+    /// Start of the current or last attempt; `None` while queued.
     pub started_at: Option<i64>,
-    /// End of the job; absent before it.
+    /// Time at which the job ended; `None` before.
     pub ended_at: Option<i64>,
-    /// When it must have ended; it fails if it has not.
+    /// Deadline: the job fails if it has not ended by this time.
     pub deadline: Option<i64>,
-    /// When it will be removed with its result; absent before its end, and where ended jobs are kept for ever.
+    /// Time at which the job and its result are removed; `None` before its end, and if ended jobs are kept forever.
     pub expires_at: Option<i64>,
-    /// Attempts that count, from 1 once running, since the last slice was stored; one handed back by a graceful shutdown does
-    /// not count.
+    /// Number of attempts since the last stored slice, at least 1 once running. Attempts that a graceful shutdown returned
+    /// do not count.
     pub attempt: u32,
-    /// 0 to 1, rough; written at most with each heartbeat.
+    /// Estimated progress from 0 to 1, written at most with each heartbeat.
     pub progress: f64,
-    /// What the client should know before using the numbers; filled when it succeeds or fails.
+    /// Remarks that matter for the use of the result; set when the job succeeds or fails.
     pub remarks: Vec<RemarkEntry>,
-    /// Why there is no answer; present exactly when the state is `failed`.
+    /// Reason of the failure; present exactly if the state is `failed`.
     pub failure: Option<Failure>,
-    /// The result was computed for an identical case before, not for this job.
+    /// Whether the result was computed for an earlier identical case.
     pub cached: bool,
-    /// Grows with every change that a client can see.
+    /// Increases with every change that clients can see.
     pub version: u64,
-    /// Its place in the queue; only filled for a queued job that is read by itself.
+    /// Position in the queue; set only for a queued job that is read individually.
     pub queue: Option<QueuePlace>,
 }
 
@@ -299,20 +299,20 @@ pub enum State {
     Cancelled,
 }
 
-/// Why a job has no answer.
+/// The reason why a job has no result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Failure {
     /// The kind of failure.
     pub kind: FailureKind,
-    /// What happened, as a sentence.
+    /// Description as a sentence.
     pub detail: String,
-    /// Residual of the best iterate, relative to the traction scale of the case, where a solve did not converge.
+    /// Residual of the best iterate relative to the traction scale of the case, if the solve did not converge.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub residual: Option<f64>,
-    /// Iterations done, where a solve did not converge.
+    /// Number of iterations, if the solve did not converge.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub iterations: Option<u32>,
-    /// JSON pointer to the part of the case that allows no answer, where one part does.
+    /// JSON pointer to the part of the case that caused the failure, if there is one.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub pointer: Option<String>,
 }
@@ -338,13 +338,13 @@ pub enum FailureKind {
 }
 
 impl State {
-    /// Nothing will change any more.
+    /// Whether the state is final.
     #[must_use]
     pub fn ended(self) -> bool {
         matches!(self, State::Succeeded | State::Failed | State::Cancelled)
     }
 
-    /// May a job move from this state to `next`? An ended job never moves again.
+    /// Whether a job may change from this state to `next`. A final state never changes.
     #[must_use]
     pub fn may_become(self, next: State) -> bool {
         match self {
@@ -356,7 +356,7 @@ impl State {
 }
 
 impl Failure {
-    /// A failure without numbers.
+    /// Creates a failure of this kind.
     #[must_use]
     pub fn new(kind: FailureKind, detail: impl Into<String>) -> Failure {
         Failure {
@@ -368,7 +368,7 @@ impl Failure {
         }
     }
 
-    /// Every allowed attempt lost its worker.
+    /// The failure of a job that lost its worker in each allowed attempt.
     #[must_use]
     pub fn worker_lost(attempts_max: u32) -> Failure {
         Failure::new(
@@ -377,7 +377,7 @@ impl Failure {
         )
     }
 
-    /// The failure a solver error stands for; a cancelled solve is no failure.
+    /// The failure that corresponds to a solver error; `None` for a cancelled solve.
     #[must_use]
     pub fn of_solve(error: &SolveError) -> Option<Failure> {
         match error {
@@ -410,12 +410,12 @@ impl Failure {
     }
 }
 
-/// The time of submission is the one inside the id, so that order by id is order by time.
+/// The time of submission, which is the leading part of an id: order by id is order by time.
 pub(crate) fn created_at(id: Uuid) -> i64 {
     i64::try_from(id.as_u128() >> 80).unwrap_or(0)
 }
 
-/// The failure of a job that had not ended by its deadline.
+/// The failure of a job that passed its deadline.
 pub(crate) fn too_late() -> Failure {
     Failure::new(
         FailureKind::DeadlinePassed,
@@ -423,28 +423,28 @@ pub(crate) fn too_late() -> Failure {
     )
 }
 
-/// What is known of one batch.
+/// A batch or run as it is stored, with the number of its jobs by state.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Batch {
     /// UUIDv7.
     pub id: Uuid,
-    /// Whose it is.
+    /// The tenant that owns it.
     pub tenant: String,
-    /// [`Kind::Cases`], or [`Kind::Rows`]: a run, whose jobs are its chunks.
+    /// [`Kind::Cases`], or [`Kind::Rows`] for a run, whose jobs are chunks of rows.
     pub kind: Kind,
     /// Time of submission, epoch milliseconds.
     pub created_at: i64,
-    /// Number of jobs it was made of.
+    /// Number of jobs at submission.
     pub count: u32,
-    /// Number of faulty cases that were skipped.
+    /// Number of invalid cases that were skipped.
     pub rejected: u32,
-    /// Free text given by the client.
+    /// Name given by the client.
     pub name: Option<String>,
-    /// Labels of the client.
+    /// Labels given by the client.
     pub labels: BTreeMap<String, String>,
-    /// When the last of its jobs that have ended did so, epoch milliseconds.
+    /// Time at which the last of its ended jobs ended, epoch milliseconds.
     pub last_ended_at: Option<i64>,
-    /// Number of jobs in each state; every state is there.
+    /// Number of jobs by state; contains every state.
     pub states: BTreeMap<State, u64>,
 }
 
@@ -455,7 +455,7 @@ impl Batch {
         self.states.get(&state).copied().unwrap_or(0)
     }
 
-    /// Number of jobs that have ended, and of all jobs that are still there.
+    /// Number of ended jobs, and of all jobs that still exist.
     #[must_use]
     pub fn ended(&self) -> (u64, u64) {
         let ended = self.states.iter().filter(|(state, _)| state.ended());
@@ -464,36 +464,43 @@ impl Batch {
             self.states.values().sum(),
         )
     }
+
+    /// A text that differs between any two states of the batch that clients can distinguish.
+    #[must_use]
+    pub fn change_tag(&self) -> String {
+        let counts: Vec<String> = self.states.values().map(ToString::to_string).collect();
+        counts.join("-")
+    }
 }
 
 /// The stored record of a run, without its chunks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunRecord {
-    /// Its template, as stored.
+    /// The template as stored.
     pub template: Bytes,
-    /// Its own part of what its chunks share, as stored; none in the first form, whose template has all.
+    /// The part of the head that is specific to the run; `None` in the first format, whose template contains everything.
     pub head: Option<Bytes>,
-    /// Rows of ended chunks that have no answer.
+    /// Number of rows without an answer in ended chunks.
     pub without_answer: u64,
-    /// Sum of the progress of the chunks that are being solved.
+    /// Sum of the progress of running chunks.
     pub running: f64,
 }
 
-/// One job of a batch with what is needed to show its result.
+/// A job of a batch with its result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchItem {
     /// Index of the case in the request, from 0.
     pub index: u32,
     /// The job.
     pub job: Job,
-    /// The outputs the case asks for, as the JSON list of their names.
+    /// The requested outputs as a JSON list of names.
     pub outputs: String,
-    /// What there is to show; `None` until the job has succeeded.
+    /// The result; `None` unless the job has succeeded.
     pub result: Option<ItemResult>,
 }
 
 impl BatchItem {
-    /// The key of a result that lies outside the table.
+    /// The key of a result outside the table.
     #[must_use]
     pub fn key(&self) -> Option<&str> {
         match &self.result {
@@ -506,28 +513,19 @@ impl BatchItem {
 /// The result of one job of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ItemResult {
-    /// The solution as JSON text: a small one.
+    /// The solution as JSON text, if it is small.
     Solution(Bytes),
-    /// It lies under this key and is read by `Jobs::open_item`.
+    /// The key of a result outside the table, which `Jobs::open_item` reads.
     Stored(String),
 }
 
-/// Why the result of a job of a batch cannot be shown.
+/// Why the result of a job of a batch cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ItemFault {
-    /// It was removed while the lines were read: the job has expired or was deleted.
+    /// It was removed in the meantime: the job expired or was deleted.
     Gone,
     /// It cannot be read.
     Unreadable,
-}
-
-impl Batch {
-    /// A short text that differs between any two states of the batch that a client can tell apart.
-    #[must_use]
-    pub fn change_tag(&self) -> String {
-        let counts: Vec<String> = self.states.values().map(ToString::to_string).collect();
-        counts.join("-")
-    }
 }
 
 #[cfg(test)]

@@ -1,15 +1,13 @@
-//! Stand-in for `trace` in a build without the feature `otlp`: there is no tracer, so that no span is ever made.
+//! Replacement for `trace` in a build without the feature `otlp`, in which no span is recorded.
 
 use std::sync::Arc;
 use std::time::SystemTime;
 
 use crate::attempts::slices::Outcome;
 use crate::error::Result;
-use crate::handle::Jobs;
-use crate::shared::Shared;
 use crate::store::Claim;
 
-/// Makes spans; no value of it exists in this build.
+/// Records spans; this build has no value of it.
 #[derive(Debug, Clone)]
 pub enum Tracer {}
 
@@ -26,6 +24,10 @@ impl KeyValue {
 pub(crate) struct SubmitSpan;
 
 impl SubmitSpan {
+    pub(crate) fn begin(_: Option<&Tracer>) -> SubmitSpan {
+        SubmitSpan
+    }
+
     pub(crate) fn traceparent(&self) -> Option<Arc<str>> {
         None
     }
@@ -39,23 +41,15 @@ impl SubmitSpan {
     }
 }
 
-impl Jobs {
-    pub(crate) fn submit_span(&self) -> SubmitSpan {
-        SubmitSpan
-    }
-}
-
-impl Shared {
-    pub(crate) fn job_trace(&self, _: &Claim) -> Option<JobTrace> {
-        None
-    }
-}
-
-/// An attempt at a job whose trace is collected; no value of it exists in this build.
+/// The trace of an attempt at a job; this build has no value of it.
 #[derive(Debug, Clone)]
 pub(crate) enum JobTrace {}
 
 impl JobTrace {
+    pub(crate) fn of(_: Option<&Tracer>, _: &Claim) -> Option<JobTrace> {
+        None
+    }
+
     pub(crate) fn solving(
         _: Option<&JobTrace>,
         _: bool,

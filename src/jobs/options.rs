@@ -1,4 +1,4 @@
-//! How jobs are kept and worked on.
+//! Options of the job service, most of which are flags of `serve`.
 
 use std::fmt;
 use std::ops::RangeBounds;
@@ -20,36 +20,36 @@ pub use crate::store::NotifyMode;
 pub struct Database {
     /// `postgres://user:password@host:port/database`.
     pub url: String,
-    /// Most connections of this process, beside the one on which it listens.
+    /// Maximum number of connections of this process, in addition to the one that receives notifications.
     pub connections: u32,
-    /// Where nodes receive each other's notifications.
+    /// Source of the notifications of other nodes.
     pub notify_mode: NotifyMode,
 }
 
 impl fmt::Debug for Database {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // The URL has a password in it.
+        // The URL contains a password.
         write!(f, "Database({} connections)", self.connections)
     }
 }
 
-/// How jobs are kept and worked on; most of it is a flag of `serve`, declared here.
+/// Options of the job service. Most of them are flags of `serve`, which are declared here.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Jobs")]
 pub struct Options {
-    /// Folder of the job table and the results; created if it is not there.
+    /// Folder of the job table and the results; created if it does not exist.
     #[arg(skip)]
     pub data_dir: PathBuf,
-    /// The database that keeps jobs and results, if several processes share them; otherwise they are in the data folder.
+    /// The database that stores jobs and results, if several processes share them; otherwise they are in the data folder.
     #[arg(skip)]
     pub database: Option<Database>,
-    /// Where large results are kept, if neither in the data folder nor in the database.
+    /// Location of large results, if neither the data folder nor the database.
     #[arg(skip)]
     pub results: Option<ResultsPlace>,
-    /// Number of workers, each with a solver thread of its own.
+    /// Number of workers, each with its own solver thread.
     #[arg(skip = 1_usize)]
     pub workers: usize,
-    /// What one case may use.
+    /// Limits of one case.
     #[arg(skip)]
     pub limits: Limits,
     /// Number of attempts after which a job fails if its worker is lost each time.
@@ -83,27 +83,27 @@ pub struct Options {
     /// restarted.
     #[arg(long, env = "RAILHEAD_ABANDONED_MAX", default_value = "3", value_name = "N", value_parser = value_parser!(u16).map(usize::from))]
     pub abandoned_max: usize,
-    /// Bounds of what batches that are being received stand for.
+    /// Bounds of the batches that are being received.
     #[command(flatten)]
     pub staging: StagingBounds,
     /// Maximum size in MB of the stored cases, templates and results of one tenant; beyond it: 507 [default: no limit].
     #[arg(long = "tenant-stored-mb", env = "RAILHEAD_TENANT_STORED_MB", value_name = "MB", value_parser = mib(..))]
     pub tenant_stored_max_bytes: Option<u64>,
-    /// Most jobs a worker claims together, if they are small; 1 means no groups.
+    /// Maximum number of small jobs that a worker claims together; 1: no groups.
     #[arg(skip = 256_usize)]
     pub group_max: usize,
-    /// Results up to this size in bytes are kept in the database, larger ones in folders.
+    /// Maximum size in bytes of results in the database; larger ones are stored outside.
     #[arg(skip = 32_usize << 10)]
     pub small_result_max_bytes: usize,
-    /// What leases, ends and expiries are measured with.
+    /// Clock of leases, job times and expiry.
     #[arg(skip = Clock::system())]
     pub clock: Clock,
-    /// What makes spans of jobs, if they are collected.
+    /// Records spans of jobs, if they are collected.
     #[arg(skip)]
     pub tracer: Option<Tracer>,
 }
 
-/// Bounds of staged bytes.
+/// Bounds of the bytes of batches that are being received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 #[command(next_help_heading = "Jobs")]
 pub struct StagingBounds {
@@ -116,7 +116,7 @@ pub struct StagingBounds {
 }
 
 impl Options {
-    /// The defaults for a data folder: those of the flags, one worker, ended jobs kept for ever, the system's clock, no spans.
+    /// The default options for a data folder: defaults of the flags, one worker, no expiry, the system's clock, no spans.
     #[must_use]
     pub fn new(data_dir: impl Into<PathBuf>) -> Options {
         Options {
@@ -126,10 +126,10 @@ impl Options {
     }
 }
 
-/// The defaults of flags, whatever the environment says.
+/// The default values of flags, regardless of the environment.
 ///
 /// # Panics
-/// A flag has no default.
+/// Panics if a flag has no default.
 pub fn defaults<T: Args>() -> T {
     let mut command = T::augment_args(Command::new("")).mut_args(|flag| flag.env(None::<&str>));
     let none = command
@@ -138,19 +138,19 @@ pub fn defaults<T: Args>() -> T {
     T::from_arg_matches(&none).expect("every flag has a default")
 }
 
-/// A number of MiB as bytes.
+/// Parses a number of MiB; the value is in bytes.
 pub fn mib(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = u64> {
     let number = value_parser!(u32).range(allowed);
     number.map(|number| u64::from(number) << 20)
 }
 
-/// A whole number of seconds.
+/// Parses a whole number of seconds.
 pub fn seconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = Duration> {
     let number = value_parser!(u32).range(allowed);
     number.map(|number| Duration::from_secs(number.into()))
 }
 
-/// A time of at least a millisecond, and not above a day, in s.
+/// Parses a time from 1 ms to one day, in seconds.
 fn part_of_a_day(text: &str) -> Result<Duration, String> {
     match text.parse() {
         Ok(seconds) if (0.001..=86_400.0).contains(&seconds) => {

@@ -1,6 +1,6 @@
-//! Cross-sections kept for a tenant, and cases that name them.
+//! Stored profiles of a tenant, and cases that refer to them by digest.
 //!
-//! A name is replaced by what it stands for when a case is submitted, so that a job never depends on what is deleted later.
+//! References are resolved at submission, so that jobs do not depend on profiles that are deleted later.
 use std::collections::{BTreeMap, HashMap};
 
 use bytes::Bytes;
@@ -23,11 +23,11 @@ use railhead_contact::evaluate::varied::{
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
 
-/// Cross-sections that were read a moment ago, by their digests.
+/// Recently read profiles by digest.
 pub(crate) type KnownSections = HashMap<String, Value>;
 
 impl Jobs {
-    /// Checks a cross-section and keeps it for the tenant; also says whether it was kept already.
+    /// Checks and stores a profile; also returns whether it was stored already.
     ///
     /// # Errors
     /// [`JobsError::Case`] with every fault, [`JobsError::ProfilesFull`], [`JobsError::Draining`], or a failed database.
@@ -59,7 +59,7 @@ impl Jobs {
         }
     }
 
-    /// A kept cross-section.
+    /// Reads a stored profile.
     ///
     /// # Errors
     /// [`JobsError::ProfileNotFound`], or a failed database.
@@ -68,7 +68,7 @@ impl Jobs {
         found.ok_or(JobsError::ProfileNotFound)
     }
 
-    /// One page of what is kept, newest first; `limit` is brought into 1 to [`PAGE_MAX`].
+    /// Reads one page of the stored profiles, newest first; `limit` is clamped to 1 to [`PAGE_MAX`].
     ///
     /// # Errors
     /// [`JobsError::BoundKey`], [`JobsError::BadCursor`], or a failed database.
@@ -83,7 +83,7 @@ impl Jobs {
         Ok(store.profiles(&self.tenant, after.as_ref(), limit).await?)
     }
 
-    /// Removes a kept cross-section. Jobs and runs that named it have it.
+    /// Deletes a stored profile. Jobs and runs that referred to it have copies.
     ///
     /// # Errors
     /// [`JobsError::BoundKey`], [`JobsError::ProfileNotFound`], or a failed database.
@@ -96,16 +96,16 @@ impl Jobs {
         }
     }
 
-    /// The case with kept cross-sections in the place of their names.
+    /// Resolves the references to stored profiles in a case.
     ///
     /// # Errors
-    /// [`JobsError::Case`]: the tenant keeps no such cross-section, or one is named and given; or a failed database.
+    /// [`JobsError::Case`] if a profile does not exist, or if a reference and points are given; or a failed database.
     pub async fn with_profiles(&self, case: Value) -> Result<Value> {
         self.with_known_profiles(case, &mut KnownSections::new())
             .await
     }
 
-    /// The same on a thread that may block, with what was read before.
+    /// As [`Jobs::with_profiles`], blocking and with a cache.
     pub(crate) fn with_profiles_here(
         &self,
         case: Value,
@@ -136,7 +136,7 @@ impl Jobs {
         Ok(case)
     }
 
-    /// A cross-section, if it is kept.
+    /// Reads a stored profile; `None` if it does not exist.
     pub(crate) async fn known_section(
         &self,
         digest: &str,
@@ -154,7 +154,7 @@ impl Jobs {
     }
 }
 
-/// The fault of a name that stands for nothing.
+/// The fault for a reference to a profile that does not exist.
 pub(crate) fn unknown(pointer: String, digest: &str) -> Fault {
     let detail = format!(
         "`{digest}` given, which is not a profile of this tenant; `POST /v1/profiles` stores one and returns its digest"
@@ -163,10 +163,10 @@ pub(crate) fn unknown(pointer: String, digest: &str) -> Fault {
 }
 
 impl Jobs {
-    /// The stored profiles that columns name. Blocks.
+    /// Reads the stored profiles that columns refer to. Blocks.
     ///
     /// # Errors
-    /// The tenant has no such profile, or a failed database.
+    /// A profile does not exist, or a failed database.
     pub fn profiles_of(&self, columns: &[VariedColumn]) -> Result<BTreeMap<String, Value>> {
         let mut known = KnownSections::new();
         let named = columns.iter();
@@ -178,8 +178,9 @@ impl Jobs {
         }
     }
 
-    /// Reads the profiles that the rows of columns name, from row `first` on; each column has its name, its place in the case and its values.
-    /// Blocks. Answers the first fault: no such profile, or more than `bytes_max` bytes of them, which are added to the second of `found`.
+    /// Reads the profiles that rows refer to. Each column has a name, a place in the case and values, the first of which
+    /// belongs to row `first`. The sizes of the profiles are added to the second member of `found`. Returns at most one
+    /// fault: a profile that does not exist, or more than `bytes_max` bytes in all. Blocks.
     ///
     /// # Errors
     /// The database failed.
@@ -219,10 +220,11 @@ impl Jobs {
         Ok(Vec::new())
     }
 
-    /// The template with the values of the first row in place, checked; the columns have these places in the case and names.
+    /// Inserts the values of the first row into the template and checks the case. `names` maps places in the case to names
+    /// of columns.
     ///
     /// # Errors
-    /// A column has no place in the case, the case has faults, it has several answers, or `refused` has a fault of it.
+    /// A column has no place in the case, the case is invalid, it has several answers, or `refused` returns a fault.
     pub fn first_row(
         &self,
         template: &Value,
@@ -250,10 +252,10 @@ impl Jobs {
         }
     }
 
-    /// Answers rows at once, without a job, on this thread, which may block. `checked` is the checked case of the first row, `case`.
+    /// Evaluates rows on this thread, without a job. `checked` is the checked `case` of the first row. Blocks.
     ///
     /// # Errors
-    /// The rows exceed what one evaluation may take, or it was ended by the monitor or by `step`.
+    /// The rows exceed the limits of one evaluation, or the monitor or `step` ended it.
     pub fn evaluate<E>(
         &self,
         (case, checked): (&Value, &CheckedCase),

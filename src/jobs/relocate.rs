@@ -1,12 +1,12 @@
-//! Moves what is in a data folder into a database that several nodes share: `railhead move`.
+//! `railhead move`: moves the contents of a data folder into a shared database.
 
 use std::path::Path;
 
-use crate::blobs::Blobs;
+use crate::blobs::{Blobs, Copied};
+use crate::data_dir::lock_folder;
+use crate::data_dir::table_file;
 use crate::error::{JobsError, Result};
-use crate::lifecycle::lock_folder;
 use crate::metrics::StoreRequests;
-use crate::open_store::table_file;
 use crate::options::Options;
 use crate::result_place::settle::settle;
 use crate::result_place::url::ResultsPlace;
@@ -14,38 +14,30 @@ use crate::store::postgres::database::PostgresStore;
 use crate::store::sqlite::database::SqliteStore;
 use crate::store::{Reap, Store, Upkeep};
 
-/// What the job table is called once its rows are elsewhere, so that no service starts on it.
+/// Name of the job table after the move, so that no service starts on it.
 const MOVED: &str = "jobs.db.moved";
 
-/// What was moved.
+/// Result of [`relocate`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Moved {
-    /// The rows of each table.
+    /// Number of rows of each table.
     pub rows: Vec<(&'static str, usize)>,
-    /// Results outside the table, and their bytes.
-    pub results: usize,
-    /// Bytes of these.
-    pub result_bytes: u64,
-    /// Results outside the table that are not there; their jobs are moved without.
-    pub missing: usize,
+    /// The large results.
+    pub results: Copied,
 }
 
-/// Moves the jobs, batches, keys and profiles of a data folder, which no service uses, into a database without jobs, and its large
-/// results into the place of that database. What was running is queued again, as by a start of the service. The data folder keeps its
-/// results; its table gets another name.
+/// Moves the jobs, batches, keys and profiles of a data folder that no service uses into a database without jobs, and its
+/// large results into the location of that database. Running jobs are queued again. The data folder keeps its results, and
+/// its table is renamed.
 ///
-/// Results come first, then all rows in one transaction: whatever fails, the data folder can be used as before.
+/// Results are copied first, then all rows in one transaction: after a failure the data folder can be used as before.
 ///
 /// # Errors
-/// The folder is in use or has no job table, the database has jobs or no tables, or something cannot be read or written.
+/// The folder is in use or has no job table, the database has jobs or no tables, or a read or write failed.
 pub async fn relocate(data_dir: &Path, url: &str, place: Option<&ResultsPlace>) -> Result<Moved> {
     let table = table_file(data_dir);
-    let failed = |source| JobsError::DataDir {
-        path: table.clone(),
-        source,
-    };
-    // Not made by the lock of the folder.
-    std::fs::metadata(&table).map_err(failed)?;
+    // The lock creates the folder, so the check comes first.
+    std::fs::metadata(&table).map_err(JobsError::at(&table))?;
     let _lock = lock_folder(data_dir)?;
     let from = SqliteStore::open_existing(&table).await?;
     let to = PostgresStore::open(url, 4).await?;
@@ -54,25 +46,17 @@ pub async fn relocate(data_dir: &Path, url: &str, place: Option<&ResultsPlace>) 
     let attempts_max = Options::new(data_dir).attempts_max;
     Upkeep::reap(&from, Reap::Dead, now, attempts_max).await?;
     let results = settle(&to, place, StoreRequests::default()).await?;
-    let mut moved = Moved {
-        rows: Vec::new(),
-        results: 0,
-        result_bytes: 0,
-        missing: 0,
-    };
+    let mut copied = Copied::default();
     let here = Blobs::open(data_dir)?;
     for key in from.large_results().await? {
-        match here.copy(&key, &results).await? {
-            Some(bytes) => {
-                moved.results += 1;
-                moved.result_bytes += bytes;
-            }
-            None => moved.missing += 1,
-        }
+        copied.add(here.copy(&key, &results).await?);
     }
-    moved.rows = to.import(&from).await?;
+    let rows = to.import(&from).await?;
     from.close().await;
     to.close().await;
-    std::fs::rename(&table, data_dir.join(MOVED)).map_err(failed)?;
-    Ok(moved)
+    std::fs::rename(&table, data_dir.join(MOVED)).map_err(JobsError::at(&table))?;
+    Ok(Moved {
+        rows,
+        results: copied,
+    })
 }

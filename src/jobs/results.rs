@@ -1,4 +1,4 @@
-//! What is kept of a job besides its row: the case, the solution, the fields.
+//! Reads the case, the solution and the fields of a job.
 
 use bytes::Bytes;
 use futures_util::stream::{self, BoxStream};
@@ -13,28 +13,28 @@ use crate::sync::blocking;
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchFields, Solution};
 
-/// Solutions from this size on are read off the threads that answer requests.
+/// Solutions of at least this size are parsed outside the request threads.
 const LARGE_BYTES: usize = 64 << 10;
 
-/// The answer of a succeeded job, read from where it is stored while it is taken.
+/// The solution of a succeeded job, read from storage as it is consumed.
 pub struct ResultStream {
-    /// What was computed, as JSON text without the closing brace.
+    /// The JSON text without the closing brace.
     pub open_solution: BoxStream<'static, Result<Bytes>>,
-    /// Size of the whole text.
+    /// Size of the whole text in bytes.
     pub bytes: usize,
-    /// How much of it is in memory already.
+    /// Number of bytes that are in memory already.
     pub held_bytes: usize,
-    /// It was computed for an identical case before.
+    /// Whether the result was computed for an earlier identical case.
     pub cached: bool,
-    /// What the case asked for.
+    /// The requested outputs.
     pub outputs: Vec<Output>,
 }
 
 impl ResultStream {
-    /// The whole text.
+    /// Reads the whole text.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// The result cannot be read.
     pub async fn text(mut self) -> Result<Bytes> {
         let mut text = Vec::with_capacity(self.bytes);
         while let Some(piece) = self.open_solution.try_next().await? {
@@ -46,14 +46,14 @@ impl ResultStream {
 }
 
 impl Jobs {
-    /// The case of a job as submitted, as JSON text.
+    /// Reads the case of a job as submitted, as JSON text.
     ///
     /// # Errors
     /// [`JobsError::NotFound`], or a failed database.
     pub async fn case(&self, id: Uuid) -> Result<Bytes> {
         self.get(id).await?;
         let case = self.shared.store.case(&self.tenant, id).await?;
-        // It was there a moment ago.
+        // The job was just read, so it was removed since.
         let case = case.ok_or(JobsError::Expired)?;
         if case.template.is_none() {
             return Ok(case.body);
@@ -62,7 +62,7 @@ impl Jobs {
         Ok(Bytes::from(filled.to_string()))
     }
 
-    /// The answer of a succeeded job, without fields.
+    /// Reads the solution of a succeeded job.
     ///
     /// # Errors
     /// [`JobsError::NotReady`], [`JobsError::NotSucceeded`], [`JobsError::NotFound`], or a failed store.
@@ -78,7 +78,7 @@ impl Jobs {
         solution.map_err(|error: serde_json::Error| damaged(error))
     }
 
-    /// The answer of a succeeded job, read piece by piece: a client that does not take it holds no memory for it.
+    /// Opens the solution of a succeeded job as a stream, which holds no memory for a client that does not read.
     ///
     /// # Errors
     /// As [`Jobs::solution`].
@@ -112,23 +112,16 @@ impl Jobs {
         })
     }
 
-    /// The cells of one patch with the values of every motion; reads no other patch.
-    ///
-    /// # Errors
-    /// [`JobsError::NoSuchPatch`], else as [`Jobs::solution`].
-    pub async fn patch_fields(&self, id: Uuid, patch: usize) -> Result<PatchFields> {
-        self.fields_of(id, patch, None).await
-    }
-
-    /// The cells of one patch with the values of one motion, the only entry of `points`; reads nothing else.
+    /// Reads the cells of one patch, with the values of one motion, which is then the only entry of `points`, or of all motions.
     ///
     /// # Errors
     /// [`JobsError::NoSuchPatch`], [`JobsError::NoSuchPoint`], else as [`Jobs::solution`].
-    pub async fn point_fields(&self, id: Uuid, patch: usize, point: usize) -> Result<PatchFields> {
-        self.fields_of(id, patch, Some(point)).await
-    }
-
-    async fn fields_of(&self, id: Uuid, patch: usize, point: Option<usize>) -> Result<PatchFields> {
+    pub async fn patch_fields(
+        &self,
+        id: Uuid,
+        patch: usize,
+        point: Option<usize>,
+    ) -> Result<PatchFields> {
         let (_, stored) = self.stored(id).await?;
         if patch >= stored.field_patches {
             return Err(JobsError::NoSuchPatch(stored.field_patches));
@@ -142,7 +135,7 @@ impl Jobs {
         }
     }
 
-    /// Returns a result that was read from storage. If it could not be read because its job was deleted in the meantime, the error says so.
+    /// Replaces the error of a read by [`JobsError::Expired`] if the job was removed in the meantime.
     async fn unless_gone<T>(&self, id: Uuid, read: Result<T>) -> Result<T> {
         match read {
             Err(error) => Err(self.gone_meanwhile(id, error).await),
@@ -150,7 +143,7 @@ impl Jobs {
         }
     }
 
-    /// Why the result of a job that was just there cannot be read: it went in between, or `error`.
+    /// The error for a result that cannot be read: [`JobsError::Expired`] if the job was removed in the meantime, else `error`.
     pub(crate) async fn gone_meanwhile(&self, id: Uuid, error: JobsError) -> JobsError {
         if !matches!(
             error,
@@ -165,7 +158,7 @@ impl Jobs {
         }
     }
 
-    /// Where the result of a job lies.
+    /// Reads a succeeded job with the reference to its result.
     async fn stored(&self, id: Uuid) -> Result<(Job, ResultRef)> {
         let found = self.shared.store.result(&self.tenant, id).await?;
         let Some((job, stored)) = found else {

@@ -1,4 +1,4 @@
-//! Solve time of a case, measured by solving it for a moment.
+//! Estimate of the solve time of a case by solving it for a short time.
 //!
 //! The cost formulas of the physics do not include the speed of the machine or the number of refinements. Most cases end within the limit of
 //! a probe. For the others the formulas extrapolate from the part that was solved.
@@ -12,24 +12,24 @@ use railhead_contact::monitor::{Monitor, Stop};
 use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::solution::words::answer::FoundBy;
 
-/// Largest memory of its own, in bytes, of a case that is probed: probes run outside the memory budget of the workers.
+/// Maximum memory of a case that is probed, in bytes: probes run outside the memory budget of the workers.
 const BYTES_MAX: u64 = 128 << 20;
 
 /// Default limit of a probe. 98 % of the cases of the stress bench end within it.
 pub const USUAL_LIMIT: Duration = Duration::from_millis(200);
 
-/// Least total time of a first motion that did not end within a probe, over the time of the probe. Of 27 such cases of
-/// `cargo bench --bench stress -- --only times` 25 are within a factor of 3.
+/// Lower bound of the total time of a first motion that did not end within a probe, relative to the probe. Of 27 such cases
+/// of `cargo bench --bench stress -- --only times`, 25 are within a factor of 3.
 const REST_TIMES: f64 = 2.0;
-/// Number of solved motions from which on they determine the time of the others.
+/// Number of solved motions from which the time of the others is extrapolated.
 const MOTIONS_MIN: usize = 3;
 
-/// Solve time of a case, and its source.
+/// Estimated solve time of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProbedTime {
     /// Solve time in s on one core.
     pub seconds: f64,
-    /// How it was found.
+    /// Source of the estimate.
     pub found_by: FoundBy,
 }
 

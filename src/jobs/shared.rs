@@ -1,6 +1,6 @@
-//! What all handles and workers of a process use together.
+//! State that all handles and workers of a process share.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
@@ -17,113 +17,146 @@ use crate::attempts::fair_scheduler::FairScheduler;
 use crate::blobs::Blobs;
 use crate::clock::{ClockStep, ClockSteps};
 use crate::engine::Engine;
+use crate::error::{JobsError, Result};
 use crate::metrics::Metrics;
 use crate::model::Trusted;
-use crate::options::Options;
-use crate::recent_reads::RecentReads;
-use crate::staged_bytes::StagedBytes;
+use crate::options::{Options, StagingBounds};
 use crate::storage_fault::StorageFaults;
 use crate::store::{Lease, Node, Notification, Store};
 use crate::sync::lock;
-use crate::work::Work;
+use crate::work::{RecentReads, Work};
 
-/// How often a waiting caller reads again although nothing was announced.
+/// Interval at which a waiting caller reads again without an announcement.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);
 
-/// What every handle and every worker shares.
+/// State that all handles and workers of a process share.
 #[derive(Debug)]
 pub(crate) struct Shared {
     pub(crate) options: Options,
     pub(crate) engine: Engine,
     pub(crate) store: Arc<dyn Store>,
     pub(crate) blobs: Blobs,
-    /// This process among those that share its store.
+    /// This process as a node of the cluster.
     pub(crate) node: Node,
-    /// Workers of all nodes that share its store, as far as it is known.
+    /// Number of workers of all live nodes, as last read.
     pub(crate) cluster_workers: AtomicUsize,
-    /// How far the clock of the store is ahead of that of this machine.
+    /// Offset of the clock of the store from the clock of this machine.
     pub(crate) clock_offset_ms: Arc<AtomicI64>,
-    /// Wakes an idle worker; a hint only, workers also poll.
+    /// Wakes an idle worker. Workers also poll.
     pub(crate) wake: Notify,
-    /// Announces ended jobs; a hint only, waiting callers also poll.
+    /// Announces ended jobs. Waiting callers also poll.
     pub(crate) ended: broadcast::Sender<Uuid>,
-    /// The leases that this process holds, and its heartbeat once there was one.
+    /// The leases that this process holds.
     pub(crate) leases: AllLeases,
+    /// Set once the heartbeat task runs.
     pub(crate) heartbeat: OnceLock<()>,
-    /// Set when the service is about to stop: no new claims, not ready, no more waiting.
+    /// Cancelled when the service begins to stop: no new claims, not ready, no waiting.
     pub(crate) draining: CancellationToken,
-    /// Set when the grace period is over: running jobs are handed back.
+    /// Cancelled when the grace period is over: running jobs return to the queue.
     pub(crate) stopping: CancellationToken,
     pub(crate) tasks: TaskTracker,
     pub(crate) metrics: Metrics,
     pub(crate) registry: Registry,
-    /// Which of the places that it writes to fail.
+    /// Current faults of the storage locations.
     pub(crate) storage: StorageFaults,
-    /// Keys found good a moment ago.
+    /// Recently validated keys.
     pub(crate) trusted: Mutex<Trusted>,
-    /// Cases of single jobs that may be checked at the same time.
+    /// Limits the number of large cases that are checked at the same time.
     pub(crate) checks: Semaphore,
     /// Bytes of batches that are being received.
     pub(crate) staged: StagedBytes,
-    /// Batches that are being received or filled, and those that are to be removed.
+    /// Batches that are not acknowledged.
     pub(crate) batches: Mutex<UnfinishedBatches>,
-    /// Jobs, batches and runs that clients follow, as they were read a moment ago.
+    /// Recent reads of work that clients follow.
     pub(crate) recent: RecentReads<Option<Work>>,
-    /// Steps of the wall clock.
+    /// Jumps of the wall clock.
     pub(crate) leaps: ClockSteps,
-    /// Whose turn it is.
+    /// Solver time used by each queue.
     pub(crate) turns: FairScheduler,
-    /// Held while a job is solved that may have killed a process.
+    /// Held while a job runs that may have crashed a process.
     pub(crate) suspect: Arc<tokio::sync::Mutex<()>>,
-    /// Solves that have taken longer than a slice while others wait.
+    /// Number of solves that have exceeded a slice while other work waits.
     pub(crate) long_solves: AtomicUsize,
     /// Wakes the spare worker.
     pub(crate) wake_spare: Notify,
-    /// Solver threads that did not stop and still run.
+    /// Number of abandoned solver threads that still run.
     pub(crate) abandoned: Arc<AtomicUsize>,
-    /// Set when there are too many of them.
+    /// Cancelled when too many solver threads were abandoned.
     pub(crate) broken: CancellationToken,
-    /// What a dead process left is taken back; nothing is claimed before.
+    /// Set once the jobs of a crashed process are back in the queue; nothing is claimed before.
     pub(crate) recovered: SetOnce<()>,
-    /// Held as long as this process uses the data folder.
+    /// Lock of the data folder.
     pub(crate) lock: Mutex<Option<File>>,
-    /// Ids that are made with the clock of the store grow within a millisecond too.
+    /// Keeps ids increasing within a millisecond if they are created with the clock of the store.
     pub(crate) id_context: Mutex<ContextV7>,
 }
 
-/// Batches that are not acknowledged: being received and filled, or given up and to be removed.
+/// Batches that are not acknowledged.
 #[derive(Debug, Default)]
 pub(crate) struct UnfinishedBatches {
-    /// Being received or filled by this process.
+    /// Batches that this process is receiving or filling.
     pub(crate) living: HashSet<Uuid>,
-    /// Given up: their jobs are neither solved nor shown, and are removed as soon as the disk allows it.
+    /// Abandoned batches: their jobs are neither solved nor shown, and are removed as soon as storage permits.
     pub(crate) abandoned: HashSet<Uuid>,
 }
 
-impl UnfinishedBatches {
-    /// This process neither receives nor fills this batch any more.
-    pub(crate) fn forget(&mut self, id: Uuid) {
-        self.living.remove(&id);
+/// Bytes of batches that are being received, by tenant. A row of a table counts with its template.
+#[derive(Debug, Default)]
+pub(crate) struct StagedBytes(Mutex<HashMap<Arc<str>, u64>>);
+
+impl StagedBytes {
+    /// Adds bytes of a tenant.
+    ///
+    /// # Errors
+    /// [`JobsError::StagingQuotaExceeded`] or [`JobsError::StagingFull`].
+    pub(crate) fn add(&self, tenant: &str, bytes: u64, bounds: StagingBounds) -> Result<()> {
+        let mut staged = lock(&self.0);
+        let of_tenant = staged.get(tenant).copied().unwrap_or(0);
+        if of_tenant + bytes > bounds.tenant {
+            return Err(JobsError::StagingQuotaExceeded(bounds.tenant));
+        }
+        if staged.values().sum::<u64>() + bytes > bounds.all {
+            return Err(JobsError::StagingFull(bounds.all));
+        }
+        staged.insert(tenant.into(), of_tenant + bytes);
+        Ok(())
+    }
+
+    /// Number of staged bytes of a tenant.
+    pub(crate) fn of(&self, tenant: &str) -> u64 {
+        let staged = lock(&self.0);
+        staged.get(tenant).copied().unwrap_or(0)
+    }
+
+    /// Subtracts bytes of a tenant.
+    pub(crate) fn give_back(&self, tenant: &str, bytes: u64) {
+        let mut staged = lock(&self.0);
+        let left = staged.get(tenant).map_or(0, |of| of.saturating_sub(bytes));
+        if left == 0 {
+            staged.remove(tenant);
+        } else {
+            staged.insert(tenant.into(), left);
+        }
     }
 }
 
 impl Shared {
-    /// The present, epoch milliseconds.
+    /// The current time, epoch milliseconds.
     pub(crate) fn now_ms(&self) -> i64 {
         self.options.clock.now_ms()
     }
 
-    /// Milliseconds of the steady clock, with which leases are measured.
+    /// The time of the steady clock in ms, by which leases are measured.
     pub(crate) fn steady_ms(&self) -> i64 {
         self.options.clock.steady_ms()
     }
 
-    /// The time from a claim or a heartbeat until the job is given away, in ms.
+    /// Length of a lease in ms.
     pub(crate) fn lease_ms(&self) -> i64 {
         i64::try_from(self.options.lease.as_millis()).unwrap_or(i64::MAX)
     }
 
-    /// How far the wall clock has leapt since the start.
+    /// The jump of the wall clock since the start.
     pub(crate) fn clock_step(&self) -> ClockStep {
         self.leaps.measure(&self.options.clock)
     }
@@ -136,12 +169,12 @@ impl Shared {
         }
     }
 
-    /// When a lease that begins now runs out.
+    /// Time at which a lease that begins now expires.
     pub(crate) fn lease_until(&self) -> i64 {
         self.steady_ms().saturating_add(self.lease_ms())
     }
 
-    /// An id for a job that is submitted now.
+    /// Creates the id of a job that is submitted now.
     pub(crate) fn new_id(&self) -> Uuid {
         let offset = self.clock_offset_ms.load(Ordering::Relaxed);
         if offset == 0 {
@@ -153,63 +186,84 @@ impl Shared {
         Uuid::new_v7(Timestamp::from_unix(&self.id_context, seconds, nanos))
     }
 
-    /// Workers of all nodes.
+    /// Number of workers of all nodes.
     pub(crate) fn all_workers(&self) -> usize {
         let others = self.cluster_workers.load(Ordering::Relaxed);
         self.options.workers.max(others)
     }
 
-    /// Whether every worker is at a solve that has taken longer than a slice while others wait.
+    /// Whether every worker runs a solve that has exceeded a slice while other work waits.
     pub(crate) fn all_workers_are_long(&self) -> bool {
         self.long_solves.load(Ordering::Acquire) >= self.options.workers
     }
 
-    /// Wakes one worker for one job.
+    /// Wakes one worker of each node.
     pub(crate) fn wake_worker(&self) {
         self.wake.notify_one();
         self.publish(Notification::Work);
     }
 
-    /// Tells workers that there is something to be claimed.
+    /// Wakes all workers of all nodes.
     pub(crate) fn wake_workers(&self) {
         self.wake_here();
         self.publish(Notification::Work);
     }
 
-    /// The same, only those of this process.
+    /// Wakes all workers of this process.
     pub(crate) fn wake_here(&self) {
         self.wake.notify_waiters();
         self.wake.notify_one();
     }
 
-    /// Rings at all nodes, if there are others.
+    /// Sends a notification to all nodes, if there are others.
     pub(crate) fn publish(&self, notification: Notification) {
         if let Some(cluster) = self.store.cluster() {
             cluster.publish(notification);
         }
     }
 
-    /// Tells waiting callers, those of other nodes too, that a job has ended.
+    /// Announces an ended job to the waiting callers of all nodes.
     pub(crate) fn announce(&self, id: Uuid) {
         self.announce_here(id);
         self.publish(Notification::Ended(id));
     }
 
-    /// The same, only those of this process.
+    /// Announces an ended job to the waiting callers of this process.
     pub(crate) fn announce_here(&self, id: Uuid) {
-        // It is no error if no caller waits.
+        // An error means that nobody waits.
         let _ = self.ended.send(id);
     }
-}
-
-impl Shared {
-    /// Batches that are not acknowledged.
+    /// Locks the batches that are not acknowledged.
     pub(crate) fn unfinished_batches(&self) -> MutexGuard<'_, UnfinishedBatches> {
         lock(&self.batches)
     }
 }
 
-/// Time between two heartbeats of a worker, and between two rounds of the reaper.
+/// Interval between heartbeats, and between runs of the reaper.
 pub(crate) fn heartbeat(shared: &Shared) -> Duration {
     (shared.options.lease / 3).max(Duration::from_millis(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_bounded_per_tenant_and_in_all_and_come_back() {
+        let staged = StagedBytes::default();
+        let bounds = StagingBounds {
+            all: 150,
+            tenant: 100,
+        };
+        let (a, b): (Arc<str>, Arc<str>) = ("a".into(), "b".into());
+        staged.add(&a, 100, bounds).unwrap();
+        let refused = staged.add(&a, 1, bounds);
+        assert!(matches!(refused, Err(JobsError::StagingQuotaExceeded(100))));
+        let refused = staged.add(&b, 51, bounds);
+        assert!(matches!(refused, Err(JobsError::StagingFull(150))));
+        staged.add(&b, 50, bounds).unwrap();
+        staged.give_back(&a, 100);
+        staged.add(&b, 50, bounds).unwrap();
+        staged.add(&a, 50, bounds).unwrap();
+    }
 }

@@ -1,4 +1,4 @@
-//! Faults of the storage, as opposed to faults of a job.
+//! Faults of the storage, as opposed to failures of a job.
 
 use std::error::Error;
 use std::io;
@@ -7,11 +7,11 @@ use std::sync::{Mutex, MutexGuard};
 use crate::error::{JobsError, StorageFault};
 use crate::sync::lock;
 
-/// What a folder is called in errors.
+/// Name of the local store in errors of `object_store`.
 const DISK: &str = "LocalFileSystem";
 
 impl JobsError {
-    /// The fault of the storage behind this error, if that is what it is.
+    /// The fault of the storage that caused this error, if it is one.
     #[must_use]
     pub fn storage_fault(&self) -> Option<StorageFault> {
         match self {
@@ -22,7 +22,7 @@ impl JobsError {
                 let far =
                     !matches!(error, object_store::Error::Generic { store, .. } if *store == DISK);
                 if far {
-                    // Whatever it is, it is not about the job.
+                    // Any error of a remote store concerns the store, not the job.
                     return Some(StorageFault::Unreachable);
                 }
                 let mut cause: Option<&(dyn Error + 'static)> = Some(error);
@@ -50,19 +50,19 @@ pub(crate) fn fault_of_io(error: &io::Error) -> Option<StorageFault> {
     }
 }
 
-/// A place that the service writes to.
+/// A location that the service writes to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StoragePlace {
     /// The job table.
     Table,
-    /// The results that are too large for the table.
+    /// Results outside the table.
     Results,
-    /// The files of bodies that are being received.
+    /// Spool files of request bodies.
     Spool,
 }
 
 impl StoragePlace {
-    /// All of them.
+    /// All locations.
     pub(crate) const ALL: [StoragePlace; 3] = [
         StoragePlace::Table,
         StoragePlace::Results,
@@ -70,34 +70,34 @@ impl StoragePlace {
     ];
 }
 
-/// Which places fail at present.
+/// Current fault of each location.
 #[derive(Debug, Default)]
 pub(crate) struct StorageFaults(Mutex<[PlaceState; StoragePlace::ALL.len()]>);
 
 #[derive(Debug, Clone, Copy, Default)]
 struct PlaceState {
     fault: Option<StorageFault>,
-    /// Writers that repeat their write until it succeeds.
+    /// Number of writers that repeat their write until it succeeds.
     waiting: usize,
 }
 
-/// What the outcome of a write changed.
+/// Effect of the outcome of a write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FaultChange {
-    /// The place fails from now on.
+    /// The location fails from now on.
     Begun,
-    /// No place fails any more.
+    /// No location fails any more.
     AllOver,
-    /// Nothing.
+    /// No change.
     None,
 }
 
-/// A writer that repeats its write until it succeeds; it stops waiting when dropped.
+/// Counts a writer that repeats its write, until it is dropped.
 #[derive(Debug)]
 pub(crate) struct WaitingWriter<'a>(&'a StorageFaults, StoragePlace);
 
 impl StorageFaults {
-    /// Notes the outcome of a write to a place. Damage stays until the next start, which examines everything.
+    /// Records the outcome of a write. Damage remains until the next start, which checks the whole table.
     pub(crate) fn note(&self, place: StoragePlace, fault: Option<StorageFault>) -> FaultChange {
         let mut places = self.places();
         let fails = |places: &[PlaceState]| places.iter().any(|state| state.fault.is_some());
@@ -116,24 +116,24 @@ impl StorageFaults {
         }
     }
 
-    /// The fault of a place, and whether a writer waits for it.
+    /// The fault of a location, and whether a writer repeats its write there.
     pub(crate) fn fault(&self, place: StoragePlace) -> Option<(StorageFault, bool)> {
         let state = self.places()[place as usize];
         state.fault.map(|fault| (fault, state.waiting > 0))
     }
 
-    /// Does any place fail?
+    /// Whether any location fails.
     pub(crate) fn any(&self) -> bool {
         self.places().iter().any(|state| state.fault.is_some())
     }
 
-    /// Is the table damaged?
+    /// Whether the table is damaged.
     pub(crate) fn damaged(&self) -> bool {
         let fault = self.fault(StoragePlace::Table);
         fault.is_some_and(|(fault, _)| fault == StorageFault::Damaged)
     }
 
-    /// Counts a writer that waits for a place.
+    /// Counts a writer that repeats its write to a location.
     pub(crate) fn wait(&self, place: StoragePlace) -> WaitingWriter<'_> {
         self.places()[place as usize].waiting += 1;
         WaitingWriter(self, place)

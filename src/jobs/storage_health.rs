@@ -1,40 +1,40 @@
-//! Jobs while a disk is full or cannot be written: nothing that was accepted is lost, and the service says that it is not ready.
+//! Behaviour while storage is full or cannot be written: nothing that was accepted is lost, and the service is not ready.
 //!
-//! A result that cannot be stored stays in memory; its worker waits and repeats the write.
+//! A result that cannot be stored stays in memory while its worker repeats the write.
 //!
-//! Each [`StoragePlace`] fails by itself. Its fault ends with the next write there that succeeds. While a writer waits, only its own
-//! write ends the fault: smaller ones may find room on a disk that is full for it.
+//! Each [`StoragePlace`] fails separately. Its fault ends with the next successful write there. While a writer repeats its
+//! write, only that write ends the fault, because smaller ones may still find room.
 
 use std::future::Future;
 use std::time::Duration;
 
-use crate::disk_reserve;
+use crate::data_dir;
 use crate::error::{JobsError, Result, StorageFault, StoreError};
 use crate::handle::Jobs;
 use crate::shared::Shared;
 use crate::storage_fault::{FaultChange, StoragePlace};
 use crate::sync::blocking;
 
-/// Tries to write where the cause is not the disk, with pauses that double from [`FIRST_PAUSE`].
+/// Number of attempts to write if storage is not the cause. Pauses double from [`FIRST_PAUSE`].
 const WRITE_TRIES: u32 = 6;
 
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 
-/// Longest pause between two tries.
+/// Longest pause between two attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
 impl Jobs {
-    /// Passes the outcome of a write to the job table on. After a fault of the storage the service is not ready until a write succeeds.
+    /// Records the outcome of a write to the job table. After a fault the service is not ready until a write succeeds.
     pub(crate) fn observe_write<T, E: Into<JobsError>>(&self, written: Result<T, E>) -> Result<T> {
         let written = written.map_err(Into::into);
         self.shared.observe_storage(StoragePlace::Table, &written);
         written
     }
 
-    /// The error of a file for a body that is being received.
-    pub(crate) fn staging_failed(&self, source: std::io::Error) -> JobsError {
-        let path = self.shared.options.data_dir.clone();
-        let error = JobsError::DataDir { path, source };
+    /// The error for a failed read or write of a spool file, whose fault is recorded.
+    #[must_use]
+    pub fn spool_failed(&self, source: std::io::Error) -> JobsError {
+        let error = JobsError::at(&self.shared.options.data_dir)(source);
         if let Some(fault) = error.storage_fault() {
             self.shared.note_fault(StoragePlace::Spool, Some(fault));
         }
@@ -43,11 +43,11 @@ impl Jobs {
 }
 
 impl Shared {
-    /// Notes whether a place takes what is written.
+    /// Records the outcome of a write to a location.
     pub(crate) fn observe_storage<T>(&self, place: StoragePlace, written: &Result<T>) {
         match written {
             Ok(_) => self.note_fault(place, None),
-            // Filling a batch reads its file too, whose faults are noted where they arise.
+            // Filling a batch also reads its spool file, whose faults are recorded where they occur.
             Err(error) if place == StoragePlace::Table && !matches!(error, JobsError::Store(_)) => {
             }
             Err(error) => {
@@ -77,8 +77,8 @@ impl Shared {
         }
     }
 
-    /// Writes to a place, again and again: a few times if the database fails for a moment, for as long as it takes if the disk is
-    /// full or cannot be written. Gives up when the service stops.
+    /// Writes to a location with retries: a few times if the database fails, and without limit while storage is full or
+    /// cannot be written. Gives up when the service stops.
     pub(crate) async fn write_with_retries<T, E, F>(
         &self,
         place: StoragePlace,
@@ -115,7 +115,7 @@ impl Shared {
         }
     }
 
-    /// The store does not answer in time.
+    /// The error for a store that does not answer in time.
     pub(crate) fn silent_store(&self) -> StoreError {
         match (StoreError::timed_out(), self.store.cluster()) {
             (StoreError::Away(_, cause), Some(_)) => {
@@ -125,7 +125,7 @@ impl Shared {
         }
     }
 
-    /// Do all places take data? Writes only to those that did not the last time.
+    /// Requires that all locations accept writes; writes only to those with a recorded fault.
     pub(crate) async fn require_storage(&self) -> Result<()> {
         for place in StoragePlace::ALL {
             let Some((fault, waited_for)) = self.storage.fault(place) else {
@@ -144,7 +144,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Writes to a place and leaves nothing there.
+    /// Writes to a location and removes what was written.
     async fn try_write(&self, place: StoragePlace) -> Result<()> {
         match place {
             StoragePlace::Table => Ok(self.store.ready(true).await?),
@@ -154,10 +154,10 @@ impl Shared {
                 self.blobs.try_write(bytes).await
             }
             StoragePlace::Spool => {
-                let path = self.options.data_dir.clone();
-                let folder = path.clone();
-                let written = blocking(move || disk_reserve::try_write(&folder)).await?;
-                written.map_err(|source| JobsError::DataDir { path, source })
+                let folder = self.options.data_dir.clone();
+                let failed = JobsError::at(&folder);
+                let written = blocking(move || data_dir::try_write(&folder)).await?;
+                written.map_err(failed)
             }
         }
     }

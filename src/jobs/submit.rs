@@ -1,17 +1,19 @@
-//! Submission of single jobs: check, idempotency key, cached result, queue.
+//! Submission of single jobs: check, idempotency key, result cache, queue.
 
 use std::sync::Arc;
 
 use bytes::Bytes;
 use serde_json::Value;
+use uuid::Uuid;
 
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::idempotency;
-use crate::model::{Job, Kind, WorkOptions, created_at};
-use crate::store::{Enqueued, NewJob, QueueBounds, Refusal};
+use crate::model::{Job, Kind, State, WorkOptions, created_at};
+use crate::shared::Shared;
+use crate::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal};
 use crate::sync::blocking;
-use crate::trace::KeyValue;
+use crate::trace::{KeyValue, SubmitSpan};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::error::CaseError;
 use railhead_contact::evaluate::varied::in_template;
@@ -19,11 +21,10 @@ use railhead_contact::evolution::task::Evolution;
 use railhead_contact::problem::checked_case::CheckedCase;
 
 impl Jobs {
-    /// Checks a case and queues it. Once this returns the job survives the death of the process. If an identical case
-    /// was solved before, the job has already succeeded, with that result.
+    /// Checks a case and queues it. The job is durable once this returns. If an identical case was solved before, the job
+    /// has already succeeded with its result.
     ///
-    /// With an idempotency key the same case gives the same job again, however often it is submitted, for as long as
-    /// that job exists.
+    /// With an idempotency key the same case returns the same job for as long as that job exists.
     ///
     /// # Errors
     /// [`JobsError::Case`], [`JobsError::QueueFull`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`], or a
@@ -37,7 +38,7 @@ impl Jobs {
         submitted.await.map(|(job, _)| job)
     }
 
-    /// As [`Jobs::submit`], with options; also says whether the job is that of an earlier submission with the same
+    /// As [`Jobs::submit`], with options; also returns whether the job is that of an earlier submission with the same
     /// idempotency key.
     ///
     /// # Errors
@@ -53,7 +54,7 @@ impl Jobs {
         self.submit_work(case, small, check, options).await
     }
 
-    /// Checks an evolution and queues it, as [`Jobs::submit_with`] does with a case; its columns are named by JSON pointers into its template.
+    /// Checks an evolution and queues it. JSON pointers in its columns refer to its template.
     ///
     /// # Errors
     /// As [`Jobs::submit`].
@@ -96,7 +97,7 @@ impl Jobs {
         check: impl FnOnce(&Jobs, &Value) -> Result<NewJob> + Send + 'static,
         options: WorkOptions,
     ) -> Result<(Job, bool)> {
-        let span = self.submit_span();
+        let span = SubmitSpan::begin(self.tracer());
         let traceparent = span.traceparent();
         let submitted = self.store_work(request, small, check, (options, traceparent));
         span.end(submitted.await, |(job, _)| {
@@ -131,8 +132,7 @@ impl Jobs {
         let (checked, body, idempotency) = if small {
             read()
         } else {
-            // Checking a large case is arithmetic. It stays off the threads that answer requests, and a crowd of submitters does
-            // not take the cores from them either.
+            // Checking a large case takes CPU time: it runs outside the request threads, with limited concurrency.
             let _turn = self.shared.checks.acquire().await;
             blocking(read).await?
         };
@@ -144,7 +144,7 @@ impl Jobs {
                 .await?
         {
             match self.of_enqueued(enqueued) {
-                // The job is over and only waits for its removal: the key is free.
+                // The job has expired and is about to be removed, so the key is free.
                 Err(JobsError::Expired) => self.shared.store.forget_key(&self.tenant, key).await?,
                 answer => return answer,
             }
@@ -172,7 +172,7 @@ impl Jobs {
         Ok((job, replayed))
     }
 
-    /// A checked case as a job about to be queued.
+    /// A new job for a checked case.
     pub(crate) fn new_job(&self, checked: CheckedCase) -> NewJob {
         NewJob {
             method: checked.run.method.name().to_owned(),
@@ -186,7 +186,7 @@ impl Jobs {
         }
     }
 
-    /// A job about to be queued without anything to do.
+    /// A new job without content.
     pub(crate) fn blank_job(&self) -> NewJob {
         let id = self.shared.new_id();
         NewJob {
@@ -214,7 +214,7 @@ impl Jobs {
         }
     }
 
-    /// Why there is no room.
+    /// The error for a refused submission.
     pub(crate) fn refused(&self, refusal: Refusal) -> JobsError {
         let bounds = self.queue_bounds();
         match refusal {
@@ -224,7 +224,7 @@ impl Jobs {
         }
     }
 
-    /// The job that was made, or that the idempotency key stands for, and whether it is the latter.
+    /// The created job, or the existing one of the idempotency key; `true` in the second case.
     fn of_enqueued(&self, enqueued: Enqueued) -> Result<(Job, bool)> {
         match enqueued {
             Enqueued::Created(job) => Ok((self.dated(job), false)),
@@ -235,7 +235,55 @@ impl Jobs {
     }
 }
 
-/// Whether a case is so small that its check takes microseconds. Profiles and long sweeps are larger.
+// A case gets the stored result of an earlier identical case of the same tenant.
+impl Jobs {
+    /// The cache key of a case with this digest; `None` if the cache is disabled.
+    pub(crate) fn cache_key(&self, digest: &str) -> Option<CacheKey> {
+        if !self.shared.options.cache {
+            return None;
+        }
+        let mut hasher = blake3::Hasher::new();
+        // A tenant must not learn from a fast response that another one has solved the case.
+        hasher.update(self.tenant.as_bytes());
+        hasher.update(&[0]);
+        hasher.update(digest.as_bytes());
+        let mut key = CacheKey::default();
+        hasher.finalize_xof().fill(&mut key);
+        Some(key)
+    }
+
+    /// Sets the source of each new job for which a result is stored.
+    pub(crate) async fn find_sources(&self, jobs: impl Iterator<Item = &mut NewJob>) -> Result<()> {
+        let jobs: Vec<_> = jobs.collect();
+        let keys: Vec<_> = jobs.iter().filter_map(|job| job.cache_key).collect();
+        if keys.is_empty() {
+            return Ok(());
+        }
+        let sources = self.shared.store.cached(&keys).await?;
+        let (mut hits, now) = (0, self.shared.now_ms());
+        for job in jobs {
+            let source = job.cache_key.and_then(|key| sources.get(&key));
+            job.source = source.map(|source| (*source, now));
+            hits += u64::from(job.source.is_some());
+        }
+        self.shared
+            .metrics
+            .cache_lookup(hits, keys.len() as u64 - hits);
+        Ok(())
+    }
+}
+
+impl Shared {
+    /// Counts and announces jobs that ended with the result of their source.
+    pub(crate) fn ended_cached(&self, ids: &[Uuid]) {
+        self.metrics.ended(State::Succeeded, ids.len() as u64);
+        for id in ids {
+            self.announce(*id);
+        }
+    }
+}
+
+/// Whether a case is so small that its check takes microseconds.
 fn is_small(case: &Value) -> bool {
     const VALUES_MAX: usize = 100;
     const BYTES_PER_VALUE: usize = 16;
@@ -268,7 +316,7 @@ pub(crate) fn cost_us(checked: &CheckedCase) -> u32 {
     microseconds(checked.cost().seconds)
 }
 
-/// A time in s as µs, at least 1.
+/// Converts a time in s to µs, at least 1.
 pub(crate) fn microseconds(seconds: f64) -> u32 {
     let microseconds = (seconds * 1e6).clamp(1.0, f64::from(i32::MAX));
     #[expect(

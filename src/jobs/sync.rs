@@ -1,15 +1,15 @@
-//! Locks and work outside the threads of the runtime.
+//! Mutexes, and work outside the threads of the runtime.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::error::{JobsError, Result};
 
-/// Locks a mutex, also after a panic of another holder.
+/// Locks a mutex, ignoring poisoning.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs work that takes long, or waits for the disk, on a thread of its own.
+/// Runs work that takes long or waits for the disk on a thread for blocking calls.
 ///
 /// # Errors
 /// [`JobsError::Damaged`] if the work panics.

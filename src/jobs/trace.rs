@@ -1,7 +1,7 @@
 //! Spans of a request and of a job: `submit`, `queue`, `solve`, `store`.
 //!
-//! A job may be solved by another process than the one that took it, so its trace travels with its row, as a W3C
-//! `traceparent`. Where nobody collects spans there is no [`Tracer`], and nothing is made, stored or measured.
+//! A job may be solved by another process than the one that accepted it, so its row contains its trace as a W3C `traceparent`.
+//! If no spans are collected, there is no [`Tracer`], and nothing is recorded.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -18,27 +18,25 @@ use uuid::Uuid;
 
 use crate::attempts::slices::Outcome;
 use crate::error::Result;
-use crate::handle::Jobs;
 use crate::model::created_at;
-use crate::shared::Shared;
 use crate::store::Claim;
 
 const TRACEPARENT: &str = "traceparent";
 
 const TRACESTATE: &str = "tracestate";
 
-/// Makes spans for those who collect them; clones share it.
+/// Records spans; clones share the tracer.
 #[derive(Debug, Clone)]
 pub struct Tracer(Arc<BoxedTracer>);
 
 impl Tracer {
-    /// Spans go where this tracer of OpenTelemetry sends them.
+    /// Records spans with a tracer of OpenTelemetry.
     pub fn new(tracer: impl ObjectSafeTracer + Send + Sync + 'static) -> Tracer {
         Tracer(Arc::new(BoxedTracer::new(Box::new(tracer))))
     }
 
-    /// Begins the span of a request, inside the client's trace if its headers name one. What the headers should not
-    /// say is passed over, as W3C Trace Context asks.
+    /// Begins the span of a request, inside the client's trace if its headers contain one. Invalid headers are ignored, as W3C Trace
+    /// Context requires.
     #[must_use]
     pub fn request(
         &self,
@@ -60,11 +58,20 @@ impl Tracer {
     }
 }
 
-/// The span of a submission; without a tracer it is none.
+/// The span of a submission, if there is a tracer.
 pub(crate) struct SubmitSpan(Option<Context>);
 
 impl SubmitSpan {
-    /// What is written to the rows of the jobs; `None` if the trace is not collected.
+    /// Begins the span, inside the span of the request.
+    pub(crate) fn begin(tracer: Option<&Tracer>) -> SubmitSpan {
+        SubmitSpan(tracer.map(|tracer| {
+            let parent = Context::current();
+            let span = tracer.0.start_with_context("submit", &parent);
+            parent.with_span(span)
+        }))
+    }
+
+    /// The trace context for the rows of the jobs; `None` if the trace is not recorded.
     pub(crate) fn traceparent(&self) -> Option<Arc<str>> {
         let context = self.0.as_ref()?;
         if !context.span().span_context().is_sampled() {
@@ -75,7 +82,7 @@ impl SubmitSpan {
         headers.remove(TRACEPARENT).map(Into::into)
     }
 
-    /// Ends the span with what became of it.
+    /// Ends the span with the outcome of the submission.
     pub(crate) fn end<T>(
         self,
         submitted: Result<T>,
@@ -93,40 +100,7 @@ impl SubmitSpan {
     }
 }
 
-impl Jobs {
-    /// What makes the spans, if they are collected.
-    #[must_use]
-    pub fn tracer(&self) -> Option<&Tracer> {
-        self.shared.options.tracer.as_ref()
-    }
-
-    /// Begins the span of a submission, inside the span of the request.
-    pub(crate) fn submit_span(&self) -> SubmitSpan {
-        SubmitSpan(self.tracer().map(|tracer| {
-            let parent = Context::current();
-            let span = tracer.0.start_with_context("submit", &parent);
-            parent.with_span(span)
-        }))
-    }
-}
-
-impl Shared {
-    /// The trace to which an attempt at a job belongs, if it is collected.
-    pub(crate) fn job_trace(&self, claim: &Claim) -> Option<JobTrace> {
-        let tracer = self.options.tracer.clone()?;
-        let traceparent = claim.traceparent.clone()?;
-        let headers = HashMap::from([(TRACEPARENT.to_owned(), traceparent)]);
-        Some(JobTrace {
-            parent: TraceContextPropagator::new().extract_with_context(&Context::new(), &headers),
-            tracer,
-            job: claim.id,
-            attempt: claim.attempt,
-            method: claim.method.clone(),
-        })
-    }
-}
-
-/// An attempt at a job whose trace is collected.
+/// The trace of an attempt at a job.
 #[derive(Debug, Clone)]
 pub(crate) struct JobTrace {
     tracer: Tracer,
@@ -137,7 +111,21 @@ pub(crate) struct JobTrace {
 }
 
 impl JobTrace {
-    /// Solves a case and writes down how long it had waited and how long it took.
+    /// The trace of an attempt, if it is recorded.
+    pub(crate) fn of(tracer: Option<&Tracer>, claim: &Claim) -> Option<JobTrace> {
+        let tracer = tracer?.clone();
+        let traceparent = claim.traceparent.clone()?;
+        let headers = HashMap::from([(TRACEPARENT.to_owned(), traceparent)]);
+        Some(JobTrace {
+            parent: TraceContextPropagator::new().extract_with_context(&Context::new(), &headers),
+            tracer,
+            job: claim.id,
+            attempt: claim.attempt,
+            method: claim.method.clone(),
+        })
+    }
+
+    /// Solves a case and records the spans `queue`, if it comes from the queue, and `solve`.
     pub(crate) fn solving(
         traced: Option<&JobTrace>,
         comes_from_queue: bool,
@@ -152,7 +140,7 @@ impl JobTrace {
         }
         let outcome = solve();
         let fault = match &outcome {
-            Outcome::Solved { .. } | Outcome::Slice { .. } => None,
+            Outcome::Solved(_) | Outcome::Slice { .. } => None,
             Outcome::Unsolved { error, .. } => Some(error.to_string()),
             Outcome::Refused(error) => Some(error.to_string()),
             Outcome::Broken(failure) => Some(failure.detail.clone()),
@@ -163,21 +151,21 @@ impl JobTrace {
         outcome
     }
 
-    /// Writes down how long a job has waited.
+    /// Records the span `queue`.
     pub(crate) fn waited_until(&self, end: SystemTime) {
         let queued = Duration::from_millis(created_at(self.job).unsigned_abs());
-        // The clock may have been set back since.
+        // The clock may have been set back in the meantime.
         let queued = (UNIX_EPOCH + queued).min(end);
         self.past("queue", [queued, end], Vec::new(), None);
     }
 
-    /// Writes down how long the end of a job took to store, and what it was.
+    /// Records the span `store` with the final state of the job.
     pub(crate) fn stored(&self, from: SystemTime, end: &'static str) {
         let end = KeyValue::new("railhead.job.state", end);
         self.past("store", [from, SystemTime::now()], vec![end], None);
     }
 
-    /// Writes down a span that is over.
+    /// Records a span that has ended.
     fn past(
         &self,
         name: &'static str,

@@ -1,33 +1,19 @@
-//! Jobs, batches and runs alike: read, listed, waited for, followed, cancelled and deleted.
-use std::collections::{HashMap, VecDeque};
-use std::future::pending;
+//! [`Work`], the common type of jobs, batches, runs and evolutions, and a cache of recent reads.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use tokio::time::{Instant, sleep, timeout_at};
+use tokio::time::Instant;
 use uuid::Uuid;
 
-use crate::attempts::attempt::StopReason;
-use crate::batch::control::DELETED_AT_ONCE;
-use crate::error::{JobsError, Result, StoreError};
-use crate::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
-use crate::model::{Batch, Job, Kind, Labels, QueuePlace, State};
-use crate::run::model::{Run, RunHead};
-use crate::shared::POLL_INTERVAL;
-use crate::store::{Deleted, Filter, Membership, Notification, Page};
+use crate::error::{JobsError, Result};
+use crate::model::{Batch, Job, Kind, Labels};
+use crate::run::model::Run;
+use crate::sync::lock;
 
-/// Time between two reads of a job or batch of which no change is announced. Within it, what another request has read serves.
-const PAUSE: Duration = Duration::from_millis(50);
-
-/// Time between two reads of a batch for each of its jobs: counting them takes time.
-const PAUSE_PER_JOB: Duration = Duration::from_micros(10);
-
-/// Beyond this place in the queue the place of a job is not given.
-const PLACES_COUNTED: u32 = 10_000;
-
-/// Jobs of a batch that are cancelled in one transaction.
-const CANCELLED_AT_ONCE: u32 = 2000;
-
-/// What a client has submitted and follows.
+/// Work that a client has submitted.
 #[derive(Debug, Clone)]
 pub enum Work {
     /// A job or an evolution.
@@ -51,7 +37,7 @@ impl From<Batch> for Work {
 }
 
 impl Work {
-    /// UUIDv7.
+    /// Id, a UUIDv7.
     #[must_use]
     pub fn id(&self) -> Uuid {
         match self {
@@ -61,7 +47,7 @@ impl Work {
         }
     }
 
-    /// Its kind.
+    /// Kind.
     #[must_use]
     pub fn kind(&self) -> Kind {
         match self {
@@ -71,7 +57,7 @@ impl Work {
         }
     }
 
-    /// Its labels.
+    /// Labels.
     #[must_use]
     pub fn labels(&self) -> &Labels {
         match self {
@@ -81,7 +67,7 @@ impl Work {
         }
     }
 
-    /// Whether nothing of it will change any more.
+    /// Whether the state is final.
     #[must_use]
     pub fn ended(&self) -> bool {
         let (ended, all) = match self {
@@ -92,7 +78,7 @@ impl Work {
         ended == all
     }
 
-    /// A short text that differs between any two states that a client can tell apart, progress aside.
+    /// A text that differs between any two states that clients can distinguish, not counting progress.
     #[must_use]
     pub fn version(&self) -> String {
         match self {
@@ -102,10 +88,10 @@ impl Work {
         }
     }
 
-    /// The job or evolution that it is.
+    /// The job or evolution.
     ///
     /// # Errors
-    /// [`JobsError::NotFound`]: it is neither.
+    /// [`JobsError::NotFound`] if it is a batch or a run.
     pub fn job(self) -> Result<Job> {
         match self {
             Work::Job(job) => Ok(*job),
@@ -114,433 +100,113 @@ impl Work {
     }
 }
 
-impl Jobs {
-    /// Work as it is stored, or was not longer than `age` ago: one read serves all who follow it. A run is a batch here.
-    async fn read(&self, id: Uuid, age: Duration) -> Result<Work> {
-        let (shared, tenant) = (&self.shared, &self.tenant);
-        let read = async {
-            Ok::<_, StoreError>(match self.kind {
-                Kind::Case | Kind::Evolution => shared.store.job(tenant, id).await?.map(Work::from),
-                kind => shared.store.batch(tenant, kind, id).await?.map(Work::from),
-            })
-        };
-        let owned = (tenant.clone(), self.kind, id);
-        match shared.recent.at(owned, age, read).await? {
-            Some(work) if work.kind() != self.kind || !self.sees(work.labels()) => {
-                Err(JobsError::NotFound(self.kind))
-            }
-            Some(Work::Job(job)) => Ok(self.unexpired(*job)?.into()),
-            Some(work) => Ok(work),
-            None => Err(self.missing(id).await),
-        }
-    }
+/// Tenant, kind and id of work.
+type OwnedId = (Arc<str>, Kind, Uuid);
+type SharedRead<T> = Arc<tokio::sync::Mutex<Option<(Instant, T)>>>;
 
-    /// Work as clients see it: a job that has not expired, a batch, or a run with its head.
-    async fn shown(&self, work: Work) -> Result<Work> {
-        let batch = match work {
-            Work::Job(job) => return Ok(self.unexpired(*job)?.into()),
-            Work::Batch(batch) if batch.kind == Kind::Rows => *batch,
-            work => return Ok(work),
-        };
-        let (_, there) = batch.ended();
-        if there < u64::from(batch.count) {
-            // Its first chunks have expired, or it is being deleted.
-            return Err(JobsError::Expired);
-        }
-        let record = self.shared.store.run(&self.tenant, batch.id).await?;
-        let record = record.ok_or(JobsError::NotFound(Kind::Rows))?;
-        let head = RunHead::read(&record.template, record.head.as_deref())?;
-        Ok(Work::Run(Box::new(Run::new(batch, head, &record))))
-    }
+/// Recent reads of work, which are shared among callers: however many clients follow a batch, the store is queried once.
+pub(crate) struct RecentReads<T>(Mutex<HashMap<OwnedId, SharedRead<T>>>);
 
-    /// A job.
-    ///
-    /// # Errors
-    /// As [`Jobs::work`].
-    pub async fn get(&self, id: Uuid) -> Result<Job> {
-        self.read(id, Duration::ZERO).await?.job()
+impl<T> Default for RecentReads<T> {
+    fn default() -> Self {
+        RecentReads(Mutex::default())
     }
+}
 
-    /// A run.
-    ///
-    /// # Errors
-    /// As [`Jobs::work`].
-    pub async fn run(&self, id: Uuid) -> Result<Run> {
-        match self.of_kind(Kind::Rows).work(id).await? {
-            Work::Run(run) => Ok(*run),
-            _ => Err(JobsError::NotFound(Kind::Rows)),
-        }
+impl<T> fmt::Debug for RecentReads<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("RecentReads")
     }
+}
 
-    /// Work as it is now; a queued job with its place among the others, unless too many come before it.
-    ///
-    /// # Errors
-    /// [`JobsError::NotFound`], [`JobsError::Expired`], or a failed database.
-    pub async fn work(&self, id: Uuid) -> Result<Work> {
-        let mut work = self.read(id, Duration::ZERO).await?;
-        if let Work::Job(job) = &mut work
-            && job.state == State::Queued
-        {
-            job.queue = self.queue_place(job).await?;
-        }
-        self.shown(work).await
-    }
-
-    async fn queue_place(&self, job: &Job) -> Result<Option<QueuePlace>> {
-        let store = &self.shared.store;
-        let ahead = store.queued_before(job, PLACES_COUNTED).await?;
-        let position = u32::try_from(ahead.jobs).ok();
-        #[expect(clippy::cast_precision_loss, reason = "rough")]
-        let seconds = ahead.cost_us as f64 * 1e-6;
-        // Each of the tenants has as much solver time as this one, until its own queue is empty.
-        #[expect(clippy::cast_precision_loss, reason = "rough")]
-        let share = ahead.tenants.max(1) as f64 / self.shared.all_workers().max(1) as f64;
-        let position = position.filter(|position| *position < PLACES_COUNTED);
-        Ok(position.map(|position| QueuePlace {
-            position,
-            starts_in_s: seconds * share,
-        }))
-    }
-
-    /// One page of a list, newest first. A page has at most [`PAGE_MAX`] jobs or [`BATCH_PAGE_MAX`] batches.
-    ///
-    /// # Errors
-    /// [`JobsError::BadCursor`], or a failed database.
-    pub async fn list(
+impl<T: Clone> RecentReads<T> {
+    /// Returns the result of `read`, or that of a read at most `age` ago. Concurrent callers wait for one read.
+    pub(crate) async fn at<E>(
         &self,
-        filter: &Filter,
-        cursor: Option<&str>,
-        limit: u32,
-    ) -> Result<Page<Work>> {
-        // The store makes cursors for the narrowed filter.
-        let filter = Filter {
-            kind: self.kind,
-            labels: self.narrowed(&filter.labels),
-            ..filter.clone()
+        id: OwnedId,
+        age: Duration,
+        read: impl Future<Output = Result<T, E>>,
+    ) -> Result<T, E> {
+        if age.is_zero() {
+            return read.await;
+        }
+        let last = {
+            let mut all = lock(&self.0);
+            Arc::clone(all.entry(id).or_default())
         };
-        let after = match cursor {
-            Some(cursor) => Some(filter.read_cursor(cursor).ok_or(JobsError::BadCursor)?),
-            None => None,
-        };
-        let (store, tenant) = (&self.shared.store, &self.tenant);
-        let mut page = match self.kind {
-            Kind::Case | Kind::Evolution => {
-                let limit = limit.clamp(1, PAGE_MAX);
-                let page = store.list(tenant, &filter, after, limit).await?;
-                page.map(Work::from)
-            }
-            _ => {
-                let limit = limit.clamp(1, BATCH_PAGE_MAX);
-                let page = store.batches(tenant, &filter, after, limit).await?;
-                page.map(Work::from)
-            }
-        };
-        for work in std::mem::take(&mut page.entries) {
-            match self.shown(work).await {
-                Ok(work) => page.entries.push(work),
-                // Deleted meanwhile, or about to be removed.
-                Err(JobsError::NotFound(_) | JobsError::Expired) => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(page)
-    }
-
-    /// Waits until work has ended, but not longer than `at_most`, and returns it as it then is. Returns at once when the service is about to
-    /// stop.
-    ///
-    /// # Errors
-    /// As [`Jobs::work`].
-    pub async fn wait_for(&self, id: Uuid, at_most: Duration) -> Result<Work> {
-        let until = Instant::now() + at_most;
-        let mut seen = None;
-        while let Ok(changed) = timeout_at(until, self.changed_since(id, seen.as_deref())).await {
-            let Some(work) = changed? else { break };
-            if work.ended() {
-                return Ok(work);
-            }
-            seen = Some(work.version());
-        }
-        // The place in the queue is only read for clients that ask for it.
-        let work = self.read(id, Duration::ZERO).await?;
-        self.shown(work).await
-    }
-
-    /// As [`Jobs::wait_for`], for a job.
-    ///
-    /// # Errors
-    /// As [`Jobs::get`].
-    pub async fn wait(&self, id: Uuid, at_most: Duration) -> Result<Job> {
-        self.wait_for(id, at_most).await?.job()
-    }
-
-    /// Waits until work is at another version than `seen` and returns it; at once if it is, or if nothing was seen yet. `None` when nothing more will
-    /// come: it had ended, or the service is about to stop.
-    ///
-    /// # Errors
-    /// As [`Jobs::work`].
-    pub async fn changed_since(&self, id: Uuid, seen: Option<&str>) -> Result<Option<Work>> {
-        // Subscribe first, then read: the end of a job in between is announced. Nothing announces changes of batches.
-        let mut ended = self.shared.ended.subscribe();
-        let mut age = match (self.kind, seen) {
-            (Kind::Cases | Kind::Rows, Some(_)) => PAUSE,
-            _ => Duration::ZERO,
-        };
-        loop {
-            let work = self.read(id, age).await?;
-            if seen != Some(&work.version()) {
-                return self.shown(work).await.map(Some);
-            }
-            if work.ended() {
-                return Ok(None);
-            }
-            let pause = match &work {
-                Work::Batch(batch) => PAUSE_PER_JOB.saturating_mul(batch.count).max(PAUSE),
-                _ => POLL_INTERVAL,
-            };
-            let announced = async {
-                match &work {
-                    // A lagging receiver may have missed the announcement, so it reads again as well.
-                    Work::Job(_) => while ended.recv().await.is_ok_and(|ended| ended != id) {},
-                    _ => pending().await,
-                }
-            };
-            tokio::select! {
-                // What others read a moment ago serves, unless something was announced since.
-                announced = timeout_at(Instant::now() + pause, announced) => age = match (announced, &work) {
-                    (Ok(()), _) => Duration::ZERO,
-                    (_, Work::Job(_)) => PAUSE,
-                    _ => pause,
-                },
-                () = self.shared.draining.cancelled() => return Ok(None),
-            }
-        }
-    }
-
-    /// Cancels what has not ended: queued jobs end at once, running ones at the next tick of their solvers. Returns the work as it then is.
-    ///
-    /// # Errors
-    /// As [`Jobs::work`].
-    pub async fn cancel(&self, id: Uuid) -> Result<Work> {
-        let (store, tenant) = (&self.shared.store, &self.tenant);
-        let now = self.shared.now_ms();
-        if let Work::Job(_) = self.read(id, Duration::ZERO).await? {
-            let job = store.cancel(tenant, id, now).await?;
-            let job = job.ok_or(JobsError::NotFound(self.kind))?;
-            let ends_now = job.state == State::Cancelled && job.ended_at == Some(now);
-            if ends_now || !job.state.ended() {
-                self.tell_cancelled(id, job.state);
-            }
-            return Ok(self.dated(job).into());
-        }
-        loop {
-            let changed = store
-                .cancel_batch(tenant, id, CANCELLED_AT_ONCE, now)
-                .await?;
-            for (job, state) in &changed {
-                self.tell_cancelled(*job, *state);
-            }
-            if changed.len() < CANCELLED_AT_ONCE as usize {
-                return self.work(id).await;
-            }
-        }
-    }
-
-    /// Announces a cancelled job to those who wait for it and to the worker that solves it.
-    fn tell_cancelled(&self, job: Uuid, state: State) {
-        let shared = &self.shared;
-        if state.ended() {
-            shared.metrics.ended(state, 1);
-            shared.announce(job);
-        } else if !shared.leases.stop(job, StopReason::Cancel) {
-            // A worker that claims the job later reads the request from the store.
-            shared.publish(Notification::Cancel(job));
-        }
-    }
-
-    /// Removes ended work with its jobs, their cases and their results. Jobs of a batch go in portions, so that other writers are not held up; if
-    /// the process dies meanwhile, the rest is still there and can be removed again.
-    ///
-    /// # Errors
-    /// [`JobsError::NotEnded`], else as [`Jobs::work`].
-    pub async fn delete(&self, id: Uuid) -> Result<()> {
-        let (shared, tenant) = (&self.shared, &self.tenant);
-        let work = self.read(id, Duration::ZERO).await?;
-        if !work.ended() {
-            return Err(JobsError::NotEnded(self.kind));
-        }
-        if let Work::Job(_) = work {
-            match shared.store.delete(tenant, id).await? {
-                Deleted::NotEnded(_) => return Err(JobsError::NotEnded(self.kind)),
-                Deleted::NotFound => return Err(JobsError::NotFound(self.kind)),
-                Deleted::Done => {}
-            }
-        } else {
-            while !shared
-                .store
-                .delete_batch(tenant, id, DELETED_AT_ONCE)
-                .await?
-            {
-                shared.collect_blobs().await;
-            }
-            tracing::info!(batch = %id, "batch deleted");
-        }
-        shared.collect_blobs().await;
-        Ok(())
-    }
-}
-
-/// Time between two polls of the store.
-const POLL_PAUSE: Duration = Duration::from_millis(250);
-/// How far each poll reaches back, in ms.
-const REACH_MS: i64 = 2000;
-/// Changes read at once; a poll that finds more reads on. Chosen by judgement: a hundred kilobytes, far more than a poll usually finds.
-const AT_ONCE: u32 = 1000;
-/// Running jobs whose progress is followed.
-const RUNNING_MAX: u32 = 100;
-
-/// Where somebody who follows a tenant stands.
-#[derive(Debug)]
-pub struct Follower {
-    jobs: Jobs,
-    /// Everything that changed before this time was told.
-    since: i64,
-    told: VecDeque<(Work, i64)>,
-    /// What was told of what changed lately: version of a job with its progress, counts of a batch or run.
-    known: HashMap<Uuid, (i64, String)>,
-}
-
-impl Jobs {
-    /// Follows the tenant from a moment on (epoch milliseconds), or from now on.
-    #[must_use]
-    pub fn follow(&self, since: Option<i64>) -> Follower {
-        Follower {
-            jobs: self.clone(),
-            since: since.unwrap_or_else(|| self.shared.now_ms()),
-            told: VecDeque::new(),
-            known: HashMap::new(),
-        }
-    }
-}
-
-impl Follower {
-    /// The moment up to which everything was told, from which another one can go on.
-    #[must_use]
-    pub fn since(&self) -> i64 {
-        self.since
-    }
-
-    /// Waits for the next change, with the moment up to which everything was told with it; `None` when the service is about to
-    /// stop.
-    ///
-    /// # Errors
-    /// The database failed.
-    pub async fn next(&mut self) -> Result<Option<(Work, i64)>> {
-        let shared = self.jobs.shared.clone();
-        loop {
-            if let Some(next) = self.told.pop_front() {
-                return Ok(Some(next));
-            }
-            self.poll().await?;
-            if self.told.is_empty() {
-                tokio::select! {
-                    () = sleep(POLL_PAUSE) => {}
-                    () = shared.draining.cancelled() => return Ok(None),
-                }
-            }
-        }
-    }
-
-    async fn poll(&mut self) -> Result<()> {
-        let from = self.since.saturating_sub(REACH_MS);
-        self.poll_changes(from).await?;
-        self.tell_progress().await?;
-        let horizon = self.since.saturating_sub(2 * REACH_MS);
-        self.known.retain(|_, (at, _)| *at >= horizon);
-        Ok(())
-    }
-
-    async fn poll_changes(&mut self, mut from: i64) -> Result<()> {
-        let mut after = None;
-        let mut changed: HashMap<(Kind, Uuid), i64> = HashMap::new();
-        loop {
-            let store = &self.jobs.shared.store;
-            let changes = store
-                .changes(&self.jobs.tenant, from, after, AT_ONCE)
-                .await?;
-            for change in &changes {
-                let work = match (change.batch, change.kind) {
-                    (None, kind) => (kind, change.id),
-                    (Some(run), Kind::Rows) => (Kind::Rows, run),
-                    (Some(batch), _) => (Kind::Cases, batch),
-                };
-                let latest = changed.entry(work).or_insert(change.at);
-                *latest = change.at.max(*latest);
-            }
-            let Some(last) = changes.last().filter(|_| changes.len() == AT_ONCE as usize) else {
-                break;
-            };
-            (from, after) = (last.at, Some(last.id));
-        }
-        let mut changed: Vec<_> = changed.into_iter().collect();
-        changed.sort_unstable_by_key(|(_, at)| *at);
-        for ((kind, id), at) in changed {
-            self.since = self.since.max(at);
-            match self.read_changed(kind, id).await {
-                Ok((tag, work)) => self.tell(id, at, tag, work),
-                // Not acknowledged yet, or gone.
-                Err(JobsError::NotFound(_) | JobsError::Expired) => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(())
-    }
-
-    /// What changed, with its tag; only the tag if the change was announced before.
-    async fn read_changed(&self, kind: Kind, id: Uuid) -> Result<(String, Option<Work>)> {
-        let jobs = self.jobs.of_kind(kind);
-        let work = jobs.read(id, POLL_PAUSE).await?;
-        let tag = tag(&work);
-        let known = self.known.get(&id).is_some_and(|(_, known)| *known == tag);
-        match known {
-            true => Ok((tag, None)),
-            false => Ok((tag, Some(jobs.shown(work).await?))),
-        }
-    }
-
-    async fn tell_progress(&mut self) -> Result<()> {
-        let filter = Filter {
-            states: vec![State::Running],
-            member: Some(Membership::Alone),
-            ..Filter::default()
-        };
-        for kind in [Kind::Case, Kind::Evolution] {
-            let jobs = self.jobs.of_kind(kind);
-            for work in jobs.list(&filter, None, RUNNING_MAX).await?.entries {
-                let job = work.job()?;
-                let (id, at) = (job.id, self.since.max(job.updated_at));
-                let work = Work::from(job);
-                self.tell(id, at, tag(&work), Some(work));
-            }
-        }
-        Ok(())
-    }
-
-    /// Records the state of some work, and queues an event for it unless this state was sent before.
-    fn tell(&mut self, id: Uuid, at: i64, tag: String, work: Option<Work>) {
-        let before = self.known.insert(id, (at, tag.clone()));
-        if before.is_none_or(|(_, known)| known != tag)
-            && let Some(work) = work
+        let mut seen = last.lock().await;
+        if let Some((when, found)) = seen.as_ref()
+            && when.elapsed() < age
         {
-            self.told.push_back((work, self.since));
+            return Ok(found.clone());
         }
+        let found = read.await?;
+        *seen = Some((Instant::now(), found.clone()));
+        drop(seen);
+        drop(last);
+        self.forget(age);
+        Ok(found)
+    }
+
+    /// Removes reads that are not in use.
+    fn forget(&self, age: Duration) {
+        let mut all = lock(&self.0);
+        all.retain(|_, read| {
+            Arc::strong_count(read) > 1
+                || read.try_lock().is_ok_and(|seen| {
+                    seen.as_ref()
+                        .is_some_and(|(when, _)| when.elapsed() < 4 * age)
+                })
+        });
     }
 }
 
-/// Identifies a state of a job, batch or run in events. States that differ in the answers to clients have different identities.
-fn tag(work: &Work) -> String {
-    match work {
-        Work::Job(job) => format!("{} {:.2}", job.version, job.progress),
-        work => work.version(),
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_thousand_clients_that_ask_for_the_same_cause_a_few_reads() {
+        let reads = Arc::new(RecentReads::<u64>::default());
+        let asked = Arc::new(AtomicU64::new(0));
+        let tenant: Arc<str> = "t".into();
+        let (id, age) = (Uuid::now_v7(), Duration::from_millis(200));
+        for round in 1..=2 {
+            let (before, began) = (asked.load(Ordering::SeqCst), Instant::now());
+            let all = (0..1000).map(|_| {
+                let (reads, asked, tenant) = (reads.clone(), asked.clone(), tenant.clone());
+                tokio::spawn(async move {
+                    let read = async {
+                        tokio::time::sleep(Duration::from_millis(5)).await;
+                        Ok::<_, ()>(asked.fetch_add(1, Ordering::SeqCst) + 1)
+                    };
+                    reads.at((tenant, Kind::Case, id), age, read).await
+                })
+            });
+            for found in all.collect::<Vec<_>>() {
+                assert!(found.await.unwrap().unwrap() > before, "older than allowed");
+            }
+            // A read serves all callers until it is too old.
+            let made = asked.load(Ordering::SeqCst) - before;
+            let most = 1 + began.elapsed().as_millis() / age.as_millis();
+            assert!(u128::from(made) <= most, "round {round}: {made}");
+            tokio::time::sleep(age).await;
+        }
+        // A failed read is the answer of its caller alone, and what is not followed is forgotten.
+        let failed = reads
+            .at((tenant.clone(), Kind::Case, id), age, async {
+                Err::<u64, _>("away")
+            })
+            .await;
+        assert_eq!(failed, Err("away"));
+        let other = reads.at((tenant, Kind::Case, Uuid::now_v7()), age, async {
+            Ok::<_, ()>(7)
+        });
+        assert_eq!(other.await, Ok(7));
+        tokio::time::sleep(5 * age).await;
+        reads.forget(age);
+        assert!(reads.0.lock().unwrap().is_empty());
     }
 }

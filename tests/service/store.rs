@@ -175,7 +175,7 @@ async fn open_store(kind: StoreKind, folder: &Path, url: Option<&str>) -> Arc<dy
 
 /// The store of a data folder, beside the service that uses it.
 pub async fn open_beside(folder: &Path) -> Arc<dyn Store> {
-    railhead::jobs::open_store::open_beside(folder)
+    railhead::jobs::store::open::open_beside(folder)
         .await
         .unwrap()
 }

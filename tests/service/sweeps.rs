@@ -83,7 +83,7 @@ impl Shop {
     }
 
     async fn answer(&self, id: Uuid) -> (Value, PatchFields) {
-        let fields = self.lab.jobs.patch_fields(id, 0).await.unwrap();
+        let fields = self.lab.jobs.patch_fields(id, 0, None).await.unwrap();
         let solution = self.lab.jobs.solution(id).await.unwrap();
         (timeless(solution), fields)
     }

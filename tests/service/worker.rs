@@ -49,17 +49,20 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
     assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
     assert_eq!(job.remarks, solution.remarks);
     assert_eq!(jobs.solution(id).await.unwrap(), solution);
-    assert_eq!(jobs.patch_fields(id, 0).await.unwrap(), fields.patches[0]);
     assert_eq!(
-        jobs.point_fields(id, 0, 0).await.unwrap(),
+        jobs.patch_fields(id, 0, None).await.unwrap(),
+        fields.patches[0]
+    );
+    assert_eq!(
+        jobs.patch_fields(id, 0, Some(0)).await.unwrap(),
         fields.patches[0]
     );
     assert!(matches!(
-        jobs.patch_fields(id, 1).await,
+        jobs.patch_fields(id, 1, None).await,
         Err(JobsError::NoSuchPatch(1))
     ));
     assert!(matches!(
-        jobs.point_fields(id, 0, 1).await,
+        jobs.patch_fields(id, 0, Some(1)).await,
         Err(JobsError::NoSuchPoint(1))
     ));
     let in_folder = !files_below(&folder.path().join("results")).is_empty();

@@ -120,7 +120,7 @@ pub(crate) async fn stored(
     [patch, point]: [usize; 2],
     wanted: &[Output],
 ) -> Result<(PatchCells, PointFields)> {
-    let mut fields = match jobs.point_fields(id, patch, point).await {
+    let mut fields = match jobs.patch_fields(id, patch, Some(point)).await {
         // Without any requested field nothing is stored per cell.
         Err(JobsError::NoSuchPatch(0)) => {
             let Some(output) = wanted.first() else {

@@ -260,7 +260,7 @@ async fn profiles_drawing(
                 "only contacts of the type `profiles` have one wheel and one rail",
             ));
         };
-        let cells = match jobs.point_fields(id, number, 0).await {
+        let cells = match jobs.patch_fields(id, number, Some(0)).await {
             Err(JobsError::NoSuchPatch(_)) => PatchCells::default(),
             fields => fields?.meshes.pop().unwrap_or_default(),
         };

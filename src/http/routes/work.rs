@@ -31,8 +31,9 @@ use crate::render::row_tables::{Piece, stream};
 use crate::routes::wait::{EventRequest, Wait, WaitQuery, changed, event};
 use crate::state::AppState;
 use railhead_jobs::Jobs;
+use railhead_jobs::follow::Follower;
 use railhead_jobs::model::{Kind, State as JobState};
-use railhead_jobs::work::{Follower, Work};
+use railhead_jobs::work::Work;
 use railhead_tables::table::TableKind;
 use railhead_tables::write::WriteError;
 

@@ -1,4 +1,4 @@
-//! One attempt at claimed jobs: its thread, its control, its lease.
+//! Attempts at claimed jobs: solver threads, controls and leases.
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, AtomicUsize, Ordering};
@@ -16,14 +16,14 @@ use crate::store::{Claim, ClaimedCase};
 use crate::sync::lock;
 use railhead_contact::monitor::{Monitor, Stop};
 
-/// Blocks of at least this size, in bytes, are given back when they are freed. Left alone, glibc raises this limit to 32 MiB with the
-/// blocks that it sees freed, and keeps what is below. 400 mixed cases on four workers peak at 351 to 361 MB then, and at 255 to
-/// 261 MB with these three numbers, for 7 % more processor time (`cargo bench --bench load -- memory`, two and three runs; 1 MiB instead of the
-/// first costs more).
+/// Blocks of at least this size, in bytes, are returned to the system when they are freed. By default glibc raises this
+/// limit to 32 MiB with the blocks that it sees freed, and keeps smaller ones. 400 mixed cases on four workers peak at 351
+/// to 361 MB by default, and at 255 to 261 MB with the numbers below, for 7 % more processor time (`cargo bench --bench
+/// load -- memory`, two and three runs; 1 MiB for this one costs more).
 const BLOCK_BYTES: i32 = 4 << 20;
-/// Free memory at the end of a heap, in bytes, from which on it is given back.
+/// Free memory at the end of a heap, in bytes, from which on it is returned to the system.
 const FREE_BYTES: i32 = 32 << 20;
-/// Environment variables by which an operator sets the same.
+/// Environment variables that override these settings.
 const VARIABLES: [&str; 4] = [
     "GLIBC_TUNABLES",
     "MALLOC_ARENA_MAX",
@@ -31,8 +31,8 @@ const VARIABLES: [&str; 4] = [
     "MALLOC_TRIM_THRESHOLD_",
 ];
 
-/// Bounds what the process keeps of freed memory, unless the environment says how. Heaps are as many as cores: there would be eight for
-/// each. To be called before there are other threads.
+/// Bounds the freed memory that the process keeps, unless the environment configures it. The number of heaps is the number
+/// of cores; the default is eight per core. To be called before other threads start.
 #[cfg_attr(
     all(target_os = "linux", target_env = "gnu"),
     expect(unsafe_code, reason = "a function of the C library")
@@ -57,8 +57,8 @@ pub fn bound_heap() {
     }
 }
 
-/// Gives free pages back to the system. glibc keeps what lies between blocks that are still in use: about 100 MB after 900 motions
-/// of a creep map, whose operators come and go beside those that are kept.
+/// Returns free pages to the system. glibc keeps pages between blocks that are in use: about 100 MB after 900 motions of a
+/// creep map, whose operators are allocated between permanent blocks.
 #[cfg_attr(
     all(target_os = "linux", target_env = "gnu"),
     expect(unsafe_code, reason = "a function of the C library")
@@ -71,24 +71,24 @@ pub(crate) fn give_memory_back() {
     }
 }
 
-/// After tasks of at least this length free memory is given back to the system, which takes a walk over the whole heap.
+/// Tasks of at least this length return free memory to the system, which walks the whole heap.
 const LONG: Duration = Duration::from_secs(1);
 
 /// Stack of a solver thread.
 const STACK_BYTES: usize = 16 << 20;
 
-/// Something to compute.
+/// A task of a solver thread.
 pub(crate) type Task = Box<dyn FnOnce() + Send>;
 
-/// A thread that does arithmetic, one task after the other, until its handle is dropped.
+/// A thread that runs tasks one after the other until its handle is dropped.
 #[derive(Debug)]
 pub(crate) struct SolverThread {
     tasks: mpsc::Sender<Task>,
-    /// Set when it is left behind; it then counts as such until it ends.
+    /// Set when the thread is abandoned; it counts as abandoned until it ends.
     pub(crate) left: Arc<OnceLock<Counted>>,
 }
 
-/// One of a number, as long as it lives.
+/// Counts one in a shared counter until it is dropped.
 #[derive(Debug)]
 pub(crate) struct Counted(pub(crate) Arc<AtomicUsize>);
 
@@ -99,7 +99,7 @@ impl Drop for Counted {
 }
 
 impl SolverThread {
-    /// Starts a thread of this name.
+    /// Starts a thread with this name.
     pub(crate) fn start(name: &str) -> Result<SolverThread> {
         let (tasks, todo) = mpsc::channel::<Task>();
         let left = Arc::new(OnceLock::new());
@@ -121,28 +121,28 @@ impl SolverThread {
         Ok(SolverThread { tasks, left })
     }
 
-    /// Hands a task over; `false` if the thread is gone.
+    /// Runs a task on the thread; `false` if the thread has ended.
     pub(crate) fn give(&self, task: Task) -> bool {
         self.tasks.send(task).is_ok()
     }
 }
 
-/// Why a running solve was told to stop. The first reason given stays.
+/// Why a running solve was stopped. The first reason is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopReason {
     /// The client cancelled the job.
     Cancel,
-    /// The service shuts down; the job goes back to the queue.
+    /// The service shuts down; the job returns to the queue.
     Shutdown,
-    /// The lease is lost; whatever comes out is discarded.
+    /// The lease was lost; the outcome is discarded.
     Lost,
     /// The deadline of the job has passed.
     Deadline,
-    /// It takes longer than was expected of a short job; it goes back to the queue.
+    /// A job that was expected to be short takes too long; it returns to the queue.
     TooLong,
 }
 
-/// One attempt at a job. The solver ticks; the async side reads the progress and stops it.
+/// Control of one attempt at a job. The solver ticks; the worker reads the progress and stops it.
 #[derive(Debug, Default)]
 pub struct AttemptControl {
     reason: OnceLock<StopReason>,
@@ -152,34 +152,34 @@ pub struct AttemptControl {
     taken_up: AtomicBool,
 }
 
-/// How long a solve has taken.
+/// Elapsed time of a solve, without pauses.
 #[derive(Debug, Default)]
 struct SolveClock {
-    /// Before it last went on.
+    /// Time before the current period.
     spent: Duration,
-    /// Since when it goes on.
+    /// Start of the current period; `None` while paused.
     since: Option<Instant>,
 }
 
 impl AttemptControl {
-    /// The solver's thread has come to this job.
-    pub fn take_up(&self) {
+    /// Marks the job as started by the solver thread.
+    pub fn mark_started(&self) {
         self.taken_up.store(true, Ordering::Release);
     }
 
-    /// The solver's thread has not come to this job, or has yet to come again.
+    /// Marks the job as not started, or not resumed.
     pub fn reset_started(&self) {
         self.taken_up.store(false, Ordering::Release);
     }
 
-    /// Has the solver's thread come to this job?
+    /// Whether the solver thread has started the job.
     #[must_use]
     pub fn is_started(&self) -> bool {
         self.taken_up.load(Ordering::Acquire)
     }
 
-    /// Starts the clock of the solve, against which `contact` holds the time limit of the case, at the time that was spent
-    /// before. It goes on until [`AttemptControl::pause`]; a clock that goes is left alone.
+    /// Starts the clock of the solve at the time spent before. `contact` compares it with the time limit of the case. No
+    /// effect while the clock runs.
     pub fn begin(&self, spent: Duration) {
         let mut clock = self.clock();
         if clock.since.is_none() {
@@ -190,7 +190,7 @@ impl AttemptControl {
         }
     }
 
-    /// Stops the clock and returns the time spent in all.
+    /// Stops the clock and returns the total time spent.
     pub fn pause(&self) -> Duration {
         let spent = self.elapsed();
         *self.clock() = SolveClock { spent, since: None };
@@ -201,25 +201,25 @@ impl AttemptControl {
         lock(&self.clock)
     }
 
-    /// Tells the solver to stop at its next tick.
+    /// Stops the solver at its next tick.
     pub fn stop(&self, reason: StopReason) {
-        // A second reason changes nothing: the solver is stopping already.
+        // The first reason is kept.
         let _ = self.reason.set(reason);
     }
 
-    /// Why the solver was told to stop, if it was.
+    /// Why the solver was stopped, if it was.
     #[must_use]
     pub fn reason(&self) -> Option<StopReason> {
         self.reason.get().copied()
     }
 
-    /// How often the solver has ticked. If this stands still, so does the solver.
+    /// Number of ticks of the solver. A constant number means that the solver makes no progress.
     #[must_use]
     pub fn ticks(&self) -> u64 {
         self.ticks.load(Ordering::Acquire)
     }
 
-    /// Progress as last reported, 0 to 1.
+    /// Progress as last reported, from 0 to 1.
     #[must_use]
     pub fn progress(&self) -> f64 {
         f64::from_bits(self.progress.load(Ordering::Acquire))
@@ -245,43 +245,43 @@ impl Monitor for AttemptControl {
     }
 }
 
-/// The leases of an attempt. They are no longer renewed once this is dropped.
+/// The leases of an attempt. They are renewed until this is dropped.
 #[derive(Debug)]
 pub(crate) struct GroupLease(pub(crate) Arc<HeldLeases>);
 
 #[derive(Debug)]
 pub(crate) struct HeldLeases {
     leases: Mutex<Vec<(Claim, Arc<AttemptControl>)>>,
-    /// A solver works and has to tick.
+    /// Whether a solver runs, which has to tick.
     pub(crate) solving: AtomicBool,
-    /// Solves that ended: each is a sign of life like a tick.
+    /// Number of solves that ended; each counts as a tick.
     solved: AtomicU64,
-    /// Ticks at the last renewal.
+    /// Number of ticks at the last renewal.
     pub(crate) seen: AtomicU64,
-    /// When the leases run out, by the steady clock in ms.
+    /// Expiry of the leases, by the steady clock in ms.
     pub(crate) until: AtomicI64,
-    /// The leases are over because the solver stands still.
+    /// Cancelled when the leases expire because the solver makes no progress.
     pub(crate) lost: CancellationToken,
 }
 
-/// All leases that this process holds, with the jobs that it works on.
+/// All leases of this process.
 #[derive(Debug, Default)]
 pub(crate) struct AllLeases(Mutex<Vec<Weak<HeldLeases>>>);
 
 impl AllLeases {
-    /// Adds the leases of an attempt until it is over.
+    /// Adds the leases of an attempt.
     pub(crate) fn add(&self, held: &Arc<HeldLeases>) {
         self.lock().push(Arc::downgrade(held));
     }
 
-    /// Those that are still held.
+    /// The leases of current attempts.
     pub(crate) fn held(&self) -> Vec<Arc<HeldLeases>> {
         let mut all = self.lock();
         all.retain(|held| held.strong_count() > 0);
         all.iter().filter_map(Weak::upgrade).collect()
     }
 
-    /// The jobs that are held.
+    /// The jobs of current attempts.
     pub(crate) fn ids(&self) -> Vec<Uuid> {
         let held = self.held();
         let ids = held.iter().flat_map(|held| {
@@ -291,7 +291,7 @@ impl AllLeases {
         ids.collect()
     }
 
-    /// Tells the solver of a job to stop; `false` if this process does not work on it.
+    /// Stops the solver of a job; `false` if this process does not run it.
     pub(crate) fn stop(&self, id: Uuid, reason: StopReason) -> bool {
         let mut found = false;
         for held in self.held() {
@@ -309,19 +309,19 @@ impl AllLeases {
 }
 
 impl GroupLease {
-    /// From now on a solver has to tick, or need not.
+    /// Sets whether a solver runs, which has to tick.
     pub(crate) fn solving(&self, solving: bool) {
         self.0.solving.store(solving, Ordering::Release);
     }
 
-    /// These jobs are no longer held: they ended or were given back.
+    /// Removes jobs that ended or were released.
     pub(crate) fn let_go(&self, ids: &[Uuid]) {
         self.0
             .leases()
             .retain(|(claim, _)| !ids.contains(&claim.id));
     }
 
-    /// Set once the leases are over because the solver stands still.
+    /// Cancelled when the leases expire because the solver makes no progress.
     pub(crate) fn lost(&self) -> &CancellationToken {
         &self.0.lost
     }
@@ -329,13 +329,13 @@ impl GroupLease {
 
 impl Drop for GroupLease {
     fn drop(&mut self) {
-        // A solver thread that was left behind may keep the rest.
+        // An abandoned solver thread may keep the rest.
         self.0.leases().clear();
     }
 }
 
 impl HeldLeases {
-    /// Leases of jobs that were claimed just now.
+    /// Leases of newly claimed jobs.
     pub(crate) fn new(leases: Vec<(Claim, Arc<AttemptControl>)>, until: i64) -> HeldLeases {
         HeldLeases {
             leases: Mutex::new(leases),
@@ -347,7 +347,7 @@ impl HeldLeases {
         }
     }
 
-    /// A solve has ended.
+    /// Counts a solve that has ended.
     pub(crate) fn alive(&self) {
         self.solved.fetch_add(1, Ordering::AcqRel);
     }
@@ -366,78 +366,78 @@ impl HeldLeases {
     }
 }
 
-/// One claimed job.
+/// One claimed job of an attempt.
 #[derive(Debug)]
 pub(crate) struct Member {
     pub(crate) claim: Claim,
     pub(crate) control: Arc<AttemptControl>,
     pub(crate) phase: Phase,
-    /// Its case, until it is handed to a thread.
+    /// The case, until it is passed to a thread.
     pub(crate) case: Option<ClaimedCase>,
-    /// What it goes on with, once it is known.
+    /// The state between two slices, once it is known.
     pub(crate) sliced: Option<Box<SlicedWork>>,
 }
 
-/// Where a claimed job stands.
+/// Phase of a claimed job.
 #[derive(Debug)]
 pub(crate) enum Phase {
-    /// It is to be solved, or is being solved.
+    /// To be solved, or being solved.
     Solving,
-    /// Its solve is over.
+    /// The solve has ended.
     Solved(Outcome),
-    /// It was not begun and goes back to the queue.
+    /// Not begun; returns to the queue.
     NotBegun,
-    /// It is equal to this earlier job of the group and waits for its answer.
+    /// Equal to this earlier job of the group, whose result it gets.
     WaitingFor(Uuid),
-    /// Nothing is left to be done.
+    /// Ended or released.
     Done,
 }
 
-/// Claimed jobs with the thread that solves them one after the other.
+/// Claimed jobs, and the thread that solves them one after the other.
 #[derive(Debug)]
 pub(crate) struct Attempt {
     pub(crate) queue: Queue,
     pub(crate) members: Vec<Member>,
     pub(crate) lease: GroupLease,
-    /// It was running when a process died; this process solves no other such job at the same time.
+    /// Held if a job of the attempt ran when a process crashed: this process solves no other such job at the same time.
     pub(crate) _suspect: Option<OwnedMutexGuard<()>>,
-    /// It is a sweep that had been in the queue between two of its slices.
+    /// Whether the job is a sweep that was in the queue between two of its slices.
     pub(crate) was_begun: bool,
-    /// Begin of its turn.
+    /// Start of the attempt's time slice.
     pub(crate) turn_began: Instant,
-    /// Solver time spent on what it is at.
+    /// Solver time since the last start of the thread.
     pub(crate) spent: Duration,
     pub(crate) solver: Option<Solver>,
 }
 
-/// Outcomes that the thread has left for its worker, with the places of their members.
+/// Outcomes that the thread has produced, with the indices of their members.
 pub(crate) type Outcomes = Arc<Mutex<Vec<(usize, Outcome)>>>;
 
-/// What comes from the thread.
+/// A solver thread at work.
 #[derive(Debug)]
 pub(crate) struct Solver {
     pub(crate) thread: SolverThread,
     pub(crate) outcomes: Outcomes,
-    /// Set when there will be no more outcomes.
+    /// Cancelled when there will be no more outcomes.
     pub(crate) over: CancellationToken,
-    /// Nothing more shall be begun.
+    /// Set to prevent the start of further members.
     pub(crate) closed: Arc<Mutex<bool>>,
 }
 
 impl Attempt {
-    /// Has it been handed to a thread?
+    /// Whether the attempt has a solver thread.
     pub(crate) fn begun(&self) -> bool {
         self.solver.is_some()
     }
 
-    /// The places of the members that are to be solved.
+    /// The indices of the members that are to be solved.
     pub(crate) fn to_solve(&self) -> Vec<usize> {
         let members = self.members.iter().enumerate();
         let solving = members.filter(|(_, member)| matches!(member.phase, Phase::Solving));
         solving.map(|(place, _)| place).collect()
     }
 
-    /// Takes the outcomes that there are.
+    /// Moves the available outcomes to the members.
     pub(crate) fn take_outcomes(&mut self) {
         if let Some(solver) = &self.solver {
             let mut outcomes = lock(&solver.outcomes);
@@ -447,7 +447,7 @@ impl Attempt {
         }
     }
 
-    /// Set when there will be no more outcomes.
+    /// Cancelled when there will be no more outcomes.
     pub(crate) fn over(&self) -> CancellationToken {
         if let Some(solver) = &self.solver {
             return solver.over.clone();
@@ -457,7 +457,7 @@ impl Attempt {
         none
     }
 
-    /// Nothing more is begun: what the thread has not taken up goes back to the queue.
+    /// Prevents the start of further members; those that the thread has not started return to the queue.
     pub(crate) fn close(&mut self) {
         if let Some(solver) = &self.solver {
             *lock(&solver.closed) = true;
@@ -471,7 +471,7 @@ impl Attempt {
         }
     }
 
-    /// The solver does not stop: what it is at counts as abandoned. Returns its thread, which is to be left behind.
+    /// Ends members that are being solved as abandoned. Returns the thread, which is to be abandoned.
     pub(crate) fn abandon(&mut self) -> Option<SolverThread> {
         self.close();
         for member in &mut self.members {
@@ -482,32 +482,27 @@ impl Attempt {
         self.take_thread()
     }
 
-    /// The thread, once it has nothing more to do.
+    /// Takes the thread, which has nothing more to do.
     pub(crate) fn take_thread(&mut self) -> Option<SolverThread> {
         self.solver.take().map(|solver| solver.thread)
     }
 
-    /// Are there members that wait behind another of this attempt? A sweep that is about to begin its next slice waits
-    /// behind nobody.
+    /// Whether some members wait for another member of this attempt. A sweep that is about to begin its next slice waits
+    /// for nobody.
     pub(crate) fn has_more_to_begin(&self) -> bool {
-        let solving = self
-            .members
-            .iter()
-            .filter(|member| matches!(member.phase, Phase::Solving));
-        let waiting = solving
-            .clone()
-            .filter(|member| !member.control.is_started());
-        solving.count() > 1 && waiting.count() > 0
+        let solving = self.to_solve();
+        let waits = |index: &usize| !self.members[*index].control.is_started();
+        solving.len() > 1 && solving.iter().any(waits)
     }
 
-    /// Tells every member to stop.
+    /// Stops every member.
     pub(crate) fn stop(&self, reason: StopReason) {
         for member in &self.members {
             member.control.stop(reason);
         }
     }
 
-    /// The member that the solver is at, if it was cancelled or its deadline has passed.
+    /// The member that is being solved, if it was cancelled or its deadline has passed.
     pub(crate) fn unwanted(&self) -> Option<usize> {
         self.members.iter().position(|member| {
             let reason = member.control.reason();
@@ -517,13 +512,13 @@ impl Attempt {
         })
     }
 
-    /// Claims of the members that are in the phase that `is` tells.
+    /// Claims of the members in certain phases.
     pub(crate) fn claims(&self, is: impl Fn(&Phase) -> bool) -> Vec<Claim> {
         let members = self.members.iter().filter(|member| is(&member.phase));
         members.map(|member| member.claim.clone()).collect()
     }
 
-    /// Members with these ids need nothing more.
+    /// Marks members as done.
     pub(crate) fn done(&mut self, ids: &[Uuid]) {
         self.lease.let_go(ids);
         for member in &mut self.members {
@@ -533,7 +528,7 @@ impl Attempt {
         }
     }
 
-    /// Members equal to an earlier one wait for its answer.
+    /// Lets members wait for an earlier member with an equal case.
     pub(crate) fn set_aside_duplicates(&mut self) {
         let mut firsts = HashMap::new();
         for member in &mut self.members {
@@ -633,9 +628,9 @@ mod tests {
             "its thread has yet to come to it"
         );
         let group = attempt(2);
-        group.members[0].control.take_up();
+        group.members[0].control.mark_started();
         assert!(group.has_more_to_begin());
-        group.members[1].control.take_up();
+        group.members[1].control.mark_started();
         assert!(!group.has_more_to_begin());
     }
 }

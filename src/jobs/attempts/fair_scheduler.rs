@@ -1,6 +1,6 @@
-//! Which queue has the next turn. Tenants share solver seconds; within a queue, begun sweeps and new jobs take turns.
+//! Fair scheduling: tenants share solver time, and within a queue begun sweeps and new jobs alternate.
 //!
-//! The seconds are kept in memory, by the process that spends them, and fade: what counts is the last minutes.
+//! The accounts are in the memory of the process that spends the time, and decay: only the last minutes count.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -9,22 +9,22 @@ use std::time::{Duration, Instant};
 use crate::model::{Kind, Queue};
 use crate::sync::lock;
 
-/// Time after which a solver second counts half.
+/// Half-life of an account.
 const HALF_LIFE: Duration = Duration::from_secs(60);
 
-/// Less than this is forgotten, in s.
+/// Accounts below this are removed, in s.
 const FORGOTTEN: f64 = 1e-6;
 
-/// Solver seconds of tenants.
+/// Solver time by queue.
 #[derive(Debug, Default)]
 pub(crate) struct FairScheduler(Mutex<HashMap<Queue, Used>>);
 
 #[derive(Debug, Clone, Copy)]
 struct Used {
-    /// As of `at`.
+    /// Solver time in s at the time `at`.
     seconds: f64,
     at: Instant,
-    /// Seconds that new jobs of the queue have had since one of its begun sweeps had a turn.
+    /// Solver time of new jobs since the last turn of a begun sweep, in s.
     queue_since: f64,
 }
 
@@ -37,7 +37,7 @@ impl Used {
 }
 
 impl FairScheduler {
-    /// Puts solver time on the account of a queue; `was_begun` if a sweep used it that had been in the queue between two slices.
+    /// Charges solver time to a queue; `was_begun` if a sweep used it that was in the queue between two slices.
     pub(crate) fn charge(&self, queue: &Queue, time: Duration, was_begun: bool) {
         let mut queues = lock(&self.0);
         let now = Instant::now();
@@ -55,10 +55,10 @@ impl FairScheduler {
         queues.retain(|_, used| used.at(now) > FORGOTTEN);
     }
 
-    /// Queues in the order of their turns: first those of the tenant that has used the least in all, and of these the one that has.
+    /// Sorts queues by their turn: first by the solver time of the tenant, then by that of the queue.
     pub(crate) fn order(&self, mut queues: Vec<(Queue, u64)>) -> Vec<(Queue, u64)> {
         let accounts = lock(&self.0);
-        // One present for all, so that both queues of a tenant have the same sum.
+        // One time for all, so that all queues of a tenant have the same sum.
         let now = Instant::now();
         let used = |queue: &Queue| accounts.get(queue).map_or(0.0, |used| used.at(now));
         let keys = |queue: &Queue| {
@@ -80,7 +80,7 @@ impl FairScheduler {
         queues
     }
 
-    /// Have new jobs of this queue had a slice of time since one of its begun sweeps had a turn?
+    /// Whether new jobs of this queue have used a time slice since the last turn of a begun sweep.
     pub(crate) fn queue_had_its_share(&self, queue: &Queue, slice: Duration) -> bool {
         let queues = lock(&self.0);
         let used = queues.get(queue);

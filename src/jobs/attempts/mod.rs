@@ -1,7 +1,7 @@
-//! An attempt at claimed jobs and all that belongs to it: its thread, its pause point, its lease, its slices and its outcomes.
+//! State of attempts at claimed jobs.
 //!
-//! What a worker does with an attempt stands in [`worker`](crate::worker). The parts are here, because all of the crate may stop an
-//! attempt, and those that wait for their turn ([`fair_scheduler`]) are shared by the workers.
+//! [`worker`](crate::worker) runs attempts. Their state is separate, because other modules stop attempts, and the workers
+//! share the [`fair_scheduler`].
 
 pub mod attempt;
 pub mod fair_scheduler;

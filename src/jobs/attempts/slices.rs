@@ -1,6 +1,6 @@
-//! A case on its way, slice by slice: where it is cut, what is solved already, and how the parts become the whole answer.
+//! Slices of a case: where it is divided, which slices are solved, and the outcome of a solver thread.
 //!
-//! The cuts depend on the case alone, so that a slice that was stored by a process that died serves the next one.
+//! The division depends on the case alone, so that the stored slices of a crashed process remain usable.
 use std::ops::Range;
 use std::time::Duration;
 
@@ -13,18 +13,18 @@ use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::evolution::EvolutionState;
 
-/// A checked case with its slices, of which the first `done` are stored.
+/// A checked case with its slices, the first `done` of which are stored.
 #[derive(Debug)]
 pub(crate) struct SlicedCase {
     pub(crate) checked: CheckedCase,
     slices: Vec<Range<usize>>,
     done: usize,
-    /// Solver time up to the end of what is stored.
+    /// Solver time of the stored slices.
     pub(crate) spent: Duration,
 }
 
 impl SlicedCase {
-    /// A case cut here, of which this is stored. What was cut elsewhere, or solved by another solver, is left aside.
+    /// A case with its stored slices. Slices with another division or of another solver revision are ignored.
     pub(crate) fn new(
         checked: CheckedCase,
         slices: Vec<Range<usize>>,
@@ -46,17 +46,17 @@ impl SlicedCase {
         }
     }
 
-    /// There is one slice: the whole.
+    /// Whether the case has a single slice.
     pub(crate) fn is_one(&self) -> bool {
         self.slices.len() <= 1
     }
 
-    /// The slice to be solved next, if there is one.
+    /// The next slice, if any is left.
     pub(crate) fn next(&self) -> Option<Range<usize>> {
         self.slices.get(self.done).cloned()
     }
 
-    /// What is to be noted of the next slice, solved when the job had taken so long.
+    /// The record of the next slice; `spent` is the solver time of the job up to its end.
     pub(crate) fn note(&self, spent: Duration) -> SliceRecord {
         let motions = self.next().map_or(0, |slice| slice.end);
         SliceRecord {
@@ -67,24 +67,24 @@ impl SlicedCase {
         }
     }
 
-    /// Part of the motions that is done once the next slice is, 0 to 1.
+    /// Fraction of the motions that are solved after the next slice.
     pub(crate) fn done_after_next(&self) -> f64 {
         let motions = self.next().map_or(0, |slice| slice.end);
         motions as f64 / self.checked.problem.motions.len().max(1) as f64
     }
 
-    /// The next slice is stored.
+    /// Records that the next slice is stored.
     pub(crate) fn advance(&mut self, spent: Duration) {
         self.done += 1;
         self.spent = spent;
     }
 
-    /// What is stored cannot be used.
+    /// Starts again, because the stored slices cannot be used.
     pub(crate) fn begin_again(&mut self) {
         self.done = 0;
     }
 
-    /// Are these parts as many as there are slices?
+    /// Whether this number of parts is the whole case.
     pub(crate) fn is_whole(&self, parts: usize) -> bool {
         parts == self.slices.len()
     }
@@ -94,16 +94,16 @@ impl SlicedCase {
 #[derive(Debug)]
 pub(crate) struct SlicedEvolution {
     pub(crate) task: Evolution,
-    /// Where it stands; nothing if that has to be read from the stored slices.
+    /// Current state; `None` if it has to be read from the stored slices.
     pub(crate) state: Option<EvolutionState>,
-    /// Slices stored.
+    /// Number of stored slices.
     pub(crate) done: u32,
-    /// Solver time up to the end of what is stored.
+    /// Solver time of the stored slices.
     pub(crate) spent: Duration,
 }
 
 impl SlicedEvolution {
-    /// An evolution of which this is stored. What another solver stored is left aside.
+    /// An evolution with its stored slices. Slices of another solver revision are ignored.
     pub(crate) fn new(task: Evolution, stored: &[SliceRecord]) -> SlicedEvolution {
         let fit = stored.iter().all(|note| note.digest == task.digest);
         let stored = if fit { stored } else { &[] };
@@ -115,7 +115,7 @@ impl SlicedEvolution {
         }
     }
 
-    /// What is stored cannot be used.
+    /// Starts again, because the stored slices cannot be used.
     pub(crate) fn begin_again(&mut self) {
         self.done = 0;
         self.state = Some(self.task.begin());
@@ -133,7 +133,7 @@ pub(crate) enum SlicedWork {
 }
 
 impl SlicedWork {
-    /// Nothing can be done before the stored parts are read: all is solved, or where to go on is in them.
+    /// Whether the stored slices have to be read first: because all are solved, or because they contain the current state.
     pub(crate) fn waits_for_parts(&self) -> bool {
         match self {
             SlicedWork::Case(case) => case.next().is_none(),
@@ -141,7 +141,7 @@ impl SlicedWork {
         }
     }
 
-    /// The remarks of the check.
+    /// Remarks of the check.
     pub(crate) fn remarks(self) -> Vec<RemarkEntry> {
         match self {
             SlicedWork::Case(case) => case.checked.remarks,
@@ -149,7 +149,7 @@ impl SlicedWork {
         }
     }
 
-    /// Part that is done once the slice that was solved last is stored, 0 to 1.
+    /// Fraction of the work that is done once the last solved slice is stored.
     pub(crate) fn done_after_next(&self) -> f64 {
         match self {
             SlicedWork::Case(case) => case.done_after_next(),
@@ -157,7 +157,7 @@ impl SlicedWork {
         }
     }
 
-    /// Expected time in s that is left once this part is done.
+    /// Expected remaining solve time in s after the fraction `done`.
     pub(crate) fn seconds_left(&self, done: f64) -> f64 {
         (1.0 - done)
             * match self {
@@ -166,7 +166,7 @@ impl SlicedWork {
             }
     }
 
-    /// The slice that was solved last is stored.
+    /// Records that the last solved slice is stored.
     pub(crate) fn advance(&mut self, spent: Duration) {
         match self {
             SlicedWork::Case(case) => case.advance(spent),
@@ -177,7 +177,7 @@ impl SlicedWork {
         }
     }
 
-    /// What is stored cannot be used.
+    /// Starts again, because the stored slices cannot be used.
     pub(crate) fn begin_again(&mut self) {
         match self {
             SlicedWork::Case(case) => case.begin_again(),
@@ -246,42 +246,39 @@ pub(crate) mod tests {
     }
 }
 
-/// What came out of the solver thread.
+/// The result of a job in its stored form.
+#[derive(Debug)]
+pub(crate) struct Solved {
+    pub(crate) result: EncodedResult,
+    pub(crate) remarks: Vec<RemarkEntry>,
+    /// Number of patches with stored fields; of a chunk of rows, number of rows without an answer.
+    pub(crate) field_patches: u32,
+}
+
+/// Outcome of a task of a solver thread.
 #[derive(Debug)]
 pub(crate) enum Outcome {
-    /// The answer in its stored form.
-    Solved {
-        result: EncodedResult,
-        remarks: Vec<RemarkEntry>,
-        field_patches: u32,
-    },
-    /// The next slice of a sweep, in its stored form, if one was solved; there is more to be done.
+    /// The job is solved.
+    Solved(Solved),
+    /// A slice in its stored form, if one was solved; further slices follow.
     Slice {
         sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
     },
-    /// The solver gave up or was stopped. The remarks are those of the check.
+    /// The solver failed or was stopped. The remarks are those of the check.
     Unsolved {
         error: SolveError,
         remarks: Vec<RemarkEntry>,
     },
-    /// The case no longer passes its checks.
+    /// The stored case is no longer valid.
     Refused(CaseError),
-    /// The fault is ours.
+    /// The service failed.
     Broken(Failure),
-    /// The solver did not listen and was left behind.
+    /// The solver ignored a stop request, and its thread was abandoned.
     Abandoned,
 }
 
-impl Outcome {
-    /// The outcome of work that a defect of the service ended. The log has the reason.
-    pub(crate) fn internal(reason: &str) -> Outcome {
-        tracing::error!(reason, "a job fails inside the service");
-        Outcome::Broken(Failure::new(FailureKind::Internal, INTERNAL))
-    }
-}
-
-/// The outcome of work. An outcome that ends the work early is the `Err`, so that `?` returns it.
+/// The outcome of work. The `Err` is an outcome that ends the work early, so that `?` returns it.
 pub(crate) type Ended = Result<Outcome, Box<Outcome>>;
 
 impl From<SolveError> for Box<Outcome> {
@@ -299,23 +296,27 @@ impl From<CaseError> for Box<Outcome> {
     }
 }
 
-/// The reason of an internal error.
+/// Converts the reason of an internal error.
 impl From<String> for Box<Outcome> {
     fn from(reason: String) -> Box<Outcome> {
-        Box::new(Outcome::internal(&reason))
+        Box::new(Outcome::Broken(internal_failure(&reason)))
     }
 }
 
-/// What is to be done for a job.
+/// Next task for a job.
 #[derive(Debug)]
 pub(crate) enum Work {
-    /// Check the case, of which this is stored, and solve what comes next.
+    /// Check the case, which has these stored slices, and solve the next slice.
     New(StoredCase, Vec<SliceRecord>),
     /// Solve the next slice.
     Next(Box<SlicedWork>),
-    /// All slices are solved: put the parts of the answer together.
+    /// Join the parts of the stored slices.
     Join(Box<SlicedWork>, Vec<EncodedResult>),
 }
 
-/// What clients read of a failure of the service itself.
-pub(crate) const INTERNAL: &str = "the job could not be solved because of a fault of the service; its log has the reason under the id of the job";
+/// The failure of a job because of an internal error, whose reason is logged.
+pub(crate) fn internal_failure(reason: &str) -> Failure {
+    tracing::error!(reason, "a job fails inside the service");
+    let detail = "the job could not be solved because of a fault of the service; its log has the reason under the id of the job";
+    Failure::new(FailureKind::Internal, detail)
+}

@@ -1,4 +1,4 @@
-//! Batches in the job table: filled, read, cancelled, deleted, and given up.
+//! Batches in the job table: filling, reading results, and removal of abandoned batches.
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,20 +16,20 @@ use crate::shared::Shared;
 use crate::storage_fault::StoragePlace;
 use crate::store::{BatchBegun, NewBatch, NewJob};
 use crate::sync::blocking;
-use crate::trace::KeyValue;
+use crate::trace::{KeyValue, SubmitSpan};
 
-/// Jobs that are removed in one transaction.
+/// Number of jobs removed in one transaction.
 pub(crate) const DELETED_AT_ONCE: u32 = 500;
 
 impl Shared {
-    /// From now on this batch is not filled, its jobs are not shown, and no worker takes one.
+    /// Abandons a batch: it is no longer filled, and its jobs are neither shown nor solved.
     pub(crate) fn abandon(&self, id: Uuid) {
         let mut batches = self.unfinished_batches();
-        batches.forget(id);
+        batches.living.remove(&id);
         batches.abandoned.insert(id);
     }
 
-    /// Removes what is left of batches that were given up; what cannot be removed now is tried again later.
+    /// Removes the jobs of abandoned batches. Failed removals are repeated later.
     pub(crate) async fn drop_abandoned(&self) {
         let abandoned: Vec<Uuid> = self
             .unfinished_batches()
@@ -59,19 +59,19 @@ impl Shared {
     }
 }
 
-/// Jobs queued in one transaction.
+/// Number of jobs queued in one transaction.
 const CHUNK_JOBS: usize = 1000;
 
-/// Bytes of cases queued in one transaction, the last case beyond them included.
+/// Number of bytes of cases queued in one transaction; the last case may exceed it.
 const CHUNK_BYTES: usize = 4 << 20;
 
-/// Shortest and longest pause between two reads of a batch that another request is filling.
+/// Shortest and longest pause between two reads of a batch that another request fills.
 const FILLING_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
 impl Jobs {
-    /// Queues the good cases of an upload. Once this returns all of them survive the death of the process; if it fails,
-    /// none of them will be there. Workers begin once all are there. Returns the id of the batch, and whether it is that of an
-    /// earlier submission with the same idempotency key.
+    /// Queues the valid cases of an upload. Once this returns, all of them are durable; if it fails, none of them is
+    /// queued. Workers begin when all are queued. Returns the id of the batch, and whether it is that of an earlier
+    /// submission with the same idempotency key.
     ///
     /// # Errors
     /// [`JobsError::QueueFull`], [`JobsError::QuotaExceeded`], [`JobsError::IdempotencyConflict`], [`JobsError::Draining`],
@@ -81,7 +81,7 @@ impl Jobs {
         draft: BatchUpload,
         options: WorkOptions,
     ) -> Result<(Uuid, bool)> {
-        let span = self.submit_span();
+        let span = SubmitSpan::begin(self.tracer());
         let jobs = draft.cases - draft.rejected;
         let submitted = self.store_batch(draft, options, span.traceparent());
         span.end(submitted.await, |(id, _)| {
@@ -129,14 +129,14 @@ impl Jobs {
             }
             pause = (2 * pause).min(FILLING_PAUSE.1);
         }
-        // A client that hangs up must not leave a batch half filled, so the filling goes on without it.
+        // Filling continues if the client disconnects, so that no batch is left incomplete.
         let jobs = self.clone();
         let filled = self.shared.tasks.spawn(async move {
             let filled = jobs.fill(&new, &mut draft, (submit, traceparent)).await;
             match &filled {
                 Ok(()) => {
                     draft.settle();
-                    // Opens the batch to the workers.
+                    // Makes the batch visible to the workers.
                     drop(draft);
                     jobs.shared.wake_workers();
                 }
@@ -162,7 +162,7 @@ impl Jobs {
         };
         let mut reader = staging
             .into_reader()
-            .map_err(|source| self.staging_failed(source))?;
+            .map_err(|source| self.spool_failed(source))?;
         loop {
             if self.shared.stopping.is_cancelled() {
                 return Err(JobsError::Draining);
@@ -173,7 +173,7 @@ impl Jobs {
             });
             let (back, cases) = taken.await?;
             reader = back;
-            let cases = cases.map_err(|source| self.staging_failed(source))?;
+            let cases = cases.map_err(|source| self.spool_failed(source))?;
             if cases.is_empty() {
                 break;
             }
@@ -206,7 +206,7 @@ impl Jobs {
         Ok(())
     }
 
-    /// Removes what is left of a failed upload, at once if the disk allows it.
+    /// Removes the jobs of a failed upload.
     async fn give_up(&self, mut draft: BatchUpload) {
         if draft.in_table {
             self.shared.abandon(draft.id);
@@ -216,38 +216,38 @@ impl Jobs {
     }
 }
 
-/// Small solutions read at once: once they are this large together, the rest is left for the next page.
+/// Size of the small solutions that are read with one page.
 pub const PAGE_BYTES: usize = 256 << 10;
 
-/// Jobs that are read the first time.
+/// Number of jobs of the first page.
 const FIRST_PAGE_JOBS: u32 = 50;
-/// Most jobs that are read at once.
+/// Maximum number of jobs of a page.
 const PAGE_JOBS: u32 = 500;
 
-/// Pause between two reads of a job that a reader of results waits for.
+/// Pause between two reads while waiting for a job.
 const REREAD_PAUSE: Duration = Duration::from_millis(10);
 
-/// Size of a solution, and its text without the closing brace.
+/// Size of a solution, and a stream of its text without the closing brace.
 pub type OpenedItem = (usize, BoxStream<'static, Result<Bytes>>);
 
-/// The jobs of a batch or the chunks of a run in the order in which they were sent, read page by page.
+/// Iterates over the jobs of a batch or the chunks of a run, in the order of submission.
 #[derive(Debug)]
 pub struct Items {
     jobs: Jobs,
     batch: Uuid,
     page: u32,
-    /// The job after which to go on.
+    /// The last job that was read.
     pub after: Option<Uuid>,
-    /// Jobs that have not ended are waited for until then.
+    /// Time until which to wait for jobs that have not ended; `None`: no waiting.
     pub until: Option<Instant>,
-    /// States of the jobs that are returned; all if there is none.
+    /// States of the returned jobs; empty: all states.
     pub states: Vec<State>,
-    /// Jobs of the page that was read last that are still to be returned.
+    /// Jobs of the current page that were not returned yet.
     pub read: VecDeque<BatchItem>,
 }
 
 impl Items {
-    /// The next job; nothing at the end of the batch.
+    /// Returns the next job; `None` at the end of the batch.
     ///
     /// # Errors
     /// A failed database.
@@ -256,9 +256,9 @@ impl Items {
         Ok(self.read.pop_front())
     }
 
-    /// Reads the next page if nothing is left of the last one; false at the end of the batch. Small results are read with their jobs, and a page
-    /// ends once they come to [`PAGE_BYTES`]; large ones are left to [`Jobs::open_item`]. With `until`, only jobs that have ended are
-    /// read as long as that time is not reached, and at least one is waited for.
+    /// Reads the next page if the current one is consumed; `false` at the end of the batch. Small results are read with
+    /// their jobs, at most [`PAGE_BYTES`] per page; large ones are read by [`Jobs::open_item`]. Before the time `until`,
+    /// pages contain ended jobs only, and the first job is waited for.
     ///
     /// # Errors
     /// A failed database.
@@ -279,10 +279,10 @@ impl Items {
                 let ended = items.iter().take_while(|item| item.job.state.ended());
                 let ended = ended.count();
                 if let Some(first) = items.first().filter(|_| ended == 0) {
-                    // If it is gone, the page is read again.
+                    // If it was removed, the page is read again.
                     let jobs = self.jobs.of_kind(Kind::Case);
                     let _ = jobs.wait_for(first.job.id, until - now).await;
-                    // Many jobs end in the same moment; one read serves all of them.
+                    // Many jobs may end at the same time; one read covers all of them.
                     tokio::time::sleep(REREAD_PAUSE).await;
                     continue;
                 }
@@ -304,7 +304,7 @@ impl Items {
 }
 
 impl Jobs {
-    /// The jobs of a batch or the chunks of a run.
+    /// Iterates over the jobs of a batch or the chunks of a run.
     #[must_use]
     pub fn items(&self, batch: Uuid) -> Items {
         Items {
@@ -318,7 +318,7 @@ impl Jobs {
         }
     }
 
-    /// The keys of the labels of the jobs of a batch, sorted, the first `limit`.
+    /// The keys of the labels of the jobs of a batch, sorted, at most `limit`.
     ///
     /// # Errors
     /// A failed database.
@@ -327,11 +327,10 @@ impl Jobs {
         Ok(store.batch_label_keys(&self.tenant, id, limit).await?)
     }
 
-    /// The result of a line that lies outside the table: its size, and its text without the closing brace, read while it is taken. What cannot be
-    /// read costs its own line and no other.
+    /// Opens the result of a job of a batch that is stored outside the table.
     ///
     /// # Errors
-    /// It went in between, or cannot be read.
+    /// The result was removed in the meantime, or cannot be read.
     pub async fn open_item(&self, id: Uuid, key: &str) -> Result<OpenedItem, ItemFault> {
         let error = match self.shared.blobs.open_solution(key).await {
             Ok(opened) => return Ok(opened),

@@ -1,4 +1,4 @@
-//! Many jobs submitted, followed and read as one.
+//! Batches: many jobs that are submitted, followed and read together.
 
 pub mod control;
 pub mod upload;

@@ -1,7 +1,8 @@
-//! A batch under way: its cases are checked, counted and staged in a file, and rows fill a template.
+//! Upload of a batch: cases are checked while they arrive, and staged in a file.
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
@@ -9,7 +10,7 @@ use serde_json::Value;
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
-use crate::disk_reserve::nameless;
+use crate::data_dir::nameless;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::idempotency;
@@ -22,15 +23,15 @@ use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::varied::{named_sections, put};
 use railhead_contact::problem::checked_case::CheckedCase;
 
-/// A job that waits in a file: its place in what was sent, the options that it has for itself, and the job without its body.
+/// A staged job: its index in the request, its own options, and the job without its body.
 type Staged = (u32, CaseOptions, NewJob);
 
-/// Staged cases, first in, first out.
+/// A file of staged cases, first in, first out.
 #[derive(Debug)]
 pub(crate) struct Staging(BufWriter<File>);
 
 impl Staging {
-    /// Makes an empty staging file in a folder.
+    /// Creates an empty staging file in a folder.
     pub(crate) fn new(folder: &Path) -> io::Result<Staging> {
         Ok(Staging(BufWriter::with_capacity(
             1 << 18,
@@ -47,7 +48,7 @@ impl Staging {
         Ok(())
     }
 
-    /// Ends the writing and reads from the beginning.
+    /// Ends writing and reads from the beginning.
     pub(crate) fn into_reader(self) -> io::Result<StagingReader> {
         let mut file = self.0.into_inner()?;
         file.seek(SeekFrom::Start(0))?;
@@ -55,12 +56,12 @@ impl Staging {
     }
 }
 
-/// A staging file that is being read.
+/// A staging file that is read.
 #[derive(Debug)]
 pub(crate) struct StagingReader(BufReader<File>);
 
 impl StagingReader {
-    /// The next cases: at most `jobs`, and no further one once `bytes` are reached.
+    /// Reads the next cases: at most `jobs`, and none after `bytes` are reached.
     pub(crate) fn take(&mut self, jobs: usize, bytes: usize) -> io::Result<Vec<(Staged, Vec<u8>)>> {
         let mut taken = Vec::new();
         let mut size = 0;
@@ -85,7 +86,7 @@ impl StagingReader {
     }
 }
 
-/// A value and the members that lead to its place.
+/// A value and the member names that lead to its place.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cell(pub Vec<String>, pub Value);
 
@@ -98,17 +99,17 @@ impl Cell {
     }
 }
 
-/// Digest of the cells of a row, whatever their order.
+/// Digest of the cells of a row, independent of their order.
 #[must_use]
 pub fn digest(cells: &[Cell]) -> [u8; 32] {
     let places = cells.iter().map(|cell| (cell.pointer(), cell.1.clone()));
     idempotency::digest(&Value::Object(places.collect()))
 }
 
-/// The template with the values of a row in their places.
+/// The template with the values of a row.
 ///
 /// # Errors
-/// The number of the first cell that leads nowhere, and why.
+/// The index of the first cell whose place does not exist, and the reason.
 pub fn fill(template: &Value, row: &[Cell]) -> Result<Value, (usize, String)> {
     let mut case = template.clone();
     for (number, Cell(path, value)) in row.iter().enumerate() {
@@ -118,10 +119,10 @@ pub fn fill(template: &Value, row: &[Cell]) -> Result<Value, (usize, String)> {
 }
 
 impl StoredCase {
-    /// The case as JSON.
+    /// Parses the case; of a row of a table, its template with the values of the row.
     ///
     /// # Errors
-    /// What is stored cannot be read.
+    /// The stored case cannot be read.
     pub fn value(&self) -> Result<Value> {
         let damaged = |reason: String| JobsError::Damaged(format!("a stored case: {reason}"));
         let Some(template) = &self.template else {
@@ -135,45 +136,46 @@ impl StoredCase {
     }
 }
 
-/// Faulty cases whose faults are kept; further ones are only counted.
+/// Number of invalid cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;
 
-/// Good cases of a batch that are staged before places are reserved: a batch that small is refused early enough when it
-/// is queued, and a repeated submission with its idempotency key finds the batch even if the queue is full by then.
+/// Number of valid cases of a batch that are staged without a reservation. A batch up to this size is refused when it is
+/// queued, which is early enough. A repeated submission with its idempotency key is found even if the queue is full by
+/// then.
 const UNRESERVED_MAX: u32 = 1000;
 
-/// A faulty case of a batch.
+/// An invalid case of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FaultyCase {
     /// Index of the case in the request, from 0.
     pub index: u32,
-    /// Line of the text on which it stands, counted from 1, if cases are lines.
+    /// Line of the case in the text, from 1, if each case is a line.
     pub line: Option<u64>,
     /// Every fault of the case.
     pub faults: Vec<Fault>,
 }
 
-/// A case of a batch with what was said of it alone.
+/// A case of a batch with its own options.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchCase {
     /// The case.
     pub case: Value,
-    /// It stands in an object of this shape beside its options: `{"case": …, "priority": …}`.
+    /// Whether the case is wrapped in an object with its options: `{"case": …, "priority": …}`.
     pub wrapped: bool,
-    /// Its own options.
+    /// Options of the case.
     pub own: CaseOptions,
 }
 
-/// A row of a table: what it puts into the template, and its own options.
+/// A row of a table with its own options.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BatchRow {
-    /// What the row puts into the template.
+    /// Values for the template.
     pub cells: Vec<Cell>,
-    /// Its own options.
+    /// Options of the row.
     pub own: CaseOptions,
 }
 
-/// A batch that is being received: checked cases wait in a file of the data folder. Dropping it gives everything back.
+/// A batch that is being received. Checked cases are staged in a file of the data folder. Dropping it removes everything.
 #[derive(Debug)]
 pub struct BatchUpload {
     jobs: Jobs,
@@ -181,64 +183,62 @@ pub struct BatchUpload {
     pub(crate) id: Uuid,
     pub(crate) staging: Option<Staging>,
     pub(crate) template: Option<Bytes>,
-    /// The case that rows fill.
-    rows: Option<RowTemplate>,
+    /// The template that rows fill.
+    rows: Option<Arc<RowTemplate>>,
     head: Option<Bytes>,
-    /// Bytes of the good cases as they are kept.
+    /// Number of bytes of the valid cases as stored.
     kept: u64,
     digest: blake3::Hasher,
-    /// Cases seen so far.
+    /// Number of cases so far.
     pub cases: u32,
-    /// Faulty ones among them.
+    /// Number of invalid cases among them.
     pub rejected: u32,
-    /// The first faulty ones.
+    /// The first invalid cases.
     pub faulty: Vec<FaultyCase>,
-    /// Places in the queue reserved so far.
+    /// Number of places in the queue that are reserved.
     reserved: u32,
-    /// Bytes counted so far.
+    /// Number of bytes counted as staged.
     staged: u64,
-    /// Profiles that its cases name, as far as they came.
+    /// Stored profiles that its cases refer to.
     profiles: KnownSections,
-    /// There may be something of it in the job table.
+    /// Whether the job table may contain a part of it.
     pub(crate) in_table: bool,
 }
 
-/// The case that rows of a table fill one after the other, in place.
+/// The template of a table.
 #[derive(Debug)]
 struct RowTemplate {
     case: Value,
-    /// The cross-sections that were read last.
+    /// Cache of the last profile pairs.
     known: KnownPair,
 }
 
 impl BatchUpload {
-    /// Sets what is stored once for all its cases.
+    /// Sets the template, which is stored once for all cases.
     pub(crate) fn set_template(&mut self, template: Bytes) {
         self.digest.update(&template);
         self.template = Some(template);
     }
 
-    /// Sets the case that rows added with [`BatchUpload::add_row`] fill.
+    /// Sets the template that the rows of [`BatchUpload::add_row`] fill.
     pub fn set_row_template(&mut self, case: Value) {
         self.set_template(Bytes::from(case.to_string()));
-        self.rows = Some(RowTemplate {
-            case,
-            known: KnownPair::default(),
-        });
+        let known = KnownPair::default();
+        self.rows = Some(Arc::new(RowTemplate { case, known }));
     }
 
-    /// What the chunks of a run share, as it is stored. `whole` is the text of all of it, by which a submission is known again.
+    /// Sets the common part and the head of a run. `whole` is the text that identifies a submission.
     pub(crate) fn set_head(&mut self, template: Bytes, head: Bytes, whole: &[u8]) {
         self.digest.update(whole);
         self.template = Some(template);
         self.head = Some(head);
     }
 
-    /// Checks one more case and keeps it if it has no fault. `case` is what `text` says, or why it says nothing. Blocks;
-    /// not to be called on a thread that answers requests.
+    /// Checks a case and stages it if it is valid. `case` is the parsed `text`, or the faults of parsing. Blocks; not for
+    /// threads that answer requests.
     ///
     /// # Errors
-    /// The file could not be written, or there is no room for more cases: [`JobsError::QueueFull`],
+    /// The file could not be written, or a bound is exceeded: [`JobsError::QueueFull`],
     /// [`JobsError::QuotaExceeded`], [`JobsError::StagingFull`], [`JobsError::StagingQuotaExceeded`].
     pub fn add(
         &mut self,
@@ -264,7 +264,7 @@ impl BatchUpload {
         self.keep(line, checked, prefix, (false, own), &kept)
     }
 
-    /// As [`BatchUpload::add`], of a row of a table.
+    /// As [`BatchUpload::add`], for a row of a table.
     ///
     /// # Errors
     /// As [`BatchUpload::add`].
@@ -274,29 +274,17 @@ impl BatchUpload {
         text: &[u8],
         row: Result<BatchRow, Vec<Fault>>,
     ) -> Result<()> {
-        // Checked and solved as a case of this size, however little is kept of it.
+        // The case is checked and solved with the template, although only the row is stored.
         self.count(text.len() + self.template.as_ref().map_or(0, Bytes::len))?;
-        let Some(row) = self.good(line, text, row) else {
+        let Some(BatchRow { cells, own }) = self.good(line, text, row) else {
             return Ok(());
         };
-        let Some(template) = self.rows.take() else {
+        let Some(template) = self.rows.clone() else {
             let detail = "a row of a table without a template";
             return Err(JobsError::Damaged(detail.to_owned()));
         };
-        let added = self.add_filled(line, &template, row);
-        self.rows = Some(template);
-        added
-    }
-
-    /// Adds the case that a row makes of the template.
-    fn add_filled(
-        &mut self,
-        line: Option<u64>,
-        template: &RowTemplate,
-        BatchRow { cells, own }: BatchRow,
-    ) -> Result<()> {
         self.digest.update(&digest(&cells));
-        let RowTemplate { case, known } = template;
+        let RowTemplate { case, known } = &*template;
         let case = match fill(case, &cells) {
             Ok(case) => case,
             Err((number, reason)) => {
@@ -305,34 +293,21 @@ impl BatchUpload {
                 return Ok(());
             }
         };
-        match named_sections(&case).is_empty() {
-            true => {
-                let checked = self.jobs.check_next(known, &case);
-                let kept = serde_json::to_vec(&cells);
-                kept.map_err(|error| JobsError::Damaged(error.to_string()))
-                    .and_then(|kept| self.keep(line, checked, "", (true, own), &kept))
-            }
-            // A profile that the row names is kept with it.
-            false => self.add_with_profiles(line, case, own),
+        if named_sections(&case).is_empty() {
+            let checked = self.jobs.check_next(known, &case);
+            let kept = serde_json::to_vec(&cells);
+            let kept = kept.map_err(|error| JobsError::Damaged(error.to_string()))?;
+            return self.keep(line, checked, "", (true, own), &kept);
         }
-    }
-
-    /// Adds the case of a row that names profiles.
-    fn add_with_profiles(
-        &mut self,
-        line: Option<u64>,
-        case: Value,
-        own: CaseOptions,
-    ) -> Result<()> {
+        // A row that refers to a profile is stored as a whole case, because it contains the profile.
         let Some(case) = self.with_profiles(line, case, "")? else {
             return Ok(());
         };
-        let kept = case.to_string();
         let checked = self.jobs.check(&case);
-        self.keep(line, checked, "", (false, own), kept.as_bytes())
+        self.keep(line, checked, "", (false, own), case.to_string().as_bytes())
     }
 
-    /// The case with kept profiles in the place of their names; nothing if one is not kept, which is noted.
+    /// Resolves references to stored profiles; `None` after the case was rejected because one does not exist.
     fn with_profiles(
         &mut self,
         line: Option<u64>,
@@ -349,7 +324,7 @@ impl BatchUpload {
         }
     }
 
-    /// Adds a chunk of rows of a run, which take so long. Blocks.
+    /// Adds a chunk of rows of a run. Blocks.
     ///
     /// # Errors
     /// As [`BatchUpload::add`].
@@ -367,7 +342,7 @@ impl BatchUpload {
         self.stage(CaseOptions::default(), job, body)
     }
 
-    /// Counts the next case as a good one and stages what is kept of it.
+    /// Counts a valid case and stages it.
     fn stage(&mut self, own: CaseOptions, job: NewJob, kept: &[u8]) -> Result<()> {
         let staged = (self.cases, own, job);
         self.cases += 1;
@@ -377,10 +352,10 @@ impl BatchUpload {
         };
         self.kept += kept.len() as u64;
         let written = staging.push(&staged, kept);
-        written.map_err(|source| self.jobs.staging_failed(source))
+        written.map_err(|source| self.jobs.spool_failed(source))
     }
 
-    /// What the next case says; nothing if it cannot be read, which is noted.
+    /// Returns a parsed case, or rejects it.
     fn good<T>(
         &mut self,
         line: Option<u64>,
@@ -397,7 +372,7 @@ impl BatchUpload {
         }
     }
 
-    /// As `reject`, of a case that stands at `prefix` in what was sent.
+    /// As `reject`, for a case whose pointers begin with `prefix`.
     fn reject_within(&mut self, line: Option<u64>, mut faults: Vec<Fault>, prefix: &str) {
         for fault in &mut faults {
             fault.pointer.insert_str(0, prefix);
@@ -405,7 +380,7 @@ impl BatchUpload {
         self.reject(line, faults);
     }
 
-    /// Counts a faulty case and keeps its faults.
+    /// Counts an invalid case and keeps its faults.
     fn reject(&mut self, line: Option<u64>, faults: Vec<Fault>) {
         let index = self.cases;
         self.cases += 1;
@@ -419,7 +394,7 @@ impl BatchUpload {
         }
     }
 
-    /// Keeps `kept` of a case that was checked, or its faults, whose pointers begin with `prefix`.
+    /// Stages the body `kept` of a checked case, or rejects the case with pointers that begin with `prefix`.
     fn keep(
         &mut self,
         line: Option<u64>,
@@ -458,7 +433,7 @@ impl BatchUpload {
         Ok(())
     }
 
-    /// Reserves more places as the batch grows, twice as many each time, so that few writes reserve many.
+    /// Reserves places as the batch grows, twice as many each time, so that few writes are needed.
     fn require_place(&mut self) -> Result<()> {
         let good = self.cases - self.rejected;
         if good <= UNRESERVED_MAX || good <= self.reserved {
@@ -475,17 +450,17 @@ impl BatchUpload {
             Err(refusal) => return Err(self.jobs.refused(refusal)),
         };
         if good > self.reserved {
-            // The first reservation has to cover what was staged without one.
+            // The first reservation has to cover the cases that were staged without one.
             return self.require_place();
         }
         Ok(())
     }
 
-    /// The batch as it is to be stored. Its digest is that of all cases, with its name, its labels and its options.
+    /// The batch as it will be stored. Its digest covers all cases, name, labels and options.
     pub(crate) fn as_new(&mut self, options: WorkOptions) -> NewBatch {
         let (name, labels) = (options.name, options.labels);
         if name.is_some() || !labels.is_empty() {
-            // Quotes say where a text ends.
+            // Quotes separate the texts.
             self.digest
                 .update(format!("{name:?} {labels:?}").as_bytes());
         }
@@ -506,7 +481,7 @@ impl BatchUpload {
         }
     }
 
-    /// Nothing of it is left to be given back but its bytes.
+    /// Marks the batch as stored or abandoned: dropping it only releases its staged bytes.
     pub(crate) fn settle(&mut self) {
         self.in_table = false;
     }
@@ -524,13 +499,13 @@ impl Drop for BatchUpload {
                 tasks.spawn_on(async move { shared.drop_abandoned().await }, &runtime);
             }
         } else {
-            shared.unfinished_batches().forget(self.id);
+            shared.unfinished_batches().living.remove(&self.id);
         }
     }
 }
 
 impl Jobs {
-    /// An empty batch, or an empty run for [`Kind::Rows`].
+    /// Begins a batch, or a run for [`Kind::Rows`].
     ///
     /// # Errors
     /// [`JobsError::Draining`], or the data folder cannot be written.
@@ -539,7 +514,7 @@ impl Jobs {
             return Err(JobsError::Draining);
         }
         let staging = Staging::new(&self.shared.options.data_dir);
-        let staging = staging.map_err(|source| self.staging_failed(source))?;
+        let staging = staging.map_err(|source| self.spool_failed(source))?;
         let id = self.shared.new_id();
         self.shared.unfinished_batches().living.insert(id);
         Ok(BatchUpload {

@@ -8,45 +8,49 @@
 //! then              the blocks; offsets count from the end of the header
 //! ```
 //!
-//! A block is a zstd frame with checksum; inside are `count` little-endian values of its kind (`f64`, `u32` or `u8`),
-//! in the cell order of [`PatchCells`]; `subsurface` has nine for every requested point: x, y, depth and the stress. Blocks stand patch by patch, in each patch first the cells of every mesh
-//! (`point` is null), then motion by motion, so that one patch is one range of bytes. An array that was not computed
-//! has no block. Zones are `u8`: 0 stick, 1 slip.
+//! A block is a zstd frame with checksum; inside are `count` little-endian values of its kind (`f64`, `u32` or `u8`), in
+//! the cell order of [`PatchCells`]. `subsurface` has nine values per point: x, y, depth and the stress. Blocks are ordered
+//! by patch, in each patch first the cells of every mesh (`point` is null), then the motions, so that one patch is one
+//! range of bytes. An array that was not computed has no block. Zones are `u8`: 0 stick, 1 slip.
 
+use std::io;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
+use zstd::bulk::Compressor;
 
-use railhead_contact::solution::words::answer::{PatchCells, PatchFields, PointFields, Zone};
+use railhead_contact::solution::words::answer::{
+    Fields, PatchCells, PatchFields, PointFields, Zone,
+};
 
-pub(crate) const MAGIC: &[u8; 8] = b"RHFIELD2";
+const MAGIC: &[u8; 8] = b"RHFIELD2";
 
-/// Length of the part before the header.
+/// Length of the part before the header in bytes.
 pub const PREFIX_BYTES: usize = 12;
 
-/// What lies where in a stored file of fields.
+/// Index of a stored file of fields.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
-    pub(crate) points: Vec<usize>,
-    pub(crate) meshes: Vec<Vec<usize>>,
-    pub(crate) blocks: Vec<Block>,
+    points: Vec<usize>,
+    meshes: Vec<Vec<usize>>,
+    blocks: Vec<Block>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Block {
-    pub(crate) patch: usize,
-    pub(crate) point: Option<usize>,
-    pub(crate) mesh: usize,
-    pub(crate) name: String,
-    pub(crate) kind: Kind,
-    pub(crate) count: usize,
-    pub(crate) offset: u64,
-    pub(crate) bytes: u64,
+struct Block {
+    patch: usize,
+    point: Option<usize>,
+    mesh: usize,
+    name: String,
+    kind: Kind,
+    count: usize,
+    offset: u64,
+    bytes: u64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Kind {
+enum Kind {
     F64,
     U32,
     U8,
@@ -55,7 +59,7 @@ pub(crate) enum Kind {
 /// Length of the header in bytes, from the first [`PREFIX_BYTES`] of the file.
 ///
 /// # Errors
-/// This is no file of fields.
+/// The file has another signature.
 pub fn header_length(prefix: &[u8]) -> Result<usize, String> {
     match prefix.split_at_checked(8) {
         Some((magic, length)) if magic == MAGIC && length.len() == 4 => {
@@ -70,10 +74,21 @@ impl Header {
     /// Reads the header.
     ///
     /// # Errors
-    /// It is not one.
+    /// The header cannot be parsed.
     pub fn read(bytes: &[u8]) -> Result<Header, String> {
         serde_json::from_slice(bytes)
             .map_err(|error| format!("header of a file of fields: {error}"))
+    }
+
+    /// Parses the header at the beginning of a file and returns it with its end; `None` if `start` does not contain all of it.
+    ///
+    /// # Errors
+    /// The file has another signature, or the header cannot be parsed.
+    pub fn of_file(start: &[u8]) -> Result<(Option<Header>, usize), String> {
+        let prefix = start.get(..PREFIX_BYTES).unwrap_or(start);
+        let end = PREFIX_BYTES + header_length(prefix)?;
+        let header = start.get(PREFIX_BYTES..end).map(Header::read);
+        Ok((header.transpose()?, end))
     }
 
     /// Number of patches.
@@ -82,14 +97,13 @@ impl Header {
         self.points.len()
     }
 
-    /// Number of motions of a patch; 0 if there is no such patch.
+    /// Number of motions of a patch; 0 if it does not exist.
     #[must_use]
     pub fn points(&self, patch: usize) -> usize {
         self.points.get(patch).copied().unwrap_or(0)
     }
 
-    /// The ranges of bytes, counted from the end of the header, that hold the cells of a patch and the values of one
-    /// motion, or of all of them.
+    /// The byte ranges, counted from the end of the header, of the cells of a patch and the values of one motion or of all motions.
     #[must_use]
     pub fn ranges(&self, patch: usize, point: Option<usize>) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
@@ -102,7 +116,7 @@ impl Header {
         ranges
     }
 
-    /// The cells of a patch with one motion, or all of them, from the bytes of [`Header::ranges`] put end to end.
+    /// Decodes the cells of a patch with one motion or all motions, from the concatenated bytes of [`Header::ranges`].
     ///
     /// # Errors
     /// The bytes are damaged.
@@ -118,7 +132,7 @@ impl Header {
         };
         let mut cells = PatchFields::default();
         match point {
-            // The one mesh of the one motion.
+            // One motion with its mesh.
             Some(_) => {
                 cells.points.push(PointFields::default());
                 cells.meshes.push(PatchCells::default());
@@ -160,7 +174,7 @@ impl Header {
         Ok(cells)
     }
 
-    /// The blocks of a patch, or only those of one motion and of its cells.
+    /// The blocks of a patch, or only those of one motion and its cells.
     fn wanted(&self, patch: usize, point: Option<usize>) -> impl Iterator<Item = &Block> {
         let all = self.meshes.get(patch);
         let mesh = point.map(|at| all.and_then(|all| all.get(at)).copied().unwrap_or(0));
@@ -175,7 +189,7 @@ impl Header {
 }
 
 impl Block {
-    /// The little-endian values of the block.
+    /// Decompresses the little-endian values.
     fn unpack(&self, packed: &[u8]) -> Result<Vec<u8>, String> {
         let size = match self.kind {
             Kind::F64 => 8,
@@ -196,7 +210,7 @@ impl Block {
         }
     }
 
-    /// Puts a part of a mesh where it belongs.
+    /// Decodes an array of a mesh.
     fn put_cells(&self, cells: &mut PatchCells, values: &[u8]) -> Result<(), String> {
         match self.name.as_str() {
             "x_mm" => cells.x_mm = read_f64(values),
@@ -210,7 +224,7 @@ impl Block {
         Ok(())
     }
 
-    /// Puts values of a motion where they belong.
+    /// Decodes an array of a motion.
     fn put_values(&self, point: &mut PointFields, values: &[u8]) -> Result<(), String> {
         match self.name.as_str() {
             "zone" => {
@@ -257,13 +271,151 @@ fn read_u32(bytes: &[u8]) -> Vec<u32> {
         .collect()
 }
 
+const ZSTD_LEVEL: i32 = 3;
+
+/// Encodes fields for storage.
+///
+/// # Errors
+/// Compression failed.
+pub fn encode(fields: &Fields) -> io::Result<Vec<u8>> {
+    let mut compressor = Compressor::new(ZSTD_LEVEL)?;
+    compressor.include_checksum(true)?;
+    let mut blocks = Blocks {
+        compressor,
+        list: Vec::new(),
+        body: Vec::new(),
+    };
+    for (patch, all) in fields.patches.iter().enumerate() {
+        for (mesh, cells) in all.meshes.iter().enumerate() {
+            let at = Place::cells(patch, mesh);
+            blocks.push_f64(at, "x_mm", Some(&cells.x_mm))?;
+            blocks.push_f64(at, "y_mm", Some(&cells.y_mm))?;
+            blocks.push_f64(at, "dx_mm", Some(&cells.dx_mm))?;
+            blocks.push_f64(at, "dy_mm", Some(&cells.dy_mm))?;
+            let strips = cells
+                .strip
+                .iter()
+                .flat_map(|v| v.to_le_bytes())
+                .collect::<Vec<_>>();
+            blocks.push(at, "strip", Kind::U32, &strips, cells.strip.len())?;
+            blocks.push_f64(at, "pressure_mpa", cells.pressure_mpa.as_ref())?;
+        }
+        for (point, values) in all.points.iter().enumerate() {
+            let at = Place::values(patch, point);
+            if let Some(zones) = &values.zone {
+                let codes = zones
+                    .iter()
+                    .map(|zone| zone_code(*zone))
+                    .collect::<Vec<_>>();
+                blocks.push(at, "zone", Kind::U8, &codes, codes.len())?;
+            }
+            blocks.push_f64(at, "traction_x_mpa", values.traction_x_mpa.as_ref())?;
+            blocks.push_f64(at, "traction_y_mpa", values.traction_y_mpa.as_ref())?;
+            blocks.push_f64(at, "slip_x", values.slip_x.as_ref())?;
+            blocks.push_f64(at, "slip_y", values.slip_y.as_ref())?;
+            blocks.push_f64(at, "temperature_c", values.temperature_c.as_ref())?;
+            blocks.push_f64(at, "subsurface", values.subsurface.as_ref())?;
+        }
+    }
+    let header = serde_json::to_vec(&Header {
+        points: fields
+            .patches
+            .iter()
+            .map(|patch| patch.points.len())
+            .collect(),
+        meshes: fields
+            .patches
+            .iter()
+            .map(|patch| patch.points.iter().map(|point| point.mesh).collect())
+            .collect(),
+        blocks: blocks.list,
+    })?;
+    let header_length = u32::try_from(header.len()).map_err(io::Error::other)?;
+    let mut file = Vec::with_capacity(PREFIX_BYTES + header.len() + blocks.body.len());
+    file.extend_from_slice(MAGIC);
+    file.extend_from_slice(&header_length.to_le_bytes());
+    file.extend_from_slice(&header);
+    file.extend_from_slice(&blocks.body);
+    Ok(file)
+}
+
+/// Position of a block: cells of a mesh (`point` is `None`) or values of a motion.
+#[derive(Clone, Copy)]
+struct Place {
+    patch: usize,
+    point: Option<usize>,
+    mesh: usize,
+}
+
+impl Place {
+    /// The cells of a mesh.
+    fn cells(patch: usize, mesh: usize) -> Place {
+        let point = None;
+        Place { patch, point, mesh }
+    }
+
+    /// The values of a motion.
+    fn values(patch: usize, point: usize) -> Place {
+        let (point, mesh) = (Some(point), 0);
+        Place { patch, point, mesh }
+    }
+}
+
+/// Blocks that were encoded so far.
+struct Blocks {
+    /// Reused, because creating one takes longer than compressing a small block.
+    compressor: Compressor<'static>,
+    list: Vec<Block>,
+    body: Vec<u8>,
+}
+
+impl Blocks {
+    fn push_f64(&mut self, at: Place, name: &str, v: Option<&Vec<f64>>) -> io::Result<()> {
+        let Some(values) = v else { return Ok(()) };
+        let bytes = values
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect::<Vec<_>>();
+        self.push(at, name, Kind::F64, &bytes, values.len())
+    }
+
+    fn push(
+        &mut self,
+        at: Place,
+        name: &str,
+        kind: Kind,
+        values: &[u8],
+        count: usize,
+    ) -> io::Result<()> {
+        let offset = self.body.len();
+        self.body
+            .extend_from_slice(&self.compressor.compress(values)?);
+        self.list.push(Block {
+            patch: at.patch,
+            point: at.point,
+            mesh: at.mesh,
+            name: name.to_owned(),
+            kind,
+            count,
+            offset: offset as u64,
+            bytes: (self.body.len() - offset) as u64,
+        });
+        Ok(())
+    }
+}
+
+fn zone_code(zone: Zone) -> u8 {
+    match zone {
+        Zone::Stick => 0,
+        Zone::Slip => 1,
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use crate::codec::encode::encode;
     use proptest::prelude::*;
 
     use super::*;
-    use railhead_contact::solution::words::answer::Fields;
 
     /// Any bit pattern: NaN payloads, infinities and negative zero have to survive too.
     fn values(count: usize) -> impl Strategy<Value = Vec<f64>> {

@@ -1,5 +1,4 @@
-//! The stored forms of solutions and fields.
+//! Stored forms of solutions and fields.
 
-pub mod encode;
 pub mod fields;
 pub mod result;

@@ -1,27 +1,28 @@
-//! A result in its stored form.
+//! The stored form of a result.
 
 use bytes::Bytes;
 use serde::Serialize;
 
-use crate::codec::fields::{Header, PREFIX_BYTES, header_length};
+use crate::codec::fields::Header;
 use crate::error::{JobsError, Result};
 use railhead_contact::solution::words::answer::PatchFields;
 use railhead_tables::parquet;
 
-/// A result in its stored form.
+/// The stored form of a result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct EncodedResult {
     /// The solution as JSON.
     pub solution: Bytes,
-    /// The fields as [`encode`](crate::codec::encode::encode) writes them, if the case asked for any.
+    /// The fields as written by [`encode`](crate::codec::fields::encode), or the table of a chunk of rows; `None` if the
+    /// case requested no fields.
     pub fields: Option<Bytes>,
 }
 
 impl EncodedResult {
-    /// Encodes an answer, or a part of one, that has no fields.
+    /// Encodes a solution, or a part of one, that has no fields.
     ///
     /// # Errors
-    /// The answer cannot be written as JSON, and why.
+    /// JSON serialisation failed.
     pub fn as_json(answer: &impl Serialize) -> Result<EncodedResult, String> {
         let text = serde_json::to_vec(answer);
         let text =
@@ -38,25 +39,23 @@ impl EncodedResult {
         self.solution.len() + self.fields.as_ref().map_or(0, Bytes::len)
     }
 
-    /// These are the answers of a chunk of rows, whose table stands in place of fields.
+    /// Whether this is the result of a chunk of rows, with a table instead of fields.
     #[must_use]
     pub fn is_rows(&self) -> bool {
         let fields = self.fields.as_ref();
         fields.is_some_and(|fields| fields.starts_with(parquet::MAGIC))
     }
 
-    /// The cells of one patch, with the values of one motion or of all of them.
+    /// Decodes the cells of one patch, with the values of one motion or of all motions.
     ///
     /// # Errors
-    /// There is no such motion, or the fields cannot be read.
+    /// The motion does not exist, or the fields cannot be decoded.
     pub fn patch_fields(&self, patch: usize, point: Option<usize>) -> Result<PatchFields> {
         let file = self.fields.as_deref().unwrap_or_default();
         let damaged = |error: String| JobsError::Damaged(format!("stored fields: {error}"));
-        let prefix = file.get(..PREFIX_BYTES).unwrap_or_default();
-        let body = PREFIX_BYTES + header_length(prefix).map_err(damaged)?;
         let cut = || damaged("cut short".to_owned());
-        let header =
-            Header::read(file.get(PREFIX_BYTES..body).ok_or_else(cut)?).map_err(damaged)?;
+        let (header, body) = Header::of_file(file).map_err(damaged)?;
+        let header = header.ok_or_else(cut)?;
         let points = header.points(patch);
         if point.is_some_and(|point| point >= points) {
             return Err(JobsError::NoSuchPoint(points));

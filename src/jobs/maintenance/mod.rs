@@ -1,4 +1,4 @@
-//! What runs beside the workers: leases, deadlines, retention, blobs.
+//! Periodic tasks: expired leases, deadlines, expired jobs and orphaned results.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use tokio::time::MissedTickBehavior;
 use uuid::Uuid;
 
 use crate::attempts::attempt::StopReason;
-use crate::disk_reserve;
+use crate::data_dir;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::model::{FailureKind, Job, State, too_late};
@@ -18,7 +18,7 @@ use crate::sync::blocking;
 
 pub mod nodes;
 
-/// Starts all of this.
+/// Starts the periodic tasks.
 pub(crate) fn start(shared: &Arc<Shared>) {
     let (longest, shortest) = SWEEP_EVERY;
     let retention = shared.options.retention.unwrap_or(longest);
@@ -34,7 +34,7 @@ pub(crate) fn start(shared: &Arc<Shared>) {
     }
 }
 
-/// Does this at once, and again each time the interval has passed, until the service drains.
+/// Runs a task at once and then at each interval, until the service drains.
 fn every<F>(
     shared: &Arc<Shared>,
     interval: Duration,
@@ -57,14 +57,14 @@ fn every<F>(
     });
 }
 
-/// Results checked in one call by the sweep for orphans.
+/// Number of results checked in one call by the sweep of orphans.
 const SWEEP_CHUNK: usize = 500;
 
-/// Results taken from the outbox at once.
+/// Number of results removed in one round.
 const COLLECT_CHUNK: u32 = 500;
 
 impl Shared {
-    /// Removes large results that no job refers to any more. What cannot be removed now is tried again later.
+    /// Removes results that no job refers to. Failed removals are repeated later.
     pub(crate) async fn collect_blobs(&self) {
         let mut done = Vec::new();
         loop {
@@ -91,18 +91,18 @@ impl Shared {
     }
 }
 
-/// Time between two sweeps of an embedded table.
+/// Interval of the sweep of orphans with an embedded table.
 const SWEEP_RESULTS_EVERY: Duration = Duration::from_secs(24 * 3600);
 
-/// Removes results that no job refers to: what a process left behind that was killed between the write of a result and the end of its
-/// job. The nodes of a database do so together.
+/// Removes results that no job refers to, which a process leaves that is killed between the write of a result and the end
+/// of its job. With a shared database, the nodes do this together.
 async fn sweep_orphans(shared: Arc<Shared>) {
     if shared.store.cluster().is_none() {
         note_swept(shared.sweep_results().await);
     }
 }
 
-/// Notes the end of a sweep of results.
+/// Logs the outcome of a sweep of orphans.
 fn note_swept(removed: Result<u64>) {
     match removed {
         Ok(0) => {}
@@ -111,15 +111,15 @@ fn note_swept(removed: Result<u64>) {
     }
 }
 
-/// Results written less long ago may be on their way to their job, in ms.
+/// Minimum age in ms of a result without a job before it counts as an orphan: its job may be about to end.
 const YOUNG: i64 = 24 * 3600 * 1000;
 
 impl Jobs {
-    /// Removes results outside the table that no job refers to; returns their number. Where several nodes share a database, only results
-    /// that were written more than a day ago. A running service does this by itself, once a day.
+    /// Removes results outside the table that no job refers to; returns their number. With a shared database, only results
+    /// older than a day are removed. A running service does this once a day.
     ///
     /// # Errors
-    /// The database or the place of the results failed; the next sweep will go on.
+    /// The database or the store of results failed; the next sweep continues.
     pub async fn sweep_results(&self) -> Result<u64> {
         match self.shared.store.cluster() {
             Some(_) => self.shared.sweep_old_results().await,
@@ -129,7 +129,7 @@ impl Jobs {
 }
 
 impl Shared {
-    /// Removes the results of an embedded table that no job refers to; returns their number.
+    /// Removes the orphans of an embedded table; returns their number.
     async fn sweep_results(&self) -> Result<u64> {
         self.collect_blobs().await;
         let mut removed = 0;
@@ -150,8 +150,7 @@ impl Shared {
         Ok(orphans.len() as u64)
     }
 
-    /// Removes results outside the database that no job refers to and that were written more than a day ago; returns their number.
-    /// Several nodes may do so at once.
+    /// Removes orphans outside the database that are older than a day; returns their number. Several nodes may do so at once.
     pub(crate) async fn sweep_old_results(&self) -> Result<u64> {
         let before = self.now_ms() - YOUNG;
         let mut listed = self.blobs.listed();
@@ -176,7 +175,7 @@ impl Shared {
     }
 }
 
-/// Time between two checks for jobs whose deadline has passed.
+/// Interval between two checks of the deadlines.
 const DEADLINE_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Ends jobs whose deadline has passed: queued ones at once, running ones at the next tick of their solvers.
@@ -211,7 +210,7 @@ async fn enforce_deadlines(shared: &Shared) -> Result<()> {
     Ok(())
 }
 
-/// Takes jobs whose lease has run out from their workers, three times per lease, until the service drains.
+/// Takes jobs with expired leases from their workers, three times per lease, until the service drains.
 async fn reap_expired(shared: Arc<Shared>) {
     let mut beat = tokio::time::interval(heartbeat(&shared));
     beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -225,12 +224,12 @@ async fn reap_expired(shared: Arc<Shared>) {
         .await
         .is_some()
     {
-        // While nothing can be written no lease can be renewed either, which is no silence of the workers.
+        // While nothing can be written, leases cannot be renewed either, which is not the fault of the workers.
         if shared.storage.fault(StoragePlace::Table).is_some() {
             quiet_until = shared.lease_until();
         }
         let now = shared.steady_ms();
-        // If the table has held up this loop, it has held up the heartbeats of the workers as well.
+        // A table that delayed this loop has also delayed the heartbeats of the workers.
         if now.saturating_sub(checked_at) > shared.lease_ms() * 2 / 3 {
             quiet_until = shared.lease_until();
         }
@@ -267,14 +266,13 @@ fn count_taken(shared: &Shared, state: State) {
     }
 }
 
-/// Time between two tries to do what a full disk did not allow.
+/// Interval between two attempts to recover from a storage fault.
 const RECOVER_EVERY: Duration = Duration::from_secs(1);
 
-/// Time between two checks of the disk reserve.
+/// Interval between two checks of the disk reserve.
 const RESERVE_EVERY: Duration = Duration::from_secs(60);
 
-/// Takes back what a dead process left, and removes what is left of batches that were given up, again and again for as
-/// long as the disk does not allow it.
+/// Returns the jobs of a crashed process to the queue, and removes abandoned batches, until storage permits it.
 async fn recover(shared: Arc<Shared>) {
     if shared.recovered.get().is_none()
         && let Err(error) = shared.recover().await
@@ -285,28 +283,28 @@ async fn recover(shared: Arc<Shared>) {
         shared.drop_abandoned().await;
     }
     if shared.storage.any() {
-        // The outcome is noted; what fails is tried again at the next time.
+        // The outcome is recorded; a failure is repeated at the next interval.
         let _ = shared.require_storage().await;
     }
 }
 
-/// Keeps the disk reserve.
+/// Creates the disk reserve again if it is missing.
 async fn keep_reserve(shared: Arc<Shared>) {
     if !shared.storage.any() {
         let data_dir = shared.options.data_dir.clone();
-        // It is tried again at the next time.
-        let _ = blocking(move || disk_reserve::keep(&data_dir)).await;
+        // A failure is repeated at the next interval.
+        let _ = blocking(move || data_dir::keep_reserve(&data_dir)).await;
     }
 }
 
 impl Shared {
-    /// Takes back the jobs that a dead process was running.
+    /// Returns the jobs of a crashed process to the queue.
     pub(crate) async fn recover(&self) -> Result<()> {
         if self.recovered.get().is_some() {
             return Ok(());
         }
         if self.store.cluster().is_some() {
-            // What runs is of other processes, as long as their leases last.
+            // Running jobs belong to other processes while their leases last.
             let _ = self.recovered.set(());
             return Ok(());
         }
@@ -320,7 +318,7 @@ impl Shared {
         for (id, state) in taken? {
             tracing::info!(job = %id, state = state.name(), "job of a dead process returned to the queue");
         }
-        // Set once; whoever was first is right.
+        // An error means that it is set already.
         let _ = self.recovered.set(());
         if !self.unfinished_batches().abandoned.is_empty() {
             self.drop_abandoned().await;
@@ -332,28 +330,27 @@ impl Shared {
 /// How long the ids of expired jobs and batches are remembered.
 pub const REMEMBERED_FOR: Duration = Duration::from_secs(30 * 24 * 3600);
 
-/// Jobs removed in one transaction.
+/// Number of jobs removed in one transaction.
 const SWEEP_JOBS: u32 = 500;
 
-/// Free pages of the database given back to the file system in one step.
+/// Number of free database pages returned to the file system in one step.
 const SHRINK_PAGES: u32 = 2000;
 
-/// Free pages that stay in the database file for what comes next.
+/// Number of free pages that remain in the database file.
 const SPARE_PAGES: i64 = 4000;
 
-/// Pause between two steps, in which others may write.
+/// Pause between two steps, for other writers.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// Longest and shortest time between two sweeps.
+/// Longest and shortest interval between two sweeps of expired jobs.
 const SWEEP_EVERY: (Duration, Duration) = (Duration::from_secs(60), Duration::from_secs(1));
 
 impl Jobs {
-    /// Removes every ended job whose time is over, batches of which nothing is left, and ids remembered long enough;
-    /// gives free space of the database back. Returns the number of jobs removed. A running service does this by
-    /// itself.
+    /// Removes expired jobs, empty batches, and ids that were remembered long enough; returns free space of the database to
+    /// the file system. Returns the number of jobs removed. A running service does this periodically.
     ///
     /// # Errors
-    /// The database failed; the next sweep will go on.
+    /// The database failed; the next sweep continues.
     pub async fn sweep_expired(&self) -> Result<u64> {
         self.shared.sweep_expired().await
     }

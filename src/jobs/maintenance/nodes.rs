@@ -1,5 +1,5 @@
-//! What a node does because others use its store too: it shows itself, listens to the notifications of the others, keeps the batches
-//! that it is filling, and looks for what the notifications did not tell.
+//! Tasks of a node of a cluster: it reports itself, receives notifications, keeps the batches that it fills, and polls for
+//! changes that notifications missed.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -12,33 +12,33 @@ use crate::attempts::attempt::StopReason;
 use crate::error::JobsError;
 use crate::maintenance::{every, note_swept};
 use crate::shared::Shared;
-use crate::store::{Cluster, ClusterView, Notification, Result};
+use crate::store::{Cluster, Notification, Result};
 
-/// Time between two signs of life; the store counts a node as dead after four.
+/// Interval between two reports of a node; the store counts a node as dead after four missed ones.
 const BEAT_EVERY: Duration = Duration::from_secs(5);
 
-/// Time between two looks for running jobs that are to be cancelled.
+/// Interval between two polls for running jobs that are to be cancelled.
 const CANCEL_EVERY: Duration = Duration::from_millis(500);
 
-/// Time between two rounds in which counts are brought into a short form.
+/// Interval at which the counters in the database are summed up.
 const FOLD_EVERY: Duration = Duration::from_secs(2);
 
-/// Time between two sweeps of results that no job refers to.
+/// Interval between two sweeps of orphaned results.
 const SWEEP_EVERY: Duration = Duration::from_secs(3600);
 
-/// Pause after a connection for notifications has failed.
+/// Pause after the connection for notifications has failed.
 const LISTEN_AGAIN: Duration = Duration::from_secs(1);
 
-/// Longest round trip that tells the time of the store, in ms.
+/// Longest round trip that is used to measure the clock of the store, in ms.
 const MEASURED_WITHIN: i64 = 500;
 
-/// Smaller differences of the clocks are left alone, in ms.
+/// Smaller clock offsets are ignored, in ms.
 const OFFSET_MIN: i64 = 250;
 
-/// A clock that is off by so much is worth a line in the log, in ms.
+/// Clock offsets of at least this size are logged, in ms.
 const OFFSET_TOLD: i64 = 1000;
 
-/// Starts all of this.
+/// Starts the tasks of a node.
 pub(super) fn start(shared: &Arc<Shared>) {
     every(shared, BEAT_EVERY, beat);
     every(shared, FOLD_EVERY, fold);
@@ -48,16 +48,16 @@ pub(super) fn start(shared: &Arc<Shared>) {
 }
 
 impl Shared {
-    /// Shows this node to the others and sets its clock by that of the store.
-    pub(crate) async fn show_node(&self, cluster: &dyn Cluster) -> Result<ClusterView> {
+    /// Reports this node to the others and sets its clock by that of the store.
+    pub(crate) async fn show_node(&self, cluster: &dyn Cluster) -> Result<()> {
         self.set_clock(cluster).await?;
-        let view = cluster.beat(&self.node).await?;
-        self.cluster_workers.store(view.workers, Ordering::Relaxed);
-        Ok(view)
+        let workers = cluster.beat(&self.node).await?;
+        self.cluster_workers.store(workers, Ordering::Relaxed);
+        Ok(())
     }
 
-    /// How far the clock of the store is ahead. An answer that took long says little, and a small difference is one of the
-    /// measurement.
+    /// Measures the offset of the clock of the store. Slow round trips are ignored as inaccurate, and small offsets as
+    /// measurement errors.
     async fn set_clock(&self, cluster: &dyn Cluster) -> Result<()> {
         let asked = self.steady_ms();
         let there = cluster.now().await?;
@@ -80,7 +80,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Does what a notification asks for.
+    /// Handles a notification.
     fn hear(&self, notification: Notification) {
         match notification {
             Notification::Work => self.wake_here(),
@@ -101,7 +101,7 @@ async fn beat(shared: Arc<Shared>) {
     }
 }
 
-/// Keeps the batches that this node fills, and takes up those that nobody fills any more, to remove them.
+/// Keeps the batches that this node fills, and takes over those that no node fills, to remove them.
 async fn keep_batches(shared: &Shared, cluster: &dyn Cluster) -> Result<()> {
     let living: Vec<Uuid> = {
         let batches = shared.unfinished_batches();
@@ -121,7 +121,7 @@ async fn watch_cancellations(shared: Arc<Shared>) {
     let mut beat = interval(CANCEL_EVERY);
     beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
-        // Also while the node drains: its running jobs have a grace period.
+        // Also while the node drains, because its running jobs have a grace period.
         if shared
             .stopping
             .run_until_cancelled(beat.tick())
@@ -158,7 +158,7 @@ async fn sweep(shared: Arc<Shared>) {
     }
 }
 
-/// In the database every node may look as often as it likes; what is elsewhere is listed once a day, by one of them.
+/// Sweeps results in the database at any time; results elsewhere once a day, by one node.
 async fn sweep_once(shared: &Shared, cluster: &dyn Cluster) -> Result<u64, JobsError> {
     match &shared.options.results {
         None => Ok(cluster.sweep_objects().await?),

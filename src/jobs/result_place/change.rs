@@ -1,9 +1,9 @@
-//! Moves the large results of a database to another place: `railhead move-results`.
+//! `railhead move-results`: moves the large results of a database to another location.
 
 use futures_util::{StreamExt, TryStreamExt, stream};
 use object_store::ObjectStore;
 
-use crate::blobs::Blobs;
+use crate::blobs::{Blobs, Copied};
 use crate::error::{JobsError, Result};
 use crate::metrics::StoreRequests;
 use crate::result_place::settle::{IN_DATABASE, decide, mark, marker, on_this_machine_alone};
@@ -11,29 +11,25 @@ use crate::result_place::url::{ResultsPlace, ResultsUrl};
 use crate::store::postgres::database::PostgresStore;
 use crate::store::{Cluster, Deployment, Store};
 
-/// Results that are copied at once: each waits for its requests most of the time. Chosen by judgement, below the usual 10 connections to
-/// the database.
+/// Number of concurrent copies, which mostly wait for requests. Chosen by judgement, below the default of 10 database connections.
 const AT_ONCE: usize = 8;
 
-/// What was moved.
+/// Result of [`move_results`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MovedResults {
-    /// Where they were; empty: in the database.
+    /// Previous location; empty: in the database.
     pub from: String,
-    /// How many there are now in the new place.
-    pub results: u64,
-    /// Bytes of these.
-    pub bytes: u64,
-    /// Those that were not where they were looked for; their jobs stay without.
-    pub missing: u64,
+    /// The results in the new location.
+    pub results: Copied,
 }
 
-/// Copies the large results of a database, which no node uses, to another place, and notes this place. What was in the database is removed
-/// there afterwards; what was elsewhere stays. Whatever fails before that, nothing has changed, and it can be repeated.
+/// Copies the large results of a database that no node uses to another location, and records the location. Results in the
+/// database are removed afterwards; results elsewhere stay. A failure before that changes nothing, and the call can be
+/// repeated.
 ///
 /// # Errors
-/// A node uses the database, no node has ever been started, the place is that of another database or the same as before, or something
-/// cannot be read or written.
+/// A node uses the database, no node was ever started, the location belongs to another database or is the current one, or a
+/// read or write failed.
 pub async fn move_results(url: &str, place: &ResultsPlace) -> Result<MovedResults> {
     let database = PostgresStore::open(url, 4).await?;
     let moved = move_within(&database, place).await;
@@ -58,36 +54,20 @@ async fn move_within(database: &PostgresStore, place: &ResultsPlace) -> Result<M
     let old = open_old(database, &before, &from).await?;
     let objects = place.url.open(StoreRequests::default())?;
     match marker(&*objects).await? {
-        Some(marker) if marker.deployment != before.id => {
-            return refused(format!(
-                "{} holds the results of another database ({}); use another prefix",
-                place.url, marker.deployment
-            ));
-        }
+        Some(marker) if marker.deployment != before.id => return Err(marker.foreign(&place.url)),
         Some(_) => {}
         None => mark(&*objects, &before, &place.url.to_string()).await?,
     }
     let new = Blobs::at(objects, place.url.folder());
-    let mut moved = MovedResults {
-        from: from.clone(),
-        results: 0,
-        bytes: 0,
-        missing: 0,
-    };
+    let mut results = Copied::default();
     let keys = database.result_keys().await?;
     let mut copies = stream::iter(&keys)
         .map(|key| old.copy(key, &new))
         .buffer_unordered(AT_ONCE);
     while let Some(copied) = copies.try_next().await? {
-        match copied {
-            Some(bytes) => {
-                moved.results += 1;
-                moved.bytes += bytes;
-            }
-            None => moved.missing += 1,
-        }
+        results.add(copied);
     }
-    // A node that came meanwhile may have written where the results were.
+    // A node that was started in the meantime may have written to the previous location.
     without_nodes(database).await?;
     if database.result_keys().await? != keys {
         return refused("a node has written results meanwhile; move them again".to_owned());
@@ -96,10 +76,10 @@ async fn move_within(database: &PostgresStore, place: &ResultsPlace) -> Result<M
     if from == IN_DATABASE {
         database.remove_objects().await?;
     }
-    Ok(moved)
+    Ok(MovedResults { from, results })
 }
 
-/// What the database knows, if no node uses it.
+/// The deployment, if no node uses the database.
 async fn without_nodes(database: &PostgresStore) -> Result<Deployment> {
     let deployment = database.deployment().await?;
     match deployment.nodes {

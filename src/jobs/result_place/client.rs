@@ -1,4 +1,4 @@
-//! How requests to an object store are sent: HTTP/1.1, with the TLS and the authorities that the database is reached by.
+//! The HTTP client for object stores: HTTP/1.1, with the TLS implementation and certificates of the database connection.
 
 use std::time::Duration;
 
@@ -19,20 +19,20 @@ use tokio::time::timeout;
 use crate::error::{JobsError, Result};
 use crate::metrics::{StoreRequests, count_request};
 
-/// How long a connection may take.
+/// Time limit of connecting.
 const CONNECTED_WITHIN: Duration = Duration::from_secs(5);
 
-/// How long the head of an answer may take, and how much longer for each MiB that is sent.
+/// Time limit of the head of a response, and the additional time for each MiB of the request.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(15);
 const SENT_WITHIN: Duration = Duration::from_secs(2);
 
-/// How long the next piece of an answer may take.
+/// Time limit of the next part of a response.
 const PIECE_WITHIN: Duration = Duration::from_secs(15);
 
-/// How long a connection without a request is kept.
+/// How long an idle connection is kept.
 const KEPT_FOR: Duration = Duration::from_secs(30);
 
-/// Sends requests to an object store, and counts them.
+/// Sends requests to an object store and counts them.
 #[derive(Debug, Clone)]
 pub(crate) struct Client {
     pool: legacy::Client<HttpsConnector<TcpConnector>, HttpRequestBody>,
@@ -40,8 +40,10 @@ pub(crate) struct Client {
 }
 
 impl Client {
+    /// Creates a client.
+    ///
     /// # Errors
-    /// No authority is trusted on this machine.
+    /// The machine has no trusted certificate authorities.
     pub(crate) fn new(requests: StoreRequests) -> Result<Client> {
         let mut tcp = TcpConnector::new();
         tcp.enforce_http(false);
@@ -97,7 +99,7 @@ impl HttpService for Client {
     }
 }
 
-/// What failed before there was an answer: connections are made again, requests sent again if they may be.
+/// Classifies an error before the response: connection errors are retried, other requests only if they are idempotent.
 fn sorted(error: legacy::Error) -> HttpError {
     let kind = match error.is_connect() {
         true => HttpErrorKind::Connect,

@@ -1,11 +1,7 @@
-//! Where large results are, if not in the data folder or the database: a folder that all nodes share, or an object store.
+//! Location of large results outside the data folder: in the database, in a shared folder, or in an object store.
 //!
-//! | to find | look in |
-//! |---|---|
-//! | the URL, and the store that it names | [`url`] |
-//! | how requests to an object store are sent, and how long they are waited for | `client` |
-//! | what ties a database and the place of its results together | [`settle`] |
-//! | how all results go to another place | `change` |
+//! [`url`] parses the location and opens the store, `client` sends requests to object stores, [`settle`] binds a location
+//! to a database, and `change` moves results.
 
 #[cfg(feature = "cluster")]
 pub mod change;
@@ -24,7 +20,7 @@ use crate::store::{
     postgres::{database::PostgresStore, doctor::Finding},
 };
 
-/// Examines the place of the results of a database.
+/// Checks the location of the results of a database.
 ///
 /// # Errors
 /// The database cannot be reached, or has no job table.

@@ -1,6 +1,6 @@
-//! What ties a database and the place of its results together: the database knows the place, and an object there, the marker, names
-//! the database. A node that is pointed at the results of another database, or away from those of its own, does not start:
-//! otherwise results would be looked for in vain, or swept as orphans.
+//! Binds the location of results to a database: the database records the location, and a marker object there names the
+//! database. A node does not start with the results of another database, or with another location than that of its
+//! database: results would be missing, or removed as orphans.
 
 use std::time::Duration;
 
@@ -16,13 +16,13 @@ use crate::metrics::StoreRequests;
 use crate::result_place::url::{ResultsPlace, ResultsUrl};
 use crate::store::{Cluster, Deployment};
 
-/// The object that says whose results these are.
+/// Name of the marker object.
 const MARKER: &str = "railhead.json";
 
-/// How long the first requests may take together.
+/// Time limit of the first requests together.
 const SETTLED_WITHIN: Duration = Duration::from_secs(60);
 
-/// What the database says if its results are in itself.
+/// Recorded location of results in the database itself.
 pub(super) const IN_DATABASE: &str = "";
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -30,10 +30,20 @@ pub(super) struct Marker {
     pub(super) deployment: String,
 }
 
-/// The place of the results of a database; on the first call for a database it is decided.
+impl Marker {
+    /// The error for a location with the results of another database.
+    pub(super) fn foreign(&self, url: &ResultsUrl) -> JobsError {
+        JobsError::ResultPlace(format!(
+            "{url} holds the results of another database ({}); use another prefix",
+            self.deployment
+        ))
+    }
+}
+
+/// Opens the location of the results of a database; the first call for a database records it.
 ///
 /// # Errors
-/// [`JobsError::ResultPlace`] if place and database do not belong together, or one of them cannot be reached.
+/// [`JobsError::ResultPlace`] if location and database do not belong together, or one of them is unreachable.
 pub(crate) async fn settle(
     cluster: &dyn Cluster,
     place: Option<&ResultsPlace>,
@@ -52,7 +62,7 @@ pub(crate) async fn settle(
     settled.map_err(|_| JobsError::ResultPlace("it does not answer".to_owned()))?
 }
 
-/// Refuses a folder that is not said to be the same on every node.
+/// Rejects a folder that is not declared as shared by all nodes.
 pub(super) fn on_this_machine_alone(place: &ResultsPlace) -> Result<()> {
     match (&place.url, place.shared) {
         (ResultsUrl::Folder(path), false) => Err(JobsError::ResultPlace(format!(
@@ -87,12 +97,9 @@ async fn settle_outside(
     let place = url.to_string();
     let refused = |why: String| Err(JobsError::ResultPlace(why));
     match marker(objects).await? {
-        Some(marker) if marker.deployment != deployment.id => refused(format!(
-            "{place} holds the results of another database ({}); use another prefix",
-            marker.deployment
-        )),
+        Some(marker) if marker.deployment != deployment.id => Err(marker.foreign(url)),
         Some(_) if deployment.results_place.as_ref() == Some(&place) => Ok(()),
-        // The same results under another name, or a place that was marked by a node that then failed.
+        // The same results with another URL, or a location whose first node failed.
         Some(_) if deployment.results_place.as_deref() != Some(IN_DATABASE) => {
             if let Some(known) = &deployment.results_place
                 && is_another(objects, known, &deployment).await?
@@ -127,11 +134,11 @@ async fn settle_outside(
     }
 }
 
-/// Whether the place that the database knows is still there and does not show what is written to `objects`: then these are not
-/// the same results under another name, but a copy, or what a move has left behind.
+/// Whether the recorded location exists and does not contain what is written to `objects`, which are then a copy or the
+/// rest of a move.
 ///
 /// # Errors
-/// The place could not be written to; nodes use the known place, and it does not answer.
+/// The location could not be written to, or the recorded location is in use and does not respond.
 async fn is_another(
     objects: &dyn ObjectStore,
     known: &str,
@@ -145,7 +152,7 @@ async fn is_another(
     match marker(&*there).await {
         Ok(Some(marker)) if marker.deployment == deployment.id => {}
         Ok(_) => return Ok(false),
-        // Nobody writes there, and whoever starts this node may not be allowed to any more.
+        // No node uses it, and this node may lack the permission to read it.
         Err(_) if deployment.nodes == 0 => return Ok(false),
         Err(error) => return Err(error),
     }
@@ -164,6 +171,7 @@ async fn is_another(
     }
 }
 
+/// Records the location if the recorded one has not changed.
 pub(super) async fn decide(cluster: &dyn Cluster, before: &Deployment, place: &str) -> Result<()> {
     let known = before.results_place.as_deref();
     if cluster.place_results(known, place).await? {
@@ -178,6 +186,7 @@ pub(super) async fn decide(cluster: &dyn Cluster, before: &Deployment, place: &s
     }
 }
 
+/// Reads the marker object.
 pub(super) async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>> {
     let found = match objects.get(&Path::from(MARKER)).await {
         Ok(found) => found.bytes().await?,
@@ -190,6 +199,7 @@ pub(super) async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>> 
     })
 }
 
+/// Writes the marker object.
 pub(super) async fn mark(
     objects: &dyn ObjectStore,
     deployment: &Deployment,
@@ -201,7 +211,7 @@ pub(super) async fn mark(
     let payload = PutPayload::from_bytes(Bytes::from(text.to_string()));
     let written = objects.put(&Path::from(MARKER), payload).await;
     written.map_err(|error| unusable(&error))?;
-    // Of two databases that mark the same place at once, the one that wrote last has it.
+    // If two databases mark the same location at once, the last writer gets it.
     match marker(objects).await? {
         Some(marker) if marker.deployment == deployment.id => Ok(()),
         _ => Err(JobsError::ResultPlace(format!(
@@ -214,11 +224,11 @@ fn unusable(error: &Error) -> JobsError {
     JobsError::ResultPlace(error.to_string())
 }
 
-#[cfg(feature = "cluster")]
-/// Examines the place of the results of a database, and writes, reads and removes an object there.
+/// Checks the location of the results of a database by writing, reading and removing an object.
 ///
 /// # Errors
 /// The database failed.
+#[cfg(feature = "cluster")]
 pub(crate) async fn examine(
     cluster: &dyn Cluster,
     place: Option<&ResultsPlace>,
@@ -245,8 +255,8 @@ pub(crate) async fn examine(
     })
 }
 
+/// Checks the marker, and writes, reads and removes an object.
 #[cfg(feature = "cluster")]
-/// Checks whose results are there, and writes, reads and removes an object.
 async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<()> {
     let wrong = |why: String| Err(JobsError::ResultPlace(why));
     match &deployment.results_place {

@@ -1,4 +1,4 @@
-//! The URL of a place for results.
+//! The URL of a location for results.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -20,19 +20,19 @@ use crate::metrics::StoreRequests;
 #[cfg(feature = "cluster")]
 use crate::result_place::client::Client;
 
-/// Tries of a request that fails for a moment, beside the first.
+/// Number of retries of a failed request.
 #[cfg(feature = "cluster")]
 const RETRIES: usize = 5;
 
-/// How long after the first try of a request another one may begin: a client waits for a result meanwhile.
+/// Time after the first attempt within which a retry may begin, because a client waits for the result.
 #[cfg(feature = "cluster")]
 const RETRIED_WITHIN: Duration = Duration::from_secs(10);
 
-/// Pauses between tries: the first, and the longest.
+/// First and longest pause between retries.
 #[cfg(feature = "cluster")]
 const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(2));
 
-/// Where large results are kept.
+/// Location of large results.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ResultsUrl {
     /// `file:///…`: a folder.
@@ -43,17 +43,17 @@ pub enum ResultsUrl {
         scheme: &'static str,
         /// Bucket or container.
         bucket: String,
-        /// What stands before every key; may be empty.
+        /// Prefix of every key; may be empty.
         prefix: String,
     },
 }
 
-/// A place for results and whether all nodes see the same one under it.
+/// Location of large results, with a statement whether it is shared.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ResultsPlace {
-    /// Where.
+    /// URL.
     pub url: ResultsUrl,
-    /// A folder is one that all nodes share.
+    /// Whether a folder is the same on all nodes.
     pub shared: bool,
 }
 
@@ -119,18 +119,15 @@ impl fmt::Display for ResultsUrl {
 }
 
 impl ResultsUrl {
-    /// The store, which is not asked anything yet. Keys, region and address of an object store are those of the usual variables
-    /// of its provider (`AWS_…`, `GOOGLE_…`, `AZURE_…`).
+    /// Creates the store, without sending a request. Credentials, region and address of an object store come from the usual
+    /// variables of its provider (`AWS_…`, `GOOGLE_…`, `AZURE_…`).
     ///
     /// # Errors
-    /// The folder cannot be made, or a variable is wrong.
+    /// The folder cannot be created, or a variable has an invalid value.
     pub(crate) fn open(&self, requests: StoreRequests) -> Result<Arc<dyn ObjectStore>> {
         match self {
             ResultsUrl::Folder(path) => {
-                std::fs::create_dir_all(path).map_err(|source| JobsError::DataDir {
-                    path: path.clone(),
-                    source,
-                })?;
+                std::fs::create_dir_all(path).map_err(JobsError::at(path))?;
                 Ok(Arc::new(
                     LocalFileSystem::new_with_prefix(path)?.with_fsync(true),
                 ))

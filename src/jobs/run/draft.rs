@@ -1,4 +1,4 @@
-//! A run that is being received: rows are checked and cut into chunks while they arrive.
+//! A run that is being received: rows are checked and divided into chunks while they arrive.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
@@ -7,7 +7,7 @@ use serde_json::Value;
 use uuid::Uuid;
 
 use crate::batch::upload::BatchUpload;
-use crate::disk_reserve::nameless;
+use crate::data_dir::nameless;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::model::{Kind, WorkOptions};
@@ -24,30 +24,31 @@ use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_tables::table::COLUMNS_MAX;
 use railhead_tables::titles::TitledColumn;
 
-/// Expected solve time of a chunk in s: much longer than a claim takes, shorter than a lease, and soon done again.
+/// Expected solve time of a chunk in s: much longer than a claim, shorter than a lease, and cheap to repeat.
 const CHUNK_SECONDS: f64 = 3.0;
-/// Fewest rows of a chunk.
+/// Minimum number of rows of a chunk.
 const CHUNK_ROWS_MIN: usize = 50;
-/// Bytes of the profiles that the rows of a run may name together: every chunk is solved with all of them at hand.
+/// Maximum size in bytes of the profiles that the rows of a run refer to: every chunk is solved with all of them.
 const PROFILE_BYTES_MAX: usize = 8 << 20;
-/// Faulty texts of a column that are listed for the rows that are pushed at once.
+/// Maximum number of faults per column that are reported for one call of `push`.
 const FAULTS_MAX: usize = 20;
-/// Most rows of a chunk, also the rows that decide the size of all chunks.
+/// Maximum number of rows of a chunk; also the number of rows that determine the size of all chunks.
 const CHUNK_ROWS_MAX: usize = 10_000;
 
-/// A run that is being received. Dropping it gives everything back.
+/// A run that is being received. Dropping it removes everything.
 #[derive(Debug)]
 pub struct RunDraft {
     jobs: Jobs,
     upload: BatchUpload,
     template: Value,
-    /// Rows that are in no chunk yet.
+    /// Rows that are not in a chunk yet.
     rows: ReceivedRows,
-    /// Known once the first rows are there.
+    /// Set once the first rows have arrived.
     begun: Option<Begun>,
     rows_max: u64,
-    /// Kept profiles that rows name, and the bytes that they take.
+    /// Stored profiles that rows refer to.
     profiles: KnownSections,
+    /// Total size of these profiles in bytes.
     profile_bytes: usize,
 }
 
@@ -60,11 +61,11 @@ struct Begun {
 }
 
 impl Jobs {
-    /// A run of this case without rows, for at most `rows_max` of them. Blocks; not to be called on a thread that answers requests.
+    /// Begins a run of this case with at most `rows_max` rows. Blocks; not for threads that answer requests.
     ///
     /// # Errors
-    /// [`JobsError::Case`]: a column is there twice, or there is none that varies the case; [`JobsError::Draining`], or the data folder cannot
-    /// be written.
+    /// [`JobsError::Case`] if a column is given twice, or no column varies the case; [`JobsError::Draining`]; or the data
+    /// folder cannot be written.
     pub fn draft_run(
         &self,
         template: Value,
@@ -86,7 +87,7 @@ impl Jobs {
         })
     }
 
-    /// A nameless file for rows that are being received.
+    /// Creates an unnamed file for rows that are being received.
     ///
     /// # Errors
     /// The data folder cannot be written.
@@ -95,13 +96,7 @@ impl Jobs {
         file.map_err(|source| self.spool_failed(source))
     }
 
-    /// What a failed write of such a file is.
-    #[must_use]
-    pub fn spool_failed(&self, source: std::io::Error) -> JobsError {
-        self.staging_failed(source)
-    }
-
-    /// Queues a run. Once this returns it survives the death of the process. Returns its id, and whether it is that of an earlier submission
+    /// Queues a run, which is durable once this returns. Returns its id, and whether it is that of an earlier submission
     /// with the same idempotency key.
     ///
     /// # Errors
@@ -112,18 +107,18 @@ impl Jobs {
         mut options: WorkOptions,
     ) -> Result<(Uuid, bool)> {
         let upload = blocking(move || draft.finish()).await??;
-        // Results of rows cannot be found again by a digest.
+        // Results of rows are not cached.
         options.submit.bypass_cache = true;
         self.submit_batch(upload, options).await
     }
 }
 
 impl RunDraft {
-    /// Adds rows, column by column. Blocks; not to be called on a thread that answers requests.
+    /// Adds rows, column by column. Blocks; not for threads that answer requests.
     ///
     /// # Errors
-    /// [`JobsError::Case`]: the columns differ in length or kind, or hold what no case may have; more rows than are allowed; or as
-    /// [`BatchUpload::add`].
+    /// [`JobsError::Case`] if the columns differ in length or type or contain invalid values; [`JobsError::TooManyRows`];
+    /// or as [`BatchUpload::add`].
     pub fn push(&mut self, columns: Vec<Values>) -> Result<()> {
         let faults = self.find_profiles(&columns)?;
         if !faults.is_empty() {
@@ -139,10 +134,10 @@ impl RunDraft {
         Ok(())
     }
 
-    /// Stages the rest of the rows once all of them were added. Blocks.
+    /// Stages the remaining rows once all were added. Blocks.
     ///
     /// # Errors
-    /// [`JobsError::Case`]: there are no rows, or the case of the first one is faulty; or as [`BatchUpload::add`].
+    /// [`JobsError::Case`] if there are no rows or the case of the first row is invalid; or as [`BatchUpload::add`].
     pub fn cut_all(&mut self) -> Result<()> {
         if self.rows.received == 0 {
             let fault = Fault::new("/columns", "0 rows given; at least one is needed");
@@ -151,7 +146,7 @@ impl RunDraft {
         self.cut(true)
     }
 
-    /// Everything is there.
+    /// Stages the remaining rows and sets the head.
     fn finish(mut self) -> Result<BatchUpload> {
         self.cut_all()?;
         if let Some(Begun {
@@ -169,7 +164,7 @@ impl RunDraft {
         Ok(self.upload)
     }
 
-    /// Stages whole chunks of what is held, at the end all of it.
+    /// Stages complete chunks of the rows that are held; with `last` all rows.
     fn cut(&mut self, last: bool) -> Result<()> {
         if self.begun.is_none() {
             self.begun = Some(self.begin()?);
@@ -189,7 +184,7 @@ impl RunDraft {
             let seconds = begun.row_seconds * (end - begin) as f64;
             let body = chunk
                 .to_bytes()
-                .map_err(|source| self.jobs.staging_failed(source))?;
+                .map_err(|source| self.jobs.spool_failed(source))?;
             self.upload
                 .add_chunk(&begun.head.method, microseconds(seconds), &body)?;
             begin = end;
@@ -198,7 +193,7 @@ impl RunDraft {
         Ok(())
     }
 
-    /// What the first rows decide: is the case good, and how many rows are a chunk?
+    /// Checks the case of the first row, and determines the number of rows per chunk.
     fn begin(&self) -> Result<Begun> {
         let varied = self.rows.varied(CHUNK_ROWS_MAX);
         let profiles: BTreeMap<String, Value> = self.profiles.clone().into_iter().collect();
@@ -242,7 +237,7 @@ impl RunDraft {
         })
     }
 
-    /// Reads the kept profiles that rows name.
+    /// Reads the stored profiles that rows refer to.
     fn find_profiles(&mut self, columns: &[Values]) -> Result<Vec<Fault>> {
         let named = self.rows.columns.iter().zip(columns);
         let named = named.filter_map(|(column, values)| {
@@ -258,17 +253,17 @@ impl RunDraft {
 #[derive(Debug)]
 pub struct ReceivedRows {
     columns: Vec<TitledColumn>,
-    /// Rows that are not yet in a chunk, column by column, in the units of the case.
+    /// Rows that are not in a chunk yet, column by column, in the units of the case.
     values: Vec<Values>,
-    /// Number of rows received so far, with those already in chunks.
+    /// Number of rows received so far, including those in chunks.
     received: u64,
 }
 
 impl ReceivedRows {
-    /// No rows yet, of these columns.
+    /// No rows yet, with these columns.
     ///
     /// # Errors
-    /// A column is there twice or has a name that it may not have, or there is none that varies the case.
+    /// A column is given twice or has an invalid name, or no column varies the case.
     pub fn new(columns: Vec<TitledColumn>) -> Result<ReceivedRows, CaseError> {
         let faults = faults_of_columns(&columns);
         if !faults.is_empty() {
@@ -288,7 +283,7 @@ impl ReceivedRows {
     /// Adds rows, column by column.
     ///
     /// # Errors
-    /// The columns differ in length or kind, or hold what no case may have.
+    /// The columns differ in length or type, or contain invalid values.
     pub fn push(&mut self, columns: Vec<Values>) -> Result<(), CaseError> {
         let faults = self.faults_of(&columns);
         if !faults.is_empty() {
@@ -313,7 +308,7 @@ impl ReceivedRows {
         self.values.first().map_or(0, Values::len)
     }
 
-    /// The columns that vary the case, with the first rows that are held, at most this many.
+    /// The columns that vary the case, with at most this many of the rows that are held.
     #[must_use]
     pub fn varied(&self, most: usize) -> Vec<VariedColumn> {
         let values = self.part(0..self.held().min(most));
@@ -334,7 +329,7 @@ impl ReceivedRows {
         })
     }
 
-    /// The places in the case of the columns that vary it, with their names.
+    /// Place in the case and name of each column that varies it.
     #[must_use]
     pub fn names(&self) -> Vec<(&str, &str)> {
         let names = self.columns.iter();
@@ -376,7 +371,7 @@ impl ReceivedRows {
     }
 }
 
-/// The fault of a case that asks for more than numbers.
+/// The fault of a case that requests other outputs than numbers.
 fn fields_asked_for(checked: &CheckedCase) -> Option<Fault> {
     let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
     let mut asked = checked.run.outputs.iter();
@@ -438,7 +433,7 @@ fn faults_of_columns(columns: &[TitledColumn]) -> Vec<Fault> {
     faults
 }
 
-/// Texts with control characters, which tear tables and lines of logs apart; `first` is the row of the first text.
+/// Faults of texts with control characters, which would break tables and log lines; `first` is the row of the first text.
 fn faults_of_texts(name: &str, texts: &[Option<String>], first: u64) -> Vec<Fault> {
     let texts = (first..).zip(texts);
     let texts = texts.filter_map(|(row, text)| Some((row, text.as_deref()?)));

@@ -1,4 +1,4 @@
-//! A run: its head, its chunks, and how far it is.
+//! Stored form and state of a run: head, chunks and progress.
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -13,13 +13,13 @@ use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
 use railhead_tables::table::{TableColumn, TableKind};
 use railhead_tables::titles::TitledColumn;
 
-/// The form of heads and chunks that is written.
+/// Version of the stored form of heads and chunks.
 const FORM: u32 = 1;
 
-/// The column with the reason why a row has no answer.
+/// Name of the column with the reason why a row has no answer.
 pub const REASON: &str = "reason";
 
-/// The values of a column of rows as a column of a table.
+/// Converts a column of rows to a column of a table.
 #[must_use]
 pub fn table_column(values: Values) -> TableColumn {
     match values {
@@ -28,37 +28,37 @@ pub fn table_column(values: Values) -> TableColumn {
     }
 }
 
-/// What all chunks of a run share.
+/// Data that all chunks of a run share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunHead {
     form: u32,
     /// The case of the first row.
     pub case: Value,
-    /// The columns that were sent, in their order.
+    /// The submitted columns in their order.
     pub columns: Vec<TitledColumn>,
-    /// Names of the columns of numbers of the answers.
+    /// Names of the numeric result columns.
     pub numbers: Vec<String>,
-    /// Kept cross-sections that rows name.
+    /// Stored profiles that rows refer to.
     #[serde(default)]
     pub profiles: BTreeMap<String, Value>,
     /// The requested method.
     pub method: String,
-    /// Always false. Stored runs have the member, and a repeated submission is recognised by the bytes of its head.
+    /// Always false. Stored runs have this member, and a repeated submission is recognised by the bytes of its head.
     #[serde(default)]
     from_neighbours: bool,
-    /// Answers have the column of reasons; those of older runs do not.
+    /// Whether the answers have the column of reasons, which older runs lack.
     #[serde(default)]
     pub with_reasons: bool,
     /// Number of rows.
     pub rows: u64,
-    /// Rows of each chunk but the last.
+    /// Number of rows of each chunk but the last.
     pub chunk_rows: u32,
-    /// Places and values that the first row puts into the template; none where `case` is stored itself.
+    /// Places and values of the first row, which are inserted into the template; empty if `case` is stored.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     first_row: Vec<(String, Value)>,
 }
 
-/// The part of what the chunks of a run share that runs over the same template have in common.
+/// The part of the stored head that runs with the same template share.
 #[derive(Debug, Serialize, Deserialize)]
 struct CommonPart<'a> {
     template: Cow<'a, Value>,
@@ -66,7 +66,7 @@ struct CommonPart<'a> {
 }
 
 impl RunHead {
-    /// A head of the present form, without rows.
+    /// A head of the current version, without rows.
     #[must_use]
     pub fn new(
         case: Value,
@@ -89,14 +89,14 @@ impl RunHead {
         }
     }
 
-    /// The text of all of it, by which a submission is known again.
+    /// The JSON text of the whole head, which identifies a submission.
     #[must_use]
     pub fn whole(&self) -> Vec<u8> {
         serde_json::to_vec(self).unwrap_or_default()
     }
 
-    /// As it is stored: the part in common with other runs over this template, and the rest. `first_row` is what makes the case of the
-    /// template.
+    /// The stored form: the part that runs with the same template share, and the rest. `first_row` are the values that turn
+    /// the template into the case.
     #[must_use]
     pub fn into_parts(self, template: &Value, first_row: Vec<(String, Value)>) -> (Bytes, Bytes) {
         let common = CommonPart {
@@ -113,10 +113,10 @@ impl RunHead {
         (common.into(), own.whole().into())
     }
 
-    /// Reads a stored head: the common part and the rest. Runs of earlier versions have all in the first.
+    /// Reads a stored head from its common part and the rest. Runs of earlier versions have everything in the first.
     ///
     /// # Errors
-    /// It is damaged, or of another form.
+    /// The head is damaged, or of another version.
     pub fn read(common: &[u8], own: Option<&[u8]>) -> Result<RunHead> {
         let damaged = |reason: String| JobsError::Damaged(format!("the head of a run: {reason}"));
         let text = own.unwrap_or(common);
@@ -148,8 +148,7 @@ impl RunHead {
         Ok(head)
     }
 
-    /// Names and kinds of the columns of the answers, in their order: the row, what was carried along, what became of it, its numbers,
-    /// and why it has none.
+    /// Names and types of the result columns in their order: row, copied columns, status and method, numbers, reason.
     #[must_use]
     pub fn answers(&self) -> Vec<(String, TableKind)> {
         let carried = self
@@ -179,27 +178,28 @@ impl RunHead {
     }
 }
 
-/// What a chunk begins with.
+/// Signature of a stored chunk.
 const MAGIC: &[u8] = b"RHROWS1\n";
-/// Cheap compression; chunks are unpacked before every solve.
+/// Cheap compression, because chunks are decompressed before every solve.
 const ZSTD_LEVEL: i32 = 1;
-/// In the place of the length of a text: the row has none.
+/// Length of a text that is absent.
 const NO_TEXT: u64 = u64::MAX;
 
-/// Rows of a run.
+/// A chunk of rows of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunChunk {
-    /// The number of its first row in the run.
+    /// Number of its first row in the run.
     pub first_row: u64,
-    /// Its columns, as the head of the run names them.
+    /// Its columns, in the order of the head.
     pub columns: Vec<Values>,
 }
 
 impl RunChunk {
-    /// As it is stored.
+    /// The stored form: [`MAGIC`], then a zstd frame with the first row and the number of rows (u64), and column by column
+    /// the values: numbers as f64, texts with a length (u64) before each, all little-endian.
     ///
     /// # Errors
-    /// There is no memory to pack it.
+    /// Compression failed.
     pub fn to_bytes(&self) -> std::io::Result<Vec<u8>> {
         let rows = self.columns.first().map_or(0, Values::len);
         let mut plain = Vec::with_capacity(16 + 8 * rows * self.columns.len());
@@ -227,7 +227,7 @@ impl RunChunk {
     /// Reads a stored chunk of a run with these columns.
     ///
     /// # Errors
-    /// It is damaged.
+    /// The chunk is damaged.
     pub fn read(body: &[u8], columns: &[TitledColumn]) -> Result<RunChunk> {
         let damaged = |what: String| JobsError::Damaged(format!("rows of a run: {what}"));
         let packed = body.strip_prefix(MAGIC);
@@ -269,7 +269,7 @@ fn number(rest: &mut &[u8]) -> Option<u64> {
     Some(u64::from_le_bytes(*head))
 }
 
-/// What varies the case, and what is carried along.
+/// Divides the columns of a chunk into those that vary the case and those that are copied to the results.
 pub(crate) fn parted(
     head: &RunHead,
     chunk: RunChunk,
@@ -287,21 +287,21 @@ pub(crate) fn parted(
     (varied, carried)
 }
 
-/// A run.
+/// A run with its state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// Its chunks as jobs of a batch.
+    /// Its chunks, as jobs of a batch.
     pub chunks: Batch,
     /// Its case, columns and sizes.
     pub head: RunHead,
-    /// Rows of ended chunks that have no answer, those of chunks without a result included.
+    /// Number of rows without an answer in ended chunks, including chunks without a result.
     pub without_answer: u64,
-    /// The part that is done, 0 to 1.
+    /// Progress from 0 to 1.
     pub progress: f64,
 }
 
 impl Run {
-    /// A run from what is kept of it.
+    /// Creates a run from its stored parts.
     #[must_use]
     pub fn new(chunks: Batch, head: RunHead, record: &RunRecord) -> Run {
         let each = u64::from(head.chunk_rows);
@@ -317,7 +317,7 @@ impl Run {
         }
     }
 
-    /// Where it stands.
+    /// State of the run.
     #[must_use]
     pub fn state(&self) -> State {
         let number = |state| self.chunks.in_state(state);
@@ -335,7 +335,7 @@ impl Run {
         }
     }
 
-    /// Rows of chunks that have ended.
+    /// Number of rows in ended chunks.
     #[must_use]
     pub fn rows_done(&self) -> u64 {
         let (ended, _) = self.chunks.ended();

@@ -1,4 +1,4 @@
-//! The answers of a run.
+//! Reads the answers of a run.
 use bytes::Bytes;
 use serde_json::Value;
 use uuid::Uuid;
@@ -13,7 +13,7 @@ use railhead_tables::parquet::TableReader;
 use railhead_tables::table::{RowTable, TableColumn};
 
 impl Jobs {
-    /// The case that a row of a run stands for, and its answer as a table of one row if it is there.
+    /// The case of a row, and its answer as a table of one row if its chunk has ended.
     ///
     /// # Errors
     /// A failed store, or the run has gone.
@@ -41,7 +41,8 @@ impl Jobs {
         Ok((case, answer.map(|table| table.cut(&(place..place + 1)))))
     }
 
-    /// The answers of a chunk, those columns that `wanted` names, or all. Rows of a chunk without answers have its state as their status.
+    /// The answers of a chunk with the columns `wanted`, or all columns. In a chunk without a result, the status of each
+    /// row is the state of the chunk.
     ///
     /// # Errors
     /// The store failed, or the answers cannot be read.
@@ -91,7 +92,7 @@ impl Jobs {
         Ok(RowTable { columns })
     }
 
-    /// The rows of a chunk as they were sent.
+    /// The submitted rows of a chunk.
     ///
     /// # Errors
     /// A failed database, or the run has gone.

@@ -1,20 +1,20 @@
-//! What a job table must promise: [`Store`]. One database is one folder here.
+//! The job table: [`Store`] and the data types of its calls. Each database has a folder with an implementation.
 //!
-//! Promises of every call:
+//! Guarantees of every call:
 //!
-//! - It is one transaction: if it fails, it changed nothing. What has returned survives the death of the process.
-//! - A call on behalf of a tenant names the tenant in its statement. What belongs to another tenant is treated like what
-//!   does not exist.
-//! - The present is an argument (epoch milliseconds), so that tests need no clock. Leases are measured with a clock of
-//!   their own, which nobody sets.
-//! - A write after a claim names the fencing token of the claim ([`Claim::lease_token`]). Once the job has been given away
-//!   or has ended the write changes nothing and says so. Tokens are random: a database that was set back in time gives none
-//!   out twice.
+//! - It is one transaction: if it fails, nothing changed. A successful write survives the death of the process, and all writes
+//!   but claims survive a power cut.
+//! - A call for a tenant names the tenant in its statement. Objects of another tenant are treated as missing.
+//! - The current time is an argument (epoch milliseconds), so that tests need no clock. Leases are measured with a steady
+//!   clock, which is never set.
+//! - A write after a claim contains the fencing token of the claim ([`Claim::lease_token`]). If the job was taken away or
+//!   has ended, the write changes nothing and reports that. Tokens are random, so that a database restored from a backup
+//!   issues none twice.
 //! - States change only as [`State::may_become`] allows.
-//! - Work on many rows comes in portions with a limit, so that other writers are not held up.
-//! - Errors are [`StoreError`], sorted by what the caller can do.
+//! - Work on many rows is limited per call, so that other writers are not blocked.
+//! - Errors are [`StoreError`], classified by what the caller can do.
 //!
-//! `tests/service/store*.rs` hold every store to this.
+//! `tests/service/store*.rs` test these guarantees for every store.
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -33,8 +33,8 @@ use crate::model::{
 };
 use railhead_contact::remark::entry::RemarkEntry;
 
-/// Runs a statement on a connection with a value for each of its parameters, and takes its rows as `execute`, `fetch_all` or the like do;
-/// `scalar` takes those of one column.
+/// Runs a statement on a connection with a value for each parameter. The first argument is the method that fetches the
+/// rows; `scalar` before it reads rows of one column.
 macro_rules! sql {
     ($take:ident, $connection:expr, $text:expr $(; $($value:expr),+)?) => {
         query($text)$($(.bind($value))+)?.$take($connection).await
@@ -51,6 +51,7 @@ macro_rules! values {
     };
 }
 
+pub mod open;
 #[cfg(feature = "cluster")]
 pub mod postgres;
 mod sql_errors;
@@ -59,7 +60,7 @@ pub mod sqlite;
 /// The result of a call of a store; a failed call changes nothing.
 pub type Result<T, E = StoreError> = std::result::Result<T, E>;
 
-/// A job table, which also keeps API keys.
+/// A job table, which also stores API keys and profiles.
 #[async_trait]
 pub trait Store:
     SubmitJobs
@@ -73,31 +74,31 @@ pub trait Store:
     + KeyStore
     + Debug
 {
-    /// Makes a round trip; with `write` the round trip writes, although it changes nothing.
+    /// Makes a round trip; with `write` the round trip includes a write without effect.
     async fn ready(&self, write: bool) -> Result<()>;
 
-    /// What the store can do beside, if several processes may use it at once.
+    /// The additional calls of a store that several processes may share.
     fn cluster(&self) -> Option<&dyn Cluster>;
 
     /// Closes every connection. Later calls fail.
     async fn close(&self);
 
-    /// Gives up to `step` free pages back to the file system if there are more than `spare`; says whether it did.
+    /// Returns up to `step` free pages to the file system if there are more than `spare`; returns whether it did.
     async fn compact(&self, spare: i64, step: u32) -> Result<bool>;
 }
 
 /// Submission of single jobs.
 #[async_trait]
 pub trait SubmitJobs: Send + Sync {
-    /// Inserts a job if the bounds leave it a place, or finds the job for which its idempotency key stands. A job with a
-    /// cached result ends at once and needs no place; if its source has gone meanwhile, the job is queued. A caller that
-    /// stops waiting does not stop the call.
+    /// Inserts a job if the bounds permit it, or finds the job of its idempotency key. A job with a cached result ends at
+    /// once and needs no place in the queue; if its source was removed in the meantime, the job is queued. Dropping the
+    /// future does not cancel the call.
     async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued>;
 
     /// Frees an idempotency key of a tenant.
     async fn forget_key(&self, tenant: &str, key: &str) -> Result<()>;
 
-    /// The job for which an idempotency key of a tenant stands, or the conflict if it stands for another digest.
+    /// Finds the job of an idempotency key, or the conflict if the key has another digest.
     async fn job_by_key(
         &self,
         tenant: &str,
@@ -106,10 +107,10 @@ pub trait SubmitJobs: Send + Sync {
     ) -> Result<Option<Enqueued>>;
 }
 
-/// Batches and runs: filled piece by piece, acknowledged once they are complete, read and removed as a whole.
+/// Batches and runs: filled in portions, acknowledged once complete, read and removed as a whole.
 #[async_trait]
 pub trait Batches: Send + Sync {
-    /// Reserves up to `most` more places in the queue for a batch that is being received; returns how many.
+    /// Reserves up to `most` more places in the queue for a batch that is being received; returns the number.
     async fn reserve(
         &self,
         batch: Uuid,
@@ -118,15 +119,15 @@ pub trait Batches: Send + Sync {
         bounds: QueueBounds,
     ) -> Result<Result<u32, Refusal>>;
 
-    /// What [`Batches::begin_batch`] would answer because of the idempotency key; `None` if the key is free.
+    /// The answer of [`Batches::begin_batch`] that follows from the idempotency key; `None` if the key is free.
     async fn batch_by_key(
         &self,
         new: &NewBatch,
         filled_here: FilledHere<'_>,
     ) -> Result<Option<BatchBegun>>;
 
-    /// Begins to fill a batch, or finds the one for which its idempotency key stands. Afterwards exactly the places of its
-    /// jobs are reserved. A key of an unfinished batch that no process fills is free.
+    /// Begins to fill a batch, or finds the batch of its idempotency key. Afterwards exactly the places of its jobs are
+    /// reserved. The key of an unfinished batch that no process fills is free.
     async fn begin_batch(
         &self,
         new: &NewBatch,
@@ -134,21 +135,21 @@ pub trait Batches: Send + Sync {
         bounds: QueueBounds,
     ) -> Result<BatchBegun>;
 
-    /// Inserts jobs of a batch, with their indices in it, on its reserved places. Returns those that ended at once with a
-    /// cached result.
+    /// Inserts jobs of a batch, with their indices in it, on its reserved places. Returns the jobs that ended at once with
+    /// a cached result.
     async fn fill_batch(&self, batch: Uuid, jobs: &[(u32, NewJob)]) -> Result<Vec<Uuid>>;
 
-    /// Acknowledges a batch: from now on it is found, and survives the process.
+    /// Acknowledges a batch: from now on it is visible and durable.
     async fn complete_batch(&self, batch: Uuid) -> Result<()>;
 
     /// Removes up to `limit` jobs of a batch that was never acknowledged, and the batch after the last of them; `true` once
     /// nothing is left. The first call frees its places and its key.
     async fn drop_batch(&self, batch: Uuid, limit: u32) -> Result<bool>;
 
-    /// The batches that are not acknowledged.
+    /// The batches that are not acknowledged and that no process fills.
     async fn unfinished_batches(&self) -> Result<Vec<Uuid>>;
 
-    /// Cancels up to `limit` jobs of a batch; returns those that changed.
+    /// Cancels up to `limit` jobs of a batch; returns the jobs that changed.
     async fn cancel_batch(
         &self,
         tenant: &str,
@@ -160,8 +161,8 @@ pub trait Batches: Send + Sync {
     /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
     async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool>;
 
-    /// The jobs of a batch after the job `after`, in the order in which they were sent, at most `limit`; small solutions are read with
-    /// them, and none after those of `bytes` together.
+    /// Up to `limit` jobs of a batch after the job `after`, in the order of submission, with their small solutions. The
+    /// list ends once the solutions reach `bytes`.
     async fn batch_items(
         &self,
         tenant: &str,
@@ -171,10 +172,11 @@ pub trait Batches: Send + Sync {
         bytes: usize,
     ) -> Result<Vec<BatchItem>>;
 
-    /// The keys of the labels of the jobs of a batch, sorted, the first `limit`.
+    /// The keys of the labels of the jobs of a batch, sorted, at most `limit`.
     async fn batch_label_keys(&self, tenant: &str, id: Uuid, limit: u32) -> Result<Vec<String>>;
 
-    /// One page of the acknowledged batches of a tenant with their counts, newest first, from the first one older than `after`.
+    /// One page of the acknowledged batches of a tenant with their counts, newest first, starting with the first one older
+    /// than `after`.
     async fn batches(
         &self,
         tenant: &str,
@@ -186,31 +188,31 @@ pub trait Batches: Send + Sync {
     /// An acknowledged batch or run with its counts.
     async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>>;
 
-    /// The template of an acknowledged batch that is a run, and how far its chunks are.
+    /// The stored record of an acknowledged run, with the progress of its chunks.
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>>;
 }
 
-/// Reads, lists and cancels jobs for clients.
+/// Calls of clients for single jobs.
 #[async_trait]
 pub trait ClientJobs: Send + Sync {
-    /// Cancels a queued job at once, and marks a running one as to be cancelled; an ended one stays as it is. Returns the
-    /// job as it then is.
+    /// Cancels a queued job at once, and marks a running one for cancellation; an ended job does not change. Returns the
+    /// new state of the job.
     async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>>;
 
-    /// Removes an ended job with all that hangs on it; its blob goes with the last reference to it.
+    /// Removes an ended job with everything that belongs to it; its blob is removed with the last reference.
     async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted>;
 
-    /// A job.
+    /// Reads a job.
     async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>>;
 
-    /// A job with its result: a small one itself, a large one by the key of its blob.
+    /// Reads a job with its result, or with the key of its result if that is large.
     async fn result(&self, tenant: &str, id: Uuid) -> Result<Option<(Job, Option<ResultRef>)>>;
 
-    /// The case of a job as it was submitted.
+    /// Reads the case of a job as submitted.
     async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>>;
 
-    /// One page of the jobs of a tenant, newest first, from the first job older than `after`. It reads no more rows than it
-    /// returns, up to a constant.
+    /// One page of the jobs of a tenant, newest first, starting with the first one older than `after`. The number of rows
+    /// read is bounded.
     async fn list(
         &self,
         tenant: &str,
@@ -219,8 +221,8 @@ pub trait ClientJobs: Send + Sync {
         limit: u32,
     ) -> Result<Page<Job>>;
 
-    /// Jobs of a tenant that changed, progress aside, in the order of the time of their last change and of their ids: those
-    /// that changed later than `since`, and of those that changed at that time the ones after the job `after`, or all of them.
+    /// Jobs of a tenant that changed after `since`, not counting progress, ordered by time of the change and id. Of the
+    /// jobs that changed at `since`, those after the job `after` are included.
     async fn changes(
         &self,
         tenant: &str,
@@ -230,10 +232,10 @@ pub trait ClientJobs: Send + Sync {
     ) -> Result<Vec<Change>>;
 }
 
-/// Cross-sections that tenants keep.
+/// Stored profiles of tenants.
 #[async_trait]
 pub trait Profiles: Send + Sync {
-    /// Keeps a cross-section for a tenant, unless it has it already, or would keep more than `max_bytes` with it.
+    /// Stores a profile of a tenant, unless it exists or the total size would exceed `max_bytes`.
     async fn add_profile(
         &self,
         tenant: &str,
@@ -241,10 +243,10 @@ pub trait Profiles: Send + Sync {
         max_bytes: u64,
     ) -> Result<ProfileKept>;
 
-    /// A cross-section of a tenant by its digest.
+    /// Reads a profile by its digest.
     async fn profile(&self, tenant: &str, digest: &str) -> Result<Option<StoredProfile>>;
 
-    /// One page of the cross-sections of a tenant, newest first.
+    /// One page of the profiles of a tenant, newest first.
     async fn profiles(
         &self,
         tenant: &str,
@@ -252,28 +254,28 @@ pub trait Profiles: Send + Sync {
         limit: u32,
     ) -> Result<Page<ProfileEntry>>;
 
-    /// Removes a cross-section of a tenant; `false` if there was none.
+    /// Deletes a profile; `false` if it does not exist.
     async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool>;
 }
 
-/// Claims of queued jobs, and what workers do while they hold a lease.
+/// Claims of queued jobs, and calls of workers that hold a lease.
 #[async_trait]
 pub trait Claims: Send + Sync {
-    /// Queues with jobs in them, and how many.
+    /// Queues that have jobs, with their number.
     async fn queues(&self) -> Result<Vec<(Queue, u64)>>;
 
-    /// Claims the first job of a queue, by priority and then by age, together with those behind it that are small
-    /// enough, in their order. A suspect comes alone, and no job of a batch that is not acknowledged.
+    /// Claims the first job of a queue, by priority and age, with the jobs after it that fit the bounds of a group. A
+    /// suspect is claimed alone. Jobs of a batch that is not acknowledged are skipped.
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>>;
 
-    /// The cases of claimed jobs, with what has happened to them meanwhile.
+    /// Reads the cases of claimed jobs, with changes since the claim.
     async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>>;
 
     /// Extends leases and stores progress; the answers are in the order of the claims.
     async fn renew(&self, claims: &[(&Claim, f64)], lease: Lease) -> Result<Vec<Renewal>>;
 
-    /// Gives claimed jobs back to the queue without counting their attempts; those that the client has cancelled end.
-    /// Returns those that were still held, with their new states.
+    /// Returns claimed jobs to the queue without counting the attempt; jobs that were cancelled end. Returns the jobs that
+    /// were still held, with their new states.
     async fn release(
         &self,
         claims: &[Claim],
@@ -281,289 +283,277 @@ pub trait Claims: Send + Sync {
         now: i64,
     ) -> Result<Vec<(Uuid, State)>>;
 
-    /// Stores a solved slice in place of what there was from its number on; `false` if the lease is lost. Attempts are
-    /// counted from the last slice. The same call again changes nothing.
+    /// Stores a solved slice and removes stored slices from its number on; `false` if the lease was lost. The count of
+    /// attempts starts again. A repeated call changes nothing.
     async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool>;
 
-    /// The stored slices of a job in their order. Whatever ends a job removes its slices.
+    /// The stored slices of a job in their order. They are removed when the job ends.
     async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>>;
 
-    /// The parts of the answer that the slices of a job are, in their order.
+    /// The results of the stored slices of a job, in their order.
     async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>>;
 }
 
 /// Ends of claimed jobs.
 #[async_trait]
 pub trait Ends: Send + Sync {
-    /// Ends claimed jobs, all in one transaction; returns those that ended. Of the others the lease is lost, or the source
-    /// of their cached result has gone.
+    /// Ends claimed jobs in one transaction; returns those that ended. Of the others the lease was lost, or the source of
+    /// their cached result was removed.
     async fn finish(&self, ends: &[(Claim, Ending)], now: i64) -> Result<HashSet<Uuid>>;
 
-    /// For each of these keys that a succeeded job carries, one such job.
+    /// Finds a succeeded job for each of these keys, if there is one.
     async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>>;
 }
 
-/// Takes jobs from workers that no longer answer, removes what has expired, and counts what there is.
+/// Maintenance: expired leases, deadlines, expired jobs, and statistics.
 #[async_trait]
 pub trait Upkeep: Send + Sync {
-    /// Takes running jobs from their workers: to `cancelled` if the client asked for that, to `failed` if `attempts_max` are
-    /// used up, else back to the queue. An attempt counts only for a job that was solved alone; the others come alone
-    /// next time. Returns them with their new states.
+    /// Takes running jobs from their workers: to `cancelled` if they were cancelled, to `failed` if `attempts_max` is
+    /// reached, else back to the queue. The attempt counts only for a job that was claimed alone; the others are claimed
+    /// alone next time. Returns them with their new states.
     async fn reap(&self, which: Reap, now: i64, attempts_max: u32) -> Result<Vec<(Uuid, State)>>;
 
-    /// Ends some of the queued jobs whose deadline has passed with this failure, and names the running ones. To be called
-    /// again until it ends none.
+    /// Ends some of the queued jobs whose deadline has passed, and finds the running ones. To be called until it ends none.
     async fn pass_deadlines(&self, failure: &Failure, moment: Moment) -> Result<Overdue>;
 
-    /// Removes expired jobs and leaves tombstones, removes empty batches of that age, and old tombstones. Returns the number
-    /// of jobs removed.
+    /// Removes expired jobs and leaves tombstones; removes empty batches of the same age, and old tombstones. Returns the
+    /// number of jobs removed.
     async fn expire(&self, rule: RetentionRule) -> Result<u64>;
 
-    /// Was there a job or a batch of this tenant that has expired?
+    /// Whether a job or batch of this tenant with this id has expired.
     async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool>;
 
-    /// What a tenant has; the bytes that its unfinished batches stand for are not known here.
+    /// Usage of a tenant, without staged bytes.
     async fn usage(&self, tenant: &str) -> Result<Usage>;
 
-    /// Counts and sizes, read from indices alone.
+    /// Counts and sizes, which are read from indices.
     async fn stats(&self) -> Result<Stats>;
 
-    /// Counts the jobs of the same tenant that come before a queued job, at most `limit` of them.
+    /// Counts the jobs of the same tenant before a queued job, at most `limit`.
     async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead>;
 }
 
-/// Keys of large results.
+/// Keys of results outside the table.
 #[async_trait]
 pub trait ResultKeys: Send + Sync {
-    /// Keys of large results that nobody refers to any more, at most `limit`; those in `done` are forgotten first.
+    /// Keys of large results without references, at most `limit`; the keys in `done` were removed and are forgotten first.
     async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>>;
 
-    /// Leaves a large result that was written and that no job will refer to, to be removed.
+    /// Registers a large result without a job for removal.
     async fn abandon_blob(&self, key: &str) -> Result<()>;
 
-    /// The keys of those of these large results that no job refers to. The results of a running job are left out: this attempt may have
-    /// written them and refer to them when it ends.
+    /// Selects the results that no job refers to. Results of running jobs are excluded, because the current attempt may
+    /// have written them.
     async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Vec<String>>;
 }
 
 /// API keys.
 #[async_trait]
 pub trait KeyStore: Send + Sync {
-    /// Stores a key. It fails if there is one with the same id.
+    /// Stores a key. Fails if the id exists.
     async fn add_key(&self, key: &Key) -> Result<()>;
 
     /// A key by its id.
     async fn key(&self, id: &str) -> Result<Option<Key>>;
 
-    /// All keys, oldest first, with the revoked ones.
+    /// All keys, oldest first, including revoked ones.
     async fn keys(&self) -> Result<Vec<Key>>;
 
-    /// Revokes a key; `None` if there is none. A key that was revoked before keeps its time.
+    /// Revokes a key; `None` if it does not exist. The first time of revocation is kept.
     async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>>;
 }
 
-/// The right to work on a job, until the lease runs out.
+/// A claimed job with the fencing token of its lease.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Claim {
     /// The job.
     pub id: Uuid,
-    /// Attempts counted so far, this one included.
+    /// Number of attempts, including this one.
     pub attempt: u32,
-    /// The fencing token: random, the same for all jobs that were claimed together.
+    /// The fencing token: random, the same for all jobs of a group.
     pub lease_token: u64,
     /// The requested method.
     pub method: String,
-    /// W3C trace context of its submission, if its trace is collected.
+    /// W3C trace context of the submission, if its trace is recorded.
     pub traceparent: Option<String>,
-    /// The key of identical cases in the result cache; `None` for a job that must be solved.
+    /// Key of the result cache; `None` for a job that must be solved.
     pub cache_key: Option<CacheKey>,
-    /// It ran together with others when their process died: it comes alone.
+    /// Whether the job ran in a group when its process crashed; it is claimed alone.
     pub suspect: bool,
-    /// Slices that are solved and stored.
+    /// Number of stored slices.
     pub slices: u32,
 }
 
-/// How long a job is a worker's from now on.
+/// Begin and length of a lease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Lease {
-    /// The present by the steady clock of this process, in ms. A store that several processes share has a clock of its own
-    /// and takes that one.
+    /// The current time of the steady clock of this process, in ms. A shared store uses its own clock instead.
     pub now: i64,
     /// Length in ms.
     pub ms: i64,
 }
 
-/// Which of the queued jobs a worker asks for.
+/// Selection of queued jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ClaimKind {
-    /// Those of which nothing is solved.
+    /// Jobs without stored slices.
     New,
-    /// One of which some slices are solved.
+    /// Jobs with stored slices.
     Begun,
 }
 
-/// What a worker asks for.
+/// Arguments of a claim.
 #[derive(Debug, Clone, Copy)]
 pub struct ClaimRequest<'a> {
     /// Name of the worker.
     pub worker: &'a str,
-    /// The queue whose turn it is.
+    /// The queue.
     pub queue: &'a Queue,
     /// Which of its jobs.
     pub kind: ClaimKind,
-    /// Most jobs; of begun ones there is one.
+    /// Maximum number of jobs; begun jobs are claimed one at a time.
     pub jobs: usize,
-    /// Largest sum of the expected solve times in µs; one job may be above it.
+    /// Maximum sum of the expected solve times in µs; a single job may exceed it.
     pub cost_us: u64,
-    /// Largest expected solve time of one slice of each job in µs, if there is such a bound.
+    /// Maximum expected solve time of one slice of each job in µs, if bounded.
     pub each_slice_us: Option<u64>,
-    /// Also jobs that may have killed a process.
+    /// Whether to include suspects.
     pub suspects: bool,
-    /// Jobs in the queue, when that was asked last.
+    /// Number of jobs in the queue, as last read.
     pub waiting: u64,
-    /// The lease that begins.
+    /// The lease to be granted.
     pub lease: Lease,
-    /// The present, epoch milliseconds.
+    /// The current time, epoch milliseconds.
     pub now: i64,
-    /// Jobs with a deadline before this time are left to whoever ends them.
+    /// Jobs with a deadline before this time are skipped.
     pub late_before: i64,
 }
 
-/// Why jobs go back to the queue; none of these counts as an attempt.
+/// Why jobs return to the queue without counting the attempt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReleaseReason {
-    /// They were not begun, they had their slice, or the service stops.
+    /// They were not begun, their time slice is over, or the service stops.
     NotBegun,
-    /// They were to share an answer that did not come: solved next time.
+    /// The result that they were to share is missing; they will be solved.
     SolveItself,
-    /// A slice of them takes longer than was thought, at least this long.
+    /// A slice takes longer than expected.
     Long {
-        /// Its expected solve time from now on, in µs.
+        /// New expected solve time of a slice, in µs.
         slice_us: u64,
     },
 }
 
-/// The answer to a heartbeat.
+/// Result of the renewal of a lease.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Renewal {
     /// The lease is extended.
     Held {
-        /// The client asked to cancel.
+        /// Whether the job was cancelled.
         cancel_requested: bool,
     },
-    /// The job was given away or has ended: stop and discard.
+    /// The job was taken away or has ended.
     Lost,
 }
 
-/// Which running jobs are taken from their workers.
+/// Which running jobs to take from their workers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reap {
-    /// Those whose lease has run out.
+    /// Jobs whose lease has expired.
     Expired {
-        /// The present, as [`Lease::now`].
+        /// The current time, as [`Lease::now`].
         now: i64,
     },
-    /// All of them: the one process that runs jobs of this table has died.
+    /// All running jobs, because the only process that uses this table has crashed.
     Dead,
 }
 
-/// What comes before a queued job.
+/// Jobs before a queued job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QueueAhead {
-    /// Jobs of its tenant.
+    /// Number of jobs of the same tenant.
     pub jobs: u64,
     /// Their expected solve time in µs.
     pub cost_us: u64,
-    /// Tenants with queued jobs, its own included.
+    /// Number of tenants with queued jobs, including its own.
     pub tenants: usize,
 }
 
-/// A hint to other processes that something happened. A process that misses one finds out by polling, a little later.
+/// A hint to other processes. A process that misses one finds the change by polling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Notification {
-    /// There is something to be claimed.
+    /// There is a job to claim.
     Work,
     /// This job has ended.
     Ended(Uuid),
-    /// This job is to be cancelled; its worker does so.
+    /// This running job was cancelled.
     Cancel(Uuid),
 }
 
-/// Where nodes receive each other's notifications. What is missed is found by polling, up to a second later.
+/// Source of the notifications of other nodes. Missed notifications are replaced by polling within a second.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum NotifyMode {
-    /// At the URL of the database.
+    /// The connection URL of the database.
     #[default]
     Database,
-    /// At another URL of the same database: a pooler that gives each transaction another session passes none on.
+    /// Another URL of the same database, for example without a pooler that assigns sessions per transaction.
     Direct(String),
-    /// Nowhere.
+    /// No notifications.
     Off,
 }
 
-/// A node as it shows itself to the others.
+/// A node of a cluster.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Node {
-    /// Random, new with every start.
+    /// Random id, new at every start.
     pub id: Uuid,
-    /// Jobs that it solves at the same time.
-    pub workers: usize,
-}
-
-/// What a node learns when it shows itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ClusterView {
-    /// Nodes that have shown themselves lately.
-    pub nodes: usize,
-    /// Their workers.
+    /// Number of workers.
     pub workers: usize,
 }
 
 /// Identity of a database, location of its large results, and number of its live nodes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Deployment {
-    /// Random, given when the tables were made.
+    /// Random id, assigned when the tables were created.
     pub id: String,
-    /// URL of the place of large results; empty: they are in the database; `None`: not decided.
+    /// URL of the location of large results; empty: in the database; `None`: not determined yet.
     pub results_place: Option<String>,
-    /// There are large results.
+    /// Whether there are large results.
     pub has_results: bool,
-    /// Nodes that have shown themselves lately.
+    /// Number of live nodes.
     pub nodes: u64,
 }
 
 impl Deployment {
-    /// The place of the results can no longer be changed.
+    /// Whether the location of the results is fixed.
     #[must_use]
     pub fn in_use(&self) -> bool {
         self.results_place.is_some() && (self.has_results || self.nodes > 0)
     }
 }
 
-/// Calls of a store that several processes use at once.
+/// Calls of a store that several processes share.
 #[async_trait]
 pub trait Cluster: Send + Sync + Debug {
     /// The clock of the store, epoch milliseconds.
     async fn now(&self) -> Result<i64>;
 
-    /// Records that a node is alive and returns its view of the cluster.
-    async fn beat(&self, node: &Node) -> Result<ClusterView>;
+    /// Records that a node is alive and returns the number of workers of all live nodes.
+    async fn beat(&self, node: &Node) -> Result<usize>;
 
-    /// The node is no more.
+    /// Removes a node.
     async fn leave(&self, node: Uuid) -> Result<()>;
 
-    /// Those of these running jobs that are to be cancelled.
+    /// Selects the jobs among `running` that were cancelled.
     async fn cancel_requests(&self, running: &[Uuid]) -> Result<Vec<Uuid>>;
 
-    /// Shows that these batches are still received or filled. A batch of which nobody has shown that for a minute is
+    /// Records that these batches are being received or filled. Batches without such a record for a minute are
     /// [unfinished](crate::store::Batches::unfinished_batches).
     async fn keep_batches(&self, batches: &[Uuid]) -> Result<()>;
 
-    /// Removes large results that were written long ago and that no job refers to: what a node left that was killed between the
-    /// two. Returns their number.
+    /// Removes orphans among the large results in the database; returns their number.
     async fn sweep_objects(&self) -> Result<u64>;
 
-    /// Brings what the database counts into a short form.
+    /// Sums up the counters that the database keeps as differences.
     async fn fold_counts(&self) -> Result<()>;
 
     /// Identity of the database, location of its large results, and number of its live nodes.
@@ -575,59 +565,59 @@ pub trait Cluster: Send + Sync + Debug {
     /// Claims the daily sweep of results outside the database; returns whether the claim succeeded.
     async fn take_sweep(&self) -> Result<bool>;
 
-    /// Where large results are kept that are in the database.
+    /// The store of large results in the database.
     fn objects(&self) -> Arc<dyn ObjectStore>;
 
     /// Queues a notification, which is sent together with others. Never blocks.
     fn publish(&self, notification: Notification);
 
-    /// Listens to the notifications of all nodes until the connection fails; for ever with [`NotifyMode::Off`].
+    /// Receives the notifications of all nodes until the connection fails; never returns with [`NotifyMode::Off`].
     async fn listen(&self, heard: &(dyn Fn(Notification) + Send + Sync)) -> Result<()>;
 }
 
-/// A solved slice about to be stored.
+/// A solved slice to be stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewSlice {
-    /// What is known of it.
+    /// Its record.
     pub note: SliceRecord,
-    /// Its part of the answer.
+    /// Its part of the result.
     pub result: StoredResult,
-    /// Part of the job that is done with it, 0 to 1.
+    /// Fraction of the job that is done with it, from 0 to 1.
     pub done: f64,
-    /// Expected solve time of the rest in µs.
+    /// Expected solve time of the remaining slices in µs.
     pub rest_us: u64,
 }
 
-/// How an attempt ends.
+/// How an attempt ends a job.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ending {
-    /// The result is stored.
+    /// The job has a result.
     Succeeded {
         /// Remarks of the solution.
         remarks: Vec<RemarkEntry>,
-        /// Where the result is kept.
+        /// The stored result.
         result: StoredResult,
-        /// Patches with stored fields.
+        /// Number of patches with stored fields.
         field_patches: u32,
     },
-    /// There is no answer.
+    /// The job has no result.
     Failed {
-        /// Why.
+        /// Reason.
         failure: Failure,
         /// Remarks of the check, which may explain the failure.
         remarks: Vec<RemarkEntry>,
     },
-    /// The client no longer wanted it.
+    /// The client cancelled the job.
     Cancelled,
-    /// It gets the result of this succeeded job; the attempt does not count.
+    /// The job gets the result of another succeeded job; the attempt does not count.
     Cached {
-        /// Whose result it gets.
+        /// The other job.
         source: Uuid,
     },
 }
 
 impl Ending {
-    /// The state of the job that ended so.
+    /// The final state.
     #[must_use]
     pub fn state(&self) -> State {
         match self {
@@ -638,24 +628,16 @@ impl Ending {
     }
 }
 
-/// Where a result is kept once its job has ended.
+/// A stored result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum StoredResult {
-    /// Under this key, where it already lies, with its size in bytes.
+    /// A large result outside the table: its key, and its size in bytes.
     Blob(String, u64),
-    /// In the database, written together with the end of the job: a small one.
+    /// A small result in the table, written together with the end of the job.
     Inline(EncodedResult),
 }
 
 impl StoredResult {
-    /// A small result as the database has it.
-    pub(crate) fn inline(solution: Vec<u8>, fields: Option<Vec<u8>>) -> StoredResult {
-        StoredResult::Inline(EncodedResult {
-            solution: solution.into(),
-            fields: fields.map(Bytes::from),
-        })
-    }
-
     /// Size in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
@@ -666,75 +648,74 @@ impl StoredResult {
     }
 }
 
-/// A result with what is needed to show it.
+/// A result with the data needed to read it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ResultRef {
-    /// Where it is, or itself.
+    /// The result.
     pub result: StoredResult,
-    /// Patches with stored fields; 0 if there is no fields object.
+    /// Number of patches with stored fields; 0 without fields.
     pub field_patches: usize,
-    /// The outputs the case asks for, as the JSON list of their names.
+    /// The requested outputs as a JSON list of names.
     pub outputs: String,
 }
 
-/// What is known of a stored slice of a sweep.
+/// The record of a stored slice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SliceRecord {
-    /// Place among the slices of the case, from 0.
+    /// Index of the slice, from 0.
     pub number: u32,
-    /// Motions of the case up to its end.
+    /// Number of motions of the case up to its end.
     pub motions: u32,
-    /// Digest of the case as the solver that solved it knew it; of another digest it is of no use.
+    /// Digest of the case and the solver revision; slices with another digest cannot be used.
     pub digest: String,
     /// Solver time of the job up to its end.
     pub spent: Duration,
 }
 
-/// Where the jobs of a list belong.
+/// Membership of listed jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Membership {
-    /// To this batch.
+    /// Jobs of this batch.
     Batch(Uuid),
-    /// To no batch: each was submitted alone.
+    /// Jobs that were submitted alone.
     Alone,
 }
 
-/// Which work of a kind to list; everything left out does not restrict. Lists of batches and runs know no states, memberships and times of
-/// changes.
+/// Filter of a list; absent members do not restrict. States, membership and time of change apply to jobs only.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Filter {
-    /// The kind of the work.
+    /// Kind of the work.
     pub kind: Kind,
-    /// Only jobs in one of these states; any if there is none.
+    /// States of the jobs; empty: any state.
     pub states: Vec<State>,
-    /// Only jobs of one batch, or of none.
+    /// Membership of the jobs.
     pub member: Option<Membership>,
-    /// Only work that carry each of these labels with its value.
+    /// Labels that the work must carry.
     pub labels: Vec<(String, String)>,
-    /// Only work whose name contains this text; ASCII letters match in either case.
+    /// Text that the name must contain; ASCII letters match in either case.
     pub name: Option<String>,
-    /// Only work submitted at or after this time (epoch milliseconds).
+    /// Earliest time of submission, epoch milliseconds.
     pub created_after: Option<i64>,
-    /// Only work submitted before this time (epoch milliseconds). Together with `created_after`: a half-open window.
+    /// End of the interval of submission, exclusive, epoch milliseconds.
     pub created_before: Option<i64>,
-    /// Only jobs that changed at or after this time (epoch milliseconds), progress aside.
+    /// Earliest time of the last change of a job, not counting progress, epoch milliseconds.
     pub updated_after: Option<i64>,
 }
 
-/// One page of a list. It may have fewer entries than asked for although more follow: where many have to be looked at to find
-/// some, a page ends after a bounded number of them.
+/// One page of a list. It may have fewer entries than requested although more follow, because the number of rows examined
+/// per page is bounded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Page<T> {
     /// The entries, newest first.
     pub entries: Vec<T>,
-    /// Where the next page begins; absent on the last page.
+    /// Cursor of the next page; `None` on the last page.
     pub next_cursor: Option<String>,
     /// Number of entries of the whole list.
     pub total: Total,
 }
 
 impl<T> Page<T> {
-    /// The same page with other entries.
+    /// Converts the entries.
     #[must_use]
     pub fn map<U>(self, entry: impl FnMut(T) -> U) -> Page<U> {
         Page {
@@ -748,9 +729,9 @@ impl<T> Page<T> {
 /// Number of entries of a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Total {
-    /// So many.
+    /// The exact number.
     Exactly(u64),
-    /// So many were counted, there may be more.
+    /// A lower bound.
     AtLeast(u64),
 }
 
@@ -763,12 +744,12 @@ pub struct Change {
     pub batch: Option<Uuid>,
     /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
     pub kind: Kind,
-    /// When, epoch milliseconds.
+    /// Time of the change, epoch milliseconds.
     pub at: i64,
 }
 
 impl Filter {
-    /// All work of a kind.
+    /// A filter for all work of a kind.
     #[must_use]
     pub fn of(kind: Kind) -> Filter {
         Filter {
@@ -783,7 +764,7 @@ impl Filter {
         format!("{}{}", last.simple(), self.digest())
     }
 
-    /// The entry after which `text` continues; `None` if it is not a cursor of this very filter.
+    /// The entry after which a cursor continues; `None` if `text` is no cursor of this filter.
     #[must_use]
     pub fn read_cursor(&self, text: &str) -> Option<Uuid> {
         let (id, digest) = text.split_at_checked(32)?;
@@ -791,11 +772,11 @@ impl Filter {
             return None;
         }
         let read = Uuid::try_parse(id).ok()?;
-        // Only our own spelling is a cursor: the parser would also take capital letters.
+        // The parser also accepts upper case, which is no cursor.
         (read.simple().to_string() == id).then_some(read)
     }
 
-    /// Whether jobs themselves have to be read, because no index knows all that is asked for.
+    /// Whether rows of jobs have to be read because no index covers the filter.
     pub(crate) fn reads_jobs(&self) -> bool {
         self.labels.len() > 1
             || self.name.is_some()
@@ -803,7 +784,7 @@ impl Filter {
             || (self.alone() && !self.labels.is_empty())
     }
 
-    /// Whether only jobs of no batch are listed.
+    /// Whether only jobs without a batch are listed.
     pub(crate) fn alone(&self) -> bool {
         self.member == Some(Membership::Alone)
     }
@@ -816,19 +797,19 @@ impl Filter {
         }
     }
 
-    /// Smallest id a job of the filter can have: UUIDv7 begins with 48 bits of milliseconds.
+    /// Smallest possible id of a job of the filter: UUIDv7 begins with 48 bits of milliseconds.
     pub(crate) fn id_from(&self) -> Option<Uuid> {
         self.created_after.map(first_id_at)
     }
 
-    /// Smallest id that is too young for the filter.
+    /// Smallest id above the filter.
     pub(crate) fn id_before(&self) -> Option<Uuid> {
         self.created_before.map(first_id_at)
     }
 
     /// Eight hexadecimal digits of a digest of the filter.
     fn digest(&self) -> String {
-        // Quotes say where a text ends.
+        // Quotes separate the texts.
         let digest = blake3::hash(format!("{self:?}").as_bytes());
         digest.to_hex()[..8].to_owned()
     }
@@ -840,52 +821,53 @@ pub(crate) fn first_id_at(epoch_ms: i64) -> Uuid {
     Uuid::from_u128(millis << 80)
 }
 
-/// A kept cross-section.
+/// A stored profile.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredProfile {
     /// Digest of its JSON value, 64 hexadecimal digits.
     pub digest: String,
     /// Its JSON text.
     pub body: Bytes,
-    /// When it was first sent, epoch milliseconds.
+    /// Time at which it was stored, epoch milliseconds.
     pub created_at: i64,
 }
 
-/// What became of a cross-section that was to be kept.
+/// Result of [`Profiles::add_profile`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ProfileKept {
-    /// It is kept.
+    /// The profile was stored.
     Added,
-    /// It was kept already.
+    /// The profile existed.
     Existing(StoredProfile),
-    /// There is no room for it.
+    /// The size limit is reached.
     Full,
 }
 
-/// The entry of a stored cross-section in a list.
+/// The entry of a stored profile in a list.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProfileEntry {
     /// Its digest.
     pub digest: String,
-    /// Its size.
+    /// Its size in bytes.
     pub bytes: u64,
-    /// When it was first sent, epoch milliseconds.
+    /// Time at which it was stored, epoch milliseconds.
     pub created_at: i64,
 }
 
-/// The last entry of a page: its time in ms and the first digits of its digest. As text 40 characters of `[0-9a-f]`, as the cursors of other lists.
+/// The cursor of a list of profiles: time in ms and first digits of the digest of the last entry. Its text has 40
+/// characters of `[0-9a-f]`, as other cursors.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProfileCursor(pub i64, pub String);
 
 impl ProfileCursor {
-    /// The cursor behind this entry.
+    /// The cursor after this entry.
     #[must_use]
     pub fn after(entry: &ProfileEntry) -> ProfileCursor {
         let digits = entry.digest.chars().take(28);
         ProfileCursor(entry.created_at, digits.collect())
     }
 
-    /// The cursor that a text is.
+    /// Parses a cursor.
     #[must_use]
     pub fn read(text: &str) -> Option<ProfileCursor> {
         let (time, digest) = text.split_at_checked(12)?;
@@ -901,88 +883,88 @@ impl std::fmt::Display for ProfileCursor {
     }
 }
 
-/// The answer to a call that deletes a job.
+/// Result of [`ClientJobs::delete`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Deleted {
-    /// The row and all that hung on it are gone.
+    /// The job was removed.
     Done,
-    /// It has not ended.
+    /// The job has not ended.
     NotEnded(State),
-    /// There was none.
+    /// The job does not exist.
     NotFound,
 }
 
-/// The present, and what became of the clock.
+/// The current time, and the last jump of the wall clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Moment {
-    /// Epoch milliseconds.
+    /// The current time, epoch milliseconds.
     pub now: i64,
-    /// What was submitted before this time is judged by the next.
+    /// Time of the jump; jobs submitted before it are compared with `unset`.
     pub set_at: i64,
-    /// The present of a clock that was not set.
+    /// The current time without the jump.
     pub unset: i64,
 }
 
-/// What is to be removed. Times are epoch milliseconds.
+/// Expiry of jobs. Times are epoch milliseconds.
 #[derive(Debug, Clone, Copy)]
 pub struct RetentionRule {
-    /// The present.
+    /// The current time.
     pub now: i64,
     /// Jobs that ended at this time or before have expired.
     pub ended_before: i64,
-    /// Ids of what was removed at this time or before are forgotten.
+    /// Tombstones from this time or before are removed.
     pub forget_before: i64,
-    /// Most jobs to remove.
+    /// Maximum number of jobs to remove.
     pub jobs: u32,
 }
 
 /// Statistics of a job table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stats {
-    /// Number of jobs in each state; every state is there.
+    /// Number of jobs by state; contains every state.
     pub jobs: BTreeMap<State, u64>,
     /// Time of submission of the oldest queued job, epoch milliseconds.
     pub oldest_queued_at: Option<i64>,
-    /// Mean expected solve time of queued jobs in µs; of a long queue, of some of them.
+    /// Mean expected solve time of queued jobs in µs, from a sample of a long queue.
     pub mean_cost_us: f64,
     /// Size of the database file and its write-ahead log.
     pub database_bytes: u64,
-    /// Size of the results outside the table.
+    /// Size of the results outside the table in bytes.
     pub result_bytes: u64,
 }
 
-/// What a tenant has in a job table.
+/// Usage of a job table by a tenant.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Usage {
-    /// Number of jobs and of chunks of runs in each state; a state may be missing.
+    /// Number of jobs and of chunks of runs by state; a state may be missing.
     pub jobs: BTreeMap<State, u64>,
-    /// Places in the queue that are reserved for batches that are being received.
+    /// Number of places in the queue that are reserved for batches that are being received.
     pub reserved: u64,
-    /// Bytes that these stand for.
+    /// Number of staged bytes of these batches.
     pub staged_bytes: u64,
-    /// Bytes of cases, templates and results that are stored.
+    /// Number of bytes of stored cases, templates and results.
     pub stored_bytes: u64,
 }
 
 /// Jobs whose deadline has passed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Overdue {
-    /// Those that were queued and have been ended.
+    /// Jobs that were queued and have been ended.
     pub ended: Vec<Uuid>,
-    /// Those that are running.
+    /// Jobs that are running.
     pub running: Vec<Uuid>,
 }
 
-/// Equal for cases of one tenant that have the same answer.
+/// Key of the result cache: equal for cases of one tenant that have the same result.
 pub type CacheKey = [u8; 16];
 
-/// A job about to be queued. One of a batch is written to a file while the batch arrives, with what is known of it by then.
+/// A job to be queued. For a job of a batch, the members without `skip` are staged in a file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct NewJob {
     /// UUIDv7.
     #[serde(skip)]
     pub id: Uuid,
-    /// Whose it is.
+    /// The tenant that owns the job.
     #[serde(skip)]
     pub tenant: Arc<str>,
     /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
@@ -991,32 +973,32 @@ pub struct NewJob {
     /// Time of submission.
     #[serde(skip)]
     pub created_at: i64,
-    /// Free text given by the client.
+    /// Name given by the client.
     pub name: Option<String>,
-    /// Labels of the client.
+    /// Labels given by the client.
     pub labels: BTreeMap<String, String>,
-    /// The method asked for, for the logs.
+    /// The requested method, for the logs.
     pub method: String,
-    /// The case as submitted, as JSON text; of a row of a table what it puts into the template of its batch.
+    /// The case as JSON text; for a row of a table, its values for the template of the batch.
     #[serde(skip)]
     pub body: Bytes,
-    /// It is such a row.
+    /// Whether the body is such a row.
     pub row: bool,
-    /// The outputs the case asks for, as the JSON list of their names.
+    /// The requested outputs as a JSON list of names.
     pub outputs: String,
     /// Expected solve time in µs; small jobs are claimed in groups.
     pub cost_us: u32,
-    /// That of its longest slice.
+    /// Expected solve time of the longest slice in µs.
     pub slice_us: u32,
-    /// The key under which later identical cases find the result of this job.
+    /// Key under which later identical cases find the result.
     pub cache_key: Option<CacheKey>,
-    /// A succeeded job whose result this one gets, instead of being queued, and the time at which it ends so.
+    /// A succeeded job whose result this one gets instead of being queued, and the time at which it ends so.
     #[serde(skip)]
     pub source: Option<(Uuid, i64)>,
-    /// The client's idempotency key with the digest of case and options; not used inside a batch.
+    /// The idempotency key with the digest of case and options; not used in a batch.
     #[serde(skip)]
     pub idempotency: Option<(String, [u8; 32])>,
-    /// W3C trace context of its submission, if its trace is collected.
+    /// W3C trace context of the submission, if its trace is recorded.
     #[serde(skip)]
     pub traceparent: Option<Arc<str>>,
     /// Options of the submission.
@@ -1025,7 +1007,7 @@ pub struct NewJob {
 }
 
 impl NewJob {
-    /// When the job must have ended.
+    /// The deadline of the job, epoch milliseconds.
     #[must_use]
     pub fn deadline(&self) -> Option<i64> {
         let within = i64::try_from(self.options.ends_within?.as_millis()).unwrap_or(i64::MAX);
@@ -1033,14 +1015,14 @@ impl NewJob {
     }
 }
 
-/// Bounds of the queue: of queued jobs together with the places reserved for batches that are being filled.
+/// Bounds of the queue. Reserved places of batches count as queued jobs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QueueBounds {
-    /// Of all tenants.
+    /// Maximum number of queued jobs.
     pub all: u64,
-    /// Of one tenant, the chunks of its runs included.
+    /// Maximum number of queued jobs of one tenant, including chunks of runs.
     pub tenant: u64,
-    /// Bytes that one tenant may have stored, if they are bounded.
+    /// Maximum number of stored bytes of one tenant, if bounded.
     pub stored: Option<u64>,
 }
 
@@ -1053,75 +1035,75 @@ impl QueueBounds {
     };
 }
 
-/// Which bound is reached.
+/// The bound that is reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
-    /// That of the tenant.
+    /// Queued jobs of the tenant.
     Quota,
-    /// That of the queue.
+    /// Queued jobs of all tenants.
     Queue,
-    /// That of the bytes that the tenant has stored.
+    /// Stored bytes of the tenant.
     Stored,
 }
 
-/// A batch about to be filled.
+/// A batch to be filled.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewBatch {
-    /// UUIDv7; that of its reservation, if it has one.
+    /// UUIDv7, which is also the id of its reservation.
     pub id: Uuid,
-    /// Whose it is.
+    /// The tenant that owns the batch.
     pub tenant: Arc<str>,
     /// [`Kind::Cases`] or [`Kind::Rows`].
     pub kind: Kind,
     /// Time of submission.
     pub created_at: i64,
-    /// Number of jobs it will have.
+    /// Number of its jobs.
     pub count: u32,
-    /// Number of cases that were refused.
+    /// Number of invalid cases that were skipped.
     pub rejected: u32,
-    /// Free text given by the client.
+    /// Name given by the client.
     pub name: Option<String>,
-    /// Labels of the client.
+    /// Labels given by the client.
     pub labels: BTreeMap<String, String>,
-    /// The case that its rows fill, if it is a table.
+    /// The template that its rows fill, if it is a table.
     pub template: Option<Bytes>,
-    /// Of a run: its own part of what its chunks share.
+    /// The part of the head that is specific to a run.
     pub head: Option<Bytes>,
-    /// Bytes of its cases as they will be stored.
+    /// Number of bytes of its cases as stored.
     pub bytes: u64,
-    /// The client's idempotency key with the digest of all cases and options.
+    /// The idempotency key with the digest of all cases and options.
     pub idempotency: Option<(String, [u8; 32])>,
 }
 
-/// Whether this process receives or fills a batch at the moment of the call. It is called within the transaction that decides what an
-/// idempotency key stands for: a batch that began while the transaction waited for the writer counts too.
+/// Returns whether this process currently receives or fills a batch. It is called in the transaction that evaluates an
+/// idempotency key, so that a batch that began while the transaction waited for the writer counts too.
 pub type FilledHere<'a> = &'a (dyn Fn(Uuid) -> bool + Sync);
 
-/// What became of an attempt to begin a batch.
+/// Result of [`Batches::begin_batch`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum BatchBegun {
     /// The batch can be filled.
     Created,
-    /// The idempotency key already stands for this batch, with the same cases.
+    /// The idempotency key belongs to this batch, which has the same cases.
     Existing(Uuid),
-    /// The idempotency key stands for a batch that is being filled at this moment.
+    /// The idempotency key belongs to a batch that is being filled.
     Unfinished,
-    /// The idempotency key already stands for other cases or options.
+    /// The idempotency key belongs to other cases or options.
     Conflict,
-    /// There is no room; nothing was stored.
+    /// A bound is reached; nothing was stored.
     Refused(Refusal),
 }
 
-/// What became of an attempt to queue a job.
+/// Result of [`SubmitJobs::enqueue`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum Enqueued {
     /// The job is queued, or has ended with the result of its source.
     Created(Job),
-    /// The idempotency key already stands for this job, with the same case.
+    /// The idempotency key belongs to this job, which has the same case.
     Existing(Job),
-    /// The idempotency key already stands for another case, or for other options.
+    /// The idempotency key belongs to another case or other options.
     Conflict,
-    /// There is no room; nothing was stored.
+    /// A bound is reached; nothing was stored.
     Refused(Refusal),
 }
 
@@ -1130,22 +1112,22 @@ pub enum Enqueued {
 pub struct ClaimedCase {
     /// The case.
     pub case: StoredCase,
-    /// The client asked to cancel the job.
+    /// Whether the job was cancelled.
     pub cancel_requested: bool,
-    /// A succeeded job with the same answer, if the job may end with that.
+    /// A succeeded job with the same cache key, if the job may end with its result.
     pub source: Option<Uuid>,
 }
 
-/// A case as it is stored.
+/// A stored case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredCase {
     /// [`Kind::Case`], or [`Kind::Rows`] for a chunk of a run.
     pub kind: Kind,
-    /// The case that the body fills; none if the body is the case.
+    /// The template that the body fills; `None` if the body is the case.
     pub template: Option<Bytes>,
-    /// Of a chunk of a run: the run's own part of what its chunks share.
+    /// The part of the head that is specific to a run, for a chunk.
     pub head: Option<Bytes>,
-    /// JSON text.
+    /// The case as JSON text, the values of a row, or a chunk of a run.
     pub body: Bytes,
 }
 

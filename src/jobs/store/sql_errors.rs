@@ -1,4 +1,4 @@
-//! Errors of databases as those of a store.
+//! Conversion of database errors to [`StoreError`].
 
 #[cfg(feature = "cluster")]
 use std::io::ErrorKind;
@@ -64,7 +64,7 @@ impl From<sqlx::Error> for JobsError {
     }
 }
 
-/// The server is away, or the way to it.
+/// The fault of a connection error, if the server is unavailable or unreachable.
 #[cfg(feature = "cluster")]
 fn fault_of_connection(error: &std::io::Error) -> Option<StorageFault> {
     match error.kind() {
@@ -83,13 +83,13 @@ fn fault_of_connection(error: &std::io::Error) -> Option<StorageFault> {
     }
 }
 
-/// The state that PostgreSQL gives with an error; its first two characters are the class.
+/// The fault of a PostgreSQL error code (SQLSTATE), whose first two characters are the class.
 #[cfg(feature = "cluster")]
 fn of_state(state: &str) -> Option<StorageFault> {
     const DISK_FULL: &str = "53100";
-    // Cancelled by `statement_timeout`, or waited for a lock in vain.
+    // Cancelled by `statement_timeout`, or timed out waiting for a lock.
     const TOO_SLOW: [&str; 2] = ["57014", "55P03"];
-    // Read-only as after a failover; a session that was ended because it held a transaction open.
+    // Read-only after a failover; a session that was ended because its transaction was idle.
     const ENDED: [&str; 2] = ["25006", "25P03"];
     match state {
         DISK_FULL => Some(StorageFault::Full),

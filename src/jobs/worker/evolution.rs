@@ -1,4 +1,4 @@
-//! What a solver thread does for an evolution: steps up to the next record, again and again, then the whole answer.
+//! Tasks of a solver thread for an evolution: steps up to the next record, then the whole result.
 
 use std::error::Error;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::attempts::attempt::AttemptControl;
-use crate::attempts::slices::{Ended, Outcome, SlicedEvolution, SlicedWork};
+use crate::attempts::slices::{Ended, Outcome, SlicedEvolution, SlicedWork, Solved};
 use crate::codec::result::EncodedResult;
 use crate::shared::Shared;
 use crate::store::SliceRecord;
@@ -14,13 +14,13 @@ use railhead_contact::error::SolveError;
 use railhead_contact::evolution::task::{Evolution, SolveContext};
 use railhead_contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
 
-/// Steps that are stored together, unless a record ends them before.
+/// Maximum number of steps in one slice; a record ends it earlier.
 const STEPS: u32 = 16;
 
-/// What a slice stores: the record that ends it, if one does, and the state after it.
+/// Content of a slice: the record at its end, if any, and the state after it.
 type Part = (Option<EvolutionRecord>, EvolutionState);
 
-/// Checks an evolution, of which this is stored, and takes its next steps.
+/// Checks an evolution with its stored slices, and takes the next steps.
 pub(crate) fn begin(
     shared: &Shared,
     control: &AttemptControl,
@@ -31,7 +31,7 @@ pub(crate) fn begin(
     advance(shared, control, SlicedEvolution::new(task, notes))
 }
 
-/// Takes the next steps; where there are none, or it is not known where to go on, the stored parts are wanted.
+/// Takes the next steps. If there are none, or the state is unknown, the outcome requests the stored slices.
 pub(crate) fn advance(
     shared: &Shared,
     control: &AttemptControl,
@@ -70,7 +70,7 @@ pub(crate) fn advance(
     Ok(Outcome::Slice { sliced, part })
 }
 
-/// Goes on from the stored parts, or puts them together where all is solved.
+/// Continues from the stored slices, or joins them if all are solved.
 pub(crate) fn join(
     shared: &Shared,
     control: &AttemptControl,
@@ -80,11 +80,11 @@ pub(crate) fn join(
     match read(parts, evolution.done) {
         Ok((state, records)) if evolution.task.is_over(&state) => {
             let answer = evolution.task.answer(&state, records);
-            Ok(Outcome::Solved {
+            Ok(Outcome::Solved(Solved {
                 result: EncodedResult::as_json(&answer)?,
                 remarks: answer.remarks,
                 field_patches: 0,
-            })
+            }))
         }
         Ok((state, _)) => {
             evolution.state = Some(state);
@@ -98,7 +98,7 @@ pub(crate) fn join(
     }
 }
 
-/// The state after the last of this many stored parts, and all their records.
+/// Reads `count` stored slices: the state after the last one, and all records.
 fn read(
     parts: &[EncodedResult],
     count: u32,

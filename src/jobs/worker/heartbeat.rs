@@ -1,4 +1,4 @@
-//! Renews the leases of this process while its solvers tick.
+//! Heartbeat: renews the leases of this process while its solvers tick.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Weak};
@@ -10,7 +10,7 @@ use crate::attempts::attempt::{AttemptControl, GroupLease, HeldLeases, StopReaso
 use crate::shared::{Shared, heartbeat};
 use crate::store::{Claim, Renewal};
 
-/// Keeps the leases of jobs that were claimed just now.
+/// Holds the leases of newly claimed jobs and renews them.
 pub(crate) fn keep(shared: &Arc<Shared>, leases: Vec<(Claim, Arc<AttemptControl>)>) -> GroupLease {
     let held = Arc::new(HeldLeases::new(leases, shared.lease_until()));
     shared.leases.add(&held);
@@ -20,7 +20,7 @@ pub(crate) fn keep(shared: &Arc<Shared>, leases: Vec<(Claim, Arc<AttemptControl>
     GroupLease(held)
 }
 
-/// One task serves all attempts: most end before their first renewal.
+/// Renews all leases; one task for the process, because most attempts end before their first renewal.
 async fn beat(shared: Weak<Shared>) {
     while let Some(period) = shared.upgrade().map(|shared| heartbeat(&shared)) {
         sleep(period).await;
@@ -46,7 +46,7 @@ async fn renew(shared: &Shared, kept: &HeldLeases) {
         let renewed = renewed.inspect_err(|error| {
             tracing::warn!(%error, "leases could not be renewed");
         });
-        // While nothing can be written, the reaper cannot give the jobs away either.
+        // While the store rejects writes, the reaper cannot take the jobs either.
         if renewed
             .as_ref()
             .map_or_else(|error| error.storage_fault().is_some(), |_| true)

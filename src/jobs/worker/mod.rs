@@ -1,4 +1,4 @@
-//! Claim, solve, finish: one path for every group of jobs; a single job is a group of one.
+//! Workers: claim, solve, finish. A single job is a group of one.
 
 pub mod evolution;
 pub mod heartbeat;

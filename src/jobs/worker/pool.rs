@@ -1,4 +1,4 @@
-//! Workers: each takes one turn after the other until the service drains.
+//! The worker pool: each worker takes one turn after the other until the service drains.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,31 +12,29 @@ use crate::shared::Shared;
 use crate::store::{ClaimKind, ClaimRequest};
 use crate::worker::solve;
 
-/// How often an idle worker asks for jobs although nothing has woken it.
+/// Interval at which an idle worker looks for jobs without being woken.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);
 
-/// One worker. It has at most one solver at work.
+/// A worker. It has at most one running solver.
 #[derive(Debug)]
 pub struct Worker {
     pub(crate) shared: Arc<Shared>,
     pub(crate) name: String,
-    /// It serves short jobs while every other worker is at a long solve.
+    /// Whether it serves short jobs while every other worker runs a long solve.
     pub(crate) spare: bool,
-    /// A thread without work.
+    /// An idle solver thread.
     pub(crate) thread: Option<SolverThread>,
 }
 
-/// What became of one [`Worker::step`].
+/// Result of one [`Worker::step`].
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct StepReport {
-    /// There was something to be done.
+    /// Whether there was a job.
     pub busy: bool,
-    /// Jobs that ended, with their states.
+    /// Jobs that ended, with their final states.
     pub ended: Vec<(Uuid, State)>,
-    /// Jobs that went back to the queue, their attempts uncounted.
+    /// Jobs that returned to the queue without counting the attempt.
     pub handed_back: Vec<Uuid>,
-    /// Jobs that had been given away; their outcomes were discarded.
-    pub lost: Vec<Uuid>,
 }
 
 impl Worker {
@@ -49,7 +47,7 @@ impl Worker {
         })
     }
 
-    /// Steps until the service drains.
+    /// Takes turns until the service drains.
     pub(crate) async fn run(mut self) {
         let shared = self.shared.clone();
         let recovered = shared.recovered.wait();
@@ -72,10 +70,10 @@ impl Worker {
         }
     }
 
-    /// Takes one turn: claims, solves, and writes down what became of each job. The pool calls this, and tests do.
+    /// Takes one turn: claims and solves jobs, and records their outcomes. Called by the pool and by tests.
     ///
     /// # Errors
-    /// The database failed; claimed jobs are given back if that is possible, or taken back when their leases run out.
+    /// The database failed; claimed jobs are released if possible, or reaped when their leases expire.
     pub async fn step(&mut self) -> Result<StepReport> {
         let Some(mut attempt) = self.next_turn().await? else {
             return Ok(StepReport::default());
@@ -92,11 +90,11 @@ impl Worker {
     }
 }
 
-/// Largest sum of expected solve times in a group, in µs.
+/// Maximum sum of the expected solve times of a group, in µs.
 const GROUP_COST_US: u64 = 200_000;
 
 impl Worker {
-    /// What to work on next, by the turns of the tenants. Within a queue, new jobs and begun sweeps take turns.
+    /// Claims the next attempt, in the order of the fair scheduler. Within a queue, new jobs and begun sweeps alternate.
     pub(crate) async fn next_turn(&self) -> Result<Option<Attempt>> {
         let shared = &self.shared;
         if shared.draining.is_cancelled() || (self.spare && !shared.all_workers_are_long()) {
@@ -128,10 +126,10 @@ impl Worker {
         let shared = &self.shared;
         let options = &shared.options;
         let slice_us = u64::try_from(options.slice.as_micros()).unwrap_or(u64::MAX);
-        // Each worker gets some of a short queue.
+        // Short queues are divided among the workers.
         let share = usize::try_from(waiting).unwrap_or(usize::MAX);
         let share = share.div_ceil(shared.all_workers().max(1));
-        // Of two suspects that are solved at the same time, nobody would know which one has killed the process.
+        // If two suspects ran at the same time, the one that crashes the process would not be known.
         let suspect = shared.suspect.clone().try_lock_owned().ok();
         let request = ClaimRequest {
             worker: &self.name,
@@ -154,6 +152,11 @@ impl Worker {
             claims.iter_mut().for_each(|claim| claim.cache_key = None);
         }
         let suspect = suspect.filter(|_| claims.iter().any(|claim| claim.suspect));
-        Ok(Some(solve::take_up(shared, queue.clone(), claims, suspect)))
+        Ok(Some(solve::new_attempt(
+            shared,
+            queue.clone(),
+            claims,
+            suspect,
+        )))
     }
 }

@@ -1,54 +1,44 @@
-//! What follows for a job from the outcome of its solver and from the reason for which the solver was told to stop. This is the
-//! one place that decides it.
-use std::collections::{HashMap, HashSet};
+//! Records the outcomes of solvers. [`disposition_of`] is the one place that decides the effect of an outcome on its job.
+use std::collections::HashSet;
 use std::time::SystemTime;
 
 use uuid::Uuid;
 
 use crate::attempts::attempt::{Attempt, Phase, StopReason};
-use crate::attempts::slices::{INTERNAL, Outcome, SlicedWork, Work};
+use crate::attempts::slices::{Outcome, SlicedWork, Solved, Work, internal_failure};
 use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
 use crate::model::{Failure, FailureKind, State, too_late};
 use crate::storage_fault::StoragePlace;
 use crate::store::{Claim, Ending, NewSlice, ReleaseReason, SliceRecord, StoredResult};
 use crate::submit::microseconds;
+use crate::trace::JobTrace;
 use crate::worker::pool::{StepReport, Worker};
 use railhead_contact::error::SolveError;
-use railhead_contact::remark::entry::RemarkEntry;
 
-/// What follows from the outcome of an attempt.
+/// Effect of an outcome on its job.
 pub(crate) enum Disposition {
-    /// Store a solved slice, if there is one; the case is not solved whole. With a reason to stop it is released then, without
-    /// one the next slice is solved.
+    /// Store a solved slice, if there is one. Then release the job if it was stopped, else solve the next slice.
     StoreSlice {
         sliced: Box<SlicedWork>,
         part: Option<(SliceRecord, EncodedResult)>,
         stopped: Option<StopReason>,
     },
-    /// Store the answer, then end.
-    Store {
-        result: EncodedResult,
-        remarks: Vec<RemarkEntry>,
-        field_patches: u32,
-    },
-    /// End without an answer.
+    /// Store the result, then end the job.
+    Store(Solved),
+    /// End the job without a result.
     End(Ending),
-    /// Give the job back to the queue, its attempt uncounted.
+    /// Return the job to the queue without counting the attempt.
     Release,
-    /// The same, and note that a slice of it takes longer than was expected.
+    /// As [`Disposition::Release`], and increase the expected time of its slices.
     ReleaseAsLong,
-    /// The lease is lost: discard whatever there is.
+    /// The lease was lost: discard the outcome.
     Discard,
 }
 
-/// What follows from an outcome and the reason for which the solver was stopped, if it was.
+/// The effect of an outcome, given the reason for which the solver was stopped, if it was.
 pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Disposition {
     let failed = |failure, remarks| Disposition::End(Ending::Failed { failure, remarks });
-    let internal = |reason: String| {
-        tracing::error!(reason, "a job fails inside the service");
-        Failure::new(FailureKind::Internal, INTERNAL)
-    };
     let stopped = |remarks| match reason {
         Some(StopReason::Cancel) => Disposition::End(Ending::Cancelled),
         Some(StopReason::Shutdown) => Disposition::Release,
@@ -56,15 +46,15 @@ pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Di
         Some(StopReason::Lost) => Disposition::Discard,
         Some(StopReason::Deadline) => failed(too_late(), remarks),
         None => {
-            let reason = "the solver stopped without a request";
-            failed(internal(reason.to_owned()), remarks)
+            let failure = internal_failure("the solver stopped without a request");
+            failed(failure, remarks)
         }
     };
     match outcome {
-        Outcome::Solved { .. } | Outcome::Slice { .. } if reason == Some(StopReason::Lost) => {
+        Outcome::Solved(_) | Outcome::Slice { .. } if reason == Some(StopReason::Lost) => {
             Disposition::Discard
         }
-        // A slice is kept like an answer as long as the whole is still wanted.
+        // A slice is stored like a result unless the job is cancelled.
         Outcome::Slice { sliced, part }
             if matches!(
                 reason,
@@ -77,15 +67,7 @@ pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Di
                 stopped: reason,
             }
         }
-        Outcome::Solved {
-            result,
-            remarks,
-            field_patches,
-        } => Disposition::Store {
-            result,
-            remarks,
-            field_patches,
-        },
+        Outcome::Solved(solved) => Disposition::Store(solved),
         Outcome::Unsolved {
             error: SolveError::Cancelled,
             remarks,
@@ -94,21 +76,19 @@ pub(crate) fn disposition_of(outcome: Outcome, reason: Option<StopReason>) -> Di
         Outcome::Abandoned => stopped(Vec::new()),
         Outcome::Unsolved { error, remarks } => {
             let failure = Failure::of_solve(&error);
-            failed(
-                failure.unwrap_or_else(|| internal(error.to_string())),
-                remarks,
-            )
+            let internal = || internal_failure(&error.to_string());
+            failed(failure.unwrap_or_else(internal), remarks)
         }
         Outcome::Refused(error) => {
             let reason = format!("the stored case is no longer accepted: {error}");
-            failed(internal(reason), Vec::new())
+            failed(internal_failure(&reason), Vec::new())
         }
         Outcome::Broken(failure) => failed(failure, Vec::new()),
     }
 }
 
 impl Worker {
-    /// Stores a solved slice of a member, which goes on from there; `false` if the lease is lost.
+    /// Stores a solved slice of a member, which continues from there; `false` if the lease was lost.
     pub(crate) async fn keep_slice(
         &self,
         attempt: &mut Attempt,
@@ -147,7 +127,7 @@ impl Worker {
         Ok(true)
     }
 
-    /// What is to be done next for a sweep.
+    /// The next task of a sweep.
     pub(crate) async fn next_of(&self, id: Uuid, mut sliced: Box<SlicedWork>) -> Result<Work> {
         if !sliced.waits_for_parts() {
             return Ok(Work::Next(sliced));
@@ -163,7 +143,7 @@ impl Worker {
         }
     }
 
-    /// The stored parts of the answer of a sweep.
+    /// Reads the stored slices of a sweep.
     async fn parts(&self, id: Uuid) -> Result<Vec<EncodedResult>> {
         let shared = &self.shared;
         let placed = shared.store.slice_results(id).await?;
@@ -179,8 +159,8 @@ impl Worker {
 }
 
 impl Worker {
-    /// Reads the cases of the claimed jobs, and ends those whose result has been there since they were queued. To be called once the
-    /// leases are kept: a cancellation is then either read here or finds the control of the job.
+    /// Reads the cases of the claimed jobs, and ends jobs whose result is in the cache by now. Called while the leases are
+    /// held: a cancellation is then either read here or finds the control of the job.
     pub(crate) async fn read_cases(
         &self,
         attempt: &mut Attempt,
@@ -200,7 +180,7 @@ impl Worker {
         self.answer_with(attempt, known, step).await
     }
 
-    /// Ends claimed jobs with the results of these others; where there is none, the job goes back to the queue.
+    /// Ends claimed jobs with the results of other jobs. If such a result was removed, the job returns to the queue.
     async fn answer_with(
         &self,
         attempt: &mut Attempt,
@@ -211,7 +191,7 @@ impl Worker {
             return Ok(());
         }
         let shared = &self.shared;
-        let from = shared.options.tracer.is_some().then(SystemTime::now);
+        let from = SystemTime::now();
         let ends: Vec<_> = pairs
             .iter()
             .map(|(claim, source)| (claim.clone(), Ending::Cached { source: *source }))
@@ -223,13 +203,10 @@ impl Worker {
             .await?;
         let ids: Vec<_> = ended.iter().copied().collect();
         shared.metrics.cache_lookup(ids.len() as u64, 0);
-        if let Some(from) = from {
-            let claims = pairs.iter().map(|(claim, _)| claim);
-            for claim in claims.filter(|claim| ended.contains(&claim.id)) {
-                if let Some(traced) = shared.job_trace(claim) {
-                    traced.waited_until(from);
-                    traced.stored(from, State::Succeeded.name());
-                }
+        for (claim, _) in pairs.iter().filter(|(claim, _)| ended.contains(&claim.id)) {
+            if let Some(traced) = JobTrace::of(shared.options.tracer.as_ref(), claim) {
+                traced.waited_until(from);
+                traced.stored(from, State::Succeeded.name());
             }
         }
         shared.ended_cached(&ids);
@@ -242,10 +219,9 @@ impl Worker {
             .await
     }
 
-    /// Writes down what became of the members that are over.
+    /// Records the outcomes of the members that have one.
     pub(crate) async fn record(&self, attempt: &mut Attempt, step: &mut StepReport) -> Result<()> {
-        let shared = &self.shared;
-        let from = shared.options.tracer.is_some().then(SystemTime::now);
+        let from = SystemTime::now();
         let mut pending = PendingWrites::default();
         for place in 0..attempt.members.len() {
             let phase = &mut attempt.members[place].phase;
@@ -263,13 +239,10 @@ impl Worker {
                 .await;
             }
         }
-        attempt.done(&pending.lost);
-        step.lost.append(&mut pending.lost);
         let PendingWrites {
             ends,
             mut back,
             long,
-            ..
         } = pending;
         self.finish(attempt, ends, from, step).await?;
         back.extend(attempt.claims(|phase| matches!(phase, Phase::NotBegun)));
@@ -281,17 +254,17 @@ impl Worker {
         self.settle_duplicates(attempt, step).await
     }
 
-    /// Stores the result or the slice that a verdict keeps, and notes what remains to be written for the member.
+    /// Stores the result or slice of a member, and collects the remaining writes.
     async fn apply(
         &self,
         attempt: &mut Attempt,
         place: usize,
-        verdict: Disposition,
+        disposition: Disposition,
         pending: &mut PendingWrites,
     ) {
         let claim = attempt.members[place].claim.clone();
-        let stored = match verdict {
-            Disposition::Discard => return pending.lost.push(claim.id),
+        let stored = match disposition {
+            Disposition::Discard => return attempt.done(&[claim.id]),
             Disposition::Release => return pending.back.push(claim),
             Disposition::ReleaseAsLong => return pending.long.push(claim),
             Disposition::End(ending) => Ok(ending),
@@ -300,7 +273,7 @@ impl Worker {
                 part,
                 stopped,
             } => match self.keep_slice(attempt, place, sliced, part).await {
-                Ok(false) => return pending.lost.push(claim.id),
+                Ok(false) => return attempt.done(&[claim.id]),
                 Ok(true) => match stopped {
                     Some(StopReason::TooLong) => return pending.long.push(claim),
                     Some(_) => return pending.back.push(claim),
@@ -309,22 +282,18 @@ impl Worker {
                 },
                 Err(error) => Err(error),
             },
-            Disposition::Store {
-                result,
-                remarks,
-                field_patches,
-            } => self
-                .store_result(&claim, None, result)
-                .await
-                .map(|result| Ending::Succeeded {
-                    remarks,
+            Disposition::Store(solved) => {
+                let result = self.store_result(&claim, None, solved.result).await;
+                result.map(|result| Ending::Succeeded {
+                    remarks: solved.remarks,
                     result,
-                    field_patches,
-                }),
+                    field_patches: solved.field_patches,
+                })
+            }
         };
         match stored {
             Ok(ending) => pending.ends.push((claim, ending)),
-            // The service stops while the disk takes nothing.
+            // The service stops while storage rejects writes.
             Err(error) if error.storage_fault().is_some() => pending.back.push(claim),
             Err(error) => pending.ends.push((claim, not_stored(&error))),
         }
@@ -334,14 +303,14 @@ impl Worker {
         &self,
         attempt: &mut Attempt,
         ends: Vec<(Claim, Ending)>,
-        from: Option<SystemTime>,
+        from: SystemTime,
         step: &mut StepReport,
     ) -> Result<()> {
         if ends.is_empty() {
             return Ok(());
         }
         let shared = &self.shared;
-        // A database that fails for a while does not cost the results.
+        // Results survive a temporary failure of the database.
         let ended = shared
             .write_with_retries(StoragePlace::Table, || {
                 shared.store.finish(&ends, shared.now_ms())
@@ -349,21 +318,18 @@ impl Worker {
             .await?;
         for (claim, ending) in &ends {
             if ended.contains(&claim.id) {
-                if let (Some(from), Some(traced)) = (from, shared.job_trace(claim)) {
+                if let Some(traced) = JobTrace::of(shared.options.tracer.as_ref(), claim) {
                     traced.stored(from, ending.state().name());
                 }
                 shared.metrics.ending(ending);
                 shared.announce(claim.id);
                 step.ended.push((claim.id, ending.state()));
-            } else {
-                step.lost.push(claim.id);
-                if let Ending::Succeeded {
-                    result: StoredResult::Blob(key, _),
-                    ..
-                } = ending
-                {
-                    self.abandon_blob(key).await;
-                }
+            } else if let Ending::Succeeded {
+                result: StoredResult::Blob(key, _),
+                ..
+            } = ending
+            {
+                self.abandon_blob(key).await;
             }
         }
         let ids: Vec<_> = ends.iter().map(|(claim, _)| claim.id).collect();
@@ -374,39 +340,32 @@ impl Worker {
         Ok(())
     }
 
-    /// Leaves a result that no job refers to, to be removed.
+    /// Registers a result without a job for removal.
     pub(crate) async fn abandon_blob(&self, key: &str) {
         if let Err(error) = self.shared.store.abandon_blob(key).await {
             tracing::warn!(key, %error, "a result without a job is left until the next start");
         }
     }
 
-    /// Ends members that waited for an equal one with its answer; without an answer they go back to the queue.
+    /// Ends members that waited for an equal one with its result; without a result they return to the queue.
     async fn settle_duplicates(&self, attempt: &mut Attempt, step: &mut StepReport) -> Result<()> {
-        let still: HashSet<Uuid> = attempt
+        let solving: HashSet<Uuid> = attempt
             .claims(|phase| matches!(phase, Phase::Solving))
             .iter()
             .map(|claim| claim.id)
             .collect();
-        let firsts: HashMap<Uuid, Uuid> = attempt
-            .members
-            .iter()
-            .filter_map(|member| match member.phase {
-                Phase::WaitingFor(first) if !still.contains(&first) => {
-                    Some((member.claim.id, first))
-                }
-                _ => None,
-            })
-            .collect();
-        let duplicates = attempt.claims(|phase| matches!(phase, Phase::WaitingFor(_)));
-        let pairs = duplicates.into_iter().filter_map(|claim| {
-            let first = *firsts.get(&claim.id)?;
-            Some((claim, first))
+        let members = attempt.members.iter();
+        let pairs = members.filter_map(|member| match member.phase {
+            Phase::WaitingFor(first) if !solving.contains(&first) => {
+                Some((member.claim.clone(), first))
+            }
+            _ => None,
         });
-        self.answer_with(attempt, pairs.collect(), step).await
+        let pairs = pairs.collect();
+        self.answer_with(attempt, pairs, step).await
     }
 
-    /// Stores a large result as a blob; a small one is handed back and goes into the database with the end of its job.
+    /// Stores a large result outside the table; a small one is stored later with the end of its job.
     async fn store_result(
         &self,
         claim: &Claim,
@@ -414,7 +373,7 @@ impl Worker {
         result: EncodedResult,
     ) -> Result<StoredResult> {
         let shared = &self.shared;
-        // Other programs read the answers of rows where they lie.
+        // Other programs read the files of rows directly.
         if !result.is_rows() && result.bytes() <= shared.options.small_result_max_bytes {
             return Ok(StoredResult::Inline(result));
         }
@@ -438,7 +397,7 @@ impl Worker {
             return Ok(());
         }
         let shared = &self.shared;
-        // While the store is away the jobs stay claimed: a lease that ran out would count as an attempt.
+        // While the store is unavailable the jobs stay claimed: an expired lease would count as an attempt.
         let released = shared
             .write_with_retries(StoragePlace::Table, || {
                 shared.store.release(claims, why, shared.now_ms())
@@ -453,9 +412,6 @@ impl Worker {
                 step.handed_back.push(*id);
             }
         }
-        let kept: HashSet<_> = released.iter().map(|(id, _)| *id).collect();
-        let lost = claims.iter().map(|claim| claim.id);
-        step.lost.extend(lost.filter(|id| !kept.contains(id)));
         let ids: Vec<_> = claims.iter().map(|claim| claim.id).collect();
         attempt.done(&ids);
         shared.wake_workers();
@@ -463,13 +419,12 @@ impl Worker {
     }
 }
 
-/// What remains to be written for the members of an attempt, in few transactions for all of them.
+/// Writes for the members of an attempt, combined into few transactions.
 #[derive(Default)]
 struct PendingWrites {
     ends: Vec<(Claim, Ending)>,
     back: Vec<Claim>,
     long: Vec<Claim>,
-    lost: Vec<Uuid>,
 }
 
 /// The end of a job whose result could not be stored.
@@ -499,10 +454,10 @@ mod tests {
         railhead_contact::check(&case, &railhead_contact::case::solver::Limits::default()).unwrap()
     }
 
-    /// What becomes of a job, as a word.
+    /// The effect of an outcome as a word.
     fn fate(outcome: Outcome, reason: Option<StopReason>) -> &'static str {
         match disposition_of(outcome, reason) {
-            Disposition::Store { .. } => "kept",
+            Disposition::Store(_) => "kept",
             Disposition::StoreSlice { stopped: None, .. } => "goes on",
             Disposition::StoreSlice { .. } => "part kept",
             Disposition::End(ending) => ending.state().name(),
@@ -522,13 +477,15 @@ mod tests {
             Some(StopReason::Deadline),
             Some(StopReason::TooLong),
         ];
-        let solved = || Outcome::Solved {
-            result: EncodedResult {
-                solution: "{}".into(),
-                fields: None,
-            },
-            remarks: Vec::new(),
-            field_patches: 0,
+        let solved = || {
+            Outcome::Solved(Solved {
+                result: EncodedResult {
+                    solution: "{}".into(),
+                    fields: None,
+                },
+                remarks: Vec::new(),
+                field_patches: 0,
+            })
         };
         let slice = || Outcome::Slice {
             sliced: Box::new(SlicedWork::Case(SlicedCase::new(

@@ -1,4 +1,4 @@
-//! What a solver thread does for one job: check, solve, encode.
+//! Tasks of a solver thread for one job: check, solve, encode.
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
@@ -12,8 +12,8 @@ use tokio_util::sync::CancellationToken;
 use crate::attempts::attempt::{
     Attempt, AttemptControl, Member, Outcomes, Phase, Solver, SolverThread, Task,
 };
-use crate::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Work};
-use crate::codec::encode::encode;
+use crate::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Solved, Work};
+use crate::codec::fields::encode;
 use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
 use crate::model::{Failure, FailureKind, Kind, Queue};
@@ -32,7 +32,7 @@ use railhead_contact::solution::words::answer::{Fields, PatchFields, Solution};
 use railhead_tables::parquet;
 use railhead_tables::table::{RowTable, TableColumn};
 
-/// Does the work; a panic becomes a failure and the thread stays usable.
+/// Runs a task; a panic becomes a failure, and the thread stays usable.
 pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Work) -> Outcome {
     let done = catch_unwind(AssertUnwindSafe(|| match work {
         Work::New(stored, notes) => check_and_solve(shared, control, &stored, &notes),
@@ -46,7 +46,7 @@ pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Wor
         },
     }));
     let ended = done.unwrap_or_else(|payload| {
-        // What a defect says of the program is for the log, not for clients.
+        // The message of a panic is for the log, not for clients.
         tracing::error!(reason = panic_text(payload.as_ref()), "the solver panicked");
         let detail = "the solver stopped on an internal error; the service's log has the reason";
         Ok(Outcome::Broken(Failure::new(FailureKind::Panic, detail)))
@@ -122,7 +122,7 @@ fn join_parts(
     }
 }
 
-/// The outcome of a case that is solved whole.
+/// The outcome of a case that is solved completely.
 fn whole(
     shared: &Shared,
     sliced: &SlicedCase,
@@ -133,14 +133,14 @@ fn whole(
     let seconds = spent.as_secs_f64();
     let method = sliced.checked.run.method_asked;
     shared.metrics.solved(method, &solution, seconds);
-    Ok(Outcome::Solved {
+    Ok(Outcome::Solved(Solved {
         result: encoded(&solution, fields)?,
         field_patches: u32::try_from(fields.patches.len()).unwrap_or(u32::MAX),
         remarks: solution.remarks,
-    })
+    }))
 }
 
-/// An answer, or a part of one, in its stored form.
+/// Encodes a solution, or a part of one, for storage.
 fn encoded(solution: &Solution, fields: &Fields) -> Result<EncodedResult, String> {
     let packed = match fields.patches.len() {
         0 => None,
@@ -152,10 +152,10 @@ fn encoded(solution: &Solution, fields: &Fields) -> Result<EncodedResult, String
     })
 }
 
-/// Puts the parts of an answer together, in the order of their slices. `go_on` is asked before each part.
+/// Joins the parts of a solution in the order of their slices. `go_on` is called before each part.
 ///
 /// # Errors
-/// A part cannot be read, or does not fit to the others. `None` if `go_on` said no.
+/// A part cannot be read, or does not match the others. `None` if `go_on` returned `false`.
 fn join(parts: &[EncodedResult], go_on: impl Fn() -> bool) -> Result<Option<(Solution, Fields)>> {
     let mut whole: Option<(Solution, Fields)> = None;
     for part in parts {
@@ -201,7 +201,7 @@ fn panic_text(payload: &(dyn Any + Send)) -> &str {
         .unwrap_or("no message")
 }
 
-/// Solves a chunk; its answers are a Parquet file.
+/// Solves a chunk of rows; its answers are a Parquet file.
 pub(crate) fn solve_chunk(shared: &Shared, control: &AttemptControl, stored: &StoredCase) -> Ended {
     let (head, chunk) = read_rows(stored).map_err(|error| error.to_string())?;
     let first_row = chunk.first_row;
@@ -226,14 +226,14 @@ pub(crate) fn solve_chunk(shared: &Shared, control: &AttemptControl, stored: &St
     shared.metrics.rows_ended(&answer);
     let file = parquet::encode(&table(&head, first_row, carried, answer));
     let file = file.map_err(|error| format!("a chunk of rows cannot be written: {error}"))?;
-    Ok(Outcome::Solved {
+    Ok(Outcome::Solved(Solved {
         result: EncodedResult {
             solution: Bytes::from(json!({ "rows": rows, "without_answer": without }).to_string()),
             fields: Some(Bytes::from(file)),
         },
         remarks: Vec::new(),
         field_patches: u32::try_from(without).unwrap_or(u32::MAX),
-    })
+    }))
 }
 
 fn read_rows(stored: &StoredCase) -> Result<(RunHead, RunChunk)> {
@@ -245,7 +245,7 @@ fn read_rows(stored: &StoredCase) -> Result<(RunHead, RunChunk)> {
     Ok((head, chunk))
 }
 
-/// The answers in the order of [`RunHead::answers`].
+/// The answers, with the columns of [`RunHead::answers`].
 fn table(
     head: &RunHead,
     first_row: u64,
@@ -272,11 +272,11 @@ fn table(
     RowTable { columns }
 }
 
-/// A group that takes longer hands back what it has not begun.
+/// After this time a group releases the jobs that it has not begun.
 const GROUP_TIME: Duration = Duration::from_millis(400);
 
-/// Keeps the leases of claimed jobs from now on.
-pub(crate) fn take_up(
+/// Creates an attempt at claimed jobs, whose leases are renewed from now on.
+pub(crate) fn new_attempt(
     shared: &Arc<Shared>,
     queue: Queue,
     claims: Vec<Claim>,
@@ -308,7 +308,7 @@ pub(crate) fn take_up(
     }
 }
 
-/// Hands the work for the members at these places to a thread.
+/// Passes tasks for the members with these indices to a thread.
 pub(crate) fn begin(
     shared: &Arc<Shared>,
     attempt: &mut Attempt,
@@ -324,7 +324,7 @@ pub(crate) fn begin(
         .map(|(place, work)| {
             let member = &attempt.members[place];
             member.control.reset_started();
-            let traced = shared.job_trace(&member.claim);
+            let traced = JobTrace::of(shared.options.tracer.as_ref(), &member.claim);
             (place, member.control.clone(), work, traced)
         })
         .collect();
@@ -342,7 +342,7 @@ pub(crate) fn begin(
                     if late || *closed || shared.stopping.is_cancelled() {
                         break;
                     }
-                    control.take_up();
+                    control.mark_started();
                 }
                 let from_queue = matches!(work, Work::New(..));
                 let solve = || solve_guarded(&shared, &control, work);
@@ -362,7 +362,7 @@ pub(crate) fn begin(
         });
         return;
     }
-    // The thread is gone, which no panic of a solver can do.
+    // The thread has ended, which no panic of a solver causes.
     let died = || Failure::new(FailureKind::Internal, "the solver thread had died");
     for place in attempt.to_solve() {
         attempt.members[place].phase = Phase::Solved(Outcome::Broken(died()));

@@ -1,15 +1,15 @@
-//! One turn of a worker: claimed jobs are solved, and what became of them is recorded.
+//! One turn of a worker: claimed jobs are solved, and their outcomes are recorded.
 //!
-//! A turn is a job or a group of small ones. The async side claims and finishes; the arithmetic runs on a thread of the worker's own.
-//! A sweep makes room for others between its slices. A solve that reaches no cut within a slice runs on; once all workers are at such
-//! solves, the spare worker serves jobs that are expected to be short. A solver that ignores a request to stop is left behind with its
-//! thread, and the worker goes on with a new one.
+//! A turn is a job or a group of small ones. The asynchronous part claims and finishes; the solver runs on a separate
+//! thread. A sweep yields to other jobs between its slices. A solve that does not reach the end of a slice in time
+//! continues; once all workers run such solves, the spare worker serves jobs that are expected to be short. A solver that
+//! ignores a stop request is abandoned with its thread, and the worker continues with a new thread.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use tokio::time::{MissedTickBehavior, interval};
+use tokio::time::{MissedTickBehavior, interval_at};
 
 use crate::attempts::attempt::{Attempt, Counted, Phase, SolverThread, StopReason};
 use crate::attempts::slices::Work;
@@ -19,7 +19,7 @@ use crate::store::{ClaimedCase, ReleaseReason};
 use crate::worker::pool::{StepReport, Worker};
 use crate::worker::solve;
 
-/// How long a solver that was told to stop may go on before its thread is left behind.
+/// How long a solver may continue after a stop request before its thread is abandoned.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// How often a worker checks whether other work waits for the solver.
@@ -35,7 +35,7 @@ impl Worker {
         self.read_cases(attempt, step).await?;
         attempt.set_aside_duplicates();
         attempt.turn_began = start;
-        // A sliced case comes back after each slice.
+        // A sweep returns here after each slice.
         while !attempt.to_solve().is_empty() {
             self.begin(attempt).await?;
             let working = self.shared.metrics.working();
@@ -98,15 +98,17 @@ impl Worker {
         Ok(())
     }
 
-    /// Waits until the solver is done, and stops it when its time is up. What a group has not begun within a slice goes back to the queue.
+    /// Waits until the solver has ended, and stops it when its time is up. Members of a group that were not begun within a
+    /// slice return to the queue.
     async fn until_over(&self, attempt: &mut Attempt, step: &mut StepReport) -> Result<()> {
         let shared = &self.shared;
         let (start, mut charged) = (Instant::now(), Instant::now());
         let slice = shared.options.slice;
-        let mut check = interval(YIELD_CHECK_INTERVAL.min(slice.max(Duration::from_millis(1))));
+        let period = YIELD_CHECK_INTERVAL.min(slice.max(Duration::from_millis(1)));
+        let mut check = interval_at((start + period).into(), period);
         check.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut told: Option<Instant> = None;
-        // The member that was told to stop, and since when its solver has gone on all the same.
+        // A stopped member whose solver continues, and since when.
         let mut unwanted: Option<(usize, Instant)> = None;
         let mut long: Option<LongSolve> = None;
         let lost = attempt.lease.lost().clone();
@@ -131,7 +133,7 @@ impl Worker {
                     let mut since = told.into_iter().chain(unwanted.map(|(_, since)| since));
                     if since.any(|since| since.elapsed() >= STOP_TIMEOUT) {
                         tracing::warn!("the solver does not stop; its thread is abandoned");
-                        self.leave_behind(attempt.abandon());
+                        self.abandon_thread(attempt.abandon());
                         break;
                     }
                     if told.is_none() && long.is_none() && attempt.turn_began.elapsed() >= slice
@@ -153,27 +155,27 @@ impl Worker {
         Ok(())
     }
 
-    /// Whether a case that has just stored a slice goes back to the queue. It does so only after half of its time has passed: then the
-    /// next slice would probably be interrupted.
+    /// Whether a job that has just stored a slice returns to the queue. It does so only after half of its time slice, when
+    /// the next slice would probably exceed it.
     pub(crate) async fn makes_room(&self, attempt: &Attempt) -> bool {
         let slice = self.shared.options.slice;
         attempt.turn_began.elapsed() >= slice / 2 && (self.spare || self.somebody_waits().await)
     }
 
-    /// Does other work wait for the solver?
+    /// Whether other jobs wait in the queues.
     async fn somebody_waits(&self) -> bool {
         let shared = &self.shared;
         let queues = shared.store.queues();
         !shared.draining.is_cancelled() && queues.await.is_ok_and(|queues| !queues.is_empty())
     }
 
-    /// Leaves a thread behind whose solver does not stop. Nothing but the end of the process ends such threads, so that too many of
+    /// Abandons the thread of a solver that does not stop. Only the end of the process ends such threads, so too many of
     /// them shut the service down.
-    fn leave_behind(&self, thread: Option<SolverThread>) {
+    fn abandon_thread(&self, thread: Option<SolverThread>) {
         let Some(thread) = thread else { return };
         let shared = &self.shared;
         let left = shared.abandoned.fetch_add(1, Ordering::AcqRel) + 1;
-        // The thread drops the other end of this with itself.
+        // The thread drops its reference when it ends.
         let _ = thread.left.set(Counted(shared.abandoned.clone()));
         drop(thread);
         let most = shared.options.abandoned_max;
@@ -183,14 +185,14 @@ impl Worker {
         }
     }
 
-    /// Releases what is still held after the store has failed.
+    /// Releases the jobs of an attempt after the store has failed.
     pub(crate) async fn give_up(&mut self, attempt: &mut Attempt) {
         attempt.stop(StopReason::Shutdown);
         if attempt.begun() {
             let over = attempt.over();
             let ended = tokio::time::timeout(STOP_TIMEOUT, over.cancelled()).await;
             if ended.is_err() {
-                self.leave_behind(attempt.abandon());
+                self.abandon_thread(attempt.abandon());
             } else {
                 attempt.take_outcomes();
                 self.thread = attempt.take_thread();
@@ -205,7 +207,7 @@ impl Worker {
     }
 }
 
-/// Counts a solve that has taken longer than a slice while others wait. Once all workers are at such solves, the spare worker begins.
+/// Counts a solve that has exceeded a time slice while other work waits. Once all workers run such solves, the spare worker begins.
 struct LongSolve(Arc<Shared>);
 
 impl LongSolve {

@@ -1,8 +1,8 @@
-//! What a process remembers of long queues between two claims, so that a claim does not walk over what was claimed before.
+//! Cached positions in long queues, so that a claim does not scan rows that were claimed before.
 //!
-//! Rows that were claimed stay in the index of queued jobs until VACUUM removes them, which it cannot while somebody holds an old
-//! snapshot. A claim therefore begins where the last one of this process began. Jobs that came back to the queue below that place, or
-//! were accepted by a node whose clock is behind, wait until the place is forgotten.
+//! Claimed rows remain in the index of queued jobs until VACUUM removes them, which is delayed by old snapshots. A claim
+//! therefore begins where the previous claim of this process began. Jobs that returned to the queue before that position,
+//! or were accepted by a node whose clock is behind, wait until the position expires.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -18,16 +18,16 @@ use crate::store::postgres::sql::rows::count;
 use crate::store::{ClaimRequest, Result};
 use crate::sync::lock;
 
-/// Queues that are shorter are counted and walked from their start at every claim.
+/// Shorter queues are counted and scanned from their start at every claim.
 const LONG: u64 = 2000;
 
-/// How long the place of a claim is remembered.
+/// How long the position of a claim is kept.
 const PLACE_KEPT: Duration = Duration::from_secs(2);
 
-/// How long the queues with jobs in them are remembered while one is long.
+/// How long the list of queues is cached while one of them is long.
 const QUEUES_KEPT: Duration = Duration::from_millis(250);
 
-/// Ranks of priority, the most urgent first.
+/// Number of priority ranks.
 const RANKS: usize = 3;
 
 macro_rules! peek_of {
@@ -46,7 +46,7 @@ macro_rules! peek_of {
     };
 }
 
-/// As the peek of every claim, from a place in each rank on. The parts are walked in their order, and only as far as needed.
+/// As `PEEK`, from a position in each rank on. The parts are scanned in their order, and only as far as needed.
 const PEEK_FROM: &str = concat!(
     "SELECT id, suspect, cost_us, rank FROM (",
     peek_of!("0", "$5"),
@@ -57,7 +57,7 @@ const PEEK_FROM: &str = concat!(
     ") AS queued LIMIT $2"
 );
 
-/// Where the claims of a long queue began, in each rank; empty: at its start. The time is that of the last one from the start.
+/// Positions in a long queue by rank; empty: its start. The time is that of the last scan from the start.
 type Places = (Instant, [String; RANKS]);
 
 #[derive(Debug, Default)]
@@ -66,7 +66,7 @@ struct Known {
     queues: Option<(Instant, Vec<(Queue, u64)>)>,
 }
 
-/// What a process remembers; clones share it.
+/// The cache of a process; clones share it.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ClaimMemory(Arc<Mutex<Known>>);
 
@@ -75,12 +75,12 @@ impl ClaimMemory {
         lock(&self.0)
     }
 
-    /// Jobs went back to the queue: the next claims walk it from the start.
+    /// Forgets the positions, because jobs returned to the queue.
     pub(crate) fn forget_places(&self) {
         self.known().places.clear();
     }
 
-    /// The first jobs of a queue, locked, at most as many as are asked for.
+    /// Selects and locks the first jobs of a queue, at most as many as requested.
     pub(crate) async fn peek(
         &self,
         connection: &mut PgConnection,
@@ -106,7 +106,7 @@ impl ClaimMemory {
         Ok(found)
     }
 
-    /// Remembers where a full group of a long queue began; without one the next claim begins at the start.
+    /// Stores the position of a full group of a long queue; after an incomplete group the next claim begins at the start.
     fn remember(&self, request: &ClaimRequest<'_>, found: &[PgRow], since: Instant) -> Result<()> {
         let mut known = self.known();
         let Some((_, mut places)) = known.places.remove(request.queue).or_else(|| {
@@ -130,7 +130,7 @@ impl ClaimMemory {
         Ok(())
     }
 
-    /// The queues with jobs in them as they were a moment ago, if one is long.
+    /// The cached list of queues, if one of them is long.
     pub(crate) fn queues(&self) -> Option<Vec<(Queue, u64)>> {
         let known = self.known();
         let (at, queues) = known.queues.as_ref()?;
@@ -138,7 +138,7 @@ impl ClaimMemory {
         (long && at.elapsed() < QUEUES_KEPT).then(|| queues.clone())
     }
 
-    /// Remembers the queues with jobs in them.
+    /// Caches the list of queues.
     pub(crate) fn remember_queues(&self, queues: &[(Queue, u64)]) {
         self.known().queues = Some((Instant::now(), queues.to_vec()));
     }

@@ -1,4 +1,4 @@
-//! Calls by which nodes learn of each other.
+//! Calls of nodes of a cluster.
 
 use std::sync::Arc;
 
@@ -12,22 +12,22 @@ use uuid::Uuid;
 use crate::store::postgres::connection::{FOLD, LOCKS};
 use crate::store::postgres::database::PostgresStore;
 use crate::store::postgres::objects::PgObjects;
-use crate::store::postgres::sql::rows::{count, read_id, read_small};
+use crate::store::postgres::sql::rows::{count, read_id};
 use crate::store::postgres::{engine, notifier};
-use crate::store::{Cluster, ClusterView, Deployment, Node, Notification, Result};
+use crate::store::{Cluster, Deployment, Node, Notification, Result};
 
 const NOW: &str = "SELECT CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)";
 
-/// A node that was not seen for so long is not counted, in ms.
+/// Time without a report after which a node counts as dead, in ms.
 const DEAD_AFTER: i64 = 20_000;
 
-/// A node that was not seen for so long is forgotten, in ms.
+/// Time without a report after which a node is removed, in ms.
 const FORGOTTEN_AFTER: i64 = 600_000;
 
-/// How long a batch is kept for whoever fills it, from each sign of life on, in ms; as in the schema.
+/// How long each report keeps a batch that is being filled, in ms; the schema has the same number.
 const FILLED_WITHIN: i64 = 60_000;
 
-/// A result that no job refers to after so long has lost its job, in ms: results are written just before their jobs end.
+/// Age at which a result without a job is an orphan, in ms: results are written shortly before their jobs end.
 const SWEPT_AFTER: i64 = 24 * 3600 * 1000;
 
 /// The key of a result is the folder of its objects.
@@ -41,7 +41,7 @@ impl Cluster for PostgresStore {
         Ok(sql!(scalar fetch_one, &self.writer, NOW)?)
     }
 
-    async fn beat(&self, node: &Node) -> Result<ClusterView> {
+    async fn beat(&self, node: &Node) -> Result<usize> {
         let now = self.now().await?;
         sql!(execute, &self.writer,
             "INSERT INTO nodes (id, version, workers, seen_at) VALUES ($1, $2, $3, $4) \
@@ -49,14 +49,11 @@ impl Cluster for PostgresStore {
             node.id.to_string(), env!("CARGO_PKG_VERSION"), count(node.workers), now
         )?;
         sql!(execute, &self.writer, "DELETE FROM nodes WHERE seen_at < $1"; now - FORGOTTEN_AFTER)?;
-        let living = sql!(fetch_one, &self.writer,
-            "SELECT COUNT(*) AS nodes, CAST(COALESCE(SUM(workers), 0) AS bigint) AS workers FROM nodes WHERE seen_at > $1";
+        let workers: i64 = sql!(scalar fetch_one, &self.writer,
+            "SELECT CAST(COALESCE(SUM(workers), 0) AS bigint) FROM nodes WHERE seen_at > $1";
             now - DEAD_AFTER
         )?;
-        Ok(ClusterView {
-            nodes: read_small(&living, "nodes")?,
-            workers: read_small(&living, "workers")?,
-        })
+        Ok(usize::try_from(workers).unwrap_or(0))
     }
 
     async fn leave(&self, node: Uuid) -> Result<()> {
@@ -88,7 +85,7 @@ impl Cluster for PostgresStore {
         Ok(swept.await?.rows_affected())
     }
 
-    // Somebody else may be at it.
+    // Another node may be summing up the counters.
     async fn fold_counts(&self) -> Result<()> {
         let mut transaction = self.writer.begin().await?;
         let free: bool = sql!(scalar fetch_one, &mut *transaction,
@@ -167,18 +164,18 @@ impl Cluster for PostgresStore {
 }
 
 impl PostgresStore {
-    /// The keys of all results outside the table, each once, in order.
+    /// The keys of all results outside the table, sorted.
     pub(crate) async fn result_keys(&self) -> Result<Vec<String>> {
         let keys = "SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL ORDER BY key";
         let mut connection = self.writer.acquire().await?;
-        // For a command of the operator, which may take its time.
+        // For a command of the operator, which may take long.
         sqlx::raw_sql("SET statement_timeout = 0")
             .execute(&mut *connection)
             .await?;
         Ok(sql!(scalar fetch_all, &mut *connection, keys)?)
     }
 
-    /// Removes all large results that are in the database.
+    /// Removes all large results from the database.
     pub(crate) async fn remove_objects(&self) -> Result<()> {
         sqlx::raw_sql("TRUNCATE objects")
             .execute(&self.writer)

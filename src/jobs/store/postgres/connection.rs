@@ -1,4 +1,4 @@
-//! Connections to PostgreSQL, and the locks that nodes take there.
+//! Connections to PostgreSQL, and advisory locks.
 
 use std::io::ErrorKind;
 use std::time::Duration;
@@ -8,24 +8,25 @@ use sqlx::postgres::{PgConnectOptions, PgConnection, PgPool, PgPoolOptions};
 use sqlx::query;
 use tokio::time::timeout;
 
-use crate::error::{JobsError, StoreError};
+use crate::error::{JobsError, StorageFault, StoreError};
 use crate::store::Result;
 use crate::store::postgres::url;
 
 /// How long a call waits for a connection.
 const CONNECT_WITHIN: Duration = Duration::from_secs(5);
 
-/// Prepared statements kept by a connection. Statements on several rows have a text for each number of rows.
+/// Number of prepared statements that a connection caches. Statements on several rows have a different text for each number
+/// of rows.
 const STATEMENTS_KEPT: usize = 300;
 
-/// How long a connection may take to say that it is alive, before it is used and before it is kept for later.
+/// Time limit of the check of a connection before its use and before it returns to the pool.
 const ALIVE_WITHIN: Duration = Duration::from_secs(3);
 
-/// A connection that was used so lately is not asked.
+/// A connection that was used within this time is not checked.
 const ALIVE_FOR: Duration = Duration::from_secs(1);
 
-/// Settings of every session. A node that was cut off inside a transaction keeps its rows locked, and others pass them by,
-/// until the server ends the session: because nothing is asked in the transaction, or because nobody takes what it sends.
+/// Settings of every session. A node that was disconnected inside a transaction keeps its rows locked, and others skip
+/// them, until the server ends the session because it is idle or its connection is dead.
 const SESSION: [(&str, &str); 7] = [
     ("statement_timeout", "10s"),
     ("lock_timeout", "5s"),
@@ -36,14 +37,13 @@ const SESSION: [(&str, &str); 7] = [
     ("tcp_user_timeout", "10s"),
 ];
 
-/// Locks of this service are told from those of others in the same database by this number ("rhjb"); the second number says
-/// what is locked.
+/// The first number of all advisory locks of this service ("rhjb"); the second one identifies the lock.
 pub(crate) const LOCKS: i32 = 0x7268_6a62;
 pub(crate) const ADMISSION: i32 = 1;
 pub(crate) const FOLD: i32 = 2;
 pub(crate) const SCHEMA: i32 = 3;
 
-/// How sessions with a database begin.
+/// The options of sessions with a database.
 ///
 /// # Errors
 /// [`JobsError::BadDatabaseUrl`].
@@ -56,7 +56,7 @@ pub(crate) fn session(url: &str) -> Result<PgConnectOptions, JobsError> {
         .options(SESSION))
 }
 
-/// Connects to a database, whatever is in it.
+/// Connects to a database with any contents.
 ///
 /// # Errors
 /// [`JobsError::BadDatabaseUrl`], [`JobsError::NoTls`], or it cannot be reached.
@@ -65,15 +65,15 @@ pub(crate) async fn connect(
     connections: u32,
 ) -> Result<(PgConnectOptions, PgPool), JobsError> {
     let options = session(url)?;
-    // A pool tries again until its time is over, and then no longer knows why.
+    // The pool would retry until its time limit, and lose the cause.
     let first = timeout(CONNECT_WITHIN, PgConnection::connect_with(&options)).await;
     let first = first.map_err(|_| StoreError::timed_out())?;
     first.map_err(tls_failed)?.close().await?;
     let pool = PgPoolOptions::new()
         .max_connections(connections)
         .acquire_timeout(CONNECT_WITHIN)
-        // The questions of the pool itself have no end: on a way that swallows everything they would keep all connections for
-        // as long as TCP tries, which is a quarter of an hour.
+        // The checks of the pool have no time limit: on a connection that drops packets they would block all connections
+        // until TCP gives up after a quarter of an hour.
         .test_before_acquire(false)
         .before_acquire(|connection, used| {
             Box::pin(async move {
@@ -91,7 +91,7 @@ pub(crate) async fn connect(
     Ok((options, pool))
 }
 
-/// Asks the server for a sign of life; a transaction that was left is rolled back with it.
+/// Checks a connection; rolls back a transaction that was left open.
 async fn alive(connection: &mut PgConnection) -> Result<(), sqlx::Error> {
     let silent = |_| sqlx::Error::Io(ErrorKind::TimedOut.into());
     timeout(ALIVE_WITHIN, connection.ping())
@@ -99,11 +99,11 @@ async fn alive(connection: &mut PgConnection) -> Result<(), sqlx::Error> {
         .map_err(silent)?
 }
 
-/// A connection that is not encrypted as the URL asks, or whose other end cannot be trusted, is no server that is away.
+/// Classifies an encryption that does not meet the URL, or a server that is not trusted, which is not an unavailable server.
 fn tls_failed(error: sqlx::Error) -> JobsError {
     match error {
         sqlx::Error::Tls(cause) => JobsError::NoTls(cause.to_string()),
-        // What the handshake says of a certificate that it does not accept.
+        // The error of the handshake for a certificate that is not accepted.
         sqlx::Error::Io(cause) if cause.kind() == ErrorKind::InvalidData => {
             JobsError::NoTls(cause.to_string())
         }
@@ -111,8 +111,29 @@ fn tls_failed(error: sqlx::Error) -> JobsError {
     }
 }
 
-/// From here to the end of the transaction nobody else has this lock.
+/// Takes an advisory lock until the end of the transaction.
 pub(crate) async fn lock(connection: &mut PgConnection, what: i32) -> Result<()> {
     sql!(execute, connection, "SELECT pg_advisory_xact_lock($1, $2)"; LOCKS, what)?;
     Ok(())
+}
+
+/// Maximum duration of a call; the server ends its statements earlier.
+const ANSWERED_WITHIN: Duration = Duration::from_secs(15);
+
+/// Runs a call with a time limit.
+pub(crate) async fn in_time<T>(call: impl Future<Output = Result<T>>) -> Result<T> {
+    let answer = timeout(ANSWERED_WITHIN, call).await;
+    answer
+        .unwrap_or_else(|_| Err(StoreError::timed_out()))
+        .map_err(far)
+}
+
+/// Classifies a server that rejects writes as unreachable, as opposed to a local disk.
+fn far(error: StoreError) -> StoreError {
+    match error {
+        StoreError::Away(StorageFault::Unwritable, cause) => {
+            StoreError::Away(StorageFault::Unreachable, cause)
+        }
+        other => other,
+    }
 }

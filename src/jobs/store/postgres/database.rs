@@ -1,4 +1,4 @@
-//! The job table in PostgreSQL, opened.
+//! The shared job table in PostgreSQL.
 
 use std::fmt;
 
@@ -15,26 +15,26 @@ use crate::store::{NotifyMode, Result};
 /// The job table that several processes share.
 #[derive(Clone)]
 pub struct PostgresStore {
-    /// The connection on which notifications are received.
+    /// Options of the connection that receives notifications; `None`: no notifications.
     pub(crate) listens_at: Option<PgConnectOptions>,
     pub(crate) writer: PgPool,
     pub(crate) readers: PgPool,
     pub(crate) group_commit: GroupCommit,
     pub(crate) notifier: Notifier,
     pub(crate) claim_memory: ClaimMemory,
-    /// Leases are judged by the times that are given, not by the clock of the database.
+    /// Whether leases use the times of the arguments instead of the clock of the database, for tests.
     pub(crate) given_clock: bool,
 }
 
 impl fmt::Debug for PostgresStore {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // The options of a pool have a password in them.
+        // The options of a pool contain a password.
         write!(f, "PostgresStore({} connections)", self.writer.size())
     }
 }
 
 impl PostgresStore {
-    /// Opens the database, whose tables must be there, with at most so many connections beside two for wake-ups.
+    /// Opens the database, whose tables must exist, with a maximum number of connections, in addition to two for notifications.
     ///
     /// # Errors
     /// [`JobsError::BadDatabaseUrl`], [`JobsError::UnsupportedSchema`], [`JobsError::NotMigrated`], or it cannot be reached.
@@ -42,7 +42,7 @@ impl PostgresStore {
         let (options, writer) = connect(url, connections).await?;
         require(&writer).await?;
         let store = PostgresStore {
-            group_commit: GroupCommit::start(writer.clone()),
+            group_commit: GroupCommit::start(writer.clone())?,
             notifier: Notifier::start(writer.clone()),
             claim_memory: ClaimMemory::default(),
             readers: writer.clone(),
@@ -53,7 +53,7 @@ impl PostgresStore {
         Ok(store)
     }
 
-    /// Receives notifications by another connection, or not at all.
+    /// Sets the source of notifications.
     ///
     /// # Errors
     /// [`JobsError::BadDatabaseUrl`].
@@ -66,7 +66,7 @@ impl PostgresStore {
         Ok(PostgresStore { listens_at, ..self })
     }
 
-    /// The same with leases that are judged by the times that are given, so that tests need no clock.
+    /// Uses the times of the arguments for leases, so that tests need no clock.
     #[must_use]
     pub fn with_given_clock(self) -> PostgresStore {
         PostgresStore {

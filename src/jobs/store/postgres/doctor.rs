@@ -1,4 +1,4 @@
-//! How is the database? What an operator wants to know before and while nodes use it.
+//! `railhead doctor`: checks of a shared database.
 
 use sqlx::postgres::PgPool;
 use sqlx::query_scalar;
@@ -7,30 +7,30 @@ use crate::error::JobsError;
 use crate::store::postgres::connection::connect;
 use crate::store::postgres::schema::require;
 
-/// Oldest version of the server that is supported, as it tells it itself.
+/// Oldest supported version of the server, in its own notation.
 const VERSION_MIN: i64 = 150_000;
 
-/// A clock that differs by more is wrong, in ms.
+/// A larger clock offset is a problem, in ms.
 const OFFSET_MAX: i64 = 5_000;
 
-/// A transaction that is open for longer keeps dead rows from being removed, in s.
+/// A transaction that is open for longer prevents the removal of dead rows, in s.
 const TRANSACTION_MAX: i64 = 300;
 
-/// More dead rows of the job table than this slow claims down.
+/// More dead rows of the job table than this slow down claims.
 const DEAD_ROWS_MAX: i64 = 200_000;
 
-/// The answer to one question.
+/// Result of one check.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finding {
-    /// What was asked.
+    /// Subject.
     pub about: &'static str,
-    /// What there is.
+    /// Finding.
     pub says: String,
-    /// It is not as it should be.
+    /// Whether it is a problem.
     pub wrong: bool,
 }
 
-/// What a number is about, the statement that reads it, and when it is wrong.
+/// Subject, statement and criterion of a check.
 type Question = (&'static str, &'static str, fn(i64) -> bool);
 
 macro_rules! questions {
@@ -49,7 +49,7 @@ const NUMBERS: [Question; 10] = questions! {
     "commits are on the disk when they are answered (0: they may be lost)"
         "SELECT CASE WHEN current_setting('synchronous_commit') = 'off' OR current_setting('fsync') = 'off' THEN 0::bigint ELSE 1 END"
         |durable| durable == 0;
-    // Behind a pooler that drops the settings with which sessions begin, those of the role count.
+    // Behind a pooler that drops the session options, the settings of the role apply.
     "seconds after which a session that was left inside a transaction is ended (0: never)"
         "SELECT setting::bigint / 1000 FROM pg_settings WHERE name = 'idle_in_transaction_session_timeout'"
         |seconds| seconds == 0;
@@ -73,7 +73,7 @@ const NUMBERS: [Question; 10] = questions! {
         |invalid| invalid > 0;
 };
 
-/// Looks at a database with a job table; changes nothing.
+/// Checks a database with a job table; changes nothing.
 ///
 /// # Errors
 /// [`JobsError::NotMigrated`], [`JobsError::UnsupportedSchema`], or it cannot be reached.

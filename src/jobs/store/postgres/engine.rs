@@ -1,4 +1,4 @@
-//! PostgreSQL as the shared statements see it.
+//! The interface of PostgreSQL for the shared statements.
 
 use async_trait::async_trait;
 use futures_util::TryStreamExt;
@@ -10,8 +10,7 @@ use uuid::Uuid;
 
 use crate::error::StoreError;
 use crate::model::Queue;
-use crate::store::postgres::answer::in_time;
-use crate::store::postgres::connection::{ADMISSION, lock};
+use crate::store::postgres::connection::{ADMISSION, in_time, lock};
 use crate::store::postgres::database::PostgresStore;
 use crate::store::postgres::engine;
 use crate::store::{ClaimRequest, Cluster, Result, Store};
@@ -25,14 +24,20 @@ pub(crate) type DbPool = PgPool;
 pub(crate) type DbRow = PgRow;
 pub(crate) type SqlStore = PostgresStore;
 
-/// What stands before and behind the present by which leases are judged, a value or NULL.
+/// Text before and after the parameter with the current time by which leases are judged; the database clock if it is NULL.
 pub(crate) const LEASE_NOW: (&str, &str) = (
     "COALESCE(",
     ", CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint))",
 );
 
-/// How often a call that gave way to another one is made again before its error counts.
+/// Number of repetitions after a conflict before the error is returned.
 const REPEATED: u32 = 4;
+
+/// Spawns the task that stores submitted jobs.
+pub(crate) fn spawn(task: impl Future<Output = ()> + Send + 'static) -> Result<()> {
+    drop(tokio::spawn(task));
+    Ok(())
+}
 
 /// Begins a transaction.
 pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>> {
@@ -44,7 +49,7 @@ pub(crate) async fn begin_claim(pool: &DbPool) -> Result<Transaction<'static, Db
     begin(pool).await
 }
 
-/// Passes each row of a statement on until `row` returns `false`.
+/// Passes each row of a statement to `row` until that returns `false`.
 pub(crate) async fn for_each(
     rows: Query<'_, Db, PgArguments>,
     readers: &DbPool,
@@ -59,13 +64,13 @@ pub(crate) async fn for_each(
     Ok(())
 }
 
-/// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key. What the one
-/// before did is seen by the next statement.
+/// Until the end of the transaction no other one takes places in the queue or uses idempotency keys. The next statement
+/// sees the effect of the previous holder.
 pub(crate) async fn lock_admission(connection: &mut DbConnection) -> Result<()> {
     lock(connection, ADMISSION).await
 }
 
-/// Keeps jobs from being removed until the end of the transaction: another job is about to refer to their results.
+/// Prevents the removal of jobs until the end of the transaction, because other jobs are about to refer to their results.
 pub(crate) async fn lock_jobs_for_share(connection: &mut DbConnection, ids: &[Uuid]) -> Result<()> {
     let ids: Vec<String> = ids.iter().map(Uuid::to_string).collect();
     sql!(fetch_all, connection,
@@ -75,8 +80,8 @@ pub(crate) async fn lock_jobs_for_share(connection: &mut DbConnection, ids: &[Uu
     Ok(())
 }
 
-/// Keeps others from counting the references to blobs until the end of the transaction. Of two who drop the last two
-/// references at the same time, the later sees that the other one is gone.
+/// Prevents changes of the references to blobs until the end of the transaction. Of two transactions that remove the last
+/// two references, the second sees the effect of the first.
 pub(crate) async fn lock_blobs(connection: &mut DbConnection, ids: &[i64]) -> Result<()> {
     sql!(fetch_all, connection,
         "SELECT id FROM blobs WHERE id = ANY($1) ORDER BY id FOR UPDATE";
@@ -86,7 +91,7 @@ pub(crate) async fn lock_blobs(connection: &mut DbConnection, ids: &[i64]) -> Re
 }
 
 impl PostgresStore {
-    /// Ids for new blobs. They are given here, not by the insertion: rows of one statement may come back in any order.
+    /// New ids of blobs. They are generated before the insertion, because its rows may be returned in any order.
     pub(crate) async fn new_blob_ids(
         &self,
         connection: &mut DbConnection,
@@ -99,7 +104,7 @@ impl PostgresStore {
         Ok(ids)
     }
 
-    /// The first new jobs of a queue, locked.
+    /// Selects and locks the first new jobs of a queue.
     pub(crate) async fn first_new(
         &self,
         connection: &mut DbConnection,
@@ -108,12 +113,12 @@ impl PostgresStore {
         self.claim_memory.peek(connection, request).await
     }
 
-    /// The present by which leases are judged: none, so that the database's clock is asked; in tests the one that is given.
+    /// The current time by which leases are judged: `None` for the clock of the database; in tests the argument.
     pub(crate) fn lease_now(&self, now: i64) -> Option<i64> {
         self.given_clock.then_some(now)
     }
 
-    /// The queues with jobs in them, if they were read a moment ago and one is long.
+    /// The cached queues, if one of them is long.
     pub(crate) fn known_queues(&self) -> Option<Vec<(Queue, u64)>> {
         self.claim_memory.queues()
     }
@@ -122,12 +127,12 @@ impl PostgresStore {
         self.claim_memory.remember_queues(queues);
     }
 
-    /// Jobs went back to the queue.
+    /// Records that jobs returned to the queue.
     pub(crate) fn requeued(&self) {
         self.claim_memory.forget_places();
     }
 
-    /// Size of the database.
+    /// Size of the database in bytes.
     pub(crate) async fn database_bytes(&self) -> Result<u64> {
         let bytes: i64 = sql!(scalar fetch_one, &self.readers,
             "SELECT pg_database_size(current_database())"
@@ -157,14 +162,14 @@ impl Store for PostgresStore {
         self.writer.close().await;
     }
 
-    /// The server gives space back by itself.
+    /// The server reclaims space by itself.
     async fn compact(&self, _: i64, _: u32) -> Result<bool> {
         Ok(false)
     }
 }
 
-/// Makes a call, and makes it again if it was the one that had to give way to another transaction, or if a row that it was about
-/// to remove was referred to meanwhile: in both cases nothing of it was done.
+/// Runs a call, and repeats it after a serialization failure, a deadlock, or a new reference to a row that it removes: in
+/// these cases nothing was changed.
 pub(crate) async fn again<T, F: Future<Output = Result<T>>>(call: impl Fn() -> F) -> Result<T> {
     for _ in 0..REPEATED {
         match in_time(call()).await {

@@ -1,4 +1,4 @@
-//! Takes the rows of an embedded job table into an empty database, all of them or none.
+//! Import of an embedded job table into an empty database, in one transaction.
 
 use sqlx::postgres::PgConnection;
 use sqlx::query_scalar;
@@ -10,7 +10,7 @@ use crate::store::postgres::connection::{ADMISSION, lock};
 use crate::store::postgres::database::PostgresStore;
 use crate::store::sqlite::database::SqliteStore;
 
-/// The tables that are moved, those first that others refer to. What a database counts itself is counted anew.
+/// The imported tables, referenced tables first. Counters are computed again by the database.
 const TABLES: [&str; 13] = [
     "templates",
     "batches",
@@ -27,11 +27,11 @@ const TABLES: [&str; 13] = [
     "profiles",
 ];
 
-/// What nodes may have made before: rows that are there stay as they are.
+/// Tables in which nodes may have inserted rows already, which are kept.
 const ONCE: [&str; 3] = ["tombstones", "api_keys", "profiles"];
 
 impl PostgresStore {
-    /// There is no job and no batch.
+    /// Requires that there is no job and no batch.
     ///
     /// # Errors
     /// [`JobsError::DatabaseNotEmpty`], or the database failed.
@@ -39,7 +39,7 @@ impl PostgresStore {
         require_empty(&mut *self.writer.acquire().await?).await
     }
 
-    /// Takes all rows of an embedded table; the number of those of each table.
+    /// Imports all rows of an embedded table; returns the number of rows of each table.
     ///
     /// # Errors
     /// [`JobsError::DatabaseNotEmpty`], or one of the databases failed; nothing changed.
@@ -52,7 +52,7 @@ impl PostgresStore {
         sqlx::raw_sql("SET LOCAL statement_timeout = 0; SET LOCAL idle_in_transaction_session_timeout = '60s'")
             .execute(&mut *transaction)
             .await?;
-        // Nothing is accepted meanwhile.
+        // Nothing is accepted in the meantime.
         lock(&mut transaction, ADMISSION).await?;
         require_empty(&mut transaction).await?;
         let mut moved = Vec::new();
@@ -88,7 +88,7 @@ async fn require_empty(connection: &mut PgConnection) -> Result<(), JobsError> {
     }
 }
 
-/// The statement that inserts a portion of a table, its parameter.
+/// The statement that inserts a portion of a table, which is its parameter.
 fn insertion(table: &str, columns: &[(String, String)]) -> String {
     let (mut names, mut values, mut types) = (Vec::new(), Vec::new(), Vec::new());
     for (name, kind) in columns {

@@ -1,13 +1,12 @@
-//! The job table that several processes share: PostgreSQL 15 or later.
+//! The shared job table: PostgreSQL 15 or later.
 //!
-//! The statements are those of the embedded table. What a single writer gives there is asked for here: claims lock their rows
-//! and pass by those that others have locked, who takes places in the queue does so alone, counts are kept as differences that
-//! nobody waits for, and only the clock of the database decides when a lease has run out.
+//! The statements are those of the embedded table. Locks replace its single writer: claims lock their rows and skip those
+//! that others have locked, and an advisory lock protects the places in the queue. Counters are stored as differences,
+//! which need no lock. Only the clock of the database decides when a lease has expired.
 
 #[macro_use]
 mod tokens;
 
-pub(crate) mod answer;
 mod claim_memory;
 pub mod cluster;
 pub mod connection;

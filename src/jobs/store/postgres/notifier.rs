@@ -1,5 +1,5 @@
-//! Notifications between the nodes of a database (`NOTIFY`), sent after the commit, outside its transaction: a transaction that notifies
-//! serialises the commits of the whole server.
+//! Notifications between nodes (`NOTIFY`). They are sent after the commit, outside its transaction, because a transaction
+//! that notifies serialises the commits of the whole server.
 
 use std::time::Duration;
 
@@ -8,22 +8,22 @@ use tokio::sync::mpsc;
 use tokio::time::timeout;
 use uuid::Uuid;
 
-use crate::store::postgres::answer::in_time;
+use crate::store::postgres::connection::in_time;
 use crate::store::{Notification, Result};
 
 /// The channel of all nodes.
 const CHANNEL: &str = "railhead";
 
-/// Shortest time between two notifications of a node.
+/// Minimum interval between two notifications of a node.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// Most notifications in one `NOTIFY`, whose payload may have 8000 bytes.
+/// Maximum number of notifications in one `NOTIFY`, whose payload is limited to 8000 bytes.
 const BATCH_MAX: usize = 200;
 
-/// Time without a notification after which the connection is probed: a cut connection is silent.
+/// Time without a notification after which the connection is checked, because a dead connection is silent.
 const SILENT_FOR: Duration = Duration::from_secs(10);
 
-/// Most pending notifications; further ones are dropped, and other nodes find the change by polling.
+/// Maximum number of pending notifications; further ones are dropped, and other nodes find the change by polling.
 const WAITING: usize = 10_000;
 
 /// A handle to the task that sends notifications; the task ends with its last handle.
@@ -40,7 +40,7 @@ impl Notifier {
 
     /// Sends a notification soon, unless too many are pending.
     pub(crate) fn publish(&self, notification: Notification) {
-        // A notification is a hint; a node that misses it polls a moment later.
+        // Nodes that miss a notification poll a moment later.
         let _ = self.0.try_send(notification);
     }
 }
@@ -62,7 +62,7 @@ async fn send_all(pool: PgPool, mut waiting: mpsc::Receiver<Notification>) {
     }
 }
 
-/// `w`, `e` with an id, `c` with an id; the first only once.
+/// The payload: `w`, `e` with an id, or `c` with an id; `w` only once.
 fn text_of(notifications: &[Notification]) -> String {
     let mut words = Vec::with_capacity(notifications.len());
     if notifications.contains(&Notification::Work) {
@@ -80,7 +80,7 @@ fn text_of(notifications: &[Notification]) -> String {
     words.join(" ")
 }
 
-/// A word that says nothing to this version is left out.
+/// Parses a word of a payload; `None` for words of later versions.
 fn read(word: &str) -> Option<Notification> {
     let id = || Uuid::try_parse(word.get(1..)?).ok();
     match word.get(..1)? {
@@ -91,7 +91,7 @@ fn read(word: &str) -> Option<Notification> {
     }
 }
 
-/// Passes on what all nodes ring, until the connection fails.
+/// Passes the notifications of all nodes to `heard` until the connection fails.
 pub(crate) async fn listen(
     options: PgConnectOptions,
     heard: &(dyn Fn(Notification) + Send + Sync),
@@ -109,7 +109,7 @@ pub(crate) async fn listen(
     loop {
         let notification = match timeout(SILENT_FOR, listener.try_recv()).await {
             Ok(Ok(Some(notification))) => notification,
-            // The connection failed and was made again; what was rung meanwhile is found by looking.
+            // The connection was restored; changes in between are found by polling.
             Ok(Ok(None)) => continue,
             Ok(Err(error)) => return Err(error.into()),
             Err(_) => {

@@ -1,4 +1,4 @@
-//! Large results in the database itself: objects in pieces, read by range as from any other object store.
+//! Large results in the database: an object store of pieces, with reads by range.
 
 use std::fmt;
 use std::ops::Range;
@@ -16,10 +16,10 @@ use object_store::{
 use sqlx::postgres::PgPool;
 use sqlx::{query, query_scalar};
 
-/// Bytes of a piece.
+/// Size of a piece in bytes.
 const PIECE: u64 = 1 << 20;
 
-/// What this store is called in errors.
+/// Name of this store in errors.
 const NAME: &str = "PostgreSQL";
 
 /// Objects in a table of the database.
@@ -43,7 +43,7 @@ impl PgObjects {
         match size {
             Some(size) => Ok(ObjectMeta {
                 location: location.clone(),
-                // Nobody asks for it.
+                // Not used.
                 last_modified: Default::default(),
                 size: size.unsigned_abs(),
                 e_tag: None,
@@ -53,7 +53,7 @@ impl PgObjects {
         }
     }
 
-    /// The part of a range that one piece has.
+    /// The part of a range that is in one piece.
     async fn piece(&self, location: &Path, number: u64, range: &Range<u64>) -> Result<Bytes> {
         let start = number * PIECE;
         let body: Option<Vec<u8>> = sql!(scalar fetch_optional, &self.pool,
@@ -61,7 +61,7 @@ impl PgObjects {
             location.as_ref(), number.cast_signed()
         )
         .map_err(failed)?;
-        // Somebody may have removed it meanwhile.
+        // It may have been removed in the meantime.
         let body = Bytes::from(body.ok_or_else(|| missing(location))?);
         let place = |at: u64| usize::try_from(at.saturating_sub(start)).unwrap_or(usize::MAX);
         let (from, to) = (place(range.start), place(range.end).min(body.len()));
@@ -164,7 +164,7 @@ impl ObjectStore for PgObjects {
             .boxed()
     }
 
-    /// Results in the database are found by its tables.
+    /// Not supported, because results in the database are found by its tables.
     fn list(&self, _: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
         stream::once(async { Err(not_done("list")) }).boxed()
     }

@@ -1,8 +1,9 @@
-//! The schema of the shared job table: made and brought forward by a command of the operator, required by every node.
+//! The schema of the shared job table: created and migrated by `railhead migrate`, required by every node.
 //!
-//! `schema.sql` is its first form. Every later one is a step of its own, so that a database in use is brought forward; a step is one
-//! transaction. Nodes of the version before go on beside newer tables as long as a step leaves what they use: it says from which
-//! form on programs can do so. What such a step leaves behind is removed by a step of the next version.
+//! `schema.sql` is version 1. Every later version is a migration, which is one transaction and can run while the database
+//! is in use. Nodes of the previous version can continue with the new tables as long as a migration keeps what they use:
+//! each migration names the oldest version that can use the tables. Leftovers are removed by a migration of the next
+//! version.
 
 use sqlx::PgConnection;
 use sqlx::postgres::PgPool;
@@ -11,7 +12,7 @@ use sqlx::{query, query_scalar};
 use crate::error::JobsError;
 use crate::store::postgres::connection::{self, connect, lock};
 
-/// The statements that make an empty schema a job table of form 1.
+/// The statements that create the tables of version 1.
 const SCHEMA: &str = include_str!("schema.sql");
 
 /// Migrations, in order: the version after the migration, its statements, and the oldest version whose programs can still use the tables.
@@ -32,25 +33,25 @@ const STEPS: &[(i64, &str, i64)] = &[
     (8, include_str!("steps/8.sql"), 7),
 ];
 
-/// The form that is read and written.
+/// The version that this program reads and writes.
 const SCHEMA_VERSION: i64 = STEPS[STEPS.len() - 1].0;
 
-/// The form without a step.
+/// The version of `schema.sql`.
 const FIRST_SCHEMA_VERSION: i64 = 1;
 
-/// What [`migrate`] did.
+/// Result of [`migrate`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Migrated {
-    /// The tables were made.
+    /// The tables were created.
     Made,
-    /// They were there, in an earlier form.
+    /// The tables were upgraded.
     Upgraded,
-    /// They were there.
+    /// The tables have this version or a later compatible one.
     AlreadyCurrent,
 }
 
-/// Makes the tables in the first schema of the search path, or brings them forward to the form of this program. Several may do so
-/// at once.
+/// Creates the tables in the first schema of the search path, or migrates them to the version of this program. Concurrent
+/// calls are safe.
 ///
 /// # Errors
 /// [`JobsError::UnsupportedSchema`] if there are tables that this program cannot use, or the database failed.
@@ -63,11 +64,11 @@ pub async fn migrate(url: &str) -> Result<Migrated, JobsError> {
 
 async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
     let mut transaction = pool.begin().await?;
-    // What is done to a large table takes its time.
+    // Changes of a large table may take long.
     sqlx::raw_sql("SET LOCAL statement_timeout = 0")
         .execute(&mut *transaction)
         .await?;
-    // Ends with the transaction: a lock of the session would not pass a pooler.
+    // The lock ends with the transaction, because a session lock would not work with a pooler.
     lock(&mut transaction, connection::SCHEMA).await?;
     let before = form(&mut transaction).await?;
     if before.is_some_and(|form| form >= SCHEMA_VERSION) {
@@ -123,7 +124,7 @@ async fn require_within(connection: &mut PgConnection) -> Result<(), JobsError> 
     }
 }
 
-/// The form of the tables, if there are any.
+/// The version of the tables, if they exist.
 async fn form(connection: &mut PgConnection) -> Result<Option<i64>, JobsError> {
     let there: bool = sql!(scalar fetch_one, &mut *connection,
         "SELECT to_regclass('deployment') IS NOT NULL"

@@ -1,48 +1,49 @@
-//! What PostgreSQL says otherwise than the other databases, as pieces of the statements they share.
+//! Parts of the shared statements in the words of PostgreSQL.
 
-/// Locks the rows of a selection; those that another transaction has locked are left out.
+/// Locks the selected rows; rows that another transaction has locked are skipped.
 macro_rules! skip_locked {
     () => {
         " FOR UPDATE SKIP LOCKED"
     };
 }
 
-/// Locks the rows of a selection, once whoever else has locked them is done.
+/// Locks the selected rows.
 macro_rules! for_update {
     () => {
         " FOR UPDATE"
     };
 }
 
-/// A column; which index is used is the planner's choice.
+/// A column; the planner chooses the index.
 macro_rules! bare {
     ($column:literal) => {
         $column
     };
 }
 
-/// A column whose order is not used: the planner would walk all jobs from the oldest to find the first that is queued.
+/// A column as an expression, so that its order is not used: the planner would scan all jobs from the oldest to find the
+/// first queued one.
 macro_rules! unordered {
     ($column:literal) => {
         concat!($column, " || ''")
     };
 }
 
-/// The larger of two values.
+/// The greater of two values.
 macro_rules! greatest {
     () => {
         "GREATEST"
     };
 }
 
-/// The smaller of two values.
+/// The lesser of two values.
 macro_rules! least {
     () => {
         "LEAST"
     };
 }
 
-/// Place of a text in another, 0 if it is not in there.
+/// Position of a text in another, 0 if it does not occur.
 macro_rules! place_in {
     () => {
         "strpos"
@@ -56,7 +57,7 @@ macro_rules! pairs_of_labels {
     };
 }
 
-/// The present by which leases are judged: this parameter, or the database's clock if it is NULL.
+/// The current time by which leases are judged: this parameter, or the clock of the database if it is NULL.
 macro_rules! lease_now {
     ($parameter:literal) => {
         concat!(
@@ -67,7 +68,7 @@ macro_rules! lease_now {
     };
 }
 
-/// 1 if some process is filling a batch: its lease has not run out.
+/// 1 if another process is filling a batch.
 macro_rules! being_filled {
     () => {
         "CAST(CASE WHEN filled_until > CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) THEN 1 ELSE 0 END AS bigint)"

@@ -1,8 +1,8 @@
-//! The URL of a database, read as libpq reads it; what would be left out silently is refused.
+//! Database URLs, interpreted as by libpq. Parameters that would be ignored are rejected.
 //!
-//! `sslmode` means what it does in libpq (PostgreSQL 15, 34.19.1): `require` encrypts, `verify-ca` also checks who signed the
-//! certificate of the server, `verify-full` also its name. Where libpq trusts the authorities of one file, this service trusts
-//! those of the system as well, and without `sslrootcert` those alone.
+//! `sslmode` has the meaning of libpq (PostgreSQL 15, 34.19.1): `require` encrypts, `verify-ca` also checks the signature
+//! of the server's certificate, `verify-full` also its name. Where libpq trusts the authorities of one file, this service
+//! also trusts those of the system; without `sslrootcert` it trusts only those.
 
 use std::str::FromStr;
 
@@ -10,7 +10,7 @@ use sqlx::postgres::{PgConnectOptions, PgSslMode};
 
 use crate::error::JobsError;
 
-/// Parameters of the query that are understood; `options[…]` are as well.
+/// Supported parameters, in addition to `options[…]`.
 const KNOWN: [&str; 12] = [
     "sslmode",
     "sslrootcert",
@@ -26,17 +26,17 @@ const KNOWN: [&str; 12] = [
     "options",
 ];
 
-/// Parameters that do no harm: what they ask for is done anyway, or by other means.
+/// Ignored parameters: they request the default behaviour.
 const HARMLESS: [(&str, &str); 3] = [
     ("connect_timeout", ""),
     ("gssencmode", "disable"),
     ("channel_binding", "prefer"),
 ];
 
-/// Reads the URL of a database.
+/// Parses the URL of a database.
 ///
 /// # Errors
-/// [`JobsError::BadDatabaseUrl`] if it is none, or asks for what is not done.
+/// [`JobsError::BadDatabaseUrl`] if it is invalid or has an unsupported parameter.
 pub(crate) fn read(text: &str) -> Result<PgConnectOptions, JobsError> {
     let bad = |why: &str| JobsError::BadDatabaseUrl(why.to_owned());
     let (front, query) = text.split_once('?').unwrap_or((text, ""));
@@ -68,7 +68,7 @@ pub(crate) fn read(text: &str) -> Result<PgConnectOptions, JobsError> {
         _ if system_roots => Err(bad(
             "sslrootcert=system needs sslmode=verify-full, for anybody may have a certificate of a public authority",
         )),
-        // As libpq does: who names an authority wants the certificate checked.
+        // As in libpq: a named authority implies that the certificate is checked.
         PgSslMode::Require if own_roots => Ok(options.ssl_mode(PgSslMode::VerifyCa)),
         _ => Ok(options),
     }

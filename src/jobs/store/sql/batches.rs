@@ -1,7 +1,7 @@
-//! Batches in the job table: filled piece by piece, acknowledged once they are complete.
+//! Batches in the job table: filled in portions, acknowledged once complete.
 //!
-//! No worker claims a job of a batch while it is being filled: the statement that claims leaves it out. A batch that a dead process left
-//! incomplete was never acknowledged and is removed with its jobs.
+//! Jobs of a batch that is not complete are excluded from claims. A batch that a crashed process left incomplete was never
+//! acknowledged and is removed with its jobs.
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
@@ -11,10 +11,10 @@ use railhead_macros::repeat_conflicts;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query};
+use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query, query_scalar};
 use super::rows::{
-    count, job_columns, push_list, push_name, read_blob_ids, read_count, read_flag, read_id,
-    read_job, read_json, read_kind, read_small, read_state, to_json,
+    count, job_columns, push_list, push_name, read_blob_ids, read_bytes, read_count, read_flag,
+    read_id, read_job, read_json, read_kind, read_optional_bytes, read_small, read_state, to_json,
 };
 use super::submit::{Places, insert_jobs};
 use crate::error::StoreError;
@@ -259,10 +259,10 @@ impl Batches for SqlStore {
         let mut items = Vec::new();
         let mut read = 0;
         engine::for_each(rows, &self.readers, |row| {
-            let solution: Option<Vec<u8>> = row.try_get("solution")?;
-            read += solution.as_ref().map_or(0, Vec::len);
+            let solution = read_optional_bytes(row, "solution")?;
+            read += solution.as_ref().map_or(0, Bytes::len);
             let key: Option<String> = row.try_get("blob_key")?;
-            let inline = solution.map(|solution| ItemResult::Solution(solution.into()));
+            let inline = solution.map(ItemResult::Solution);
             items.push(BatchItem {
                 index: read_small(row, "batch_index")?,
                 job: read_job(row)?,
@@ -276,19 +276,15 @@ impl Batches for SqlStore {
     }
 
     async fn batch_label_keys(&self, tenant: &str, id: Uuid, limit: u32) -> Result<Vec<String>> {
-        let rows = sql!(fetch_all, &self.readers,
+        let keys = sql!(scalar fetch_all, &self.readers,
             concat!(
-                "SELECT DISTINCT label.key AS key FROM jobs, ",
+                "SELECT DISTINCT label.key FROM jobs, ",
                 pairs_of_labels!(),
                 " AS label WHERE batch_id = (SELECT id FROM batches WHERE id = $1 AND tenant = $2) ORDER BY label.key LIMIT $3"
             );
             id.to_string(), tenant, i64::from(limit)
         )?;
-        let key = |row: &DbRow| {
-            let key = row.try_get("key")?;
-            Ok(key)
-        };
-        rows.iter().map(key).collect()
+        Ok(keys)
     }
 
     async fn batches(
@@ -331,18 +327,16 @@ impl Batches for SqlStore {
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>> {
         let row = sql!(fetch_optional, &self.readers, GET_RUN; id.to_string(), tenant)?;
         let Some(row) = row else { return Ok(None) };
-        let template: Vec<u8> = row.try_get("body")?;
-        let head: Option<Vec<u8>> = row.try_get("head")?;
         Ok(Some(RunRecord {
-            template: template.into(),
-            head: head.map(Bytes::from),
+            template: read_bytes(&row, "body")?,
+            head: read_optional_bytes(&row, "head")?,
             without_answer: read_count(&row, "without_answer")?,
             running: row.try_get("running")?,
         }))
     }
 }
 
-/// Stores the idempotency key of a batch. A key that is still there belongs to the rest of a batch that failed.
+/// Stores the idempotency key of a batch. An existing key belongs to a batch that failed and is replaced.
 async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<()> {
     let Some((key, digest)) = &new.idempotency else {
         return Ok(());
@@ -363,7 +357,7 @@ async fn has_template(connection: &mut DbConnection, tenant: &str, digest: &[u8]
     Ok(found.is_some())
 }
 
-/// What was given up is not filled any more.
+/// Fails if no row was found, because the batch was abandoned.
 fn require_batch(id: Uuid, found: u64) -> Result<()> {
     match found {
         0 => Err(StoreError::Failed(Arc::new(std::io::Error::other(
@@ -395,7 +389,7 @@ async fn by_key(
     let (id, complete) = (read_id(&row)?, read_flag(&row, "complete")?);
     let filled = read_flag(&row, "filled")? || filled_here(id);
     Ok(match (stored == digest, complete) {
-        // It is not filled any more, and it was never acknowledged.
+        // The batch is no longer filled and was never acknowledged.
         (_, false) if !filled => None,
         (false, _) => Some(BatchBegun::Conflict),
         (true, true) => Some(BatchBegun::Existing(id)),
@@ -403,10 +397,10 @@ async fn by_key(
     })
 }
 
-/// Most batches that are examined for one page, and how far they are counted.
+/// Maximum number of batches that are counted for one page.
 const EXAMINED_MAX: i64 = 10_000;
 
-/// The columns a [`Batch`] is read from.
+/// The columns of a [`Batch`].
 const COLUMNS: &str = "id, tenant, kind, created_at, count, rejected, name, labels, ended_at";
 
 impl SqlStore {
@@ -429,10 +423,10 @@ impl SqlStore {
         }
         let ids = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
         let mut query = QueryBuilder::new(
-            "SELECT batch_id AS id, state, COUNT(*) AS jobs FROM jobs WHERE batch_id IN (",
+            "SELECT batch_id AS id, state, COUNT(*) AS jobs FROM jobs WHERE batch_id IN ",
         );
         push_list(&mut query, &ids);
-        query.push(") GROUP BY batch_id, state");
+        query.push(" GROUP BY batch_id, state");
         let mut states: HashMap<Uuid, BTreeMap<State, u64>> = HashMap::new();
         for row in &query.build().fetch_all(&self.readers).await? {
             let of_batch = states.entry(read_id(row)?).or_default();
@@ -467,7 +461,7 @@ pub(crate) fn page_query(tenant: &str, filter: &Filter, after: Option<Uuid>) -> 
     query
 }
 
-/// A tenant has far fewer batches than jobs, so its batches are scanned from the newest.
+/// The statement of a page. A tenant has far fewer batches than jobs, so its batches are scanned from the newest.
 fn push_page(
     query: &mut QueryBuilder,
     columns: &str,
@@ -501,7 +495,7 @@ fn push_page(
     query.push(" ORDER BY id DESC");
 }
 
-/// Of a chunk, `field_patches` counts the rows without an answer.
+/// In rows of chunks, `field_patches` is the number of rows without an answer.
 const GET_RUN: &str = "SELECT body, head, \
      (SELECT CAST(COALESCE(SUM(field_patches), 0) AS bigint) FROM jobs WHERE batch_id = batches.id AND state = 'succeeded') AS without_answer, \
      (SELECT CAST(COALESCE(SUM(progress), 0.0) AS double precision) FROM jobs WHERE batch_id = batches.id AND state = 'running') AS running \

@@ -1,7 +1,7 @@
-//! References to blobs, in the transactions that make and drop them.
+//! References to blobs, in the transactions that create and remove them.
 //!
-//! A blob is a row. Jobs and stored slices refer to it; a job that shares a result is one more reference. [`release_blobs`] is
-//! the only place where a blob ends: it is called in every transaction that drops references.
+//! A blob is a row to which jobs and stored slices refer; jobs that share a result refer to the same blob. Every
+//! transaction that removes references calls [`release_blobs`], the only place that removes blobs.
 use std::collections::HashSet;
 
 use async_trait::async_trait;
@@ -12,12 +12,12 @@ use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, quer
 use super::rows::{count, fence, push_list, read_blob_ids, read_id, read_small, read_state};
 use crate::store::{Claim, Result, ResultKeys, StoredResult};
 
-/// Values bound in one statement; far below the bound of SQLite.
+/// Number of values bound in one statement; far below the limit of SQLite.
 pub(crate) const VALUES_PER_STATEMENT: usize = 250;
 
 impl SqlStore {
-    /// Stores results of claimed jobs whose leases are held, within the caller's transaction; the ids of their blobs are in the order of
-    /// the results.
+    /// Stores results of claimed jobs whose leases are held, within the caller's transaction; the ids of the blobs are in
+    /// the order of the results.
     pub(crate) async fn insert_blobs(
         &self,
         connection: &mut DbConnection,
@@ -56,12 +56,12 @@ impl SqlStore {
     }
 }
 
-/// Removes those of these blobs that nothing refers to any more; the keys of the large ones enter the outbox.
+/// Removes the blobs that have no more references; the keys of large results are added to the outbox.
 pub(crate) async fn release_blobs(connection: &mut DbConnection, mut ids: Vec<i64>) -> Result<()> {
     ids.sort_unstable();
     ids.dedup();
     for some in ids.chunks(VALUES_PER_STATEMENT) {
-        // Of two transactions that drop the last two references, the later has to see that the other one is gone.
+        // Of two transactions that remove the last two references, the second has to see the effect of the first.
         engine::lock_blobs(connection, some).await?;
         let mut free = QueryBuilder::new("DELETE FROM blobs WHERE id IN (");
         let mut list = free.separated(", ");
@@ -83,7 +83,7 @@ pub(crate) async fn release_blobs(connection: &mut DbConnection, mut ids: Vec<i6
     Ok(())
 }
 
-/// Removes the slices of those of these jobs that have ended. The rows have the columns `id`, `state` and `slices`.
+/// Removes the slices of the jobs that have ended. The rows have the columns `id`, `state` and `slices`.
 pub(crate) async fn drop_slices_of_ended(
     connection: &mut DbConnection,
     rows: &[DbRow],
@@ -96,17 +96,16 @@ pub(crate) async fn drop_slices_of_ended(
         }
     }
     for some in ids.chunks(VALUES_PER_STATEMENT) {
-        let mut drop = QueryBuilder::new("DELETE FROM job_slices WHERE job_id IN (");
+        let mut drop = QueryBuilder::new("DELETE FROM job_slices WHERE job_id IN ");
         push_list(&mut drop, some);
-        drop.push(") RETURNING blob_id");
+        drop.push(" RETURNING blob_id");
         let gone = drop.build().fetch_all(&mut *connection).await?;
         release_blobs(connection, read_blob_ids(&gone)?).await?;
     }
     Ok(())
 }
 
-/// Leaves these keys to the collector, except those that another blob has: a call that is repeated because its answer was
-/// lost brings the same key twice.
+/// Adds keys to the outbox of the collector, except those that another blob has: a repeated call may pass the same key twice.
 pub(crate) async fn leave_to_collector(
     connection: &mut DbConnection,
     keys: &[String],
@@ -125,21 +124,13 @@ pub(crate) async fn leave_to_collector(
     Ok(())
 }
 
-pub(crate) fn push_keys(query: &mut QueryBuilder, keys: &[String]) {
-    let mut list = query.separated(", ");
-    for key in keys {
-        list.push_bind(key.clone());
-    }
-    query.push(")");
-}
-
 #[repeat_conflicts]
 #[async_trait]
 impl ResultKeys for SqlStore {
     async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>> {
         for some in done.chunks(VALUES_PER_STATEMENT) {
-            let mut forget = QueryBuilder::new("DELETE FROM blob_outbox WHERE key IN (");
-            push_keys(&mut forget, some);
+            let mut forget = QueryBuilder::new("DELETE FROM blob_outbox WHERE key IN ");
+            push_list(&mut forget, some);
             forget.build().execute(&self.writer).await?;
         }
         let keys = sql!(scalar fetch_all, &self.readers,
@@ -157,11 +148,10 @@ impl ResultKeys for SqlStore {
     async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Vec<String>> {
         let mut orphans = Vec::new();
         for some in results.chunks(VALUES_PER_STATEMENT) {
-            // In this order: what a running job has written is known by its key before the job no longer runs.
+            // In this order: a running job registers the keys of its results before it stops running.
             let running = self.running(some).await?;
-            let mut query = QueryBuilder::new("SELECT key FROM blobs WHERE key IN (");
-            let keys: Vec<String> = some.iter().map(|(_, key)| key.clone()).collect();
-            push_keys(&mut query, &keys);
+            let mut query = QueryBuilder::new("SELECT key FROM blobs WHERE key IN ");
+            push_list(&mut query, some.iter().map(|(_, key)| key));
             let known = query.build().fetch_all(&self.readers).await?;
             let known = known.iter().map(|row| row.try_get("key"));
             let known: HashSet<String> = known.collect::<Result<_, _>>()?;
@@ -176,11 +166,8 @@ impl ResultKeys for SqlStore {
 
 impl SqlStore {
     async fn running(&self, results: &[(Uuid, String)]) -> Result<HashSet<Uuid>> {
-        let mut query =
-            QueryBuilder::new("SELECT id FROM jobs WHERE state = 'running' AND id IN (");
-        let ids: Vec<Uuid> = results.iter().map(|(id, _)| *id).collect();
-        push_list(&mut query, &ids);
-        query.push(")");
+        let mut query = QueryBuilder::new("SELECT id FROM jobs WHERE state = 'running' AND id IN ");
+        push_list(&mut query, results.iter().map(|(id, _)| id));
         let rows = query.build().fetch_all(&self.readers).await?;
         rows.iter().map(read_id).collect()
     }

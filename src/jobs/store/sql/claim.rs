@@ -1,4 +1,4 @@
-//! Claims: the next group of queued jobs of a tenant.
+//! Claims of queued jobs, leases, and slices.
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,8 +11,8 @@ use uuid::Uuid;
 use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{
-    count, fence, push_list, read_blob_ids, read_cache_key, read_count, read_flag, read_id,
-    read_kind, read_move, read_optional_id, read_small,
+    count, fence, push_list, read_blob_ids, read_bytes, read_cache_key, read_count, read_flag,
+    read_id, read_kind, read_move, read_optional_bytes, read_optional_id, read_result, read_small,
 };
 use crate::error::StoreError;
 use crate::model::{Queue, State};
@@ -21,7 +21,7 @@ use crate::store::{
     Result, SliceRecord, StoredCase, StoredResult,
 };
 
-/// Selects the first jobs of the queue $1 and $5, at most $2; suspects if $6 is 1.
+/// Selects the first jobs of the queue of tenant $1 and kind $5, at most $2; includes suspects if $6 is 1.
 macro_rules! peek {
     ($begun:literal) => {
         concat!(
@@ -35,18 +35,18 @@ macro_rules! peek {
     };
 }
 
-/// The jobs of a queue that come first: by priority, the oldest of each first. Jobs whose deadline has passed are
-/// left to whoever ends them, jobs of a batch that is not acknowledged to whoever fills it.
+/// The first new jobs of a queue, by priority and age. Jobs whose deadline has passed and jobs of a batch that is not
+/// complete are skipped.
 pub(crate) const PEEK: &str = peek!("slices = 0");
 
-/// Like `PEEK`, for jobs of which some slices are solved.
+/// As [`PEEK`], for jobs with stored slices.
 pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0");
 
-/// The columns that a [`Claim`] is read from.
+/// The columns of a [`Claim`].
 const CLAIMED: &str = "id, rank, attempt, lease_token, method, traceparent, suspect, slices, \
      CASE WHEN bypass_cache = 1 THEN NULL ELSE cache_key END AS cache_key";
 
-/// Queues with jobs in them.
+/// Queues that have jobs.
 pub(crate) const QUEUES: &str = "SELECT tenant, kind, CAST(SUM(number) AS bigint) AS waiting FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0 ORDER BY tenant, kind";
 
 #[repeat_conflicts]
@@ -89,10 +89,9 @@ impl Claims for SqlStore {
             "SELECT id, kind, cases.row, body, batch_id, cancel_requested, CASE WHEN bypass_cache = 0 AND jobs.cache_key IS NOT NULL THEN \
              (SELECT source.id FROM jobs AS source WHERE source.cache_key = jobs.cache_key AND source.state = 'succeeded' LIMIT 1) END AS source \
              FROM cases JOIN jobs ON jobs.id = cases.job_id \
-             WHERE job_id IN (",
+             WHERE job_id IN ",
         );
         push_list(&mut query, ids);
-        query.push(")");
         let mut connection = self.readers.acquire().await?;
         let rows = query.build().fetch_all(&mut *connection).await?;
         drop(connection);
@@ -113,12 +112,11 @@ impl Claims for SqlStore {
                 template = Some(of_batch.clone());
                 head.clone_from(of_run);
             }
-            let body: Vec<u8> = row.try_get("body")?;
             let case = StoredCase {
                 kind: read_kind(row)?,
                 template,
                 head,
-                body: body.into(),
+                body: read_bytes(row, "body")?,
             };
             let claimed = ClaimedCase {
                 case,
@@ -172,9 +170,12 @@ impl Claims for SqlStore {
         if claims.is_empty() {
             return Ok(Vec::new());
         }
-        let mut query = with_held(claims);
+        let mut query = QueryBuilder::new("WITH held (id, lease_token) AS (");
+        query.push_values(claims, |mut row, claim| {
+            values!(row; claim.id.to_string(), fence(claim));
+        });
         query.push(
-            " UPDATE jobs SET state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
+            ") UPDATE jobs SET state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
              started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
              attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, \
              version = version + 1",
@@ -215,7 +216,7 @@ impl Claims for SqlStore {
         let note = &slice.note;
         let spent_us = i64::try_from(note.spent.as_micros()).unwrap_or(i64::MAX);
         let mut transaction = engine::begin(&self.writer).await?;
-        // Attempts are counted from the last slice that was stored: who gets on is not what processes die of.
+        // Attempts are counted from the last stored slice: a job that makes progress does not crash its process.
         let added = sql!(execute, &mut *transaction,
             "UPDATE jobs SET attempt = 1, version = version + 1, slices = $1, done = $2, progress = $2, cost_us = $3 \
              WHERE id = $4 AND lease_token = $5 AND state = 'running'";
@@ -264,27 +265,17 @@ impl Claims for SqlStore {
 
     async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>> {
         let rows = sql!(fetch_all, &self.readers, RESULTS; id.to_string())?;
-        rows.iter()
-            .map(|row| {
-                if let Some(key) = row.try_get::<Option<String>, _>("key")? {
-                    return Ok(StoredResult::Blob(key, read_count(row, "bytes")?));
-                }
-                Ok(StoredResult::inline(
-                    row.try_get("solution")?,
-                    row.try_get("fields")?,
-                ))
-            })
-            .collect()
+        rows.iter().map(read_result).collect()
     }
 }
 
-/// A token that no other claim has, not even after the database was restored from a backup.
+/// A random token. No other claim has it, even after the database was restored from a backup.
 fn new_token() -> Result<i64> {
     let random = getrandom::u64().map_err(|error| StoreError::Failed(Arc::new(error)))?;
     Ok(count(random >> 1))
 }
 
-/// Writes when a lease that begins now runs out.
+/// Adds the expression for the expiry of a lease that begins now.
 fn push_lease_until(query: &mut QueryBuilder, store: &SqlStore, lease: Lease) {
     query.push(engine::LEASE_NOW.0);
     query.push_bind(store.lease_now(lease.now));
@@ -305,7 +296,7 @@ fn read_claim(row: &DbRow) -> Result<Claim> {
     })
 }
 
-/// The first jobs of a queue, found by a statement from its start.
+/// Selects the first jobs of a queue with the statement `peek`.
 pub(crate) async fn first_queued(
     connection: &mut DbConnection,
     peek: &'static str,
@@ -321,7 +312,7 @@ pub(crate) async fn first_queued(
     Ok(rows)
 }
 
-/// The ids of the next group: the first of the queued jobs together with those behind it that are small enough.
+/// The ids of the next group: the first of the queued jobs, and the jobs after it that fit the bounds of the request.
 fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>> {
     let mut ids = Vec::with_capacity(queued.len());
     let mut cost_us = 0;
@@ -340,7 +331,7 @@ fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>> {
 }
 
 impl SqlStore {
-    /// Claims the next jobs of a queue; rows with the columns of `CLAIMED`.
+    /// Claims the next jobs of a queue; the rows have the columns of `CLAIMED`.
     async fn claim_next(&self, request: &ClaimRequest<'_>, token: i64) -> Result<Vec<DbRow>> {
         let mut transaction = engine::begin_claim(&self.writer).await?;
         let queued = match request.kind {
@@ -364,47 +355,40 @@ impl SqlStore {
         update.push(concat!(
             ", progress = done, version = version + 1 WHERE ",
             bare!("state"),
-            " = 'queued' AND id IN ("
+            " = 'queued' AND id IN "
         ));
-        push_list(&mut update, &ids);
-        update.push(") RETURNING ").push(CLAIMED);
+        push_list(&mut update, ids);
+        update.push(" RETURNING ").push(CLAIMED);
         let rows = update.build().fetch_all(&mut *transaction).await?;
         transaction.commit().await?;
         Ok(rows)
     }
 
-    /// The template of a batch, and the head of a run.
+    /// Reads the template of a batch, and the head of a run.
     async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>> {
         let row = sql!(fetch_optional, &self.readers,
             "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
              WHERE batches.id = $1";
             batch
         )?;
-        // It goes with the last job of its batch.
+        // The template is removed with the last job of its batch.
         let Some(row) = row else { return Ok(None) };
-        let (body, head): (Vec<u8>, Option<Vec<u8>>) = (row.try_get("body")?, row.try_get("head")?);
-        Ok(Some((body.into(), head.map(Bytes::from))))
+        Ok(Some((
+            read_bytes(&row, "body")?,
+            read_optional_bytes(&row, "head")?,
+        )))
     }
 }
 
-/// The end of an update of claimed jobs, as long as their leases are held.
+/// The end of an update that is restricted to jobs whose leases are held.
 const OF_HELD: &str = concat!(
     " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token AND ",
     unordered!("jobs.state"),
     " = 'running' RETURNING "
 );
 
-fn with_held(claims: &[Claim]) -> QueryBuilder {
-    let mut query = QueryBuilder::new("WITH held (id, lease_token) AS (");
-    query.push_values(claims, |mut row, claim| {
-        row.push_bind(claim.id.to_string()).push_bind(fence(claim));
-    });
-    query.push(")");
-    query
-}
-
 pub(crate) const NOTES: &str =
     "SELECT number, motions, digest, spent_us FROM job_slices WHERE job_id = $1 ORDER BY number";
 
-pub(crate) const RESULTS: &str = "SELECT key, bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
+pub(crate) const RESULTS: &str = "SELECT key AS blob_key, bytes AS blob_bytes, solution, fields FROM job_slices JOIN blobs ON blobs.id = blob_id \
      WHERE job_id = $1 ORDER BY number";

@@ -1,5 +1,4 @@
-//! Cached results: a job ends with the result of another. It then refers to the same blob, which is kept for as long as any
-//! job refers to it.
+//! Ends of jobs: with their own result, or with the result of another job, to whose blob they then refer.
 use std::collections::{HashMap, HashSet};
 
 use async_trait::async_trait;
@@ -12,12 +11,12 @@ use super::rows::{fence, read_cache_key, read_id, read_move, read_optional_id, t
 use crate::model::State;
 use crate::store::{CacheKey, Claim, Ending, Ends, NewJob, Result, StoredResult};
 
-/// One seek in the index, however many jobs have the same key.
+/// Finds the job of a cache key by one index lookup, however many jobs have the same key.
 pub(crate) const SOURCE: &str =
     "(SELECT id FROM jobs WHERE cache_key = asked.cache_key AND state = 'succeeded' LIMIT 1)";
 
-/// Ends those of the jobs just queued that have a source, with its result. A job whose source is gone meanwhile stays
-/// queued. Returns the jobs that ended.
+/// Ends the newly inserted jobs that have a source, with its result. A job whose source was removed in the
+/// meantime stays queued. Returns the jobs that ended.
 pub(crate) async fn end_with_sources(
     connection: &mut DbConnection,
     jobs: impl Iterator<Item = &NewJob>,
@@ -36,25 +35,28 @@ pub(crate) async fn end_with_sources(
     end_pairs(connection, &pairs).await
 }
 
-/// A job and the one whose result it gets.
+/// A job, and the job whose result it gets.
 pub(crate) struct Pair {
     pub(crate) job: Uuid,
     pub(crate) source: Uuid,
     pub(crate) at: i64,
-    /// Of a claimed job.
+    /// The fencing token, if the job was claimed.
     pub(crate) lease_token: Option<i64>,
 }
 
-/// Ends jobs that are queued, or running under the given lease; returns them.
+/// Ends jobs that are queued, or running with the given fencing token; returns them.
 pub(crate) async fn end_pairs(connection: &mut DbConnection, pairs: &[Pair]) -> Result<Vec<Uuid>> {
     if pairs.is_empty() {
         return Ok(Vec::new());
     }
     let sources: Vec<Uuid> = pairs.iter().map(|pair| pair.source).collect();
     engine::lock_jobs_for_share(connection, &sources).await?;
-    let mut update = with_pairs(pairs);
+    let mut update = QueryBuilder::new("WITH pairs (job, at, source, lease_token) AS (");
+    update.push_values(pairs, |mut row, pair| {
+        values!(row; pair.job.to_string(), pair.at, pair.source.to_string(), pair.lease_token);
+    });
     update.push(
-        " UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, updated_at = pairs.at, progress = 1.0, cached = 1, \
+        ") UPDATE jobs SET state = 'succeeded', started_at = pairs.at, ended_at = pairs.at, updated_at = pairs.at, progress = 1.0, cached = 1, \
          remarks = source.remarks, blob_id = source.blob_id, field_patches = source.field_patches, \
          cache_key = NULL, lease_until = NULL, worker = NULL, version = jobs.version + 1, \
          attempt = CASE WHEN pairs.lease_token IS NULL THEN jobs.attempt ELSE jobs.attempt - 1 END \
@@ -67,18 +69,9 @@ pub(crate) async fn end_pairs(connection: &mut DbConnection, pairs: &[Pair]) -> 
     rows.iter().map(read_id).collect()
 }
 
-fn with_pairs<'a>(pairs: impl IntoIterator<Item = &'a Pair>) -> QueryBuilder {
-    let mut query = QueryBuilder::new("WITH pairs (job, at, source, lease_token) AS (");
-    query.push_values(pairs, |mut row, pair| {
-        values!(row; pair.job.to_string(), pair.at, pair.source.to_string(), pair.lease_token);
-    });
-    query.push(")");
-    query
-}
-
 impl SqlStore {
-    /// Ends jobs with what their solves gave, as long as their leases are held. Returns the ids of the blobs, and the rows of the jobs
-    /// that ended.
+    /// Ends jobs with the outcomes of their solves if their leases are held. Returns the ids of the blobs, and the rows of
+    /// the jobs that ended.
     async fn end_solved(
         &self,
         connection: &mut DbConnection,
@@ -106,7 +99,7 @@ impl SqlStore {
         update.push(") UPDATE jobs SET state = done.state, ended_at = ");
         update.push_bind(now);
         update.push(", updated_at = ").push_bind(now);
-        // Jobs are found by their ids: the index of running ones keeps what no longer runs, until that can be removed.
+        // Jobs are found by their ids: the index of running jobs contains dead rows until VACUUM.
         update.push(concat!(
             ", remarks = done.remarks, failure = done.failure, blob_id = done.blob, \
              field_patches = done.patches, \
@@ -120,13 +113,6 @@ impl SqlStore {
         let ended = update.build().fetch_all(connection).await?;
         Ok((made, ended))
     }
-}
-
-/// The jobs that ended.
-fn read_ended(rows: &[DbRow]) -> Result<HashSet<Uuid>> {
-    rows.iter()
-        .map(|row| Ok(read_move(row, State::Running)?.0))
-        .collect()
 }
 
 #[repeat_conflicts]
@@ -156,9 +142,12 @@ impl Ends for SqlStore {
         let mut transaction = engine::begin(&self.writer).await?;
         let (made, rows_ended) = self.end_solved(&mut transaction, &rows, now).await?;
         drop_slices_of_ended(&mut transaction, &rows_ended).await?;
-        let mut ended = read_ended(&rows_ended)?;
+        let ids = rows_ended
+            .iter()
+            .map(|row| Ok(read_move(row, State::Running)?.0));
+        let mut ended = ids.collect::<Result<HashSet<Uuid>>>()?;
         if ended.len() < rows.len() {
-            // Results whose lease was lost meanwhile have no owner.
+            // Results of jobs whose lease was lost have no owner.
             release_blobs(&mut transaction, made).await?;
             let lost = rows.iter().filter(|(claim, _)| !ended.contains(&claim.id));
             let lost = lost.filter_map(|(_, end)| match end.result {
@@ -193,7 +182,7 @@ impl Ends for SqlStore {
     }
 }
 
-/// The end of a job in the form the database takes.
+/// The end of a job as column values.
 pub(crate) struct EndRow<'a> {
     pub(crate) state: State,
     pub(crate) remarks: String,
@@ -227,7 +216,7 @@ impl EndRow<'_> {
                 row.remarks = to_json(remarks)?;
                 row.failure = Some(to_json(failure)?);
             }
-            // The latter is written elsewhere.
+            // `Cached` is handled by `end_pairs`.
             Ending::Cancelled | Ending::Cached { .. } => {}
         }
         Ok(row)

@@ -1,20 +1,19 @@
-//! What clients ask of one job.
+//! Calls of clients for single jobs, and lists of jobs.
 use std::cmp::Reverse;
 
 use async_trait::async_trait;
-use bytes::Bytes;
 use railhead_macros::repeat_conflicts;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{
-    GET, job_columns, push_name, read_blob_id, read_count, read_flag, read_id, read_job, read_kind,
-    read_optional_id, read_small,
+    GET, job_columns, push_name, read_blob_id, read_bytes, read_count, read_flag, read_id,
+    read_job, read_kind, read_optional_bytes, read_optional_id, read_result, read_small,
 };
 use crate::model::{Job, State};
 use crate::store::{
-    Change, ClientJobs, Deleted, Filter, Page, Result, ResultRef, StoredCase, StoredResult, Total,
+    Change, ClientJobs, Deleted, Filter, Page, Result, ResultRef, StoredCase, Total,
 };
 
 #[repeat_conflicts]
@@ -79,12 +78,8 @@ impl ClientJobs for SqlStore {
             return Ok(Some((job, None)));
         }
         let patches: u32 = read_small(&row, "field_patches")?;
-        let result = match row.try_get::<Option<String>, _>("blob_key")? {
-            Some(key) => StoredResult::Blob(key, read_count(&row, "blob_bytes")?),
-            None => StoredResult::inline(row.try_get("solution")?, row.try_get("fields")?),
-        };
         let stored = ResultRef {
-            result,
+            result: read_result(&row)?,
             field_patches: patches as usize,
             outputs: row.try_get("outputs")?,
         };
@@ -100,17 +95,15 @@ impl ClientJobs for SqlStore {
             id.to_string(), tenant
         )?;
         let Some(row) = row else { return Ok(None) };
-        let body: Vec<u8> = row.try_get("body")?;
-        let template: Option<Vec<u8>> = match read_flag(&row, "row")? {
-            true => row.try_get("template")?,
+        let template = match read_flag(&row, "row")? {
+            true => read_optional_bytes(&row, "template")?,
             false => None,
         };
-        let head: Option<Vec<u8>> = row.try_get("head")?;
         Ok(Some(StoredCase {
             kind: read_kind(&row)?,
-            template: template.map(Bytes::from),
-            head: head.map(Bytes::from),
-            body: body.into(),
+            template,
+            head: read_optional_bytes(&row, "head")?,
+            body: read_bytes(&row, "body")?,
         }))
     }
 
@@ -134,9 +127,9 @@ impl ClientJobs for SqlStore {
             }
         }
         jobs.sort_unstable_by_key(|job| Reverse(job.id));
-        // Below, not every state was looked at.
+        // Below this id, not every state was examined.
         jobs.retain(|job| looked_to.is_none_or(|to| job.id >= to));
-        // One job more than asked for was read: it says whether there is a next page.
+        // One job more than requested was read, which shows whether there is a next page.
         let more = jobs.len() > limit as usize;
         jobs.truncate(limit as usize);
         let last = if more {
@@ -177,9 +170,9 @@ impl ClientJobs for SqlStore {
     }
 }
 
-/// Most jobs that are examined for one page where no index finds them.
+/// Maximum number of jobs that are examined for one page without a suitable index.
 const EXAMINED_MAX: i64 = 20_000;
-/// How far the jobs of a list are counted.
+/// Limit up to which the jobs of a list are counted.
 const COUNTED: i64 = 1_000;
 
 impl SqlStore {
@@ -209,18 +202,18 @@ impl SqlStore {
 const CHANGES: &str = "SELECT id, batch_id, kind, updated_at FROM jobs WHERE tenant = $1 AND (updated_at, id) > ($2, $3) \
      ORDER BY updated_at, id LIMIT $4";
 
-/// The states whose jobs are walked one after the other; `None` stands for all of them.
+/// The states whose jobs are read one after the other; `None` stands for all states.
 fn walked(filter: &Filter) -> Vec<Option<State>> {
     let all = State::ALL.iter().all(|state| filter.states.contains(state));
     match filter.states.is_empty() || all {
-        // The index of jobs that were submitted alone is sorted by state first.
+        // The index of jobs that were submitted alone begins with the state.
         true if filter.alone() => State::ALL.map(Some).to_vec(),
         true => vec![None],
         false => filter.states.iter().copied().map(Some).collect(),
     }
 }
 
-/// The statement of one page of the jobs in one state, or in any.
+/// The statement of one page of the jobs in one state, or in all states.
 pub(crate) fn page_query(
     tenant: &str,
     filter: &Filter,
@@ -257,7 +250,7 @@ pub(crate) fn page_query(
     query
 }
 
-/// The last of the jobs that are examined for one page, if it was not the last of all.
+/// The statement for the last of the jobs that are examined for one page, if more follow.
 fn end_query(
     tenant: &str,
     filter: &Filter,
@@ -278,7 +271,7 @@ fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuil
     query
 }
 
-/// The counts that the database keeps itself.
+/// The statement for the counters that the database maintains.
 fn kept_count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder {
     let mut query = QueryBuilder::new(
         "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts WHERE tenant = ",
@@ -291,8 +284,8 @@ fn kept_count_query(tenant: &str, filter: &Filter, state: Option<State>) -> Quer
     query
 }
 
-/// Walks the jobs of a filter, as far as an index finds them, from the newest. Labels have a table of their own, sorted by job
-/// within each label, so that every kind of list walks an index and stops at its limit.
+/// Adds a scan of the jobs of a filter, from the newest, as far as an index covers the filter. Labels have a separate
+/// table, sorted by job within each label, so that every list scans an index and stops at its limit.
 fn walk(
     query: &mut QueryBuilder,
     columns: &str,
@@ -315,7 +308,7 @@ fn walk(
         query.push(joint).push(condition).push_bind(value);
         joint = " AND ";
     };
-    // Within a batch one of its indices is walked, not that of the tenant: a bare expression keeps that out.
+    // Within a batch an index of the batch is used: the expression excludes the index of the tenant.
     let owner = match (label, filter.batch()) {
         (Some(_), _) => "of_tenant = ",
         (None, Some(_)) => concat!(bare!("tenant"), " = "),
@@ -328,7 +321,7 @@ fn walk(
         and(query, "value = ", value.clone());
     }
     if let Some(batch) = filter.batch() {
-        // Nothing of a batch of another tenant is walked.
+        // A batch of another tenant yields no rows.
         let column = match label {
             Some(_) => concat!(bare!("batch_id"), " = (SELECT id FROM batches WHERE id = "),
             None => "batch_id = (SELECT id FROM batches WHERE id = ",
@@ -346,7 +339,7 @@ fn walk(
         };
         and(query, column, state.name().to_owned());
     }
-    // Of several bounds only the closest is passed on, so that the index is entered at one place.
+    // Of several upper bounds only the smallest is used, so that the index has one starting point.
     let before = [after, filter.id_before()].into_iter().flatten().min();
     if label.is_none() && filter.alone() {
         query.push(" AND batch_id IS NULL");
@@ -364,7 +357,7 @@ fn walk(
     query.push(format!(" ORDER BY {id} DESC"));
 }
 
-/// Ids within a batch lie between its first and its last, so no more of a label is walked than was sent meanwhile.
+/// Adds bounds from the first and last id of the batch, so that only this part of the label's index is scanned.
 fn within_batch(query: &mut QueryBuilder, batch: Uuid, from: Option<Uuid>, before: Option<Uuid>) {
     let end = "(SELECT MAX(id) FROM jobs WHERE batch_id = ";
     let last = before.map_or(Uuid::max(), |id| {

@@ -5,7 +5,7 @@ use async_trait::async_trait;
 use railhead_macros::repeat_conflicts;
 
 use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
-use super::rows::{read_count, read_flag, read_json, to_json};
+use super::rows::{read_bytes, read_count, read_flag, read_json, to_json};
 use crate::error::StoreError;
 use crate::model::Key;
 use crate::store::{
@@ -13,10 +13,15 @@ use crate::store::{
     Total,
 };
 
-const ALL: &str =
-    "SELECT id, hash, tenant, name, created_at, revoked_at, read_only, labels FROM api_keys";
-
-const ONE: &str = "SELECT id, hash, tenant, name, created_at, revoked_at, read_only, labels FROM api_keys WHERE id = $1";
+/// Selects the columns of a [`Key`].
+macro_rules! select_keys {
+    ($condition:literal) => {
+        concat!(
+            "SELECT id, hash, tenant, name, created_at, revoked_at, read_only, labels FROM api_keys",
+            $condition
+        )
+    };
+}
 
 #[repeat_conflicts]
 #[async_trait]
@@ -31,12 +36,12 @@ impl KeyStore for SqlStore {
     }
 
     async fn key(&self, id: &str) -> Result<Option<Key>> {
-        let row = sql!(fetch_optional, &self.readers, ONE; id)?;
+        let row = sql!(fetch_optional, &self.readers, select_keys!(" WHERE id = $1"); id)?;
         row.as_ref().map(read_key).transpose()
     }
 
     async fn keys(&self) -> Result<Vec<Key>> {
-        let rows = sql!(fetch_all, &self.readers, ALL)?;
+        let rows = sql!(fetch_all, &self.readers, select_keys!(""))?;
         let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
         keys.sort_by(|a, b| (a.created_at, &a.id).cmp(&(b.created_at, &b.id)));
         Ok(keys)
@@ -135,14 +140,12 @@ impl Profiles for SqlStore {
                 created_at: row.try_get("created_at")?,
             })
         };
-        let entries: Result<Vec<_>> = rows.iter().map(read).collect();
-        let mut entries = entries?;
+        let mut entries = rows.iter().map(read).collect::<Result<Vec<_>>>()?;
         let more = entries.len() > limit as usize;
         entries.truncate(limit as usize);
         let last = entries.last().filter(|_| more);
-        let next_cursor = last.map(|entry| ProfileCursor::after(entry).to_string());
         Ok(Page {
-            next_cursor,
+            next_cursor: last.map(|entry| ProfileCursor::after(entry).to_string()),
             total: Total::AtLeast(entries.len() as u64),
             entries,
         })
@@ -158,10 +161,9 @@ impl Profiles for SqlStore {
 }
 
 fn read_profile(row: &DbRow) -> Result<StoredProfile> {
-    let body: Vec<u8> = row.try_get("body")?;
     Ok(StoredProfile {
         digest: row.try_get("digest")?,
-        body: body.into(),
+        body: read_bytes(row, "body")?,
         created_at: row.try_get("created_at")?,
     })
 }

@@ -1,10 +1,9 @@
-//! The statements of a job table: one text for every database.
+//! The shared statements of a job table.
 //!
-//! These files are compiled once for each database, below its folder. There, `engine` says what its types are called and how a
-//! transaction begins, and `tokens` the few words that databases spell differently. What makes it a rule of its own: PostgreSQL
-//! reads each statement of a transaction as of its own time, so that a change says itself which state it starts from
-//! (`WHERE state = 'running' AND lease_token = …`), or takes rows that were locked before. Integers are 64 bits and flags are 0
-//! or 1, because both databases have these.
+//! These files are compiled once for each database, as a module of its folder. There, `engine` defines types and
+//! transactions, and `tokens` the few words that differ. PostgreSQL evaluates each statement of a transaction with a new
+//! snapshot, so that an update names the state it starts from (`WHERE state = 'running' AND lease_token = …`), or its rows
+//! were locked before. Integers are 64 bits and flags are 0 or 1, because both databases support these.
 
 use super::engine;
 

@@ -1,15 +1,17 @@
-//! Rows of the job table as the types of [`model`](crate::model), and back.
+//! Conversion of rows of the job table to the types of [`model`](crate::model), and of values to columns.
 
+use bytes::Bytes;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use uuid::Uuid;
 
 use super::engine::{DbRow, QueryBuilder, Row};
+use crate::codec::result::EncodedResult;
 use crate::error::StoreError;
 use crate::model::{Job, Kind, Priority, State};
-use crate::store::{CacheKey, Claim, Result};
+use crate::store::{CacheKey, Claim, Result, StoredResult};
 
-/// The columns a [`Job`] is read from.
+/// The columns of a [`Job`].
 macro_rules! job_columns {
     () => {
         "id, tenant, kind, state, name, labels, batch_id, created_at, updated_at, started_at, ended_at, attempt, progress, remarks, failure, cached, version, rank, deadline"
@@ -17,7 +19,7 @@ macro_rules! job_columns {
 }
 pub(crate) use job_columns;
 
-/// Reads a row that has the columns of `job_columns`.
+/// Reads a row with the columns of `job_columns`.
 pub(crate) fn read_job(row: &DbRow) -> Result<Job> {
     Ok(Job {
         id: read_id(row)?,
@@ -53,14 +55,14 @@ pub(crate) fn read_id(row: &DbRow) -> Result<Uuid> {
     id.ok_or_else(|| StoreError::Corrupt("a row without an id".to_owned()))
 }
 
-/// An id, if the row has one.
+/// Reads an optional id.
 pub(crate) fn read_optional_id(row: &DbRow, column: &str) -> Result<Option<Uuid>> {
     let text: Option<String> = row.try_get(column)?;
     let id = text.as_deref().map(Uuid::try_parse).transpose();
     id.map_err(|error| StoreError::Corrupt(format!("{column} {text:?}: {error}")))
 }
 
-/// The key of identical cases, if the row has one.
+/// Reads an optional cache key.
 pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>> {
     let key: Option<Vec<u8>> = row.try_get("cache_key")?;
     key.map(CacheKey::try_from)
@@ -68,22 +70,40 @@ pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>> {
         .map_err(|_| StoreError::Corrupt("a cache key has a wrong length".to_owned()))
 }
 
-/// The blob a row refers to.
+/// Reads the optional reference to a blob.
 pub(crate) fn read_blob_id(row: &DbRow) -> Result<Option<i64>> {
-    let id = row.try_get("blob_id")?;
-    Ok(id)
+    Ok(row.try_get("blob_id")?)
 }
 
-/// The blobs that rows refer to.
+/// Reads the references of rows to blobs.
 pub(crate) fn read_blob_ids(rows: &[DbRow]) -> Result<Vec<i64>> {
-    let ids = rows
-        .iter()
-        .map(read_blob_id)
-        .collect::<Result<Vec<_>, _>>()?;
-    Ok(ids.into_iter().flatten().collect())
+    rows.iter()
+        .filter_map(|row| read_blob_id(row).transpose())
+        .collect()
 }
 
-/// The kind of the work in a row.
+/// Reads bytes.
+pub(crate) fn read_bytes(row: &DbRow, column: &str) -> Result<Bytes> {
+    Ok(row.try_get::<Vec<u8>, _>(column)?.into())
+}
+
+/// Reads optional bytes.
+pub(crate) fn read_optional_bytes(row: &DbRow, column: &str) -> Result<Option<Bytes>> {
+    Ok(row.try_get::<Option<Vec<u8>>, _>(column)?.map(Bytes::from))
+}
+
+/// Reads a result from the columns `blob_key`, `blob_bytes`, `solution` and `fields`.
+pub(crate) fn read_result(row: &DbRow) -> Result<StoredResult> {
+    if let Some(key) = row.try_get::<Option<String>, _>("blob_key")? {
+        return Ok(StoredResult::Blob(key, read_count(row, "blob_bytes")?));
+    }
+    Ok(StoredResult::Inline(EncodedResult {
+        solution: read_bytes(row, "solution")?,
+        fields: read_optional_bytes(row, "fields")?,
+    }))
+}
+
+/// Reads a kind.
 pub(crate) fn read_kind(row: &DbRow) -> Result<Kind> {
     let name: String = row.try_get("kind")?;
     Kind::from_name(&name).ok_or_else(|| StoreError::Corrupt(format!("kind {name:?}")))
@@ -94,7 +114,7 @@ pub(crate) fn read_state(row: &DbRow) -> Result<State> {
     State::from_name(&name).ok_or_else(|| StoreError::Corrupt(format!("job state {name:?}")))
 }
 
-/// The id of a row and its state, into which a job that was in `from` has moved.
+/// Reads the id of a job and its new state; `from` is the state before, for an assertion.
 pub(crate) fn read_move(row: &DbRow, from: State) -> Result<(Uuid, State)> {
     let to = read_state(row)?;
     debug_assert!(from.may_become(to), "{from:?} became {to:?}");
@@ -106,13 +126,13 @@ pub(crate) fn read_count(row: &DbRow, column: &str) -> Result<u64> {
     u64::try_from(count).map_err(|_| StoreError::Corrupt(format!("{column} is {count}")))
 }
 
-/// A number that is never large.
+/// Reads a small number.
 pub(crate) fn read_small<T: TryFrom<i64>>(row: &DbRow, column: &str) -> Result<T> {
     let count: i64 = row.try_get(column)?;
     T::try_from(count).map_err(|_| StoreError::Corrupt(format!("{column} is {count}")))
 }
 
-/// A column that is 0 or 1.
+/// Reads a flag, 0 or 1.
 pub(crate) fn read_flag(row: &DbRow, column: &str) -> Result<bool> {
     Ok(row.try_get::<i64, _>(column)? != 0)
 }
@@ -126,19 +146,21 @@ pub(crate) fn read_json<T: DeserializeOwned>(row: &DbRow, column: &str) -> Resul
     serde_json::from_str(&text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
 }
 
-/// Ids as the list of an `IN`, without the brackets.
-pub(crate) fn push_list(query: &mut QueryBuilder, ids: &[Uuid]) {
-    if ids.is_empty() {
-        // Some databases know no empty list; nothing is equal to this.
-        query.push("NULL");
+/// Adds values as the list of an `IN`.
+pub(crate) fn push_list<T: ToString>(
+    query: &mut QueryBuilder,
+    values: impl IntoIterator<Item = T>,
+) {
+    let mut separator = "(";
+    for value in values {
+        query.push(separator).push_bind(value.to_string());
+        separator = ", ";
     }
-    let mut list = query.separated(", ");
-    for id in ids {
-        list.push_bind(id.to_string());
-    }
+    // An empty list is a syntax error in some databases; nothing equals NULL.
+    query.push(if separator == "(" { "(NULL)" } else { ")" });
 }
 
-/// Restricts a list to entries whose column `name` contains a text.
+/// Restricts a list to entries whose `name` contains a text.
 pub(crate) fn push_name(query: &mut QueryBuilder, name: Option<&String>) {
     let Some(name) = name else { return };
     query.push(concat!(
@@ -149,17 +171,17 @@ pub(crate) fn push_name(query: &mut QueryBuilder, name: Option<&String>) {
     query.push_bind(name.to_ascii_lowercase()).push(") > 0");
 }
 
-/// A count in the form the database takes.
+/// A count as a column value.
 pub(crate) fn count(number: impl TryInto<i64>) -> i64 {
     number.try_into().unwrap_or(i64::MAX)
 }
 
-/// The lease token in the form the database takes.
+/// The fencing token as a column value.
 pub(crate) fn fence(claim: &Claim) -> i64 {
     count(claim.lease_token)
 }
 
-/// One job.
+/// Selects one job.
 pub(crate) const GET: &str = concat!(
     "SELECT ",
     job_columns!(),

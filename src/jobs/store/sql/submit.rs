@@ -1,4 +1,4 @@
-//! Submission: places in the queue, rows of jobs, and single submissions that share a transaction.
+//! Submission: places in the queue, insertion of jobs, and group commit of single submissions.
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -7,24 +7,24 @@ use railhead_macros::repeat_conflicts;
 use tokio::sync::{mpsc, oneshot};
 use uuid::Uuid;
 
-use super::engine::{self, DbConnection, DbPool, QueryBuilder, Row, SqlStore, query};
+use super::engine::{self, DbConnection, DbPool, QueryBuilder, Row, SqlStore, query, query_scalar};
 use super::finish::end_with_sources;
 use super::rows::{count, job_columns, push_list, read_count, read_id, read_job, to_json};
 use crate::error::StoreError;
 use crate::model::Job;
 use crate::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result, SubmitJobs};
 
-/// Places still free, as one transaction has read them and takes them.
+/// Free places in the queue as read by one transaction, which takes some of them.
 pub(crate) struct Places {
     bounds: QueueBounds,
-    /// Queued jobs of all tenants with the places that are reserved for batches being filled.
+    /// Number of queued jobs of all tenants, including reserved places.
     all: u64,
-    /// Queued jobs and reserved places of each tenant, and its stored bytes.
+    /// Number of queued jobs and reserved places of each tenant, and its stored bytes.
     of_tenants: HashMap<String, (u64, u64)>,
 }
 
 impl Places {
-    /// What these tenants have taken.
+    /// Reads the places that these tenants have taken.
     pub(crate) async fn of<'a>(
         connection: &mut DbConnection,
         tenants: impl IntoIterator<Item = &'a str>,
@@ -55,7 +55,7 @@ impl Places {
         Ok(places)
     }
 
-    /// Takes as many places as there are, at most `most`; a refusal if there is not even one.
+    /// Takes the available places, at most `most`; a refusal if there is none.
     pub(crate) fn take(&mut self, tenant: &str, most: u64) -> Result<u64, Refusal> {
         let (of_tenant, stored) = self.taken_by(tenant);
         let places = most
@@ -70,7 +70,7 @@ impl Places {
         Ok(places)
     }
 
-    /// Counts bytes that are about to be stored; a refusal if the tenant would have more than it may.
+    /// Adds bytes to be stored; a refusal if the tenant would exceed its bound.
     pub(crate) fn store(&mut self, tenant: &str, bytes: u64) -> Result<(), Refusal> {
         let (of_tenant, stored) = self.taken_by(tenant);
         if self.bounds.stored.is_some_and(|most| stored + bytes > most) {
@@ -85,7 +85,7 @@ impl Places {
         self.of_tenants.get(tenant).copied().unwrap_or((0, 0))
     }
 
-    /// Which bound has no place left.
+    /// The bound that is reached.
     pub(crate) fn refusal_of(&self, tenant: &str) -> Refusal {
         if self.taken_by(tenant).0 >= self.bounds.tenant {
             Refusal::Quota
@@ -95,16 +95,16 @@ impl Places {
     }
 }
 
-/// Bytes of cases, templates and results that a tenant has stored.
+/// Number of bytes of cases, templates and results that a tenant has stored.
 pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Result<u64> {
-    let row = sql!(fetch_one, connection,
-        "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) AS bytes FROM stored_bytes WHERE tenant = $1";
+    let bytes: i64 = sql!(scalar fetch_one, connection,
+        "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE tenant = $1";
         tenant
     )?;
-    read_count(&row, "bytes")
+    Ok(bytes.max(0).unsigned_abs())
 }
 
-/// Those of these jobs that have succeeded.
+/// Selects the jobs that have succeeded.
 pub(crate) async fn succeeded(
     connection: &mut DbConnection,
     ids: &[Uuid],
@@ -115,19 +115,18 @@ pub(crate) async fn succeeded(
     let mut query = QueryBuilder::new(concat!(
         "SELECT id FROM jobs WHERE ",
         bare!("state"),
-        " = 'succeeded' AND id IN ("
+        " = 'succeeded' AND id IN "
     ));
     push_list(&mut query, ids);
-    query.push(")");
     let rows = query.build().fetch_all(connection).await?;
     rows.iter().map(read_id).collect()
 }
 
-/// Jobs in one statement; with 20 values each far below the bound of SQLite.
+/// Number of jobs in one statement; with 20 values each far below the limit of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
-/// Queues jobs within the caller's transaction, those of a batch with their places in it. Returns those that ended at once with the
-/// result of their source.
+/// Inserts jobs within the caller's transaction; jobs of a batch with their indices in it. Returns the jobs that ended at
+/// once with the result of their source.
 pub(crate) async fn insert_jobs(
     connection: &mut DbConnection,
     batch: Option<Uuid>,
@@ -182,17 +181,17 @@ pub(crate) async fn insert_jobs(
     Ok(ended)
 }
 
-/// Most jobs stored together.
+/// Maximum number of jobs stored in one transaction.
 const GROUP_MAX: usize = 256;
 
-/// What an idempotency key of a tenant stands for.
+/// Selects the job of an idempotency key.
 pub(crate) const BY_KEY: &str = concat!(
     "SELECT ",
     job_columns!(),
     ", digest FROM idempotency_keys JOIN jobs ON jobs.id = idempotency_keys.job_id WHERE of_tenant = $1 AND key = $2"
 );
 
-/// A job whose submitter waits.
+/// A job whose submitter waits for the reply.
 #[derive(Debug)]
 pub(crate) struct Submission {
     pub(crate) new: NewJob,
@@ -200,16 +199,16 @@ pub(crate) struct Submission {
     pub(crate) reply: oneshot::Sender<Result<Enqueued>>,
 }
 
-/// The way to the task that stores jobs; it ends with the last of these.
+/// A handle of the task that stores submitted jobs; the task ends with its last handle.
 #[derive(Debug, Clone)]
 pub(crate) struct GroupCommit(pub(crate) mpsc::Sender<Submission>);
 
 impl GroupCommit {
     /// Starts the task.
-    pub(crate) fn start(writer: DbPool) -> GroupCommit {
+    pub(crate) fn start(writer: DbPool) -> Result<GroupCommit> {
         let (sender, waiting) = mpsc::channel(GROUP_MAX);
-        tokio::spawn(store_all(writer, waiting));
-        GroupCommit(sender)
+        engine::spawn(store_all(writer, waiting))?;
+        Ok(GroupCommit(sender))
     }
 }
 
@@ -223,7 +222,7 @@ async fn store_all(writer: DbPool, mut waiting: mpsc::Receiver<Submission>) {
     }
 }
 
-/// Takes out jobs whose idempotency key another of the group has: they have to see what became of that one.
+/// Removes jobs whose idempotency key occurs earlier in the group: they depend on the outcome of the earlier job.
 fn set_aside_repeated_keys(group: &mut Vec<Submission>) -> Vec<Submission> {
     let mut seen = HashSet::new();
     let keyed = |waiting: &Submission| {
@@ -247,11 +246,11 @@ async fn store_some(writer: &DbPool, group: Vec<Submission>) {
     match stored {
         Ok(answers) => {
             for (waiting, answer) in group.into_iter().zip(answers) {
-                // The submitter may have stopped waiting.
+                // The receiver is closed if the submitter has stopped waiting.
                 let _ = waiting.reply.send(Ok(answer));
             }
         }
-        // What is wrong with the disk is wrong for all of them.
+        // A storage fault affects all of them.
         Err(error) if alone || error.storage_fault().is_some() => {
             for waiting in group {
                 let _ = waiting.reply.send(Err(error.clone()));
@@ -339,7 +338,7 @@ fn lost() -> StoreError {
     StoreError::Corrupt("a job was stored and not answered".to_owned())
 }
 
-/// What an idempotency key of a tenant stands for, if it was used.
+/// Finds the job of an idempotency key, if it was used.
 pub(crate) async fn by_key(
     connection: &mut DbConnection,
     tenant: &str,
@@ -356,25 +355,20 @@ pub(crate) async fn by_key(
     }))
 }
 
-/// The jobs that were added, as they are.
+/// Reads the inserted jobs.
 async fn read_back(
     connection: &mut DbConnection,
     added: &[(Option<u32>, &NewJob)],
 ) -> Result<Vec<Job>> {
-    let ids: Vec<Uuid> = added.iter().map(|(_, job)| job.id).collect();
     let tenants: HashSet<&str> = added.iter().map(|(_, job)| &*job.tenant).collect();
     let mut query = QueryBuilder::new(concat!(
         "SELECT ",
         job_columns!(),
-        " FROM jobs WHERE id IN ("
+        " FROM jobs WHERE id IN "
     ));
-    push_list(&mut query, &ids);
-    query.push(concat!(") AND ", bare!("tenant"), " IN ("));
-    let mut list = query.separated(", ");
-    for tenant in tenants {
-        list.push_bind(tenant.to_owned());
-    }
-    query.push(")");
+    push_list(&mut query, added.iter().map(|(_, job)| job.id));
+    query.push(concat!(" AND ", bare!("tenant"), " IN "));
+    push_list(&mut query, tenants);
     let rows = query.build().fetch_all(connection).await?;
     rows.iter().map(read_job).collect()
 }

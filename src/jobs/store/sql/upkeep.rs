@@ -1,4 +1,4 @@
-//! What ends or goes by itself: leases that run out, deadlines that pass, jobs that expire.
+//! Expired leases, deadlines, expired jobs, and statistics.
 use std::collections::{BTreeMap, HashSet};
 
 use async_trait::async_trait;
@@ -15,8 +15,8 @@ use crate::store::{
     first_id_at,
 };
 
-/// Those whose lease has run out: a job that was claimed alone counts the attempt; those of a group do not, and come alone next
-/// time.
+/// Takes jobs with expired leases from their workers. The attempt counts for a job that was claimed alone; jobs of a group are
+/// claimed alone next time.
 pub(crate) const REAP: &str = concat!(
     "UPDATE jobs SET \
      state = CASE WHEN cancel_requested = 1 THEN 'cancelled' \
@@ -32,8 +32,8 @@ pub(crate) const REAP: &str = concat!(
     " RETURNING id, state, slices"
 );
 
-/// Returns the jobs of a dead process that may not have caused its death to the queue: the attempt does not count, and each is claimed alone next time.
-/// The remaining job was the only suspect, or the only one that was running.
+/// Returns those jobs of a crashed process to the queue that cannot be identified as its cause. Their attempts do not count, and
+/// they are claimed alone next time. The remaining job was the only suspect, or the only running job.
 pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
      state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
      ended_at = CASE WHEN cancel_requested = 1 THEN $1 ELSE NULL END, \
@@ -72,7 +72,7 @@ impl Upkeep for SqlStore {
     }
 
     async fn pass_deadlines(&self, failure: &Failure, moment: Moment) -> Result<Overdue> {
-        // Late jobs are rare, and a read holds no writer up.
+        // Late jobs are rare, and a read does not block writers.
         let rows = sql!(fetch_all, &self.readers, LATE; moment.now, moment.set_at, moment.unset)?;
         let (mut queued, mut overdue) = (false, Overdue::default());
         for row in &rows {
@@ -102,13 +102,12 @@ impl Upkeep for SqlStore {
                 "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, ",
             );
             bury.push_bind(expiry.now);
-            bury.push(" FROM jobs WHERE id IN (");
+            bury.push(" FROM jobs WHERE id IN ");
             push_list(&mut bury, &ids);
-            bury.push(") ON CONFLICT (id) DO NOTHING");
+            bury.push(" ON CONFLICT (id) DO NOTHING");
             bury.build().execute(&mut *transaction).await?;
-            let mut delete = QueryBuilder::new("DELETE FROM jobs WHERE id IN (");
-            push_list(&mut delete, &ids);
-            delete.push(")");
+            let mut delete = QueryBuilder::new("DELETE FROM jobs WHERE id IN ");
+            push_list(&mut delete, ids);
             delete.build().execute(&mut *transaction).await?;
         }
         release_blobs(&mut transaction, blobs).await?;
@@ -150,12 +149,11 @@ impl Upkeep for SqlStore {
                 .jobs
                 .insert(read_state(row)?, read_count(row, "number")?);
         }
-        let reserved = query(
-            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) AS reserved FROM batches WHERE complete = 0 AND tenant = $1",
-        );
-        let reserved = reserved.bind(tenant);
-        let row = reserved.fetch_one(&self.readers).await?;
-        usage.reserved = read_count(&row, "reserved")?;
+        let reserved: i64 = sql!(scalar fetch_one, &self.readers,
+            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND tenant = $1";
+            tenant
+        )?;
+        usage.reserved = reserved.unsigned_abs();
         usage.stored_bytes = stored(&mut *self.readers.acquire().await?, tenant).await?;
         Ok(usage)
     }
@@ -194,7 +192,7 @@ impl Upkeep for SqlStore {
     }
 }
 
-/// Late at $1; what was submitted before $2 is late only if it is at $3.
+/// Jobs whose deadline is before $1; jobs submitted before $2 only if it is also before $3.
 pub(crate) const LATE: &str = "SELECT id, state FROM jobs WHERE deadline <= $1 AND deadline IS NOT NULL AND ended_at IS NULL \
      AND (created_at >= $2 OR deadline <= $3)";
 
@@ -209,7 +207,7 @@ pub(crate) const FAIL_LATE: &str = concat!(
      WHERE id IN (SELECT id FROM late) RETURNING id, state, slices"
 );
 
-/// Jobs ended in one transaction, whose rows are locked until it ends. Chosen by judgement: some tens of milliseconds.
+/// Number of jobs ended in one transaction, which locks their rows. Chosen by judgement: some tens of milliseconds.
 const AT_ONCE: i64 = 1000;
 
 impl SqlStore {
@@ -227,8 +225,8 @@ impl SqlStore {
     }
 }
 
-/// Ids grow with the time of submission, so that only the oldest rows are read. Chunks of a run expire with the last of
-/// them.
+/// Expired jobs. Ids increase with the time of submission, so that only the oldest rows are read. Chunks of a run expire together
+/// after the last of them.
 pub(crate) const EXPIRED: &str = concat!(
     "SELECT id, blob_id FROM jobs \
      WHERE id < $1 AND ended_at <= $2 \
@@ -242,13 +240,13 @@ pub(crate) const EXPIRED: &str = concat!(
 pub(crate) const COUNT: &str =
     "SELECT state, CAST(SUM(number) AS bigint) AS jobs FROM job_counts GROUP BY state";
 
-/// Mean expected solve time of queued jobs in µs; of each tenant, of those that come first.
+/// Mean expected solve time of queued jobs in µs, from the first jobs of each queue.
 pub(crate) const MEAN_COST: &str = "SELECT CAST(COALESCE(SUM(number * mean) / SUM(number), 0) AS double precision) FROM (SELECT number, \
      (SELECT AVG(cost_us) FROM (SELECT cost_us FROM jobs WHERE state = 'queued' AND tenant = queued.tenant AND kind = queued.kind ORDER BY rank, id LIMIT 100) AS sampled) AS mean \
      FROM (SELECT tenant, kind, SUM(number) AS number FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0) AS queued) AS means";
 
-/// When the oldest queued job was submitted: the first of each tenant and priority is looked at, however long their queues are. The
-/// priority is no equation, so that only the index of the queue has the order that is asked for.
+/// Time of submission of the oldest queued job: the first job of each queue and priority is read. The priority is not compared by an
+/// equation, so that only the index of the queue has the requested order.
 pub(crate) const OLDEST: &str = "SELECT MIN(first) FROM (SELECT (SELECT created_at FROM jobs \
      WHERE state = 'queued' AND tenant = queued.tenant AND kind = queued.kind AND rank >= ranks.rank AND rank <= ranks.rank ORDER BY rank, id LIMIT 1) AS first \
      FROM (SELECT tenant, kind FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0) AS queued, \
@@ -257,6 +255,6 @@ pub(crate) const OLDEST: &str = "SELECT MIN(first) FROM (SELECT (SELECT created_
 pub(crate) const RESULT_BYTES: &str =
     "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM blobs WHERE key IS NOT NULL";
 
-/// Jobs of the tenant before one of this rank and id, and their expected µs; no further than the limit.
+/// Number of jobs of the tenant before this rank and id, at most the limit, and the sum of their expected solve times in µs.
 pub(crate) const BEFORE: &str = "SELECT COUNT(*) AS jobs, CAST(COALESCE(SUM(cost_us), 0) AS bigint) AS cost_us FROM (SELECT cost_us FROM jobs \
      WHERE state = 'queued' AND tenant = $1 AND kind = 'case' AND (rank, id) < ($2, $3) LIMIT $4) AS before";

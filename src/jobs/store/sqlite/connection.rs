@@ -1,7 +1,7 @@
-//! Connections to SQLite, and statements in the form that the shared SQL uses for every database.
+//! Connections to SQLite, with an interface like that of `sqlx`, which the shared SQL uses for every database.
 //!
-//! A statement runs on the thread that asks for it: a page that is in memory is read in microseconds, and another thread would have to be
-//! woken twice. What may wait for the disk, a commit, is announced to the runtime as blocking.
+//! A statement runs on the calling thread, because reading a cached page takes microseconds, less than waking another
+//! thread. Commits, which may wait for the disk, are announced to the runtime as blocking.
 
 use std::borrow::Cow;
 use std::ops::{Deref, DerefMut};
@@ -17,28 +17,28 @@ use crate::error::{StorageFault, StoreError};
 use crate::store::Result;
 use crate::sync::lock;
 
-/// How long a statement waits for a lock that another process holds.
+/// How long a statement waits for a lock of another process.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Time between two attempts to get that lock.
+/// Interval between two attempts to get that lock.
 const LOCK_RETRY: Duration = Duration::from_millis(5);
 
-/// Prepared statements that a connection keeps.
+/// Number of prepared statements that a connection caches.
 const PREPARED: usize = 100;
 
-/// Longer statements, such as insertions of many rows, are not kept.
+/// Longer statements, such as insertions of many rows, are not cached.
 const PREPARED_TEXT_MAX: usize = 4096;
 
-/// Commits neither wait for the disk nor move the log into the database.
+/// Commits neither wait for the disk nor checkpoint the log.
 const RELAX: &str = "PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0";
 
-/// What holds otherwise.
+/// Restores the default settings.
 const TIGHTEN: &str = "PRAGMA synchronous = FULL; PRAGMA wal_autocheckpoint = 1000";
 
 /// Opens a connection.
 type Open = Box<dyn Fn() -> rusqlite::Result<rusqlite::Connection> + Send + Sync>;
 
-/// Connections of one kind. Callers get them in the order in which they ask.
+/// A pool of connections, which are assigned in the order of requests.
 #[derive(Clone)]
 pub(crate) struct Pool(Arc<Shared>);
 
@@ -56,7 +56,7 @@ impl std::fmt::Debug for Pool {
 }
 
 impl Pool {
-    /// Opens the first of up to `size` connections; the others are opened when they are needed.
+    /// Creates a pool of up to `size` connections and opens the first; the others are opened on demand.
     pub(crate) fn open(size: u32, open: Open) -> Result<Pool> {
         let pool = Shared {
             free: Arc::new(Semaphore::new(size as usize)),
@@ -69,7 +69,7 @@ impl Pool {
         Ok(Pool(Arc::new(pool)))
     }
 
-    /// Takes a connection once one is free.
+    /// Acquires a connection once one is free.
     pub(crate) async fn acquire(&self) -> Result<Pooled> {
         let permit = self.0.free.clone().acquire_owned().await;
         let permit = permit.map_err(|_| closed())?;
@@ -86,20 +86,20 @@ impl Pool {
         })
     }
 
-    /// Begins a transaction that writes. One that reads first and then turns into a writer would fail at once beside another.
-    pub(crate) async fn begin(&self) -> Result<Transaction> {
+    /// Begins a write transaction. A read transaction that is upgraded would fail if there is another writer.
+    pub(crate) async fn begin(&self) -> Result<Pooled> {
         begin(self.acquire().await?).await
     }
 
-    /// As [`Pool::begin`], for what may be lost in a power cut, though not with the process: the commit does not wait for the disk.
-    pub(crate) async fn begin_relaxed(&self) -> Result<Transaction> {
+    /// As [`Pool::begin`], but the commit does not wait for the disk: it survives the process, not a power cut.
+    pub(crate) async fn begin_relaxed(&self) -> Result<Pooled> {
         let mut connection = self.acquire().await?;
         connection.batch(RELAX)?;
         connection.relaxed = true;
         begin(connection).await
     }
 
-    /// Closes every connection, once those that are in use are given back.
+    /// Closes every connection after its use.
     pub(crate) async fn close(&self) {
         let _all = self.0.free.acquire_many(self.0.size).await;
         self.0.free.close();
@@ -108,12 +108,12 @@ impl Pool {
     }
 }
 
-async fn begin(mut connection: Pooled) -> Result<Transaction> {
+async fn begin(mut connection: Pooled) -> Result<Pooled> {
     unlocked(&mut connection, |connection| {
         connection.execute_batch("BEGIN IMMEDIATE")
     })
     .await?;
-    Ok(Transaction(connection))
+    Ok(connection)
 }
 
 impl Shared {
@@ -133,13 +133,24 @@ fn closed() -> StoreError {
     StoreError::Away(StorageFault::Unwritable, Arc::new(cause))
 }
 
-/// A connection in use. An open transaction is rolled back when it is given back.
+/// A connection in use, or a write transaction on it. Dropped without a commit, the transaction changes nothing.
 pub(crate) struct Pooled {
     connection: Connection,
     pool: Arc<Shared>,
-    /// Its commits do not wait for the disk until it is given back.
+    /// Whether commits do not wait for the disk.
     relaxed: bool,
     _permit: OwnedSemaphorePermit,
+}
+
+impl Pooled {
+    /// Commits the transaction.
+    pub(crate) async fn commit(mut self) -> Result<()> {
+        let relaxed = self.relaxed;
+        self.with(|connection| match relaxed {
+            true => connection.execute_batch("COMMIT"),
+            false => blocking(|| connection.execute_batch("COMMIT")),
+        })
+    }
 }
 
 impl Deref for Pooled {
@@ -160,7 +171,7 @@ impl Drop for Pooled {
     fn drop(&mut self) {
         if let Some(connection) = self.connection.0.take() {
             if !connection.is_autocommit() {
-                // A full disk can leave a connection inside a transaction for ever; such a connection is closed.
+                // A full disk can leave a connection inside a transaction forever; such a connection is closed.
                 let _ = connection.execute_batch("ROLLBACK");
             }
             let strict = !self.relaxed || connection.execute_batch(TIGHTEN).is_ok();
@@ -171,34 +182,7 @@ impl Drop for Pooled {
     }
 }
 
-/// A transaction that writes. Dropped without a commit, it changes nothing.
-pub(crate) struct Transaction(Pooled);
-
-impl Transaction {
-    pub(crate) async fn commit(mut self) -> Result<()> {
-        let relaxed = self.0.relaxed;
-        self.0.with(|connection| match relaxed {
-            true => connection.execute_batch("COMMIT"),
-            false => blocking(|| connection.execute_batch("COMMIT")),
-        })
-    }
-}
-
-impl Deref for Transaction {
-    type Target = Connection;
-
-    fn deref(&self) -> &Connection {
-        &self.0
-    }
-}
-
-impl DerefMut for Transaction {
-    fn deref_mut(&mut self) -> &mut Connection {
-        &mut self.0
-    }
-}
-
-/// One connection, until its pool takes it back.
+/// A connection, until it returns to its pool.
 pub(crate) struct Connection(Option<rusqlite::Connection>);
 
 impl Connection {
@@ -209,15 +193,15 @@ impl Connection {
         Ok(call(self.0.as_ref().ok_or_else(closed)?)?)
     }
 
-    /// Runs several statements that have no parameters.
+    /// Runs several statements without parameters.
     pub(crate) fn batch(&mut self, statements: &str) -> Result<()> {
         self.with(|connection| connection.execute_batch(statements))
     }
 }
 
-/// Where statements run: a connection, or one of a pool for a single statement.
+/// A connection, or a pool that provides one for a single statement.
 pub(crate) trait Executor: Send {
-    /// Runs a statement; with `long` it may wait for the disk or read many rows.
+    /// Runs a statement; `long` if it may wait for the disk or read many rows.
     fn run<T: Send>(
         self,
         long: bool,
@@ -250,7 +234,7 @@ impl Executor for &Pool {
     }
 }
 
-/// Makes a call outside any transaction; repeats it for a while if another process holds a lock.
+/// Runs a call outside a transaction; repeats it for a while if another process holds a lock.
 async fn unlocked<T: Send>(
     connection: &mut Connection,
     mut call: impl FnMut(&rusqlite::Connection) -> rusqlite::Result<T> + Send,
@@ -271,7 +255,7 @@ async fn unlocked<T: Send>(
     }
 }
 
-/// Makes a call that may wait for the disk, while another thread of the runtime takes over the tasks of this one.
+/// Runs a call that may wait for the disk, while another thread of the runtime takes over the tasks of this one.
 fn blocking<T>(call: impl FnOnce() -> T) -> T {
     match Handle::try_current().map(|runtime| runtime.runtime_flavor()) {
         Ok(RuntimeFlavor::MultiThread) => tokio::task::block_in_place(call),
@@ -285,7 +269,7 @@ pub(crate) struct Query {
     values: Vec<Value>,
 }
 
-/// A statement of a fixed text, whose parameters are `$1`, `$2` and so on.
+/// A statement whose parameters are `$1`, `$2` and so on.
 pub(crate) fn query(text: impl Into<Cow<'static, str>>) -> Query {
     Query {
         text: text.into(),
@@ -293,7 +277,7 @@ pub(crate) fn query(text: impl Into<Cow<'static, str>>) -> Query {
     }
 }
 
-/// A statement of a fixed text whose rows have one column.
+/// A statement whose rows have one column.
 pub(crate) fn query_scalar(text: impl Into<Cow<'static, str>>) -> ScalarQuery {
     ScalarQuery(query(text))
 }
@@ -308,13 +292,13 @@ fn value(value: impl ToSql) -> Value {
 }
 
 impl Query {
-    /// The next parameter.
+    /// Binds the next parameter.
     pub(crate) fn bind(mut self, parameter: impl ToSql) -> Query {
         self.values.push(value(parameter));
         self
     }
 
-    /// Runs the statement; how many rows it changed.
+    /// Runs the statement; returns the number of changed rows.
     pub(crate) async fn execute(self, executor: impl Executor) -> Result<Done> {
         let mut none = |_| true;
         let changed = executor.run(true, |connection| {
@@ -337,7 +321,7 @@ impl Query {
             .await
     }
 
-    /// The first row of a statement that has few. It runs to its end.
+    /// The first row of a statement with few rows, which runs to its end.
     pub(crate) async fn fetch_optional(self, executor: impl Executor) -> Result<Option<SqliteRow>> {
         executor
             .run(false, |connection| {
@@ -357,40 +341,24 @@ impl Query {
         rows.into_iter().next().ok_or_else(none)
     }
 
-    /// Passes each row on until `row` returns `false`.
+    /// Passes each row to `row` until that returns `false`.
     pub(crate) async fn for_each(
         self,
         executor: impl Executor,
         mut row: impl FnMut(&SqliteRow) -> Result<bool> + Send,
     ) -> Result<()> {
         executor
-            .run(true, |connection| self.walk(connection, &mut row))
-            .await?
-    }
-
-    /// As [`Query::for_each`], on a thread that may block.
-    #[cfg(feature = "cluster")]
-    pub(crate) fn for_each_now(
-        self,
-        connection: &mut Connection,
-        mut row: impl FnMut(&SqliteRow) -> Result<bool>,
-    ) -> Result<()> {
-        connection.with(|connection| self.walk(connection, &mut row))?
-    }
-
-    fn walk(
-        &self,
-        connection: &rusqlite::Connection,
-        row: &mut dyn FnMut(&SqliteRow) -> Result<bool>,
-    ) -> rusqlite::Result<Result<()>> {
-        let mut done = Ok(());
-        self.step(connection, &mut |next| {
-            row(&next).unwrap_or_else(|error| {
-                done = Err(error);
-                false
+            .run(true, |connection| {
+                let mut done = Ok(());
+                self.step(connection, &mut |next| {
+                    row(&next).unwrap_or_else(|error| {
+                        done = Err(error);
+                        false
+                    })
+                })?;
+                Ok(done)
             })
-        })?;
-        Ok(done)
+            .await?
     }
 
     fn step(
@@ -431,7 +399,7 @@ impl Query {
     }
 }
 
-/// What a statement did.
+/// Result of a statement without rows.
 pub(crate) struct Done(u64);
 
 impl Done {
@@ -444,22 +412,22 @@ impl Done {
 pub(crate) struct ScalarQuery(Query);
 
 impl ScalarQuery {
-    /// The next parameter.
+    /// Binds the next parameter.
     pub(crate) fn bind(self, parameter: impl ToSql) -> ScalarQuery {
         ScalarQuery(self.0.bind(parameter))
     }
 
     pub(crate) async fn fetch_one<T: FromSql>(self, executor: impl Executor) -> Result<T> {
-        self.0.fetch_one(executor).await?.try_get(0)
+        self.0.fetch_one(executor).await?.value(0, "0")
     }
 
     pub(crate) async fn fetch_all<T: FromSql>(self, executor: impl Executor) -> Result<Vec<T>> {
         let rows = self.0.fetch_all(executor).await?;
-        rows.iter().map(|row| row.try_get(0)).collect()
+        rows.iter().map(|row| row.value(0, "0")).collect()
     }
 }
 
-/// A row with the names of its columns.
+/// A row with its column names.
 #[derive(Debug)]
 pub(crate) struct SqliteRow {
     names: Arc<[String]>,
@@ -468,14 +436,21 @@ pub(crate) struct SqliteRow {
 
 /// Access to the columns of a row.
 pub(crate) trait Row {
-    /// The value of a column, given by its name or its place.
-    fn try_get<T: FromSql, C: Column>(&self, column: C) -> Result<T>;
+    /// The value of a column.
+    fn try_get<T: FromSql, C: AsRef<str>>(&self, column: C) -> Result<T>;
 }
 
 impl Row for SqliteRow {
-    fn try_get<T: FromSql, C: Column>(&self, column: C) -> Result<T> {
-        let place = column.place(&self.names);
-        let value = place.and_then(|place| self.values.get(place));
+    fn try_get<T: FromSql, C: AsRef<str>>(&self, column: C) -> Result<T> {
+        let column = column.as_ref();
+        let index = self.names.iter().position(|name| name == column);
+        self.value(index.unwrap_or(self.values.len()), column)
+    }
+}
+
+impl SqliteRow {
+    fn value<T: FromSql>(&self, index: usize, column: &str) -> Result<T> {
+        let value = self.values.get(index);
         let read = value.and_then(|value| T::column_result(value.into()).ok());
         read.ok_or_else(|| {
             let kind = std::any::type_name::<T>();
@@ -484,24 +459,7 @@ impl Row for SqliteRow {
     }
 }
 
-/// The name or the place of a column.
-pub(crate) trait Column: std::fmt::Debug + Copy {
-    fn place(self, names: &[String]) -> Option<usize>;
-}
-
-impl Column for &str {
-    fn place(self, names: &[String]) -> Option<usize> {
-        names.iter().position(|name| name == self)
-    }
-}
-
-impl Column for usize {
-    fn place(self, _: &[String]) -> Option<usize> {
-        Some(self)
-    }
-}
-
-/// Builds a statement piece by piece.
+/// Builds a statement in parts.
 pub(crate) struct QueryBuilder {
     text: String,
     values: Vec<Value>,
@@ -515,20 +473,20 @@ impl QueryBuilder {
         }
     }
 
-    /// Adds a piece of the text.
+    /// Appends text.
     pub(crate) fn push(&mut self, piece: impl AsRef<str>) -> &mut QueryBuilder {
         self.text.push_str(piece.as_ref());
         self
     }
 
-    /// Adds a parameter.
+    /// Appends a parameter.
     pub(crate) fn push_bind(&mut self, parameter: impl ToSql) -> &mut QueryBuilder {
         self.text.push('?');
         self.values.push(value(parameter));
         self
     }
 
-    /// Adds `VALUES` with a row of parameters for each item.
+    /// Appends `VALUES` with a row of parameters for each item.
     pub(crate) fn push_values<I: IntoIterator>(
         &mut self,
         items: I,
@@ -543,7 +501,7 @@ impl QueryBuilder {
         self
     }
 
-    /// A list within the statement.
+    /// Appends a list.
     pub(crate) fn separated(&mut self, separator: &'static str) -> Separated<'_> {
         Separated {
             query: self,
@@ -552,7 +510,7 @@ impl QueryBuilder {
         }
     }
 
-    /// The statement so far; the builder is empty afterwards.
+    /// The statement; the builder is empty afterwards.
     pub(crate) fn build(&mut self) -> Query {
         Query {
             text: std::mem::take(&mut self.text).into(),
@@ -566,7 +524,7 @@ impl QueryBuilder {
     }
 }
 
-/// A list within a statement that is being built.
+/// A list in a statement that is being built.
 pub(crate) struct Separated<'b> {
     query: &'b mut QueryBuilder,
     separator: &'static str,
@@ -581,7 +539,7 @@ impl Separated<'_> {
         self.query
     }
 
-    /// Adds a parameter as an entry.
+    /// Appends a parameter as an entry.
     pub(crate) fn push_bind(&mut self, parameter: impl ToSql) -> &mut Self {
         self.next().push_bind(parameter);
         self
@@ -594,7 +552,7 @@ mod tests {
     use crate::store::Store;
     use crate::store::sqlite::database::SqliteStore;
 
-    async fn bury(transaction: &mut Transaction, id: &str) -> Result<Done> {
+    async fn bury(transaction: &mut Pooled, id: &str) -> Result<Done> {
         let insert = query("INSERT INTO tombstones (id, tenant, gone_at) VALUES ($2, $1, 0)");
         insert.bind("t").bind(id).execute(&mut **transaction).await
     }

@@ -1,9 +1,8 @@
-//! The job table on one machine, embedded: SQLite with one writing connection and a pool of readers.
+//! The embedded job table: SQLite with one writing connection and a pool of readers.
 //!
-//! There is one writing connection, because SQLite's busy handler has no queue: of several writers one starves. The queue of
-//! the pool is fair. `synchronous=FULL`, because a job that was acknowledged must survive a power cut; claims need not. Every
-//! transaction that writes begins with `BEGIN IMMEDIATE`: a deferred one that reads first fails at once when it
-//! turns into a writer.
+//! There is one writing connection, because several writers would starve each other: SQLite's busy handler has no queue,
+//! while the pool is fair. `synchronous=FULL`, because an acknowledged job must survive a power cut; claims need not. Every
+//! write transaction begins with `BEGIN IMMEDIATE`, because a deferred one that reads first fails when it begins to write.
 
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
@@ -17,12 +16,12 @@ use crate::store::sqlite::connection::{Pool, query, query_scalar};
 use crate::store::sqlite::schema::{migrate, require};
 use crate::store::sqlite::sql::submit::GroupCommit;
 
-/// The write-ahead log is cut to this size when it was larger for a while.
+/// The write-ahead log is truncated to this size.
 const LOG_BYTES: i64 = 64 << 20;
 
 const READERS: u32 = 4;
 
-/// How long an opening waits for another process that is opening the same file. Statements wait without a thread, see [`Pool`].
+/// How long opening waits for another process that opens the same file. Statements wait without a thread, see [`Pool`].
 const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The embedded job table.
@@ -35,7 +34,7 @@ pub struct SqliteStore {
 }
 
 impl SqliteStore {
-    /// Opens the database file; makes it if there is none, and brings it forward if an earlier version made it.
+    /// Opens the database file; creates it if it does not exist, and upgrades one of an earlier version.
     ///
     /// # Errors
     /// The file cannot be opened, or [`JobsError::UnsupportedSchema`].
@@ -46,15 +45,12 @@ impl SqliteStore {
         Ok(store)
     }
 
-    /// Opens the database file beside a service that may be using it; makes and changes nothing.
+    /// Opens the database file, which a service may be using; changes nothing.
     ///
     /// # Errors
-    /// There is no such file, it cannot be opened, [`JobsError::OldFolder`] or [`JobsError::UnsupportedSchema`].
+    /// The file does not exist, cannot be opened, [`JobsError::OldFolder`] or [`JobsError::UnsupportedSchema`].
     pub async fn open_existing(file: &Path) -> Result<SqliteStore, JobsError> {
-        std::fs::metadata(file).map_err(|source| JobsError::DataDir {
-            path: file.to_owned(),
-            source,
-        })?;
+        std::fs::metadata(file).map_err(JobsError::at(file))?;
         let store = SqliteStore::connect(file)?;
         require(&store.readers).await?;
         Ok(store)
@@ -67,7 +63,7 @@ impl SqliteStore {
         let readers = Pool::open(READERS, Box::new(move || open_reader(&path)))?;
         Ok(SqliteStore {
             file: file.to_owned(),
-            group_commit: GroupCommit::start(writer.clone()),
+            group_commit: GroupCommit::start(writer.clone())?,
             writer,
             readers,
         })
@@ -85,10 +81,10 @@ impl SqliteStore {
         }
     }
 
-    /// Writes a copy of the database, as it is at one moment, to a new file with mode 0600.
+    /// Writes a snapshot of the database to a new file with mode 0600.
     ///
     /// # Errors
-    /// The file is there already or cannot be written.
+    /// The file exists or cannot be written.
     pub async fn copy_into(&self, file: &Path) -> Result<(), JobsError> {
         make_private(file)?;
         sql!(execute, &self.writer, "VACUUM INTO $1"; file.to_string_lossy())?;
@@ -96,7 +92,7 @@ impl SqliteStore {
     }
 }
 
-/// Makes an empty file with mode 0600, if there is none; what SQLite puts beside it gets the same mode.
+/// Creates an empty file with mode 0600, if it does not exist; SQLite gives its other files the same mode.
 fn make_private(file: &Path) -> Result<(), JobsError> {
     let made = std::fs::OpenOptions::new()
         .create_new(true)
@@ -105,10 +101,7 @@ fn make_private(file: &Path) -> Result<(), JobsError> {
         .open(file);
     match made {
         Err(source) if source.kind() != std::io::ErrorKind::AlreadyExists => {
-            Err(JobsError::DataDir {
-                path: file.to_owned(),
-                source,
-            })
+            Err(JobsError::at(file)(source))
         }
         _ => Ok(()),
     }
@@ -117,7 +110,7 @@ fn make_private(file: &Path) -> Result<(), JobsError> {
 fn open_writer(file: &Path) -> rusqlite::Result<rusqlite::Connection> {
     let empty = std::fs::metadata(file).is_ok_and(|about| about.len() == 0);
     let connection = open(file, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
-    // The mode stays with the file. Setting it again writes a page, which a full disk does not take.
+    // The mode is stored in the file. Setting it again writes a page, which fails on a full disk.
     if empty {
         connection.execute_batch("PRAGMA auto_vacuum = INCREMENTAL")?;
     }

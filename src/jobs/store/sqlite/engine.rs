@@ -1,13 +1,16 @@
-//! SQLite as the shared statements see it.
+//! The interface of SQLite for the shared statements.
 
 use std::ffi::OsString;
 use std::path::Path;
+use std::sync::Arc;
 
 use async_trait::async_trait;
+use tokio::runtime::Handle;
 use uuid::Uuid;
 
+use crate::error::StoreError;
 use crate::model::Queue;
-use crate::store::sqlite::connection::{Query, Transaction};
+use crate::store::sqlite::connection::{Pooled, Query};
 use crate::store::sqlite::database::SqliteStore;
 use crate::store::sqlite::schema::mark;
 use crate::store::sqlite::sql::claim::{PEEK, first_queued};
@@ -20,20 +23,29 @@ pub(crate) use crate::store::sqlite::connection::{
 
 pub(crate) type SqlStore = SqliteStore;
 
-/// What stands before and behind the present by which leases are judged, a value.
+/// Text before and after the parameter with the current time by which leases are judged.
 pub(crate) const LEASE_NOW: (&str, &str) = ("", "");
 
-/// Begins a transaction that writes.
-pub(crate) async fn begin(writer: &DbPool) -> Result<Transaction> {
+/// Runs the task that stores submitted jobs on a separate thread, which may wait for the disk.
+pub(crate) fn spawn(task: impl Future<Output = ()> + Send + 'static) -> Result<()> {
+    let runtime = Handle::current();
+    let thread = std::thread::Builder::new().name("railhead-commit".to_owned());
+    let started = thread.spawn(move || runtime.block_on(task));
+    started.map_err(|error| StoreError::Failed(Arc::new(error)))?;
+    Ok(())
+}
+
+/// Begins a write transaction.
+pub(crate) async fn begin(writer: &DbPool) -> Result<Pooled> {
     writer.begin().await
 }
 
-/// Begins a transaction that claims: a claim that a power cut undoes leaves its jobs in the queue.
-pub(crate) async fn begin_claim(writer: &DbPool) -> Result<Transaction> {
+/// Begins a transaction that claims. A power cut may undo a claim, which leaves its jobs in the queue.
+pub(crate) async fn begin_claim(writer: &DbPool) -> Result<Pooled> {
     writer.begin_relaxed().await
 }
 
-/// Passes each row of a statement on until `row` returns `false`.
+/// Passes each row of a statement to `row` until that returns `false`.
 pub(crate) async fn for_each(
     rows: Query,
     readers: &DbPool,
@@ -42,29 +54,28 @@ pub(crate) async fn for_each(
     rows.for_each(readers, row).await
 }
 
-/// From here to the end of the transaction nobody else takes places in the queue or uses an idempotency key: there is one
-/// writer.
+/// Until the end of the transaction no other one takes places in the queue or uses idempotency keys; there is one writer.
 pub(crate) async fn lock_admission(_: &mut DbConnection) -> Result<()> {
     Ok(())
 }
 
-/// Keeps jobs from being removed until the end of the transaction: there is one writer.
+/// Prevents the removal of jobs until the end of the transaction; there is one writer.
 pub(crate) async fn lock_jobs_for_share(_: &mut DbConnection, _: &[Uuid]) -> Result<()> {
     Ok(())
 }
 
-/// Keeps others from counting the references to blobs until the end of the transaction: there is one writer.
+/// Prevents changes of the references to blobs until the end of the transaction; there is one writer.
 pub(crate) async fn lock_blobs(_: &mut DbConnection, _: &[i64]) -> Result<()> {
     Ok(())
 }
 
-/// Makes a call; with one writer none has to give way to another.
+/// Runs a call; with one writer there are no conflicts that would require a repetition.
 pub(crate) async fn again<T, F: Future<Output = Result<T>>>(call: impl Fn() -> F) -> Result<T> {
     call().await
 }
 
 impl SqliteStore {
-    /// Ids for new blobs. An id is never used twice, so that a reader cannot meet the result of another job under it.
+    /// New ids of blobs. An id is never reused, so that a reader cannot get the result of another job.
     pub(crate) async fn new_blob_ids(
         &self,
         connection: &mut DbConnection,
@@ -76,7 +87,7 @@ impl SqliteStore {
         Ok((last + 1..).take(number).collect())
     }
 
-    /// The first new jobs of a queue.
+    /// Selects the first new jobs of a queue.
     pub(crate) async fn first_new(
         &self,
         connection: &mut DbConnection,
@@ -85,22 +96,22 @@ impl SqliteStore {
         first_queued(connection, PEEK, request, request.jobs).await
     }
 
-    /// The present by which leases are judged: that of the one process.
+    /// The current time by which leases are judged: that of this process.
     pub(crate) fn lease_now(&self, now: i64) -> Option<i64> {
         Some(now)
     }
 
-    /// Not cached: the query is cheap.
+    /// Queues are not cached, because the query is cheap.
     pub(crate) fn known_queues(&self) -> Option<Vec<(Queue, u64)>> {
         None
     }
 
     pub(crate) fn remember_queues(&self, _: &[(Queue, u64)]) {}
 
-    /// Every claim walks the queue from its start.
+    /// Nothing is cached between claims.
     pub(crate) fn requeued(&self) {}
 
-    /// Size of the file and its write-ahead log.
+    /// Size of the file and its write-ahead log in bytes.
     pub(crate) async fn database_bytes(&self) -> Result<u64> {
         let mut log = OsString::from(self.file.as_os_str());
         log.push("-wal");
@@ -122,7 +133,7 @@ impl Store for SqliteStore {
         None
     }
 
-    /// The write-ahead log is folded into the database.
+    /// Closing checkpoints the write-ahead log.
     async fn close(&self) {
         self.readers.close().await;
         self.writer.close().await;
@@ -144,7 +155,7 @@ impl Store for SqliteStore {
     }
 }
 
-/// Size of a file, 0 if there is none.
+/// Size of a file in bytes, 0 if it does not exist.
 async fn size(file: &Path) -> u64 {
     tokio::fs::metadata(file)
         .await

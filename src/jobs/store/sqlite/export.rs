@@ -1,5 +1,6 @@
-//! The rows of an embedded job table, for those who move them elsewhere.
+//! Export of the rows of an embedded job table.
 
+use tokio::runtime::Handle;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
@@ -7,11 +8,11 @@ use crate::store::Result;
 use crate::store::sqlite::connection::{Row, query, query_scalar};
 use crate::store::sqlite::database::SqliteStore;
 
-/// A portion ends with this row, or once its text is so long.
+/// Maximum number of rows and bytes of a portion.
 const ROWS_MAX: usize = 500;
 const BYTES_MAX: usize = 8 << 20;
 
-/// Some rows of a table: their number, and a JSON array of an object for each.
+/// A portion of a table: number of rows, and a JSON array with an object for each.
 pub(crate) type Portion = (usize, String);
 
 impl SqliteStore {
@@ -24,8 +25,8 @@ impl SqliteStore {
         columns.collect()
     }
 
-    /// The rows of a table, some at a time, and the task that reads them. Bytes are texts of hexadecimal digits; real numbers are texts that
-    /// have all of their digits.
+    /// Reads the rows of a table in portions, by a separate task. Bytes are hexadecimal texts; real numbers are texts
+    /// with all their digits.
     pub(crate) async fn portions(
         &self,
         table: &'static str,
@@ -41,25 +42,26 @@ impl SqliteStore {
         });
         let members: Vec<String> = members.collect();
         let all = query(format!(
-            "SELECT json_object({}) FROM {table}",
+            "SELECT json_object({}) AS line FROM {table}",
             members.join(", ")
         ));
         let mut connection = self.readers.acquire().await?;
         let (sender, portions) = mpsc::channel(1);
+        let runtime = Handle::current();
         let reading = tokio::task::spawn_blocking(move || {
             let (mut rows, mut text) = (0, String::new());
-            all.for_each_now(&mut connection, |row| {
+            runtime.block_on(all.for_each(&mut *connection, |row| {
                 text.push(if rows == 0 { '[' } else { ',' });
-                text.push_str(&row.try_get::<String, _>(0)?);
+                text.push_str(&row.try_get::<String, _>("line")?);
                 rows += 1;
                 if rows < ROWS_MAX && text.len() < BYTES_MAX {
                     return Ok(true);
                 }
                 let full = (std::mem::take(&mut rows), std::mem::take(&mut text) + "]");
                 Ok(sender.blocking_send(full).is_ok())
-            })?;
+            }))?;
             if rows > 0 {
-                // Nobody may listen any more.
+                // The receiver may be closed.
                 let _ = sender.blocking_send((rows, text + "]"));
             }
             Ok(())
@@ -67,7 +69,7 @@ impl SqliteStore {
         Ok((portions, reading))
     }
 
-    /// The keys of the large results that something refers to.
+    /// The keys of all referenced large results.
     pub(crate) async fn large_results(&self) -> Result<Vec<String>> {
         let keys = query_scalar("SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL");
         keys.fetch_all(&self.readers).await

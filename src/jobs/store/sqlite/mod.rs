@@ -1,4 +1,4 @@
-//! The job table on one machine, embedded: SQLite.
+//! The embedded job table: SQLite.
 
 #[macro_use]
 mod tokens;
@@ -14,7 +14,7 @@ pub mod sql;
 
 #[cfg(test)]
 mod plans {
-    //! Do the statements take the indices that were made for them?
+    //! Tests that statements use the intended indices.
 
     use tempfile::TempDir;
     use uuid::Uuid;
@@ -30,7 +30,7 @@ mod plans {
     use crate::store::sqlite::sql::{batches, jobs};
     use crate::store::{Filter, Membership};
 
-    /// A job table in a folder of its own.
+    /// A job table in a temporary folder.
     struct Opened(
         SqliteStore,
         #[expect(dead_code, reason = "removed at the end")] TempDir,
@@ -43,7 +43,7 @@ mod plans {
             Opened(store.unwrap(), folder)
         }
 
-        /// The steps in which a statement is carried out.
+        /// The query plan of a statement.
         async fn plan(&self, statement: &str) -> Vec<String> {
             let mut explain = query(format!("EXPLAIN QUERY PLAN {statement}"));
             for _ in 0..20 {
@@ -55,7 +55,7 @@ mod plans {
         }
     }
 
-    /// Asserts that some step contains `seek`, and that none begins with or contains one of the others.
+    /// Asserts that some step contains `seek`, and that no step contains one of the others.
     fn assert_seeks(steps: &[String], seek: &str, others: &[&str]) {
         assert!(steps.iter().any(|step| step.contains(seek)), "{steps:?}");
         let other = |step: &String| others.iter().any(|other| step.contains(other));
@@ -97,7 +97,7 @@ mod plans {
     #[tokio::test]
     async fn slices_are_found_by_their_job_and_blobs_by_their_slice() {
         let store = Opened::new().await;
-        // The last is what the database asks itself when a blob goes.
+        // The last is the foreign key check when a blob is removed.
         let referring = "SELECT 1 FROM job_slices WHERE blob_id = 1";
         for (statement, seek) in [
             (NOTES, "PRIMARY KEY (job_id=?"),
@@ -149,7 +149,7 @@ mod plans {
         let store = Opened::new().await;
         let steps = store.plan(EXPIRED).await;
         assert_eq!(steps[0], "SEARCH jobs USING PRIMARY KEY (id<?)");
-        // Of a chunk, its run and its neighbours that have not ended are looked at.
+        // Of a chunk, its run and the other chunks of the run that have not ended are read.
         let looks = steps.iter().filter(|step| step.starts_with("SEARCH"));
         assert_eq!(looks.count(), 3, "{steps:?}");
         let beside: Vec<String> = steps
@@ -176,7 +176,7 @@ mod plans {
                 Some(_) => "jobs_by_batch_and_state (batch_id=? AND state=?",
             };
             assert!(steps[0].contains(seek), "{steps:?}");
-            // The batch is sought first, among those of the tenant: of another tenant's nothing is walked.
+            // The batch is found first, restricted to the tenant: nothing is read of a batch of another tenant.
             let owner = [
                 "SCALAR SUBQUERY 1",
                 "SEARCH batches USING PRIMARY KEY (id=?)",

@@ -1,20 +1,20 @@
-//! The schema of the embedded job table: made in an empty file, and brought forward where an earlier version made it. Anything else
-//! is refused and left as it is.
+//! The schema of the embedded job table: created in an empty file, and migrated from earlier versions. Other files are
+//! refused and not changed.
 //!
-//! `schema.sql` is its first form that later ones go on with. Every later one is a step, which is one transaction: a process that dies
-//! between two steps leaves a table that the next start brings forward.
+//! `schema.sql` is the oldest supported version. Every later version is a migration, which is one transaction: after a
+//! crash between two migrations, the next start continues.
 
 use crate::error::JobsError;
 use crate::store::Result;
 use crate::store::sqlite::connection::{Connection, Pool, query, query_scalar};
 
-/// The statements that make an empty file a job table of the first form.
+/// The statements that create the tables of the oldest supported version.
 const SCHEMA: &str = include_str!("schema.sql");
 
 /// Marks a file as a job table of this service ("rhjb").
 const APPLICATION: i64 = 0x7268_6a62;
 
-/// The form of `schema.sql`.
+/// The version of `schema.sql`.
 const FIRST_SCHEMA_VERSION: i64 = 7;
 
 /// Migrations, in order: the version after the migration, and its statements. A released migration is never changed.
@@ -25,10 +25,10 @@ const STEPS: &[(i64, &str)] = &[
     (11, include_str!("steps/11.sql")),
 ];
 
-/// The form that is read and written.
+/// The version that this program reads and writes.
 const SCHEMA_VERSION: i64 = STEPS[STEPS.len() - 1].0;
 
-/// Makes the tables in an empty file, or brings them forward to the form of this program.
+/// Creates the tables in an empty file, or migrates them to the version of this program.
 ///
 /// # Errors
 /// [`JobsError::UnsupportedSchema`] if the file holds something else or is of a later version, or the database failed.
@@ -67,7 +67,7 @@ pub(crate) async fn require(pool: &Pool) -> Result<(), JobsError> {
     }
 }
 
-/// The form of the tables.
+/// The version of the tables.
 async fn form(connection: &mut Connection) -> Result<i64, JobsError> {
     let application: i64 = sql!(scalar fetch_one, &mut *connection, "PRAGMA application_id")?;
     if application != APPLICATION {
@@ -77,7 +77,7 @@ async fn form(connection: &mut Connection) -> Result<i64, JobsError> {
     Ok(form.fetch_one(connection).await?)
 }
 
-/// Writes the number of the version again: a page that stays as it was.
+/// Writes the version again, which does not change it.
 pub(crate) async fn mark(writer: &Pool) -> Result<()> {
     sql!(
         execute,

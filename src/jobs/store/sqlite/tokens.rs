@@ -1,49 +1,48 @@
-//! What SQLite says otherwise than the other databases, as pieces of the statements they share. There is one writer, so that
-//! nothing has to be locked.
+//! Parts of the shared statements in the words of SQLite. There is one writer, so that no locks are needed.
 
-/// Locks the rows of a selection; those that another transaction has locked are left out.
+/// Locks the selected rows; rows that another transaction has locked are skipped.
 macro_rules! skip_locked {
     () => {
         ""
     };
 }
 
-/// Locks the rows of a selection, once whoever else has locked them is done.
+/// Locks the selected rows.
 macro_rules! for_update {
     () => {
         ""
     };
 }
 
-/// Makes of a column an expression that no index is used for.
+/// Turns a column into an expression, for which no index is used.
 macro_rules! bare {
     ($column:literal) => {
         concat!($column, " || ''")
     };
 }
 
-/// A column as it is.
+/// A column.
 macro_rules! unordered {
     ($column:literal) => {
         $column
     };
 }
 
-/// The larger of two values.
+/// The greater of two values.
 macro_rules! greatest {
     () => {
         "MAX"
     };
 }
 
-/// The smaller of two values.
+/// The lesser of two values.
 macro_rules! least {
     () => {
         "MIN"
     };
 }
 
-/// Place of a text in another, 0 if it is not in there.
+/// Position of a text in another, 0 if it does not occur.
 macro_rules! place_in {
     () => {
         "instr"
@@ -57,14 +56,14 @@ macro_rules! pairs_of_labels {
     };
 }
 
-/// The present by which leases are judged: this parameter.
+/// The current time by which leases are judged: this parameter.
 macro_rules! lease_now {
     ($parameter:literal) => {
         $parameter
     };
 }
 
-/// 1 if some process is filling a batch. Which ones this process fills it knows itself, and there is no other.
+/// 1 if another process is filling a batch, which does not occur here.
 macro_rules! being_filled {
     () => {
         "0"

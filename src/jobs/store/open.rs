@@ -1,11 +1,9 @@
-//! Which store a data folder has, and how it is opened: the only place, besides its backup, that knows one store from another.
+//! Opens the store of a service or of a command.
 
-use std::fs::File;
-use std::os::unix::fs::OpenOptionsExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
-use crate::disk_reserve;
+use crate::data_dir::{self, table_file};
 use crate::error::{JobsError, Result};
 use crate::options::{Database, NotifyMode};
 use crate::store::Store;
@@ -13,20 +11,11 @@ use crate::store::Store;
 use crate::store::postgres::database::PostgresStore;
 use crate::store::sqlite::database::SqliteStore;
 
-/// The file that says that the job table was closed in good order.
-const CLOSED: &str = "closed";
-
-/// The file of the embedded job table.
-#[must_use]
-pub fn table_file(data_dir: &Path) -> PathBuf {
-    data_dir.join("jobs.db")
-}
-
-/// Opens the store for a service: the database that it shares with others, or the one of its data folder, of which it is the
-/// only user. The latter is checked for damage unless it was closed in good order.
+/// Opens the store of a service: the shared database, or the table of its data folder, which no other process uses. The
+/// table is checked for damage unless it was closed in good order.
 ///
 /// # Errors
-/// It cannot be opened, is of another version, or is damaged.
+/// The store cannot be opened, has another version, or is damaged.
 pub async fn open_for_service(
     data_dir: &Path,
     database: Option<&Database>,
@@ -58,10 +47,10 @@ async fn open_database(_: &Database) -> Result<Arc<dyn Store>> {
 async fn open_embedded(data_dir: &Path) -> Result<Arc<dyn Store>> {
     let table = table_file(data_dir);
     // After an end that closed the table there is nothing to be checked.
-    let closed = std::fs::remove_file(data_dir.join(CLOSED)).is_ok();
+    let closed = data_dir::take_closed_mark(data_dir);
     let unclean = !closed && table.exists();
     let store = match SqliteStore::open(&table).await {
-        Err(error) if error.storage_fault().is_some() && disk_reserve::give_back(data_dir) => {
+        Err(error) if error.storage_fault().is_some() && data_dir::remove_reserve(data_dir) => {
             tracing::warn!(%error, "the job table is opened on the reserve");
             SqliteStore::open(&table).await?
         }
@@ -73,18 +62,18 @@ async fn open_embedded(data_dir: &Path) -> Result<Arc<dyn Store>> {
     Ok(Arc::new(store))
 }
 
-/// Opens the store of a data folder beside a service that may be running.
+/// Opens the store of a data folder that a service may be using.
 ///
 /// # Errors
-/// It cannot be opened, or is of another version.
+/// The store cannot be opened, or has another version.
 pub async fn open_beside(data_dir: &Path) -> Result<Arc<dyn Store>> {
     Ok(Arc::new(SqliteStore::open(&table_file(data_dir)).await?))
 }
 
-/// Opens a database beside the services that use it.
+/// Opens a database that services may be using.
 ///
 /// # Errors
-/// It cannot be reached, has no job table, or one of another version.
+/// The database cannot be reached, has no job table, or one of another version.
 pub async fn open_shared(url: &str) -> Result<Arc<dyn Store>> {
     open_database(&Database {
         connections: 1,
@@ -92,17 +81,4 @@ pub async fn open_shared(url: &str) -> Result<Arc<dyn Store>> {
         url: url.to_owned(),
     })
     .await
-}
-
-/// Notes that the store was closed in good order.
-pub fn note_closed(data_dir: &Path) {
-    let marked = File::options()
-        .create(true)
-        .truncate(true)
-        .write(true)
-        .mode(0o600)
-        .open(data_dir.join(CLOSED));
-    if let Err(error) = marked {
-        tracing::debug!(%error, "the next start will check the job table");
-    }
 }
