@@ -3,7 +3,7 @@ use std::collections::{HashMap, VecDeque};
 use std::future::pending;
 use std::time::Duration;
 
-use tokio::time::{Instant, sleep, timeout_at};
+use tokio::time::{Instant, sleep, timeout, timeout_at};
 use uuid::Uuid;
 
 use crate::attempts::attempt::StopReason;
@@ -166,14 +166,11 @@ impl Jobs {
     /// # Errors
     /// As [`Jobs::work`].
     pub async fn wait_for(&self, id: Uuid, at_most: Duration) -> Result<Work> {
-        let until = Instant::now() + at_most;
-        let mut seen = None;
-        while let Ok(changed) = timeout_at(until, self.changed_since(id, seen.as_deref())).await {
-            let Some(work) = changed? else { break };
-            if work.ended() {
-                return Ok(work);
-            }
-            seen = Some(work.version());
+        let ended = self.read_until(id, Duration::ZERO, Work::ended);
+        if let Ok(ended) = timeout(at_most, ended).await
+            && let Some(work) = ended?
+        {
+            return Ok(work);
         }
         // Without the position in the queue, which takes another query.
         let work = self.read(id, Duration::ZERO).await?;
@@ -194,15 +191,26 @@ impl Jobs {
     /// # Errors
     /// As [`Jobs::work`].
     pub async fn changed_since(&self, id: Uuid, seen: Option<&str>) -> Result<Option<Work>> {
-        // Subscribe before reading, so that the end of a job in between is announced. Changes of batches are not announced.
-        let mut ended = self.shared.ended.subscribe();
-        let mut age = match (self.kind, seen) {
+        let age = match (self.kind, seen) {
             (Kind::Cases | Kind::Rows, Some(_)) => PAUSE,
             _ => Duration::ZERO,
         };
+        self.read_until(id, age, |work| seen != Some(&work.version()))
+            .await
+    }
+
+    /// Reads work until it is as `wanted`. The first read may be `age` old. `None` if the work had ended, or the service begins to stop.
+    async fn read_until(
+        &self,
+        id: Uuid,
+        mut age: Duration,
+        wanted: impl Fn(&Work) -> bool,
+    ) -> Result<Option<Work>> {
+        // Subscribe before reading, so that the end of a job in between is announced. Changes of batches are not announced.
+        let mut ended = self.shared.ended.subscribe();
         loop {
             let work = self.read(id, age).await?;
-            if seen != Some(&work.version()) {
+            if wanted(&work) {
                 return self.shown(work).await.map(Some);
             }
             if work.ended() {
