@@ -195,7 +195,7 @@ pub struct RunChunk {
 }
 
 impl RunChunk {
-    /// The stored form: [`MAGIC`], then a zstd frame with the first row and the number of rows (u64), and column by column
+    /// The stored form: a signature, then a zstd frame with the first row and the number of rows (u64), and column by column
     /// the values: numbers as f64, texts with a length (u64) before each, all little-endian.
     ///
     /// # Errors

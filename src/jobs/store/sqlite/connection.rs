@@ -348,17 +348,33 @@ impl Query {
         mut row: impl FnMut(&SqliteRow) -> Result<bool> + Send,
     ) -> Result<()> {
         executor
-            .run(true, |connection| {
-                let mut done = Ok(());
-                self.step(connection, &mut |next| {
-                    row(&next).unwrap_or_else(|error| {
-                        done = Err(error);
-                        false
-                    })
-                })?;
-                Ok(done)
-            })
+            .run(true, |connection| self.walk(connection, &mut row))
             .await?
+    }
+
+    /// As [`Query::for_each`], on a thread that may block.
+    #[cfg(feature = "cluster")]
+    pub(crate) fn for_each_now(
+        self,
+        connection: &mut Connection,
+        mut row: impl FnMut(&SqliteRow) -> Result<bool>,
+    ) -> Result<()> {
+        connection.with(|connection| self.walk(connection, &mut row))?
+    }
+
+    fn walk(
+        &self,
+        connection: &rusqlite::Connection,
+        row: &mut dyn FnMut(&SqliteRow) -> Result<bool>,
+    ) -> rusqlite::Result<Result<()>> {
+        let mut done = Ok(());
+        self.step(connection, &mut |next| {
+            row(&next).unwrap_or_else(|error| {
+                done = Err(error);
+                false
+            })
+        })?;
+        Ok(done)
     }
 
     fn step(

@@ -1,6 +1,5 @@
 //! Export of the rows of an embedded job table.
 
-use tokio::runtime::Handle;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
@@ -47,10 +46,9 @@ impl SqliteStore {
         ));
         let mut connection = self.readers.acquire().await?;
         let (sender, portions) = mpsc::channel(1);
-        let runtime = Handle::current();
         let reading = tokio::task::spawn_blocking(move || {
             let (mut rows, mut text) = (0, String::new());
-            runtime.block_on(all.for_each(&mut *connection, |row| {
+            all.for_each_now(&mut connection, |row| {
                 text.push(if rows == 0 { '[' } else { ',' });
                 text.push_str(&row.try_get::<String, _>("line")?);
                 rows += 1;
@@ -59,7 +57,7 @@ impl SqliteStore {
                 }
                 let full = (std::mem::take(&mut rows), std::mem::take(&mut text) + "]");
                 Ok(sender.blocking_send(full).is_ok())
-            }))?;
+            })?;
             if rows > 0 {
                 // The receiver may be closed.
                 let _ = sender.blocking_send((rows, text + "]"));
