@@ -72,7 +72,8 @@ pub(crate) fn read_cache_key(row: &DbRow) -> Result<Option<CacheKey>> {
 
 /// Reads the optional reference to a blob.
 pub(crate) fn read_blob_id(row: &DbRow) -> Result<Option<i64>> {
-    Ok(row.try_get("blob_id")?)
+    let id = row.try_get("blob_id")?;
+    Ok(id)
 }
 
 /// Reads the references of rows to blobs.
