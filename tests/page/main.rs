@@ -1,15 +1,13 @@
-//! Does the page do what it shows? Its modules in Node, its types against the contract, and all of it in a browser against the real
-//! program.
+//! Tests of the page: unit tests of its modules in Node, a type check against the contract, and browser tests against the real program.
 //!
-//! Node, its packages, Chromium and Firefox are installed by `.ci/run`. Where they are missing the tests say so and do nothing; in
-//! continuous integration that is a failure.
+//! `.ci/run` installs Node, its packages, Chromium and Firefox. If one is missing, the tests are skipped with a message; under `CI` they fail.
 
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Oldest Node in which the tests run: it tells modules from scripts by their text.
+/// The oldest Node version that runs the tests. It detects from the source text whether a file is a module.
 const NODE_MIN: [u32; 2] = [20, 19];
 const BROWSERS: [&str; 4] = [
     "/usr/bin/chromium",
@@ -22,7 +20,7 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/page")
 }
 
-/// Says why tests are not run; in continuous integration they have to be.
+/// Reports why tests are skipped. Panics if the variable `CI` is set.
 fn skip(reason: &str) {
     assert!(env::var_os("CI").is_none(), "not run: {reason}");
     eprintln!("SKIPPED: {reason}");
@@ -44,7 +42,7 @@ fn node_is_there() -> bool {
     [number(), number()] >= NODE_MIN
 }
 
-/// Is everything there? Says what is missing.
+/// Returns whether Node and the packages are installed, and reports what is missing.
 fn ready() -> bool {
     if !node_is_there() {
         let [major, minor] = NODE_MIN;
@@ -64,7 +62,7 @@ fn browser() -> Option<PathBuf> {
     chosen.into_iter().chain(known).find(|path| path.exists())
 }
 
-/// Runs Node in the folder of these tests and fails with what it printed.
+/// Runs Node in the folder of these tests. Panics with its output if it fails.
 fn node(arguments: &[&str], variables: &[(&str, &Path)]) {
     let mut command = Command::new("node");
     command.current_dir(folder()).args(arguments);
@@ -76,7 +74,7 @@ fn node(arguments: &[&str], variables: &[(&str, &Path)]) {
     println!("{printed}");
 }
 
-/// The files of tests in a folder, in order.
+/// Returns the sorted paths of the test files in a folder.
 fn test_files(name: &str) -> Vec<String> {
     let entries = fs::read_dir(folder().join(name)).expect("a folder");
     let names = entries.map(|entry| entry.expect("an entry").file_name());

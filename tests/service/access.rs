@@ -1,4 +1,4 @@
-//! Keys and tenants: access to resources of the own tenant and of others.
+//! Tests access with keys to resources of the same tenant and of other tenants.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -73,10 +73,10 @@ async fn a_bad_key_is_refused_also_where_none_is_needed() {
     assert_problem(&answer, 401, "unauthorized", "not known");
 }
 
-/// An id that nothing has.
+/// A job id that does not exist.
 const NOBODY: &str = "01890000-0000-7000-8000-000000000000";
 
-/// Every operation on one job, batch or run that the contract has, with the id put in.
+/// Returns method and path of every operation of the contract on one job, batch or run with this id.
 fn operations_on(kind: &str, id: &str) -> Vec<(Method, String)> {
     let contract: Value = serde_json::from_str(&railhead::http::openapi_json()).unwrap();
     let prefix = format!("/v1/{kind}/{{id}}");
@@ -93,7 +93,7 @@ fn operations_on(kind: &str, id: &str) -> Vec<(Method, String)> {
     found
 }
 
-/// Asserts that resources of another tenant are answered like unknown ones.
+/// Asserts that requests for resources of another tenant and for unknown ids have the same answer.
 async fn assert_foreign_is_unknown(
     guarded: &Guarded,
     key: &str,
@@ -114,7 +114,7 @@ async fn assert_foreign_is_unknown(
     }
 }
 
-/// Another tenant's key opens nothing, nor does a key of the same tenant that is bound to a label which the work has not.
+/// The key of another tenant gives no access. A key of the same tenant that is bound to another label gives none either.
 #[tokio::test]
 async fn what_belongs_to_others_is_answered_like_what_does_not_exist() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;
@@ -139,7 +139,7 @@ async fn what_belongs_to_others_is_answered_like_what_does_not_exist() {
             let seen = guarded.get(key, &list).await;
             assert_eq!(seen.json[kind], json!([]), "{kind}");
         }
-        // The refused requests have changed nothing.
+        // The refused requests changed nothing.
         assert_eq!(guarded.get(north, &path).await.status, 200);
         if kind == "batches" {
             for query in ["state=succeeded", "label=line:A12", &format!("batch={id}")] {
@@ -220,8 +220,8 @@ async fn figures_of_the_whole_service_are_for_the_operator() {
     assert!(!answer.text.contains("north"), "no tenant is named");
 }
 
-/// Every path of the contract with a parameter belongs to a job, a batch, a run, an evolution or a profile, whose operations are all tried below, or
-/// concerns no tenant.
+/// Every path of the contract with a parameter names a job, batch, run, evolution or profile, or concerns no tenant. All operations on the former
+/// are tested below.
 #[test]
 fn whatever_has_an_id_belongs_to_something_of_a_tenant() {
     let contract: Value = serde_json::from_str(&railhead::http::openapi_json()).unwrap();

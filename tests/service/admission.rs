@@ -1,4 +1,4 @@
-//! Limits of the queue are exact under concurrent submissions, and refused work leaves nothing behind.
+//! Tests that queue limits are exact under concurrent submissions and that refused work leaves nothing behind.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,7 @@ use crate::runs::{columns, template};
 use crate::server::{Server, Setup};
 use crate::support::{Turned, case, pause};
 
-/// A service without workers that queues so many jobs.
+/// Starts a service without workers with these queue limits.
 async fn bounded(queue_max: u64, tenant_queue_max: u64) -> Server {
     let mut setup = Setup::idle();
     setup.options.queue_max = queue_max;
@@ -44,7 +44,7 @@ async fn queued(server: &Server) -> usize {
 
 #[tokio::test]
 async fn batches_at_the_same_time_do_not_pass_the_bound_of_the_queue() {
-    // Below and above the size from which places are reserved while a batch arrives.
+    // The sizes lie below and above the size from which a batch reserves places while it arrives.
     for (queue_max, of_tenant, size, kind, fit) in [
         (60, 10_000, 50, "queue-full", 1),
         (10_000, 110, 50, "quota-exceeded", 2),
@@ -60,10 +60,10 @@ async fn batches_at_the_same_time_do_not_pass_the_bound_of_the_queue() {
             let status = if kind == "queue-full" { 503 } else { 429 };
             assert_problem(refused, status, kind, "");
         }
-        // Reservations of batches that arrive together may keep each other out, but never let too many in.
+        // Concurrent batches may refuse each other by their reservations, but never exceed the limit.
         assert!(accepted <= fit, "{accepted} batches of {size}");
         assert_eq!(queued(&server).await, accepted * size);
-        // Once nobody reserves any more, there is exactly the room that is left.
+        // After all reservations are released, exactly the remaining places are free.
         while server.jobs.ready().await.is_err() {
             pause().await;
         }
@@ -92,7 +92,7 @@ async fn until_accepted(server: &Server, body: &str) -> crate::server::Answer {
 #[tokio::test]
 async fn a_batch_that_is_broken_off_gives_its_places_back() {
     let server = bounded(3_000, 3_000).await;
-    // 2 000 good cases, then an element that is no JSON: the array is refused after places were reserved.
+    // The array has 2 000 valid cases and then an element that is not JSON. It is refused after places were reserved.
     let mut body = Value::from(many(2_000)).to_string();
     body.pop();
     body.push_str(", nonsense]");
@@ -117,7 +117,7 @@ async fn staged_bytes_are_bounded_as_expanded() {
     assert!(table.len() < 10_000);
     let refused = send(&server, &format!("?template={id}"), "text/csv", table).await;
     assert_problem(&refused, 429, "quota-exceeded", "100000 bytes");
-    // The counted jobs are released.
+    // The jobs that were counted are released.
     let half = lines(&many(150));
     assert!(half.len() > 50_000, "two of these are too many together");
     for _ in 0..3 {
@@ -147,7 +147,7 @@ async fn a_key_stands_for_one_piece_of_work_with_its_options() {
             assert_eq!(again.header("idempotency-replayed"), Some("true"));
             assert_eq!(again.is(202).json, first.json);
         }
-        // Requests with a new key that arrive together make one piece of work.
+        // Concurrent requests with a new key create a single piece of work.
         let key = format!("{path}/2");
         let new = (0..6).map(|_| ask("?priority=low", &key, &body));
         let new = join_all(new).await.into_iter();

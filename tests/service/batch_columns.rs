@@ -1,4 +1,4 @@
-//! Results of a batch as a table with selected columns and lines.
+//! Tests results of a batch as a table with selected columns and lines.
 
 use serde_json::{Value, json};
 
@@ -19,7 +19,7 @@ async fn table(server: &Server, path: &str) -> Csv {
     Csv::read(&server.get(path).await.is(200).text)
 }
 
-/// The path of the results of these cases, all ended, and their lines as NDJSON.
+/// Solves a batch. Returns the path of its results, and its results as lines of NDJSON.
 async fn solved(server: &Server, cases: &[Value]) -> (String, Vec<Value>) {
     let batch = server.post("/v1/batches", &json!(cases)).await.json;
     let path = link(&batch, "results").to_owned();
@@ -77,7 +77,7 @@ async fn columns_are_those_asked_for_and_say_what_the_result_says() {
     assert!(rows[2][8].contains("time"), "{}", rows[2][8]);
 }
 
-/// Load, area and force along x of each patch, motion by motion, or position by position.
+/// Returns load, area and longitudinal force of each patch, grouped by motion or by position.
 fn by_point(result: &Value) -> Vec<Vec<[f64; 3]>> {
     let mut found = vec![Vec::new(); 3];
     let positions = result["wheelset"]["positions"].as_array();
@@ -103,7 +103,7 @@ fn by_point(result: &Value) -> Vec<Vec<[f64; 3]>> {
     found
 }
 
-/// Motions that change the pressure, and positions of a wheelset, have loads of their own in every table.
+/// Each motion that changes the pressure, and each position of a wheelset, has its own load in every table.
 #[tokio::test]
 async fn each_motion_and_each_position_has_its_own_load() {
     let server = Server::start().await;

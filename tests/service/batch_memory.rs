@@ -1,4 +1,4 @@
-//! Memory of the results of a batch while they are read: bounded for small results, and counted for every large one.
+//! Tests memory of batch results while they are read: it is bounded for small results and counted for each large one.
 
 use axum::body::Body;
 use http_body_util::BodyExt;
@@ -9,12 +9,12 @@ use tower::ServiceExt;
 use crate::server::{Server, link};
 use crate::support::long_case;
 
-/// Bytes counted for a reader of small results.
+/// The number of bytes counted for a reader of small results.
 const READER_BYTES: usize = 512 << 10;
-/// The part of all memory that is for answers.
+/// The ratio of the memory limit to the part of it for answers.
 const ANSWERS: usize = 2;
 
-/// A batch of a small case, a large one and a small one, solved: the path of its results, and the path of the large one.
+/// Solves a batch of a small, a large and a small case. Returns the path of its results and the path of the large result.
 async fn solved(server: &Server, motions: u32) -> (String, String) {
     let mut large = long_case("large", motions);
     large["solver"]["mesh"] = json!({ "strips": 2, "cells": 2 });
@@ -26,7 +26,7 @@ async fn solved(server: &Server, motions: u32) -> (String, String) {
     (path, format!("/v1/jobs/{job}/result"))
 }
 
-/// A router on the same jobs with so much memory for answers.
+/// Returns a router on the same jobs with this much memory for answers.
 fn with_answers(server: &Server, bytes: usize) -> axum::Router {
     let memory = ANSWERS * bytes;
     let options = HttpOptions {
@@ -37,7 +37,7 @@ fn with_answers(server: &Server, bytes: usize) -> axum::Router {
     router(server.jobs.clone(), options)
 }
 
-/// The status of an answer and its body, of which nothing has been taken.
+/// Returns the status of an answer and its unread body.
 async fn ask(router: &axum::Router, path: &str) -> (u16, Body) {
     let mut request = axum::http::Request::get(path)
         .header("host", "localhost")
@@ -54,7 +54,7 @@ async fn text_of(body: Body) -> String {
     String::from_utf8(bytes.to_vec()).expect("UTF-8")
 }
 
-/// So many more readers begin before one is refused.
+/// Returns how many additional readers are accepted before one is refused.
 async fn readers(router: &axum::Router, path: &str) -> usize {
     let mut reading = Vec::new();
     loop {
@@ -87,7 +87,7 @@ async fn a_result_that_is_larger_than_all_memory_for_answers_passes_through_the_
     assert_eq!(lines.len(), 3);
     assert_eq!(lines[1]["result"], result.json);
 
-    // A table has to be made from the whole of it, for which there is no room.
+    // A table needs the whole result in memory, which exceeds the limit.
     let (_, body) = ask(&little, &format!("{path}?format=csv")).await;
     let table = text_of(body).await;
     assert_eq!(table.lines().count(), 1 + 2 + 1 + 3, "{table}");
@@ -105,7 +105,7 @@ async fn a_result_that_is_larger_than_all_memory_for_answers_passes_through_the_
     assert_counted_while_read(&server, &path, result.bytes.len()).await;
 }
 
-/// Asserts that a large result is counted as long as its table is being read.
+/// Asserts that the memory of a large result is counted while its table is read.
 async fn assert_counted_while_read(server: &Server, path: &str, bytes: usize) {
     let places = 2 * bytes / READER_BYTES + 3;
     let router = with_answers(server, places * READER_BYTES);

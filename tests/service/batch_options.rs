@@ -1,4 +1,4 @@
-//! Cases of a batch with a priority and a deadline of their own.
+//! Tests individual priorities and deadlines of the cases of a batch.
 
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use crate::server::Server;
 
 const NDJSON: &str = "application/x-ndjson";
 
-/// Priority, and whether there is a deadline, of the jobs of a batch in the order of their cases.
+/// Returns, for each job of a batch in the order of the cases, its priority and whether it has a deadline.
 async fn options(server: &Server, batch: &Value) -> Vec<(String, bool)> {
     let id = batch["id"].as_str().expect("an id");
     let page = server.read(&format!("/v1/jobs?batch={id}")).await;

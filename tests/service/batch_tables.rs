@@ -1,4 +1,4 @@
-//! Tables of cases: columns by name or pointer, faults by line.
+//! Tests tables of cases: columns by name or pointer, and errors by line.
 
 use serde_json::json;
 
@@ -88,7 +88,7 @@ async fn names_and_labels_have_no_control_characters() {
     }
 }
 
-/// Numbers are read as in runs.
+/// Numbers are parsed in the same way as in runs.
 #[tokio::test]
 async fn numbers_may_have_a_plus_sign() {
     let server = Server::idle().await;

@@ -1,4 +1,4 @@
-//! Batches: accepted as a whole, solved in groups, read in order.
+//! Tests batches: atomic acceptance, solution in groups, results in input order.
 
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ pub fn lines(cases: &[Value]) -> String {
     lines.join("\n")
 }
 
-/// A case that is solved in no time.
+/// Returns a case that is solved very quickly.
 pub fn small(name: &str) -> Value {
     let mut case = case(name);
     case["solver"] = json!({ "method": "boundary_element", "mesh": { "strips": 2, "cells": 2 } });
@@ -27,21 +27,21 @@ pub fn small(name: &str) -> Value {
     case
 }
 
-/// Returns the case of `small` with this normal force.
+/// Returns the same case as `small` with this normal force.
 pub fn small_loaded(name: &str, newtons: usize) -> Value {
     let mut case = small(name);
     case["load"]["normal_force_n"] = json!(newtons);
     case
 }
 
-/// Sends the body of a batch.
+/// Sends the body of a batch with this media type.
 pub async fn send(server: &Server, query: &str, content: &str, body: String) -> Answer {
     server
         .post_as(&format!("/v1/batches{query}"), content, body)
         .await
 }
 
-/// The lines of the results of a batch.
+/// Returns the lines of the results of a batch.
 pub async fn results(server: &Server, batch: &Value, query: &str) -> Vec<Value> {
     let path = link(batch, "results");
     let answer = server.get(&format!("{path}{query}")).await;
@@ -53,7 +53,7 @@ pub async fn results(server: &Server, batch: &Value, query: &str) -> Vec<Value> 
 #[tokio::test]
 async fn results_come_in_input_order_with_one_line_per_case() {
     let mut setup = Setup::new();
-    // The second form shall be solved like the first.
+    // Without the cache, the second format is solved as well.
     setup.options.cache = false;
     let server = setup.start().await;
     let cases: Vec<Value> = (0..150).map(|i| small(&format!("case {i}"))).collect();
@@ -79,7 +79,7 @@ async fn results_come_in_input_order_with_one_line_per_case() {
         assert_eq!(now["states"]["succeeded"], 150);
         assert_eq!(now["progress"], 1.0);
         assert_eq!(now["ended"], true);
-        // A line says what the job itself says.
+        // A line has the same content as the resources of its job.
         let id = lines[77]["id"].as_str().expect("an id");
         let alone = server.read(&format!("/v1/jobs/{id}/result")).await;
         assert_eq!(lines[77]["result"], alone);
@@ -238,7 +238,7 @@ async fn a_panic_in_a_group_fails_that_job_only() {
         solve(checked, monitor)
     });
     let server = setup.start().await;
-    // Of identical cases only the first would be solved.
+    // If the cases were identical, only the first one would be solved.
     let cases = [("a", 50_000), ("bad", 50_001), ("c", 50_002)];
     let cases = cases.map(|(name, load)| small_loaded(name, load));
     let batch = send(&server, "", "application/x-ndjson", lines(&cases)).await;

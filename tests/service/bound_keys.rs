@@ -1,4 +1,4 @@
-//! Keys that are bound to labels: every kind of list page by page, events, templates and profiles.
+//! Tests keys that are bound to labels: pages of every list, events, templates and profiles.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use crate::runs::{columns, template};
 use crate::server::{Setup, example};
 use crate::support::case;
 
-/// A job, a batch or a run of the tenant with this label; its id.
+/// Creates a job, a batch or a run of the tenant with this label. Returns its id.
 async fn make(guarded: &Guarded, list: &str, number: usize, label: &str) -> String {
     let (path, body) = match list {
         "jobs" => {
@@ -39,7 +39,7 @@ async fn make(guarded: &Guarded, list: &str, number: usize, label: &str) -> Stri
         .to_owned()
 }
 
-/// The ids of a whole list, one entry a page.
+/// Reads a whole list with one entry per page and returns the ids.
 async fn ids(guarded: &Guarded, key: &str, list: &str, filter: &str) -> Vec<String> {
     let mut ids = Vec::new();
     let mut next = Some(format!("/v1/{list}?limit=1{filter}"));
@@ -77,7 +77,7 @@ async fn a_bound_key_turns_the_pages_of_its_own_part_of_every_list() {
         }
         let foreign = ids(&guarded, &guarded.line_7, list, "&label=line:8").await;
         assert_eq!(foreign, Vec::<String>::new(), "{list}");
-        // A cursor of the whole list is none of the narrowed one.
+        // A cursor of the whole list is not valid for the restricted list.
         let page = guarded
             .get(&guarded.north, &format!("/v1/{list}?limit=1"))
             .await;
@@ -185,7 +185,7 @@ async fn a_bound_key_gives_its_label_to_what_it_makes() {
     assert_eq!(me.json["labels"], json!({ "line": "7" }));
 }
 
-/// A bound key that sends the case and the idempotency key of a job of another line is not answered with that job.
+/// A bound key that repeats the case and the idempotency key of a job of another line does not receive that job.
 #[tokio::test]
 async fn a_bound_key_is_not_answered_with_a_job_of_others() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;

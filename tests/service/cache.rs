@@ -1,4 +1,4 @@
-//! An identical case, and only that, is answered by the earlier result.
+//! Tests that only an identical case is answered with an earlier result.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,7 +14,7 @@ use crate::results::path_of;
 use crate::server::{Answer, Server, Setup, link};
 use crate::support::{Service, case, files_below, loaded};
 
-/// A service that counts its solves.
+/// Starts a service that counts its solves.
 async fn counting(change: impl FnOnce(&mut Options)) -> (Server, Arc<AtomicUsize>) {
     let solves = Arc::new(AtomicUsize::new(0));
     let counter = solves.clone();
@@ -32,7 +32,7 @@ fn renamed(name: &str) -> Value {
     case
 }
 
-/// The result of a job without what differs between jobs.
+/// Returns the result of a job without the members that differ between jobs.
 fn bare(result: &Value) -> Value {
     let mut result = result.clone();
     let members = result.as_object_mut().expect("a result");
@@ -54,7 +54,7 @@ async fn an_identical_case_is_answered_at_once_with_the_first_result() {
     let first = server.solve(&renamed("first")).await;
     assert_eq!(first["cached"], false);
     assert_eq!(first["result"]["cached"], false);
-    // Not waited for: it has ended when it is accepted.
+    // The request does not wait, but the job has already ended when it is accepted.
     let answer = server.post("/v1/jobs", &renamed("second")).await.is(202);
     assert_eq!(answer.json["state"], "succeeded");
     let second = server.read(&path_of(&answer.json)).await;
@@ -66,7 +66,7 @@ async fn an_identical_case_is_answered_at_once_with_the_first_result() {
     assert_eq!(second["remarks"], first["remarks"]);
     let result = server.read(&format!("{}/result", path_of(&second))).await;
     assert_eq!(result["cached"], true);
-    // The seconds are those of the one solve there was.
+    // The solver times are those of the only solve.
     assert_eq!(bare(&result), bare(&first["result"]));
     for part in ["tractions", "zones", "resultants"] {
         let of = async |job: &Value| server.read(&format!("{}/{part}", path_of(job))).await;
@@ -140,7 +140,7 @@ async fn a_batch_is_answered_from_earlier_results() {
     assert_eq!(solves.load(Ordering::SeqCst), 60);
 }
 
-/// Sends a batch and returns its lines once all have ended.
+/// Sends a batch and returns its result lines once all jobs have ended.
 async fn batch_items(server: &Server, cases: &[Value], fresh: bool) -> Vec<Value> {
     let (cases, control) = (json!(cases), if fresh { "no-cache" } else { "max-age=60" });
     let sent = server.post_with("/v1/batches", "cache-control", control, &cases);
@@ -202,7 +202,7 @@ async fn identical_cases_that_fail_all_say_why() {
 #[tokio::test]
 async fn earlier_results_outlive_the_process_and_the_deletion_of_their_job() {
     let folder = tempfile::tempdir().unwrap();
-    // Fine enough for fields that do not fit into the table.
+    // The mesh is so fine that the fields do not fit into the table.
     let mut large = case("large");
     large["solver"]["mesh"] = json!({ "strips": 40, "cells": 40 });
     let solve = async |service: &Service| -> Value {
@@ -223,7 +223,7 @@ async fn earlier_results_outlive_the_process_and_the_deletion_of_their_job() {
     let gone = service.request(Method::DELETE, &path).send().await.unwrap();
     assert_eq!(gone.status(), 204);
     service.kill();
-    // The sweep at the start leaves what another job needs.
+    // The cleanup at the start keeps data that another job refers to.
     let service = Service::start(folder.path(), &[]);
     let path = format!("/v1/jobs/{}", second["id"].as_str().unwrap());
     for _ in 0..20 {

@@ -1,4 +1,4 @@
-//! Caching by clients, and compression.
+//! Tests caching by clients and compression.
 
 use std::io::Read;
 
@@ -17,7 +17,7 @@ use crate::table_forms::kept_template;
 async fn finished_results_are_kept_for_good_and_asked_for_by_tag() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("spin.case.json")).await);
-    // A service with the same jobs that cannot render: stored responses of the client are not rendered again.
+    // A service on the same jobs that cannot render: it must not render again what the client has stored.
     let options = HttpOptions {
         renderings_waiting_max: 0,
         ..HttpOptions::default()
@@ -205,7 +205,7 @@ async fn packed_cases_and_batches_are_unpacked() {
     assert_problem(&answer, 400, "unreadable-body", "");
 }
 
-/// RFC 1952 allows several members, as parallel compressors and `cat` make them.
+/// RFC 1952 allows several members in a file. Parallel compressors and `cat` produce such files.
 #[tokio::test]
 async fn every_member_of_a_packed_body_is_read_and_nothing_may_follow() {
     let server = Server::idle().await;
@@ -261,7 +261,7 @@ async fn limits_hold_before_and_after_unpacking() {
     let fits = send_packed(&server, "/v1/jobs", json, "gzip", padded).await;
     fits.is(202);
     let generous = Server::idle().await;
-    // Empty lines, a few kB on the way.
+    // The body consists of empty lines and takes a few kB when compressed.
     let text = vec![b'\n'; 40_000_000];
     for (coding, bomb) in [
         ("gzip", gzip(&text)),
@@ -271,13 +271,13 @@ async fn limits_hold_before_and_after_unpacking() {
         assert_problem(&answer, 413, "body-too-large", "20000");
         let answer = send_packed(&server, "/v1/batches", json, coding, bomb.clone()).await;
         assert_problem(&answer, 413, "body-too-large", "60000");
-        // A large body is still refused once it has unpacked to many times what has come.
+        // A large body is refused as well once it expands to many times its compressed size.
         let lines = "application/x-ndjson";
         let answer = send_packed(&generous, "/v1/batches", lines, coding, bomb).await;
         assert_problem(&answer, 413, "body-too-large", "200 times its size");
     }
     let server = Server::idle_with(|setup| setup.http.body_max_bytes = 20_000).await;
-    // Empty blocks without end: nothing comes out, but more goes in than is allowed; the length is not declared.
+    // An endless sequence of empty blocks: the decompressed size stays 0, the compressed size exceeds the limit, and no length is declared.
     let head = vec![0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 0xff];
     let blocks = std::iter::repeat_n([0, 0, 0, 0xff, 0xff].repeat(100), 1000);
     let pieces = std::iter::once(head)
@@ -293,7 +293,7 @@ async fn limits_hold_before_and_after_unpacking() {
     assert_problem(&send.await, 413, "body-too-large", "20000");
 }
 
-/// The tag of the result of a job, and the status of the answer to who has this tag.
+/// Returns the entity tag of the result of a job, and the status of a conditional request with the tag `known`.
 async fn tag_and_status(service: &Service, result: &str, known: &str) -> (String, u16) {
     let request = service.request(Method::GET, result);
     let answer = request.header("if-none-match", known).send().await;
@@ -311,14 +311,14 @@ async fn tags_of_results_end_with_the_build_that_made_them() {
     let result = format!("/v1/jobs/{job}/resultants");
     let (tag, _) = tag_and_status(&service, &result, "\"none\"").await;
     service.kill();
-    // The same build after a restart or on another node.
+    // The tag is the same after a restart and on another node with the same build.
     let service = Service::start(folder.path(), &[]);
     assert_eq!(
         tag_and_status(&service, &result, &tag).await,
         (tag.clone(), 304)
     );
     service.kill();
-    // Another build: what stands behind the end of a program does not change what it does.
+    // A different build: bytes appended to a program do not change its behaviour.
     let other = folder.path().join("another-build");
     std::fs::copy(env!("CARGO_BIN_EXE_railhead"), &other).expect("a copy");
     let file = std::fs::File::options().append(true).open(&other);

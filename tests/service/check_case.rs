@@ -1,4 +1,4 @@
-//! The interpretation of a case by `cases/check`, compared with its solution.
+//! Compares the interpretation of a case by `cases/check` with its solution.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ async fn understood(server: &Server, case: &Value) -> Value {
     answer.json["understood"].clone()
 }
 
-/// The corners of a curve.
+/// Returns the corners of a curve.
 fn curve(value: &Value) -> Vec<[f64; 2]> {
     let corners = value.as_array().expect("a curve").iter();
     corners
@@ -20,7 +20,7 @@ fn curve(value: &Value) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Least distance of a place from a curve, in mm.
+/// Returns the smallest distance of a point from a curve, in mm.
 fn distance(curve: &[[f64; 2]], [y, z]: [f64; 2]) -> f64 {
     let pieces = curve.windows(2).map(|piece| {
         let [from, to] = [piece[0], piece[1]];
@@ -118,7 +118,7 @@ async fn wheel_and_rail_are_placed_where_they_touch_when_solved() {
 async fn a_solve_that_fails_while_it_is_tried_is_told() {
     let server = Server::with(|setup| setup.http.check_trial = Duration::from_secs(3600)).await;
     let mut case = example("uic60-crown.case.json");
-    // Overlaps so deeply that the contact reaches the ends of the samples.
+    // The interpenetration is so large that the contact reaches the ends of the samples.
     case["load"] = json!({ "normal_force_n": 1e9 });
     let answer = server.post("/v1/cases/check", &case).await.is(200);
     assert_eq!(

@@ -1,4 +1,4 @@
-//! The commands of the program.
+//! Tests the commands of the program.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ fn example(name: &str) -> PathBuf {
         .join(name)
 }
 
-/// Runs `railhead solve -` on a text.
+/// Runs `railhead solve -` with this text on standard input.
 fn solve(text: &str) -> Output {
     let mut child = railhead()
         .args(["solve", "-"])
@@ -31,7 +31,7 @@ fn solve(text: &str) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// Asserts that a program ended with this exit code and named this word on standard error. Returns standard error.
+/// Asserts that a program ended with this exit code and that its standard error contains `word`. Returns standard error.
 #[track_caller]
 fn fails(output: &Output, code: i32, word: &str) -> String {
     let complaints = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -40,7 +40,7 @@ fn fails(output: &Output, code: i32, word: &str) -> String {
     complaints
 }
 
-/// The output of a run as JSON.
+/// Returns the standard output of a successful run as JSON.
 fn said(output: &Output) -> Value {
     assert!(output.status.success(), "{output:?}");
     serde_json::from_slice(&output.stdout).unwrap()
@@ -173,7 +173,7 @@ fn config_tells_every_setting_and_where_it_comes_from() {
         assert_eq!(told[setting]["source"], source, "{setting}");
     }
     assert!(told["workers"]["value"].as_u64() >= Some(1));
-    // Every flag of `serve` is there under its name.
+    // Every flag of `serve` is listed under its name.
     let help = railhead().args(["serve", "--help"]).output().unwrap();
     let help = String::from_utf8(help.stdout).unwrap();
     let flags = help
@@ -204,7 +204,7 @@ async fn a_backup_of_a_working_service_can_be_started() {
     let folder = tempfile::tempdir().unwrap();
     let (data_dir, copy) = (folder.path().join("data"), folder.path().join("copy"));
     let service = Service::start(&data_dir, &["--cache", "false"]);
-    // Some results lie in the table, some are too large for it.
+    // Small results are stored in the table, and large results outside it.
     let mut large = case("large");
     large["solver"]["mesh"] = json!({ "strips": 40, "cells": 40 });
     let mut results = Vec::new();
@@ -225,7 +225,7 @@ async fn a_backup_of_a_working_service_can_be_started() {
     };
     let made = backup();
     assert!(made.status.success(), "{made:?}");
-    // No file is overwritten.
+    // An existing file is not overwritten.
     fails(&backup(), 1, "");
     service.kill();
     std::fs::remove_dir_all(&data_dir).unwrap();

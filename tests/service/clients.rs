@@ -1,12 +1,12 @@
-//! A Python client made from the contract: its classes have the names of the contract, and it works against the real program. That of
-//! TypeScript is tried by the tests of the page.
+//! Tests a Python client generated from the contract: its classes have the names of the contract, and it works with the real program. The tests of
+//! the page cover the TypeScript types.
 
 use std::path::Path;
 
 use crate::schemathesis::{python_program, run};
 use crate::support::Service;
 
-/// The version that `client.py` is written for.
+/// The version of the generator that `client.py` is written for.
 const VERSION: &str = "0.29.1";
 
 #[tokio::test]
@@ -25,7 +25,7 @@ async fn a_python_client_made_from_the_contract_solves_a_case() {
     let address = format!("http://{}", service.address());
     let script = text(&root.join("tests/service/client.py"));
     let examples = text(&root.join("api/examples"));
-    // The client needs what its maker brings along.
+    // The environment of the generator has the packages that the client needs.
     let python = program.with_file_name("python");
     let told = run(
         &python,

@@ -1,4 +1,4 @@
-//! Columns of tables in requests and responses: titles, units, limits, texts, damaged files.
+//! Tests columns of tables in requests and responses: titles, units, limits, texts, damaged files.
 
 use railhead::tables::parquet::encode;
 use railhead::tables::table::{COLUMNS_MAX, RowTable, TableColumn};
@@ -15,7 +15,7 @@ async fn rows_of(server: &Server, sent: &Answer) -> Vec<Value> {
     answers(server, &sent.location()).await
 }
 
-/// One row of numbers with these titles.
+/// Returns a table of one row of numbers with these titles.
 fn one_row(titles: &[String]) -> RowTable {
     let titles = titles.iter().enumerate();
     let columns = titles.map(|(k, title)| {
@@ -45,7 +45,7 @@ async fn a_column_that_is_not_known_is_refused_with_what_it_may_be() {
     let errors = refused.json["errors"].as_array().expect("errors");
     assert_eq!(errors.len(), 1);
     assert_eq!(errors[0]["pointer"], "/columns/Q_left");
-    // Named with the unit of the line of units, it is the same run as in the words of the service.
+    // If the column is mapped and its unit comes from the line of units, the run is the same as with the names of the service.
     let named = send_rows(
         &server,
         &format!("{template}&column=Q_left:normal_force"),
@@ -60,7 +60,7 @@ async fn a_column_that_is_not_known_is_refused_with_what_it_may_be() {
     let own = send_rows(&server, &template, "text/csv", own).await;
     let (named, own) = (rows_of(&server, &named).await, rows_of(&server, &own).await);
     assert_eq!(named, own);
-    // Carried along, it changes nothing.
+    // A column that is only copied does not change the results.
     let carried = send_rows(
         &server,
         &format!("{template}&carry=Q_left"),
@@ -183,7 +183,7 @@ async fn a_codec_that_is_not_read_is_named_with_those_that_are() {
     let server = Server::idle().await;
     let template = kept_template(&server).await;
     let mut file = encode(&one_row(&["creepage_x".to_owned()])).expect("a file");
-    // The codec of a column is the field after its name, twice its number: 1 for SNAPPY, 4 for BROTLI.
+    // The codec of a column is the field after its name, encoded as twice its number: 1 is SNAPPY, 4 is BROTLI.
     let codec = b"creepage_x\x15\x02";
     let place = file.windows(codec.len()).rposition(|bytes| bytes == codec);
     file[place.expect("the codec") + codec.len() - 1] = 8;

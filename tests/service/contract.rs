@@ -1,4 +1,4 @@
-//! The contract: generated, committed, complete, and in agreement with the service.
+//! Tests that the contract is up to date and complete, and that it agrees with the service.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -7,10 +7,10 @@ use serde_json::Value;
 
 use crate::schema::contract as document;
 
-/// The committed contract; `railhead openapi` prints the one to commit.
+/// The path of the committed contract. `railhead openapi` prints the current one.
 const COMMITTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/api/openapi.json");
 
-/// Every operation: `METHOD path` and its description.
+/// Returns every operation of the contract with its title `METHOD path`.
 fn operations(document: &Value) -> Vec<(String, &Value)> {
     let mut all = Vec::new();
     for (path, item) in document["paths"].as_object().expect("paths") {
@@ -145,7 +145,7 @@ fn every_reference_leads_somewhere_and_every_schema_is_used() {
     let document = document();
     let mut used = BTreeSet::new();
     walk(&document, "", &mut |pointer, value| {
-        // Member names of examples are the client's, not references.
+        // Examples contain names of the client, not references.
         if pointer.ends_with("/$ref") && !pointer.contains("/examples/") {
             let target = value.as_str().expect("a reference is a string");
             let inside = target

@@ -1,4 +1,4 @@
-//! Cost of requests: memory is bounded for any body and response, and other clients are served.
+//! Tests the cost of requests: memory is bounded for any body and response, and other clients are served.
 
 use std::process::Stdio;
 use std::time::Duration;
@@ -13,10 +13,10 @@ use crate::errors::assert_problem;
 use crate::server::{Server, Setup, example};
 use crate::support::{Service, railhead};
 
-/// Memory that the whole process may take with idle workers.
+/// The maximal resident memory of the whole process with idle workers.
 const RESIDENT_MAX: usize = 1 << 30;
 
-/// Memory of a process by the name of a line: `VmRSS:` resident now, `VmHWM:` the most it ever took.
+/// Returns the memory of a process in bytes by a name in `/proc/PID/status`: `VmRSS:` is the current and `VmHWM:` the peak resident size.
 pub fn memory_bytes(process: u32, name: &str) -> usize {
     memory_of(process, name).expect("a process")
 }
@@ -28,7 +28,7 @@ fn memory_of(process: u32, name: &str) -> Option<usize> {
     Some(kibibytes * 1024)
 }
 
-/// An array of so many bytes that repeats an element.
+/// Returns an array of this many bytes that repeats an element.
 fn repeated(element: &str, bytes: usize) -> String {
     format!(
         "[{}]",
@@ -38,7 +38,7 @@ fn repeated(element: &str, bytes: usize) -> String {
 
 #[tokio::test]
 async fn bodies_that_would_fill_the_memory_are_refused_unread() {
-    // Small limits in the ratio of the defaults.
+    // The limits are small, in the same ratio as the defaults.
     let server = Server::idle_with(|setup| {
         setup.http.body_max_bytes = 1 << 20;
         setup.http.parsed_max_bytes = 12 << 20;
@@ -62,11 +62,11 @@ async fn bodies_that_would_fill_the_memory_are_refused_unread() {
 
 #[tokio::test]
 async fn large_bodies_at_once_take_bounded_memory_and_others_are_served() {
-    // Limits in the ratio of the defaults, as far as they can be as small.
+    // The limits are in the same ratio as the defaults, as far as small limits allow.
     let limits = "--body-max-mib 2 --parsed-case-max-mb 24 --request-memory-mb 128 --tenant-request-memory-mb 64";
     let limits: Vec<&str> = limits.split(' ').collect();
     let (_folder, service) = Service::fresh(&limits);
-    // A body that is read whole, and one that is refused for what it would become.
+    // The first body is read completely. The second is refused because its parsed form would be too large.
     let plain = format!(
         r#"{{"x":{}}}"#,
         repeated("0.12345678901234567", (2 << 20) - 100)
@@ -104,7 +104,7 @@ async fn large_bodies_at_once_take_bounded_memory_and_others_are_served() {
     assert!(peak < RESIDENT_MAX / 4, "{} MiB", peak >> 20);
 }
 
-/// The path of a solved job with fields.
+/// Solves a case with fields. Returns the path of its job.
 async fn solved(service: &Service) -> String {
     let mut case = example("spin.case.json");
     case["outputs"] = json!(["resultants", "zones", "tractions", "slip"]);
@@ -126,7 +126,7 @@ async fn grids_that_nobody_reads_take_bounded_memory_and_others_are_served() {
     for stream in held.iter_mut().take(2) {
         let mut begun = [0; 12];
         stream.read_exact(&mut begun).await.unwrap();
-        // Or 503, where the memory for answers is taken.
+        // The answer is 503 if the memory for answers is used up.
         assert!([b"HTTP/1.1 200", b"HTTP/1.1 503"].contains(&&begun));
     }
     service.get("/healthz").await;
@@ -150,7 +150,7 @@ async fn grids_have_a_largest_number_of_samples() {
     assert_eq!((answer.status, answer.text.lines().count()), (200, 2501));
 }
 
-/// A service that solves one motion and answers as if it had been this many.
+/// Returns a service that solves one motion and repeats its answer this many times.
 pub fn repeating_motions(motions: usize) -> Setup {
     Setup::new().solving(move |problem, monitor| {
         let (mut solution, fields) = railhead::contact::solve(problem, monitor)?;
@@ -192,7 +192,7 @@ async fn large_results_are_passed_on_as_they_are_stored() {
     assert_problem(&none, 400, "bad-query", "");
 }
 
-/// Creepages whose spin pole lies on a grid inside the patch, at fixed spin: every motion would like a mesh of its own.
+/// Returns a sweep at fixed spin whose spin poles form a grid inside the patch, so that the best mesh differs between motions.
 fn creep_map(side: u32) -> Value {
     let spin = 0.003;
     let ranges =
@@ -209,7 +209,7 @@ fn creep_map(side: u32) -> Value {
     })
 }
 
-/// Solves a case with the real program; the largest resident size that was seen.
+/// Solves a case with the real program. Returns the peak resident size that was observed, in bytes.
 fn peak_of(case: &Value) -> usize {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("case.json");
@@ -233,7 +233,7 @@ fn peak_of(case: &Value) -> usize {
 fn a_creep_map_needs_hardly_more_memory_than_four_motions() {
     let (four, map) = (peak_of(&creep_map(2)), peak_of(&creep_map(8)));
     assert!(four > 1 << 20, "{four} bytes were seen");
-    // Operators of the 64 motions would be about 320 MB.
+    // Operators of the 64 motions would take about 320 MB.
     let more = map.saturating_sub(four);
     assert!(
         more < 160 << 20,

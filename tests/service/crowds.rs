@@ -1,4 +1,4 @@
-//! Many concurrent clients: idle connections are replaced, event streams and waits have their own limits, probes are always answered.
+//! Tests many concurrent clients: idle connections are replaced, event streams and waits have their own limits, probes are always answered.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -12,14 +12,14 @@ use crate::errors::assert_problem;
 use crate::server::{Server, Setup, example};
 use crate::support::{Service, pause, railhead};
 
-/// A request on a connection of its own, of which nothing is read.
+/// Sends a request on a new connection and reads nothing.
 pub async fn send(address: SocketAddr, request: &str) -> TcpStream {
     let mut stream = TcpStream::connect(address).await.expect("a connection");
     stream.write_all(request.as_bytes()).await.expect("sent");
     stream
 }
 
-/// Opens a connection, sends a GET, and leaves the answer unread.
+/// Sends a GET on a new connection and leaves the answer unread.
 pub async fn silent(address: SocketAddr, path: &str) -> TcpStream {
     let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\n\r\n");
     send(address, &request).await
@@ -44,7 +44,7 @@ pub async fn read_answer(stream: &mut TcpStream) -> String {
     }
 }
 
-/// The whole answer to a request on a connection of its own.
+/// Returns the whole answer to a GET on a new connection.
 async fn ask(address: SocketAddr, path: &str) -> String {
     let request = format!("GET {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\n\r\n");
     let mut stream = send(address, &request).await;
@@ -52,7 +52,7 @@ async fn ask(address: SocketAddr, path: &str) -> String {
     read.await.expect("an answer in time")
 }
 
-/// A reader of the events of a job, and the first part of its answer.
+/// Follows the events of a job. Returns the connection and the first bytes of the answer.
 async fn follow(server: &Server, job: &str) -> (TcpStream, [u8; 12]) {
     let mut stream = silent(server.address, &format!("{job}/events")).await;
     let mut begun = [0; 12];
@@ -88,7 +88,7 @@ async fn probes_are_answered_while_every_connection_is_busy() {
     assert!(refused.contains("/problems/overloaded"), "{refused}");
 }
 
-/// Asserts that probes are answered and that every other request gets this status. Returns that answer.
+/// Asserts that probes are answered and that another request gets this status. Returns the last answer.
 async fn assert_probed(address: SocketAddr, status: u16) -> String {
     let mut last = String::new();
     let probes = ["/healthz", "/readyz", "/metrics"].map(|path| (path, 200));
@@ -115,14 +115,14 @@ async fn a_tenant_may_follow_and_wait_so_often_and_no_more() {
     }
     let answer = ask(server.address, &format!("{job}/events")).await;
     assert!(answer.contains("/problems/too-many-requests"), "{answer}");
-    // A wait is a wish only: the job is made, and its id told at once.
+    // A wait is only a preference: the job is created and its id is returned at once.
     let waiting = |request: reqwest::RequestBuilder| {
         let request = request.header("prefer", "wait=60");
         request.json(&example("hertz-steel.case.json"))
     };
     let answer = server.send(Method::POST, "/v1/jobs", waiting).await.is(202);
     assert_eq!(answer.header("preference-applied"), None);
-    // Its place is free again when a follower has gone.
+    // The slot of a follower is free again after it disconnects.
     streams.pop();
     while &follow(&server, &job).await.1 != b"HTTP/1.1 200" {}
 }
@@ -130,7 +130,7 @@ async fn a_tenant_may_follow_and_wait_so_often_and_no_more() {
 #[tokio::test]
 async fn a_tenant_may_have_so_many_requests_under_way_and_no_more() {
     let server = Server::idle_with(|setup| setup.http.tenant_requests_max = 1).await;
-    // A body that does not come: its request is under way until it does.
+    // The request remains active while its body is missing.
     let begun = "POST /v1/jobs HTTP/1.1\r\nhost: localhost\r\ncontent-type: application/json\r\ncontent-length: 2\r\n\r\n";
     let held = send(server.address, begun).await;
     let until = async |part: &str| {
@@ -153,7 +153,7 @@ async fn probes_can_have_a_port_of_their_own() {
     let address = event["address"].as_str().unwrap().parse().unwrap();
     assert_probed(address, 404).await;
     service.signal("INT");
-    // The other port is closed at once; this one answers for as long as the process lives.
+    // The main port closes at once. The port for probes stays open as long as the process lives.
     assert_eq!(service.wait().code(), Some(0));
 }
 
@@ -200,7 +200,7 @@ async fn a_log_that_nobody_reads_holds_up_nobody() {
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    // Read as far as the address, and no further.
+    // The log is read up to the address and no further.
     let mut log = std::io::BufReader::new(child.stderr.take().unwrap());
     let address = loop {
         let mut line = String::new();

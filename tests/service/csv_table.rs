@@ -1,4 +1,4 @@
-//! Reads CSV of a response.
+//! A reader of CSV responses.
 
 pub struct Csv {
     pub head: Vec<String>,

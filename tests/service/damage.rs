@@ -1,4 +1,4 @@
-//! A damaged job table is detected and reported.
+//! Tests that a damaged job table is detected and reported.
 
 use railhead::jobs::{Jobs, JobsError};
 
@@ -7,7 +7,7 @@ use crate::errors::assert_problem;
 use crate::lab::Lab;
 use crate::support::Service;
 
-/// A data folder after an orderly shutdown, with this many jobs and this many bytes damaged from the middle of its table on.
+/// Creates a data folder with this many jobs, shuts down in an orderly way, and overwrites this many bytes from the middle of the table on.
 async fn damaged(jobs: usize, bytes: usize) -> Lab {
     let lab = Lab::idle(|_| {}).await;
     for number in 0..jobs {
@@ -26,7 +26,7 @@ async fn damaged(jobs: usize, bytes: usize) -> Lab {
 #[tokio::test]
 async fn a_table_that_was_damaged_is_refused_after_an_unclean_end() {
     let lab = damaged(200, 8192).await;
-    // As after a kill: the table is not marked as closed.
+    // Without this file the table counts as not closed, as after a kill.
     std::fs::remove_file(lab.folder.path().join("closed")).unwrap();
     match Jobs::open(lab.options).await {
         Err(JobsError::TableDamaged(_)) => {}
@@ -39,8 +39,7 @@ async fn a_table_that_was_damaged_is_refused_after_an_unclean_end() {
 
 #[tokio::test]
 async fn a_table_that_is_damaged_under_a_service_is_told_by_probes_metrics_and_refusals() {
-    // After an orderly end nobody looks for damage at the start: it is met while the service runs. What the tables begin with
-    // lies in front.
+    // After an orderly shutdown the start does not check for damage, so the service finds it while running. The beginning of the file is intact.
     let lab = damaged(400, usize::MAX).await;
     let service = Service::start(lab.folder.path(), &["--cache", "false"]);
     let mut refusal = None;

@@ -1,4 +1,4 @@
-//! Data of a dashboard: lists, batches, the event stream of a tenant, its identity.
+//! Tests data for a dashboard: lists, batches, the event stream of a tenant, its identity.
 
 use std::time::Duration;
 
@@ -32,7 +32,7 @@ async fn a_list_is_narrowed_counted_and_not_sent_twice() {
         .await;
     assert_eq!(count(&two["jobs"]), 4);
     assert_eq!(two["total_at_least"], 4);
-    // Only the first colon of a label divides; the `+` of an offset is written as `%2B`.
+    // Only the first colon of a label separates key and value. The `+` of an offset is written as `%2B`.
     for (query, expected) in [
         ("label=time:12:30", 4),
         ("label=time:12:30&state=cancelled", 0),
@@ -197,7 +197,7 @@ async fn one_stream_tells_all_work_and_goes_on_where_it_was() {
             batch = work.json["id"].clone();
         }
     }
-    // A second stream that starts after the last event of the first has the events of the batch, and no earlier ones.
+    // A second stream that starts after the last event of the first one has the events of the batch and no earlier events.
     let mut later = Reader::open(&server, "/v1/events", Some(&seen)).await;
     assert_eq!(later.next().await.expect("the first").name, "start");
     let told = |data: &Value| {

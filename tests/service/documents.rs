@@ -1,10 +1,10 @@
-//! Documents of the service about itself: capabilities, contract, tour.
+//! Tests documents of the service about itself: capabilities, contract, tour.
 
 use serde_json::{Value, json};
 
 use crate::server::{Server, example, example_text};
 
-/// The names in a list, sorted.
+/// Returns the names in a list, sorted.
 fn words(list: &Value) -> Vec<String> {
     let mut words: Vec<String> = list
         .as_array()
@@ -16,7 +16,7 @@ fn words(list: &Value) -> Vec<String> {
     words
 }
 
-/// The words that a schema allows, sorted.
+/// Returns the values of an enumeration in a schema, sorted.
 fn enumerated(schema: &Value) -> Vec<String> {
     if let Some(told) = schema["discriminator"]["mapping"].as_object() {
         return told.keys().cloned().collect();

@@ -1,4 +1,4 @@
-//! Problems of requests: status, kind and advice.
+//! Tests problems of requests: status, type and advice.
 
 use std::collections::BTreeSet;
 use std::sync::Mutex;
@@ -15,7 +15,7 @@ use crate::runs::{columns, template};
 use crate::server::{Answer, Server, Setup, count, example, link};
 use crate::support::files_below;
 
-/// Checks a failure: status, type, and a word that its detail must have.
+/// Asserts status and type of a problem, and that its detail contains `word`.
 pub fn assert_problem(answer: &Answer, status: u16, kind: &str, word: &str) {
     assert_eq!(answer.status, status, "{}", answer.text);
     assert_eq!(
@@ -60,7 +60,7 @@ async fn faulty_case_is_answered_with_all_its_faults() {
     );
     let listed = server.read("/v1/jobs").await;
     assert_eq!(listed["jobs"], json!([]), "a faulty case makes no job");
-    // A refused case leaves its idempotency key free, so that the corrected case can be sent with it.
+    // A refused case does not use up its idempotency key, so that the corrected case can be sent with the same key.
     keyed("spin.case.json").await.is(202);
 }
 
@@ -92,7 +92,7 @@ async fn unknown_addresses_and_methods_are_problems() {
     );
 }
 
-/// Paths of all kinds of work, a body for each, and its problems if it is not there or has not ended.
+/// Returns the path of each kind of work, a valid body, and its problem types for unknown and for unfinished work.
 fn kinds_of_work() -> [(&'static str, Value, [&'static str; 2]); 4] {
     let rows = json!({ "template": template("table"), "columns": columns(3) });
     let case = example("spin.case.json");
@@ -204,7 +204,7 @@ async fn draining_service_is_not_ready_and_takes_no_jobs() {
     server.get("/healthz").await.is(200);
 }
 
-/// The check often names what makes a case unsolvable.
+/// The check often identifies why a case cannot be solved.
 #[tokio::test]
 async fn a_failed_job_has_the_remarks_of_its_check() {
     let server = Server::start().await;
@@ -299,7 +299,7 @@ async fn job_whose_workers_fall_silent_fails_as_lost() {
     let (release, held) = channel::<()>();
     let held = Mutex::new(held);
     let mut setup = Setup::new().solving(move |_, _| {
-        // Never ticks, so the lease is not renewed; returns when the test is over.
+        // The solver does not tick until the test ends, so that the lease is not renewed.
         let _ = held.lock().expect("a lock").recv();
         Err(SolveError::Cancelled)
     });
@@ -322,8 +322,8 @@ async fn every_kind_of_problem_explains_itself() {
         assert!(seen.insert(path.to_owned()), "{path} is there twice");
         assert_eq!(&server.read(path).await, kind);
     }
-    // Every kind is provoked by a test here; `internal` by a unit test of the panic handler, and `not-ready`
-    // needs a job table that stops answering.
+    // A test in this folder provokes every problem except `internal`, which has a unit test in the panic handler, and `not-ready`, which needs a
+    // job table that stops responding.
     let tests = files_below(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/service").as_ref());
     let tests = tests
         .iter()

@@ -1,4 +1,4 @@
-//! `POST /v1/evaluate`.
+//! Tests `POST /v1/evaluate`.
 
 use std::io::{Read, Write};
 
@@ -32,7 +32,7 @@ async fn evaluate(server: &Server, template: Value, columns: Value) -> crate::se
     server.post("/v1/evaluate", &body).await
 }
 
-/// An NPZ archive of arrays of float64, as `numpy.savez_compressed` writes it.
+/// Returns an NPZ archive with arrays of float64, as `numpy.savez_compressed` writes it.
 pub fn npz(arrays: &[(&str, Vec<f64>)]) -> Vec<u8> {
     let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     for (name, values) in arrays {
@@ -54,7 +54,7 @@ pub fn npz(arrays: &[(&str, Vec<f64>)]) -> Vec<u8> {
     archive.finish().expect("an archive").into_inner()
 }
 
-/// The values of an array of an archive, which end its file and take so many bytes.
+/// Returns the last `bytes` bytes of an array file in an archive, which are its values.
 fn values_of(archive: &[u8], name: &str, bytes: usize) -> Vec<u8> {
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(archive)).expect("a ZIP");
     let mut file = Vec::new();
@@ -100,7 +100,7 @@ async fn arrays_of_numpy_come_in_and_go_out() {
             "faulty-case",
             "normal_force_n/0`: no number given",
         ),
-        // Packed it is small.
+        // The compressed body is small.
         (
             vec![("normal_force_n", vec![1e5; 10_000])],
             413,
@@ -228,7 +228,7 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
     assert_problem(&answer, 413, "body-too-large", "evaluate-max-mib");
 }
 
-/// The example of a wheel on a rail, with one row that is its own motion.
+/// Returns the example of a wheel on a rail with a single motion, and columns with one row that repeats this motion.
 fn wheel_on_rail() -> (Value, Value) {
     let mut case = crate::server::example("wheel-rail.case.json");
     case["outputs"] = json!(["resultants", "zones"]);
@@ -247,7 +247,7 @@ async fn rows_beyond_the_budget_of_the_solver_belong_to_a_run() {
     let many = json!({ "/motion/creepage_x": many });
     let answer = evaluate(&server, case, many).await;
     assert_problem(&answer, 422, "evaluation-too-long", "201 rows");
-    // The table has no such limit.
+    // The method `table` has no such limit.
     let answer = evaluate(&server, template("table"), columns_of(201)).await;
     assert_eq!(answer.status, 200, "{}", answer.text);
 }
@@ -256,7 +256,7 @@ fn columns_of(rows: usize) -> Value {
     json!({ "/load/normal_force_n": vec![1e5; rows], "/motion/creepage_x": vec![1e-3; rows] })
 }
 
-/// A packed table claims the memory of the largest table until it is read; the solver's memory is claimed after that.
+/// A compressed table reserves the memory of the largest table until it is parsed. The memory of the solver is reserved after that.
 #[tokio::test]
 async fn a_packed_table_leaves_memory_for_the_solver() {
     let server = Server::start().await;

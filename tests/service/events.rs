@@ -1,4 +1,4 @@
-//! Server-sent events: every state once, resumption, end of the stream.
+//! Tests server-sent events: every state is sent once, streams can be resumed, and streams end.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use crate::support::{Service, case, endless_case, tick_forever};
 
 const AT_MOST: Duration = Duration::from_secs(60);
 
-/// One event.
+/// A server-sent event.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     pub name: String,
@@ -21,7 +21,7 @@ pub struct Event {
     pub data: Value,
 }
 
-/// Reads events of one answer as they come.
+/// A reader of the events of one response.
 pub struct Reader {
     response: Response,
     text: String,
@@ -45,7 +45,7 @@ impl Reader {
         }
     }
 
-    /// The next event; `None` at the end of the stream.
+    /// Returns the next event, or `None` at the end of the stream.
     pub async fn next(&mut self) -> Option<Event> {
         loop {
             if let Some((block, rest)) = self.text.split_once("\n\n") {
@@ -70,7 +70,7 @@ impl Reader {
         }
     }
 
-    /// Reads events until one about this id satisfies a condition, and returns it.
+    /// Reads events until one with this id satisfies a condition, and returns it.
     pub async fn until(&mut self, id: &Value, is: impl Fn(&Value) -> bool) -> Event {
         loop {
             let event = self.next().await.expect("an event");
@@ -215,7 +215,7 @@ async fn comments_keep_a_quiet_stream_alive() {
     let server = Server::idle().await;
     let path = server.submit(&example("spin.case.json")).await;
     let reader = Reader::open(&server, &format!("{path}/events"), None).await;
-    // The first event alone; nothing more is sent while nothing happens, and the stream stays open.
+    // Only the first event is sent. The stream then stays open without further data.
     let mut pieces = reader.response.bytes_stream();
     let first = pieces.next().await.expect("a piece").expect("bytes");
     assert!(String::from_utf8_lossy(&first).contains("retry: 1000"));

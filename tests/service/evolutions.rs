@@ -1,4 +1,4 @@
-//! Evolutions: submission, events, interruption and results.
+//! Tests evolutions: submission, events, interruption and results.
 
 use std::time::{Duration, Instant};
 
@@ -10,10 +10,10 @@ use crate::runs::ended;
 use crate::server::{Server, example};
 use crate::support::{Service, pause};
 
-/// Time after which a guard reports that a test hangs.
+/// Timeout of a test that hangs.
 const WITHIN: Duration = Duration::from_secs(240);
 
-/// The shipped wheel and rail under two states, over a short extent.
+/// Returns a request for the example wheel and rail in two operating states over a short extent.
 pub fn request(records: u32) -> Value {
     let mut template = example("wheel-rail.case.json");
     for name in ["name", "outputs"] {
@@ -41,7 +41,7 @@ async fn an_evolution_is_answered_as_json_tables_and_sections() {
     let done = ended(&server, &path).await;
     assert_eq!(done["state"], "succeeded");
     assert_eq!(done["name"], "short");
-    // It is in its own list alone, and no job.
+    // The evolution appears only in the list of evolutions. It is not a job.
     let id = done["id"].as_str().unwrap();
     let list = server.read("/v1/evolutions?label=line:A").await;
     assert_eq!(
@@ -92,7 +92,7 @@ async fn an_evolution_is_answered_as_json_tables_and_sections() {
     let table = TableReader::new(bytes::Bytes::from(parquet.bytes)).unwrap();
     assert_eq!(table.group_size(0).0 as usize, points.sum::<usize>());
 
-    // The section files are cross-sections of cases.
+    // The exported sections are accepted as cross-sections of cases.
     for (body, format, form) in [
         ("rail", "miniprof", "miniprof"),
         ("wheel", "simpack", "simpack"),
@@ -134,14 +134,14 @@ async fn faults_are_named_with_their_place_and_what_is_allowed() {
             "distance",
         ),
         ("/traffic/passes", json!([1, -3]), "/traffic/passes/1", "-3"),
-        // Columns keep the titles that they were sent with.
+        // Errors name columns by the titles in the request.
         (
             "/traffic/columns/wheel_load [kN]",
             json!([70, 0]),
             "/traffic/columns/wheel_load [kN]/1",
             "0.0 given",
         ),
-        // A place where the wheel misses the rail is the fault of its row.
+        // A position in which the wheel misses the rail is an error of its row.
         (
             "/traffic/columns/lateral_shift [cm]",
             json!([0.1, 90]),
@@ -170,7 +170,7 @@ async fn faults_are_named_with_their_place_and_what_is_allowed() {
     }
 }
 
-/// A process that is killed again and again gives the bytes of one that is not.
+/// An evolution whose process is killed several times has the same bytes as an uninterrupted one.
 #[tokio::test]
 async fn an_evolution_gives_the_same_bytes_although_the_process_is_killed() {
     let whole = tempfile::tempdir().unwrap();

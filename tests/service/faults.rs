@@ -1,10 +1,10 @@
-//! Members of a fault for programs, besides its detail.
+//! Tests the machine-readable members of a validation error.
 
 use serde_json::{Value, json};
 
 use crate::server::{Server, example};
 
-/// The fault at a pointer, without its sentence.
+/// Returns the error at a pointer without its detail.
 fn at(problem: &Value, pointer: &str) -> Value {
     let faults = problem["errors"].as_array().expect("faults");
     let fault = faults.iter().find(|fault| fault["pointer"] == pointer);

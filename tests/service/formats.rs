@@ -1,4 +1,4 @@
-//! Results in other formats than JSON have the same numbers, to the last bit.
+//! Tests that results in other formats have exactly the same numbers as in JSON.
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
@@ -10,7 +10,7 @@ use crate::errors::assert_problem;
 use crate::results::{number, numbers, path_of};
 use crate::server::{Answer, Server, example};
 
-/// Parts per cell and the columns that belong to them.
+/// The parts with values per cell, and their columns.
 pub const PARTS: [(&str, &[&str]); 4] = [
     ("tractions", &["traction_x_mpa", "traction_y_mpa"]),
     ("pressure", &["pressure_mpa"]),
@@ -19,7 +19,7 @@ pub const PARTS: [(&str, &[&str]); 4] = [
 ];
 const PLACES: [&str; 5] = ["x_mm", "y_mm", "dx_mm", "dy_mm", "strip"];
 
-/// A number, or the code that binary forms have for a zone or for nothing.
+/// Returns a number, or the code of a zone or of a missing value in binary formats.
 fn coded(value: &Value) -> f64 {
     match value {
         Value::String(word) if word == "stick" => 0.0,
@@ -38,7 +38,7 @@ fn column(values: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// All values of rows, in order.
+/// Returns all values of rows, in order.
 pub fn flat(rows: &Value) -> Vec<f64> {
     rows.as_array()
         .expect("rows")
@@ -51,7 +51,7 @@ pub fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// A column of a CSV; empty fields are NaN.
+/// Returns a column of a CSV. Empty fields are NaN.
 fn coded_column(table: &Csv, name: &str) -> Vec<f64> {
     let number = |field: &str| field.parse().expect("a number");
     let coded = |field| match field {
@@ -68,7 +68,7 @@ fn each<const N: usize>(data: &[u8], read: impl Fn([u8; N]) -> f64) -> Vec<f64> 
     numbers.map(|bytes| read(*bytes)).collect()
 }
 
-/// The arrays of an NPZ with their shapes as written.
+/// Returns the arrays of an NPZ archive with their shapes as text.
 pub fn read_npz(answer: &Answer) -> BTreeMap<String, (String, Vec<f64>)> {
     let mut archive = zip::ZipArchive::new(Cursor::new(&answer.bytes)).expect("an archive");
     let mut arrays = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Seeds of the fuzzers and their earlier findings.
+//! Tests the seeds of the fuzzers and their earlier findings.
 
 #[path = "../../fuzz/src/lib.rs"]
 mod promises;

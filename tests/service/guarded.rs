@@ -1,4 +1,4 @@
-//! A service that requires keys, with some keys.
+//! A service that requires keys.
 
 use std::collections::BTreeMap;
 
@@ -9,13 +9,13 @@ use serde_json::Value;
 
 use crate::server::{Answer, Server, Setup};
 
-/// A service with keys of two tenants and of the operator, and one that is bound to a label.
+/// A service that requires keys, with keys of two tenants and of the operator, and one key that is bound to a label.
 pub struct Guarded {
     pub server: Server,
     pub north: String,
     pub south: String,
     pub operator: String,
-    /// A key of the north that is bound to `line:7`.
+    /// A key of the tenant `north` that is bound to `line:7`.
     pub line_7: String,
 }
 
@@ -65,7 +65,7 @@ impl Guarded {
         self.send(key, Method::POST, path, Some(body)).await
     }
 
-    /// Sends a body of some media type.
+    /// Sends a body with this media type.
     pub async fn post_as(
         &self,
         key: &str,

@@ -1,4 +1,4 @@
-//! The code blocks of the guides run unchanged against the real program.
+//! Runs the code blocks of the guides unchanged against the real program.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,7 +10,7 @@ use crate::support::{Service, skip};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
-/// The blocks of a language in a guide, one after the other, with the address of the service under test.
+/// Returns the concatenated blocks of a language in a guide, with the address of the service under test.
 fn blocks(guide: &str, language: &str, service: &Service) -> String {
     let text = std::fs::read_to_string(Path::new(ROOT).join(guide)).expect("a guide");
     let fences = format!("```{language}\n");
@@ -25,7 +25,7 @@ fn blocks(guide: &str, language: &str, service: &Service) -> String {
     blocks.replace("localhost:8080", &address)
 }
 
-/// A folder in which `api/examples` is found as in the repository.
+/// Creates a temporary folder with a link to `api`, so that `api/examples` is found as in the repository.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     std::os::unix::fs::symlink(Path::new(ROOT).join("api"), folder.path().join("api"))
@@ -33,7 +33,7 @@ fn folder() -> TempDir {
     folder
 }
 
-/// Runs a program in a folder; it must succeed. Returns its output.
+/// Runs a program in a folder. Returns its output, and panics if it fails.
 fn run(program: &Path, arguments: &[&str], folder: &Path) -> String {
     let mut command = Command::new(program);
     let command = command.args(arguments).current_dir(folder);
@@ -54,7 +54,7 @@ fn begins_with(file: &Path, mark: &[u8]) {
     );
 }
 
-/// Runs the shell blocks of a guide. Returns the folder where they ran and their output.
+/// Runs the shell blocks of a guide. Returns the folder in which they ran and their output.
 fn run_shell(guide: &str) -> Option<(TempDir, String)> {
     let there = |program: &str| succeeds(Path::new(program), &["--version"]);
     if !there("curl") || !there("jq") {
@@ -140,7 +140,7 @@ fn creep_curve_from_python_runs_as_it_stands() {
     }
 }
 
-/// A Python with the packages of the guide: `RAILHEAD_TEST_PYTHON` or `python3`.
+/// Returns a Python with the packages of the guide: `RAILHEAD_TEST_PYTHON` or `python3`.
 pub fn python() -> Option<PathBuf> {
     let named = std::env::var_os("RAILHEAD_TEST_PYTHON");
     let python = named.map_or_else(|| PathBuf::from("python3"), PathBuf::from);

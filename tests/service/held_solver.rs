@@ -1,4 +1,4 @@
-//! The real program when one of its solver threads stops listening: the thread is held from outside, as a debugger does.
+//! Tests the real program when one of its solver threads stops responding. A tracer stops the thread, as a debugger does.
 
 use std::path::PathBuf;
 use std::sync::mpsc;
@@ -23,16 +23,16 @@ async fn a_process_with_more_deaf_solvers_than_allowed_ends_to_be_started_again(
     holder.join().unwrap();
     assert_eq!(ended.code(), Some(75), "{ended}");
 
-    // No repair is needed, and the port is served again.
+    // No repair is needed, and a new process serves the data folder.
     let service = Service::start(folder.path(), &flags);
     service.until(&id, "cancelled").await;
 }
 
-/// Holds one thread of a process until the process ends; returns once the thread stands still.
+/// Stops a thread of a process until the process ends. Returns after the thread has stopped.
 fn hold(process: u32, name: &str) -> std::thread::JoinHandle<()> {
     let thread = thread_named(process, name);
     let (held, is_held) = mpsc::channel();
-    // A thread is held by the one that took it, and let go when that one ends.
+    // A thread stays stopped by its tracer until the tracer ends.
     let holder = std::thread::spawn(move || {
         ptrace::seize(thread, Options::empty()).expect("a thread that may be traced");
         let all = Some(WaitPidFlag::__WALL);
@@ -45,14 +45,14 @@ fn hold(process: u32, name: &str) -> std::thread::JoinHandle<()> {
             ptrace::cont(thread, None).expect("a thread that goes on");
         }
         held.send(()).expect("a test that waits");
-        // The end of the thread, without which that of its process is not told.
+        // Reports the end of the thread, without which the end of its process is not reported.
         while waitpid(thread, all).is_ok_and(|status| status.pid().is_some() && !ended(status)) {}
     });
     is_held.recv().expect("a thread that is held");
     holder
 }
 
-/// Whether a thread that stands still is in the C library, where it may hold the lock of the allocator, which all other threads need.
+/// Returns whether a stopped thread is in the C library. There it may hold the lock of the allocator, which all other threads need.
 fn is_in_libc(process: u32, thread: Pid) -> bool {
     let folder = PathBuf::from(format!("/proc/{process}"));
     let state = std::fs::read_to_string(folder.join(format!("task/{thread}/syscall"))).unwrap();

@@ -1,4 +1,4 @@
-//! Histories of rolling over HTTP.
+//! Tests rolling histories over HTTP.
 
 use serde_json::json;
 
@@ -23,7 +23,7 @@ async fn a_history_is_answered_point_by_point_in_json_and_csv() {
         assert!(number(&history["dissipated_n_mm"]) >= dissipated, "{point}");
         dissipated = number(&history["dissipated_n_mm"]);
     }
-    // The two points where nothing rolls are shifts.
+    // The two points without rolling are tangential shifts.
     let shifted = |k: usize| number(&points[k]["history"]["shift_x_mm"]);
     assert!(shifted(0) > 0.0 && shifted(12) < 0.0, "{job}");
     assert!(points[1]["history"].get("shift_x_mm").is_none());

@@ -1,4 +1,4 @@
-//! HTTP/2 by prior knowledge: several requests on a connection, and responses that the client does not read.
+//! Tests HTTP/2 with prior knowledge: several requests on a connection, and responses that the client does not read.
 
 use std::time::Duration;
 
@@ -12,10 +12,10 @@ use tokio::task::JoinHandle;
 
 use crate::server::{Server, example};
 
-/// Far beyond every limit that the tests set.
+/// A time far beyond every limit that the tests set.
 const FOR_EVER: Duration = Duration::from_secs(60);
 
-/// A client that grants each answer so many bytes, and its connection, which ends when the service closes it.
+/// Connects a client with this flow-control window per response. The returned task ends when the service closes the connection.
 async fn connect(server: &Server, window: u32) -> (SendRequest<Empty<Bytes>>, JoinHandle<()>) {
     let stream = TcpStream::connect(server.address).await;
     let mut builder = Builder::new(TokioExecutor::new());
@@ -46,7 +46,7 @@ async fn without_a_key_the_name_in_the_address_is_judged() {
         let answer = sender.send_request(request).await.expect("an answer");
         assert_eq!(answer.status().is_success(), allowed, "{name}");
     }
-    // A page of this service may change something; it is known by the same name.
+    // A page of this service may change data, because its origin has the same host name.
     let address = format!("http://localhost/v1/jobs/{}/cancel", uuid::Uuid::nil());
     let request = Request::post(address).header("origin", "http://localhost");
     let request = request.body(Empty::new()).expect("a request");
@@ -58,7 +58,7 @@ async fn without_a_key_the_name_in_the_address_is_judged() {
 async fn a_client_that_grants_no_window_for_its_answer_is_let_go() {
     let server = Server::with(|setup| setup.http.write_timeout = Duration::from_millis(300)).await;
     let (mut sender, connection) = connect(&server, 100).await;
-    // A follower of events waits for the service, which is no fault of its own.
+    // A client that follows events waits for the service, and must not be disconnected.
     let events = request(Method::GET, &server, "/v1/events");
     let events = sender.send_request(events).await.expect("an answer");
     assert_eq!(events.status(), 200);
@@ -71,7 +71,7 @@ async fn a_client_that_grants_no_window_for_its_answer_is_let_go() {
     closed
         .expect("the connection is still open")
         .expect("an end");
-    // Others are served.
+    // Other clients are served.
     let job = server.solve(&example("spin.case.json")).await;
     assert_eq!(job["state"], "succeeded");
 }

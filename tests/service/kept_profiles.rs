@@ -1,4 +1,4 @@
-//! Stored cross-sections that cases, batches and runs name.
+//! Tests stored cross-sections that are referenced by cases, batches and runs.
 
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use crate::runs::answers;
 use crate::server::{Server, Setup, count, example};
 use crate::table_forms::send_rows;
 
-/// The shipped wheel on a rail, its two cross-sections and the same case without them.
+/// Returns the example of a wheel on a rail, its rail and its wheel.
 fn pair() -> (Value, Value, Value) {
     let mut case = example("wheel-rail.case.json");
     let [rail, wheel] = ["rail", "wheel"].map(|name| case["contact"][name].clone());
@@ -58,7 +58,7 @@ async fn a_case_that_names_its_profiles_is_the_case_with_their_points() {
     }
 }
 
-/// The two profiles are listed page by page, like everything else.
+/// Asserts that the two profiles are listed page by page.
 async fn assert_pages(server: &Server) {
     let first = server.get("/v1/profiles?limit=1").await;
     let cursor = first.json["next_cursor"].as_str().expect("a next page");
@@ -81,7 +81,7 @@ async fn assert_pages(server: &Server) {
     }
 }
 
-/// A run in which each row names its rail.
+/// Solves a run in which each row references its rail.
 async fn assert_run(server: &Server, named: &Value, rail: &Value) {
     let rows = json!({ "template": named, "columns": {
         "/contact/rail/profile": [rail["digest"], rail["digest"]], "lateral_shift_mm": [0.0, 1.0]
@@ -139,7 +139,7 @@ async fn profiles_are_bounded_and_faulty_ones_are_refused() {
     both["contact"]["rail"]["profile"] = rail["digest"].clone();
     let refused = server.post("/v1/cases/check", &both).await;
     assert_problem(&refused, 422, "faulty-case", "fault");
-    // A batch with one case that names it, and one that names nothing.
+    // The batch has one case with a valid reference and one with an unknown profile.
     let mut named = case;
     named["contact"]["rail"] = json!({ "profile": rail["digest"] });
     let mut unknown = named.clone();

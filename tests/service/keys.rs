@@ -1,4 +1,4 @@
-//! Keys made and revoked beside the real program, what its start refuses, and what browsers are told.
+//! Tests keys that are created and revoked while the real program runs, refusals at its start, and headers for browsers.
 
 use std::path::Path;
 use std::process::Output;
@@ -17,7 +17,7 @@ fn keys(data_dir: &Path, args: &[&str]) -> Output {
     command.arg("--data-dir").arg(data_dir).output().unwrap()
 }
 
-/// Runs a `keys` command, which must succeed. Returns standard output.
+/// Runs a `keys` command. Returns standard output, and panics if the command fails.
 fn said(data_dir: &Path, args: &[&str]) -> String {
     let done = keys(data_dir, args);
     assert!(done.status.success(), "{done:?}");
@@ -38,7 +38,7 @@ fn id_of(key: &str) -> &str {
     key.split('_').nth(1).unwrap()
 }
 
-/// The columns of a key in the list.
+/// Returns the columns of a key in the list.
 fn listed<'a>(list: &'a str, key: &str) -> Vec<&'a str> {
     let line = list.lines().find(|line| line.starts_with(id_of(key)));
     line.unwrap().split('\t').collect()
@@ -47,7 +47,7 @@ fn listed<'a>(list: &'a str, key: &str) -> Vec<&'a str> {
 #[tokio::test]
 async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
     let (folder, service) = Service::fresh(&["--anonymous", "loopback"]);
-    // Made beside the running service.
+    // The key is created while the service runs.
     let key = make_key(folder.path(), "north");
     let jobs = || (Method::GET, "/v1/jobs");
     let ask = async || ask(&service, &key, jobs(), None).await.status;
@@ -65,7 +65,7 @@ async fn a_key_works_at_once_and_is_refused_seconds_after_it_was_revoked() {
     let unknown = keys(folder.path(), &["revoke", "000000000000"]);
     assert_eq!(unknown.status.code(), Some(1));
 
-    // The secret is nowhere: not in the list, not in the log, not in the data folder.
+    // The secret appears neither in the list, nor in the log, nor in the data folder.
     let secret = key.rsplit('_').next().unwrap();
     assert!(!list.contains(secret));
     assert!(!service.log_text().contains(secret));
@@ -139,7 +139,7 @@ async fn a_revoked_key_ends_the_streams_that_it_opened() {
         open.push(request.bearer_auth(&key).send().await.unwrap());
     }
     said(folder.path(), &["revoke", id_of(&key)]);
-    // The stream of events ends, lines of results break off.
+    // The event stream ends. The stream of result lines breaks off.
     for (answer, complete) in open.into_iter().zip([true, false]) {
         assert_eq!(answer.status(), 200);
         let ended = tokio::time::timeout(Duration::from_secs(15), answer.bytes());
@@ -221,7 +221,7 @@ async fn only_pages_of_listed_origins_may_read_answers() {
         ("http://a.example", false),
     ] {
         for method in [Method::GET, Method::OPTIONS] {
-            // The preflight request of a browser.
+            // `OPTIONS` is the preflight request of a browser.
             let request = service.request(method, "/v1/jobs").header("origin", origin);
             let request = request.header("access-control-request-method", "POST");
             let headers = "authorization,content-type";

@@ -18,12 +18,12 @@ use uuid::Uuid;
 
 pub const AT_MOST: Duration = Duration::from_secs(60);
 
-/// A gate that holds solvers back until it is opened.
+/// A gate that holds solvers until it is opened.
 #[derive(Clone, Default)]
 pub struct Gate {
     open: Arc<AtomicBool>,
     begun: Arc<AtomicUsize>,
-    /// Number of solvers running now, and the largest number so far.
+    /// The number of solvers held now, and the largest number so far.
     ticking: Arc<[AtomicUsize; 2]>,
     deaf: Arc<Mutex<BTreeSet<String>>>,
 }
@@ -33,12 +33,12 @@ impl Gate {
         self.open.store(open, Ordering::SeqCst);
     }
 
-    /// Number of solves that have begun.
+    /// Returns the number of solves that have begun.
     pub fn begun(&self) -> usize {
         self.begun.load(Ordering::SeqCst)
     }
 
-    /// The most solvers that were held at once.
+    /// Returns the largest number of solvers that were held at once.
     pub fn most(&self) -> usize {
         self.ticking[1].load(Ordering::SeqCst)
     }
@@ -57,8 +57,8 @@ impl Gate {
         Ok(())
     }
 
-    /// Solves as a case's name says: `long…` ticks until the gate is open, `deaf…` hears nothing until then when it is solved for the
-    /// first time.
+    /// Returns an engine that acts on the name of a case. Cases named `long…` tick until the gate is open. Cases named `deaf…` do not tick until
+    /// then at their first attempt.
     fn engine(&self) -> Engine {
         let gate = self.clone();
         Engine::contact().solving(move |case, monitor| {
@@ -86,7 +86,7 @@ pub struct Lab {
 }
 
 impl Lab {
-    /// A service that solves nothing before it is started, and everything anew.
+    /// Opens a service without a cache that does not solve until it is started.
     pub async fn idle(change: impl FnOnce(&mut Options)) -> Lab {
         let gate = Gate::default();
         Lab::of(gate.clone(), gate.engine(), change).await
@@ -98,7 +98,7 @@ impl Lab {
         lab
     }
 
-    /// A service with an engine that looks at a gate.
+    /// Opens a service with an engine that uses this gate.
     pub async fn of(gate: Gate, engine: Engine, change: impl FnOnce(&mut Options)) -> Lab {
         let folder = tempfile::tempdir().unwrap();
         let mut options = Options::new(folder.path());
@@ -114,7 +114,7 @@ impl Lab {
         }
     }
 
-    /// Ends the service within a time of grace and opens it again.
+    /// Shuts the service down within a grace period and opens it again.
     pub async fn reopen(&mut self, grace: Duration) {
         self.jobs.shutdown(grace).await;
         let again = Jobs::open_with(self.options.clone(), self.engine.clone());
@@ -139,18 +139,18 @@ impl Lab {
         self.jobs.get(id).await.unwrap()
     }
 
-    /// A job once it has ended.
+    /// Waits until a job has ended, and returns it.
     pub async fn wait(&self, id: Uuid) -> Job {
         self.jobs.wait(id, AT_MOST).await.unwrap()
     }
 
-    /// Waits for a success at the first attempt.
+    /// Waits until a job has ended, and asserts that it succeeded at its first attempt.
     pub async fn succeeds_at_once(&self, id: Uuid) {
         let job = self.wait(id).await;
         assert_eq!((job.state, job.attempt), (State::Succeeded, 1));
     }
 
-    /// Opens the gate and waits until all solvers have gone on.
+    /// Opens the gate and shuts down with a grace period for the solvers.
     pub async fn end(self) {
         self.gate.set_open(true);
         self.jobs.shutdown(Duration::from_secs(10)).await;

@@ -1,4 +1,4 @@
-//! No job is lost or solved twice while the table or the results cannot be written for longer than a lease.
+//! Tests that no job is lost or solved twice while the table or the results cannot be written for longer than a lease.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use crate::support::case;
 
 const LEASE: Duration = Duration::from_millis(400);
 
-/// A service whose results are kept outside the table, and its job that is being solved.
+/// Starts a service that stores results outside the table, and a job that is being solved.
 async fn solving() -> (Lab, Uuid) {
     let lab = Lab::start(|options| {
         options.lease = LEASE;
@@ -35,7 +35,7 @@ async fn assert_solved_once(lab: Lab, id: Uuid) {
 #[tokio::test]
 async fn results_that_cannot_be_stored_for_longer_than_a_lease_are_kept_under_it() {
     let (lab, id) = solving().await;
-    // The place of the results is not there.
+    // A file in place of the folder makes it impossible to store results.
     let results = lab.folder.path().join("results");
     assert!(!results.exists());
     std::fs::write(&results, b"no folder").unwrap();
@@ -55,7 +55,7 @@ async fn results_that_cannot_be_stored_for_longer_than_a_lease_are_kept_under_it
 
 #[tokio::test]
 async fn a_table_that_is_locked_for_longer_than_a_lease_gives_no_job_away() {
-    // While it is being solved, and while its end is to be written.
+    // The table is locked while the job is solved, and while its end is to be written.
     for solved_meanwhile in [false, true] {
         let (lab, id) = solving().await;
         let other = table(&lab);
@@ -63,7 +63,7 @@ async fn a_table_that_is_locked_for_longer_than_a_lease_gives_no_job_away() {
         lab.gate.set_open(solved_meanwhile);
         tokio::time::sleep(4 * LEASE).await;
         other.execute_batch("ROLLBACK").unwrap();
-        // Some looks of whoever takes jobs from silent workers.
+        // Leaves time for several checks for expired leases.
         tokio::time::sleep(2 * LEASE).await;
         lab.gate.set_open(true);
         assert_solved_once(lab, id).await;
@@ -79,7 +79,7 @@ async fn more_deaf_solvers_than_allowed_break_the_service_and_no_fewer() {
     .await;
     for name in ["deaf", "deaf as well"] {
         assert!(!lab.jobs.broken().is_cancelled());
-        // The second is begun once the thread of the first was left behind.
+        // The second job begins after the thread of the first was abandoned.
         let id = lab.begin(case(name)).await;
         assert!(!lab.jobs.broken().is_cancelled());
         lab.jobs.cancel(id).await.unwrap();

@@ -1,6 +1,6 @@
-//! Does the service behave?
+//! Tests of the service and of the program.
 
-/// Unwraps a resource that a test needs. Without it, which has been reported, the test returns early.
+/// Unwraps a resource that a test needs. Returns from the test if it is missing, which has been reported.
 macro_rules! or_skip {
     ($needed:expr) => {{
         let Some(there) = $needed else { return };

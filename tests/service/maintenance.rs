@@ -1,4 +1,4 @@
-//! Stresses, damage and temperatures over HTTP: the parts say what the result says, and are there only where they were asked for.
+//! Tests stresses, damage and temperatures over HTTP: the parts equal those of the result, and exist only if requested.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! Malformed bodies are answered as in the contract, and the service continues.
+//! Tests that malformed bodies are answered as documented and that the service continues.
 
 use reqwest::Method;
 use serde_json::Value;
@@ -8,18 +8,18 @@ use crate::schema::assert_documented;
 use crate::server::example_text;
 use crate::support::{Service, case};
 
-/// Bodies that must be refused before the test ends.
+/// The number of bodies that must be refused before the test ends.
 const REFUSED: usize = 2000;
-/// Clients that send at the same time.
+/// The number of concurrent clients.
 const CLIENTS: usize = 8;
 
 /// Texts that mutations insert into a body.
 const SPLICES: &str = r#"null true [] {} "" - -0 0 1e999 -1e308 5e-324 1e-400 99999999999999999999999999 NaN Infinity
     0x10 1. .5 " ' \u0000 \ud800 \ , : [ ] { } // é"#;
-/// White space and a byte order mark, which mutations put into a body too.
+/// White space and a byte order mark, which mutations insert too.
 const BLANKS: [&str; 3] = ["\n", "\r", "\u{feff}"];
 
-/// A generator of numbers (Marsaglia's xorshift64*), the same at every run.
+/// A reproducible generator of pseudo-random numbers (Marsaglia's xorshift64*).
 struct Chance(u64);
 
 impl Chance {
@@ -31,7 +31,7 @@ impl Chance {
         usize::try_from(number).unwrap() % bound.max(1)
     }
 
-    /// A stretch of a body, not longer than `longest`.
+    /// Returns a range of a body that is not longer than `longest`.
     fn stretch(&mut self, length: usize, longest: usize) -> std::ops::Range<usize> {
         let from = self.below(length + 1);
         let to = length.min(from + self.below(longest + 1));
@@ -80,7 +80,7 @@ impl Chance {
     }
 }
 
-/// Where bodies are sent, as what, and good ones.
+/// Returns valid requests: path, media type and body.
 fn seeds(template: &str) -> Vec<(String, &'static str, String)> {
     let (json, ndjson) = ("application/json", "application/x-ndjson");
     let seed = |path: &str, form, body: &str| (path.to_owned(), form, body.to_owned());
@@ -129,7 +129,7 @@ async fn malformed_bodies_are_answered_as_documented() {
                 let told = answer.bytes().await.unwrap();
                 let json: Value = serde_json::from_slice(&told).unwrap_or_default();
                 let body = String::from_utf8_lossy(&body).into_owned();
-                // Where all turns are taken, as on a busy machine, a body is not read.
+                // A body is not read if all slots are in use, as on a busy machine.
                 assert!(
                     status < 500 || status == 503,
                     "{path} answered {status} to {body}: {json}"

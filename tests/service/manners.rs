@@ -1,4 +1,4 @@
-//! Conventions of the API: parameters, final line breaks, readable limits, formats for older tools.
+//! Tests conventions of the API: parameters, final line breaks, readable limits, formats for older tools.
 
 use reqwest::Method;
 use serde_json::json;

@@ -1,4 +1,4 @@
-//! `/metrics` counts events, with a bounded number of labels.
+//! Tests that `/metrics` counts events with a bounded number of labels.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::server::{Server, Setup, example};
 use crate::support::case;
 
-/// The samples of `/metrics`: name with labels, value.
+/// Returns the samples of `/metrics`: name with labels, and value.
 pub async fn samples(server: &Server) -> BTreeMap<String, f64> {
     let answer = server.get("/metrics").await.is(200);
     let kind = answer.header("content-type").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! A way to a server that is cut, or swallows everything, when a test says so.
+//! A TCP proxy that tests can disconnect or make silent.
 
 use std::net::SocketAddr;
 
@@ -6,7 +6,7 @@ use tokio::io::copy_bidirectional;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::watch;
 
-/// What a way does.
+/// The state of a proxy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Way {
     Whole,
@@ -14,14 +14,14 @@ enum Way {
     Silent,
 }
 
-/// Passes connections on, closes them, or swallows what they send.
+/// A TCP proxy that forwards connections, closes them, or discards what they send.
 pub struct Cable {
     pub address: SocketAddr,
     way: watch::Sender<Way>,
 }
 
 impl Cable {
-    /// A way to what listens on a port of this machine.
+    /// Starts a proxy for a port of this machine.
     pub async fn to(port: u16) -> Cable {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("an address");
@@ -41,7 +41,7 @@ impl Cable {
                         _ = seen.wait_for(|way| *way != Way::Whole) => {}
                         _ = copy_bidirectional(&mut near, &mut far) => return,
                     }
-                    // For ever: what was swallowed for a while does not come back to life.
+                    // The connection stays silent for ever: discarded data are not forwarded later.
                     if *seen.borrow() == Way::Silent {
                         std::future::pending::<()>().await;
                     }
@@ -51,13 +51,13 @@ impl Cable {
         Cable { address, way }
     }
 
-    /// Closes every connection, and new ones at once; or lets new ones pass again.
+    /// Closes all connections and rejects new ones if `whole` is false. Otherwise accepts new ones again.
     pub fn set_whole(&self, whole: bool) {
         self.way
             .send_replace(if whole { Way::Whole } else { Way::Cut });
     }
 
-    /// Neither passes anything on nor says so, for the connections that there are and for new ones.
+    /// Discards all data of existing and new connections without closing them.
     pub fn swallow(&self) {
         self.way.send_replace(Way::Silent);
     }

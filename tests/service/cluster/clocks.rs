@@ -1,4 +1,4 @@
-//! Nodes whose clocks are wrong, as real processes: is a lease judged by the clock of the database alone, and are all times told by it?
+//! Tests nodes with wrong clocks, as real processes: leases and all reported times follow the clock of the database.
 
 use std::time::Duration;
 
@@ -9,13 +9,13 @@ use crate::cluster::faketime::{library, set_ahead, with_clock};
 use crate::cluster::{node_by, tables};
 use crate::support::{Service, case, endless_case, railhead};
 
-/// The lease, in seconds.
+/// The duration of a lease, in seconds.
 const LEASE: u64 = 2;
 
-/// Times are told in milliseconds, by a clock that is left alone while it is off by less than a quarter of a second.
+/// Tolerance for reported times, in ms. A node does not correct its clock while it is wrong by less than 250 ms.
 const TOLD_WITHIN_MS: i64 = 1000;
 
-/// By how much a node found its clock ahead, in ms.
+/// Returns the offset of its clock that a node measured last, in ms. It is positive if the clock is ahead.
 fn found_ahead(service: &Service) -> i64 {
     let log = service.log_text();
     let events = log
@@ -47,7 +47,7 @@ async fn clocks_that_are_off_by_40_seconds_cost_no_lease_and_shift_no_time() {
     let (url, library) = (or_skip!(tables().await), or_skip!(library()));
     let clocks = tempfile::tempdir().unwrap();
     let begun = Timestamp::now();
-    // A node whose clock is ahead by this many seconds.
+    // Starts a node whose clock is ahead by this many seconds.
     let start = |role: &str, ahead: i32| {
         let file = clocks.path().join(ahead.to_string());
         set_ahead(&file, ahead);
@@ -62,7 +62,7 @@ async fn clocks_that_are_off_by_40_seconds_cost_no_lease_and_shift_no_time() {
         assert!((found - ahead).abs() < TOLD_WITHIN_MS, "{found} ms");
     }
 
-    // Each worker holds a job for longer than a lease, and its deadline does not come early.
+    // Each worker holds a job for longer than a lease, and the deadline does not pass early.
     let mut held = Vec::new();
     for api in [&right, &behind] {
         let case = endless_case("held");

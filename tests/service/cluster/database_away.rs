@@ -1,4 +1,4 @@
-//! What do clients hear while the database cannot be reached, and does everything go on afterwards?
+//! Tests answers while the database cannot be reached, and recovery afterwards.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ use crate::cluster::postgres::at_port;
 use crate::cluster::{WITHIN, node, tables, until};
 use crate::support::{Answer, Service, case, long_case};
 
-/// A node that solves, and the way to its database.
+/// Starts a node with a worker whose connection to the database passes through a proxy.
 async fn node_at_a_cable(flags: &[&str]) -> Option<(Service, Cable)> {
     let url = tables().await?;
     let (with_port, port) = at_port(&url);
@@ -20,7 +20,7 @@ async fn node_at_a_cable(flags: &[&str]) -> Option<(Service, Cable)> {
     Some((service, cable))
 }
 
-/// Asserts that an answer names the unreachable database and does not mention disks.
+/// Asserts that an answer reports the unreachable database and does not mention disks.
 async fn assert_unreachable(request: RequestBuilder) {
     let answer = Answer::to(request).await.is(503);
     assert!(answer.header("retry-after").is_some(), "{}", answer.text);
@@ -69,12 +69,12 @@ async fn a_database_that_is_away_is_no_full_disk_and_costs_no_job() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_way_that_swallows_everything_keeps_no_connection_and_no_request() {
-    // Two connections: no request is served while one of them is kept.
+    // With two connections, no request is served while one of them hangs.
     let (service, cable) = or_skip!(node_at_a_cable(&["--database-connections", "2"]).await);
     let done = service.submit(&case("done")).await;
     service.until(&done, "succeeded").await;
 
-    // The pool tests a connection that is given back by a question without an end (docs/scaling.md, "The database"): not at this moment.
+    // The pool tests a returned connection with a query that has no timeout (docs/scaling.md, "The database"). Wait until this test is over.
     tokio::time::sleep(Duration::from_millis(500)).await;
     cable.swallow();
     let asked = Instant::now();

@@ -1,4 +1,4 @@
-//! Is the connection to the database encrypted as its URL asks for, and is the other end who it says it is?
+//! Tests encryption and certificate checks of database connections as requested by the URL.
 
 use railhead::jobs::store::postgres::doctor::examine;
 use sqlx::{Connection, PgConnection};
@@ -6,7 +6,7 @@ use sqlx::{Connection, PgConnection};
 use crate::cluster::postgres::{encrypted, with_parameter};
 use crate::cluster::tables;
 
-/// What the program says when it connects: nothing, or why it does not.
+/// Connects to a database. Returns the error as text, or an empty text on success.
 async fn connect(url: &str) -> String {
     match examine(url).await {
         Ok(_) => String::new(),
@@ -45,7 +45,7 @@ async fn a_connection_is_encrypted_and_the_certificate_checked_as_the_url_asks_f
         assert_eq!(ssl, encrypted, "{url}");
     }
 
-    // Signed by nobody who is trusted; for another name; signed by somebody else.
+    // These certificates are signed by an unknown authority, issued for another name, or signed by another authority.
     let other = tempfile::NamedTempFile::new().unwrap();
     let stranger = rcgen::generate_simple_self_signed(vec!["localhost".to_owned()]).unwrap();
     std::fs::write(other.path(), stranger.cert.pem()).unwrap();

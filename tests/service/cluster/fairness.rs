@@ -1,5 +1,4 @@
-//! Do tenants get equal shares of two nodes that know nothing of each other's turns, and hear nothing of each other, however long their
-//! jobs are?
+//! Tests that tenants get equal shares of two nodes that do not exchange notifications or scheduler state, whatever the duration of their jobs.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,26 +14,26 @@ use sqlx::{Connection, PgConnection};
 use crate::cluster::postgres::schema;
 use crate::support::{case, pause};
 
-/// Time after which a guard reports that a test hangs.
+/// Timeout of a test that hangs.
 const WITHIN: Duration = Duration::from_secs(120);
 
-/// Tenants, ms that their jobs take, and how many each has: more than its share.
+/// Name, duration of a job in ms, and number of jobs of each tenant. The number exceeds the tenant's share.
 const TENANTS: [(&str, u64, i32); 3] = [("a", 2, 2500), ("b", 20, 250), ("c", 200, 30)];
 
-/// Solver time in all, in µs, from which on shares are looked at, and until when. It is their mean that counts, for long jobs come one by one.
+/// The total solver time in µs at which the comparison of shares begins and ends. The mean is compared, because long jobs arrive one by one.
 const LOOKED_AT: (u64, u64) = (4_000_000, 9_000_000);
 
-/// Largest deviation from an equal share. Shares by number of jobs instead of solver time would be 0.03, 0.27 and 2.7.
+/// The largest allowed deviation from an equal share. With equal numbers of jobs the shares would be 0.03, 0.27 and 2.7.
 const SHARE_TOLERANCE: f64 = 0.25;
 
-/// Copies of the job that a tenant has submitted, with the costs that they are expected to have.
+/// Copies the submitted job of a tenant, with its expected cost.
 const MULTIPLY: &str = "WITH ids AS MATERIALIZED (SELECT CAST(gen_random_uuid() AS text) AS id FROM generate_series(1, $2)), \
      more AS (INSERT INTO jobs SELECT (jsonb_populate_record(jobs, jsonb_build_object('id', ids.id, 'cost_us', $3, 'slice_us', $3))).* \
      FROM jobs, ids WHERE tenant = $1) \
      INSERT INTO cases SELECT (jsonb_populate_record(cases, jsonb_build_object('job_id', ids.id))).* FROM jobs \
      JOIN cases ON cases.job_id = jobs.id, ids WHERE tenant = $1";
 
-/// A node with one worker that sleeps for as long as a job of a tenant takes, and counts that; nothing is solved.
+/// Starts a node with one worker that sleeps for the duration of a job and adds it to `spent`. It solves nothing.
 async fn node(url: &str, folder: &Path, spent: Arc<[AtomicU64; 3]>) -> Jobs {
     let options = Options {
         database: Some(Database {
@@ -51,7 +50,7 @@ async fn node(url: &str, folder: &Path, spent: Arc<[AtomicU64; 3]>) -> Jobs {
         let tenant = tenant.expect("a tenant");
         let since = Instant::now();
         std::thread::sleep(Duration::from_millis(TENANTS[tenant].1));
-        // A busy machine makes a sleep longer, which counts.
+        // On a busy machine a sleep takes longer. The actual time counts.
         let taken = u64::try_from(since.elapsed().as_micros()).expect("a number");
         spent[tenant].fetch_add(taken, Ordering::Relaxed);
         Err(SolveError::Unmeshable {

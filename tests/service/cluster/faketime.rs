@@ -1,16 +1,15 @@
-//! Processes with a clock that is off: libfaketime stands between them and the system. Their steady clocks are left alone, as on a
-//! machine whose clock was set wrong.
+//! Processes with a wrong system clock, by libfaketime. Their monotonic clocks are unchanged, as on a machine whose clock was set wrong.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::support::skip;
 
-/// The library; `None`, said aloud, if it is not on this machine.
+/// Returns the path of the library, or `None` after reporting that it is not installed.
 pub fn library() -> Option<PathBuf> {
     let folders = std::fs::read_dir("/usr/lib").into_iter().flatten();
     let folders = folders.filter_map(|folder| Some(folder.ok()?.path()));
-    // Debian has a folder for each architecture, others have one for the library.
+    // Debian has a folder for each architecture. Other distributions have one folder for the library.
     let names = folders.flat_map(|folder| {
         ["faketime/libfaketimeMT.so.1", "libfaketimeMT.so.1"].map(|name| folder.join(name))
     });
@@ -21,7 +20,7 @@ pub fn library() -> Option<PathBuf> {
     found
 }
 
-/// Sets the clock of a program ahead by what a file says, such as `+40` or `-40` seconds, which is read again every second.
+/// Sets the clock of a program by an offset in a file, such as `+40` or `-40` seconds. The program reads the file again every second.
 pub fn with_clock(command: &mut Command, library: &Path, file: &Path) {
     command
         .env("LD_PRELOAD", library)
@@ -31,7 +30,7 @@ pub fn with_clock(command: &mut Command, library: &Path, file: &Path) {
         .env("NO_FAKE_STAT", "1");
 }
 
-/// Writes how far a clock is ahead, in seconds; whole or not at all.
+/// Writes the offset of a clock in seconds, atomically.
 pub fn set_ahead(file: &Path, seconds: i32) {
     let new = file.with_extension("new");
     std::fs::write(&new, format!("{seconds:+}\n")).expect("a file");

@@ -1,4 +1,4 @@
-//! A way to a server of HTTP on which some requests go wrong: they are answered 500, or the answer ends in the middle.
+//! An HTTP proxy that answers some requests with 500 and truncates some answers.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -12,13 +12,13 @@ use axum::response::{IntoResponse, Response};
 use futures_util::{StreamExt, stream};
 use tokio::net::TcpListener;
 
-/// Which requests of a faulty server go wrong: each n-th, 0 for none.
+/// The faults of a proxy. Every n-th request is faulty; 0 disables a fault.
 #[derive(Default)]
 pub struct Faults {
     pub refused: AtomicU64,
     pub cut: AtomicU64,
     requests: AtomicU64,
-    /// Faults so far.
+    /// The number of faults so far.
     pub made: AtomicU64,
 }
 
@@ -31,14 +31,14 @@ impl Faults {
     }
 }
 
-/// A server of HTTP through which requests pass on to another one: some are answered 500, some answers end in the middle.
+/// An HTTP proxy that answers some requests with 500 and truncates some answers.
 pub struct FaultyServer {
     pub address: SocketAddr,
     pub faults: Arc<Faults>,
 }
 
 impl FaultyServer {
-    /// A way to the server that listens on a port of this machine.
+    /// Starts a proxy for the server on this port of this machine.
     pub async fn to(port: u16) -> FaultyServer {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("an address");
@@ -62,7 +62,7 @@ async fn pass(State((port, faults, client)): State<Way>, request: Request) -> Re
     let body = axum::body::to_bytes(body, usize::MAX)
         .await
         .expect("a body");
-    // With the name of the host that was signed.
+    // The headers keep the name of the host, which is signed.
     let sent = client
         .request(parts.method, url)
         .headers(parts.headers)

@@ -1,4 +1,4 @@
-//! The numbers of jobs per state, tenant and kind are sums of rows that are added up from time to time.
+//! Tests the job counts per state, tenant and kind. A count is the sum of rows that are merged from time to time.
 
 use railhead::jobs::store::Store;
 use railhead::jobs::store::postgres::database::PostgresStore;

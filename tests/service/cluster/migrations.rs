@@ -1,4 +1,4 @@
-//! Are the tables of a database made once, brought forward once, and used only by programs that can?
+//! Tests that database tables are created once, migrated once, and used only by compatible programs.
 
 use railhead::jobs::store::postgres::doctor::examine;
 use railhead::jobs::store::postgres::schema::{Migrated, migrate};
@@ -8,7 +8,7 @@ use crate::cluster::postgres::database;
 use crate::cluster::{node, old_tables, said_by, tables};
 use crate::support::{Service, case, railhead};
 
-/// Starts five nodes at once, each as its unit file does: the tables first, then the node. What the commands said, and the nodes.
+/// Starts five nodes at once. Each runs `migrate` first, as its unit file does. Returns the outputs of `migrate` and the nodes.
 fn five_starts(url: &str) -> [(String, Service); 5] {
     let start = |number: usize| {
         let (done, said) = said_by(&mut railhead(), &["migrate", "--database-url", url]);
@@ -44,7 +44,7 @@ async fn five_nodes_start_at_once_on_an_empty_and_on_an_old_database() {
         let keys = sqlx::query_scalar("SELECT COUNT(*) FROM api_keys");
         let keys: i64 = keys.fetch_one(&mut connection).await.unwrap();
         assert_eq!(keys, i64::from(before.is_some()));
-        // Nodes 0, 2 and 4 answer requests, 1 and 3 solve.
+        // Nodes 0, 2 and 4 answer requests; nodes 1 and 3 solve.
         let apis = [&nodes[0].1, &nodes[2].1, &nodes[4].1];
         for (number, api) in apis.iter().enumerate() {
             let id = api.submit(&case(&format!("of node {number}"))).await;
@@ -59,7 +59,7 @@ async fn a_program_goes_on_beside_newer_tables_unless_they_say_that_it_cannot() 
     let start = || node(&url, "serve", &["--workers", "1"]);
     let before = start();
     let mut connection = PgConnection::connect(&url).await.unwrap();
-    // What the next version does to a table in use: it adds.
+    // Like a migration to the next version, this adds to a table in use.
     let next = "ALTER TABLE jobs ADD COLUMN later bigint NOT NULL DEFAULT 0; \
          CREATE TABLE later (id bigint); UPDATE deployment SET form = form + 1";
     sqlx::raw_sql(next).execute(&mut connection).await.unwrap();

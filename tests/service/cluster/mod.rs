@@ -1,4 +1,4 @@
-//! Several nodes on PostgreSQL and S3: what only a build with the feature `cluster` has.
+//! Tests of several nodes on PostgreSQL and S3, for builds with the feature `cluster`.
 
 pub mod cable;
 mod clocks;
@@ -27,10 +27,10 @@ use std::time::{Duration, Instant};
 
 use crate::support::{Service, pause, railhead};
 
-/// Time after which a guard reports that a test hangs.
+/// Timeout of a test that hangs.
 const WITHIN: Duration = Duration::from_secs(90);
 
-/// A database of its own with the tables of the service.
+/// Creates a database with the tables of the service. Returns its URL.
 async fn tables() -> Option<String> {
     let url = postgres::database().await?;
     let migrated = railhead::jobs::store::postgres::schema::migrate(&url).await;
@@ -38,8 +38,8 @@ async fn tables() -> Option<String> {
     Some(url)
 }
 
-/// A node on a database, with short leases and results that are solved anew; no workers in `serve` and one in `worker`. Flags have the
-/// last word.
+/// Starts a node on a database, with short leases and without the cache. `serve` has no workers and `worker` has one. `flags` override these
+/// settings.
 fn node(url: &str, role: &str, flags: &[&str]) -> Service {
     node_by(railhead(), url, role, flags)
 }
@@ -52,7 +52,7 @@ fn node_by(mut program: Command, url: &str, role: &str, flags: &[&str]) -> Servi
     Service::alone(&mut program, role, flags)
 }
 
-/// Waits for something, which has to come.
+/// Waits until `done` returns true. Panics after a timeout.
 async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
     let since = Instant::now();
     while !done().await {
@@ -61,7 +61,7 @@ async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
     }
 }
 
-/// Runs a program. Returns its output and whether it succeeded.
+/// Runs a program. Returns whether it succeeded, and its output.
 fn said_by(program: &mut Command, words: &[&str]) -> (bool, String) {
     let done = program.args(words).output().unwrap();
     let said = [done.stdout, done.stderr].concat();

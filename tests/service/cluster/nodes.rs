@@ -1,4 +1,4 @@
-//! Several nodes on one database, as real processes: does each job end once, and is it seen everywhere, whoever dies?
+//! Tests several nodes on one database, as real processes: each job ends once and is visible on all nodes, even if a node is killed.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::cluster::cable::Cable;
 use crate::cluster::{WITHIN, node, postgres, said_by, tables, until};
 use crate::support::{Answer, Service, case, endless_case, long_case, railhead};
 
-/// What the program says about a database.
+/// Runs the program with this database. Returns its output.
 fn railhead_with(url: &str, words: &[&str]) -> String {
     said_by(railhead().env("RAILHEAD_DATABASE_URL", url), words).1
 }
@@ -21,7 +21,7 @@ async fn in_state(service: &Service, state: &str) -> Vec<Value> {
     list["jobs"].as_array().unwrap().clone()
 }
 
-/// The path of a batch of 60 cases with a key, and whether it was there.
+/// Sends a batch of 60 cases with an idempotency key. Returns its path, and whether the answer was a replay.
 pub async fn send_batch(service: &Service) -> (String, bool) {
     let cases: Vec<Value> = (0..60).map(|n| case(&format!("line {n}"))).collect();
     let request = service.request(Method::POST, "/v1/batches").json(&cases);
@@ -42,7 +42,7 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
         let case = long_case(&format!("case {number}"), motions);
         ids.insert(api.submit(&case).await);
     }
-    // A batch is taken by one node and solved by all.
+    // One node accepts the batch and all workers solve it.
     let (batch, replayed) = send_batch(&second).await;
     assert!(!replayed);
 
@@ -55,7 +55,7 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
     first.kill();
     let third = node(&url, "serve", &[]);
     until("all jobs end", async || {
-        // One look: between two of them a job could go back to the queue and be in neither.
+        // The states are read in one request. Between two requests a job could return to the queue and be missed in both.
         in_state(&second, "succeeded").await.len() == ids.len() + 60
     })
     .await;
@@ -74,7 +74,7 @@ async fn each_job_ends_once_and_is_read_everywhere_although_a_worker_and_an_api_
         let batch = api.get(&batch).await;
         assert_eq!(batch["states"]["succeeded"], 60, "{batch}");
     }
-    // The key of the batch is known to all.
+    // All nodes know the idempotency key of the batch.
     assert_eq!(send_batch(&third).await, (batch, true));
     assert_eq!(in_state(&third, "succeeded").await.len(), ids.len() + 60);
     assert!(!survivor.log_text().contains("panicked"));
@@ -89,20 +89,20 @@ async fn a_job_is_cancelled_and_waited_for_at_a_node_that_does_not_solve_it() {
     let worker = node(&url, "worker", &[]);
     let endless = one.submit(&endless_case("endless")).await;
     one.until(&endless, "running").await;
-    // A client waits at one node for the end that is requested at the other.
+    // A client waits at one node for a cancellation that is requested at the other.
     let waiting = one.request(Method::GET, &format!("/v1/jobs/{endless}"));
     let waiting = Answer::to(waiting.header("Prefer", "wait=30"));
     let (waited, ()) = tokio::join!(waiting, other.cancel(&endless));
     assert_eq!(waited.json["state"], "cancelled", "{}", waited.text);
 
-    // A key that is made by the command opens every node.
+    // A key created by the command is valid on every node.
     let secret = railhead_with(&url, &["keys", "create", "--tenant", "depot"]);
     let secret = secret.lines().next().unwrap();
     let me = other.request(Method::GET, "/v1/me").bearer_auth(secret);
     let me = Answer::to(me).await;
     assert_eq!(me.json["tenant"], "depot", "{}", me.text);
 
-    // An orderly end hands a running job back without counting the attempt.
+    // After an orderly shutdown a running job returns to the queue, and its attempt is not counted.
     let endless = one.submit(&endless_case("endless")).await;
     one.until(&endless, "running").await;
     worker.stop().await;
@@ -110,7 +110,7 @@ async fn a_job_is_cancelled_and_waited_for_at_a_node_that_does_not_solve_it() {
     assert_eq!(job["attempt"], 0, "{job}");
 }
 
-/// Reads a stream of events until one of them passes.
+/// Reads a stream of events until one satisfies the condition, and returns its data.
 async fn until_event(stream: &mut reqwest::Response, passes: impl Fn(&Value) -> bool) -> Value {
     let mut text = String::new();
     loop {
@@ -160,7 +160,7 @@ async fn a_worker_that_stood_still_for_longer_than_its_lease_changes_nothing() {
     let result = api.get(&format!("{path}/result")).await;
     other.stop().await;
     paused.signal("CONT");
-    // It works on: with what it held it is done.
+    // The worker continues with other jobs. The job that it held is lost to it.
     let next = api.submit(&case("next")).await;
     api.until(&next, "succeeded").await;
     assert_eq!(api.get(&path).await, job);
@@ -170,7 +170,7 @@ async fn a_worker_that_stood_still_for_longer_than_its_lease_changes_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn rows_of_a_worker_that_was_cut_off_inside_a_transaction_are_free_soon() {
     let url = or_skip!(tables().await);
-    // The first claim takes a second; a sequence counts those that are rolled back, too.
+    // The first claim takes a second. A sequence counts it even if it is rolled back.
     let slow = "CREATE SEQUENCE claims; CREATE FUNCTION slow() RETURNS trigger LANGUAGE plpgsql AS $$ \
          BEGIN IF nextval('claims') = 1 THEN PERFORM pg_sleep(1); END IF; RETURN NULL; END $$; \
          CREATE TRIGGER slow AFTER UPDATE ON jobs FOR EACH ROW \

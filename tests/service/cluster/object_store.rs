@@ -1,4 +1,4 @@
-//! Are large results in an object store read back at every node, and does nothing get lost when it fails?
+//! Tests large results in an object store: every node reads them, and no result is lost when the store fails.
 
 use std::sync::atomic::Ordering;
 
@@ -11,14 +11,14 @@ use crate::support::{Service, long_case};
 
 const PLACE: &str = "s3://results/of/tests";
 
-/// A case whose result is far above what is kept in a row.
+/// Returns a case whose result is too large for a row of the table.
 fn large_case(name: &str) -> Value {
     let mut case = long_case(name, 12);
     case["outputs"] = json!(["resultants", "tractions"]);
     case
 }
 
-/// The report of `doctor` on the place of the results, and whether it passed.
+/// Runs `doctor`. Returns whether its check of the result store passed, and its report on it.
 fn doctor(port: u16, url: &str, place: &str) -> (bool, String) {
     let words = ["doctor", "--database-url", url, "--results-url", place];
     let (_, said) = said_by(&mut railhead_at(port), &words);
@@ -33,7 +33,7 @@ async fn result(service: &Service, id: &str) -> (u16, Value) {
     (answer.status, answer.json)
 }
 
-/// A counter of `/metrics`, summed over the series whose labels have all these words.
+/// Returns the number of requests in `/metrics`, summed over the series whose labels contain all these words.
 async fn requests(service: &Service, labels: &[&str]) -> f64 {
     let text = service.ask("/metrics").await.text;
     let series = text.lines().filter(|line| {
@@ -45,7 +45,7 @@ async fn requests(service: &Service, labels: &[&str]) -> f64 {
         .sum()
 }
 
-/// A solution takes one request, the fields of one motion take two.
+/// Asserts that a solution takes one request and the fields of one motion take two.
 async fn assert_few_requests(service: &Service, id: &str) {
     let before = requests(service, &[]).await;
     assert_eq!(result(service, id).await.0, 200);
@@ -68,7 +68,7 @@ async fn results_in_s3_survive_its_faults_and_are_read_at_every_node() {
     let start = |role: &str| node_by(railhead_at(port), &url, role, &["--results-url", PLACE]);
     let [one, other, worker] = ["serve", "serve", "worker"].map(start);
 
-    // Now and then: no client and no job notices.
+    // With occasional faults, no client and no job is affected.
     faults.refused.store(4, Ordering::Relaxed);
     faults.cut.store(5, Ordering::Relaxed);
     let mut ids = Vec::new();
@@ -90,7 +90,7 @@ async fn results_in_s3_survive_its_faults_and_are_read_at_every_node() {
     assert!(written >= 8.0, "{written}");
     assert!(requests(&one, &["GET"]).await > requests(&one, &["GET", "2xx"]).await);
 
-    // Always: what is asked for is not there at the moment, and what is solved waits.
+    // With permanent faults, stored results are unavailable for the time being, and solved jobs wait.
     faults.refused.store(1, Ordering::Relaxed);
     let waiting = one.submit(&large_case("waiting")).await;
     let answer = result(&other, &ids[0]).await;

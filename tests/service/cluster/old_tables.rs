@@ -1,14 +1,14 @@
-//! Tables of a database as earlier versions made them.
+//! Creates database tables of earlier versions.
 
 use sqlx::postgres::PgConnection;
 
-/// The tables as the first version made them, with the row that says so.
+/// The tables of the first schema version, with the row that records it.
 const FIRST_FORM: &str = concat!(
     include_str!("../../../src/jobs/store/postgres/schema.sql"),
     "INSERT INTO deployment (one, form) VALUES (1, 1);"
 );
 
-/// Makes the tables of a form, the first being 1.
+/// Creates the tables of a schema version. The first version is 1.
 pub async fn make(connection: &mut PgConnection, form: u32) {
     run(connection, FIRST_FORM).await;
     for step in 2..=form {

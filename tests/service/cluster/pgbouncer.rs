@@ -1,4 +1,4 @@
-//! A PgBouncer of our own before the PostgreSQL of the tests, in transaction mode; gone with the process.
+//! A PgBouncer in transaction mode in front of the PostgreSQL of the tests. It ends with this process.
 
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
@@ -7,19 +7,19 @@ use std::process::{Child, Command};
 use crate::cluster::postgres::{at_port, free_port, left_folder, shell, started};
 use crate::support::skip;
 
-/// The first version that carries prepared statements in transaction mode.
+/// The first version that supports prepared statements in transaction mode.
 const FIRST: (u32, u32) = (1, 21);
 
-/// A pooler; it ends with this.
+/// A running pooler. It ends when dropped.
 pub struct Pooler {
     port: u16,
-    /// It ends with the standard input of this shell, however this process ends.
+    /// A shell that ends the pooler when its standard input closes, however this process ends.
     shell: Child,
 }
 
 impl Pooler {
-    /// Starts one before the server of a URL, with so many sessions for each database; `None`, said aloud, if there is none on this
-    /// machine.
+    /// Starts a pooler for the server of a URL with this many sessions per database. Returns `None` after reporting that PgBouncer is not
+    /// installed.
     pub fn before(url: &str, sessions: u32) -> Option<Pooler> {
         let Some(program) = program() else {
             skip("there is no PgBouncer of 1.21 or later here");
@@ -27,7 +27,7 @@ impl Pooler {
         };
         let (_, server) = at_port(url);
         let (folder, port) = (left_folder("railhead-pgbouncer"), free_port());
-        // Whoever comes is let in as the user of the line.
+        // Every client is accepted as the user of the configured line.
         let settings = format!(
             "[databases]\n* = user=railhead host=127.0.0.1 port={server}\n[pgbouncer]\nlisten_addr = 127.0.0.1\nlisten_port = {port}\n\
              unix_socket_dir =\nauth_type = any\npool_mode = transaction\ndefault_pool_size = {sessions}\nmax_client_conn = 500\n\
@@ -44,7 +44,7 @@ impl Pooler {
         Some(Pooler { port, shell })
     }
 
-    /// The same database by way of the pooler.
+    /// Returns the URL of the same database through the pooler.
     pub fn url(&self, url: &str) -> String {
         at_port(url).0(self.port)
     }
@@ -52,17 +52,17 @@ impl Pooler {
 
 impl Drop for Pooler {
     fn drop(&mut self) {
-        // The shell ends the pooler.
+        // When its standard input closes, the shell ends the pooler.
         drop(self.shell.stdin.take());
         let _ = self.shell.wait();
     }
 }
 
-/// The program, of a version that carries prepared statements.
+/// Returns the path of a PgBouncer that supports prepared statements.
 fn program() -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let mut folders: Vec<PathBuf> = std::env::split_paths(&path).collect();
-    // Where Debian has it, which not everybody's path names.
+    // Debian installs it here, which is not on every user's path.
     folders.push("/usr/sbin".into());
     let programs = folders.into_iter().map(|folder| folder.join("pgbouncer"));
     programs

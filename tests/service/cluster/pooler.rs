@@ -1,4 +1,4 @@
-//! Nodes behind a pooler in transaction mode, which gives each transaction whichever session is free: does everything still work?
+//! Tests nodes behind a pooler in transaction mode, which assigns each transaction to any free session.
 
 use std::time::{Duration, Instant};
 
@@ -11,10 +11,10 @@ use crate::cluster::postgres::database;
 use crate::cluster::{node, until};
 use crate::support::{Answer, Service, case, endless_case};
 
-/// Fewer sessions than the nodes have connections, so that they change hands all the time.
+/// The number of sessions. It is smaller than the number of connections of the nodes, so that sessions change hands all the time.
 const SESSIONS: u32 = 4;
 
-/// An end that is heard of takes milliseconds; one that is looked for, up to a second.
+/// A notification of an end takes milliseconds. Polling takes up to a second.
 const HEARD_WITHIN: Duration = Duration::from_millis(700);
 
 #[tokio::test(flavor = "multi_thread")]
@@ -52,8 +52,8 @@ async fn nodes_behind_a_pooler_in_transaction_mode_work_and_hear_each_other() {
     }
 }
 
-/// A client that waits at one node is notified of an end at the other, and not by polling. On a busy machine some notifications are slow:
-/// one of 20 has to be fast.
+/// Asserts that a client that waits at one node is notified of an end at the other node without polling. Since a busy machine delays some
+/// notifications, it suffices that one of 20 is fast.
 async fn assert_heard(one: &Service, other: &Service) {
     let mut fastest = Duration::MAX;
     for number in 0..20 {
@@ -63,7 +63,7 @@ async fn assert_heard(one: &Service, other: &Service) {
         one.until(&id, "running").await;
         let waiting = one.request(Method::GET, &format!("/v1/jobs/{id}"));
         let waiting = tokio::spawn(Answer::to(waiting.header("Prefer", "wait=30")));
-        // The wait begins before the end.
+        // Ensures that the wait begins before the job ends.
         tokio::time::sleep(Duration::from_millis(100)).await;
         let asked = Instant::now();
         other.cancel(&id).await;

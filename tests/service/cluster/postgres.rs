@@ -1,5 +1,5 @@
-//! A PostgreSQL of our own, started once for all tests that need one: found in the usual places, its data in a folder of its
-//! own, gone with the process. `RAILHEAD_TEST_POSTGRES` names the URL of another one, of a role that may make databases.
+//! A PostgreSQL server shared by all tests that need one. It is found in the usual folders, keeps its data in a temporary folder, and ends with
+//! this process. `RAILHEAD_TEST_POSTGRES` can name the URL of another server instead, with a role that may create databases.
 
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -13,25 +13,25 @@ use sqlx::{Connection, PgConnection};
 
 use crate::support::skip;
 
-/// How long a server may take to start.
+/// The maximal time for the start of a server.
 const STARTS_WITHIN: Duration = Duration::from_secs(60);
 
-/// An address of this machine, of a network of 24 bits that is trusted, on which the server listens as well; to be set before it starts.
+/// An additional address to listen on, whose /24 network is trusted. It must be set before the server starts.
 #[allow(dead_code, reason = "for benches")]
 pub static ALSO_AT: OnceLock<&'static str> = OnceLock::new();
 
 struct Server {
-    /// Without TLS, which most tests have no use for.
+    /// URL for connections without TLS, which most tests use.
     url: String,
-    /// Who signed its certificate, which is for `localhost`.
+    /// Certificate of the authority that signed the server's certificate for `localhost`.
     authority: Option<PathBuf>,
-    /// Its data, if it is ours.
+    /// Folder of the data, if this process started the server.
     folder: Option<PathBuf>,
-    /// The server ends with the standard input of this shell, however this process ends.
+    /// A shell that ends the server when its standard input closes, however this process ends.
     _shell: Option<Child>,
 }
 
-/// URL of a server; `None`, said aloud, if there is none on this machine.
+/// Returns the URL of the server, or `None` after reporting that PostgreSQL is not installed.
 pub fn server() -> Option<&'static str> {
     Some(the_server()?.url.as_str())
 }
@@ -53,7 +53,7 @@ fn the_server() -> Option<&'static Server> {
     server.as_ref()
 }
 
-/// The port of a server that speaks TLS as `localhost`, and the file with its authority.
+/// Returns the port of a server that supports TLS as `localhost`, and the file with the certificate of its authority.
 pub fn encrypted() -> Option<(&'static str, &'static Path)> {
     let server = the_server()?;
     let Some(authority) = &server.authority else {
@@ -64,7 +64,7 @@ pub fn encrypted() -> Option<(&'static str, &'static Path)> {
     Some((port.split('/').next()?, authority))
 }
 
-/// The port that a URL names, and what makes the same URL with another one.
+/// Returns a function that replaces the port of a URL, and the present port.
 pub fn at_port(url: &str) -> (impl Fn(u16) -> String, u16) {
     let (front, rest) = url.rsplit_once(':').expect("a URL with a port");
     let (port, rest) = rest.split_once('/').expect("a URL with a database");
@@ -73,8 +73,7 @@ pub fn at_port(url: &str) -> (impl Fn(u16) -> String, u16) {
     (move |port| format!("{front}:{port}/{rest}"), number)
 }
 
-/// Ends the server without asking anybody, as `pg_ctl -m immediate` does; it is started again at once. Not in a test, where all use
-/// the same one.
+/// Ends the server abruptly, as `pg_ctl -m immediate` does; it is restarted at once. Tests must not call this, because they share the server.
 #[allow(dead_code, reason = "for benches")]
 pub fn crash() {
     let server = the_server().expect("a server");
@@ -85,7 +84,7 @@ pub fn crash() {
     assert!(ended.is_ok_and(|status| status.success()));
 }
 
-/// What the server has logged so far; `None`, said aloud, if it is not ours.
+/// Returns the log of the server so far, or `None` after reporting that another process started it.
 #[allow(dead_code, reason = "not for every program that has this file")]
 pub fn log_lines() -> Option<Vec<String>> {
     let Some(folder) = &the_server()?.folder else {
@@ -97,7 +96,7 @@ pub fn log_lines() -> Option<Vec<String>> {
     Some(text.lines().map(str::to_owned).collect())
 }
 
-/// A URL with one more parameter.
+/// Returns a URL with one more parameter.
 pub fn with_parameter(url: &str, parameter: &str) -> String {
     let mark = if url.contains('?') { '&' } else { '?' };
     format!("{url}{mark}{parameter}")
@@ -116,7 +115,7 @@ async fn make(what: &str) -> Option<(&'static str, String)> {
     Some((url, name))
 }
 
-/// A database of its own in that server.
+/// Creates a database on the server. Returns its URL.
 pub async fn database() -> Option<String> {
     let (url, name) = make("DATABASE").await?;
     let (address, query) = url.split_once('?').unwrap_or((url, ""));
@@ -124,7 +123,7 @@ pub async fn database() -> Option<String> {
     Some(format!("{front}/{name}?{query}"))
 }
 
-/// A schema of its own with the tables of the service, which is made faster than a database.
+/// Creates a schema with the tables of the service, which is faster than creating a database. Returns its URL.
 pub async fn schema() -> Option<String> {
     let (url, name) = make("SCHEMA").await?;
     let url = with_parameter(url, &format!("options=-c%20search_path%3D{name}"));
@@ -132,7 +131,7 @@ pub async fn schema() -> Option<String> {
     Some(url)
 }
 
-/// The folder of the programs.
+/// Returns the folder of the server programs.
 fn programs() -> Option<PathBuf> {
     let there = |folder: &PathBuf| folder.join("initdb").is_file();
     let mut folders: Vec<PathBuf> = std::fs::read_dir("/usr/lib/postgresql")
@@ -147,8 +146,8 @@ fn programs() -> Option<PathBuf> {
     folders.into_iter().find(there)
 }
 
-/// A shell as somebody that the server runs for, which it refuses for root. There is a user for it where it was installed as a
-/// package; inside a namespace that has no other user than root, another name for that one does.
+/// Returns a shell with a user that may run the server, which refuses root. If PostgreSQL was installed as a package, its user exists. In a
+/// namespace whose only user is root, root is mapped to another user id.
 pub fn shell(folder: &Path) -> Command {
     let read = |file: &str| std::fs::read_to_string(file).unwrap_or_default();
     let root = read("/proc/self/status")
@@ -178,7 +177,7 @@ pub fn shell(folder: &Path) -> Command {
     command
 }
 
-/// Writes a certificate for `localhost` with its key, and that of the authority that signed it.
+/// Writes a certificate for `localhost` with its key, and the certificate of its authority. Returns the path of the latter.
 fn certify(folder: &Path) -> PathBuf {
     use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
     let mut authority = CertificateParams::new(Vec::new()).expect("no names");
@@ -198,20 +197,20 @@ fn certify(folder: &Path) -> PathBuf {
     write("authority.pem", authority.pem())
 }
 
-/// A folder that a program under test removes.
+/// Creates a temporary folder that the program under test removes.
 pub fn left_folder(name: &str) -> PathBuf {
     let mut folder = tempfile::Builder::new();
     folder.prefix(name).tempdir().expect("a folder").keep()
 }
 
-/// A port that is free at this moment.
+/// Returns a port that is free at this moment.
 pub fn free_port() -> u16 {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     listener.local_addr().expect("an address").port()
 }
 
-/// Starts a process from a shell in its folder and waits until it is ready. The process ends with the standard input of the shell, however this
-/// process ends.
+/// Starts a process from a shell in its folder and waits until it is ready. The process ends when the standard input of the shell closes, however
+/// this process ends.
 pub fn started(mut shell: Command, script: &str, ready: impl Fn() -> bool) -> Child {
     let shell = shell.args(["-c", script]).stdin(Stdio::piped());
     let child = shell.spawn().expect("a shell");
@@ -234,7 +233,7 @@ fn start() -> Option<Server> {
         ),
         None => Default::default(),
     };
-    // Keys are refused that others may read. It ends as soon as its standard input does, and takes its data with it.
+    // The server rejects keys that other users may read. The script ends when its standard input closes, and removes its data.
     let script = format!(
         "cd '{data}' && mkdir tls && cp server.pem server.key tls && chmod 600 tls/server.key && '{bin}/initdb' -D db -U railhead -A trust -E UTF8 --no-locale -N > init.log 2>&1 && {trusted}\
          {{ while [ ! -e stop ]; do '{bin}/postgres' -D db -k '{data}' -c listen_addresses=127.0.0.1{more} -p {port} -c fsync=off \

@@ -1,4 +1,4 @@
-//! Is everything of a data folder there after it was moved into a database, and is nothing moved twice?
+//! Tests that a data folder is moved into a database completely, and that nothing is moved twice.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::support::{Answer, Service, case, endless_case, loaded, long_case, rai
 /// Options of a node that solves and that shuts down without a delay.
 const SOLVES: [&str; 6] = ["--workers", "1", "--drain-delay-s", "0", "--lease-s", "30"];
 
-/// What the program says about a data folder and a database, and whether it succeeded.
+/// Runs the program with these arguments. Returns whether it succeeded, and its output.
 fn say(words: &[&str]) -> (bool, String) {
     said_by(&mut railhead(), words)
 }
@@ -28,7 +28,7 @@ fn assert_refused((moved, said): (bool, String), why: &str) {
     assert!(!moved && said.contains(why), "{said}");
 }
 
-/// Answers to paths as a client sees them.
+/// Reads these paths as a client. Returns the JSON answers by path.
 async fn read(service: &Service, paths: &[String]) -> BTreeMap<String, Value> {
     let mut answers = BTreeMap::new();
     for path in paths {
@@ -37,7 +37,7 @@ async fn read(service: &Service, paths: &[String]) -> BTreeMap<String, Value> {
     answers
 }
 
-/// Has a small and a large result and those of a batch; where they are read.
+/// Solves a small case, a large case and a batch. Returns the paths under which clients read them.
 async fn fill(before: &Service) -> Vec<String> {
     let small = before.submit(&case("small")).await;
     let mut large = long_case("large", 12);
@@ -59,9 +59,9 @@ async fn fill(before: &Service) -> Vec<String> {
     paths
 }
 
-/// Old results and old jobs are used, and new ones are made.
+/// Asserts that moved results and jobs are used and that new jobs are solved.
 async fn goes_on(after: &Service, running: &str) {
-    // A result that was moved answers the same case, and new results have keys of their own.
+    // A moved result answers the same case, and new results get new keys.
     let again = after.post("/v1/jobs", &case("small")).await.is(202);
     assert_eq!(again.json["cached"], true, "{}", again.text);
     after.until(running, "running").await;
@@ -71,7 +71,7 @@ async fn goes_on(after: &Service, running: &str) {
     after.until(running, "cancelled").await;
 }
 
-/// The secret of a key of the tenant `north`.
+/// Creates a key of the tenant `north` and returns its secret.
 fn make_key(folder: &str) -> String {
     let (_, said) = say(&["keys", "create", "--tenant", "north", "--data-dir", folder]);
     let mut lines = said.lines();
@@ -99,7 +99,7 @@ async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
     let words = [&words[..], &there].concat();
     assert!(say(&["migrate", "--database-url", &url]).0);
     assert_refused(say(&words), "in use");
-    // As after a power cut: nobody has put the running job back.
+    // After a power failure nobody has returned the running job to the queue.
     before.kill();
     let (moved, said) = say(&words);
     assert!(said.contains("jobs\t5\n"), "{said}");
@@ -120,7 +120,7 @@ async fn a_data_folder_moves_into_a_database_with_all_that_is_in_it() {
     goes_on(&after, &running).await;
     drop(worker);
 
-    // Not into a database that has jobs.
+    // A database that has jobs is refused.
     let full = tempfile::tempdir().unwrap();
     drop(Service::start(full.path(), &["--workers", "1"]));
     let full = full.path().to_str().unwrap();
@@ -159,7 +159,7 @@ async fn results_of_a_database_move_to_a_folder_from_there_to_a_bucket_and_to_an
     let left = sqlx::query_scalar("SELECT COUNT(*) FROM objects");
     let left: i64 = left.fetch_one(&pool).await.unwrap();
     assert_eq!(left, 0, "what was in the database is not kept twice");
-    // A node that still names the bucket before is refused.
+    // A node that still names the previous bucket is refused.
     service.stop().await;
     let data = tempfile::tempdir().unwrap();
     let mut before = railhead_at(port);
@@ -167,7 +167,7 @@ async fn results_of_a_database_move_to_a_folder_from_there_to_a_bucket_and_to_an
     before.arg(data.path()).args(["--database-url", &url]);
     let there = ["--results-url", "s3://first/results"];
     assert_refused(said_by(&mut before, &there), "s3://second/results");
-    // The place of a database is not given to another one.
+    // The result store of a database cannot be used by another database.
     let other = tables().await.unwrap();
     node(&other, "serve", &SOLVES).stop().await;
     let there = ["--results-url", "s3://second/results"];

@@ -1,4 +1,4 @@
-//! Does a node refuse to look for results where they are not, and is only what no job refers to swept from where they are?
+//! Tests that a node refuses a result store other than that of its database, and that only results without a job are swept.
 
 use std::path::Path;
 use std::time::{Duration, SystemTime};
@@ -20,7 +20,7 @@ fn folder_place(folder: &Path, shared: bool) -> ResultsPlace {
     }
 }
 
-/// Options of a node whose results are all kept as large ones.
+/// Returns options of a node that stores every result as a large one.
 fn options(url: &str, data_dir: &Path, results: Option<ResultsPlace>) -> Options {
     Options {
         database: Some(Database {
@@ -39,7 +39,7 @@ async fn refusal(options: Options) -> String {
     refused.expect_err("it is refused").to_string()
 }
 
-/// Solves one case on a node and ends it in good order.
+/// Solves one case on a node and shuts it down.
 async fn solve_one(options: Options) {
     let jobs = Jobs::open(options).await.unwrap();
     jobs.start().unwrap();
@@ -84,7 +84,7 @@ async fn a_node_is_refused_that_would_look_for_the_results_elsewhere() {
         "{said}"
     );
 
-    // Another database, pointed at these results; one that has its own in itself.
+    // Another database refuses the store of the first one, and a database that keeps its own results refuses another store.
     let second = tables().await.unwrap();
     let said = refusal(options(&second, data.path(), Some(shared.clone()))).await;
     assert!(said.contains("results of another database"), "{said}");
@@ -92,7 +92,7 @@ async fn a_node_is_refused_that_would_look_for_the_results_elsewhere() {
     let said = refusal(options(&second, data.path(), Some(other_place))).await;
     assert!(said.contains("in the database itself"), "{said}");
 
-    // The same results under another name, and gone.
+    // The store may be moved to another path. A missing store is refused.
     let looked = examine_results(&url, Some(&shared)).await.unwrap();
     assert!(!looked.wrong, "{looked:?}");
     let moved = elsewhere.path().join("moved");
@@ -126,7 +126,7 @@ async fn only_old_results_that_no_job_refers_to_are_swept() {
     let jobs = Jobs::open(options()).await.unwrap();
     assert_eq!(jobs.sweep_results().await.unwrap(), 1);
     assert!(!old.exists() && young.exists());
-    // The marker and the result of the job are still there.
+    // The marker and the result of the job remain.
     assert!(kept > 2);
     assert_eq!(files_below(place.path()).len(), kept);
     jobs.shutdown(Duration::ZERO).await;

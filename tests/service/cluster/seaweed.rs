@@ -1,5 +1,4 @@
-//! An S3 server of our own (SeaweedFS), started once for all tests that need one; its data in a folder of its own, gone with the
-//! process.
+//! An S3 server (SeaweedFS) shared by all tests that need one. Its data are in a temporary folder. It ends with this process.
 
 use std::net::TcpListener;
 use std::path::PathBuf;
@@ -9,7 +8,7 @@ use std::sync::OnceLock;
 use super::postgres::{left_folder, started};
 use crate::support::{railhead, skip};
 
-/// What requests are signed with.
+/// Credentials of requests.
 const KEYS: [(&str, &str); 3] = [
     ("AWS_ACCESS_KEY_ID", "test"),
     ("AWS_SECRET_ACCESS_KEY", "secret-of-the-test"),
@@ -18,11 +17,11 @@ const KEYS: [(&str, &str); 3] = [
 
 struct Server {
     port: u16,
-    /// The server ends with the standard input of this shell, however this process ends.
+    /// A shell that ends the server when its standard input closes, however this process ends.
     _shell: Child,
 }
 
-/// The port of the server; `None`, said aloud, if the program is not on this machine. It makes buckets as they are written to.
+/// Returns the port of the server, or `None` after reporting that the program is not installed. The server creates buckets on the first write.
 pub fn server() -> Option<u16> {
     static SERVER: OnceLock<Option<Server>> = OnceLock::new();
     let server = SERVER.get_or_init(|| Some(start(&program()?)));
@@ -32,7 +31,7 @@ pub fn server() -> Option<u16> {
     server.as_ref().map(|server| server.port)
 }
 
-/// The real program with the keys of that server, which it finds at a port.
+/// Returns the real program with the credentials of the server on this port.
 pub fn railhead_at(port: u16) -> Command {
     let mut command = railhead();
     command.envs(KEYS);
@@ -46,7 +45,7 @@ fn program() -> Option<PathBuf> {
     programs.find(|program| program.is_file())
 }
 
-/// A port for each of the four parts of the server, which also take those 10 000 above.
+/// Returns free ports for the four parts of the server. Each part also uses the port 10 000 above.
 fn ports() -> [u16; 4] {
     let free = |port: u16| TcpListener::bind(("127.0.0.1", port)).is_ok();
     let both = |port: u16| free(port) && free(port + 10_000);

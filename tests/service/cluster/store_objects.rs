@@ -1,4 +1,4 @@
-//! Are large results in the database read back as they were written, whole and by range, and swept only if no job has them?
+//! Tests large results in the database: they are read back unchanged, whole and by range, and swept only if no job refers to them.
 
 use bytes::Bytes;
 use object_store::path::Path;
@@ -14,7 +14,7 @@ async fn an_object_is_read_back_by_any_range_and_is_gone_once_removed() {
     }
     let table = Table::new(StoreKind::Postgres).await;
     let objects = table.store.cluster().expect("a shared store").objects();
-    // Two pieces and a half.
+    // The length is two and a half chunks.
     let body: Vec<u8> = (0..5_u32 << 19).map(|n| (n % 251) as u8).collect();
     let path = Path::from("results/2026/11/a/1/fields.bin");
     let payload = PutPayload::from_bytes(Bytes::from(body.clone()));
@@ -56,7 +56,7 @@ async fn old_objects_are_swept_if_no_job_refers_to_them() {
         .await
         .unwrap();
     let claim = table.claim(0).await.unwrap();
-    // Its result is under `results/1`.
+    // The key of its result is `results/1`.
     table.finish(&claim, &success(), 1).await.unwrap();
     let objects = cluster.objects();
     let paths = [

@@ -1,5 +1,5 @@
-//! Do the statements of a PostgreSQL with a long queue look at few rows? The server explains every statement that it gets, with the rows
-//! that each step of its plan really had.
+//! Tests that statements on a long queue in PostgreSQL read few rows. The server logs the plan of every statement with the actual rows of each
+//! step.
 
 use std::sync::Arc;
 
@@ -21,15 +21,15 @@ use crate::store::{self, new_job, queue_of, success};
 const TENANT: &str = "north";
 const GROUP: usize = 32;
 
-/// Most rows that one step of a plan may have read. Most statements ask for some tens; lists count up to 1000 jobs.
+/// The maximal number of rows that one step of a plan may read. Most statements read some tens of rows; lists count up to 1000 jobs.
 const ROWS_MAX: f64 = 1500.0;
 
-/// Queued jobs whose ids grow, as those of submissions do; every tenth belongs to somebody else, every hundredth has a deadline.
+/// Inserts queued jobs with increasing ids, as submissions do. Every tenth job belongs to another tenant, every hundredth has a deadline.
 const FILL: &str = "INSERT INTO jobs (id, tenant, state, labels, method, outputs, cost_us, slice_us, bypass_cache, rank, created_at, updated_at, deadline) \
      SELECT lpad(to_hex(n), 8, '0') || '-0000-7000-8000-000000000000', CASE WHEN n % 10 = 0 THEN 'south' ELSE 'north' END, 'queued', \
      '{}', 'auto', '[]', 3000, 3000, 1, 1, n, n, CASE WHEN n % 100 = 0 THEN 9000000000000 END FROM generate_series(1, $1) AS n";
 
-/// Explains everything that a session asks, with the rows that there were. Only who may start the server may say so.
+/// Logs the plan of every statement of a session with the actual rows. Only a superuser may set this.
 const EXPLAINED: &str = "options=-c%20session_preload_libraries%3Dauto_explain%20-c%20auto_explain.log_min_duration%3D0%20\
      -c%20auto_explain.log_analyze%3Don%20-c%20auto_explain.log_timing%3Doff%20-c%20auto_explain.log_format%3Djson";
 
@@ -42,7 +42,7 @@ fn request(queue: &Queue, kind: ClaimKind) -> ClaimRequest<'_> {
     }
 }
 
-/// The calls that nodes and clients make again and again.
+/// Makes the calls that nodes and clients repeat.
 async fn use_store(store: &Arc<dyn Store>) {
     let queue = queue_of(TENANT);
     let mut claims: Vec<Claim> = Vec::new();
@@ -86,7 +86,7 @@ async fn use_store(store: &Arc<dyn Store>) {
     store.delete(TENANT, ids[0]).await.unwrap();
 }
 
-/// What a node does by itself, and what every client asks.
+/// Makes the maintenance calls of a node and the common requests of clients.
 async fn maintain(store: &Arc<dyn Store>) {
     store.reap(Reap::Expired { now: 1 }, 2, 5).await.unwrap();
     let failure = Failure::new(FailureKind::DeadlinePassed, "late");
@@ -157,7 +157,7 @@ async fn read_lists(store: &Arc<dyn Store>, id: Uuid) {
         .unwrap();
 }
 
-/// What is wrong with a step of a plan and with those below it.
+/// Collects the faults of a step of a plan and of the steps below it.
 fn faults(step: &Value, faults: &mut Vec<String>) {
     let number = |key: &str| step[key].as_f64().unwrap_or(0.0);
     let removed = number("Rows Removed by Filter") + number("Rows Removed by Index Recheck");
@@ -177,7 +177,7 @@ fn faults(step: &Value, faults: &mut Vec<String>) {
     }
 }
 
-/// Fills a queue, makes the calls, and looks at the plans of all statements; returns their number.
+/// Fills a queue, makes the calls and checks the plans of all statements. Returns the number of plans.
 pub async fn look_at_plans(queued: i64) -> Option<usize> {
     let url = tables().await?;
     let pool = PgPool::connect(&url).await.unwrap();
@@ -219,7 +219,7 @@ pub async fn look_at_plans(queued: i64) -> Option<usize> {
 
 #[tokio::test]
 async fn no_statement_walks_a_long_queue() {
-    // A million takes half a minute: RAILHEAD_TEST_QUEUED=1000000 cargo test --test service -- store_plans
+    // A million rows take half a minute: RAILHEAD_TEST_QUEUED=1000000 cargo test --test service -- store_plans
     let queued = std::env::var("RAILHEAD_TEST_QUEUED");
     let queued = queued.map_or(20_000, |queued| queued.parse().expect("a number"));
     look_at_plans(queued).await;

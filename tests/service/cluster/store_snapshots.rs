@@ -1,4 +1,4 @@
-//! Does it cost claims and ends nothing that somebody keeps a transaction open, so that dead rows stay? Work is counted, not time.
+//! Tests that claims and ends cost no more while a transaction stays open, so that dead rows remain. The tests count work, not time.
 
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::Queue;
@@ -15,12 +15,12 @@ const QUEUED: i64 = 9000;
 const GROUP: usize = 32;
 const GROUPS: usize = 128;
 
-/// Queued jobs whose ids grow, as those of submissions do.
+/// Inserts queued jobs with increasing ids, as submissions do.
 const FILL: &str = "INSERT INTO jobs (id, tenant, state, labels, method, outputs, cost_us, slice_us, bypass_cache, rank, created_at, updated_at) \
      SELECT lpad(to_hex(n), 8, '0') || '-0000-7000-8000-000000000000', 'north', 'queued', '{}', 'auto', '[]', 3000, 3000, 1, 1, n, n \
      FROM generate_series(1, $1) AS n";
 
-/// Entries of an index that statements have read.
+/// Returns how many entries of an index statements have read.
 async fn read(connection: &mut PgConnection, index: &str) -> i64 {
     let read = "SELECT idx_tup_read FROM pg_stat_user_indexes WHERE indexrelname = $1";
     sqlx::query_scalar(read)
@@ -73,7 +73,7 @@ async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_b
         let claims = store.claim(&request(&queue_of("north"))).await.unwrap();
         assert_eq!(claims.len(), GROUP);
         if group == GROUPS / 2 {
-            // The next claim begins with them.
+            // The next claim begins with the released jobs.
             let back = Claims::release(&store, &claims, ReleaseReason::NotBegun, 0).await;
             assert_eq!(back.unwrap().len(), GROUP);
             let again = store.claim(&request(&queue_of("north"))).await.unwrap();
@@ -92,7 +92,7 @@ async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_b
         assert_eq!(ended.len(), GROUP);
     }
     assert_eq!(seen.len(), GROUP * (GROUPS - 1), "no job was claimed twice");
-    // Sessions say what they have done when they end.
+    // Sessions report their statistics when they end.
     store.close().await;
     let jobs = i64::try_from(GROUP * GROUPS).unwrap();
     let mut told = read(&mut connection, "jobs_queued").await;
@@ -101,7 +101,7 @@ async fn claims_and_ends_do_not_walk_over_dead_rows_and_miss_nothing_that_came_b
         told = read(&mut connection, "jobs_queued").await;
     }
     let running = read(&mut connection, "jobs_running").await;
-    // Walks from the start: the first, one every two seconds, and those after jobs came back.
+    // Claims scan from the start of the index the first time, once every two seconds, and after jobs were released.
     assert!(
         told < 8 * jobs,
         "{told} entries of the queue for {jobs} jobs"
