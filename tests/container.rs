@@ -1,4 +1,4 @@
-//! Does the image fit the program? `Dockerfile` and `.dockerignore` against manifest, sources and command line.
+//! Tests that the image fits the program: `Dockerfile` and `.dockerignore` against manifest, sources and command line.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -9,7 +9,7 @@ fn read(path: impl AsRef<Path>) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The instructions of the Dockerfile, one per line and without comments.
+/// Returns the instructions of the Dockerfile, one per line and without comments.
 fn instructions() -> Vec<String> {
     let lines: Vec<String> = read("Dockerfile")
         .lines()
@@ -24,7 +24,7 @@ fn instructions() -> Vec<String> {
         .collect()
 }
 
-/// What follows the instruction's name, for every instruction of that name.
+/// Returns the arguments of every instruction with this name.
 fn arguments(name: &str) -> Vec<String> {
     let found: Vec<String> = instructions()
         .iter()
@@ -34,7 +34,7 @@ fn arguments(name: &str) -> Vec<String> {
     found
 }
 
-/// Environment variables of the image, with their values.
+/// Returns the environment variables of the image, with their values.
 fn variables() -> Vec<(String, String)> {
     arguments("ENV")
         .iter()
@@ -72,7 +72,7 @@ fn the_health_check_asks_where_the_image_listens() {
         .expect("an address to listen on");
     let port = listen.strip_prefix("0.0.0.0:").expect("all interfaces");
     assert_eq!(arguments("EXPOSE"), [port]);
-    // It reads the same variable.
+    // The health check reads the same variable.
     assert!(help("healthcheck").contains("[env: RAILHEAD_LISTEN="));
 }
 
@@ -122,13 +122,13 @@ fn the_image_gets_every_file_that_is_compiled_in() {
     assert!(included > 0, "nothing is compiled in");
 }
 
-/// The source itself and what its `include_str!` and `include_bytes!` name, from the root of the project.
+/// Returns the source and the files in its `include_str!` and `include_bytes!`, from the root of the project.
 fn files_compiled_into(source: &Path) -> Vec<PathBuf> {
     let text = read(source);
     let mut files = vec![source.to_owned()];
     for name in ["include_str!(", "include_bytes!("] {
         for rest in text.split(name).skip(1) {
-            // Of a path that a macro puts together its folder is known.
+            // For a path built by a macro, only its folder is known.
             let rest = rest.trim_start();
             let rest = rest.strip_prefix("concat!(").unwrap_or(rest);
             let literal = rest.strip_prefix('"');
@@ -148,7 +148,7 @@ fn files_compiled_into(source: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The manifests by name, without the one that lists them.
+/// Returns the manifests by name, without the one that lists them.
 fn manifests() -> Vec<(String, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("deploy/kustomize");
     let names = fs::read_dir(folder).expect("the manifests");

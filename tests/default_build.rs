@@ -1,4 +1,4 @@
-//! Tests of the program that is built without optional features.
+//! Tests of the program built without optional features.
 #![cfg(not(any(feature = "cluster", feature = "otlp")))]
 
 use std::path::Path;

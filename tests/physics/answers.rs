@@ -1,5 +1,4 @@
-//! What every answer keeps, whatever is asked: finite numbers, no dust, shares of time that add up, and a word on what is
-//! implausible.
+//! Tests of properties that every answer has: finite numbers, no tiny residues, time shares that add up, and remarks on implausible values.
 
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -115,7 +114,7 @@ fn implausible_contacts_say_so_whatever_describes_them() {
     ] {
         said(&put("/motion", motion), &["creepage-large"], true);
     }
-    // What was searched for is looked at, too: here the creepage at which this much friction is reached.
+    // Values found by the solver are checked as well: here the creepage that gives this friction force.
     let forced = with(&quick, "/friction/coefficient", Some(json!(100)));
     let forced = with(&forced, "/motion", Some(json!({ "force_x_n": 9.9e6 })));
     said(&forced, &["creepage-large"], false);
@@ -157,7 +156,7 @@ fn the_simplified_theory_meets_no_target_that_nobody_asked_for() {
     assert!((ratio - 1.0).abs() < 1e-9, "{ratio}");
 }
 
-/// The clock, and nothing else.
+/// Reads the clock and never stops the solve.
 struct Clock(Instant);
 
 impl Monitor for Clock {
@@ -184,7 +183,7 @@ fn seconds_are_shares_that_add_up_over_patches_and_motions() {
             seconds.iter().all(|share| *share > 0.0),
             "{name}: {seconds:?}"
         );
-        // Between the two looks at the clock lies the last look at the answer.
+        // The second clock reading is taken after the last step of the solve.
         assert!(
             sum <= took && sum > 0.8 * took - 0.02,
             "{name}: {sum} of {took}"
@@ -226,7 +225,7 @@ fn prescribed_forces_follow_the_target() {
         let solution = answer(&case);
         let missed = (solution.total[0].force_x_n - 0.5 * limit).abs() / limit;
         let remarks = &solution.remarks;
-        // `SHARE_OF_TARGET` of the search.
+        // The factor is `SHARE_OF_TARGET` of the search.
         assert!(missed <= 0.02 * target, "{target}: {missed:e}, {remarks:?}");
         assert!(!codes(remarks).contains(&"iteration-inexact"));
     }

@@ -1,5 +1,5 @@
-//! `auto` takes the resultants of ellipses from the creep table where its bound meets the target: the same on every route, with and without values
-//! per cell, and within the errors of `boundary_element`.
+//! Tests that `auto` takes the resultants of ellipses from the creep table where its bound meets the target. The resultants are the same on every
+//! route, with and without values per cell, and within the errors of `boundary_element`.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use crate::reference::{assert_none, force_of_cells, solve, solve_on_meshes};
 const CONTACTS: usize = 40;
 const TARGET: f64 = 0.005;
 
-/// A random ellipse, by radii or semi-axes, with a motion from stick to nearly full slip.
+/// Returns a random ellipse, given by radii or semi-axes, with a motion from stick to nearly full slip.
 fn random_case(random: &mut Random) -> Value {
     let by_radii = random.between(0.0, 1.0) < 0.5;
     let ratio = random.between(-1.5, 1.5).exp();
@@ -64,7 +64,7 @@ fn only(solution: &Solution) -> &PointSolution {
     &solution.patches[0].points[0]
 }
 
-/// Forces, moment, power, errors and derivatives as bits.
+/// Returns the bits of forces, moment, power, errors and derivatives.
 fn bits(point: &PointSolution) -> Vec<u64> {
     let error = point.error_estimate.expect("an estimate");
     let slopes = point.gradients.as_deref().expect("gradients");
@@ -154,7 +154,7 @@ fn alone_in_a_list_as_a_row_and_evaluated_the_resultants_are_the_same() {
         let list = solve(&with_outputs(&list, &["resultants", "gradients", "zones"])).0;
         for (point, alone) in list.patches[0].points.iter().zip(&alone) {
             assert_eq!(point.solver.method, alone.solver.method, "{case}");
-            // On meshes motions start from each other, and agree to the residual.
+            // On meshes, each motion starts from the solution of another one, so that results agree only to the residual.
             if is_by_table(alone) {
                 assert_eq!(bits(point), bits(alone), "{case}");
             }
@@ -293,7 +293,7 @@ fn auto_leaves_the_table_where_it_does_not_cover_the_case_or_misses_the_target()
         case.pointer_mut(parent).expect("an object")[name] = value;
         assert_eq!(method(&case), MethodName::BoundaryElement, "{case}");
     }
-    // The bound meets a target relative to μN, but not to a force that is a small part of it.
+    // The bound meets a target relative to μN, but not a target relative to a force that is a small part of μN.
     let mut small = case();
     small["motion"] = json!({ "creepage_x": 2e-5 });
     assert_eq!(method(&small), MethodName::Table);

@@ -1,15 +1,15 @@
-//! The limit of a very wide patch: every strip is Carter's line contact.
+//! Tests the limit of a very wide patch: every strip is Carter's line contact.
 
 use railhead_contact::solution::words::answer::{Fields, PatchFields};
 
 use crate::reference::{Ellipse, cases, solve};
 
-/// Half width over half length: end effects fall as its square.
+/// Half width over half length. End effects decrease with its square.
 const WIDE: f64 = 1000.0;
-/// An odd number; the load of few strips on an ellipse is too large, so that its correction would lower the bound.
+/// The number of strips, which is odd. With few strips the load on an ellipse is too large, so that its correction would lower the bound.
 const STRIPS: u32 = 31;
 
-/// Σ T_x dx / (μ Σ p dx) of one strip.
+/// Returns Σ T_x dx / (μ Σ p dx) of one strip.
 fn strip_force(patch: &PatchFields, strip: u32, friction: f64) -> f64 {
     let traction = patch.points[0].traction_x_mpa.as_ref().unwrap();
     let mesh = patch.cells(0);

@@ -1,4 +1,4 @@
-//! A bad case is refused with every fault: where it is, what was given, what is allowed.
+//! Tests that an invalid case is refused with every fault: its place, the given value and the allowed values.
 
 use railhead_contact::case::words::solver::{Case, Output};
 use railhead_contact::rolling::task::Resolution;

@@ -1,4 +1,4 @@
-//! Whatever is done to a case, it is answered with a problem or with faults that point into it.
+//! Tests that every mutated case gives either a problem or faults that point into the case.
 
 use proptest::prelude::*;
 use railhead_contact::case::solver::Limits;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::cases::{good, good_with, with};
 
-/// Every pointer of the value, depth first.
+/// Appends every pointer of the value, depth first.
 fn pointers(value: &Value, here: &str, list: &mut Vec<String>) {
     list.push(here.to_owned());
     match value {
@@ -72,7 +72,7 @@ fn some_value() -> impl Strategy<Value = Value> {
     })
 }
 
-/// Valid cases of every kind, so that mutations reach every reader.
+/// Returns valid cases of every kind, so that mutations reach every reader.
 fn seeds() -> Vec<Value> {
     let ellipse = with(
         &good_with(

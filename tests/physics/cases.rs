@@ -1,4 +1,4 @@
-//! Valid cases to start from, and ways to change them.
+//! Valid cases for the tests, and functions that change them.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::check;
@@ -6,7 +6,7 @@ use railhead_contact::error::Fault;
 use railhead_contact::problem::checked_case::CheckedCase;
 use serde_json::{Value, json};
 
-/// A complete, valid case.
+/// Returns a complete, valid case.
 pub fn good() -> Value {
     json!({
         "name": "UIC60 crown, 100 kN",
@@ -21,7 +21,7 @@ pub fn good() -> Value {
     })
 }
 
-/// The good case with one member, given by its pointer, put in place or (with `None`) taken away.
+/// Returns the case with the member at this pointer replaced or, with `None`, removed.
 pub fn with(case: &Value, pointer: &str, value: Option<Value>) -> Value {
     let mut case = case.clone();
     let (parent, name) = pointer.rsplit_once('/').unwrap();
@@ -39,12 +39,12 @@ pub fn with(case: &Value, pointer: &str, value: Option<Value>) -> Value {
     case
 }
 
-/// The good case with one member put in place.
+/// Returns the valid case with the member at this pointer replaced.
 pub fn good_with(pointer: &str, value: Value) -> Value {
     with(&good(), pointer, Some(value))
 }
 
-/// Every fault of a case, none if it is good.
+/// Returns every fault of a case, or an empty list if the case is valid.
 pub fn faults(case: &Value) -> Vec<Fault> {
     match check(case, &Limits::default()) {
         Ok(_) => Vec::new(),
@@ -52,12 +52,12 @@ pub fn faults(case: &Value) -> Vec<Fault> {
     }
 }
 
-/// The problem of a good case.
+/// Returns the problem of a valid case.
 pub fn problem(case: &Value) -> CheckedCase {
     check(case, &Limits::default()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The only fault of a case stands at `pointer` and says all of `words`.
+/// Requires that the case has exactly one fault, at `pointer`, whose detail contains all of `words`.
 #[track_caller]
 pub fn assert_fault(case: &Value, pointer: &str, words: &[&str]) {
     let found = faults(case);
@@ -72,7 +72,7 @@ pub fn assert_fault(case: &Value, pointer: &str, words: &[&str]) {
     }
 }
 
-/// The good case with another contact, which carries its own load.
+/// Returns the valid case with another contact, which includes its own load.
 pub fn grid_case(contact: Value) -> Value {
     with(&good_with("/contact", contact), "/load", None)
 }

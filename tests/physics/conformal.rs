@@ -1,5 +1,5 @@
-//! Is the contact of a wheel on the curve of its rail right? Against CONTACT with curved surfaces of contact, against boundary elements, and where the
-//! rail does not bend against planes.
+//! Tests of the contact of a wheel on the reference curve of its rail: against CONTACT with curved contact surfaces, against boundary elements, and
+//! against planes where the rail is straight.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::check;
@@ -25,14 +25,14 @@ fn states() -> Vec<Value> {
     all["states"].as_array().unwrap().clone()
 }
 
-/// Points of an arc about `(0, centre)` from one angle to another, z down.
+/// Returns points of an arc about `(0, centre)` from one angle to another, with z down.
 fn arc(centre: f64, radius: f64, [from, to]: [f64; 2], count: usize) -> Vec<[f64; 2]> {
     let at = |k: usize| from + (to - from) * k as f64 / count as f64;
     let points = (0..=count).map(|k| [radius * at(k).sin(), centre - radius * at(k).cos()]);
     points.collect()
 }
 
-/// A gauge corner of 12.7 mm beside a crown of 300 mm.
+/// Returns a gauge corner of radius 12.7 mm beside a crown of radius 300 mm.
 fn gauge_corner() -> Vec<[f64; 2]> {
     let mut points = arc(12.7, 12.7, [-1.35, 0.0], 200);
     let [y, z] = points[0];
@@ -48,7 +48,7 @@ fn gauge_corner() -> Vec<[f64; 2]> {
     points
 }
 
-/// A root of a flange of a radius, beside a tread that falls off.
+/// Returns a flange root of this radius, beside a tread that slopes away.
 fn flange_root(radius: f64) -> Vec<[f64; 2]> {
     let mut points = arc(radius, radius, [-1.3, 0.0], 200);
     let [y, z] = points[0];
@@ -71,7 +71,7 @@ fn flange_root(radius: f64) -> Vec<[f64; 2]> {
     points
 }
 
-/// A groove of a radius in a flat rail.
+/// Returns a groove of this radius in a flat rail.
 fn groove(radius: f64) -> Vec<[f64; 2]> {
     let floor = |k: i32| {
         let y = 0.1 * f64::from(k);
@@ -88,7 +88,7 @@ fn groove(radius: f64) -> Vec<[f64; 2]> {
     (-206..=206).map(floor).collect()
 }
 
-/// A wheel whose tread is half a circle of 10 mm.
+/// Returns a wheel whose tread is a semicircle of radius 10 mm.
 fn round_wheel() -> Vec<[f64; 2]> {
     let tread = |k: i32| {
         let y = 0.1 * f64::from(k);
@@ -97,7 +97,7 @@ fn round_wheel() -> Vec<[f64; 2]> {
     (-99..=99).map(tread).collect()
 }
 
-/// A section of a state: made here, or a file beside the checkout.
+/// Returns the section of a state: a generated shape, or a file beside the checkout.
 fn section(file: &str) -> Option<Value> {
     let points = |points: Vec<[f64; 2]>| {
         Some(json!({ "points_mm": points, "mirror_y": false, "mirror_z": false }))
@@ -115,7 +115,7 @@ fn section(file: &str) -> Option<Value> {
     }
 }
 
-/// The case of a state on the curve of its rail, if its sections are at hand.
+/// Returns the case of a state on the curve of its rail, or `None` if its sections are not available.
 fn case_of(state: &Value, influence: &str) -> Option<Value> {
     let mut contact = state["contact"].clone();
     contact["type"] = json!("profiles");
@@ -151,8 +151,8 @@ fn pressure(solution: &Solution) -> f64 {
     pressures.fold(0.0, f64::max)
 }
 
-/// The steep state under 5 GPa is left out: there CONTACT takes the normal 0.1 mm beside the place where the bodies are pressed together, which changes
-/// the lateral force by 3.6 % of μN.
+/// The steep state under 5 GPa is left out: there CONTACT takes the normal 0.1 mm from the place where the bodies are pressed together, which
+/// changes the lateral force by 3.6 % of μN.
 #[test]
 fn half_spaces_on_the_curve_agree_with_conformal_contact() {
     let mut compared = 0;
@@ -188,7 +188,7 @@ fn half_spaces_on_the_curve_agree_with_conformal_contact() {
             (pressure(&solution) / known_pressure - 1.0).abs() < 0.02,
             "{id}"
         );
-        // Lobes of one patch there may be patches of their own here.
+        // Lobes of one patch in the reference may be separate patches here.
         let forces = known["patch_forces_n"].as_array().unwrap();
         let all: f64 = forces.iter().map(|force| force.as_f64().unwrap()).sum();
         let found: f64 = solution.patches.iter().map(|p| p.normal_force_n).sum();
@@ -236,7 +236,7 @@ fn the_factors_for_the_turn_give_the_forces_of_boundary_elements() {
     assert!(compared >= 1, "the state on made profiles needs no file");
 }
 
-/// Li's grooves (CONTACT's conformal example): the closer the wheel fits, the less half-spaces with and without factors agree.
+/// Tests Li's grooves (CONTACT's conformal example). The closer the wheel fits, the less half-spaces with and without factors agree.
 #[test]
 fn grooves_have_the_pressures_and_approaches_of_conformal_contact() {
     let state = states()
@@ -271,7 +271,7 @@ fn grooves_have_the_pressures_and_approaches_of_conformal_contact() {
     }
 }
 
-/// S1002 on 60E1 without inclination, right wheel.
+/// Returns S1002 on 60E1 without inclination, right wheel.
 fn usual(surface: &str, shift: f64, yaw: f64) -> Value {
     json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
@@ -304,8 +304,8 @@ fn mirrored(case: &Value) -> Value {
     case
 }
 
-/// A wheel of 300 mm across its tread on a flat rail, where the curve is a plane; the wheel bends, so that half of its turn and of what its rolling
-/// radius loses across the contact counts: 2e-5 of creepage, where 1e-3 slide.
+/// Returns a wheel with a lateral radius of 300 mm on a flat rail, where the curve is a plane. Only the wheel is curved, so that half of its
+/// rotation and half of the loss of rolling radius across the contact count: 2e-5 of creepage, against a creepage of 1e-3.
 fn flat(surface: &str, influence: Option<&str>) -> Value {
     let section = |of: fn(f64) -> f64| -> Vec<[f64; 2]> {
         let y = (-80..=80).map(|k| 0.25 * f64::from(k));
@@ -358,7 +358,8 @@ fn a_flat_rail_has_the_forces_of_a_plane() {
     }
 }
 
-/// A wheel of a shear modulus and Poisson's ratio on a steel rail, under a load that gives about the patch of steel bodies under 75 kN.
+/// Returns the case with a wheel of this shear modulus and Poisson's ratio on a steel rail. The load gives about the patch of steel bodies under 75
+/// kN.
 fn soft(case: &Value, [modulus, poisson_ratio]: [f64; 2]) -> Value {
     let mut case = case.clone();
     let steel = [82_000.0, 0.28];
@@ -370,10 +371,10 @@ fn soft(case: &Value, [modulus, poisson_ratio]: [f64; 2]) -> Value {
     case
 }
 
-/// Aluminium, rubber and a wheel without lateral contraction: K = 0.10, 0.10 and 0.25.
+/// Moduli and Poisson's ratios of aluminium, rubber and a wheel without lateral contraction: K = 0.10, 0.10 and 0.25.
 const SOFT: [[f64; 2]; 3] = [[23_000.0, 0.31], [800.0, 0.4], [800.0, 0.25]];
 
-/// The forces of a wheel change from like to differing bodies as those of its patch by its radii do.
+/// Tests that dissimilar bodies change the forces of a wheel as they change those of its patch given by radii.
 #[test]
 fn differing_bodies_change_forces_as_they_do_by_radii() {
     let like = |case: &Value| {
@@ -418,7 +419,7 @@ fn differing_bodies_change_forces_as_they_do_by_radii() {
     }
 }
 
-/// A gauge corner whose wheel and rail differ has the mirror image of its forces on the other side, and rounds that end.
+/// Tests a gauge corner with dissimilar wheel and rail: the other side has mirrored forces, and the coupling iteration converges.
 #[test]
 fn rounds_of_differing_bodies_end_at_a_gauge_corner() {
     for body in SOFT {
@@ -444,7 +445,7 @@ fn rounds_of_differing_bodies_end_at_a_gauge_corner() {
     }
 }
 
-/// Like bodies are like bodies however they are written.
+/// Tests that two bodies of one material are treated as like bodies, however they are given.
 #[test]
 fn two_bodies_of_one_material_are_like_bodies() {
     let alike = usual("curve", -6.0, 0.003);
@@ -465,7 +466,7 @@ fn the_left_wheel_is_the_mirror_image_of_the_right_one() {
     assert_eq!(right.patches.len(), left.patches.len());
 }
 
-/// Loads that belong to each other, and creepages in place of the wheelset's motion.
+/// Tests equivalent loads, and creepages in place of the wheelset's motion.
 #[test]
 fn loads_and_motions_may_be_given_in_every_way() {
     let vertical = usual("curve", -6.0, 0.003);
@@ -487,7 +488,7 @@ fn loads_and_motions_may_be_given_in_every_way() {
             assert!((found - known).abs() < 3e-3 * limit, "{found} {known}");
         }
     }
-    // The wheel turns about more than the normal, which creepages at one place do not tell.
+    // The wheel rotates about more axes than the normal, which creepages at one place do not describe.
     let mut case = vertical.clone();
     case["motion"] = serde_json::to_value(known.patches[0].points[0].motion).unwrap();
     let found = solve(&case);
@@ -496,7 +497,8 @@ fn loads_and_motions_may_be_given_in_every_way() {
     }
 }
 
-/// Neighbours of sweeps on the tread, and where tread and gauge corner exchange the load, differ by no more than their errors from a line.
+/// Tests that the forces of neighbouring shifts deviate from a line by no more than their errors, on the tread and where the load passes from tread
+/// to gauge corner.
 #[test]
 fn forces_do_not_jump_from_one_shift_to_the_next() {
     for (first, count) in [(-3.0, 8), (-4.9, 12)] {
@@ -564,7 +566,7 @@ fn what_is_not_solved_on_the_curve_is_refused() {
     assert_fault(&influence, "/contact/influence", &["curve"]);
 }
 
-/// A history of creepages and shifts: steps without rolling, at rest and on the way.
+/// Returns a history of creepages and shifts, with steps without rolling at rest and during rolling.
 fn history(creepages: [f64; 3]) -> Value {
     let [x, y, spin] = creepages;
     json!({ "history": {
@@ -576,7 +578,7 @@ fn history(creepages: [f64; 3]) -> Value {
     } })
 }
 
-/// Forces along, across and down at every point of a history.
+/// Returns the longitudinal, lateral and vertical forces at every point of a history.
 fn forces_of(solution: &Solution) -> Vec<[f64; 3]> {
     let totals = solution.total.iter();
     totals
@@ -598,12 +600,12 @@ fn a_history_on_a_flat_rail_has_the_forces_of_a_plane() {
     for body in [None, Some(SOFT[1])] {
         let plane = on("plane", None, body);
         let limit = limit(&plane);
-        // On planes tractions of bodies that differ do not change the pressures.
+        // On planes, the tractions of dissimilar bodies do not change the pressures.
         let allowed = if body.is_some() { 0.01 } else { 0.005 };
         for influence in ["half_space", "angle_corrected"] {
             let curve = on("curve", Some(influence), body);
             let told = |code: &str| curve.remarks.iter().any(|remark| remark.code == code);
-            // Its pressures belong to the tractions of its last point.
+            // The pressures belong to the tractions of the last point.
             assert!(!told("coupling-first-order"));
             for (found, known) in forces_of(&curve).iter().zip(&forces_of(&plane)) {
                 for k in 0..3 {
@@ -636,8 +638,8 @@ fn the_history_of_the_left_wheel_is_the_mirror_image_of_the_right_one() {
     }
 }
 
-/// At a gauge corner a history of one motion is steady from the start, or in the end, with the forces of that motion on the curve, where a plane has
-/// others. With factors for the turn, the tractions of the motion change its pressures, which the estimate of the history knows.
+/// Tests that a history of one motion at a gauge corner has the steady forces of the curve, from the start or in the end. A plane gives other
+/// forces. With factors for the curvature, the tractions change the pressures, which the estimate of the history includes.
 #[test]
 fn a_history_at_a_gauge_corner_has_the_steady_forces_of_the_curve() {
     let [x, y, spin] = [0.0006, 0.001, 4e-4];
@@ -680,7 +682,7 @@ fn a_history_at_a_gauge_corner_has_the_steady_forces_of_the_curve() {
     }
 }
 
-/// Several motions are those of as many cases: tractions change the pressures of each.
+/// Tests that several motions have the forces of separate cases, although the tractions change the pressures of each.
 #[test]
 fn several_motions_have_the_forces_of_as_many_cases() {
     let motions = [
@@ -709,7 +711,7 @@ fn several_motions_have_the_forces_of_as_many_cases() {
     }
 }
 
-/// Stresses and temperatures are given about each patch's own load centre.
+/// Tests that stresses and temperatures are given about the load centre of each patch.
 #[test]
 fn what_follows_from_a_patch_is_given_about_its_load_centre() {
     let text = include_str!("../../api/examples/wheel-rail-flange.case.json");
@@ -739,7 +741,8 @@ fn what_follows_from_a_patch_is_given_about_its_load_centre() {
         inside(point.temperature.unwrap().at_mm);
         let worst = point.subsurface.unwrap().worst.unwrap();
         inside([worst.at_mm[0], worst.at_mm[1]]);
-        // Under the load centre the stress into the rail is about the pressure, on a patch of any size a part of it.
+        // Under the load centre the vertical stress in the rail is of the order of the pressure: a fraction of the largest pressure on a patch of
+        // any size.
         let stored = fields.points[0].subsurface.as_ref().unwrap();
         assert_eq!(stored[..3], [0.0, 0.0, 1.0]);
         let down = -stored[5];
@@ -757,7 +760,7 @@ fn what_follows_from_a_patch_is_given_about_its_load_centre() {
     }
 }
 
-/// A wheelset on the curves of both rails in the middle of the track is symmetric, carries its load, and balances a torque.
+/// Tests that a wheelset on the curves of both rails in the middle of the track is symmetric, carries its load and balances a torque.
 #[test]
 fn a_wheelset_rests_on_the_curves_of_both_rails() {
     let wheel = usual("curve", 0.0, 0.0);

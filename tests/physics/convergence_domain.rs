@@ -1,4 +1,4 @@
-//! Where `liu_hsu` converges, counted over the same motions on every region.
+//! Counts for which motions `liu_hsu` converges, with the same motions on every region.
 
 use railhead_contact::mesh::Grading;
 use railhead_contact::monitor::Unmonitored;
@@ -12,7 +12,7 @@ use railhead_contact::rolling::slip_rules::Rule;
 
 use crate::regions::{Contact, Region, motion};
 
-/// Normalised motions: creepage 0 to 3 in four directions, spin 0 to 20; 218 of them.
+/// Returns 218 normalised motions: creepage 0 to 3 in four directions, spin 0 to 20.
 pub fn motions() -> Vec<[f64; 3]> {
     let root = std::f64::consts::FRAC_1_SQRT_2;
     let mut motions = Vec::new();
@@ -22,7 +22,7 @@ pub fn motions() -> Vec<[f64; 3]> {
         }
         for size in [0.1, 0.3, 0.6, 1.0, 2.0, 3.0] {
             for [x, y] in [[1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [root, root]] {
-                // Without spin the third direction is the second one turned round.
+                // Without spin, the third direction is the mirror image of the second.
                 if spin > 0.0 || y >= 0.0 {
                     motions.push([size * x, size * y, spin]);
                 }
@@ -32,28 +32,29 @@ pub fn motions() -> Vec<[f64; 3]> {
     motions
 }
 
-/// How many motions converged, and how the others ended.
+/// Numbers of motions that converged, and how the others ended.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Counts {
     pub motions: usize,
-    /// Guess 1 alone.
+    /// Motions that converge from guess 1 alone.
     pub guess_1: usize,
-    /// Guess 2 alone, about the pole of a coarse mesh; without spin there is none, and guess 1 counts.
+    /// Motions that converge from guess 2 alone, about the pole of a coarse mesh. Without spin there is no guess 2, and guess 1 counts.
     pub guess_2: usize,
-    /// The continued tractions alone.
+    /// Motions that converge from the continued tractions alone.
     pub continued: usize,
-    /// Guess 1, then guess 2: the paper.
+    /// Motions that converge from guess 1 or else guess 2, as in the paper.
     pub paper: usize,
-    /// All there is: the paper, then the continued run, for other rules than upwind from an upwind solution.
+    /// Motions that converge with the complete method: the paper's guesses, then the continued run. Rules other than upwind then start from an
+    /// upwind solution.
     pub shipped: usize,
-    /// Ends of the three alone: Newton–Raphson diverged, zones repeat, anything else.
+    /// Failures of each of the three guesses: Newton–Raphson divergence, repeating zones, other.
     pub failures: [[usize; 3]; 3],
-    /// Divisions and Newton–Raphson steps of the converged runs of the three.
+    /// Divisions and Newton–Raphson steps of the converged runs of each guess.
     pub work: [[u32; 2]; 3],
 }
 
 impl Counts {
-    /// One row of a table.
+    /// Returns one row of the table.
     pub fn row(&self) -> String {
         let per_run = |k: usize, runs: usize| {
             let [outer, newton] = self.work[k].map(|w| f64::from(w) / runs.max(1) as f64);
@@ -75,7 +76,7 @@ impl Counts {
     }
 }
 
-/// Runs every guess alone on each motion. The coarse mesh has 25 cells or fewer.
+/// Runs every guess alone on each motion. The coarse mesh has at most 25 cells.
 pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f64; 3]]) -> Counts {
     let per_patch = |strips: usize| {
         if region == Region::TwoCircles {

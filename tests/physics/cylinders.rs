@@ -1,4 +1,4 @@
-//! Cylinders of unlike bodies, after Bentall and Johnson: the middle of a very long patch across rolling.
+//! Tests cylinders of dissimilar bodies after Bentall and Johnson, in the middle of a patch that is very wide across rolling.
 
 use railhead_contact::solution::words::answer::{Fields, PatchFields};
 use serde::Deserialize;
@@ -6,14 +6,14 @@ use serde_json::{Value, json};
 
 use crate::reference::{Converged, assert_none, read, solve};
 
-/// Half width over half length: end effects fall as its square.
+/// Half width over half length. End effects decrease with its square.
 const WIDE: f64 = 1000.0;
-/// An odd number: one strip lies in the middle.
+/// The number of strips, which is odd so that one strip lies in the middle.
 const STRIPS: u32 = 9;
-/// Creepages tried, relative to the one that is looked for, which is negative: forces grow from the first to the last.
+/// Trial creepages relative to the expected one. It is negative, so that forces grow from the first to the last.
 const TRIED: [f64; 3] = [1.05, 1.0, 0.95];
 
-/// The creepage at which two cylinders carry a force, found elsewhere.
+/// The reference creepage at which two cylinders carry a given force.
 #[derive(Debug, Deserialize)]
 struct Cylinders {
     id: String,
@@ -23,7 +23,7 @@ struct Cylinders {
     half_length_mm: f64,
     force_n_per_mm: f64,
     friction: f64,
-    /// Of the lower body, over the friction limit.
+    /// Force on the lower body over the friction limit.
     force: f64,
     creepage: Converged,
 }
@@ -33,8 +33,8 @@ impl Cylinders {
         2.0 * self.force_n_per_mm / (std::f64::consts::PI * self.half_length_mm)
     }
 
-    /// The creepage at which the middle strip carries the force, between creepages about one that is known, tried in one case or in cases of
-    /// their own.
+    /// Returns the creepage at which the middle strip carries the force, by interpolation between creepages near `known`. They are solved in one
+    /// case or in separate cases.
     fn found(&self, known: f64, cells: u32, together: bool) -> f64 {
         let motion = |part: &f64| json!({ "creepage_x": part * known, "creepage_y": 0.0, "spin_per_mm": 0.0 });
         let forces = |patches: &[PatchFields]| -> Vec<f64> {
@@ -57,7 +57,7 @@ impl Cylinders {
         part * known
     }
 
-    /// The patches with one motion or several.
+    /// Returns the patches of a case with one motion or several.
     fn solved(&self, motion: &Value, cells: u32) -> Vec<PatchFields> {
         let (a, b) = (self.half_length_mm, WIDE * self.half_length_mm);
         let load = self.pressure_max() * 2.0 * std::f64::consts::PI / 3.0 * a * b;
@@ -73,7 +73,7 @@ impl Cylinders {
         patches
     }
 
-    /// Force of the middle strip over its friction limit.
+    /// Returns the force of the middle strip over its friction limit.
     fn middle_force(&self, patch: &PatchFields, motion: usize) -> f64 {
         let traction = patch.points[motion].traction_x_mpa.as_ref().unwrap();
         let mesh = patch.cells(motion);
@@ -84,13 +84,13 @@ impl Cylinders {
     }
 }
 
-/// Creepages that belong to forces, from hardly any friction to none of the slip (Bentall and Johnson 1967), of motions alone and in a list.
+/// Tests the creepages that belong to given forces, from very little friction to no slip (Bentall and Johnson 1967), in single cases and in a list.
 #[test]
 fn unlike_cylinders_roll_with_the_creepage_of_their_force() {
     let mut failures = Vec::new();
     for case in read::<Vec<Cylinders>>("cylinders.json") {
         let known = case.creepage;
-        // Without friction to speak of cells slip forward or backward as a whole, so that forces grow in steps.
+        // With very little friction, cells slip forward or backward as a whole, so that forces grow in steps.
         let cells = if case.friction < 1e-3 { 160 } else { 48 };
         let [alone, together] =
             [false, true].map(|together| case.found(known.value, cells, together) / known.value);
@@ -110,8 +110,8 @@ fn unlike_cylinders_roll_with_the_creepage_of_their_force() {
     assert_none("creepages differ", &failures);
 }
 
-/// Without friction to speak of everything slips, along ξ + 2 K p/G. Nothing pulls where half of the load lies inside the change of sign,
-/// at p = 0.9147 p0.
+/// With very little friction every cell slips, along ξ + 2 K p/G. The force vanishes where half of the load lies inside the change of sign, at p =
+/// 0.9147 p0.
 #[test]
 fn with_hardly_any_friction_the_creepage_is_that_of_half_the_load() {
     let all: Vec<Cylinders> = read("cylinders.json");

@@ -1,4 +1,4 @@
-//! The benchmark of EN 15302: radius difference and equivalent conicity of its reference profiles, every pair of `tests/data/en15302`.
+//! Tests the benchmark of EN 15302: radius difference and equivalent conicity of every pair of reference profiles in `tests/data/en15302`.
 
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn numbers(value: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// Depth of an arc or a line of a reference profile over y, z down.
+/// Returns the depth (z down) of an arc or a line of a reference profile at y.
 fn depth(segment: &Value, y: f64) -> f64 {
     if let Some(arc) = segment.get("arc") {
         let (centre, radius) = (numbers(&arc["centre"]), number(&arc["radius"]));
@@ -34,7 +34,7 @@ fn depth(segment: &Value, y: f64) -> f64 {
     number(&segment["line"]["z0"]) + number(&segment["line"]["slope"]) * y
 }
 
-/// Points of a reference profile about 0.2 mm apart along it.
+/// Returns points of a reference profile about 0.2 mm apart along it.
 fn section(segments: &Value) -> Value {
     let mut points: Vec<[f64; 2]> = Vec::new();
     for segment in segments.as_array().expect("segments") {
@@ -57,7 +57,7 @@ fn section(segments: &Value) -> Value {
 
 fn kinematics(benchmark: &Value, name: &str, pair: &Value) -> Kinematics {
     let profile = |name: &Value| section(&benchmark["profiles"][name.as_str().expect("a name")]);
-    // The rail is the last part of the name: `WheelARailA`.
+    // The last part of the name is the rail: `WheelARailA`.
     let rail = &name[name.rfind("Rail").expect("a rail")..];
     let case = json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
@@ -86,7 +86,7 @@ fn kinematics(benchmark: &Value, name: &str, pair: &Value) -> Kinematics {
     *found.expect("kinematics")
 }
 
-/// Every file of the folder has the same form; every pair of it is judged.
+/// Returns every pair of every file in the folder. All files have the same form.
 fn pairs() -> Vec<(Value, String)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/en15302");
     let mut pairs = Vec::new();
@@ -159,12 +159,12 @@ fn en_15302_is_met_by_every_pair_at_every_amplitude() {
     }
 }
 
-/// Flat treads between flanges: the standard's wheel I has no radius difference at small shifts.
+/// Tests flat treads between flanges: the standard's wheel I has no radius difference at small shifts.
 #[test]
 fn flat_treads_have_the_conicity_zero() {
     let (benchmark, name) = pairs().remove(0);
     let mut flat = benchmark.clone();
-    // The root of the flange of wheel B with a cylinder in place of the cone.
+    // The flange root of wheel B, with a cylinder in place of the cone.
     let wheel = flat["profiles"]["WheelB"].as_array_mut().expect("segments");
     wheel.truncate(5);
     wheel.push(json!({ "from": -29.3505, "to": 60.0, "line": { "z0": depth(&wheel[4], -29.3505), "slope": 0.0 } }));
@@ -184,7 +184,7 @@ fn flat_treads_have_the_conicity_zero() {
         found.equilibrium_shift_mm.map(|y| (1e6 * y).round()),
         Some(0.0)
     );
-    // Shifts end at 10 mm.
+    // The shifts end at 10 mm.
     let beyond = &found.conicity[3];
     assert_eq!(beyond.conicity, None);
     assert!(

@@ -1,5 +1,4 @@
-//! The kernels and the discrete equations against stored numbers (`tests/data/kernels.json`, described in
-//! `tests/data/README.md`).
+//! Tests of the kernels and the discrete equations against stored numbers (`tests/data/kernels.json`, described in `tests/data/README.md`).
 
 use railhead_contact::half_space::kernels::{Rectangle, rectangle};
 use railhead_contact::mesh::Grading;
@@ -18,12 +17,12 @@ struct Kernels {
     solver: Vec<SolverValue>,
 }
 
-/// Displacement of one body.
+/// Stored displacements of one body.
 #[derive(Deserialize)]
 struct InfluenceValue {
     x: f64,
     y: f64,
-    /// x and x, y and y of the sides.
+    /// The x limits and y limits of the loaded rectangle.
     cell: [f64; 4],
     poisson_ratio: f64,
     shear_modulus: f64,
@@ -32,7 +31,7 @@ struct InfluenceValue {
     yy: f64,
 }
 
-/// Forces on 6 strips of 5 equal cells, bound at the cell's centre.
+/// Stored forces on 6 strips of 5 equal cells, with the bound taken at the centre of each cell.
 #[derive(Deserialize)]
 struct SolverValue {
     region: String,
@@ -41,7 +40,7 @@ struct SolverValue {
     force_x: f64,
     force_y: f64,
     moment_z: f64,
-    /// Given for the upwind rule.
+    /// Number of sticking cells, given for the upwind rule.
     stick_cells: Option<usize>,
     #[serde(rename = "sum_pA")]
     sum_pa: Option<f64>,
@@ -61,7 +60,7 @@ impl SolverValue {
         }
     }
 
-    /// Half of the last of 10 digits of the largest force, and what the solver leaves.
+    /// Returns half a unit in the tenth digit of the largest force, plus the solver's residual.
     fn tolerance(&self) -> f64 {
         let largest = self
             .forces()
@@ -80,7 +79,7 @@ fn kernels() -> Kernels {
 }
 
 fn contact(name: &str) -> Contact {
-    // In the data, "long_ellipse" is b/a = 0.3.
+    // In the data, `long_ellipse` is b/a = 0.3.
     let (_, region) = REGIONS.into_iter().find(|(n, _)| *n == name).unwrap();
     Contact::new(region, 6, &Grading::uniform(5))
 }
@@ -97,7 +96,7 @@ fn influence_coefficients_have_their_known_twelve_digits() {
             Rectangle { x0, x1, y0, y1 },
             value.poisson_ratio,
         );
-        // Ours is for two bodies and multiplied by G.
+        // The found influence is for two bodies and multiplied by G.
         let factor = 0.5 / value.shear_modulus;
         for (ours, known) in [
             (found.xx, value.xx),
@@ -148,7 +147,7 @@ fn forces_stick_cells_and_power_have_their_known_digits() {
     }
 }
 
-/// `Σ s·T A`, slips in the normalisation of the motion.
+/// Returns `Σ s·T A`, with slips in the normalisation of the motion.
 fn power(contact: &Contact, rule: Rule, state: [f64; 3], t: &[f64]) -> f64 {
     let equations = contact.equations(rule);
     let mut slip = vec![0.0; t.len()];

@@ -1,4 +1,4 @@
-//! The simplified theory: what it must get right, and how far it is off elsewhere.
+//! Tests of the simplified theory: what it must reproduce, and its errors elsewhere.
 
 use std::f64::consts::PI;
 
@@ -21,7 +21,7 @@ fn forces(ellipse: &Ellipse, bound: &str) -> [f64; 3] {
     ellipse.relative(&solve(&question(ellipse, bound)).0.patches[0].points[0])
 }
 
-/// Stated errors relative to μN of one solver block over the 62 Hertz cases, and the true ones of forces and moment.
+/// Returns the stated errors of one solver block over the 62 Hertz cases, and the true errors of forces and moment, relative to μN.
 fn against_converged(solver: &Value) -> (Vec<f64>, [Vec<f64>; 2]) {
     let (mut stated, mut errors) = (Vec::new(), [Vec::new(), Vec::new()]);
     for case in HERTZ_CLASSES.iter().flat_map(|class| cases(class)) {
@@ -50,7 +50,7 @@ fn uncovered(solver: &Value) -> usize {
 
 #[test]
 fn the_stated_class_covers_every_reference_case() {
-    // Median, nine tenths and all of the cases: forces, then moment.
+    // Median, 90th percentile and maximum over the cases: of forces, then of the moment.
     let allowed = [
         [[0.035, 0.055, 0.12], [0.01, 0.03, 0.06]],
         [[0.045, 0.135, 0.16], [0.055, 0.1, 0.14]],
@@ -203,7 +203,7 @@ fn tractions_obey_their_bound_and_zones_cover_the_patch() {
             let (tx, ty) = (tx.expect("x")[i], ty.expect("y")[i]);
             let (sx, sy) = (sx.expect("x")[i], sy.expect("y")[i]);
             let allowed = if highest > 1.0 {
-                // The paraboloid is as high as 4/3 of the ellipsoid where that is highest.
+                // The peak of the paraboloid is 4/3 of the peak of the ellipsoid.
                 0.3 * highest * 1.03 * pressure * pressure / peak
             } else {
                 0.3 * pressure

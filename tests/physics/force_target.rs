@@ -1,5 +1,5 @@
-//! A target relative to the tangential force: met by every kind of motion, or said to be missed; and what the answer says of a small force
-//! where the target is relative to the friction limit.
+//! Tests of a target relative to the tangential force: every kind of motion meets it, or the answer says that it is missed. With a target relative
+//! to the friction limit, the answer remarks on small forces.
 
 use railhead_contact::evaluate::answer::{NUMBER_NAMES, RowStatus};
 use railhead_contact::solution::words::answer::Solution;
@@ -10,7 +10,7 @@ use crate::many_rows::{case as rows_case, numbers, solved};
 use crate::profile_cases::{generated, put};
 use crate::reference::solve;
 
-/// A case with a target relative to the force, and the same relative to the friction limit.
+/// Returns the case with a target relative to the force, and with the same target relative to the friction limit.
 fn both(case: &Value, target: f64) -> [Value; 2] {
     ["force", "friction_limit"].map(|of| {
         let mut case = case.clone();
@@ -28,7 +28,7 @@ fn force(solution: &Solution, point: usize) -> f64 {
     sum(|p| p.force_x_n).hypot(sum(|p| p.force_y_n))
 }
 
-/// Every point has an error of at most the target of its own force, and agrees with the answer relative to the friction limit.
+/// Requires that every point has an error of at most the target of its own force, and agrees with the answer relative to the friction limit.
 fn assert_met(case: &Value, target: f64) {
     let [small, usual] = both(case, target).map(|case| solve(&case).0);
     for patch in 0..small.patches.len() {
@@ -78,13 +78,13 @@ fn motions_with_small_forces_meet_a_target_relative_to_the_force() {
         ),
         0.02,
     );
-    // On the curve of the rail the estimate has a part that no mesh reduces.
+    // On the curve of the rail, mesh refinement does not reduce one part of the estimate.
     let on_planes = json!({ "reference_surface": "plane" });
     let wheel = put(&generated(), "motion", json!({ "creepage_x": 4e-4 }));
     assert_met(&put(&wheel, "contact", on_planes), 0.02);
 }
 
-/// The fields of a motion that was solved again are those of its own mesh: their sum is its force.
+/// Tests that the fields of a motion that was solved again belong to its own mesh: their sum is its force.
 #[test]
 fn tractions_of_a_sweep_belong_to_their_motion() {
     let sweep = json!({ "sweep": { "creepage_x": { "from": 2e-5, "to": 2e-3, "points": 3 } } });
@@ -108,7 +108,7 @@ fn tractions_of_a_sweep_belong_to_their_motion() {
     }
 }
 
-/// Without a force nothing is small beside it: the search ends at once or at the least target, and the answer says which.
+/// Tests motions without a force, which cannot meet a relative target: the search ends at once or at the smallest target, and the answer says which.
 #[test]
 fn a_motion_without_a_force_ends() {
     let still = good_with("/motion", json!({ "creepage_x": 0, "creepage_y": 0 }));

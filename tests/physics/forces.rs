@@ -1,4 +1,4 @@
-//! Prescribed tangential forces: the creepages that give them are found.
+//! Tests of prescribed tangential forces: the solver finds the creepages that give them.
 
 use serde_json::{Value, json};
 
@@ -9,7 +9,7 @@ use railhead_contact::solution::words::answer::{PointSolution, Solution};
 
 const LIMIT: f64 = 0.3 * 60_000.0;
 
-/// The answer to a motion on the steel ellipse.
+/// Returns the answer to a motion on the steel ellipse.
 fn answer(a_over_b: f64, motion: Value, solver: Value) -> Solution {
     let mut case = Ellipse::steel(a_over_b, 0.28).case(1, 1);
     case["motion"] = motion;
@@ -22,10 +22,10 @@ fn point(a_over_b: f64, motion: Value, solver: Value) -> PointSolution {
     answer(a_over_b, motion, solver).patches[0].points[0].clone()
 }
 
-/// What is off after a round trip: a motion's forces are prescribed, and its creepages should come back.
+/// Prescribes the forces of a motion and compares the creepages that are found with those of the motion. Returns a message if they differ too much.
 ///
-/// A creepage is allowed the change that the estimated errors of both forces stand for: error over the slope of the force,
-/// which is at least that of the secant from no creepage times what friction leaves of it.
+/// The allowed difference of a creepage is the change that corresponds to the estimated errors of both forces: the error over the slope of the
+/// force. The slope is at least that of the secant from zero creepage times the remaining share of the friction limit.
 fn round_trip(a_over_b: f64, motion: [f64; 3], named: [bool; 2], solver: &Value) -> Option<String> {
     let steel = Ellipse::steel(a_over_b, 0.28).normalised(motion[0], motion[1], motion[2]);
     let [x, y, spin] = steel.motion;
@@ -364,8 +364,8 @@ fn a_force_changes_the_digest() {
     );
 }
 
-/// On this slender patch one of the companions of a mesh converges for some creepages only, so that the force found by extrapolation
-/// jumps by 0.3 % of μN from one creepage to the next.
+/// On this slender patch one of the semi-coarsened meshes converges for some creepages only, so that the extrapolated force jumps by 0.3 % of μN
+/// from one creepage to the next.
 #[test]
 fn a_force_is_met_where_companions_of_a_mesh_answer_some_motions_only() {
     let wanted = 1_287.591_692_252_836_8;
@@ -388,12 +388,12 @@ fn a_force_is_met_where_companions_of_a_mesh_answer_some_motions_only() {
     );
     let remarks = serde_json::to_string(&solution.remarks).unwrap();
     assert!(!remarks.contains("iteration-inexact"), "{remarks}");
-    // An answer with its companions takes up to 25 000 products, a trial of the search 500.
+    // An answer with its semi-coarsened meshes takes up to 25 000 products, a trial of the search 500.
     assert!(point.solver.products < 100_000, "{}", point.solver.products);
 }
 
-/// Where the first creepage tried is far off, as on this slender patch, the levels are not chosen for it: a force costs a few solves of
-/// its motion, and no finer mesh than that needs.
+/// The first creepage tried is far off on this slender patch, and the mesh must not be chosen for it. A prescribed force costs a few solves of its
+/// motion and needs no finer mesh than the motion does.
 #[test]
 fn a_force_on_a_slender_patch_takes_a_few_solves_of_its_motion() {
     let forced = json!({
@@ -415,7 +415,7 @@ fn a_force_on_a_slender_patch_takes_a_few_solves_of_its_motion() {
     assert_eq!(found.target_met, Some(true));
     assert_eq!(found.solver.mesh, alone.solver.mesh);
     let [found, alone] = [found, alone].map(|point| point.solver.products);
-    // 3.1 times as many; 26 times, and on a mesh of twice as many cells, when the levels were chosen for the first creepage tried.
+    // The present ratio is 3.1. When the mesh was chosen for the first creepage tried, the ratio was 26 and the mesh had twice as many cells.
     assert!(
         found < 6 * alone,
         "{found} products, {alone} without a search"

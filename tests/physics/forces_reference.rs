@@ -1,14 +1,14 @@
-//! Prescribed forces against CONTACT: creepages that give them, and the moment that comes with them.
+//! Tests of prescribed forces against CONTACT: the creepages that give them, and the resulting moment.
 
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::reference::{Converged, SolvedEllipse, assert_none, read, solve};
 
-/// What is allowed of a force relative to the friction limit, and of the moment over that and √(ab).
+/// Allowed error of a force relative to the friction limit, and of the moment relative to the friction limit times √(ab).
 const ALLOWED: f64 = 0.01;
 
-/// Forces prescribed on a contact solved elsewhere; forces over the friction limit, moment over that and √(ab).
+/// A reference contact with prescribed forces. Forces are over the friction limit, the moment over the friction limit times √(ab).
 #[derive(Debug, Deserialize)]
 struct Reference {
     #[serde(flatten)]
@@ -20,7 +20,7 @@ struct Reference {
 }
 
 impl Reference {
-    /// F_x, F_y and M_z over their scales, and both creepages.
+    /// Returns F_x, F_y and M_z over their scales, and both creepages.
     fn answer(&self, motion: &Value) -> ([f64; 3], [f64; 2]) {
         let (solution, _) = solve(&self.contact.case(motion));
         let point = &solution.patches[0].points[0];
@@ -29,7 +29,7 @@ impl Reference {
     }
 }
 
-/// At default settings: the forces are met, the moment is CONTACT's, and its creepages give the forces.
+/// Tests at default settings that the forces are met, that the moment is CONTACT's, and that CONTACT's creepages give the forces.
 #[test]
 fn prescribed_forces_agree_with_contact() {
     let all: Vec<Reference> = read("prescribed_forces.json");
@@ -47,7 +47,7 @@ fn prescribed_forces_agree_with_contact() {
         let (back, _) = reference
             .answer(&json!({ "creepage_x": known_x, "creepage_y": known_y, "spin_per_mm": spin }));
         let forces = (back[0] - x).abs().max((back[1] - y).abs());
-        // Over the larger of both: without a force along x the creepage along it is 0.
+        // Relative to the size of both creepages: without a force along x the creepage along x is 0.
         let size = known_x.hypot(known_y);
         let off = (0..2).map(|k| {
             let known = reference.creepages[k];

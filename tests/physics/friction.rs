@@ -1,4 +1,4 @@
-//! Coulomb's law in every cell: the bound, complementarity, and slip along the traction.
+//! Tests of Coulomb's law in every cell: the bound, complementarity, and slip along the traction.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -16,20 +16,19 @@ use railhead_contact::rolling::task::{Motion, TOLERANCE_LEAST};
 use crate::laws::{MOTIONS, shapes};
 use crate::reference::{Ellipse, assert_none, solve};
 
-/// What one cell may leave of a law when the root mean square of the residuals is at the solver's tolerance.
+/// Allowed residual of one cell when the root mean square of all residuals is at the solver's tolerance.
 const CELL: f64 = 10.0 * TOLERANCE_LEAST;
 
-/// Tractions, slips, bounds and zones of a patch.
 struct Cells {
     traction: [Vec<f64>; 2],
     slip: [Vec<f64>; 2],
     bound: Vec<f64>,
     slips: Vec<bool>,
-    /// Units to judge slips and tractions by.
+    /// Units of slips and tractions.
     largest: [f64; 2],
 }
 
-/// Largest violations: |T| above the bound, slip in a sticking cell, |s|(g − |T|), |s||T| − s·T.
+/// Returns the largest violations: |T| above the bound, slip in a sticking cell, |s|(g − |T|), |s||T| − s·T.
 fn violations(cells: &Cells) -> [f64; 4] {
     let [rigid, bound] = cells.largest;
     let mut worst = [0.0f64; 4];
@@ -47,7 +46,7 @@ fn violations(cells: &Cells) -> [f64; 4] {
     worst
 }
 
-/// A rule's own tractions and slips, dimensionless.
+/// Returns the dimensionless tractions and slips of one rule.
 fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
     let checked = contact::check(&contact.case(12, 12), &Limits::default()).expect("a valid case");
     let size = MeshSize {
@@ -77,7 +76,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         fall: None,
         area: &area,
         scale: 1.0,
-        // The trapezoid passes the residual of a cell on to its neighbours.
+        // The trapezoidal rule passes the residual of a cell on to its neighbours.
         tolerance: 0.01 * TOLERANCE_LEAST,
         steps_max: STEPS_MAX,
         accepts_start: true,
@@ -102,7 +101,7 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
     }
 }
 
-/// What a client gets.
+/// Returns the cells of an answer as a client gets it.
 fn answered(contact: &Ellipse, n: u32) -> Cells {
     let (_, fields) = solve(&contact.case(n, n));
     let patch = &fields.patches[0];
@@ -112,7 +111,7 @@ fn answered(contact: &Ellipse, n: u32) -> Cells {
     let mut slip = [take(&point.slip_x), take(&point.slip_y)];
     let zones = point.zone.as_ref().expect("was asked for");
     for (i, zone) in zones.iter().enumerate() {
-        // The last cell of a strip may stick on the whole and slip at its trailing end.
+        // The last cell of a strip may stick on average and slip at its trailing end.
         let last = i % n as usize == 0;
         if last && *zone == contact::solution::words::answer::Zone::Stick {
             slip.iter_mut().for_each(|slip| slip[i] = 0.0);
@@ -153,7 +152,7 @@ fn contacts() -> impl Iterator<Item = (String, Ellipse)> {
     })
 }
 
-/// The laws that do not hold, in words.
+/// Returns a message for each violated law.
 fn broken(name: &str, cells: &Cells) -> Vec<String> {
     let laws = [
         "|T| above μp",
@@ -175,7 +174,7 @@ fn every_cell_of_a_solved_rule_obeys_coulomb() {
     let failures: Vec<String> = contacts()
         .flat_map(|(name, contact)| {
             let mut all = broken(&name, &one_rule(&contact, Rule::ThreePoint));
-            // The trapezoid's slips oscillate, but they too obey the law.
+            // The slips of the trapezoidal rule oscillate, but they too obey the law.
             all.extend(broken(&name, &one_rule(&contact, Rule::Trapezoid)));
             all
         })

@@ -1,4 +1,4 @@
-//! Friction that lies on the track while a history rolls over it.
+//! Tests of friction that varies along the track during a history.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -11,12 +11,12 @@ use crate::reference::{Ellipse, solve};
 const NORMAL: f64 = 60_000.0;
 const LIMIT: f64 = 0.3 * NORMAL;
 
-/// Half the length of the patch in mm.
+/// Returns half the length of the patch in mm.
 fn half_length(case: &Value) -> f64 {
     case["contact"]["a_mm"].as_f64().unwrap()
 }
 
-/// A history of a motion in dimensionless creepages over these distances in half-lengths of the patch, with friction of its own.
+/// Returns a history of one motion in dimensionless creepages over these distances, in half-lengths of the patch, with this friction.
 fn history(creepages: [f64; 3], distances: &[f64], friction: impl Fn(f64) -> Value) -> Value {
     let [x, y, spin] = creepages;
     let steady = Ellipse::steel(1.5, 0.28).normalised(x, y, spin);
@@ -32,7 +32,7 @@ fn history(creepages: [f64; 3], distances: &[f64], friction: impl Fn(f64) -> Val
     case
 }
 
-/// A table of coefficients at places in half-lengths of the patch.
+/// Returns a table of coefficients at places in half-lengths of the patch.
 fn along(a: f64, x: &[f64], coefficient: &[f64]) -> Value {
     let x: Vec<f64> = x.iter().map(|x| x * a).collect();
     json!({ "along": { "x_mm": x, "coefficient": coefficient } })
@@ -43,7 +43,7 @@ fn points(case: &Value) -> Vec<PointSolution> {
     solution.patches[0].points.clone()
 }
 
-/// Forces over μN with μ = 0.3.
+/// Returns the forces over μN with μ = 0.3.
 fn forces(point: &PointSolution) -> [f64; 2] {
     [point.force_x_n / LIMIT, point.force_y_n / LIMIT]
 }
@@ -53,7 +53,7 @@ fn apart(a: &PointSolution, b: &PointSolution) -> f64 {
     (a[0] - b[0]).abs().max((a[1] - b[1]).abs())
 }
 
-/// Share of the load of an ellipse behind x, in half-lengths: the integral of 3/4 (1 − x²).
+/// Returns the share of an ellipse's load behind x, in half-lengths: the integral of 3/4 (1 − x²).
 fn behind(x: f64) -> f64 {
     let x = x.clamp(-1.0, 1.0);
     0.25 * (2.0 + 3.0 * x - x * x * x)
@@ -96,7 +96,7 @@ fn beyond_a_jump_rolling_becomes_steady_with_the_coefficient_there() {
     );
 }
 
-/// Everything slips: the force is the integral of pressure and coefficient.
+/// Tests full slip: the force is the integral of pressure times coefficient.
 #[test]
 fn in_full_slip_a_jump_passes_through_the_force_with_the_load_behind_it() {
     let distances = [1.0, 1.3, 1.75, 2.0, 2.4, 2.9, 3.5];
@@ -125,7 +125,7 @@ fn over_a_long_slope_the_force_in_full_slip_is_that_of_the_middle() {
     }
 }
 
-/// A force below what every place carries is met on both sides of a jump, by a larger creepage where it is slippery.
+/// Tests that a force below the friction limit of every place is met on both sides of a jump, with a larger creepage where friction is lower.
 #[test]
 fn a_prescribed_force_is_met_over_a_jump() {
     let mut case = history([0.0, 0.0, 0.0], &[0.0, 9.0, 20.0], |a| {
@@ -138,7 +138,7 @@ fn a_prescribed_force_is_met_over_a_jump() {
     for point in &found[1..] {
         assert!((forces(point)[0] - 0.3).abs() < 1e-3, "{:?}", forces(point));
     }
-    // Both are those of steady rolling under the same force.
+    // Both creepages are those of steady rolling under the same force.
     for (point, coefficient) in found[1..].iter().zip([0.3, 0.15]) {
         let mut steady = case.clone();
         steady["friction"] = json!({ "coefficient": coefficient });
@@ -167,7 +167,7 @@ fn what_does_not_go_with_it_is_refused_with_the_member() {
         "/friction/along/x_mm/1",
         &["0 given after 1"],
     );
-    // Two equal places are a jump, three are a mistake.
+    // Two equal places mark a jump, three are a mistake.
     let jump = json!({ "x_mm": [0.0, 1.0, 1.0], "coefficient": [0.3, 0.3, 0.2] });
     let jump = with(&case, "/friction/along", Some(jump));
     assert!(

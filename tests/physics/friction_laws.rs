@@ -1,4 +1,4 @@
-//! Friction that falls with slip or varies across, and what lies between the bodies: references, limits, laws and faults.
+//! Tests of friction that falls with slip or varies across, and of interfacial layers: references, limits, laws and faults.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::cases::{assert_fault, good, good_with, with};
 use crate::reference::{Converged, Ellipse, assert_none, read, solve};
 
-/// Contacts solved elsewhere; `friction` in the words of a case, forces over the normal force.
+/// A reference contact. `friction` has the form of a case, and forces are over the normal force.
 #[derive(Debug, Deserialize)]
 struct Reference {
     id: String,
@@ -51,7 +51,7 @@ impl Reference {
         })
     }
 
-    /// Errors over the friction limit beyond what the reference may be off by, with what is estimated.
+    /// Returns the errors over the friction limit beyond the uncertainty of the reference, each with its estimate.
     fn errors(&self, patch: &PatchSolution) -> Vec<(f64, f64)> {
         let [a, b] = self.semi_axes_mm;
         let limit = patch.friction_limit_n.expect("known") / self.normal_force_n;
@@ -73,7 +73,7 @@ impl Reference {
     }
 }
 
-/// 110 forces of CONTACT's, at default settings: within 1 % of the friction limit, and as far as the estimate says.
+/// Compares 110 forces with CONTACT's at default settings: within 1 % of the friction limit, and within the estimate.
 #[test]
 fn friction_as_it_is_agrees_with_contact_within_one_percent_and_the_estimate() {
     let all: Vec<Reference> = read("friction.json");
@@ -137,7 +137,7 @@ fn every_way_to_say_a_constant_coefficient_gives_its_forces() {
     let plain = json!({ "coefficient": 0.3, "reduction": 1.0 });
     assert_eq!(forces(&with(&steel(), "/friction", Some(plain))), known);
     for law in ["exponential", "rational", "linear"] {
-        // Without a fall to the last digit but for the order of sums; with a small one by as much.
+        // Without a fall the forces agree up to the order of summation. A small fall changes them by about as much.
         for (drop, allowed) in [(0.0, 1e-5), (3e-5, 2e-4)] {
             let friction = falling(law, 0.3 - drop, drop, 1000.0);
             let off = distance(forces(&with(&steel(), "/friction", Some(friction))), known);
@@ -155,7 +155,7 @@ fn a_thinner_layer_comes_nearer_to_none_and_a_thick_one_takes_the_force() {
     let known = forces(&steel());
     let [thin, thick] = [2e-5, 2e-4].map(|thickness| distance(layered(thickness), known));
     assert!(thin < 0.12 * thick && thin > 0.0, "{thin:.2e} {thick:.2e}");
-    // In full stick a thick layer alone is Kalker's simplified theory: T = w/L (leading edge − x).
+    // In full stick, a thick layer alone is Kalker's simplified theory: T = w/L (leading edge − x).
     let [a, b, w, flexibility] = [6.0_f64, 4.0, 1e-5, 10.0 / 500.0];
     let mut case = Ellipse {
         a_mm: a,
@@ -168,7 +168,7 @@ fn a_thinner_layer_comes_nearer_to_none_and_a_thick_one_takes_the_force() {
     // ∬ (√(1 − y²/b²) a − x) dA = 8 a² b/3.
     let known = w / flexibility * 8.0 * a * a * b / 3.0;
     let [found, ..] = forces(&case);
-    // The bodies add 3 % to the flexibility.
+    // The bodies add 3 % to the flexibility of the layer.
     assert!((found / known - 1.0).abs() < 0.05, "{found} {known}");
 }
 
@@ -229,8 +229,8 @@ fn forces_of_a_mirrored_coefficient_are_mirrored() {
     assert!(m.abs() > 0.1 * x, "more friction on one side turns");
 }
 
-/// Under a crown that is sharp on one side the load is nowhere near an ellipse's: the friction limit is the force of full sliding all the
-/// same, and a parabola of load is not.
+/// Under a crown that is sharp on one side the load distribution is far from an ellipse's. The friction limit is still the force of full sliding,
+/// and a parabolic load distribution is not.
 #[test]
 fn sliding_under_a_skew_crown_takes_the_friction_limit_of_a_coefficient_that_varies_across() {
     let y: Vec<f64> = (-120..=120).map(|k| 0.25 * f64::from(k)).collect();
@@ -260,7 +260,7 @@ fn sliding_under_a_skew_crown_takes_the_friction_limit_of_a_coefficient_that_var
     );
 }
 
-/// A wheel at the gauge corner and at the flange of a rail that is lubricated there.
+/// Tests a wheel at the gauge corner and the flange of a rail that is lubricated there.
 #[test]
 fn every_patch_of_a_wheel_has_the_friction_of_its_place_on_the_rail() {
     let text = include_str!("../../api/examples/wheel-rail-flange.case.json");
@@ -296,7 +296,7 @@ fn friction_that_falls_too_fast_for_one_answer_is_refused_with_its_number() {
     let mut case = good_with("/friction", falling("exponential", 0.1, 0.4, 20.0));
     case["motion"]["speed_mm_per_s"] = json!(60_000.0);
     assert_fault(&case, "/friction", &["falls too fast", "stability"]);
-    // Patches that are found later are judged then.
+    // Patches found by the solver are checked after they are found.
     let y: Vec<f64> = (-20..=20).map(f64::from).collect();
     let gap: Vec<f64> = y.iter().map(|y| y * y / 600.0).collect();
     case["contact"] =

@@ -1,4 +1,4 @@
-//! Friction that depends on what a point has met in the contact: a coefficient that falls with temperature, and a layer that yields.
+//! Tests of path-dependent friction: a coefficient that falls with temperature, and a layer that yields.
 
 use railhead_contact::solution::words::answer::{Fields, Solution, Zone};
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ fn steel() -> Value {
     json!({ "conductivity_w_per_mk": 50, "density_kg_per_m3": 7850, "specific_heat_j_per_kgk": 450, "bulk_c": 20 })
 }
 
-/// A contact in partial slip or beyond, by its dimensionless creepages, with friction by temperature.
+/// Returns a contact with these dimensionless creepages and friction by temperature.
 fn heated(creepages: [f64; 3], speed: f64, friction: Value) -> Value {
     let [x, y, spin] = creepages;
     let mut case = Ellipse::steel(1.5, 0.28)
@@ -56,14 +56,14 @@ fn a_coefficient_that_does_not_fall_and_a_contact_that_stays_cold_have_its_force
     let even = json!({ "temperature_c": [0, 500], "coefficient": [0.3, 0.3] });
     let even = forces(&solve(&heated(motion, SPEED, even)));
     assert!(apart(even, constant(0.3)) < 1e-6);
-    // Rolling slowly heats nothing: the coefficient is that of 20 °C, 0.2 of it.
+    // Slow rolling generates no heat: the coefficient is that of 20 °C, 0.2.
     let cold = json!({ "temperature_c": [0, 40], "coefficient": [0.3, 0.1] });
     let cold = forces(&solve(&heated(motion, 1e-9, cold)));
     assert!(apart(cold, constant(0.2)) < 1e-5, "{cold:?}");
 }
 
-/// Everything slips by the same creepage, so that every line along x is heated by itself: its coefficients are integrated here, step by
-/// step from the leading edge, with cells of their own.
+/// All cells slip by the same creepage, so that every line along x heats up independently. The test integrates its coefficients step by step from
+/// the leading edge, with its own cells.
 #[test]
 fn in_full_slip_the_force_is_that_of_the_heat_of_every_line() {
     let ellipse = Ellipse::steel(1.5, 0.28);
@@ -94,7 +94,7 @@ fn in_full_slip_the_force_is_that_of_the_heat_of_every_line() {
                 .iter()
                 .map(|(l, r, q)| 2.0 * q * ((r - x).sqrt() - (l - x).sqrt()))
                 .sum();
-            // μ = 0.3 − 0.2 (T − 20)/380 with T of the heat ahead and of the own half cell, which is linear in μ.
+            // μ = 0.3 − 0.2 (T − 20)/380, with T due to the heat ahead and to the cell's own half, which is linear in μ.
             let own = rise * 2.0 * pressure * (right - x).sqrt();
             let fall = 0.2 / 380.0;
             let mu = (0.3 - fall * rise * ahead) / (1.0 + fall * own);
@@ -110,7 +110,7 @@ fn in_full_slip_the_force_is_that_of_the_heat_of_every_line() {
     assert!((found - known).abs() < 0.003, "{found} {known}");
 }
 
-/// Where cells slip, the traction is the coefficient of the temperature of the answer times the pressure.
+/// Tests that the traction of slipping cells is the pressure times the coefficient at the temperature of the answer.
 #[test]
 fn tractions_have_the_coefficient_of_their_own_temperature() {
     let mut case = heated(
@@ -150,7 +150,7 @@ fn tractions_have_the_coefficient_of_their_own_temperature() {
         tx.len()
     );
     assert!(slipping > 50 && slipping < tx.len() && least < 0.295);
-    // The slips of the bounds are those of the three-point rule, temperatures come from the power of the tractions.
+    // The slips of the bounds are those of the three-point rule, and temperatures follow from the power of the tractions.
     assert!(worst < 0.01, "{worst}");
     let hottest = solution.patches[0].points[0]
         .temperature
@@ -176,7 +176,7 @@ fn a_layer_that_is_strong_enough_is_elastic_and_a_weaker_one_takes_less() {
         weak[0] < weak[1] && weak[1] < weak[2] && weak[2] <= base + 1e-9,
         "{weak:?} {base}"
     );
-    // Hardly any strength: the whole patch of 25 π mm² carries the yield stress, but for an edge where friction holds less.
+    // With very little strength, the whole patch of 25 π mm² carries the yield stress, except for an edge where the friction bound is lower.
     let slow = force(yields(5.0, 0.0));
     let whole = 5.0 * std::f64::consts::PI * 25.0 / LIMIT;
     assert!((slow / whole - 1.0).abs() < 0.02, "{slow} {whole}");

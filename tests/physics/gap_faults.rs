@@ -1,4 +1,4 @@
-//! A gap without a contact to show is refused, or fails with its reason.
+//! Tests that a gap without a valid contact is refused, or fails with a reason.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -164,7 +164,7 @@ fn an_approach_counts_from_gap_zero_and_has_to_reach_the_least_gap() {
 
 #[test]
 fn a_contact_that_reaches_the_edge_of_the_data_is_an_error_that_says_where() {
-    // Hertz's ellipse is 5.4 mm wide to either side.
+    // The half width of Hertz's ellipse is 5.4 mm.
     let short = |low: f64, high: f64| {
         let y = spread(low, high, 31);
         let contact = profile(460.0, &y, |y| y * y / 600.0);

@@ -1,4 +1,4 @@
-//! Hertz's contact given as a gap is Hertz's contact again.
+//! Tests that Hertz's contact given as a gap has Hertz's solution.
 
 use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead_contact::solution::words::answer::Solution;
@@ -9,7 +9,7 @@ use crate::reference::{assert_none, solve};
 
 const CONTACT_MODULUS: f64 = 82_000.0 / 0.72;
 
-/// Radii along and across in mm, with the force in N.
+/// Longitudinal and lateral radii in mm, and the force in N.
 const CONTACTS: [(f64, f64, f64); 8] = [
     (460.0, 300.0, 100_000.0),
     (300.0, 300.0, 20_000.0),
@@ -36,7 +36,7 @@ fn by_grid(rolling: f64, lateral: f64, ellipse: &Ellipse, points: usize) -> Valu
     grid(&x, &y, |x, y| 0.5 * x * x / rolling + 0.5 * y * y / lateral)
 }
 
-/// Largest relative differences of approach, semi-axes, largest pressure and force from Hertz's.
+/// Returns the relative differences of approach, semi-axes, largest pressure and force from Hertz's.
 fn differences(solution: &Solution, ellipse: &Ellipse, force: f64) -> [f64; 5] {
     assert_eq!(solution.patches.len(), 1);
     let patch = &solution.patches[0];
@@ -171,7 +171,7 @@ fn a_symmetric_gap_keeps_its_symmetry_to_the_last_digit() {
         assert_eq!([low[2], low[3]], [-high[3], -high[2]]);
         let cells = first.x_mm.len();
         assert_eq!(cells, last.x_mm.len());
-        // Strips run from smaller to larger y, so the mirrored strip counts from the end.
+        // Strips run from smaller to larger y, so that the mirrored strip is counted from the end.
         let per_strip = first.strip.iter().filter(|strip| **strip == 0).count();
         for k in 0..cells {
             let image = cells - per_strip * (k / per_strip + 1) + k % per_strip;
@@ -179,7 +179,7 @@ fn a_symmetric_gap_keeps_its_symmetry_to_the_last_digit() {
             assert!((first.x_mm[k] - last.x_mm[image]).abs() < 1e-12);
             assert!((p[k] - q[image]).abs() < 1e-9 * solution.patches[0].pressure_max_mpa);
         }
-        // F_x of pure spin vanishes on a contact that is its own mirror image.
+        // F_x of pure spin vanishes on a mirror-symmetric contact.
         assert!(
             solution.total[0].force_x_n.abs() < 1e-6 * 24_000.0,
             "{:?}",

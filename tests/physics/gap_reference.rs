@@ -1,4 +1,4 @@
-//! Measured and analytic gaps against converged results of an independent program.
+//! Tests of measured and analytic gaps against converged results of an independent program.
 
 use std::f64::consts::PI;
 
@@ -7,13 +7,13 @@ use serde_json::Value;
 use crate::gap_samples::GapReference;
 use crate::reference::{Converged, assert_none, solve};
 
-/// What is allowed beside the uncertainty of the reference: relative, the resultants to μN and μN√(A/π).
+/// Allowed errors beyond the uncertainty of the reference. They are relative, those of the resultants to μN and μN√(A/π).
 const APPROACH: f64 = 0.003;
 const AREA: f64 = 0.02;
 const PRESSURE_MAX: f64 = 0.02;
 const RESULTANT: f64 = 0.01;
 
-/// Every quantity of the answer to a question that is off by more than is allowed.
+/// Returns a message for every quantity of the answer that is off by more than is allowed.
 fn failures(case: &GapReference, question: &Value) -> Vec<String> {
     let (solution, _) = solve(question);
     let area: f64 = solution.patches.iter().map(|patch| patch.area_mm2).sum();
@@ -48,7 +48,7 @@ fn failures(case: &GapReference, question: &Value) -> Vec<String> {
     );
     let bound = 0.3 * case.normal_force_n;
     let length = (case.area_mm2.value / PI).sqrt();
-    // Where the tangential mesh says itself that it is too coarse, its estimate is what is allowed.
+    // Where the tangential mesh reports that it is too coarse, the allowed error is its estimate.
     let point = &solution.patches[0].points[0];
     let estimate = solution.total[0]
         .error_estimate

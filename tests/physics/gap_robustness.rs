@@ -1,4 +1,4 @@
-//! Whatever the gap: a contact that satisfies the contact conditions, or a reason.
+//! Tests that every gap gives a contact that satisfies the contact conditions, or a reason.
 
 #![allow(
     clippy::needless_range_loop,
@@ -29,7 +29,7 @@ const NU: f64 = 0.28;
 /// Roughness of a measured profile in mm.
 const ROUGHNESS: f64 = 0.005;
 
-/// A gap with what the test needs to know about it.
+/// A gap with the data that the test needs.
 struct Sample {
     name: String,
     contact: Value,
@@ -37,7 +37,7 @@ struct Sample {
     rough: bool,
 }
 
-/// Arcs of random radii that join smoothly, the contact somewhere on them.
+/// Returns arcs of random radii that join smoothly, with the contact somewhere on them.
 fn arcs(random: &mut Random) -> Across {
     let count = 2 + (random.part() * 4.0) as usize;
     let mut from = -random.between(5.0, 20.0);
@@ -96,7 +96,7 @@ fn samples(count: usize) -> Vec<Sample> {
             let contact = if k % 8 < 5 {
                 profile(rolling, &y, |y| across.at(y) + noise(ROUGHNESS))
             } else {
-                // Turned in the plane, so that neither axis is special.
+                // The gap is rotated in the plane, so that neither axis is special.
                 let angle = 0.05 * (k % 17) as f64;
                 let (sin, cos) = angle.sin_cos();
                 grid(&spread(-25.0, 25.0, 61), &y[..], |x, y| {
@@ -114,7 +114,7 @@ fn samples(count: usize) -> Vec<Sample> {
         .collect()
 }
 
-/// The gap as the solver sees it: a smooth surface through the samples.
+/// Returns the smooth surface through the samples, as the solver sees it.
 fn surface(contact: &Value) -> GapSurface {
     let list = |name: &str| -> Vec<f64> {
         serde_json::from_value(contact[name].clone()).expect("numbers")
@@ -127,8 +127,8 @@ fn surface(contact: &Value) -> GapSurface {
     GapSurface::grid(&list("x_mm"), &list("y_mm"), &rows)
 }
 
-/// Largest distance of the deformed surfaces over the inner cells of the tangential mesh, relative to the depth to which
-/// they were pressed together: an independent look at region, pressure, approach and mesh at once.
+/// Returns the largest distance of the deformed surfaces over the inner cells of the tangential mesh, relative to the interpenetration. This is an
+/// independent check of region, pressure, approach and mesh.
 fn distance_inside(sample: &Sample, solution: &Solution, fields: &Fields) -> f64 {
     let mut cells = Vec::new();
     for (solution, fields) in solution.patches.iter().zip(&fields.patches) {
@@ -170,9 +170,9 @@ fn distance_inside(sample: &Sample, solution: &Solution, fields: &Fields) -> f64
     largest / (approach - least)
 }
 
-/// How a random gap ended.
+/// The outcome of a random gap.
 enum Outcome {
-    /// A contact, with the distance of [`distance_inside`].
+    /// A contact, with the result of [`distance_inside`].
     Solved(Box<Solution>, f64),
     Refused(String),
 }
@@ -206,7 +206,7 @@ fn random_gaps_end_in_a_sound_contact_or_a_reason() {
             Err(failure) => failures.push(failure),
             Ok(Outcome::Refused(reason)) => {
                 refused += 1;
-                // Loads up to 30 MN press some contacts beyond the data; nothing else is wrong with these gaps.
+                // Loads up to 30 MN extend some contacts beyond the data. No other refusal is allowed.
                 if !reason.contains("cut off") {
                     failures.push(format!("{}: {reason}", sample.name));
                 }
@@ -228,7 +228,7 @@ fn random_gaps_end_in_a_sound_contact_or_a_reason() {
     }
     assert_none("unsound", &failures);
     assert!(refused <= 16, "{refused} refused");
-    // The tangential mesh of 12 strips makes most of these distances.
+    // The tangential mesh of 12 strips causes most of these distances.
     distances.sort_by(|a, b| a.0.total_cmp(&b.0));
     let at = |share: f64| &distances[((distances.len() - 1) as f64 * share) as usize];
     for (share, allowed) in [(0.5, 0.008), (0.95, 0.02), (1.0, 0.06)] {
@@ -255,7 +255,7 @@ fn a_solve_of_a_rough_gap_can_be_stopped() {
     assert!(late.0.get() < 20, "{} looks at the clock", late.0.get());
 }
 
-/// A clock that passes the limit of a second after ten looks.
+/// A clock that passes the limit of a second after ten readings.
 struct Late(std::cell::Cell<u32>);
 
 impl Monitor for Late {
@@ -269,7 +269,7 @@ impl Monitor for Late {
     }
 }
 
-/// The case of a gap across the rail under a load in N, resultants only.
+/// Returns the case of a lateral gap under a load in N, with resultants only.
 fn across_gap(y: &[f64], gap: &[f64], force: f64) -> Value {
     json!({
         "contact": { "type": "gap_profile", "rolling_mm": 460.0, "y_mm": y, "gap_mm": gap },
@@ -282,7 +282,7 @@ fn across_gap(y: &[f64], gap: &[f64], force: f64) -> Value {
     })
 }
 
-/// Places from −12 to 12 mm.
+/// Returns places from −12 to 12 mm.
 fn places(count: usize) -> Vec<f64> {
     (0..count)
         .map(|i| -12.0 + 24.0 * i as f64 / (count - 1) as f64)
@@ -296,7 +296,7 @@ fn answer(case: &Value) -> Solution {
 
 #[test]
 fn patches_that_end_with_few_cells_say_so_with_their_numbers() {
-    // Eleven crests that share a load.
+    // Eleven crests share the load.
     let y = places(81);
     let teeth = |y: &f64| 0.038_6 * (std::f64::consts::PI * y / 0.6).sin().abs();
     let gap: Vec<f64> = y.iter().map(|y| y * y / 2_000.0 + teeth(y)).collect();
@@ -333,7 +333,7 @@ fn a_contact_whose_pressure_still_changes_is_called_rough() {
     let found = answer(&across_gap(&y, &gap, 17_000.0));
     let codes: Vec<&str> = found.remarks.iter().map(|r| r.code.as_str()).collect();
     assert!(codes.contains(&"gap-rough"), "{codes:?}");
-    // Where the surface is smooth there is nothing to say.
+    // A smooth surface has no remarks.
     let smooth: Vec<f64> = y.iter().map(|y| y * y / 600.0).collect();
     let found = answer(&across_gap(&y, &smooth, 17_000.0));
     assert!(found.remarks.is_empty(), "{:?}", found.remarks);

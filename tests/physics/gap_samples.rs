@@ -1,4 +1,4 @@
-//! Gaps for the tests: crowns of arcs, powers, bumps, and the reference cases made of them.
+//! Gaps for the tests: crowns of arcs, powers and bumps, and the reference cases made of them.
 
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -9,11 +9,11 @@ use crate::reference::{Converged, read};
 #[derive(Debug, Clone, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Across {
-    /// `[from, to, radius]` of arcs (curvature 1/radius; the outer ones continue); gap and slope are 0 at y = 0.
+    /// `[from, to, radius]` of arcs (curvature 1/radius; the outer arcs extend to infinity). Gap and slope are 0 at y = 0.
     Arcs(Vec<[f64; 3]>),
     /// Coefficients of y² and y⁴.
     Powers([f64; 2]),
-    /// The least of `(y − y0)²/d + offset`, each as `[y0, d, offset]`.
+    /// The minimum of `(y − y0)²/d + offset`, each given as `[y0, d, offset]`.
     Parabolas(Vec<[f64; 3]>),
 }
 
@@ -46,7 +46,7 @@ impl Across {
     }
 }
 
-/// `count` values from `low` to `high`, exact mirror images if the ends are.
+/// Returns `count` values from `low` to `high`, which are exact mirror images if the ends are.
 pub fn spread(low: f64, high: f64, count: usize) -> Vec<f64> {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     (0..count)
@@ -54,7 +54,7 @@ pub fn spread(low: f64, high: f64, count: usize) -> Vec<f64> {
         .collect()
 }
 
-/// A steel case of a gap with μ = 0.3.
+/// Returns a steel case of a gap with μ = 0.3.
 pub fn steel(contact: Value, load: Value, motion: [f64; 3]) -> Value {
     json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
@@ -65,13 +65,13 @@ pub fn steel(contact: Value, load: Value, motion: [f64; 3]) -> Value {
     })
 }
 
-/// A profile sampled on `y`.
+/// Returns a profile sampled on `y`.
 pub fn profile(rolling: f64, y: &[f64], mut across: impl FnMut(f64) -> f64) -> Value {
     let gap: Vec<f64> = y.iter().map(|y| across(*y)).collect();
     json!({ "type": "gap_profile", "rolling_mm": rolling, "y_mm": y, "gap_mm": gap })
 }
 
-/// A gap sampled on `x` and `y`.
+/// Returns a gap sampled on `x` and `y`.
 pub fn grid(x: &[f64], y: &[f64], mut gap: impl FnMut(f64, f64) -> f64) -> Value {
     let rows: Vec<Vec<f64>> = y
         .iter()
@@ -80,7 +80,7 @@ pub fn grid(x: &[f64], y: &[f64], mut gap: impl FnMut(f64, f64) -> f64) -> Value
     json!({ "type": "gap_grid", "x_mm": x, "y_mm": y, "gap_mm": rows })
 }
 
-/// A contact of a gap solved elsewhere; fields and signs as in `tests/data/README.md`.
+/// A reference contact of a gap, with fields and signs as in `tests/data/README.md`.
 #[derive(Debug, Clone, Deserialize)]
 pub struct GapReference {
     pub id: String,
@@ -115,7 +115,7 @@ impl GapReference {
         [self.creepage_x, self.creepage_y, self.spin_per_mm]
     }
 
-    /// The gap as a client would give it: profiles with a sample every 0.1 mm or so, grids as they are.
+    /// Returns the gap as a client would give it: profiles with a sample about every 0.1 mm, grids unchanged.
     pub fn contact(&self) -> Value {
         if let (Some(x), Some(y), Some(gap)) = (&self.x_mm, &self.y_mm, &self.gap_mm) {
             return json!({ "type": "gap_grid", "x_mm": x, "y_mm": y, "gap_mm": gap });
@@ -130,7 +130,7 @@ impl GapReference {
         profile(self.rolling_mm.expect("a radius"), &y, |y| across.at(y))
     }
 
-    /// The case under its load, solved as if nothing else was asked for.
+    /// Returns the case under its load, solved with default settings.
     pub fn case(&self) -> Value {
         let load = json!({ "normal_force_n": self.normal_force_n });
         steel(self.contact(), load, self.motion())

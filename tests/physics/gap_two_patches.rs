@@ -1,4 +1,4 @@
-//! Two patches of different size in one gap: both are resolved, whatever their sizes, or the answer says that one is not.
+//! Tests two patches of different size in one gap: both are resolved, or the answer says that one is not.
 
 use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead_contact::remark::entry::RemarkEntry;
@@ -13,14 +13,14 @@ const MODULUS: f64 = 82000.0 / 0.72;
 const ROLLING: f64 = 460.0;
 const APART: f64 = 16.0;
 
-/// Hertz's contact that also feels what its neighbour displaces at its place.
+/// Two Hertz contacts, each with the displacement due to the other at its place.
 struct Neighbours {
     ellipses: [Ellipse; 2],
 }
 
 impl Neighbours {
-    /// Paraboloids of two lateral radii under a force together: loads such that both have the same approach, counting what each
-    /// displaces at the middle of the other, and curvatures less what that displacement bends.
+    /// Returns paraboloids of two lateral radii under a total force. The loads give both the same approach, including the displacement due to the
+    /// other patch at the centre. The curvatures are reduced by those of that displacement.
     fn new(radii: [f64; 2], force: f64) -> Neighbours {
         let mut curvatures = radii.map(|radius| [1.0 / ROLLING, 1.0 / radius]);
         let mut first = 0.9 * force;
@@ -58,7 +58,7 @@ fn hertz(curvatures: [[f64; 2]; 2], forces: [f64; 2]) -> [Ellipse; 2] {
     })
 }
 
-/// Displacement at the middle of the other patch, and its second derivatives along and across, by quadrature.
+/// Returns the displacement at the centre of the other patch and its second derivatives along and across, by quadrature.
 fn bend(ellipse: &Ellipse) -> [f64; 3] {
     const COUNT: usize = 40;
     let mut sums = [0.0; 3];
@@ -112,7 +112,7 @@ fn a_small_patch_beside_a_large_one_is_hertzs_contact_with_its_neighbours_deflec
         }
         let grids = solution.normal.expect("a report").grids;
         assert_eq!(grids, if radius < 10.0 { 2 } else { 1 }, "{radius}");
-        // A steel body of 1 mm would yield.
+        // Pressure remarks are expected: a steel body of 1 mm radius would yield.
         let pressures = ["pressure-implausible", "pressure-above-shakedown"];
         let other = |remark: &&RemarkEntry| !pressures.contains(&remark.code.as_str());
         let others: Vec<_> = solution.remarks.iter().filter(other).collect();

@@ -1,8 +1,8 @@
-//! Does the solver still give the answers that belong to its revision? Stored results are served to equal cases of the same revision, so
-//! that numbers that change without a new revision would leave stale answers in the cache of every service.
+//! Tests that the solver gives the answers that belong to its revision. Stored results are served to equal cases of the same revision, so that a
+//! change of numbers without a new revision would leave stale answers in the cache of every service.
 //!
-//! When numbers were meant to change: raise `SOLVER_REVISION` in `src/contact/case/digest.rs`, then
-//! `RAILHEAD_GOLDEN=write cargo test --test physics golden`.
+//! After an intended change of numbers, raise `SOLVER_REVISION` in `src/contact/case/digest.rs`, then run `RAILHEAD_GOLDEN=write cargo test --test
+//! physics golden`.
 
 use std::path::PathBuf;
 
@@ -13,21 +13,21 @@ use serde_json::{Value, json};
 
 use crate::reference::solve;
 
-/// Largest change of a given contact, relative to the largest number of its kind. Other processors sum in another order, which matrices in
-/// single precision turn into changes of up to 4e-6. Changes of method, mesh or tolerance are larger.
+/// Largest allowed change for a given contact, relative to the largest number of its kind. Other processors sum in another order, which changes
+/// matrices in single precision by up to 4e-6. Changes of method, mesh or tolerance are larger.
 const SAME: f64 = 1e-4;
-/// Largest change of a wheel on a rail, whose height is found by decisions that the last bits can turn. Kernels without SIMD move its numbers
-/// by 1.6e-3. The recorder finds smaller changes.
+/// Largest allowed change for a wheel on a rail, whose vertical position is found by decisions that the last bits can change. Kernels without SIMD
+/// change its numbers by 1.6e-3. The recorder finds smaller changes.
 const SAME_OF_WHEELS: f64 = 0.01;
 
-/// What is said of a case that is new.
+/// Message for a new case.
 const NOT_RECORDED: &str = ": not recorded";
 
 /// The answers that belong to a revision.
 #[derive(Debug, Serialize, Deserialize)]
 struct Golden {
     revision: u32,
-    /// Numbers of every case, with eight digits.
+    /// Numbers of every case, rounded to eight digits.
     answers: Vec<(String, Vec<f64>)>,
 }
 
@@ -77,7 +77,7 @@ fn pressures() -> Value {
     json!({ "type": "pressure_grid", "x_mm": axis, "y_mm": axis, "pressure_mpa": rows })
 }
 
-/// Shipped examples.
+/// The shipped examples that are recorded.
 const EXAMPLES: [&str; 5] = [
     "wheel-rail",
     "wheel-rail-flange",
@@ -86,7 +86,7 @@ const EXAMPLES: [&str; 5] = [
     "unlike-bodies",
 ];
 
-/// Every contact type, method and kind of friction, with creepage, spin, forces and sweeps, and the outputs for maintenance.
+/// Returns cases of every contact type, method and kind of friction, with creepage, spin, forces and sweeps, and with the outputs for maintenance.
 pub fn cases() -> Vec<(String, Value)> {
     let mut cases = made();
     cases.extend(frictions());
@@ -103,13 +103,13 @@ pub fn cases() -> Vec<(String, Value)> {
     cases.into_iter().map(owned).collect()
 }
 
-/// A solver with its method.
+/// Returns the solver settings with this method.
 fn with(method: &str, mut solver: Value) -> Value {
     solver["method"] = json!(method);
     solver
 }
 
-/// The cases that are no shipped examples.
+/// Returns the cases that are not shipped examples.
 fn made() -> Vec<(&'static str, Value)> {
     let radii = || json!({ "type": "radii", "rolling_mm": 460, "lateral_mm": 300 });
     let ellipse = |a: f64, b: f64| json!({ "type": "ellipse", "a_mm": a, "b_mm": b });
@@ -179,7 +179,7 @@ fn made() -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// The table, and friction beyond one coefficient.
+/// Returns cases with the creep table, and with friction other than one coefficient.
 fn frictions() -> Vec<(&'static str, Value)> {
     let motion = || json!({ "creepage_x": 0.002, "creepage_y": -0.0005, "spin_per_mm": 0.0004, "speed_mm_per_s": 20_000 });
     let term = json!([{ "coefficient": 0.2, "half_speed_mm_per_s": 400 }]);
@@ -204,15 +204,15 @@ fn frictions() -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// Eight digits of a number.
+/// Returns the number rounded to eight digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.7e}").parse().expect("a number")
 }
 
-/// What identifies an answer: forces, patches, zones; relative to μN or to themselves, so that they are of one size.
+/// Returns the numbers that identify an answer: forces, patches, stresses and temperatures. They are scaled to similar sizes.
 fn numbers(case: &Value) -> Vec<f64> {
     let (solution, _) = solve(case);
-    // Where there is no one coefficient any number of that size does.
+    // Without a single coefficient, any number of similar size serves.
     let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.3);
     let mut numbers = Vec::new();
     for patch in &solution.patches {
@@ -244,7 +244,7 @@ fn numbers(case: &Value) -> Vec<f64> {
     numbers.into_iter().map(rounded).collect()
 }
 
-/// The cases whose numbers are not the recorded ones.
+/// Returns a message for each case whose numbers differ from the recorded ones.
 fn changed(golden: &Golden, answers: &[(String, Vec<f64>)]) -> Vec<String> {
     let mut changed = Vec::new();
     for (name, now) in answers {
@@ -267,7 +267,7 @@ fn changed(golden: &Golden, answers: &[(String, Vec<f64>)]) -> Vec<String> {
     changed
 }
 
-/// The numbers of all cases.
+/// Returns the numbers of all cases.
 fn answers() -> Vec<(String, Vec<f64>)> {
     let answer = |(name, case): (String, Value)| (name, numbers(&case));
     cases().into_iter().map(answer).collect()
@@ -295,7 +295,7 @@ fn golden_answers_belong_to_the_revision_of_the_solver_at_every_simd_level() {
     }
 }
 
-/// Writes the present answers. Answers that changed need a higher revision.
+/// Writes the present answers. Changed answers need a higher revision.
 fn write(before: Option<&Golden>) {
     let answers = answers();
     let recorded = before.map_or(0, |golden| golden.revision);

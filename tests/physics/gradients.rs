@@ -1,4 +1,5 @@
-//! Derivatives of forces and moment: Kalker's coefficients at rest, and secants of finer answers, each within the stated error.
+//! Tests of the derivatives of forces and moment, each within its stated error: against Kalker's coefficients at rest, and against secants of finer
+//! answers.
 
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
@@ -8,14 +9,14 @@ use serde_json::{Value, json};
 use crate::cases::{assert_fault, good_with};
 use crate::reference::{Ellipse, assert_none, solve};
 
-/// Targets of the answers, and of those that secants are taken from.
+/// Targets of the answers. `FINE` is the target of the answers that give the secants.
 const TARGETS: [f64; 2] = [0.02, 0.005];
 const FINE: f64 = 0.0005;
-/// Half of a secant as a part of μN/(G c²).
+/// Half the width of a secant, as a fraction of μN/(G c²).
 const HALF: f64 = 0.02;
-/// What a secant may be off by, relative to G c².
+/// Allowed error of a secant relative to G c².
 const SECANT: f64 = 0.03;
-/// States as `[a/b, ν, ξ, η, φ]`, creepages relative to those of full slip by the linear theory.
+/// States as `[a/b, ν, ξ, η, φ]`, with creepages relative to those of full slip by the linear theory.
 const STATES: [[f64; 5]; 8] = [
     [1.0, 0.28, 0.3, 0.0, 0.0],
     [1.0, 0.28, 0.9, -0.4, 0.0],
@@ -57,7 +58,7 @@ fn errors(gradients: &Gradients) -> [[f64; 3]; 3] {
     [errors.force_x_n, errors.force_y_n, errors.moment_z_n_mm]
 }
 
-/// Units of the gradients: G c² for forces by creepages, a length more for the moment and for the spin.
+/// Returns the units of the gradients: G c² for forces by creepages, with one more factor c for the moment and for the spin.
 fn units(contact: &Ellipse) -> [[f64; 3]; 3] {
     let c = contact.c();
     let force = contact.shear_modulus_mpa * c * c;
@@ -81,7 +82,7 @@ fn gradients_at_rest_are_kalkers_coefficients_within_their_errors() {
             let expected = [[c11, 0.0, 0.0], [0.0, c22, c23], [0.0, -c23, c33]];
             for (k, j) in (0..9).map(|n| (n / 3, n % 3)) {
                 let off = (rows[k][j] / unit[k][j] - expected[k][j]).abs();
-                // The coefficients are known to 0.5 %.
+                // Kalker's coefficients are known to 0.5 %.
                 let allowed = errors[k][j] / unit[k][j] + 0.005 * expected[k][j].abs() + 1e-3;
                 if off > allowed || errors[k][j] > unit[k][j] {
                     failures.push(format!(
@@ -213,7 +214,7 @@ fn a_history_has_no_gradients() {
 
 #[test]
 fn forces_are_answered_where_a_solve_for_the_gradients_does_not_converge() {
-    // Newton's method of the paper diverges on one of the motions nearby.
+    // The paper's Newton method diverges on one of the neighbouring motions.
     let case = json!({
         "material": { "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 },
         "friction": { "coefficient": 0.3 },

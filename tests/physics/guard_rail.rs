@@ -1,4 +1,4 @@
-//! Contact of the back of a flange with a guard rail that is part of the rail's section.
+//! Tests the contact of the back of a flange with a guard rail that is part of the rail's section.
 
 use railhead_contact::case::check::check_section;
 use railhead_contact::case::solver::Limits;
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::cases::assert_fault;
 
-/// Radius in mm of the arc of tip and back of the flange, and the depth of its centre below the tread.
+/// Radius in mm of the arc at tip and back of the flange. `CENTRE` is the depth of its centre below the tread.
 const TIP: f64 = 20.5;
 const CENTRE: f64 = 9.519;
 /// y of the face of the guard rail in mm.
@@ -23,7 +23,7 @@ fn solve(case: &Value) -> Solution {
     solution
 }
 
-/// S1002 on 60E1 beside a guard rail with a straight face. The back of the flange is an arc as round as its tip.
+/// Returns S1002 on 60E1 beside a guard rail with a straight face. The back of the flange has the same radius as its tip.
 fn beside_guard_rail(shift: f64) -> Value {
     let text = include_str!("../../api/examples/guard-rail.case.json");
     let mut case: Value = serde_json::from_str(text).unwrap();
@@ -38,7 +38,7 @@ fn guard_rail() -> Vec<Value> {
     points.as_array().unwrap().clone()
 }
 
-/// The gap between the back of the flange and the face of the guard rail, a torus and a plane that is inclined to its axis by the cant.
+/// Returns the gap between the back of the flange and the face of the guard rail: a torus and a plane that is inclined to its axis by the cant.
 fn torus_on_plane() -> Value {
     let ring = ROLLING_RADIUS + CENTRE;
     let (sin, cos) = CANT.sin_cos();
@@ -75,7 +75,7 @@ fn the_face_of_a_guard_rail_takes_the_back_of_a_flange_and_the_tread_carries_the
         assert!(tread.position.as_ref().unwrap().rail_mm[0].abs() < 10.0);
         assert!(guard.normal_force_n > 1.5 * before, "{shift}");
         before = guard.normal_force_n;
-        // Compare with the gap of the two surfaces, solved alone under the force on the guard rail.
+        // Compares with the gap of the two surfaces, solved alone under the force on the guard rail.
         let mut alone = case.clone();
         alone["contact"] = torus_on_plane();
         alone["load"] = json!({ "normal_force_n": guard.normal_force_n });
@@ -110,7 +110,7 @@ fn a_guard_rail_is_part_of_the_section_and_moves_nothing_else() {
         given[0].len() + given[1].len()
     );
     assert!(report.quality.hole_mm < 15.0, "{}", report.quality.hole_mm);
-    // One list with points of the groove, placed by the origin, gives the same loads.
+    // A single list that includes points of the groove, placed by the origin, gives the same loads.
     let mut one = beside_guard_rail(3.8);
     one["contact"]["rail_origin_mm"] = json!(753.5);
     let mut two = one.clone();

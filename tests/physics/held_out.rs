@@ -1,5 +1,5 @@
-//! The error estimate on contacts that no constant was fitted to: the second half of the random populations of
-//! `benches/calibrate` and all its wheels on rails, against meshes much finer.
+//! Tests the error estimate on contacts to which no constant was fitted: the second half of the random populations of `benches/calibrate` and all
+//! its wheels on rails, against much finer meshes.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -11,13 +11,13 @@ use crate::population::{Class, case, on_planes};
 use crate::reference::median;
 use crate::truth::{self, Judged};
 
-/// At targets below this one, which take most of the time, one of three cases is solved, but all gaps and wheels on the curve of the rail.
+/// Targets below this one take most of the time. For them, one case in three is solved, but all gaps and all wheels on the curve of the rail.
 const FINE: f64 = 0.002;
 
-/// Fewer errors that are clear of the uncertainty of the truth have no median to speak of.
+/// Minimum number of errors above the uncertainty of the truth for a meaningful median.
 const CLEAR_MIN: usize = 8;
 
-/// What was found for one class and one target.
+/// Results for one class and one target.
 #[derive(Default)]
 struct Tally {
     ratios: Vec<f64>,
@@ -84,12 +84,13 @@ fn tally(method: &str, class: Class, target: f64) -> Tally {
     tally
 }
 
-/// Covered in so many of a hundred, more than 2 times too small in at most `far`, and in the median at most `sharp` times the error.
+/// Requires that at least `covered` % of the estimates cover the error, that at most `far` are more than 2 times too small, and that the median of
+/// estimate over error is at most `sharp`.
 fn assert_covers(class: Class, covered: usize, far: usize, sharp: f64) {
     assert_covers_by("boundary_element", class, covered, far, sharp);
 }
 
-/// The same of a method.
+/// Applies the same requirements to a method.
 fn assert_covers_by(method: &str, class: Class, covered: usize, far: usize, sharp: f64) {
     for target in [0.02, 0.005, 0.001] {
         let found = tally(method, class, target);
@@ -129,7 +130,7 @@ fn estimates_cover_the_error_of_random_ellipses() {
 
 #[test]
 fn estimates_of_auto_cover_the_error_of_random_ellipses() {
-    // Those of the table are wider.
+    // Estimates of the table are wider.
     assert_covers_by("auto", Class::Ellipse, 95, 1, 12.0);
 }
 
@@ -150,7 +151,7 @@ fn estimates_cover_the_error_of_random_gaps() {
 
 #[test]
 fn estimates_cover_the_error_of_wheels_on_planes_of_contact() {
-    // One of 99.
+    // One of 99 estimates is too small.
     assert_covers(Class::Profiles, 95, 2, 4.0);
 }
 
@@ -159,7 +160,7 @@ fn estimates_cover_the_error_of_wheels_on_the_curve_of_the_rail() {
     assert_covers(Class::Curve, 95, 1, 4.0);
 }
 
-/// An estimate speaks of the moment as well as of the forces, and of each patch.
+/// Tests that the estimate of each patch covers the error of the moment as well as of the forces.
 #[test]
 fn the_moment_of_each_patch_of_a_wheel_on_a_rail_is_judged() {
     let truths = truth::read();
@@ -187,7 +188,7 @@ fn the_moment_of_each_patch_of_a_wheel_on_a_rail_is_judged() {
 
 #[test]
 fn estimates_on_few_given_cells_cover_the_error() {
-    // The floor of the estimate was read off another ellipse, without spin.
+    // The floor of the estimate was determined on another ellipse, without spin.
     let (mut covered, mut all) = (0, 0);
     for [a, b] in [[5.0, 8.0], [4.0, 4.0], [8.0, 3.0]] {
         let contact = json!({ "type": "ellipse", "a_mm": a, "b_mm": b });

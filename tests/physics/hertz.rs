@@ -1,11 +1,11 @@
-//! Hertz's contact: worked cases of the literature and the laws of scaling.
+//! Tests of Hertz's contact: worked cases of the literature and the scaling laws.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::check;
 use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
 use serde_json::json;
 
-/// One worked case: bodies, load, and what comes out.
+/// A worked case: bodies, load and expected results.
 struct Worked {
     contact_modulus: f64,
     radii: [f64; 2],
@@ -19,9 +19,9 @@ fn modulus_from_young(young: f64, poisson: f64) -> f64 {
     young / (2.0 * (1.0 - poisson * poisson))
 }
 
-/// Digits are as many as the source prints; sources: (1) and (2) the parameters of CONTACT's examples `fastsim` and
-/// `cattaneo`, whose boundary-element answers are p0 = 1223 MPa, δ = 0.09266 mm and p0 = 4.393 MPa, δ = 0.01998 mm;
-/// (3) and (4) wheel on rail crown, and on a crown in a concave wheel; numbers computed with 20 digits after Johnson.
+/// Returns worked cases with as many digits as the source prints. Cases (1) and (2) have the parameters of CONTACT's examples `fastsim` and
+/// `cattaneo`, whose boundary-element answers are p0 = 1223 MPa, δ = 0.09266 mm and p0 = 4.393 MPa, δ = 0.01998 mm. Cases (3) and (4) are a wheel on
+/// a rail crown, and a crown in a concave wheel, computed with 20 digits after Johnson.
 fn worked_cases() -> [Worked; 4] {
     [
         Worked {
@@ -89,8 +89,8 @@ fn worked_cases_come_out() {
 
 #[test]
 fn the_ellipse_fits_the_gap_it_was_made_from() {
-    // Inside the contact the displacement is δ − h(x, y). Its value and curvatures at the centre come from a quadrature
-    // here, independently of the elliptic integrals.
+    // Inside the contact the displacement is δ − h(x, y). The test computes its value and curvatures at the centre by quadrature, independently of
+    // the elliptic integrals.
     for (rolling, lateral) in [(460.0, 300.0), (300.0, 300.0), (100.0, 3000.0)] {
         let modulus = 1.0e5;
         let ellipse = Ellipse::of_radii(rolling, lateral, NormalLoad::Force(1e5), modulus);

@@ -1,4 +1,4 @@
-//! Rolling that changes: references, closed forms and laws.
+//! Tests of transient rolling: references, closed forms and laws.
 
 use std::cell::RefCell;
 use std::ops::ControlFlow;
@@ -19,15 +19,15 @@ use serde_json::{Value, json};
 
 use crate::reference::{SolvedEllipse, assert_none, read, solve};
 
-/// A history solved elsewhere: distance, forces over the friction limit, moment over that and √(ab), creepage along x, and the
-/// uncertainties of the last four.
+/// A reference history. Each row has the distance, forces over the friction limit, the moment over the friction limit times √(ab), the creepage
+/// along x, and the uncertainties of the last four.
 #[derive(Debug, Deserialize)]
 struct Reference {
     #[serde(flatten)]
     contact: SolvedEllipse,
     motion: [f64; 3],
     force_x: Option<f64>,
-    /// Of the finest mesh alone.
+    /// Shift on the finest mesh, without extrapolation.
     shift_mm: Option<f64>,
     rows: Vec<[f64; 9]>,
 }
@@ -48,7 +48,7 @@ impl Reference {
         self.contact.case(&json!({ "history": history }))
     }
 
-    /// Errors of the forces and of the creepage over its peak beyond the uncertainty of the reference, and their estimates.
+    /// Returns the errors beyond the uncertainty of the reference, and their estimates: of the forces, and of the creepage over its peak.
     fn errors(&self, point: &PointSolution, row: &[f64; 9]) -> ([f64; 2], [f64; 2]) {
         let [x, y, moment] = self.contact.relative(point);
         let found = [x, y, moment, point.motion.creepage_x];
@@ -91,7 +91,7 @@ fn histories_agree_with_contact_and_their_estimates_hold() {
             worst = [0, 1].map(|k| worst[k].max(errors[k]));
             most = [0, 1].map(|k| most[k].max(estimates[k]));
         }
-        // The first point of a prescribed force is a shift.
+        // The first point of a history with a prescribed force is a shift.
         let shift = of_history(&all[0]).shift_x_mm.zip(reference.shift_mm);
         let shift = shift.map_or(0.0, |(found, known)| (found / known - 1.0).abs());
         println!(
@@ -117,7 +117,7 @@ fn histories_agree_with_contact_and_their_estimates_hold() {
     assert_none("too far from CONTACT", &failures);
 }
 
-/// A sphere on a plane of the same steel with the friction limit 18 kN and the radius of contact 5 mm.
+/// Returns a sphere on a plane of the same steel with a friction limit of 18 kN and a contact radius of 5 mm.
 pub fn sphere(poisson_ratio: f64, history: Value) -> Value {
     json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": poisson_ratio },
@@ -130,7 +130,7 @@ pub fn sphere(poisson_ratio: f64, history: Value) -> Value {
 
 const LIMIT: f64 = 18_000.0;
 
-/// Cattaneo's shift for a force over the friction limit, in mm (Mindlin 1949).
+/// Returns Cattaneo's shift in mm for a force over the friction limit (Mindlin 1949).
 fn cattaneo(poisson_ratio: f64, force: f64) -> f64 {
     let full = 3.0 * LIMIT / (8.0 * 82_000.0 * 5.0) * (2.0 - poisson_ratio);
     full * (1.0 - (1.0 - force).powf(2.0 / 3.0))
@@ -138,7 +138,7 @@ fn cattaneo(poisson_ratio: f64, force: f64) -> f64 {
 
 #[test]
 fn a_shift_is_cattaneos_by_force_and_by_displacement() {
-    // The closed form leaves out tractions across, which are 0 for ν = 0 only.
+    // The closed form neglects transverse tractions, which vanish for ν = 0 only.
     for (nu, allowed) in [(0.0, 0.002), (0.28, 0.004)] {
         let forces = [0.25, 0.5, 0.75];
         let shifts = forces.map(|force| cattaneo(nu, force));
@@ -165,7 +165,7 @@ fn a_shift_is_cattaneos_by_force_and_by_displacement() {
                 (by_shift.force_x_n / LIMIT - force).abs() < 2.0 * allowed,
                 "{nu} {force}"
             );
-            // The part that sticks is a circle of the radius ∛(1 − F/μN).
+            // The stick zone is a circle of the relative radius ∛(1 − F/μN).
             let stick = by_force.stick_area_mm2.unwrap() / of_force.patches[0].area_mm2;
             assert!(
                 (stick - (1.0 - force).powf(2.0 / 3.0)).abs() < 0.06,
@@ -198,7 +198,7 @@ fn the_error_of_a_shift_covers_that_to_cattaneo() {
     assert_none("shifts without cover", &failures);
 }
 
-/// Points on one level, with the energies that answers do not have.
+/// Returns the points of a history on one mesh, with the energies that answers do not include.
 fn on_level(case: &Value, size: MeshSize, longest: f64) -> Vec<PointRecord> {
     let case = contact::check(case, &Limits::default()).unwrap();
     let pressed = normal_stage::solve(&case, &Unmonitored).unwrap();
@@ -306,7 +306,7 @@ fn a_long_way_ends_in_steady_rolling_and_steady_rolling_stays() {
     let begun = forces(&begun);
     for k in 0..3 {
         let end = forces(&late)[3][k];
-        // Each within its target of 0.005.
+        // Both forces are within their target of 0.005.
         assert!((end - steady[k]).abs() < 0.01, "{k}: {end} {}", steady[k]);
         assert!(
             begun.iter().all(|at| (at[k] - begun[0][k]).abs() < 1e-3),
@@ -314,7 +314,7 @@ fn a_long_way_ends_in_steady_rolling_and_steady_rolling_stays() {
         );
         assert!((begun[0][k] - steady[k]).abs() < 0.01, "{k}: {begun:?}");
     }
-    // Forces that steady rolling needs are found as its creepages.
+    // Prescribing the forces of steady rolling gives its creepages.
     let history = json!({ "history": { "distance_mm": [0, 30], "force_x_n": steady[0] * LIMIT, "force_y_n": steady[1] * LIMIT, "spin_per_mm": 0.0002 }, "start": "steady" });
     let (forced, _) = solve(&sphere(0.28, history));
     for point in &forced.patches[0].points {
@@ -331,7 +331,7 @@ fn a_long_way_ends_in_steady_rolling_and_steady_rolling_stays() {
     }
 }
 
-/// Under small creepages a step changes so little that tractions far from those of steady rolling nearly solve it.
+/// Tests small creepages, for which a step changes so little that tractions far from steady rolling nearly solve it.
 #[test]
 fn small_creepages_that_no_longer_change_end_in_steady_rolling() {
     let a = 7.43;
@@ -358,7 +358,7 @@ fn small_creepages_that_no_longer_change_end_in_steady_rolling() {
     assert!(off < 0.1 * steady.force_x_n.abs());
 }
 
-/// Keeps what a solve says of its progress.
+/// Records the progress that a solve reports.
 #[derive(Default)]
 struct Listener(RefCell<Vec<f64>>);
 
@@ -419,11 +419,11 @@ fn other_contacts_and_laws_follow_a_history_too() {
     let mut case = sphere(0.28, history);
     case["solver"] = json!({ "mesh": { "strips": 10, "cells": 20 } });
     let of_ellipse = forces(&solve(&case).0);
-    // A coefficient across that is the same everywhere.
+    // A lateral friction table with one value everywhere.
     let mut across = case.clone();
     across["friction"] = json!({ "across": { "y_mm": [-5, 5], "coefficient": [0.3, 0.3] } });
     let of_law = forces(&solve(&across).0);
-    // A gap with the ellipse for its patch.
+    // A gap whose patch is the ellipse.
     let mut gap = case.clone();
     let radius = 0.5 / 0.001_580_487_8;
     let y: Vec<f64> = (-20..=20).map(|k| 0.4 * f64::from(k)).collect();

@@ -1,4 +1,4 @@
-//! Histories with friction that falls with slip.
+//! Tests of histories with friction that falls with slip.
 
 use railhead_contact::solution::words::answer::{PointSolution, Solution};
 use serde_json::{Value, json};
@@ -9,12 +9,12 @@ use crate::reference::solve;
 
 const LIMIT: f64 = 18_000.0;
 
-/// A law with 0.3 at rest, of which a part is halved at a speed in mm/s.
+/// Returns a law with coefficient 0.3 at rest. The part `falls` is halved at a speed in mm/s.
 fn law(name: &str, falls: f64, half_speed: f64) -> Value {
     json!({ "law": name, "limit": 0.3 - falls, "terms": [{ "coefficient": falls, "half_speed_mm_per_s": half_speed }] })
 }
 
-/// A motion over these distances in mm, at 30 m/s.
+/// Returns a motion over these distances in mm, at 30 m/s.
 fn history(friction: Value, distances: &[f64], creepages: [f64; 3]) -> Value {
     let [x, y, spin] = creepages;
     let rolled = json!({
@@ -29,7 +29,7 @@ fn points(case: &Value) -> Vec<PointSolution> {
     solution.patches[0].points.clone()
 }
 
-/// Distance of the forces of two points over the friction limit.
+/// Returns the distance between the forces of two points over the friction limit.
 fn apart(a: &PointSolution, b: &PointSolution) -> f64 {
     (a.force_x_n - b.force_x_n).hypot(a.force_y_n - b.force_y_n) / LIMIT
 }
@@ -39,7 +39,7 @@ fn estimate(point: &PointSolution) -> f64 {
     estimate.force_x_n.hypot(estimate.force_y_n) / LIMIT
 }
 
-/// The answer of the steady solver to the motion of a history.
+/// Returns the answer of the steady solver to the motion of a history.
 fn steady(case: &Value) -> PointSolution {
     let mut motion = case["motion"]["history"].clone();
     motion.as_object_mut().unwrap().remove("distance_mm");
@@ -74,7 +74,7 @@ fn long_rolling_ends_in_the_steady_state_and_remains_in_it() {
     }
 }
 
-/// A creepage that grows, stays and falls, far into sliding; forces by the number of cells, and what is told at default settings.
+/// Tests a creepage that grows, stays and falls, far into sliding: forces by the number of cells, and the estimates at default settings.
 #[test]
 fn finer_meshes_approach_one_history_within_what_is_told() {
     for friction in [law("exponential", 0.2, 120.0), law("linear", 0.15, 400.0)] {
@@ -135,7 +135,7 @@ fn a_law_without_a_fall_has_the_history_of_its_coefficient() {
     assert!(apart_before < 1e-9);
 }
 
-/// The example of `docs/rolling.md` has the forces that are shown there.
+/// Tests that the example of `docs/rolling.md` has the forces shown there.
 #[test]
 fn the_example_has_the_forces_that_are_shown() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
@@ -155,7 +155,7 @@ fn the_example_has_the_forces_that_are_shown() {
     assert!(read("docs/rolling.md").contains(&shown), "{shown}");
 }
 
-/// Everything slides at once at the speed of the creepage, with a bound that follows within the distance of damping.
+/// All cells slide at once at the speed of the creepage, with a bound that follows within the damping distance.
 #[test]
 fn after_a_jump_of_the_creepage_the_force_falls_to_that_of_full_slip() {
     let case = history(
@@ -165,7 +165,7 @@ fn after_a_jump_of_the_creepage_the_force_falls_to_that_of_full_slip() {
     );
     let found = points(&case);
     let known = 0.1 + 0.2 * (-std::f64::consts::LN_2 * 3000.0 / 300.0).exp();
-    // The distance that the guide tells: four half-lengths times the stability number.
+    // The distance given in the guide: four half-lengths times the stability number.
     let pressure = 1.5 * 60_000.0 / (std::f64::consts::PI * 25.0);
     let fall = 0.2 * std::f64::consts::LN_2 / 300.0;
     let told = 4.0 * 5.0 * 1.7 * 30_000.0 * fall * pressure / 82_000.0;

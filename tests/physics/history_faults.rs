@@ -1,4 +1,4 @@
-//! Histories that are refused by name, or stopped.
+//! Tests of histories that are refused with a named fault, or stopped.
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -54,7 +54,7 @@ fn a_history_that_cannot_be_is_refused_by_name() {
         let path = |name: &str| format!("/motion/history/{name}");
         assert_fault(&with(&good(), &path(name), Some(value)), &path(at), &[word]);
     }
-    // The steps of a patch of a micrometre are not written as 0 mm.
+    // Steps on a patch of a micrometre are not written as 0 mm.
     let mut micro = good();
     for (at, value) in [
         ("/contact/a_mm", json!(1e-3)),
@@ -103,7 +103,7 @@ fn what_a_history_does_not_go_with_is_refused_by_name() {
     }
 }
 
-/// Stops at the hundredth question.
+/// Stops the solve at the hundredth tick.
 struct Impatient(Cell<u32>);
 
 impl Monitor for Impatient {

@@ -1,4 +1,4 @@
-//! The limit of vanishing slip: Kalker's coefficients.
+//! Tests the limit of vanishing slip: Kalker's coefficients.
 //!
 //! F_x = G c² C11 ν_x, F_y = G c² C22 ν_y + G c³ C23 φ, M_z = G c³ C32 ν_y + G c⁴ C33 φ, c = √(ab), C32 = −C23.
 
@@ -7,12 +7,12 @@ use serde_json::Value;
 
 use crate::reference::{Ellipse, assert_none, cases, read};
 
-/// Coefficients that one motion shows: name and value.
+/// Returns the coefficients that one motion determines, with their names.
 fn coefficients(contact: &Ellipse, strips: u32, cells: u32) -> Vec<(&'static str, f64)> {
     let forces = contact.forces(strips, cells);
     let [x, y, spin] = contact.motion;
     let (c, g) = (contact.c(), contact.shear_modulus_mpa);
-    // Forces come relative to μN, the moment to μN c.
+    // Forces are relative to μN, the moment to μN c.
     let unit = contact.limit() / (g * c * c);
     let mut out = Vec::new();
     if x != 0.0 {
@@ -29,7 +29,7 @@ fn coefficients(contact: &Ellipse, strips: u32, cells: u32) -> Vec<(&'static str
     out
 }
 
-/// Compares the coefficients `wanted` of the stored linear cases; how many were compared, and what failed.
+/// Compares the coefficients `wanted` of the stored linear cases. Returns the number of comparisons and the failures.
 fn against_converged(wanted: &[&str]) -> (usize, Vec<String>) {
     let cases = cases("hertz_linear");
     assert_eq!(cases.len(), 60);
@@ -95,7 +95,7 @@ struct Row {
     c33: f64,
 }
 
-/// Compares with the table at `strips × cells`: within `allowed` for a/b ½…2, twice that for 0.2…5.
+/// Compares with the table at `strips × cells`. The allowed error is `allowed` for a/b from ½ to 2, and twice that from 0.2 to 5.
 fn against_table(
     wanted: &[(&str, f64)],
     ratios: impl Fn(f64) -> bool,
@@ -155,10 +155,10 @@ fn tiny_spin_gives_kalkers_moment_coefficient() {
 
 #[test]
 fn tiny_spin_gives_kalkers_moment_coefficient_at_the_ends_of_poissons_ratio() {
-    // With ν = 0 or ½ sixteen strips leave up to 1.5 % (2.5 % where slender); the table's own digits are 0.5 %.
+    // With ν = 0 or ½ sixteen strips leave an error of up to 1.5 % (2.5 % on slender patches). The table's own digits are accurate to 0.5 %.
     let failures = against_table(&[("C33", 0.015)], |nu| nu != 0.25, 16, 16);
     assert_none("C33 at 16 x 16 cells", &failures);
-    // The error is one of the strips, not of the cells along them.
+    // The error comes from the strips, not from the cells along them.
     let failures = against_table(&[("C33", 0.006)], |_| true, 64, 16);
     assert_none("C33 with 64 strips of 16 cells", &failures);
 }

@@ -1,15 +1,15 @@
-//! The embedded table of Kalker's coefficients is what the fast solver gives where nothing slips.
+//! Tests that the embedded table of Kalker's coefficients has the values of the fast solver without slip.
 //!
-//! `cargo test --test physics kalker_table -- --ignored --nocapture` computes the whole table anew, compares, and prints it as
-//! `src/contact/rolling/linear_theory.rs` holds it.
+//! `cargo test --test physics kalker_table -- --ignored --nocapture` recomputes the whole table, compares it, and prints it in the form of
+//! `src/contact/rolling/linear_theory.rs`.
 
 use serde_json::json;
 
 use crate::reference::{Ellipse, assert_none, solve};
 use railhead_contact::rolling::linear_theory::{POISSON_RATIOS, RATIOS, coefficients, ratio};
 
-/// C11, C22 and C23 of an ellipse: two meshes, extrapolated to vanishing cells; C23 is the mean of what spin does to the
-/// lateral force and what lateral creepage does to the moment.
+/// Returns C11, C22 and C23 of an ellipse, extrapolated from two meshes to vanishing cells. C23 is the mean of the effect of spin on the lateral
+/// force and of lateral creepage on the moment.
 fn computed(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     const FINENESS: [f64; 2] = [2.0, 3.0];
     let [coarse, fine] = FINENESS.map(|fineness| on_one_mesh(a_over_b, poisson_ratio, fineness));
@@ -60,7 +60,7 @@ fn differences(ratios: &[f64], poisson_ratios: &[f64], allowed: f64) -> Vec<Stri
     failures
 }
 
-/// Compares a few entries; with `RAILHEAD_KALKER=all`, computes and prints the whole table of 105 ellipses, which takes minutes.
+/// Compares a few entries. With `RAILHEAD_KALKER=all`, computes and prints the whole table of 105 ellipses, which takes minutes.
 #[test]
 fn the_table_holds_what_the_fast_solver_gives_without_slip() {
     let all = std::env::var_os("RAILHEAD_KALKER").is_some_and(|wish| wish == "all");
@@ -82,7 +82,7 @@ fn between_its_entries_the_table_is_interpolated_to_one_part_in_a_thousand() {
     assert_none("values between", &failures);
 }
 
-/// Prints the table as its source has it.
+/// Prints the table in the form of its source.
 fn print(ratios: &[f64]) {
     for ratio in ratios {
         println!("    [");

@@ -1,13 +1,13 @@
-//! What holds exactly in theory and on every symmetric mesh: symmetry, scaling, friction, power.
+//! Tests of exact laws that hold in theory and on every symmetric mesh: symmetry, scaling, friction, power.
 
 use railhead_contact::solution::words::answer::{Fields, PatchCells, Zone};
 
 use crate::reference::{Ellipse, assert_none, solve};
 
-/// Relative to μN, μN√(ab) or the largest friction bound: what a converged iteration may leave.
+/// Allowed residual of a converged iteration, relative to μN, μN√(ab) or the largest friction bound.
 const SOLVER: f64 = 1e-6;
 
-/// Motions in the dimensionless form: creepage alone, spin alone, both; stick, partial slip, nearly full slip.
+/// Motions in dimensionless form: creepage alone, spin alone, both; stick, partial slip, nearly full slip.
 pub const MOTIONS: [[f64; 3]; 7] = [
     [0.3, 0.0, 0.0],
     [0.0, 0.8, 0.0],
@@ -85,7 +85,7 @@ fn mirrored_motion_mirrors_forces_and_tractions() {
         let ((patch, tx, ty), (_, mx, my)) = (tractions(&fields), tractions(&mirrored_fields));
         let bound = steel.friction * steel.pressure_max();
         for i in 0..tx.len() {
-            // Strip j of 12 lies opposite strip 11 − j; the place in the strip stays.
+            // Strip j of 12 lies opposite strip 11 − j, with the same order of cells.
             let image = (11 - i / 10) * 10 + i % 10;
             assert!((patch.y_mm[i] + patch.y_mm[image]).abs() < 1e-9 * steel.b_mm);
             assert!(
@@ -121,7 +121,7 @@ fn symmetry_leaves_no_forces_across_and_none_along() {
 
 #[test]
 fn rolling_forward_is_not_rolling_backward() {
-    // There is no symmetry x → −x: the tractions lean toward the trailing edge.
+    // There is no symmetry x → −x: the tractions are larger toward the trailing edge.
     let steel = Ellipse::steel(1.0, 0.28);
     let (_, fields) = solve(&steel.normalised(0.2, 0.0, 0.0).case(12, 12));
     let (patch, tx, _) = tractions(&fields);
@@ -138,7 +138,7 @@ fn units_and_lengths_do_not_matter() {
         let base = steel.normalised(x, y, spin);
         let forces = base.forces(10, 12);
         let [vx, vy, phi] = base.motion;
-        // Metres and Pa would exceed the largest modulus a case may have.
+        // Metres and Pa would exceed the largest modulus that a case may have.
         let centimetres = Ellipse {
             a_mm: base.a_mm * 0.1,
             b_mm: base.b_mm * 0.1,
@@ -210,7 +210,7 @@ fn zones_fill_the_patch_and_stick_touches_the_leading_edge() {
 #[test]
 fn full_slip_carries_friction_times_load_along_the_creepage() {
     for steel in shapes() {
-        // Little friction instead of much creepage: the same dimensionless motion with creepages that occur.
+        // Little friction replaces large creepage: the same dimensionless motion, with creepages that occur in practice.
         let steel = Ellipse {
             friction: 1e-5,
             ..steel

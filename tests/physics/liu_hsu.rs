@@ -1,4 +1,4 @@
-//! The solver of Liu and Hsu: the same answers as `boundary_element` where it converges, and a named end where not.
+//! Tests of the solver of Liu and Hsu: the same answers as `boundary_element` where it converges, and a named termination elsewhere.
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -34,7 +34,7 @@ fn with_guess(
     })
 }
 
-/// Everything the method has, as the service runs it.
+/// Runs the complete method, as the service does.
 fn everything(
     fine: &Contact,
     coarse: &Contact,
@@ -100,7 +100,7 @@ fn both_methods_agree_on_forces_and_zones_where_liu_hsu_converges() {
     }
 }
 
-/// The zones that `boundary_element` sees in its tractions.
+/// Returns the zones that `boundary_element` assigns to its tractions.
 fn zones(contact: &Contact, rule: Rule, state: [f64; 3], t: &[f64]) -> Vec<bool> {
     let equations = contact.equations(rule);
     let rigid = equations.rigid(&regions::motion(state));
@@ -172,8 +172,8 @@ fn pure_creepage_always_converges_and_with_the_upwind_rule_by_guess_1_alone() {
     }
 }
 
-/// The domain of convergence is part of what the method promises: a change of these counts is a change of the method.
-/// The whole table is printed by the bench `convergence_domain`.
+/// Tests the domain of convergence, which is part of the method: a change of these counts is a change of the method. The bench `convergence_domain`
+/// prints the whole table.
 #[test]
 fn the_pole_of_a_coarse_solution_and_the_third_run_extend_the_domain_of_convergence() {
     let motions: Vec<[f64; 3]> = motions().into_iter().step_by(2).collect();
@@ -342,7 +342,7 @@ fn a_run_without_answer_names_its_end_and_its_residual() {
     assert!(ends.contains(&ZonesTermination::ZonesRepeat), "{ends:?}");
 }
 
-/// Stops at the given look.
+/// Stops the solve at the given tick.
 struct StopAt {
     looks: Cell<u32>,
     at: u32,

@@ -1,4 +1,4 @@
-//! The algebra inside `liu_hsu`: the elimination of the stick tractions, and the Newton–Raphson step.
+//! Tests of the algebra inside `liu_hsu`: the elimination of the stick tractions, and the Newton–Raphson step.
 
 use railhead_contact::mesh::Grading;
 use railhead_contact::monitor::Unmonitored;
@@ -11,7 +11,7 @@ use railhead_contact::rolling::slip_rules::Rule;
 
 use crate::regions::{self, Contact, Region};
 
-/// A problem with a few, about half, or all of its cells slipping, and tractions that are not on their circles.
+/// Checks problems in which a few, about half, or all cells slip, with tractions that are not on their friction circles.
 fn half_slipping(check: impl Fn(&DenseProblem, &SlipSystem, &DenseTask, &[f64])) {
     let contact = Contact::new(Region::Egg, 5, &Grading::cosine(4));
     for rule in [Rule::Upwind, Rule::Trapezoid] {

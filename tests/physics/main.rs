@@ -1,4 +1,4 @@
-//! Does the physics hold?
+//! Tests of the physics.
 
 #[path = "../../benches/report/allocations.rs"]
 mod allocations;

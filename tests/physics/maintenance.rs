@@ -1,4 +1,4 @@
-//! Damage and temperatures of solved contacts.
+//! Tests of damage and temperatures of solved contacts.
 
 use railhead_contact::solution::words::answer::PointSolution;
 use serde::Deserialize;
@@ -50,7 +50,7 @@ fn damage_follows_from_the_resultants_and_carries_their_errors() {
         half > error && half < 0.1 * point.friction_power_n,
         "{t_gamma:?}"
     );
-    // 5.3 µg/(m mm²) per N/mm², over a mean length of area/width, of 7850 kg/m³.
+    // 5.3 µg/(m mm²) per N/mm², over a mean length of area/width, for a density of 7850 kg/m³.
     let wear = damage.usfd_wear.expect("asked for");
     let x = point.friction_power_n / patch.area_mm2;
     assert!(x < 10.4, "mild");
@@ -70,7 +70,7 @@ fn damage_follows_from_the_resultants_and_carries_their_errors() {
     assert!((index.index.value - (used - limit)).abs() < 1e-9);
     let place = damage.shakedown.expect("asked for");
     assert!((place.load_factor - patch.pressure_max_mpa / 300.0).abs() < 1e-12);
-    // Above the limit at the surface the index is positive, and the other way round.
+    // The index is positive above the limit at the surface, and negative below it.
     let at_surface = place.limit < 4.0;
     assert!(!at_surface || (index.index.value > 0.0) == place.ratchets);
     let parameters = solution.damage_parameters.expect("told");
@@ -100,7 +100,7 @@ fn wear_across_adds_up_to_the_power_and_the_mild_wear_of_the_patch() {
         (power / point.friction_power_n - 1.0).abs() < 1e-9,
         "{power}"
     );
-    // Mild wear is proportional to the power, so that cells and patch agree up to cells that leave the regime.
+    // Mild wear is proportional to the power, so that cells and patch agree except for cells that leave this regime.
     let usfd = sum(across.usfd_depth_nm.as_ref().expect("asked for"));
     let width: f64 = across.dy_mm.iter().sum();
     let whole = damage.usfd_wear.unwrap().depth_nm.value * width;
@@ -175,7 +175,7 @@ fn what_is_not_asked_for_costs_nothing() {
     assert!(bare.damage.is_none() && bare.temperature.is_none() && bare.subsurface.is_none());
 }
 
-/// A contact whose temperature was computed elsewhere.
+/// A contact with a reference temperature.
 #[derive(Debug, Deserialize)]
 struct HeatReference {
     #[serde(flatten)]

@@ -1,4 +1,4 @@
-//! Many rows: each is answered as a case of its own, whatever stands beside it.
+//! Tests that each of many rows is answered as a separate case, independently of the other rows.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -53,7 +53,7 @@ fn solved_by(case: &Value, columns: &[VariedColumn], solve: &RowSolver) -> ManyA
     solve_many(&task, solve, &Unmonitored).expect("nobody stops it")
 }
 
-/// The numbers of a row as bits, in which equal means the same answer.
+/// Returns the numbers of a row as bits. Equal bits mean the same answer.
 pub fn bits(answer: &ManyAnswer, row: usize) -> Vec<u64> {
     answer
         .numbers
@@ -62,7 +62,7 @@ pub fn bits(answer: &ManyAnswer, row: usize) -> Vec<u64> {
         .collect()
 }
 
-/// A column of an answer.
+/// Returns a column of an answer.
 pub fn column<'a>(answer: &'a ManyAnswer, name: &str) -> &'a [f64] {
     let names = answer.columns.names();
     let place = names.iter().position(|known| *known == name);
@@ -130,7 +130,7 @@ fn auto_takes_the_table_where_its_bound_meets_the_target_and_solves_the_rest() {
     };
     assert!(by_table(&answer) > 0, "{:?}", answer.method);
     assert_eq!(answer.status, [RowStatus::Ok; 6]);
-    // The bound of the table is never as small as this.
+    // The bound of the table never meets this target.
     case["solver"]["target_error"] = json!(0.0005);
     let exact = solved(&case, &columns()[1..]);
     assert_eq!(by_table(&exact), 0);
@@ -201,6 +201,6 @@ fn a_row_whose_profiles_were_read_for_another_one_is_the_case_solved_alone() {
         assert_eq!(found, [total.force_x_n, total.force_y_n], "row {row}");
         forces.push(found);
     }
-    // Rows that differ have answers that do.
+    // Different rows have different answers.
     assert!((1..4).all(|row| forces[row] != forces[0]), "{forces:?}");
 }

@@ -1,4 +1,4 @@
-//! Is what a case keeps in memory bounded, and does what is kept never show in an answer?
+//! Tests that a case keeps a bounded amount of memory, and that stored operators do not change an answer.
 
 use std::sync::Arc;
 
@@ -12,8 +12,7 @@ use serde_json::{Value, json};
 
 use crate::gap_samples::{profile, steel};
 
-/// Creepages whose spin pole lies on a grid of `side × side` places inside the patch, at fixed spin: every motion would like a mesh of
-/// its own.
+/// Returns creepages whose spin pole lies on a grid of `side × side` places inside the patch, at fixed spin. Each motion would prefer its own mesh.
 pub fn creep_map(side: u32, target: f64) -> Value {
     let spin = 0.003;
     let at = |k: u32| f64::from(k) / f64::from((side - 1).max(1)) - 0.5;
@@ -36,7 +35,7 @@ pub fn creep_map(side: u32, target: f64) -> Value {
     )
 }
 
-/// The resultants of motions of a contact under a load in N.
+/// Returns a case of a contact with these motions under a load in N, with resultants only.
 fn resultants(contact: Value, load: u32, motions: &Value, solver: &Value) -> Value {
     let mut case = steel(contact, json!({ "normal_force_n": load }), [0.0; 3]);
     case["motion"] = motions.clone();
@@ -49,7 +48,7 @@ fn problem(case: &Value) -> CheckedCase {
     check(case, &Limits::default()).expect("a valid case")
 }
 
-/// The answer without its times.
+/// Returns the answer with all times set to 0.
 fn answer(store: &Arc<OperatorStore>, checked: &CheckedCase) -> Solution {
     let (mut solution, _) = solve_with(store, checked, &Unmonitored).expect("an answer");
     for point in solution.patches.iter_mut().flat_map(|p| &mut p.points) {
@@ -100,14 +99,14 @@ fn a_creep_map_stays_within_the_bound_of_the_store() {
 #[test]
 fn the_memory_of_a_long_sweep_of_resultants_is_some_kilobytes_a_motion() {
     let bytes = |side: u32| problem(&creep_map(side, 0.005)).cost().bytes as f64;
-    // From so many motions on their operators fill the store.
+    // From this number of motions on, their operators fill the store.
     let (few, many) = (bytes(25), bytes(100));
     assert!(many - few < 9375.0 * 4e3, "{few} and {many}");
     assert!(many < 300e6, "{many}");
 }
 
-/// What a case leaves in a store is what its cost says, within a factor that covers the sizes of meshes that its target leads to, and is
-/// a part of the memory that the cost counts.
+/// Tests that the size of the operators that a case leaves in the store is the one in its cost. The allowed factor covers the sizes of meshes that
+/// the target leads to. The operators are part of the memory in the cost.
 #[test]
 fn the_cost_counts_the_operators_that_a_case_leaves_in_the_store() {
     let ellipse = |solver: &Value, motions: &Value| {
@@ -120,10 +119,10 @@ fn the_cost_counts_the_operators_that_a_case_leaves_in_the_store() {
     let all = json!([{ "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 0.0004 }]);
     let cases = [
         (ellipse(&mesh, &all), 1.01),
-        // Solved on the first mesh alone, which the table of creep forces finds good enough.
+        // Solved on the first mesh alone, which is fine enough according to the table of creep forces.
         (ellipse(&target, &creep), 8.0),
         (ellipse(&target, &all), 6.0),
-        // Some rows go on with one mesh that the table finds good enough, where each motion could want one about its own pole.
+        // Some rows keep one mesh that is fine enough according to the table, although each motion could use a mesh about its own pole.
         (creep_map(9, 0.005), 6.0),
     ];
     for (case, factor) in cases {

@@ -1,4 +1,4 @@
-//! The examples that redraw the figures of Liu and Hsu's paper show what the paper says, on a patch without symmetry.
+//! Tests that the examples for the figures of Liu and Hsu's paper show the paper's results, on a patch without symmetry.
 
 use railhead_contact::solution::words::answer::{Fields, Solution, Zone};
 use serde_json::{Value, json};
@@ -27,7 +27,7 @@ fn stick_area(solution: &Solution, point: usize) -> f64 {
     patch.points[point].stick_area_mm2.expect("zones") / patch.area_mm2
 }
 
-/// Mean place of what sticks, weighted with the area.
+/// Returns the mean position of the stick zone, weighted with the area.
 fn stick_centre(fields: &Fields, point: usize) -> [f64; 2] {
     let patch = &fields.patches[0];
     let zones = patch.points[point].zone.as_ref().expect("zones");
@@ -62,7 +62,7 @@ fn spin_eats_the_stick_zone_and_drives_it_to_the_side_where_it_opposes_the_creep
             assert!(here > before, "{k}: {here} {before}");
         }
     }
-    // Longitudinal creepage alone turns a wheel that does not stand on the middle of its patch.
+    // Longitudinal creepage alone causes a moment because the origin is not in the middle of the patch.
     assert!(
         total[0].moment_z_n_mm > 0.02 * BOUND * 7.8,
         "{:?}",
@@ -95,7 +95,7 @@ fn pure_spin_leaves_separate_poles_and_then_one() {
     assert!(one.iter().all(|x| *x < -0.6 && *x > -0.9), "{one:?}");
     for point in [0, 1] {
         assert!(stick_area(&solution, point) < 0.01);
-        // A patch with symmetry across would have none.
+        // A patch that is symmetric about the rolling direction would have none.
         assert!(solution.total[point].force_x_n > 0.03 * BOUND);
     }
 }

@@ -1,4 +1,4 @@
-//! Energy cell by cell: tractions times slips add up to the friction power of the patch, and no cell gains power.
+//! Tests of the energy cell by cell: tractions times slips add up to the friction power of the patch, and no cell generates power.
 
 use railhead_contact::solution::words::answer::{Fields, Solution, Zone};
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use crate::laws::{MOTIONS, shapes};
 use crate::reference::{Ellipse, assert_none, solve};
 
-/// Power of the cells of a patch over the rolling speed in N, and the least of a cell.
+/// Returns the power of the cells of a patch over the rolling speed in N, and the least power of a cell.
 fn power(fields: &Fields, patch: usize) -> (f64, f64) {
     let cells = fields.patches[patch].cells(0);
     let point = &fields.patches[patch].points[0];
@@ -20,7 +20,7 @@ fn power(fields: &Fields, patch: usize) -> (f64, f64) {
     })
 }
 
-/// What is wrong with the powers of an answer.
+/// Returns a message for each wrong power of an answer.
 fn wrong(name: &str, solution: &Solution, fields: &Fields) -> Vec<String> {
     let mut wrong = Vec::new();
     for (k, patch) in solution.patches.iter().enumerate() {

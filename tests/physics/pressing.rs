@@ -1,4 +1,4 @@
-//! Bodies that differ, pressed together under friction: Spence's contact, and rolling that begins there.
+//! Tests of dissimilar bodies pressed together with friction: Spence's contact, and rolling that begins from it.
 
 use railhead_contact::solution::words::answer::{Fields, PointSolution, Solution};
 use serde::Deserialize;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::cases::{assert_fault, with};
 use crate::reference::{Converged, assert_none, read, solve};
 
-/// A pressing solved elsewhere.
+/// A reference solution of normal loading with friction.
 #[derive(Debug, Deserialize)]
 struct Reference {
     id: String,
@@ -17,7 +17,7 @@ struct Reference {
     friction: f64,
     approach_mm: Converged,
     pressure_max_mpa: Converged,
-    /// Of the area that sticks, over that of the contact.
+    /// Radius of the stick zone over that of the contact.
     stick_radius: Converged,
     traction_max_mpa: Converged,
 }
@@ -39,7 +39,7 @@ fn references() -> Vec<Reference> {
     read("pressing.json")
 }
 
-/// Radius of the area that sticks, over that of the contact.
+/// Returns the radius of the stick zone over that of the contact.
 fn stick_radius(point: &PointSolution) -> f64 {
     let areas = [point.stick_area_mm2, point.slip_area_mm2].map(|area| area.expect("asked for"));
     (areas[0] / (areas[0] + areas[1])).sqrt()
@@ -88,7 +88,7 @@ fn bodies_pressed_together_agree_with_contact() {
     assert_none("too far from CONTACT", &failures);
 }
 
-/// Values of one field of the answer.
+/// Returns the tractions of the answer along x and y.
 fn tractions(case: &Value) -> [Vec<f64>; 2] {
     tractions_of(&solve(case).1)
 }
@@ -106,7 +106,7 @@ fn with_mesh(case: &Value) -> Value {
     )
 }
 
-/// Spence (1975): a stick radius of one half for ν = 0 and μ = 0.2986 on a rigid body. Whole cells stick, so that the radius is right to
+/// Spence (1975) gives a stick radius of one half for ν = 0 and μ = 0.2986 on a rigid body. Whole cells stick, so that the radius is accurate to
 /// half a cell.
 #[test]
 fn half_of_the_radius_sticks_where_spence_says_so() {
@@ -120,7 +120,7 @@ fn half_of_the_radius_sticks_where_spence_says_so() {
     assert!((found - 0.5).abs() < 0.02, "{found}");
 }
 
-/// Eight times the force: twice the size and the tractions, 32 times the work.
+/// Eight times the force gives twice the size and the tractions, and 32 times the work.
 #[test]
 fn a_pressing_is_a_scaled_copy_of_any_smaller_one() {
     let case = with_mesh(&references()[2].case());
@@ -159,7 +159,7 @@ fn like_bodies_are_pressed_together_without_tractions_and_exchanged_ones_with_th
     }
 }
 
-/// The tractions of a pressing are forgotten when the bodies have rolled some lengths, and what is left is steady rolling.
+/// Tests that the tractions of normal loading fade after rolling some contact lengths, and that steady rolling remains.
 #[test]
 fn rolling_of_unlike_bodies_ends_steady_wherever_it_begins() {
     let material = json!({ "upper": { "young_modulus_mpa": 70000, "poisson_ratio": 0.33 }, "lower": { "young_modulus_mpa": 210000, "poisson_ratio": 0.3 } });
@@ -196,7 +196,7 @@ fn rolling_of_unlike_bodies_ends_steady_wherever_it_begins() {
         assert!((power - 1.0).abs() < 0.03, "{start}: {power}");
         first.push(early.force_x_n / limit);
     }
-    // Steady rolling is there at once; rolling from the other two is not.
+    // The history that starts from steady rolling is steady at once, the other two are not.
     assert!(
         (first[2] - steady.force_x_n / limit).abs() < 0.01,
         "{first:?}"

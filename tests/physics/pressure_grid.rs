@@ -1,11 +1,11 @@
-//! A pressure given on a grid: the edge between samples, the pressure on cells, the load.
+//! Tests of a pressure given on a grid: the edge between samples, the pressure on cells, the load.
 
 use std::f64::consts::PI;
 
 use crate::cases::{grid_case, problem};
 use crate::pressure_samples::{Samples, chord_load, strip_load, strips};
 
-/// Hertz's pressure with semi-axes 6 and 3.5 about (1.3, −0.7), turned by an angle; largest value 1000.
+/// Hertz's pressure with semi-axes 6 and 3.5 about (1.3, −0.7), rotated by an angle. The largest value is 1000.
 struct Askew {
     xx: f64,
     xy: f64,
@@ -145,7 +145,7 @@ fn strips_carry_the_load_of_the_samples_before_scaling() {
     let hertz = askew.samples(20).field();
     let off = strip_load(&hertz, 0, 16, 16) / hertz.patches()[0].normal_force - 1.0;
     assert!(off.abs() < 5e-3, "Hertz: {off}");
-    // Strips alone, without the sampling: the mid-line rule on an elliptic load.
+    // The error of the strips alone, without sampling: the midpoint rule on an elliptic load.
     let off = strip_load(&hertz, 0, 16, 16) / Askew::load() - 1.0;
     assert!(off.abs() < 2e-3, "strips: {off}");
     let egg = Samples::of([-3.0, 3.0, -3.0, 3.0], 20, egg_pressure).field();
@@ -153,7 +153,7 @@ fn strips_carry_the_load_of_the_samples_before_scaling() {
     assert!(off.abs() < 5e-3, "egg: {off}");
 }
 
-/// An egg: blunt toward +y, pointed toward −y, pressure falling like the root of the distance from its edge.
+/// Returns the pressure of an egg: blunt toward +y, pointed toward −y, decreasing like the root of the distance to its edge.
 fn egg_pressure(x: f64, y: f64) -> f64 {
     let width = 1.5 + 0.35 * y;
     let q = 1.0 - (x / width).powi(2) - (y / 2.5).powi(2);

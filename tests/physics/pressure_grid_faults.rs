@@ -1,4 +1,4 @@
-//! A pressure grid that cannot be read is refused with the place of the fault.
+//! Tests that an unreadable pressure grid is refused with the place of the fault.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::check;
@@ -139,7 +139,7 @@ fn absurd_grids_are_refused() {
         "/contact",
         &["ratio"],
     );
-    // Coordinates so far from 0 that their differences have no digits left.
+    // Coordinates so far from 0 that their differences have no significant digits.
     assert_fault(
         &grid([524_287.999_999_999_9, 524_288.0, 524_289.0], unit, 1.0),
         "/contact/x_mm/1",

@@ -1,4 +1,4 @@
-//! Patches that are not ellipses: several, bent, hollow, flat, rough, tiny, cut.
+//! Tests of patches that are not ellipses: several, bent, hollow, flat, rough, tiny, cut off.
 
 use std::f64::consts::PI;
 
@@ -29,10 +29,10 @@ fn two_patches_keep_their_own_load() {
         );
         assert!((found.pressure_max / p - 1.0).abs() < 0.01);
         let off = strip_load(&field, patch, 12, 12) / found.normal_force - 1.0;
-        // Both ways of summing are off here: the samples by −0.65 %, the 12 strips by +0.36 %.
+        // Both sums are inexact here: the samples by −0.65 %, the 12 strips by +0.36 %.
         assert!(off.abs() < 0.015, "{off}");
     }
-    // A line through one patch is no chord of the other.
+    // A line through one patch is not a chord of the other.
     assert!(field.chords(0, &[(1.2, 0.1)]).is_empty());
     assert_eq!(field.chords(1, &[(1.2, 0.1)]).len(), 1);
 }
@@ -52,7 +52,7 @@ fn patches_one_sample_apart_stay_apart() {
     );
 }
 
-/// A kidney: a half ring of mean radius 3 and width 2, open toward +y, with a round pressure profile.
+/// Returns the pressure of a kidney: a half ring of mean radius 3 and width 2, open toward +y, with a round pressure profile.
 fn kidney_pressure(x: f64, y: f64) -> f64 {
     let r = x.hypot(y);
     let bend = if y < 0.0 {
@@ -79,7 +79,7 @@ fn a_bent_patch_has_two_segments_per_strip() {
     ] {
         assert!((found - exact).abs() < 1e-3, "{found} for {exact}");
     }
-    // A torus-like half ring (Pappus) and one circle's worth of two half circular ends.
+    // A half ring like a torus (Pappus), and two half-circular ends that together make one circle.
     let load = 700.0 * (PI / 2.0 * 3.0 * PI + 2.0 * PI / 3.0);
     assert!((field.patches()[0].normal_force / load - 1.0).abs() < 5e-3);
     assert!((strip_load(&field, 0, 24, 12) / load - 1.0).abs() < 1e-2);
@@ -125,7 +125,7 @@ fn a_block_of_equal_pressure_ends_half_a_spacing_beyond_its_samples() {
 
 #[test]
 fn rough_pressure_does_not_tear_a_patch() {
-    // Deep dips between positive samples would make the curve overshoot below 0.
+    // Deep dips between positive samples would make the interpolating curve overshoot below 0.
     let axis: Vec<f64> = (0..12).map(f64::from).collect();
     let pressure = |i: usize, j: usize| {
         if (i / 2 + j / 2).is_multiple_of(2) {
@@ -185,7 +185,7 @@ fn a_cut_contact_is_remarked() {
     assert!(x_max > 0.5 && x_max < 0.5 + 1.7 / 20.0, "{x_max}");
 }
 
-/// Any grid: axes with spacings over two decades, pressures over six, many zeros.
+/// Returns any grid: axes with spacings over two decades, pressures over six, many zeros.
 fn any_grid() -> impl Strategy<Value = (Vec<f64>, Vec<f64>, Vec<Vec<f64>>)> {
     let axis = |n: usize| {
         let spacings = prop::collection::vec(-1.0..1.0_f64, n);

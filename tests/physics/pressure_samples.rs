@@ -1,4 +1,4 @@
-//! Pressures sampled on grids, and the load that strips carry of them.
+//! Pressures sampled on grids, and the load that strips carry.
 
 use std::f64::consts::PI;
 
@@ -7,7 +7,7 @@ use railhead_contact::normal::pressure_field::field::PressureField;
 use railhead_contact::remark::entry::RemarkEntry;
 use serde_json::{Value, json};
 
-/// Samples `n` by `n` of a pressure over `[x_min, x_max, y_min, y_max]`, ends included.
+/// `n` by `n` samples of a pressure over `[x_min, x_max, y_min, y_max]`, ends included.
 pub struct Samples {
     pub x: Vec<f64>,
     pub y: Vec<f64>,
@@ -49,7 +49,7 @@ impl Samples {
     }
 }
 
-/// Equal strips over a patch.
+/// Returns equal strips over a patch.
 pub fn strips(field: &PressureField, patch: usize, count: u32) -> Vec<(f64, f64)> {
     let [_, _, y_min, y_max] = field.patches()[patch].extent;
     let dy = (y_max - y_min) / f64::from(count);
@@ -58,7 +58,7 @@ pub fn strips(field: &PressureField, patch: usize, count: u32) -> Vec<(f64, f64)
         .collect()
 }
 
-/// The force that strips with `cells` cells each carry before anything is scaled.
+/// Returns the force that strips with `cells` cells each carry before scaling.
 pub fn strip_load(field: &PressureField, patch: usize, count: u32, cells: u32) -> f64 {
     let chords = field.chords(patch, &strips(field, patch, count));
     chords

@@ -1,4 +1,4 @@
-//! A readable case is checked against physics and limits, and becomes a problem with remarks, costs and a digest.
+//! Tests that a valid case is checked against physics and limits, and becomes a problem with remarks, cost and digest.
 
 use serde_json::{Value, json};
 
@@ -15,7 +15,7 @@ fn different_bodies_are_combined_with_a_remark_or_refused() {
             }),
         )
     };
-    // So small a difference moves nothing that could be seen.
+    // A difference this small has no visible effect.
     assert!(problem(&pair(79_000.0, 0.29)).remarks.is_empty());
     let uncoupled =
         |upper: f64, nu: f64| with(&pair(upper, nu), "/solver/method", Some(json!("fastsim")));
@@ -93,7 +93,8 @@ fn memory_estimates_grow_with_mesh_and_motions() {
     let (small, large, many) = (cost(10, 2), cost(40, 2), cost(10, 200));
     assert!(large.bytes > 7 * small.bytes && large.seconds > 10.0 * small.seconds);
     assert!(many.bytes > small.bytes && many.seconds > 50.0 * small.seconds);
-    // 10 × 20 cells: three kernels of N² doubles are 0.96 MB, of which mirror symmetry leaves half; those of the coarser meshes take a third of it.
+    // 10 × 20 cells: three kernels of N² doubles take 0.96 MB, of which mirror symmetry leaves half. The kernels of the coarser meshes take a third
+    // of it.
     assert!(
         (960_000..2_600_000).contains(&small.bytes),
         "{}",

@@ -1,4 +1,4 @@
-//! Profiles are judged before they are trusted: what exports and instruments do to points is named in the answer, or there is none.
+//! Tests of the assessment of profiles: defects from exports and instruments are named in the answer, or the case is refused.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::error::SolveError;
@@ -12,7 +12,7 @@ use crate::profile_cases::{generated, put};
 use crate::profile_shapes::{rail_60e1, s1002};
 use crate::random::Random;
 
-/// The contact of [`tread`] on the rail, z down.
+/// Contact of [`tread`] on the rail, with z down.
 pub const CROWN: [f64; 2] = [0.0, 0.0];
 
 pub fn tread() -> Value {
@@ -112,7 +112,7 @@ fn a_hole_of_50_mm_at_the_crown_is_no_contact() {
     assert!(!blamed(&found).is_empty());
 }
 
-/// A straight face of the head needs no points between its ends, whatever the load.
+/// Tests that a straight face of the head needs no points between its ends, under any load.
 #[test]
 fn a_straight_face_far_from_the_wheel_is_no_hole() {
     for (field, length) in [(true, 12.7), (true, 25.0), (false, 12.7)] {
@@ -139,10 +139,10 @@ fn a_straight_face_far_from_the_wheel_is_no_hole() {
     }
 }
 
-/// A face that ends the head next to the contact makes no bump on it.
+/// Tests that a straight face that ends the head next to the contact causes no pressure peak.
 #[test]
 fn a_sharp_corner_beside_the_contact_changes_no_pressure() {
-    // Fine enough for what the iteration of the pressures leaves open.
+    // The target is small enough for the residual error of the pressures.
     let finely = |rail: &[[f64; 2]]| {
         let mut case = on_rail(rail);
         case["solver"]["target_error"] = json!(0.002);
@@ -166,7 +166,7 @@ fn a_sharp_corner_beside_the_contact_changes_no_pressure() {
     assert!(!has(&found, "profile-waves"), "{:?}", found.remarks);
 }
 
-/// The row of a measurement that was taken out by hand and came back.
+/// Tests one outlier among coarse points.
 #[test]
 fn a_point_far_off_among_coarse_points_is_named_with_its_place() {
     let points = resampled(&rail_60e1(), 1.2);
@@ -199,7 +199,7 @@ fn a_hole_of_8_mm_and_every_tenth_point_are_told_or_refused() {
 
 #[test]
 fn linear_resampling_is_named_and_the_smoothing_named_heals_it() {
-    // A loose target has a grid too coarse for the peaks between two chords.
+    // A loose target has a grid too coarse to resolve the peaks at the corners between chords.
     let on_rail =
         |rail: &[[f64; 2]]| put(&on_rail(rail), "solver", json!({ "target_error": 0.005 }));
     let sound = pressure_max(&solved(&on_rail(&rail_60e1())));
@@ -402,7 +402,7 @@ fn a_contact_near_the_end_of_a_profile_is_told_with_what_is_left() {
             .iter()
             .all(|r| r.code != "contact-at-profile-end")
     );
-    // Where the contact itself is cut off there is no answer.
+    // A contact that is itself cut off has no answer.
     let cut: Vec<_> = rail_60e1()
         .into_iter()
         .filter(|at| at[0] <= under.y_mm[1] - 1.0)
@@ -434,7 +434,7 @@ fn what_is_known_before_the_solve_is_in_the_check() {
     assert!(checked.cost().seconds > plain.cost().seconds);
 }
 
-/// Points of both profiles this far apart in mm, with white noise of a deviation in mm.
+/// Returns a pair with points this far apart in mm and white noise of this standard deviation in mm.
 fn coarse(spacing: f64, noise: f64, seed: u64) -> Value {
     let mut random = Random(seed);
     let [rail, wheel] = [rail_60e1(), s1002()].map(|points| {
@@ -473,7 +473,7 @@ fn auto_smooths_the_noise_of_coarse_points_and_what_that_leaves_open_is_known() 
             "{seed}: {force} {open:?}"
         );
     }
-    // True points as far apart are left as they are, without a word.
+    // Exact points with the same spacing are not smoothed and cause no remark.
     let clean = solved(&coarse(1.7, 0.0, 1));
     assert_eq!(smoothings(&clean), [0.0; 2]);
     assert!(!has(&clean, "smoothing-undecided"), "{:?}", clean.remarks);
@@ -518,7 +518,7 @@ fn a_hole_is_blamed_where_the_curve_over_it_is_open_or_it_may_hide_an_arc() {
         case["load"] = json!({ "vertical_force_n": force });
         solved(&case)
     };
-    // On the arc of 300 mm the curve between the ends of a hole is known, at its end toward that of 80 mm it is not.
+    // On the arc of 300 mm the curve across a hole is known. At the end of that arc toward the arc of 80 mm it is not.
     for (shift, force, length, told) in [
         (1.0, 1e3, 6.0, false),
         (1.0, 1e3, 14.0, true),

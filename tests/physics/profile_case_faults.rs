@@ -1,4 +1,4 @@
-//! Faulty wheels and rails are refused by the reader, or fail with a reason; doubtful ones are remarked on.
+//! Tests that faulty wheels and rails are refused by the parser or fail with a reason, and that doubtful ones get remarks.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::error::SolveError;
@@ -50,7 +50,7 @@ fn a_sound_wheel_on_a_rail_is_accepted_without_being_solved() {
 
 #[test]
 fn a_pair_that_cannot_be_placed_names_the_unit_of_a_profile_of_unusual_size() {
-    // A head of 7.3 by 2.5 mm ends above the height of the gauge.
+    // A head of 7.3 by 2.5 mm ends above the gauge height.
     let mut wheel = changed(RAIL, scaled(&rail_60e1(), 0.1));
     let mut wheelset = wheel.clone();
     let contact = wheelset["contact"].as_object_mut().unwrap();
@@ -59,7 +59,7 @@ fn a_pair_that_cannot_be_placed_names_the_unit_of_a_profile_of_unusual_size() {
     wheelset["load"] = json!({ "vertical_force_n": 150_000 });
     wheelset["motion"] =
         json!({ "wheelset": { "speed_mm_per_s": 20_000, "free_rolling_radius_mm": 460 } });
-    // Both in cm.
+    // Both profiles in cm.
     wheel["contact"]["wheel"]["points_mm"] = scaled(&s1002(), 0.1);
     for case in [wheel, wheelset] {
         let found = faults(&case);
@@ -85,7 +85,7 @@ fn faults_of_both_cross_sections_and_of_the_rest_come_together() {
     assert_eq!(pointers, [RAIL, "/contact/wheel/text"], "{found:?}");
     assert!(found[0].detail.contains("state unit"), "{found:?}");
     assert!(found[1].detail.contains("line 9"), "{found:?}");
-    // Profiles are looked at although the load is missing.
+    // Profiles are checked although the load is missing.
     case.as_object_mut().unwrap().remove("load");
     let pointers: Vec<String> = faults(&case)
         .into_iter()
@@ -237,7 +237,7 @@ fn what_is_left_out_is_the_standard_track() {
     assert_eq!(full.label.digest, short.label.digest);
 }
 
-/// Half of a measured rail has no gauge face: it is not placed by the end of its points, but by its origin where that is given.
+/// Tests half of a measured rail, which has no gauge face: it is not placed by the end of its points, but by its origin where that is given.
 #[test]
 fn a_rail_without_a_gauge_face_is_refused_or_placed_by_its_origin() {
     let head = |from: f64| -> Value {
@@ -256,7 +256,7 @@ fn a_rail_without_a_gauge_face_is_refused_or_placed_by_its_origin() {
         "/contact/rail",
         &["14 mm below the top", "rail_origin_mm", "1.0"],
     );
-    // A gauge measured within the points needs no more of them.
+    // A gauge height within the points needs no further points.
     assert_eq!(
         faults(&place(head(-20.0), json!({ "gauge_height_mm": 1 }))),
         []
@@ -276,7 +276,7 @@ fn a_rail_without_a_gauge_face_is_refused_or_placed_by_its_origin() {
         let position = patch.position.as_ref().expect("a position");
         [patch.pressure_max_mpa, position.rail_mm[0]]
     };
-    // The place of the gauge face, 14 mm below the top.
+    // Position of the gauge face, 14 mm below the top.
     let points = rail_60e1();
     let face = points
         .windows(2)
@@ -295,7 +295,7 @@ fn a_rail_without_a_gauge_face_is_refused_or_placed_by_its_origin() {
     }
 }
 
-/// Both distances may be 0, as a wheel on a roller rig has them: then the origins of both cross-sections lie over each other.
+/// Tests that both distances may be 0, as for a wheel on a roller rig. The origins of both cross-sections then coincide laterally.
 #[test]
 fn origins_may_lie_on_the_middle_line() {
     let mut case = wheel_on_rail(

@@ -1,11 +1,11 @@
-//! Wheels on rails as questions: the benchmark's shapes and files, in place.
+//! Cases of wheels on rails, with the shapes and files of the Manchester benchmark.
 
 use serde_json::{Value, json};
 
 use crate::profile_reference_files::reference_file;
 use crate::profile_shapes::{rail_60e1, s1002};
 
-/// A steel wheel on a steel rail with μ = 0.3, right side, placed as in the Manchester contact benchmark.
+/// Returns a steel wheel on a steel rail with μ = 0.3, on the right side, placed as in the Manchester contact benchmark.
 pub fn wheel_on_rail(rail: Value, wheel: Value, cant: f64) -> Value {
     json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
@@ -21,7 +21,8 @@ pub fn wheel_on_rail(rail: Value, wheel: Value, cant: f64) -> Value {
     })
 }
 
-/// The case with its rail placed by the origin of its cross-section, in mm from the middle of the track: shapes without a gauge face have no other place.
+/// Returns the case with its rail placed by the origin of its cross-section, in mm from the middle of the track. Shapes without a gauge face can
+/// only be placed this way.
 pub fn by_origin(mut case: Value, origin: f64) -> Value {
     let contact = case["contact"].as_object_mut().expect("a contact");
     contact.remove("gauge_mm");
@@ -30,7 +31,7 @@ pub fn by_origin(mut case: Value, origin: f64) -> Value {
     case
 }
 
-/// S1002 on 60E1 inclined 1:40, generated from their definitions.
+/// Returns S1002 on 60E1 inclined 1:40, generated from their definitions.
 pub fn generated() -> Value {
     wheel_on_rail(
         json!({ "points_mm": rail_60e1() }),
@@ -39,7 +40,7 @@ pub fn generated() -> Value {
     )
 }
 
-/// The benchmark's own files, if they are there; the rail has its inclination already.
+/// Returns the benchmark's own files, if available. The rail includes its inclination.
 pub fn benchmark() -> Option<Value> {
     let file = |name: &str| Some(json!({ "format": "simpack", "text": reference_file(name)? }));
     Some(wheel_on_rail(
@@ -49,12 +50,12 @@ pub fn benchmark() -> Option<Value> {
     ))
 }
 
-/// The case on planes of contact.
+/// Returns the case on planes of contact.
 pub fn on_planes(case: &Value) -> Value {
     put(case, "contact", json!({ "reference_surface": "plane" }))
 }
 
-/// The case with other members in one of its objects.
+/// Returns the case with these members added to one of its objects.
 pub fn put(case: &Value, object: &str, members: Value) -> Value {
     let mut case = case.clone();
     let target = case[object].as_object_mut().expect("an object");

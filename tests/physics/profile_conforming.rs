@@ -1,4 +1,4 @@
-//! A wheel worn to the shape of its rail, made here: tread and gauge corner touch side by side, inclined to each other by about half a
+//! Tests a generated wheel that is worn to the shape of its rail. Tread and gauge corner touch side by side, inclined to each other by about half a
 //! radian, where two overlaps may or may not share a gap.
 
 use railhead_contact::case::solver::Limits;
@@ -11,25 +11,25 @@ use serde_json::{Value, json};
 use crate::profile_cases::{generated, on_planes, put};
 use crate::profile_worn::{solved, worn};
 
-/// Where a worn wheel comes nearest to the rail, from the middle of the rail in mm, the radius of the clearance there and its least value, in
-/// mm.
+/// A place where a worn wheel comes nearest to the rail: its distance from the middle of the rail, the radius of the clearance and the smallest
+/// clearance, all in mm.
 type Lobe = (f64, f64, f64);
 
-/// Tread and gauge corner, 17 mm apart.
+/// Lobes on tread and gauge corner, 17 mm apart.
 const LOBES: [Lobe; 2] = [(-12.0, 500.0, 0.0), (-29.3, 30.0, 0.0)];
-/// Clearances of two lobes blend where they differ by less than this, in mm.
+/// Difference in mm below which the clearances of two lobes blend.
 const BLEND: f64 = 0.01;
-/// Half of the rail's head that the wheel follows, from its middle in mm: beyond, the gauge face is too steep for a height over y.
+/// Part of the rail's head that the wheel follows, in mm from its middle. Beyond it, the gauge face is too steep to be a height over y.
 const FOLLOWED: [f64; 2] = [-35.3, 30.0];
-/// Depth of the flange's tip below the tread and slope of the flange, in mm.
+/// Depth in mm of the flange's tip below the tread, and slope of the flange.
 const TIP: f64 = 28.0;
 const FLANGE_SLOPE: f64 = 2.5;
 
-/// Height in mm of the worn wheel over the rail, `y` mm from the middle of the rail.
+/// Returns the height in mm of the worn wheel over the rail, `y` mm from the middle of the rail.
 fn clearance(lobes: &[Lobe], y: f64) -> f64 {
     let of = |(middle, radius, least): &Lobe| (y - middle).powi(2) / (2.0 * radius) + least;
     let sum: f64 = lobes.iter().map(|lobe| (-of(lobe) / BLEND).exp()).sum();
-    // Far from all lobes the sum vanishes, and the nearest lobe is what is left of it.
+    // Far from all lobes the sum vanishes, and the nearest lobe determines the clearance.
     let least = lobes.iter().map(of).fold(f64::INFINITY, f64::min);
     if sum > 1e-200 {
         -BLEND * sum.ln()
@@ -38,7 +38,7 @@ fn clearance(lobes: &[Lobe], y: f64) -> f64 {
     }
 }
 
-/// Wheel and rail of a case in place.
+/// Returns the placed wheel and rail of a case.
 fn geometry(case: &Value) -> WheelRail {
     let checked = check(case, &Limits::default()).expect("a case");
     let NormalTask::Wheel(contact) = &checked.problem.task else {
@@ -47,12 +47,12 @@ fn geometry(case: &Value) -> WheelRail {
     contact.geometry.clone()
 }
 
-/// Points of the wheel, z down: the rail's own shape with the clearance, then a straight flange with its tip.
+/// Returns the points of the wheel, with z down: the rail's shape plus the clearance, then a straight flange with its tip.
 fn worn_wheel(case: &Value, lobes: &[Lobe]) -> Vec<[f64; 2]> {
     let geometry = geometry(case);
     let sign = geometry.placement.side.sign();
     let [rail, wheel] = geometry.parameters(0.1);
-    // A wheel without yaw and roll differs from its profile by a shift and the sense of z.
+    // A wheel without yaw and roll differs from its profile by a shift and the sign of z.
     let middle = wheel[wheel.len() / 2];
     let at = geometry.lowest(middle).expect("no yaw");
     let own = geometry.on_wheel(middle);
@@ -89,7 +89,7 @@ fn worn_wheel(case: &Value, lobes: &[Lobe]) -> Vec<[f64; 2]> {
     points
 }
 
-/// The worn wheel on a new rail 60E1, as it was worn.
+/// Returns the worn wheel on a new rail 60E1, in the position in which it was worn.
 pub fn conforming() -> Value {
     worn_with(&LOBES)
 }
@@ -105,7 +105,7 @@ fn worn_with(lobes: &[Lobe]) -> Value {
     )
 }
 
-/// Largest second difference of a row of values, relative to the values: a jump shows in it as a whole.
+/// Returns the largest second difference of a sequence of values, relative to the values. A jump appears in it in full.
 fn bend(values: &[f64]) -> f64 {
     let bend = |w: &[f64]| ((w[2] - 2.0 * w[1] + w[0]) / w[1]).abs();
     values.windows(3).map(bend).fold(0.0, f64::max)
@@ -116,7 +116,7 @@ fn peak(solution: &Solution) -> f64 {
     peaks.fold(0.0, f64::max)
 }
 
-/// The pairs of these tests: made here, and measured where the reference files are at hand.
+/// Returns the pairs of these tests: generated ones, and measured ones if the reference files are available.
 fn pairs() -> Vec<(&'static str, Value)> {
     let shifted = |shift: f64| {
         put(
@@ -151,7 +151,7 @@ fn forces_rise_smoothly_as_the_wheel_is_lowered() {
         }
         let rising = forces.windows(2).all(|pair| pair[1] > pair[0]);
         assert!(rising, "{name}: {forces:?}");
-        // A power 3/2 bends by 1e-3 here at most; what is more is that of the grids. A patch that joins another gap makes 0.05.
+        // A power 3/2 has second differences of at most 1e-3 here, and the grids cause the rest. A patch that joins another gap causes 0.05.
         assert!(
             bend(&forces) < 0.008,
             "{name}: {} of {forces:?}",
@@ -174,13 +174,13 @@ fn forces_and_pressures_do_not_jump_with_the_load() {
             lateral.push(solution.total[0].force_y_n);
             peaks.push(peak(&solution));
         }
-        // Creepages follow the meshes of the tangential problem besides.
+        // Creepages also depend on the meshes of the tangential problem.
         assert!(bend(&lateral) < 0.015, "{name}: {lateral:?}");
         assert!(bend(&peaks) < 0.015, "{name}: {peaks:?}");
     }
 }
 
-/// With yaw, from light to heavy: whatever the two overlaps do, the wheel comes to rest and carries its load.
+/// Tests light to heavy loads with yaw: the wheel reaches equilibrium and carries its load however the two overlaps behave.
 #[test]
 fn a_wheel_on_two_patches_side_by_side_always_comes_to_rest() {
     let case = conforming();
@@ -202,7 +202,7 @@ fn a_wheel_on_two_patches_side_by_side_always_comes_to_rest() {
     }
 }
 
-/// Places of a patch across the track: its ends along the rail in mm, and the inclination of the rail there in rad.
+/// Lateral extent of a patch: its ends along the rail in mm, and the inclinations of the rail in rad.
 struct Place {
     ends: [f64; 2],
     angle: f64,
@@ -238,8 +238,8 @@ fn places(case: &Value, solution: &Solution) -> Vec<Place> {
     solution.patches.iter().map(place).collect()
 }
 
-/// Tread and flange 32 mm apart and inclined to each other by 0.6 rad, with a gap of about 70 µm all the way between them, in which at most one or two percent
-/// of the load lie, on either plane.
+/// Tests tread and flange, 32 mm apart and inclined to each other by 0.6 rad. The gap between them is about 70 µm everywhere and carries at most one
+/// or two percent of the load, on either plane.
 #[test]
 fn a_thin_overlap_between_two_places_does_not_put_them_into_one_plane() {
     let lateral: Vec<f64> = [0.0, 0.005, 0.02]
@@ -276,7 +276,7 @@ fn a_thin_overlap_between_two_places_does_not_put_them_into_one_plane() {
     }
 }
 
-/// Whatever the pair and its place: neighbours in one plane are no more than 12 mm apart, and no two differ by more than half a radian.
+/// Tests random pairs and positions: neighbours in one plane are at most 12 mm apart, and no two differ by more than half a radian.
 #[test]
 fn patches_far_apart_or_inclined_to_each_other_never_share_a_plane() {
     let mut random = crate::random::Random(17);
@@ -328,7 +328,7 @@ fn patches_far_apart_or_inclined_to_each_other_never_share_a_plane() {
                 }
                 for other in &pair[k + 1..] {
                     let turned = (one.own_angle - other.own_angle).abs();
-                    // Mean inclinations under the pressure on the curve decide, not those at the load centres.
+                    // The criterion is the mean inclination under the pressure on the curve, not the inclination at the load centres.
                     assert!(turned < 0.65, "{round}: {turned}");
                 }
             }

@@ -1,13 +1,13 @@
-//! Damaged profiles in short: wrong answers are told, right ones and sound profiles are not, and what noise leaves open is known.
+//! Tests of damaged profiles, in short: wrong answers get remarks, right ones and sound profiles do not, and the uncertainty due to noise is stated.
 //!
-//! The long form is the class *damaged profile* of `cargo bench --bench stress`.
+//! The full tests are the class *damaged profile* of `cargo bench --bench stress`.
 
 use serde_json::json;
 
 use crate::damaged::{Damage, Pair, held_out, tuned_on};
 use crate::damaged_trials::{Counts, rows_of};
 
-/// The counts of all kinds of damage together, or of one with the advised smoothing.
+/// Returns the counts over all kinds of damage without smoothing, or over one kind with automatic smoothing.
 fn trials(pairs: &[Pair], seed: u64, places: usize, kind: Option<usize>) -> Counts {
     let smoothing = if kind.is_some() {
         json!("auto")

@@ -1,4 +1,4 @@
-//! Are faulty profiles refused, and doubtful ones remarked on?
+//! Tests that faulty profiles are refused, and that doubtful ones get remarks.
 
 use railhead_contact::geometry::contact_locus::ContactLocus;
 use railhead_contact::geometry::profile::{Body, Profile, Reading};
@@ -78,7 +78,7 @@ fn loops_are_refused() {
 
 #[test]
 fn points_that_are_given_twice_are_refused() {
-    // The chord from the last point back to the first crosses no other.
+    // The chord from the last point back to the first crosses no other chord.
     let text = include_str!("../../api/examples/wheel-rail.case.json");
     let case: Value = serde_json::from_str(text).unwrap();
     let given: Vec<[f64; 2]> =
@@ -105,7 +105,7 @@ fn single_points_that_run_back_are_dropped_with_a_remark() {
                     profile: "rail",
                     count: 2
                 },
-                // What ran back had left its point twice.
+                // The points that ran back left a duplicate point.
                 Remark::ProfilePointsMerged { count: 1, .. }
             ]
         ),

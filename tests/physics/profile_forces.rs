@@ -1,4 +1,5 @@
-//! Longitudinal and lateral forces prescribed under a wheel on a rail: creepages or angular velocity are found, with the wheel at rest under its load.
+//! Tests of longitudinal and lateral forces prescribed under a wheel on a rail. The solver finds creepages or angular velocity, with the wheel in
+//! equilibrium under its load.
 
 use std::time::Instant;
 
@@ -38,7 +39,7 @@ fn the_force_of_a_creepage_gives_the_creepage_back() {
         let creepage = found.patches[0].points[0].motion.creepage_x;
         assert!((creepage / x - 1.0).abs() < 0.01, "{creepage} {x}");
         assert!(found.angular_velocity_rad_per_s.is_none());
-        // Both components together still balance the load.
+        // Both components together balance the load.
         let vertical = found.total[0].force_z_n.expect("of profiles");
         assert!((vertical / 75_000.0 + 1.0).abs() < 1e-3, "{vertical}");
     }
@@ -65,7 +66,7 @@ fn a_wheelset_turns_as_fast_as_the_force_of_two_patches_needs() {
     assert!((found.total[0].force_x_n - force).abs() < 1e-3 * LIMIT);
     let turning = found.angular_velocity_rad_per_s.expect("was found");
     assert!((turning / 43.3 - 1.0).abs() < 2e-5, "{turning}");
-    // A driven wheel turns faster, and its forces drive the rail back.
+    // A driven wheel turns faster, and its forces push the rail backward.
     let driven = of(json!({ "force_x_n": -8000 }));
     let braked = of(json!({ "force_x_n": 8000 }));
     let [fast, slow] =
@@ -97,7 +98,7 @@ fn forces_that_a_wheel_cannot_have_are_refused_by_name() {
     );
 }
 
-/// Why a case that passes the checks has no answer.
+/// Returns the reason why a case that passes the checks has no answer.
 fn refusal(case: &Value) -> String {
     let checked =
         contact::check(case, &Limits::default()).expect("the normal force is not known yet");
@@ -107,7 +108,7 @@ fn refusal(case: &Value) -> String {
     reason
 }
 
-/// The same place of the wheel on the right rail (1) or, mirrored, on the left (−1).
+/// Returns the same position of the wheel on the right rail (1) or, mirrored, on the left (−1).
 fn at_shift(shift: f64, side: f64, motion: Value) -> Value {
     let name = if side > 0.0 { "right" } else { "left" };
     put(
@@ -136,7 +137,7 @@ fn the_lateral_force_of_a_creepage_gives_the_creepage_back() {
         assert_eq!(found.patches.len(), given.patches.len());
         let creepage = found.patches[0].points[0].motion.creepage_y;
         assert!((creepage / y - 1.0).abs() < 0.02, "{shift}: {creepage} {y}");
-        // The creepage in the other direction stays, and all forces balance the load.
+        // The other creepage is unchanged, and all forces balance the load.
         assert_eq!(found.patches[0].points[0].motion.creepage_x, 0.0005);
         let vertical = found.total[0].force_z_n.expect("of profiles");
         assert!((vertical / 75_000.0 + 1.0).abs() < 1e-3, "{vertical}");
@@ -157,7 +158,7 @@ fn a_mirrored_wheel_needs_the_mirrored_lateral_creepage() {
 
 #[test]
 fn a_lateral_force_is_found_up_to_full_slip_and_refused_beyond() {
-    // In full slip friction adds its angle to that of the contact: V tan(α ± φ) where one angle is that of all patches.
+    // In full slip, friction adds its angle to that of the contact: V tan(α ± φ) if all patches have the same angle.
     let still = answer(&moving(json!({ "creepage_y": 0.0 })));
     let position = still.patches[0].position.as_ref().expect("of profiles");
     let angle = position.contact_angle_rad;
@@ -248,8 +249,8 @@ fn two_forces_that_friction_carries_one_by_one_but_not_together_are_refused() {
     );
 }
 
-/// How many times as long as its creepages forces take, and are told to take: the median over random motions on tread and flange.
-/// `RAILHEAD_PULLS=40 cargo test --locked --test physics -- forces_take --nocapture` prints it for 40.
+/// Compares the measured and the estimated ratio of the time for prescribed forces to the time for creepages: medians over random motions on tread
+/// and flange. `RAILHEAD_PULLS=40 cargo test --locked --test physics -- forces_take --nocapture` prints the ratios for 40 motions.
 #[test]
 fn forces_take_about_the_time_told_for_them() {
     let named = std::env::var("RAILHEAD_PULLS").ok();
@@ -275,7 +276,7 @@ fn forces_take_about_the_time_told_for_them() {
     }
 }
 
-/// Times of a random motion by forces over that by creepages: taken and told.
+/// Returns the ratios of the time of a random motion by forces to that by creepages: measured and estimated.
 fn ratio_of_times(random: &mut Random, names: &[&str]) -> [f64; 2] {
     let [x, y] = [0, 1].map(|_| random.between(-0.002, 0.002));
     let spin = random.between(-2e-4, 2e-4);

@@ -1,4 +1,4 @@
-//! Do profile files say what their formats mean?
+//! Tests that profile files are read as their formats define.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::check;
@@ -32,14 +32,14 @@ fn columns_may_be_separated_by_blanks_commas_semicolons_or_tabs() {
     }
 }
 
-/// A rail head of 60E1 with four decimals, so that its text holds it exactly.
+/// Returns a rail head of 60E1 with four decimals, so that its text is exact.
 fn section() -> Vec<[f64; 2]> {
     let four_decimals = |part: f64| (part * 1e4).round() / 1e4;
     let points = rail_60e1().into_iter();
     points.map(|point| point.map(four_decimals)).collect()
 }
 
-/// The rows of a text, each written by a function.
+/// Returns the rows of a text, each written by a function.
 fn rows(write: impl Fn(usize, &str, &str) -> String) -> String {
     let points = section();
     let row = |(k, [y, z]): (usize, &[f64; 2])| write(k, &y.to_string(), &z.to_string());
@@ -58,7 +58,7 @@ fn is_section(format: Format, text: &str, form: &str) -> ProfileFile {
     contents
 }
 
-/// A row that lies 0.5 mm off the section, so that it shows if it is read.
+/// A row 0.5 mm off the section, so that reading it changes the result.
 const OFF: &str = "-20.0 1.5 0 0 7";
 
 fn with_line(text: &str, k: usize, line: &str) -> String {
@@ -67,7 +67,7 @@ fn with_line(text: &str, k: usize, line: &str) -> String {
     lines.join("\n")
 }
 
-/// Forms of the same rows: line ends, encodings, separators and decimal signs.
+/// Returns the same rows with different line ends, encodings, separators and decimal signs.
 fn written_forms() -> Vec<(&'static str, String)> {
     let commas = |text: String| text.replace('.', ",");
     let in_utf16 = plain().chars().flat_map(|c| [c, '\0']).collect();
@@ -104,7 +104,7 @@ fn written_forms() -> Vec<(&'static str, String)> {
     ]
 }
 
-/// Forms with more than the points: columns, words, titles, a header, an end.
+/// Returns texts with more than the points: columns, words, titles, a header, a footer.
 fn extended_forms() -> Vec<(&'static str, String)> {
     let behind =
         |words: &str| rows(|k, y, z| format!("{y} {z}{}\n", if k == 9 { words } else { "" }));
@@ -237,7 +237,7 @@ fn rows_of_numbers_in_a_header_are_no_points() {
             .unwrap_or_else(|| panic!("{form}: no remark"));
         assert_eq!(first, line, "{form}");
     }
-    // A part of the points that an empty line cuts off is no header.
+    // A part of the points separated by an empty line is not a header.
     let cut = "ColumnDef=X,Y\n\n".to_owned() + &with_line(&miniprof_rows(), 5, "");
     assert_eq!(
         is_section(Format::Miniprof, &cut, "cut off").header_rows,
@@ -294,7 +294,7 @@ fn a_line_that_cannot_be_read_is_shown_with_its_place() {
             vec!["decimal commas and decimal points are mixed"],
         ),
     ] {
-        // Behind many rows, so that no line is taken for a header.
+        // The line follows many rows, so that it is not taken for a header.
         let text = if line == 1 {
             text.to_owned()
         } else {
@@ -319,7 +319,7 @@ fn a_line_that_cannot_be_read_is_shown_with_its_place() {
 
 #[test]
 fn whole_lines_are_shown_and_texts_without_points_say_why() {
-    // The whole line is shown, up to some hundred characters.
+    // The whole line is shown, up to about a hundred characters.
     let long = format!("{}3 {}", "0 1\n".repeat(8), "x".repeat(200));
     assert!(
         read(Format::Columns, &long)
@@ -383,7 +383,7 @@ fn paths_and_other_formats_are_named_for_what_they_are() {
             );
         }
     }
-    // Keywords in remarks say nothing.
+    // Keywords in comments have no effect.
     is_section(
         Format::Columns,
         &format!("# ColumnDef=X,Y\n{}", plain()),
@@ -462,7 +462,7 @@ fn units_of_files_are_honoured() {
         read_mm(Format::Simpack, &simpack(" units.len = 'm'")),
         ([1000.0, 2000.0], Some(1000.0))
     );
-    // The factor counts before the name.
+    // The factor takes precedence over the unit name.
     assert_eq!(
         read_mm(
             Format::Simpack,
@@ -582,7 +582,7 @@ fn one_rail_in_two_formats_is_one_rail() {
         read(Format::Miniprof, &ban).unwrap(),
         read(Format::Simpack, &prr).unwrap(),
     );
-    // Rows that begin with a quote are commented out in the file of MiniProf.
+    // Rows that begin with a quote are commented out in the MiniProf file.
     assert!(ban.points.len() < prr.points.len());
     for from in &ban.points {
         let is_same =

@@ -1,4 +1,4 @@
-//! Do wheel and rail touch where they should?
+//! Tests that wheel and rail touch at the right places.
 
 use railhead_contact::geometry::contact_locus::ContactLocus;
 use railhead_contact::geometry::formats;
@@ -10,7 +10,7 @@ use railhead_contact::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRa
 use crate::profile_reference_files::reference_file;
 use crate::profile_shapes::{rail_60e1, s1002};
 
-/// The Manchester contact benchmark: right side, wheelset in the middle.
+/// Returns the placement of the Manchester contact benchmark: right side, wheelset in the middle.
 pub fn placement() -> Placement {
     Placement {
         side: Side::Right,
@@ -39,7 +39,7 @@ pub fn generated() -> [Profile; 2] {
         .map(|(body, points)| Profile::new(body, &points, AS_GIVEN).unwrap())
 }
 
-/// Roll with which both wheels of a symmetric wheelset touch symmetric rails at the same height.
+/// Returns the roll with which both wheels of a symmetric wheelset touch symmetric rails at the same height.
 pub fn roll(profiles: &[Profile; 2], placement: Placement) -> f64 {
     let difference = |roll: f64| {
         let touch = |side| {
@@ -67,8 +67,8 @@ pub fn roll(profiles: &[Profile; 2], placement: Placement) -> f64 {
     high
 }
 
-/// Shift to the right in mm, yaw in mrad, track's y of the patch on the right rail from the origin of the benchmark's rail, and about the
-/// normal approach at 10 kN: CONTACT's answers for case.
+/// CONTACT's answers for case: shift to the right in mm, yaw in mrad, track's y of the patch on the right rail from the origin of the
+/// benchmark's rail, and the approximate normal approach at 10 kN.
 pub const MANCHESTER: [[f64; 4]; 12] = [
     [0.0, 0.0, -8.66, 0.016],
     [0.5, 1.2, -16.03, 0.019],
@@ -83,11 +83,11 @@ pub const MANCHESTER: [[f64; 4]; 12] = [
     [8.0, 19.2, -40.70, 0.035],
     [10.0, 24.0, -39.44, 0.034],
 ];
-/// Track's y of the origin of the benchmark's rail, which is given with its cant.
+/// Track's y of the origin of the benchmark's rail, whose points include its cant.
 pub const RAIL_ORIGIN: f64 = 760.5326;
 
-/// Track's y of the mean overlap, weighted with its square over the area, whose length along x grows as the root of the overlap; CONTACT has one such
-/// point for patches that lie near each other.
+/// Returns the track's y of the mean overlap. The weight is the squared overlap over the area, whose length along x grows as the root of the
+/// overlap. CONTACT has one such point for neighbouring patches.
 fn centre_of_overlap(curve: &ReferenceCurve, centre: f64) -> f64 {
     let (mut weight, mut sum) = (0.0, 0.0);
     for nearest in curve.overlaps(centre).iter().flatten() {
@@ -98,7 +98,7 @@ fn centre_of_overlap(curve: &ReferenceCurve, centre: f64) -> f64 {
     sum / weight
 }
 
-/// The deepest of all overlaps.
+/// Returns the deepest of all overlaps.
 fn deepest(curve: &ReferenceCurve, centre: f64) -> Nearest {
     let all = curve.overlaps(centre).into_iter().flatten();
     let deepest = all.min_by(|a, b| a.wheel.gap.total_cmp(&b.wheel.gap));
@@ -187,7 +187,7 @@ fn left_and_right_are_mirror_images() {
     }
 }
 
-/// A cone on a cylinder: rail of radius 300 mm, wheel coned 1:20.
+/// Returns a cone on a cylinder: rail of radius 300 mm, wheel coned 1:20.
 fn cone_on_arc() -> [Profile; 2] {
     let arc = (-30..=30)
         .map(f64::from)
@@ -232,7 +232,7 @@ fn the_gap_of_a_cone_on_an_arc_has_the_closed_form() {
     assert!(plane.is_flat());
     let (_, over) = plane.nearest(&origin, centre).expect("the wheel");
     let [along, _] = geometry.on_wheel(over.wheel);
-    // The radius of curvature of a cone at right angles to its generator.
+    // Radius of curvature of a cone at right angles to its generator.
     let rolling = (460.0 - 0.05 * along) / angle.cos();
     for v in [-5.0, -1.7, 0.0, 0.9, 4.2] {
         let place = plane.at(origin.s + v);
@@ -275,7 +275,7 @@ fn a_larger_clearance_of_the_wheel_makes_the_overlap_smaller_by_as_much() {
     }
 }
 
-/// The order of smoothing the profiles and moving the wheelset does not matter.
+/// Tests that smoothing the profiles and moving the wheelset give the same contact in either order.
 #[test]
 fn a_smoothed_pair_has_the_same_contact_wherever_it_was_smoothed() {
     let [rail, wheel] = generated();

@@ -1,4 +1,4 @@
-//! Rolling that changes of a wheel on a rail that stays where it is: every patch has its own history of the same creepages.
+//! Tests of transient rolling of a wheel on a rail in a fixed position: every patch has its own history of the same creepages.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -12,7 +12,7 @@ use crate::reference::{assert_none, solve};
 const MU: f64 = 0.3;
 const CREEPAGES: [f64; 3] = [0.0015, -0.001, 2e-4];
 
-/// Load on the gauge corner and on the flange, which touches ahead because the wheelset is yawed.
+/// Returns a wheel with load on the gauge corner and on the flange, which touches ahead because the wheelset is yawed.
 fn two_patches() -> Value {
     let place = json!({ "lateral_shift_mm": -6.45, "yaw_rad": -0.02 });
     let mut case = put(&generated(), "contact", place);
@@ -31,7 +31,7 @@ fn moving(case: &Value, motion: Value) -> Solution {
     solve(&case).0
 }
 
-/// Where a patch begins and ends along the track in mm.
+/// Returns the rear and front end of a patch along the track in mm.
 fn ends(patch: &PatchSolution) -> [f64; 2] {
     let origin = patch
         .position
@@ -41,7 +41,7 @@ fn ends(patch: &PatchSolution) -> [f64; 2] {
     [0, 1].map(|k| origin + patch.extent_mm[k])
 }
 
-/// Also on the curve with factors for its turn, where the tractions of steady rolling change their pressures and those of a history do not.
+/// Also tests the curve with factors for its curvature, where tractions change the pressures of steady rolling but not those of a history.
 #[test]
 fn every_patch_ends_in_steady_rolling() {
     let mut failures = Vec::new();
@@ -86,7 +86,7 @@ fn every_patch_ends_in_steady_rolling() {
                     "patch {k}: {off:?} of {limit}, {own:?} and {other:?}"
                 ));
             }
-            // It has not always been so.
+            // The early point is not yet steady.
             assert!(early.force_x_n.abs() < 0.7 * late.force_x_n.abs(), "{k}");
             let taken = |k: usize| patch.points[k].history.expect("a history").dissipated_n_mm;
             assert!(0.0 <= taken(0) && taken(0) < taken(1));
@@ -115,7 +115,7 @@ fn totals_are_sums_in_track_axes_at_every_distance() {
     }
 }
 
-/// The pressures of a history belong to its last point: there the forces are those of steady rolling, and before it friction carries less.
+/// Tests that the pressures of a history belong to its last point. There the forces are those of steady rolling. Before it, friction carries less.
 #[test]
 fn a_vertical_force_is_met_at_the_last_point_and_a_remark_tells_of_the_others() {
     let mut case = two_patches();
@@ -124,7 +124,7 @@ fn a_vertical_force_is_met_at_the_last_point_and_a_remark_tells_of_the_others() 
         let [x, y, spin] = CREEPAGES;
         let motion = json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin });
         let steady = moving(&case, motion).total[0];
-        // Nothing is displaced at 0.
+        // Nothing is displaced at distance 0.
         let solution = moving(&case, rolled(&[0.0, 60.0], CREEPAGES));
         let code = "pressures-of-last-point";
         assert!(solution.remarks.iter().any(|remark| remark.code == code));
@@ -147,7 +147,8 @@ fn a_vertical_force_is_met_at_the_last_point_and_a_remark_tells_of_the_others() 
     }
 }
 
-/// In full slip each patch carries what its place on the track allows, and patches of a yawed wheel come to a wet place one after the other.
+/// Tests full slip: each patch carries the friction limit of its place on the track, and the patches of a yawed wheel reach a wet place one after
+/// the other.
 #[test]
 fn patches_reach_a_jump_of_friction_where_they_are() {
     let mut case = two_patches();
@@ -159,7 +160,7 @@ fn patches_reach_a_jump_of_friction_where_they_are() {
     let apart = ends(ahead)[0] - ends(behind)[0];
     assert!(apart > 3.0, "{apart}");
     let jump = 60.0;
-    // Every patch just before the jump, and just beyond it.
+    // The distances put every patch just before and just beyond the jump.
     let places = still.patches.iter().flat_map(|patch| {
         let [rear, front] = ends(patch);
         [jump - front - 0.05, jump - rear + 0.05]
@@ -216,7 +217,7 @@ fn what_does_not_go_with_a_wheel_that_stays_is_refused_by_name() {
     assert_fault(&case, "/motion/start", &["similar"]);
 }
 
-/// A history longer than the solver allows is found out when the patches are known.
+/// Tests that a history longer than the solver allows is refused once the patches are known.
 #[test]
 fn a_history_with_too_many_steps_is_refused() {
     let mut case = generated();

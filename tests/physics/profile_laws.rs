@@ -1,4 +1,4 @@
-//! What must hold for a wheel on a rail, whatever the shapes: closed forms, balance, mirror images.
+//! Tests of laws for a wheel on a rail of any shape: closed forms, balance, mirror images.
 
 use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead_contact::solution::words::answer::{PatchSolution, Position, Solution};
@@ -33,7 +33,7 @@ fn load(case: &Value, name: &str, value: f64) -> Value {
     case
 }
 
-/// A rail of radius 300 mm under a wheel coned 1:20.
+/// Returns a rail of radius 300 mm under a wheel coned 1:20.
 pub fn cone_on_arc() -> Value {
     let arc: Vec<[f64; 2]> = (-60..=60)
         .map(|k| 0.5 * f64::from(k))
@@ -57,7 +57,7 @@ fn a_cone_on_an_arc_is_hertzs_contact_at_its_angle() {
             (found.rail_mm[0] + 300.0 * angle.sin()).abs() < 0.03,
             "{found:?}"
         );
-        // The radius of curvature of a cone at right angles to its generator.
+        // Radius of curvature of a cone at right angles to its generator.
         let rolling = found.rolling_radius_mm / angle.cos();
         let normal = force / angle.cos();
         let modulus = 82_000.0 / 0.72;
@@ -100,7 +100,7 @@ fn normal_and_tangential_forces_together_carry_the_vertical_force() {
             (vertical / 75e3 - 1.0).abs() < 1e-3,
             "shift {shift}: {vertical}"
         );
-        // The parts of every patch, turned by hand. On planes the pressures of a patch have one direction.
+        // The test rotates the forces of every patch itself. On planes, the pressures of a patch have one direction.
         let (solution, _) = solve(&on_planes(&case));
         let total = solution.total[0];
         let vertical = -total.force_z_n.expect("a vertical force");
@@ -187,7 +187,7 @@ fn left_and_right_are_mirror_images_in_every_number() {
     let close = |a: f64, b: f64, scale: f64| assert!((a - b).abs() < 1e-3 * scale, "{a} {b}");
     for (a, b) in right.patches.iter().zip(left.patches.iter().rev()) {
         close(a.normal_force_n, b.normal_force_n, b.normal_force_n);
-        // Rounding decides which heights are tried on the way; of all numbers the area feels most which ones they were.
+        // Rounding decides which heights are tried. The area is the number that depends most on them.
         close(a.area_mm2, b.area_mm2, 3.0 * b.area_mm2);
         let (here, there) = (position(a), position(b));
         close(here.contact_angle_rad, -there.contact_angle_rad, 1.0);

@@ -1,4 +1,4 @@
-//! The Manchester contact benchmark, case, through the case: 10 kN, profiles generated from their definitions.
+//! Tests case of the Manchester contact benchmark, given as cases: 10 kN, with profiles generated from their definitions.
 
 use railhead_contact::solution::words::answer::{PatchSolution, Position};
 use serde_json::json;
@@ -8,8 +8,8 @@ use crate::profile_geometry::{self, MANCHESTER, RAIL_ORIGIN, placement, roll};
 use crate::reference::{assert_none, solve};
 use railhead_contact::geometry::wheel_rail::Placement;
 
-/// How far the load centre may lie from the benchmark's point, which is the mean overlap: on the flat top of the rail and
-/// where tread and corner touch together the two differ.
+/// Returns the allowed distance of the load centre from the benchmark's point, which is the mean overlap. The two differ on the flat top of the rail
+/// and where tread and corner touch together.
 fn allowed(shift: f64) -> f64 {
     match shift {
         0.0 => 0.6,

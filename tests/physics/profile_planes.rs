@@ -1,4 +1,4 @@
-//! Are forces on planes of contact those of CONTACT's planes, as far as the curve has the same? Needs the reference files.
+//! Compares forces on planes of contact with CONTACT's, as far as the curve gives the same forces. Needs the reference files.
 
 use railhead_contact::solution::words::answer::Total;
 use serde_json::{Value, json};
@@ -7,14 +7,14 @@ use crate::profile_cases::{put, wheel_on_rail};
 use crate::profile_reference_files::reference_file;
 use crate::reference::solve;
 
-/// What is allowed of a total relative to μN beside the uncertainty of the reference.
+/// Allowed error of a total relative to μN, beyond the uncertainty of the reference.
 const RESULTANT: f64 = 0.01;
 
 fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
-/// The question of a record, turned by half a turn about x: there z points down.
+/// Returns the question of a record, rotated by half a turn about x because z points down in the record.
 fn question(input: &Value) -> Option<Value> {
     let file = |name: &str| {
         let name = format!("profiles/{}", input[name].as_str()?);
@@ -56,7 +56,7 @@ fn question(input: &Value) -> Option<Value> {
     ))
 }
 
-/// The total force of a record along and across, with their uncertainties, by linear extrapolation of its two finest grids.
+/// Returns the total longitudinal and lateral force of a record with their uncertainties, by linear extrapolation of its two finest grids.
 fn expected(record: &Value) -> [[f64; 2]; 2] {
     let grids = record["grids"].as_array().expect("grids");
     let [.., coarse, fine] = grids.as_slice() else {
@@ -72,7 +72,8 @@ fn expected(record: &Value) -> [[f64; 2]; 2] {
     })
 }
 
-/// Where planes differ from the curve, the place and the inclination of a plane matter, which programs choose in their own ways.
+/// Tests the totals within the larger of the allowed error and the estimate plus the difference from the curve. Where planes differ from the curve,
+/// position and inclination of a plane matter, and programs choose them differently.
 #[test]
 fn totals_are_as_near_the_reference_as_the_curve() {
     let Some(text) = reference_file("extended/profile_module1b.json") else {
@@ -108,6 +109,6 @@ fn totals_are_as_near_the_reference_as_the_curve() {
         }
     }
     assert_eq!(records.len(), 22);
-    // At y = 14.6 mm a second patch of 0.6 % of the load decides: here it shares a half-space with the first, which lifts it off.
+    // At y = 14.6 mm a second patch with 0.6 % of the load matters. Here it shares a half-space with the first patch, which lifts it off.
     assert!(far.len() <= 1, "{far:?}");
 }

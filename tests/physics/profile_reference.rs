@@ -1,4 +1,4 @@
-//! Do the frames and creepages of wheel and rail agree with CONTACT's? Needs the reference files beside the checkout.
+//! Tests that frames and creepages of wheel and rail agree with CONTACT's. Needs the reference files beside the checkout.
 
 use railhead_contact::geometry::contact_locus::ContactLocus;
 use railhead_contact::geometry::formats;
@@ -31,8 +31,8 @@ fn list(value: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// There body 1 is the rail and z points down: turned by half a turn about x, y, yaw and lateral creepage change sign or keep it as below.
-/// The roll is not stored; it follows from the place of the contact in the track and on the wheel.
+/// In the records, body 1 is the rail and z points down. The rotation by half a turn about x changes the signs of y, yaw and lateral creepage or
+/// keeps them, as below. The roll is not stored. It follows from the place of the contact in the track and on the wheel.
 #[test]
 fn frames_and_creepages_agree_with_contact() {
     let (Some(rail), Some(wheel), Some(text)) = (
@@ -100,7 +100,7 @@ fn frames_and_creepages_agree_with_contact() {
         let rigid = RigidMotion::of_wheelset(&geometry, centre, &motion);
         let [along, across] = rigid.slip(place.point(x, wheel.gap), &place);
         let spin = rigid.spin(&place);
-        // CONTACT takes the radius at the deepest overlap, this is the one at the mean overlap, up to 0.5 mm away.
+        // CONTACT takes the radius at the deepest overlap. The radius here is that at the mean overlap, up to 0.5 mm away.
         assert!((-place.at[0] - on_track[1]).abs() < 0.5, "{}", record["id"]);
         assert!((place.angle - on_track[3]).abs() < 5e-3);
         let steep = 3e-4 * on_track[3].abs();

@@ -1,4 +1,4 @@
-//! Remarks on profiles by their codes: each kind of damage gets its own, at the profile that has it.
+//! Tests of the remarks on profiles by their codes: each kind of damage gets its own remark, at the damaged profile.
 
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::remark::kind::Figure;
@@ -20,7 +20,7 @@ fn points_far_apart_and_waves_are_named_with_their_profile() {
     let nearest = points.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
     let place = *nearest.expect("points");
     let mut done = |damage: Damage| damage.done_to(&points, place, &mut random);
-    // Short waves of few points each cannot be told from noise.
+    // Short waves with few points each cannot be distinguished from noise.
     for (rail, codes) in [
         (done(Damage::Hole(20.0)), ["profile-spacing"; 2]),
         (done(Damage::Coarse(8.0)), ["profile-spacing"; 2]),
@@ -52,7 +52,7 @@ fn a_target_that_the_measurement_does_not_support_is_told() {
     );
 }
 
-/// Beside the patch there are no points, and the curve through those that are left lies so near the wheel that it might touch.
+/// Tests a hole beside the patch. The curve through the remaining points lies so near the wheel that it might touch.
 #[test]
 fn a_hole_beside_the_patch_is_told_with_its_place_and_length() {
     let points = rail_60e1();
@@ -71,7 +71,7 @@ fn a_hole_beside_the_patch_is_told_with_its_place_and_length() {
         let Figure::Number(length) = told.figures["hole_mm"] else {
             panic!("{told:?}")
         };
-        // Measured along the curve, from the last point before the hole to the first behind it.
+        // The length is measured along the curve, from the last point before the hole to the first after it.
         assert!((20.0..23.0).contains(&length), "{length}");
         let quality = found.patches[0].quality.clone().expect("a quality").rail;
         assert_eq!(quality.hole_mm, Some(length));

@@ -1,4 +1,4 @@
-//! A wheel comes to rest wherever it stands on its rail, or the reason is told.
+//! Tests that a wheel reaches equilibrium in any position on its rail, or that the reason is given.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::error::SolveError;
@@ -46,7 +46,7 @@ fn random_wheelsets_are_balanced_or_refused_with_a_reason() {
         };
         let total = solution.total[0];
         let vertical = -total.force_z_n.expect("a vertical force");
-        // A wheel wedged by a hundred times its load may use up its rounds; then the remark says what is missed.
+        // A wheel that is wedged with a hundred times its load may reach the iteration limit. The remark then states the remaining error.
         let rounds = solution
             .remarks
             .iter()
@@ -72,7 +72,7 @@ fn random_wheelsets_are_balanced_or_refused_with_a_reason() {
                 (700.0..800.0).contains(&(sign * position.track_mm[1])),
                 "{k}: {position:?}"
             );
-            // The two surfaces are as far apart as the bodies overlap, no more.
+            // The distance of the two surfaces is the overlap of the bodies.
             let on_wheel = position.rolling_radius_mm - 460.0 - position.wheel_mm[1];
             assert!(on_wheel.abs() < 1e-9, "{k}: {position:?}");
         }

@@ -1,5 +1,5 @@
-//! Are sections read the right way round? One section has one answer, in whatever senses, order, spacing and format its points are given; where its
-//! shape does not show the senses, the case is refused and names what to state.
+//! Tests that sections are read with the right orientation. A section has one answer, whatever the signs, order, spacing and format of its points.
+//! Where its shape does not determine the orientation, the case is refused and names the members to state.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::check;
@@ -13,7 +13,7 @@ use crate::profile_shapes::{rail_60e1, s1002};
 use crate::profile_variants::{Encoding, Form, Points, Variant, rails, wheels};
 use crate::reference::solve;
 
-/// S1002 on 60E1 with other sections; the position of the flange's back is left out.
+/// Returns S1002 on 60E1 with other sections. The position of the flange's back is left out.
 fn pair(rail: Value, wheel: Value) -> Value {
     let mut case = put(
         &generated(),
@@ -29,7 +29,7 @@ fn checked(case: &Value) -> Result<CheckedCase, String> {
     check(case, &Limits::default()).map_err(|error| error.to_string())
 }
 
-/// Where the wheel touches first, `[y, z]` on the rail, and how far it comes to rest below.
+/// Returns the place `[y, z]` of first contact on the rail, and the vertical displacement from there to equilibrium.
 fn touch(checked: &CheckedCase) -> [f64; 3] {
     let understood = checked.understood().expect("a touch");
     let placed = understood.placement.expect("profiles");
@@ -45,7 +45,7 @@ fn near(found: [f64; 3], expected: [f64; 3], what: &str) {
     );
 }
 
-/// The points in place of the base's, where they show their senses or with the senses stated.
+/// Returns the case with these points in place of the base's, with the orientation given by the shape or stated.
 fn wheel_case(variant: &Variant, encoding: Encoding, stated: bool) -> Value {
     let section = if stated {
         encoding.stated(&variant.points)
@@ -93,7 +93,7 @@ fn a_wheel_has_one_contact_however_its_points_are_given_or_is_refused_with_the_m
             let what = format!("{}, {encoding:?}", variant.name);
             let stated = checked(&wheel_case(&variant, encoding, true));
             near(touch(&stated.expect(&what)), expected, &what);
-            // A Simpack file specifies its senses.
+            // A Simpack file specifies its orientation.
             let shown = variant.clear || encoding.form == Form::Simpack;
             match checked(&wheel_case(&variant, encoding, false)) {
                 Ok(found) => near(touch(&found), expected, &what),
@@ -116,7 +116,7 @@ fn a_rail_has_one_contact_however_its_points_are_given() {
         for encoding in encodings() {
             let what = format!("{}, {encoding:?}", variant.name);
             let mut section = encoding.section(&variant.points);
-            // The sense of a rail's y is that of its format, since heads are nearly symmetric.
+            // The sign of a rail's y is that of its format, since heads are nearly symmetric.
             let usual = encoding.form == Form::Miniprof;
             if encoding.form != Form::Simpack && encoding.mirror_y != usual {
                 section["mirror_y"] = json!(encoding.mirror_y);
@@ -132,7 +132,7 @@ fn a_rail_has_one_contact_however_its_points_are_given() {
     }
 }
 
-/// The place of a touch on the rail in the axes of an encoded section.
+/// Returns the place of first contact on the rail in the axes of an encoded section.
 fn shifted([y, z, lowering]: [f64; 3], encoding: Encoding) -> [f64; 3] {
     [y + encoding.origin[0], z + encoding.origin[1], lowering]
 }
@@ -183,7 +183,7 @@ fn changed_senses_are_told_and_usual_ones_are_not() {
             ..encoding
         };
         assert_eq!(told(simpack), [false; 2], "{encoding:?}");
-        // X of MiniProf files usually grows to the track centre.
+        // X of MiniProf files usually grows toward the track centre.
         let miniprof = Encoding {
             form: Form::Miniprof,
             ..encoding
@@ -211,7 +211,7 @@ fn a_stated_sense_that_contradicts_the_shape_is_a_warning_and_is_named_where_not
             Err(refused) => assert!(refused.contains(&format!("{member}: true")), "{refused}"),
         }
     }
-    // X from the back of the flange, as in MiniProf files, with the opposite stated.
+    // X is measured from the back of the flange, as in MiniProf files, with the opposite sign stated.
     let shifted = Encoding {
         origin: [70.0, 0.0],
         ..Encoding::PLAIN
@@ -228,7 +228,7 @@ fn a_stated_sense_that_contradicts_the_shape_is_a_warning_and_is_named_where_not
     assert!(refused.contains("mirror_y: true"), "{refused}");
 }
 
-/// Points shifted so that the back of the flange is at another y.
+/// Returns the points shifted so that the back of the flange is at another y.
 fn shifted_wheel(by: f64) -> Points {
     s1002().iter().map(|[y, z]| [y + by, *z]).collect()
 }
@@ -248,7 +248,7 @@ fn the_back_of_the_flange_is_found_where_it_is_left_out() {
         };
         assert!((position - (by - 70.0)).abs() < 0.1, "{position} for {by}");
     }
-    // The points end on the face of the flange, where nothing shows its back.
+    // The points end on the face of the flange and do not show its back.
     let short: Points = shifted_wheel(70.0)
         .into_iter()
         .filter(|at| at[0] > 26.0)
@@ -289,7 +289,7 @@ fn a_stated_back_outside_the_points_is_refused_and_one_elsewhere_in_them_is_told
     assert!(told(9.0));
 }
 
-/// The nose of a crossing, and one with a wing rail beside it: y to the field side, z down.
+/// Returns the nose of a crossing, and one with a wing rail beside it: y to the field side, z down.
 fn crossings() -> [Points; 2] {
     let nose = |y: f64| match y {
         _ if y < 8.0 => [

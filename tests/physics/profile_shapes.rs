@@ -1,6 +1,6 @@
-//! Cross-sections written from the standards' published definitions; y to the field side, z down, mm.
+//! Cross-sections written from the standards' published definitions in mm, with y to the field side and z down.
 
-/// Wheel S1002 (EN 13715, annex B: polynomials of the tread, arcs of the flange), for -69.9 <= y <= 60.
+/// Returns wheel S1002 (EN 13715, annex B: polynomials of the tread, arcs of the flange), for -69.9 <= y <= 60.
 pub fn s1002() -> Vec<[f64; 2]> {
     let mut points = Vec::new();
     let mut y = -69.9_f64;
@@ -54,8 +54,8 @@ fn s1002_depth(y: f64) -> f64 {
     }
 }
 
-/// Head of the rail 60E1 (EN 13674-1), 72 mm wide, origin in the middle of its top: arcs of 300, 80 and 13 mm that meet at half widths of
-/// 10.25 and 26.05 mm, with centres 0, 7.70 and 23.015 mm from the middle, and sides inclined 1:20.
+/// Returns the head of the rail 60E1 (EN 13674-1), 72 mm wide, with its origin in the middle of its top. Its arcs of 300, 80 and 13 mm meet at half
+/// widths of 10.25 and 26.05 mm, with centres 0, 7.70 and 23.015 mm from the middle. Its sides are inclined 1:20.
 pub fn rail_60e1() -> Vec<[f64; 2]> {
     rail_head([
         (300.0, 0.0, 10.25),
@@ -64,7 +64,7 @@ pub fn rail_60e1() -> Vec<[f64; 2]> {
     ])
 }
 
-/// A head of arcs, each with its radius, its centre's distance from the middle and the half width until which it goes, and sides inclined 1:20.
+/// Returns a head with sides inclined 1:20. Each arc has its radius, the distance of its centre from the middle and the half width at which it ends.
 pub fn rail_head(arcs: [(f64, f64, f64); 3]) -> Vec<[f64; 2]> {
     let mut half = vec![[0.0, 0.0]];
     for (radius, centre, until) in arcs {

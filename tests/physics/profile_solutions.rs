@@ -1,5 +1,5 @@
-//! Patches, pressures and forces of wheel on rail against converged results of an independent program. Needs the reference
-//! files beside the checkout.
+//! Tests patches, pressures and forces of wheel on rail against converged results of an independent program. Needs the reference files beside the
+//! checkout.
 
 use std::f64::consts::PI;
 
@@ -10,8 +10,7 @@ use crate::profile_cases::{benchmark, put};
 use crate::profile_reference_files::reference_file;
 use crate::reference::{Converged, assert_none, solve};
 
-/// Load centres `[x, y]` in mm of the reference's pressures in its own coordinates (y to the field side), from its tables of
-/// pressures per element.
+/// Load centres `[x, y]` in mm of the reference's pressures in its own coordinates (y to the field side), from its tables of pressures per element.
 const LOAD_CENTRES: [(&str, [f64; 2]); 10] = [
     ("prof_y-3_75kN_yaw", [-0.0003, 0.1154]),
     ("prof_y0_10kN_bench", [0.0, -0.4331]),
@@ -25,12 +24,12 @@ const LOAD_CENTRES: [(&str, [f64; 2]); 10] = [
     ("prof_y6_10kN_bench", [-0.0319, 0.0366]),
 ];
 
-/// Here the reference has two patches 8 mm apart that press on each other's surface in part only, a stage between one gap and
-/// two; of the sums only those that hardly depend on it are compared.
+/// In this record the reference has two patches 8 mm apart that press on each other's surface only in part, between one gap and two. Only those sums
+/// that hardly depend on this are compared.
 const HALF_MERGED: &str = "prof_y5_10kN_bench";
-/// How far the load centre may lie from the reference's, in mm.
+/// Allowed distance of the load centre from the reference's, in mm.
 const PLACE: f64 = 0.1;
-/// What is allowed beside the uncertainty of the reference: relative, the resultants to μN and μN√(A/π).
+/// Allowed errors beyond the uncertainty of the reference. They are relative, those of the resultants to μN and μN√(A/π).
 const APPROACH: f64 = 0.003;
 const AREA: f64 = 0.02;
 const PRESSURE_MAX: f64 = 0.02;
@@ -41,15 +40,15 @@ fn list(value: &Value) -> Vec<f64> {
     elements.map(|v| v.as_f64().expect("a number")).collect()
 }
 
-/// One record of the reference, turned by half a turn about x: there body 1 is the rail and z points down.
+/// A record of the reference, rotated by half a turn about x. In the reference, body 1 is the rail and z points down.
 struct Record {
     id: String,
     question: Value,
-    /// Where creepages and moments are counted from, in our track axes.
+    /// Reference point of creepages and moments, in railhead's track axes.
     place: [f64; 3],
     angle: f64,
     motion: [f64; 3],
-    /// Angular velocity about the axle at 2 m/s, where it is stored.
+    /// Angular velocity about the axle at 2 m/s, if stored.
     turning: Option<f64>,
     converged: Value,
 }
@@ -66,11 +65,11 @@ impl Record {
     fn new(record: &Value) -> Option<Record> {
         let (input, patch) = (&record["input"], &record["patches"][0]);
         let shift = input["y_ws_mm"].as_f64().expect("a shift");
-        // The benchmark's yaw grows with the shift; roll and pitch are read off the place of the contact below.
+        // The benchmark's yaw grows with the shift. Roll and pitch follow from the place of the contact below.
         let yaw = input["yaw_rad"].as_f64().unwrap_or(2.4e-3 * shift);
         let on_track = list(&patch["contact_ref_track_xyz_delta_and_rail_yz"]);
         let on_wheel = list(&patch["contact_ref_wheel"]);
-        // Where the circle of the contact lies across: the roll follows from it, the cosine by iteration.
+        // The lateral position of the contact circle gives the roll, by iteration of the cosine.
         let (along, across) = ((750.0 + on_wheel[1]) * yaw.cos(), on_wheel[0] * yaw.sin());
         let radius = 460.0 + on_wheel[2];
         let from = |roll: f64| (along * roll.cos() + across + shift - on_track[1]) / radius;
@@ -103,14 +102,14 @@ impl Record {
         records.iter().map(Record::new).collect()
     }
 
-    /// The load centre in the reference's plane of contact, y to the left.
+    /// Returns the load centre in the reference's plane of contact, with y to the left.
     fn load_centre(&self) -> [f64; 2] {
         let known = LOAD_CENTRES.iter().find(|(id, _)| *id == self.id);
         let [x, y] = known.expect("a load centre").1;
         [x, -y]
     }
 
-    /// How far a place is from the reference's load centre, in mm.
+    /// Returns the distance of a place from the reference's load centre, in mm.
     fn away(&self, at: [f64; 3]) -> f64 {
         let away = [0, 1, 2].map(|k| at[k] - self.place[k]);
         let (sin, cos) = self.angle.sin_cos();
@@ -118,7 +117,7 @@ impl Record {
         (away[0] - u).hypot(away[1] * cos + away[2] * sin - v)
     }
 
-    /// The motion about the load centre.
+    /// Returns the motion about the load centre.
     fn motion(&self) -> Value {
         let ([x, y, spin], [u, v]) = (self.motion, self.load_centre());
         json!({ "creepage_x": x - spin * v, "creepage_y": y + spin * u, "spin_per_mm": spin })
@@ -129,7 +128,7 @@ fn position(patch: &PatchSolution) -> Position {
     patch.position.expect("a position")
 }
 
-/// The load centre of all patches in track axes.
+/// Returns the load centre of all patches in track axes.
 fn load_centre(patches: &[PatchSolution]) -> [f64; 3] {
     let load: f64 = patches.iter().map(|patch| patch.normal_force_n).sum();
     [0, 1, 2].map(|k| {
@@ -138,7 +137,7 @@ fn load_centre(patches: &[PatchSolution]) -> [f64; 3] {
     })
 }
 
-/// The moment of all patches about the load centre of all.
+/// Returns the moment of all patches about their common load centre.
 fn moment_of_all(patches: &[PatchSolution]) -> f64 {
     let origin = load_centre(patches);
     let of_patch = |patch: &PatchSolution| {
@@ -151,11 +150,11 @@ fn moment_of_all(patches: &[PatchSolution]) -> f64 {
     patches.iter().map(of_patch).sum()
 }
 
-/// Every quantity that is off by more than is allowed.
+/// Returns a message for every quantity that is off by more than is allowed.
 fn failures(record: &Record) -> Vec<String> {
     let (solution, _) = solve(&put(&record.question, "motion", record.motion()));
     let mut failures = Vec::new();
-    // Patches near each other share a plane; the reference counts them as one.
+    // Neighbouring patches share a plane, and the reference counts them as one.
     let patches = &solution.patches;
     let origin = load_centre(patches);
     let angle = |patch: &PatchSolution| position(patch).contact_angle_rad;
@@ -209,7 +208,7 @@ fn failures(record: &Record) -> Vec<String> {
     failures
 }
 
-/// Names of forces and moment, what was found, what the reference says, and the unit of the error.
+/// Returns the names of forces and moment, the found values, the reference values, and the units of the errors.
 fn resultants(
     record: &Record,
     patches: &[PatchSolution],
@@ -252,7 +251,7 @@ fn wheel_on_rail_agrees_with_the_reference() {
     assert_none("too far from the converged value", &failures);
 }
 
-/// The same motions from the wheelset's speed and turning: CONTACT takes the rolling radius at the deepest overlap.
+/// Tests the same motions given by the wheelset's speed and angular velocity. CONTACT takes the rolling radius at the deepest overlap.
 #[test]
 fn creepages_of_a_wheelset_agree_with_the_reference() {
     let Some(records) = Record::all() else {

@@ -1,5 +1,5 @@
-//! Sections of wheels and rails as instruments, drawings and programs give them: more or less of the section, in every sense, order, spacing and
-//! format.
+//! Sections of wheels and rails as instruments, drawings and programs give them: more or less of the section, with every orientation, order, spacing
+//! and format.
 
 use serde_json::{Value, json};
 
@@ -7,17 +7,17 @@ use crate::profile_shapes::{rail_60e1, s1002};
 
 pub type Points = Vec<[f64; 2]>;
 
-/// A section with y to the field side and z down, whose contact on the tread is that of the base.
+/// A section with y to the field side and z down. Its contact on the tread is that of the base.
 pub struct Variant {
     pub name: &'static str,
     pub points: Points,
-    /// The shape shows its senses, so that no statement is needed.
+    /// Whether the shape shows its orientation, so that no statement is needed.
     pub clear: bool,
     /// y of the back of its flange, if the points show it.
     pub back: Option<f64>,
 }
 
-/// Points at even spacing on a straight line, without its first point.
+/// Returns evenly spaced points on a straight line, without its first point.
 fn line(from: [f64; 2], to: [f64; 2]) -> Points {
     let length = (to[0] - from[0]).hypot(to[1] - from[1]);
     let count = (length / 0.25).ceil();
@@ -25,7 +25,7 @@ fn line(from: [f64; 2], to: [f64; 2]) -> Points {
     (1..=count as usize).map(at).collect()
 }
 
-/// The points with further ones along these corners.
+/// Returns the points with further ones along these corners.
 fn extended(mut points: Points, corners: &[[f64; 2]]) -> Points {
     for corner in corners {
         points.extend(line(points[points.len() - 1], *corner));
@@ -47,12 +47,12 @@ fn between(points: Points, from: f64, to: f64) -> Points {
 
 /// A chamfer and the face of a rim, up to 33 mm above the tread.
 const RIM: [[f64; 2]; 2] = [[65.0, -7.6], [65.2, -33.0]];
-/// The same with the inner side of the rim.
+/// A chamfer, the face of a rim and the inner side of the rim.
 const WHOLE_RIM: [[f64; 2]; 3] = [[65.0, -7.6], [65.2, -60.0], [50.0, -72.0]];
 /// The back of the flange, up to 30 mm above the tread.
 const BACK: [[f64; 2]; 2] = [[-70.0, 9.6], [-70.0, -30.0]];
 
-/// S1002 as far as its tread and root: the wheel of all these variants.
+/// Returns wheels with tread and root of S1002 and more or less of the rest.
 pub fn wheels() -> Vec<Variant> {
     let variant = |(name, points): (&'static str, Points), clear, back: bool| Variant {
         name,
@@ -72,7 +72,7 @@ pub fn wheels() -> Vec<Variant> {
 
 fn with_back() -> [(&'static str, Points); 8] {
     let wheel = s1002();
-    // Worn at the face of its flange by 4 mm, not at its root.
+    // The wheel is worn by 4 mm at the face of its flange, but not at its root.
     let thin = |[y, z]: &[f64; 2]| {
         let worn = ((z - 6.0) / 10.0).clamp(0.0, 1.0) * ((y + 60.0) / 20.0).clamp(0.0, 1.0);
         [y - 4.0 * worn, *z]
@@ -115,7 +115,7 @@ fn without_flange() -> [(&'static str, Points); 4] {
     ]
 }
 
-/// 60E1 inclined by the case, with more or less of its section.
+/// Returns 60E1 with more or less of its section. The case gives the inclination.
 pub fn rails() -> Vec<Variant> {
     let rail = rail_60e1();
     let variant = |name, points, clear| Variant {
@@ -160,17 +160,16 @@ pub fn rails() -> Vec<Variant> {
     ]
 }
 
-/// How a file gives a section.
+/// The form in which a section is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
     Points,
     Columns,
     Miniprof,
-    /// With settings that undo the mirroring.
+    /// A Simpack file with settings that undo the mirroring.
     Simpack,
 }
 
-/// A way to give the points of a section.
 #[derive(Debug, Clone, Copy)]
 pub struct Encoding {
     pub mirror_y: bool,
@@ -178,7 +177,7 @@ pub struct Encoding {
     pub reversed: bool,
     /// Shift of the origin in mm.
     pub origin: [f64; 2],
-    /// Every how many points one is kept.
+    /// One point in this number of points is kept.
     pub every: usize,
     pub form: Form,
 }
@@ -193,7 +192,7 @@ impl Encoding {
         form: Form::Points,
     };
 
-    /// The four senses.
+    /// Returns the four combinations of mirroring.
     pub fn senses() -> impl Iterator<Item = Encoding> {
         [(false, false), (true, false), (false, true), (true, true)]
             .into_iter()
@@ -238,7 +237,7 @@ impl Encoding {
         json!({ "format": format, "text": text })
     }
 
-    /// The section with its senses stated.
+    /// Returns the section with its orientation stated.
     pub fn stated(&self, points: &[[f64; 2]]) -> Value {
         let mut section = self.section(points);
         let undone = self.form == Form::Simpack;

@@ -1,5 +1,4 @@
-//! The judgement of a profile names the defect that it has: one kind of defect at a time, of many sizes and at many places, on profiles that
-//! are sound otherwise.
+//! Tests that the assessment of a profile names its defect. Each profile has one kind of defect, of varying size and place, and is sound otherwise.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::error::SolveError;
@@ -12,12 +11,12 @@ use crate::profile_assessment::tread;
 use crate::profile_shapes::{rail_60e1, s1002};
 use crate::random::Random;
 
-/// Seeds that the judgement was developed with, and others.
+/// The seed that the assessment was developed with, and another one.
 const SEEDS: [u64; 2] = [1, 70_001];
-/// Defects of each kind and seed.
+/// Number of defects of each kind and seed.
 const EACH: usize = 2;
 
-/// A kind of defect: its name, what it does to the rail, and what an answer may say of it.
+/// A kind of defect: its name, the damaged rail, and the remarks that an answer may have.
 struct Kind {
     name: &'static str,
     damage: fn(&mut Random) -> Points,
@@ -65,13 +64,13 @@ const KINDS: [Kind; 7] = [
     },
 ];
 
-/// The number of a point near the contact of [`tread`], which lies at y = 0 on the rail within some mm.
+/// Returns the index of a point near the contact of [`tread`], which lies within some mm of y = 0 on the rail.
 fn near_contact(points: &[[f64; 2]], random: &mut Random) -> usize {
     let place = random.between(-4.0, 4.0);
     points.partition_point(|at| at[0] < place)
 }
 
-/// Neighbouring points displaced to alternate sides, some with noise of a µm everywhere.
+/// Returns a rail with neighbouring points displaced to alternate sides, sometimes with noise of 1 µm everywhere.
 fn jittered(random: &mut Random, count: usize) -> Points {
     let points = resampled(&rail_60e1(), random.between(0.2, 0.5));
     let first = near_contact(&points, random);
@@ -91,7 +90,7 @@ fn stepped(random: &mut Random) -> Points {
     off_normal(&points, |k, _| if k > first { height } else { 0.0 })
 }
 
-/// Points at equal distances on chords, whose corners are points by chance only, written with five decimals.
+/// Returns evenly spaced points on chords, written with five decimals. The corners of the chords are points only by chance.
 fn on_chords(random: &mut Random) -> Points {
     let corners = resampled(&rail_60e1(), random.decades(0.8, 5.0));
     let spacing = random.between(0.15, 0.25);
@@ -129,7 +128,7 @@ fn noisy(random: &mut Random) -> Points {
     off_normal(&points, |_, _| deviation * normal(random))
 }
 
-/// What the answer or the refusal says of the rail.
+/// Returns the remarks of the answer, or of the refusal, on the rail.
 fn verdicts(case: &Value) -> Vec<String> {
     let checked = check(case, &Limits::default()).expect("a case");
     match solve(&checked, &Unmonitored) {
@@ -175,7 +174,7 @@ fn every_defect_is_named_for_what_it_is() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Automatic smoothing takes what helps, so that the advice is never to give one.
+/// Tests that automatic smoothing applies any helpful smoothing, so that no remark recommends one.
 #[test]
 fn auto_never_ends_in_the_advice_to_smooth() {
     let mut random = Random(5);

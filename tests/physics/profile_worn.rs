@@ -1,5 +1,5 @@
-//! A measured worn wheel on a worn rail, where tread, gauge corner and flange touch close to each other. Needs the reference files beside
-//! the checkout; `profile_conforming.rs` makes a pair of its own and tests the same.
+//! Tests a measured worn wheel on a worn rail, where tread, gauge corner and flange touch close to each other. Needs the reference files beside the
+//! checkout. `profile_conforming.rs` tests the same with a generated pair.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
@@ -11,7 +11,7 @@ use crate::profile_cases::{on_planes, put, wheel_on_rail};
 use crate::profile_reference_files::reference_file;
 use crate::reference::assert_none;
 
-/// The worn pair at a lateral shift in mm under a vertical force in N, with yaw in rad.
+/// Returns the worn pair at a lateral shift in mm under a vertical force in N, with yaw in rad.
 pub fn worn(shift: f64, force: f64, yaw: f64) -> Option<Value> {
     let file = |name: &str| Some(json!({ "format": "simpack", "text": reference_file(name)? }));
     let case = wheel_on_rail(
@@ -38,8 +38,8 @@ pub fn solved(case: &Value) -> Result<Solution, String> {
         .map_err(|e| e.to_string())
 }
 
-/// Between these shifts the tread's patch ends within a millimetre of that of the gauge corner, at an inclination of half a
-/// radian to it. (`cargo bench --bench worn` solves all 336 states.)
+/// Between these shifts, the patch on the tread ends within a millimetre of the patch on the gauge corner, inclined to it by half a radian. (`cargo
+/// bench --bench worn` solves all 336 states.)
 #[test]
 fn a_patch_that_ends_next_to_another_one_is_solved() {
     let mut failures = Vec::new();
@@ -73,7 +73,7 @@ fn a_patch_that_ends_next_to_another_one_is_solved() {
     assert_none("not solved", &failures);
 }
 
-/// Loads are those of a prototype that keeps neighbouring gaps apart by the same rule, written independently.
+/// The expected loads are those of an independent prototype that separates neighbouring gaps by the same rule.
 #[test]
 fn tread_gauge_corner_and_flange_share_the_load() {
     let Some(case) = worn(-14.74, 137e3, 0.0) else {
@@ -92,7 +92,7 @@ fn tread_gauge_corner_and_flange_share_the_load() {
     }
 }
 
-/// Heavier loads than a wheel carries: tread and gauge corner grow into each other and then share a plane.
+/// Tests heavier loads than a wheel carries: tread and gauge corner grow into each other and then share a plane.
 #[test]
 fn patches_that_grow_into_each_other_make_no_ridge_of_pressure() {
     for lowering in [0.065, 0.17, 0.21] {

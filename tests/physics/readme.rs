@@ -1,4 +1,4 @@
-//! The answer shown in the README is the one that the example has.
+//! Tests that the answer shown in the README is that of the example.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
@@ -11,21 +11,21 @@ fn read(file: &str) -> String {
     std::fs::read_to_string(format!("{ROOT}/{file}")).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The first block of JSON.
+/// Returns the first block of JSON.
 fn block(text: &str) -> Value {
     let (_, rest) = text.split_once("```json\n").expect("a block of JSON");
     let (block, _) = rest.split_once("```").expect("its end");
     serde_json::from_str(block).expect("JSON")
 }
 
-/// One unit in the last digit shown of a number.
+/// Returns one unit in the last shown digit of a number.
 fn unit(shown: &serde_json::Number) -> f64 {
     let text = shown.to_string();
     let digits = text.split_once('.').map_or(0, |(_, digits)| digits.len());
     10.0_f64.powi(-i32::try_from(digits).expect("few digits"))
 }
 
-/// What is shown with the numbers of the answer, rounded alike; what differs is noted by its path.
+/// Returns the shown value with the numbers of the answer, rounded alike. Paths of differing values are appended to `differing`.
 fn filled(shown: &Value, found: &Value, path: &str, differing: &mut Vec<String>) -> Value {
     match (shown, found) {
         (Value::Object(members), _) => members

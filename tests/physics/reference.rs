@@ -1,4 +1,4 @@
-//! Stored reference results, the cases that reproduce them, and the way from a case to its forces.
+//! Stored reference results, the cases that reproduce them, and functions that solve a case for its forces.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-/// The five classes of partial slip on an ellipse: 62 cases.
+/// The five classes of partial slip on an ellipse, with 62 cases.
 pub const HERTZ_CLASSES: [&str; 5] = [
     "hertz_long",
     "hertz_lat",
@@ -19,14 +19,14 @@ pub const HERTZ_CLASSES: [&str; 5] = [
     "hertz_xyspin",
 ];
 
-/// A limit for vanishing element size, relative to μN (moment: μN√(ab)), and what it may be off by.
+/// A limit for vanishing element size and its uncertainty, relative to μN (moment: μN√(ab)).
 #[derive(Debug, Clone, Copy, Deserialize)]
 pub struct Converged {
     pub value: f64,
     pub unc: f64,
 }
 
-/// A rolling contact solved elsewhere; fields and signs as in `tests/data/README.md`.
+/// A reference rolling contact, with fields and signs as in `tests/data/README.md`.
 #[derive(Debug, Clone, Deserialize)]
 pub struct ReferenceCase {
     pub id: String,
@@ -48,22 +48,22 @@ pub struct ReferenceCase {
 }
 
 impl ReferenceCase {
-    /// Semi-axis across rolling of an elliptic patch.
+    /// Returns the semi-axis across rolling of an elliptic patch.
     pub fn b(&self) -> f64 {
         self.b_mm.expect("an elliptic patch has two semi-axes")
     }
 
-    /// Semi-axis along rolling over the one across.
+    /// Returns the ratio of the semi-axis along rolling to that across.
     pub fn a_over_b(&self) -> f64 {
         self.a_mm / self.b()
     }
 
-    /// The converged F_x, F_y, M_z.
+    /// Returns the converged F_x, F_y and M_z.
     pub fn converged(&self) -> [Converged; 3] {
         [self.force_x, self.force_y, self.moment_z]
     }
 
-    /// The same contact as a question to railhead on an explicit mesh.
+    /// Returns the same contact as an ellipse that can be solved.
     pub fn ellipse(&self) -> Ellipse {
         Ellipse {
             a_mm: self.a_mm,
@@ -77,7 +77,7 @@ impl ReferenceCase {
     }
 }
 
-/// An ellipse solved elsewhere: the head of records that each add what was asked and found.
+/// A reference ellipse: the common part of records that each add a question and its results.
 #[derive(Debug, Clone, Deserialize)]
 pub struct SolvedEllipse {
     pub id: String,
@@ -89,12 +89,12 @@ pub struct SolvedEllipse {
 }
 
 impl SolvedEllipse {
-    /// μN in N.
+    /// Returns μN in N.
     pub fn limit(&self) -> f64 {
         self.friction * self.normal_force_n
     }
 
-    /// The contact as a client would ask for it with a motion, at default settings.
+    /// Returns the contact as a client would give it with a motion, at default settings.
     pub fn case(&self, motion: &Value) -> Value {
         let [a, b] = self.semi_axes_mm;
         json!({
@@ -106,7 +106,7 @@ impl SolvedEllipse {
         })
     }
 
-    /// The resultants of a point relative to μN and μN√(ab).
+    /// Returns the resultants of a point relative to μN and μN√(ab).
     pub fn relative(&self, point: &PointSolution) -> [f64; 3] {
         let [a, b] = self.semi_axes_mm;
         let forces = [
@@ -128,12 +128,12 @@ pub fn read<T: DeserializeOwned>(name: &str) -> T {
     serde_json::from_str(&text).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// All cases of one class.
+/// Returns all cases of one class.
 pub fn cases(class: &str) -> Vec<ReferenceCase> {
     read(&format!("{class}.json"))
 }
 
-/// An elliptic contact to ask for.
+/// An elliptic contact for the tests.
 #[derive(Debug, Clone, Copy)]
 pub struct Ellipse {
     pub a_mm: f64,
@@ -147,7 +147,7 @@ pub struct Ellipse {
 }
 
 impl Ellipse {
-    /// A patch with 60 kN, steel, μ = 0.3 and √(ab) = 5 mm.
+    /// Returns a steel patch with 60 kN, μ = 0.3 and √(ab) = 5 mm.
     pub fn steel(a_over_b: f64, poisson_ratio: f64) -> Ellipse {
         Ellipse {
             a_mm: 5.0 * a_over_b.sqrt(),
@@ -160,7 +160,7 @@ impl Ellipse {
         }
     }
 
-    /// The same contact with another motion.
+    /// Returns the same contact with another motion.
     pub fn moving(self, creepage_x: f64, creepage_y: f64, spin_per_mm: f64) -> Ellipse {
         Ellipse {
             motion: [creepage_x, creepage_y, spin_per_mm],
@@ -168,30 +168,29 @@ impl Ellipse {
         }
     }
 
-    /// The same contact with creepages and spin in the dimensionless form
-    /// E c² ν/(μN(1−ν²)) and E c³ φ/(μN(1−ν²)), c = √(ab).
+    /// Returns the same contact with creepages and spin in the dimensionless form E c² ν/(μN(1−ν²)) and E c³ φ/(μN(1−ν²)), c = √(ab).
     pub fn normalised(self, x: f64, y: f64, spin: f64) -> Ellipse {
         let unit = self.limit() * (1.0 - self.poisson_ratio)
             / (2.0 * self.shear_modulus_mpa * self.c().powi(2));
         self.moving(x * unit, y * unit, spin * unit / self.c())
     }
 
-    /// √(ab) in mm.
+    /// Returns √(ab) in mm.
     pub fn c(&self) -> f64 {
         (self.a_mm * self.b_mm).sqrt()
     }
 
-    /// μN in N.
+    /// Returns μN in N.
     pub fn limit(&self) -> f64 {
         self.friction * self.normal_force_n
     }
 
-    /// Hertz's largest pressure in MPa.
+    /// Returns Hertz's largest pressure in MPa.
     pub fn pressure_max(&self) -> f64 {
         1.5 * self.normal_force_n / (std::f64::consts::PI * self.a_mm * self.b_mm)
     }
 
-    /// The case as a client would write it, all outputs asked for.
+    /// Returns the case as a client would write it, with all outputs.
     pub fn case(&self, strips: u32, cells: u32) -> Value {
         json!({
             "material": { "shear_modulus_mpa": self.shear_modulus_mpa, "poisson_ratio": self.poisson_ratio },
@@ -206,12 +205,12 @@ impl Ellipse {
         })
     }
 
-    /// F_x/μN, F_y/μN and M_z/(μN√(ab)).
+    /// Returns F_x/μN, F_y/μN and M_z/(μN√(ab)).
     pub fn forces(&self, strips: u32, cells: u32) -> [f64; 3] {
         self.relative(&solve(&self.case(strips, cells)).0.patches[0].points[0])
     }
 
-    /// The resultants of a point relative to μN and μN√(ab).
+    /// Returns the resultants of a point relative to μN and μN√(ab).
     pub fn relative(&self, point: &PointSolution) -> [f64; 3] {
         let limit = self.limit();
         [
@@ -229,21 +228,21 @@ pub fn solve(case: &Value) -> (Solution, Fields) {
     contact::solve(&checked, &Unmonitored).unwrap_or_else(|e| panic!("{e}\n{case}"))
 }
 
-/// The same by the boundary-element method.
+/// Solves a case with the boundary-element method.
 pub fn solve_on_meshes(case: &Value) -> (Solution, Fields) {
     let mut case = case.clone();
     case["solver"]["method"] = "boundary_element".into();
     solve(&case)
 }
 
-/// Middle value; the lower one of two.
+/// Returns the median, or the lower of the two middle values.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted[(sorted.len() - 1) / 2]
 }
 
-/// Fails with one line per entry, if there is any.
+/// Fails with one line per entry, unless the list is empty.
 pub fn assert_none(what: &str, failures: &[String]) {
     assert!(
         failures.is_empty(),
@@ -253,7 +252,7 @@ pub fn assert_none(what: &str, failures: &[String]) {
     );
 }
 
-/// What the cells of the first patch carry together in motion `k`, in N: the sums of tractions times areas, along x and along y.
+/// Returns the forces in N that the cells of the first patch carry in motion `k`: the sums of tractions times areas, along x and along y.
 pub fn force_of_cells(fields: &Fields, k: usize) -> [f64; 2] {
     let patch = &fields.patches[0];
     let (cells, values) = (patch.cells(k), &patch.points[k]);

@@ -1,4 +1,4 @@
-//! Partial slip on ellipses against converged results of an independent program.
+//! Tests partial slip on ellipses against converged results of an independent program.
 
 use crate::reference::{Converged, HERTZ_CLASSES, ReferenceCase, assert_none, cases, median};
 

@@ -1,5 +1,5 @@
-//! Dimensionless contacts given by formula, meshed on strips: half length of the longest strip 1, load μN = 1,
-//! `E/(1 − ν²) = 1`, so that creepage and spin are the normalised ones of Liu and Hsu.
+//! Dimensionless contacts given by formula, meshed on strips. The half length of the longest strip is 1, the load μN is 1 and `E/(1 − ν²)` is 1, so
+//! that creepage and spin are the normalised ones of Liu and Hsu.
 
 use std::f64::consts::PI;
 
@@ -28,9 +28,9 @@ pub const SHEAR_MODULUS: f64 = 0.5 * (1.0 - NU);
 pub enum Region {
     /// Hertz's ellipse with semi-axes 1 along rolling and `b` across.
     Ellipse { b: f64 },
-    /// Half chord `√(1 − (y/b)²)`, b = 0.7 for y > 0 and 1.4 for y < 0; the curvature of its outline jumps.
+    /// Half chord `√(1 − (y/b)²)`, b = 0.7 for y > 0 and 1.4 for y < 0. The curvature of its outline jumps.
     Egg,
-    /// Two of Hertz's circles of radii 1 and 0.6, side by side; each carries a load that fits its radius.
+    /// Two of Hertz's circles of radii 1 and 0.6, side by side. Each carries the load that belongs to its radius.
     TwoCircles,
 }
 
@@ -43,13 +43,13 @@ pub const REGIONS: [(&str, Region); 5] = [
     ("two_circles", Region::TwoCircles),
 ];
 
-/// Load of the second of the two circles relative to the first: Hertz's for equal radii of curvature.
+/// Load of the second circle relative to the first: Hertz's for equal radii of curvature.
 const SECOND_LOAD: f64 = 0.6 * 0.6 * 0.6;
-/// Centre of the second circle; the first is at the origin.
+/// y of the centre of the second circle. The first is at the origin.
 const SECOND_Y: f64 = 1.8;
 
 impl Region {
-    /// Chords of the two patches' or the one patch's strips.
+    /// Returns the chords of the strips of one patch or of both.
     fn chords(self, strips: usize) -> Vec<Chord> {
         let extents: &[(f64, f64)] = match self {
             Region::Ellipse { b } => &[(-b, b)],
@@ -85,7 +85,7 @@ impl Region {
         }
     }
 
-    /// μp at a point of the region.
+    /// Returns μp at a point of the region.
     fn bound(self, x: f64, y: f64) -> f64 {
         let depth = (self.half_chord(y).powi(2) - x * x).max(0.0).sqrt();
         match self {
@@ -96,7 +96,7 @@ impl Region {
     }
 }
 
-/// A meshed region, ready to be asked.
+/// A meshed region with its influence coefficients.
 pub struct Contact {
     pub mesh: Mesh,
     pub differences: StripOperator,
@@ -135,7 +135,7 @@ impl Contact {
         SlipEquations::new(rule, &self.mesh, &self.differences, None)
     }
 
-    /// Σ μp·A.
+    /// Returns Σ μp·A.
     pub fn load(&self) -> f64 {
         self.bound.iter().zip(&self.area).map(|(g, a)| g * a).sum()
     }
@@ -153,7 +153,7 @@ impl Contact {
         }
     }
 
-    /// Mean bound, or less where the motion is too small to reach it.
+    /// Returns the mean bound, or less where the motion is too small to reach it.
     fn scale(&self, rigid: &[f64]) -> f64 {
         let largest = rigid.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         let mean = self.load() / self.area.iter().sum::<f64>();
@@ -179,7 +179,7 @@ impl Contact {
         }
     }
 
-    /// Fx, Fy and Mz about the origin.
+    /// Returns Fx, Fy and Mz about the origin.
     pub fn forces(&self, t: &[f64]) -> [f64; 3] {
         let padded = t.len() / 2;
         let mut forces = [0.0; 3];
@@ -192,7 +192,7 @@ impl Contact {
         forces
     }
 
-    /// Cells with `|T| < μp (1 − 1e-7)`.
+    /// Returns the number of cells with `|T| < μp (1 − 1e-7)`.
     pub fn stick_cells(&self, t: &[f64]) -> usize {
         let padded = t.len() / 2;
         (0..self.x.len())
@@ -201,7 +201,7 @@ impl Contact {
     }
 }
 
-/// The normalised motion in units of slip `P/G`.
+/// Returns the normalised motion in units of slip `P/G`.
 pub fn motion([x, y, spin]: [f64; 3]) -> Motion {
     Motion {
         creepage_x: SHEAR_MODULUS * x,
@@ -210,7 +210,7 @@ pub fn motion([x, y, spin]: [f64; 3]) -> Motion {
     }
 }
 
-/// Solves with the semismooth Newton method from no traction; without success, by way of the upwind rule.
+/// Solves with the semismooth Newton method from zero traction. If it fails, solves the upwind rule first.
 pub fn boundary_element(
     contact: &Contact,
     rule: Rule,

@@ -1,4 +1,4 @@
-//! The solver ends with an answer, whatever the motion and the shape.
+//! Tests that the solver ends with an answer for every motion and shape.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -8,11 +8,11 @@ use serde_json::json;
 use crate::random::Random;
 use crate::reference::{Ellipse, assert_none};
 
-/// Newton iterations allowed for one rule on one level; an explicit mesh has one level and two rules.
+/// Newton iterations allowed for one rule on one mesh. An explicit mesh is solved with two rules.
 const ITERATIONS_PER_RULE: u32 = 25;
 
-/// Creepage 1e-6…1e2 of saturation in any direction, normalised spin 0…100 with either sign, a/b 0.05…20, ν 0…0.5.
-/// One motion in four has no spin, one in four no creepage.
+/// Returns contacts with a creepage of 1e-6 to 1e2 of saturation in any direction, a normalised spin of 0 to 100 with either sign, a/b 0.05 to 20, ν
+/// 0 to 0.5. One motion in four has no spin, and one in four no creepage.
 fn contacts(count: usize) -> Vec<Ellipse> {
     let mut random = Random(20_240_229);
     (0..count)
@@ -23,7 +23,7 @@ fn contacts(count: usize) -> Vec<Ellipse> {
                 random.between(0.0, 0.5)
             };
             let steel = Ellipse::steel(random.decades(0.05, 20.0), poisson);
-            // Far from the limit F ≈ G c² C ν with C between 3 and 5: a normalised creepage of 1 is near saturation.
+            // Far below the limit F ≈ G c² C ν with C between 3 and 5: a normalised creepage of 1 is near saturation.
             let creepage = if k % 4 == 1 {
                 0.0
             } else {

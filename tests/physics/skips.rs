@@ -1,4 +1,4 @@
-//! Work that a case does not need is left out, and the answer does not move.
+//! Tests that work that a case does not need is skipped, and that the answer does not change.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -28,15 +28,15 @@ fn answered(contact: &Ellipse) -> PointSolution {
     solve(&contact.case(STRIPS, CELLS)).0.patches[0].points[0].clone()
 }
 
-/// Largest difference between the door's tractions and those of a plain Newton solve of the trapezoid rule over the
-/// whole mesh in double precision, relative to the friction bound.
+/// Returns the largest difference between the solver's tractions and those of a plain Newton solve of the trapezoidal rule, relative to the friction
+/// bound. The plain solve uses the whole mesh in double precision.
 fn distance_to_plain_newton(contact: &Ellipse) -> f64 {
     on_level(contact, |_, asked| {
         distance_on(contact.poisson_ratio, asked)
     })
 }
 
-/// What `work` finds of a contact on a mesh of these strips and cells.
+/// Returns the result of `work` for a contact on the mesh of the tests.
 fn on_level<T>(contact: &Ellipse, work: impl FnOnce(&RollingTask, LevelTask) -> T) -> T {
     let case = contact.case(STRIPS, CELLS);
     let checked = contact::check(&case, &Limits::default()).expect("a valid case");
@@ -122,7 +122,7 @@ fn nothing_is_solved_without_creepage() {
         point.solver.skipped
     );
     assert_eq!(point.slip_area_mm2, Some(0.0));
-    // A creepage of a trillionth of saturation is solved, and is as good as none.
+    // A creepage of 1e-12 of saturation is solved, with negligible forces.
     let near = answered(&Ellipse::steel(1.5, 0.28).normalised(1e-12, 0.0, 0.0));
     assert!(
         near.solver.products > 0 && near.force_x_n > 0.0 && near.force_x_n < 1e-6,

@@ -49,7 +49,7 @@ fn random_cases_obey_the_laws_or_say_why_not() {
     );
 }
 
-/// A twin beyond the lengths that a case may have; a rough gap of thirteen patches, the smallest three cells across.
+/// The two cases are a twin beyond the allowed lengths of a case, and a rough gap of thirteen patches, the smallest three cells across.
 #[test]
 fn cases_that_seemed_to_break_the_law_of_units_obey_it() {
     for number in [1156, 3124] {

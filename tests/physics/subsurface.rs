@@ -1,4 +1,4 @@
-//! Stresses below the surface: closed forms, laws, and CONTACT's stresses in the upper body.
+//! Tests of stresses below the surface: closed forms, laws, and CONTACT's stresses in the upper body.
 
 use railhead_contact::post::subsurface::states::points;
 use railhead_contact::solution::words::evolution::StressPoint;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::cases::{assert_fault, good, with};
 use crate::reference::{Ellipse, assert_none, read, solve};
 
-/// Stresses of a case at points, and at the worst point.
+/// Returns the stresses of a case at points, and at the worst point.
 fn stresses(case: &Value) -> (Vec<StressPoint>, Option<StressPoint>) {
     let (solution, fields) = solve(case);
     let stored = fields.patches[0].points[0].subsurface.as_ref();
@@ -29,8 +29,8 @@ fn components(point: &StressPoint) -> [f64; 6] {
     [s.xx, s.yy, s.zz, s.xy, s.xz, s.yz]
 }
 
-/// Below the middle of a circle without friction: σ_zz = −p0/(1 + ζ²), σ_xx = σ_yy = −p0[(1 + ν)(1 − ζ atan 1/ζ) − ½/(1 + ζ²)]
-/// (Johnson 1985, eqs. 3.45).
+/// Below the centre of a circle without friction: σ_zz = −p0/(1 + ζ²), σ_xx = σ_yy = −p0[(1 + ν)(1 − ζ atan 1/ζ) − ½/(1 + ζ²)] (Johnson 1985, eqs.
+/// 3.45).
 #[test]
 fn hertz_on_the_axis() {
     let contact = Ellipse {
@@ -67,7 +67,7 @@ fn hertz_on_the_axis() {
     );
 }
 
-/// Below a patch two hundred times as wide as long: σ_xx and σ_zz of a cylinder (Johnson 1985, eqs. 4.46), largest shear 0.3 p0 at 0.786 a.
+/// Below a patch two hundred times as wide as long: σ_xx and σ_zz of a cylinder (Johnson 1985, eqs. 4.46), with the largest shear 0.3 p0 at 0.786 a.
 #[test]
 fn line_contact_on_the_axis() {
     let contact = Ellipse {
@@ -93,11 +93,11 @@ fn line_contact_on_the_axis() {
     assert!((found[2].shear_max_mpa / p0 - 0.300).abs() < 8e-3);
 }
 
-/// The field is in equilibrium inside, and a plane below carries the forces on the surface.
+/// Tests that the field is in equilibrium, and that a plane below carries the forces on the surface.
 #[test]
 fn the_field_is_in_equilibrium() {
     let contact = Ellipse::steel(1.5, 0.3).normalised(0.5, 0.3, 0.8);
-    // Cells have other points of quadrature at another place, so that differences need room.
+    // The quadrature points of a cell depend on the place, so that finite differences need a large step.
     let step = 0.25;
     let centre = [0.6, -1.1, 0.9];
     let mut places = Vec::new();
@@ -108,7 +108,7 @@ fn the_field_is_in_equilibrium() {
             places.push(at);
         }
     }
-    // Midpoints over a square.
+    // The quadrature points are midpoints over a square.
     let (reach, count, depth) = (48.0, 40, 4.0);
     let width = 2.0 * reach / f64::from(count);
     let at = |k: u32| -reach + width * (f64::from(k) + 0.5);
@@ -127,7 +127,7 @@ fn the_field_is_in_equilibrium() {
             let [low, high] = [0, 1].map(|k| components(&found[2 * axis + k]));
             [0, 1, 2, 3, 4, 5].map(|k| (high[k] - low[k]) / (2.0 * step))
         };
-        // z is up; depth grows downward in the lower body and upward in the upper one.
+        // z points up. Depth increases downward in the lower body and upward in the upper one.
         let sign = if body == "lower" { -1.0 } else { 1.0 };
         let ([x, y], z) = ([0, 1].map(change), change(2).map(|v| sign * v));
         let size = contact.pressure_max() / contact.b_mm;
@@ -141,11 +141,11 @@ fn the_field_is_in_equilibrium() {
                 *sum += stress * width * width;
             }
         }
-        // Both bodies see the same stress vector on planes across z: traction on the lower body along x, pressure along −z.
+        // Both bodies have the same stress vector on planes of constant z: traction on the lower body along x, pressure along −z.
         let patch = &solution.patches[0];
         let point = &patch.points[0];
         let known = [point.force_x_n, point.force_y_n, -patch.normal_force_n];
-        // What passes beside the square: τ_xz of a tangential force F is 3F x² z/(2π r⁵), and 1.3505 F z/reach of it lies outside.
+        // Correction for the force outside the square: τ_xz of a tangential force F is 3F x² z/(2π r⁵), and 1.3505 F z/reach of it lies outside.
         let inside = 1.0 - 1.3505 * depth / reach;
         let found = [carried[0] / inside, carried[1] / inside, carried[2]];
         for (found, known) in found.iter().zip(known) {
@@ -157,11 +157,11 @@ fn the_field_is_in_equilibrium() {
     }
 }
 
-/// On the gap of two radii CONTACT's window, 139 columns of 12/135 mm, ends inside the patch, which would reach to 7.21 mm: its contact ends there, and
-/// so does ours, where the bodies are 2 mm apart beyond it.
+/// For the gap of two radii, CONTACT's window of 139 columns of 12/135 mm ends inside the patch, which would reach to 7.21 mm. Its contact ends
+/// there. The contact of the test ends there too, because the bodies are 2 mm apart beyond it.
 const WINDOW: f64 = 139.0 * 6.0 / 135.0;
 
-/// A contact whose stresses were computed elsewhere.
+/// A contact with reference stresses.
 #[derive(Debug, Deserialize)]
 struct StressReference {
     id: String,
@@ -212,8 +212,8 @@ impl StressReference {
         json!({ "type": "gap_grid", "x_mm": x, "y_mm": y, "gap_mm": rows })
     }
 
-    /// The largest pressure inside the patch. That of the reference's gap is the peak at the end of the window: its middle grid, whose window is a
-    /// little wider, has 1730.6 MPa.
+    /// Returns the largest pressure inside the patch. The largest pressure of the reference's gap is the peak at the end of the window. Its middle
+    /// grid, with a slightly wider window, has 1730.6 MPa.
     fn largest(&self) -> f64 {
         self.gap.as_ref().map_or(self.pressure_max_mpa, |_| 1730.6)
     }
@@ -233,8 +233,8 @@ impl StressReference {
     }
 }
 
-/// At default settings, every component and von Mises' stress: within 0.3 % of the largest pressure at a depth of 0.1 semi-axes and below
-/// and within 0.8 % above; beyond the reference's uncertainty.
+/// Compares every component and the von Mises stress at default settings, beyond the reference's uncertainty: within 0.3 % of the largest pressure
+/// from a depth of 0.1 semi-axes, and within 0.8 % above.
 #[test]
 fn stresses_are_those_of_contact() {
     let mut failures = Vec::new();
@@ -292,7 +292,7 @@ fn places_are_answered_in_their_order_and_a_plane_is_a_product() {
     assert!((found[1].von_mises_mpa / worst.von_mises_mpa - 1.0).abs() < 1e-9);
 }
 
-/// Of no point of a dense scan is von Mises' stress larger than of the worst point, whatever slips.
+/// Tests that no point of a dense scan has a larger von Mises stress than the worst point, for stick and slip.
 #[test]
 fn the_worst_point_is_worse_than_all_of_a_scan() {
     for ratio in [0.2, 0.5, 1.0, 2.0, 6.0] {
@@ -322,7 +322,7 @@ fn the_worst_point_is_worse_than_all_of_a_scan() {
     }
 }
 
-/// Points are answered side by side; what is asked beside a point changes nothing of it, to the last bit.
+/// Tests that the stress at a point does not depend on the other points, to the last bit, although points are evaluated together.
 #[test]
 fn a_stress_does_not_depend_on_what_is_asked_beside_it() {
     let contact = Ellipse::steel(2.0, 0.28).normalised(0.4, 0.2, 0.7);

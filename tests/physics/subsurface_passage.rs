@@ -1,4 +1,4 @@
-//! What a point of a body lives through: shakedown and Dang Van's criterion against closed forms, laws, and faults of the question.
+//! Tests of stress histories of points in the bodies: shakedown and Dang Van's criterion against closed forms, laws, and faults of the request.
 
 use railhead_contact::half_space::kernels::Stress;
 use railhead_contact::post::subsurface::worst_passage::{PassageMeasure, judge};
@@ -21,8 +21,8 @@ fn passage(contact: &Ellipse, subsurface: Value) -> PassageSummary {
     summary(contact, subsurface).passage.expect("asked for")
 }
 
-/// Without friction the largest shear on planes along the surface is 0.214 p0 below a circle, at 0.35 a, which residual stresses leave as it
-/// is: shakedown up to 4.7 times the yield in shear (Johnson 1985, section 9.2). Nothing yields up to von Mises' 0.629 p0 over √3.
+/// Without friction, the largest shear on planes along the surface below a circle is 0.214 p0 at 0.35 a. Residual stresses do not change it, so that
+/// shakedown holds up to 4.7 times the yield stress in shear (Johnson 1985, section 9.2). Nothing yields up to von Mises' 0.629 p0 over √3.
 #[test]
 fn a_circle_shakes_down_where_it_should() {
     let contact = Ellipse {
@@ -42,7 +42,7 @@ fn a_circle_shakes_down_where_it_should() {
     assert!(found.dang_van.is_none(), "{found:?}");
 }
 
-/// Stresses below a rolling cylinder over p0 (M'Ewen; Johnson 1985, eqs. 4.49), lengths over the half-width.
+/// Returns the stresses below a rolling cylinder over p0 (M'Ewen; Johnson 1985, eqs. 4.49), with lengths over the half-width.
 fn cylinder(x: f64, z: f64, nu: f64) -> Stress {
     let sum = 1.0 - x * x + z * z;
     let root = (sum * sum + 4.0 * x * x * z * z).sqrt();
@@ -61,7 +61,7 @@ fn cylinder(x: f64, z: f64, nu: f64) -> Stress {
     ]
 }
 
-/// Shakedown needs a yield stress in shear of p0/4, half a half-width deep (Johnson 1985, section 9.2), where the shear σ_xz is largest.
+/// Shakedown needs a yield stress in shear of p0/4, at a depth of half a half-width (Johnson 1985, section 9.2), where the shear σ_xz is largest.
 #[test]
 fn a_rolling_cylinder_shakes_down_at_four_times_the_yield_in_shear() {
     let needed = |z: f64| {
@@ -74,7 +74,7 @@ fn a_rolling_cylinder_shakes_down_at_four_times_the_yield_in_shear() {
     assert!(depths.fold(0.0, f64::max) < 0.2501);
 }
 
-/// A patch two hundred times as wide as long: p0/4 for shakedown, Dang Van's stress of the closed form.
+/// A patch two hundred times as wide as long needs p0/4 for shakedown and has Dang Van's stress of the closed form.
 #[test]
 fn a_cylinder_shakes_down_where_it_should() {
     let contact = Ellipse {
@@ -98,8 +98,8 @@ fn a_cylinder_shakes_down_where_it_should() {
     assert!((dang_van - known).abs() < 6e-3, "{dang_van} {known}");
 }
 
-/// Residual stresses help; the mirrored contact is as bad; without friction the mean stress is pressure everywhere, so that its weight does
-/// no harm; what is not asked for is not there.
+/// Tests that residual stresses help, that the mirrored contact has the same measures, that the weight of the mean stress has no effect without
+/// friction because the mean stress is compressive everywhere, and that outputs that were not requested are absent.
 #[test]
 fn passages_obey_laws() {
     let contact = Ellipse::steel(1.5, 0.3).normalised(0.5, 0.3, 0.0);

@@ -1,4 +1,4 @@
-//! Do the motions of a sweep help each other, and give what each gives alone?
+//! Tests that the motions of a sweep share work, and that each has the result of a separate solve.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ fn case(motion: &Value, target: f64) -> Value {
     })
 }
 
-/// A path of 25 motions along a line, in three directions.
+/// Returns paths of 25 motions along a line, in three directions.
 fn lines() -> [Vec<Value>; 3] {
     let line = |at: fn(f64) -> Value| (0..25).map(|k| at(f64::from(k) / 24.0)).collect();
     [
@@ -38,7 +38,7 @@ fn lines() -> [Vec<Value>; 3] {
     ]
 }
 
-/// Estimates are to hold for 95 of 100 motions.
+/// Estimates must cover the error of 95 in 100 motions.
 #[test]
 fn motions_of_a_sweep_are_within_their_estimates_of_finer_solves_alone() {
     let (mut tried, mut beyond) = (0, Vec::new());
@@ -102,7 +102,7 @@ fn the_order_of_motions_does_not_change_their_answers_beyond_the_estimate() {
     }
 }
 
-/// Forces, moments, estimates, verdicts and meshes of an answer, to the last bit. Slips may take products of their own.
+/// Returns the bits of forces, moments, estimates, verdicts and meshes of an answer. Slips may need additional products.
 fn verdicts(question: &Value, outputs: &Value) -> Vec<String> {
     let mut question = question.clone();
     question["outputs"] = outputs.clone();
@@ -185,7 +185,7 @@ fn the_default_outputs_of_a_sweep_with_spin_meet_their_target() {
     }
 }
 
-/// The answer without its times.
+/// Returns the answer with all times set to 0.
 pub fn timeless((mut solution, fields): (Solution, Fields)) -> (Solution, Fields) {
     for point in solution.patches.iter_mut().flat_map(|p| &mut p.points) {
         point.solver.seconds = 0.0;
@@ -198,7 +198,7 @@ pub fn timeless((mut solution, fields): (Solution, Fields)) -> (Solution, Fields
 
 #[test]
 fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
-    // Most of it slips, which is fast.
+    // Most of the sweep is in full slip, which is fast.
     let mut question = case(
         &json!({ "sweep": { "creepage_x": { "from": 0.01, "to": 0.3, "points": 450 } } }),
         0.0005,
@@ -215,7 +215,7 @@ fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
         .iter()
         .rev()
         .map(|range| {
-            // Each in a process of its own, so to speak.
+            // Each slice is solved with an empty store, as in a separate process.
             let store = Arc::new(OperatorStore::new(0));
             solve_slice(&store, &checked, range.clone(), &Unmonitored).expect("an answer")
         })
@@ -256,7 +256,7 @@ fn the_estimate_is_continuous_along_a_sweep() {
             .map(|pair| (pair[1] - pair[0]).abs() / (0.005 * 30_000.0))
             .collect();
         changes.sort_by(f64::total_cmp);
-        // Nine of ten steps; a change of the mesh in between may be seen.
+        // The limit holds for nine of ten steps. A change of the mesh between two steps may be visible.
         let most = changes[9 * (changes.len() - 1) / 10];
         assert!(most < 0.3, "spin {spin}: {changes:?}");
     }

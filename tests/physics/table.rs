@@ -1,4 +1,4 @@
-//! The table of creep forces: its laws, its limits, and how far it is off.
+//! Tests of the table of creep forces: its laws, its limits, and its errors.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -31,7 +31,7 @@ fn shapes() -> impl Iterator<Item = ([f64; 2], EllipseTable<'static>)> {
         .map(|[ratio, nu]| ([ratio, nu], table().ellipse(ratio, nu)))
 }
 
-/// Directions of (u_x, u_y, u_s), some on planes of symmetry.
+/// Returns directions of (u_x, u_y, u_s), some on planes of symmetry.
 fn directions() -> Vec<[f64; 3]> {
     let mut all = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for k in 0..24 {
@@ -42,7 +42,7 @@ fn directions() -> Vec<[f64; 3]> {
     all
 }
 
-/// A dimensionless creepage of a direction and size.
+/// Returns the dimensionless creepage of a direction and size.
 fn creepage(shape: [f64; 2], direction: [f64; 3], size: f64) -> [f64; 3] {
     let [ratio, nu] = shape;
     let [c11, c22, _] = coefficients(ratio, nu);
@@ -153,7 +153,7 @@ fn derivatives_are_those_of_the_values_and_continue_across_planes_of_symmetry() 
                         let sides = [(here[k] - back[k]) / step, (ahead[k] - here[k]) / step];
                         for side in sides {
                             let off = (side - slopes[k][j]).abs() * unit[j];
-                            // At spin alone the direction turns within no distance, and derivatives are differences.
+                            // For pure spin, the direction turns within zero distance, and derivatives are differences.
                             let allowed = if direction[2] == 1.0 { 0.1 } else { 0.02 };
                             if off > allowed * size.clamp(0.4, 1.0) {
                                 failures.push(format!(
@@ -204,7 +204,7 @@ fn the_62_hertz_references_are_met_within_the_bounds() {
     assert!(covered >= 61, "{covered} of 62");
 }
 
-/// A contact that the table was not made from, and its motions with their answers: F_x, F_y, M_z, share that sticks, estimated error.
+/// A contact that was not used for the table, with its motions and their answers: F_x, F_y, M_z, stick share, estimated error.
 #[derive(Deserialize)]
 struct HeldOut {
     a_over_b: f64,

@@ -1,4 +1,4 @@
-//! Rows of numbers: they are answered as jobs are, and say what they cannot be answered with.
+//! Tests of rows of numbers: they have the answers of jobs, and report rows that have no answer.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::gap_samples::steel;
 use crate::reference::solve;
 
-/// Rows of a template with columns.
+/// Returns the case of a template, and the answer to its rows with these columns.
 fn rows(method: &str, contact: Value, columns: &[(&str, Vec<f64>)]) -> (Value, Option<RowsAnswer>) {
     let mut case = steel(
         contact,

@@ -1,4 +1,4 @@
-//! A target is met, and the estimate of the error is honest.
+//! Tests that targets are met, and that error estimates cover the errors.
 
 use railhead_contact::remark::kind::Figure;
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use crate::reference::{
     Ellipse, HERTZ_CLASSES, ReferenceCase, cases, force_of_cells, median, solve,
 };
 
-/// True and estimated error relative to μN, and the cells of the finest mesh, for one case and target.
+/// True and estimated error relative to μN, and the number of cells of the finest mesh, for one case and target.
 struct Outcome {
     id: String,
     truth: f64,
@@ -133,7 +133,7 @@ fn a_looser_target_costs_fewer_cells() {
 
 #[test]
 fn a_pole_on_the_edge_of_two_strips_counts() {
-    // An even number of strips has the pole of pure spin between the two in the middle, which rounding leaves apart.
+    // With an even number of strips, the pole of pure spin lies between the two middle strips, up to rounding.
     let solved = |ratio: f64, target: f64| {
         let (solution, _) = solve(&json!({
             "material": { "shear_modulus_mpa": 8345.9, "poisson_ratio": 0.494 },
@@ -153,7 +153,7 @@ fn a_pole_on_the_edge_of_two_strips_counts() {
         let (rough, estimate) = solved(ratio, 0.02);
         let (fine, _) = solved(ratio, 0.005);
         let error = (rough - fine).abs();
-        // One estimate in twenty may be too small, but not by half.
+        // One estimate in twenty may be too small, but not by a factor of two.
         assert!(
             error <= 2.0 * estimate + 0.005,
             "{ratio}: {error} for {estimate}"
@@ -208,7 +208,7 @@ fn estimates_cover_the_errors_of_slender_patches() {
 
 #[test]
 fn tractions_add_up_to_the_resultants_where_nothing_tells_the_error() {
-    // So slender a patch that one of the two rules does not converge on it.
+    // On this slender patch, one of the two rules does not converge.
     let case = json!({
         "contact": { "type": "ellipse", "a_mm": 6.0, "b_mm": 0.2 },
         "load": { "normal_force_n": 5000.0 },

@@ -1,4 +1,4 @@
-//! Numbers in another unit are asked about, and nothing else is.
+//! Tests that numbers in another unit get a remark, and that no other numbers do.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::check;
@@ -8,7 +8,7 @@ use crate::cases::{good, good_with, problem, with};
 use crate::profile_cases::generated;
 use crate::reference::solve;
 
-/// Pointers and likely units of the numbers that a check asks about.
+/// Returns pointers and likely units of the numbers that a check remarks on.
 fn suspects(case: &Value) -> Vec<(String, String)> {
     let remarks = problem(case).remarks;
     let asked = remarks
@@ -88,7 +88,7 @@ fn usual_numbers_are_not_asked_about() {
             assert!(!code("pressure-above-shakedown"), "{}", path.display());
         }
     }
-    // A ball, a plastic roller, a model of a wheel, a slow test rig.
+    // A ball, a plastic roller, a scale model of a wheel, a slow test rig.
     for (pointer, value) in [
         (
             "/contact",
@@ -119,7 +119,7 @@ fn a_pressure_above_the_shakedown_limit_is_told_once() {
             code("pressure-implausible"),
         ]
     };
-    // 1.23 GPa, 1.9 GPa, 5.7 GPa.
+    // The largest pressures are 1.23 GPa, 1.9 GPa and 5.7 GPa.
     assert_eq!(told(1e5), [0, 0]);
     assert_eq!(told(4e5), [1, 0]);
     assert_eq!(told(1e7), [0, 1]);

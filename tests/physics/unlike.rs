@@ -1,4 +1,4 @@
-//! Bodies that differ: references, laws and faults.
+//! Tests of dissimilar bodies: references, laws and faults.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::cases::assert_fault;
 use crate::reference::{Converged, assert_none, read, solve, solve_on_meshes};
 use crate::sweeps::timeless;
 
-/// A contact solved elsewhere; forces over the friction limit, moment over that and `arm_mm`.
+/// A reference contact. Forces are over the friction limit, the moment over the friction limit times `arm_mm`.
 #[derive(Debug, Deserialize)]
 struct Reference {
     id: String,
@@ -49,7 +49,7 @@ impl Reference {
         json!({ "creepage_x": x, "creepage_y": y, "spin_per_mm": spin })
     }
 
-    /// Largest error of the resultants, beyond that of the reference.
+    /// Returns the largest error of the resultants beyond the uncertainty of the reference.
     fn error(&self, solution: &Solution) -> f64 {
         let point = &solution.patches[0].points[0];
         let limit = self.friction * self.normal_force_n;
@@ -83,7 +83,7 @@ fn a_wheel_that_pulls_nothing_is_found_without_a_warning() {
 fn unlike_bodies_agree_with_contact_within_one_percent_and_the_estimate() {
     let all: Vec<Reference> = read("unlike.json");
     let (mut failures, mut covered) = (Vec::new(), 0);
-    // The mirrored case of another one has a test of its own.
+    // The mirrored case of another one has its own test.
     for reference in all
         .iter()
         .filter(|reference| !reference.id.ends_with("mxi"))
@@ -150,7 +150,7 @@ fn bodies_that_hardly_differ_give_the_forces_of_like_bodies() {
     );
 }
 
-/// Turning the track round exchanges nothing but the sign of x; exchanging the bodies changes the sign of K.
+/// Tests that reversing the track changes only the sign of x, and that exchanging the bodies changes the sign of K.
 #[test]
 fn bodies_exchanged_and_rolled_backwards_give_the_mirrored_forces() {
     let reference = soft_on_rigid("dis_soft_rigid_ab1_mu0.3_mxi");
@@ -165,7 +165,7 @@ fn codes(solution: &Solution) -> Vec<&str> {
     remarks.map(|remark| remark.code.as_str()).collect()
 }
 
-/// A motion far from its neighbours is as near to CONTACT as it is alone.
+/// Tests that a motion far from its neighbours is as close to CONTACT as a separate solve.
 #[test]
 fn a_motion_among_others_agrees_with_contact() {
     let all: Vec<Reference> = read("unlike.json");
@@ -205,7 +205,7 @@ fn a_motion_among_others_agrees_with_contact() {
     assert_none("too far from CONTACT among others", &failures);
 }
 
-/// The answer to one of the motions, as if it were alone.
+/// Returns the answer to one of the motions, as if it were the only one.
 fn only(solution: &Solution, motion: usize) -> Solution {
     let mut one = solution.clone();
     for patch in &mut one.patches {
@@ -214,7 +214,7 @@ fn only(solution: &Solution, motion: usize) -> Solution {
     one
 }
 
-/// Motions of a list and the same motions in cases of their own: creep curves, forces that are asked for, explicit meshes.
+/// Compares motions of a list with the same motions in separate cases: creep curves, prescribed forces, explicit meshes.
 #[test]
 fn motions_of_a_list_are_those_of_cases_of_their_own() {
     let reference = soft_on_rigid("dis_soft_rigid_ab1_mu0.3_eta");
@@ -246,7 +246,7 @@ fn motions_of_a_list_are_those_of_cases_of_their_own() {
             );
             let region = found.region.as_deref().expect("one of several");
             let pressure = region.pressure_max_mpa / alone.patches[0].pressure_max_mpa - 1.0;
-            // Cells of the tractions show in what they open, and how much of that the largest pressure sees depends on the grid.
+            // The cells of the tractions affect the displacement due to coupling. Its effect on the largest pressure depends on the grid.
             assert!(pressure.abs() < 0.006, "{motion}: {pressure}");
             let area = region.area_mm2 / alone.patches[0].area_mm2 - 1.0;
             assert!(area.abs() < 0.003, "{motion}: {area}");
@@ -299,7 +299,7 @@ fn a_sweep_of_unlike_bodies_solved_by_slices_in_any_order_is_the_sweep_solved_at
     assert!(joined.1 == whole.1, "fields differ");
 }
 
-/// Friction and K exchange their signs with the direction of rolling, motion by motion.
+/// Tests that friction and K change their signs with the direction of rolling, motion by motion.
 #[test]
 fn mirrored_motions_of_a_list_give_mirrored_forces() {
     let reference = soft_on_rigid("dis_soft_rigid_ab1_mu0.3_eta");
@@ -369,7 +369,7 @@ fn a_pressure_that_is_given_is_kept_and_nothing_is_said_of_it() {
     );
 }
 
-/// The work that falls short of the friction power comes from the moment against rolling: friction takes power though nothing creeps.
+/// The moment against rolling supplies the difference between work and friction power: friction dissipates power although the creepages are zero.
 #[test]
 fn free_rolling_of_unlike_bodies_takes_power_and_its_cells_add_up_to_it() {
     let reference = soft_on_rigid("dis_soft_rigid_ab1_mu0.3_free0");
@@ -389,7 +389,7 @@ fn free_rolling_of_unlike_bodies_takes_power_and_its_cells_add_up_to_it() {
         "{sum} {}",
         point.friction_power_n
     );
-    // Free rolling proper: the creepage at which nothing pulls.
+    // In free rolling, the creepage gives zero force.
     let free = solve(&reference.case(json!({ "force_x_n": 0.0 }))).0;
     let point = &free.patches[0].points[0];
     assert!(point.force_x_n.abs() < 1e-3 * reference.friction * reference.normal_force_n);

@@ -1,4 +1,4 @@
-//! Wheels and rails of unlike materials: patches of profiles against the same patches by their radii, and balance.
+//! Tests of wheels and rails of dissimilar materials: patches of profiles against the same patches given by radii, and balance.
 
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::answer::{PatchSolution, Solution};
@@ -8,7 +8,7 @@ use crate::profile_cases::{generated, on_planes, put};
 use crate::profile_laws::cone_on_arc;
 use crate::reference::solve;
 
-/// Soft wheels on steel with their K and coefficients of friction, and the load in N that gives patches as steel has them under 75 kN.
+/// Poisson's ratios and friction coefficients of soft wheels on steel. `LOAD` is the load in N that gives patches like those of steel under 75 kN.
 const SOFT: [(f64, f64); 2] = [(0.4, 0.6), (0.25, 0.3)];
 const LOAD: f64 = 1450.0;
 
@@ -22,7 +22,7 @@ fn soft(case: &Value, (poisson_ratio, friction): (f64, f64)) -> Value {
     case
 }
 
-/// Largest error estimate of a point over its friction limit.
+/// Returns the largest error estimate of a point over its friction limit.
 fn estimate(patch: &PatchSolution, point: usize) -> f64 {
     patch.points[point]
         .error_estimate
@@ -42,7 +42,7 @@ fn not_of_first_order(solution: &Solution) {
     assert!(remarks.all(|remark| remark.code != "coupling-first-order"));
 }
 
-/// The patch of a wheel by its radii, loaded as given.
+/// Returns the solution of a wheel's patch given by radii, with this load.
 fn by_radii(wheel: &PatchSolution, case: &Value, load: Value, motion: &Value) -> Solution {
     let position = wheel.position.expect("a place");
     let rolling = position.rolling_radius_mm / position.contact_angle_rad.cos();
@@ -112,7 +112,7 @@ fn motions_of_a_wheel_of_another_material_are_those_of_cases_of_their_own() {
     }
 }
 
-/// At a height that is asked for tractions change the load a little, as they do by radii.
+/// Tests that tractions change the load at a prescribed height slightly, as they do with radii.
 #[test]
 fn the_load_at_a_height_is_that_by_radii() {
     for body in SOFT {
@@ -137,7 +137,7 @@ fn the_load_at_a_height_is_that_by_radii() {
     }
 }
 
-/// Together several patches carry all of the load.
+/// Tests that several patches together carry the whole load.
 #[test]
 fn patches_of_another_material_carry_the_load_together() {
     let mut several = 0;
@@ -171,17 +171,17 @@ fn patches_of_another_material_carry_the_load_together() {
     assert!(several > 0);
 }
 
-/// Both wheels of a wheelset of another material: forces as those of the wheels alone, without the remark.
+/// Tests both wheels of a wheelset of another material: the forces are those of the wheels alone, without the remark.
 #[test]
 fn a_wheel_that_moves_with_its_wheelset_is_coupled_too() {
-    // A cone on a crown, where the slips of a wheelset are nearly those of the creepages at one place.
+    // A cone on a crown, for which the slips of a wheelset are nearly those of the creepages at one place.
     let mut case = soft(&cone_on_arc(), SOFT[0]);
     case["load"] = json!({ "normal_force_n": LOAD });
     case["motion"] =
         json!({ "wheelset": { "speed_mm_per_s": 1e4, "angular_velocity_rad_per_s": 21.7 } });
     let (solution, _) = solve(&case);
     not_of_first_order(&solution);
-    // The same wheel with the creepages that were found for its patch.
+    // The same wheel with the creepages found for its patch.
     let motion = solution.patches[0].points[0].motion;
     case["motion"] = json!(motion);
     let (known, _) = solve(&case);
@@ -190,7 +190,7 @@ fn a_wheel_that_moves_with_its_wheelset_is_coupled_too() {
     assert!(off < 0.005, "{off}");
 }
 
-/// A lobe beside another one, `height` mm lower.
+/// Returns a lobe beside another one that is `height` mm lower.
 fn two_lobes(height: f64) -> Value {
     let y: Vec<f64> = (-60..=180).map(|k| 0.1 * f64::from(k)).collect();
     let lobe = |y: f64| (y * y / 600.0).min(height + (y - 12.0).powi(2) / 600.0);
@@ -203,7 +203,7 @@ fn two_lobes(height: f64) -> Value {
     case
 }
 
-/// An answer has one list of patches: a motion whose tractions lift a patch off that touches without them is answered in first order.
+/// An answer has one list of patches. A motion whose tractions lift off a patch that touches without them is solved to first order.
 #[test]
 fn a_motion_whose_tractions_take_a_patch_away_says_that_it_is_of_first_order() {
     let patches = |height: f64| {
@@ -244,7 +244,7 @@ fn a_motion_whose_tractions_take_a_patch_away_says_that_it_is_of_first_order() {
     assert!(told > 0);
 }
 
-/// On planes, which are for comparison, tractions do not change pressures.
+/// Tests that tractions do not change pressures on planes, which are for comparison.
 #[test]
 fn on_planes_a_wheel_of_another_material_is_of_first_order() {
     let mut case = soft(&cone_on_arc(), SOFT[1]);

@@ -1,4 +1,4 @@
-//! A caller is asked again and again whether a solve shall go on, also on the largest inputs.
+//! Tests that a solve polls its monitor regularly, also on the largest inputs.
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -14,10 +14,10 @@ use crate::damaged::{resampled, with};
 use crate::profile_cases::{generated, put};
 use crate::profile_shapes::{rail_60e1, s1002};
 
-/// Measured on the inputs below: at most 0.04 s. This is a guard against a stage that asks nobody, not a limit of time.
+/// The longest measured interval on the inputs below is 0.04 s. The limit detects a stage without ticks. It is not a time limit.
 const SILENCE_MAX: Duration = Duration::from_secs(1);
 
-/// Counts ticks and the longest time between two, and stops at one of them.
+/// Counts ticks and the longest interval between two, and stops at one of them.
 struct Counting {
     began: Instant,
     last: Cell<Instant>,
@@ -56,7 +56,7 @@ impl Monitor for Counting {
     }
 }
 
-/// Profiles of nearly as many points as are allowed, in contact at gauge corner and flange.
+/// Returns profiles with nearly the maximum number of points, in contact at gauge corner and flange.
 fn long_profiles() -> Value {
     let case = put(&generated(), "contact", json!({ "lateral_shift_mm": -5.0 }));
     let fine = |points: Vec<[f64; 2]>| resampled(&points, 0.009);
@@ -65,7 +65,7 @@ fn long_profiles() -> Value {
     case
 }
 
-/// A rough gap of 600 by 600 samples.
+/// Returns a rough gap of 600 by 600 samples.
 fn large_gap() -> Value {
     let count = 600;
     let axis: Vec<f64> = (0..count)
@@ -94,7 +94,7 @@ fn no_stage_leaves_the_caller_unasked_on_the_largest_inputs() {
         assert!(monitor.tick(1.0).is_continue());
         let silence = monitor.silence.get();
         assert!(silence < SILENCE_MAX, "{name}: {silence:?}");
-        // A stop is obeyed wherever it comes, at the tick that says it.
+        // A stop is obeyed at every tick, at once.
         let ticks = monitor.ticks.get();
         assert!(ticks > 50, "{name}: {ticks} ticks");
         for part in 1..8 {
@@ -107,7 +107,7 @@ fn no_stage_leaves_the_caller_unasked_on_the_largest_inputs() {
     }
 }
 
-/// The back of a flange beside the face of a guard rail, 41 mm from the gauge face and 20 mm higher than the running rail.
+/// Returns a case with the back of a flange beside the face of a guard rail, 41 mm from the gauge face and 20 mm higher than the running rail.
 fn beside_guard_rail() -> Value {
     let text = include_str!("../../api/examples/wheel-rail.case.json");
     let mut case: Value = serde_json::from_str(text).unwrap();

@@ -1,4 +1,4 @@
-//! Wear across a patch against sums of tractions times slips over the elements of another program.
+//! Tests wear across a patch against sums of tractions times slips over the elements of another program.
 
 use std::collections::HashMap;
 
@@ -9,11 +9,11 @@ use serde_json::{Value, json};
 use crate::gap_samples::GapReference;
 use crate::reference::{assert_none, cases, read, solve};
 
-/// What the total power may be off, and the share of it on either side of any line.
+/// Allowed error of the total power. `SHARE` is the allowed error of its share on either side of any line.
 const TOTAL: f64 = 0.02;
 const SHARE: f64 = 0.025;
 
-/// Rows of elements: friction power over speed and width, and depth of the wear map; and the power of the converged forces.
+/// Rows of elements with friction power over speed and width and the depth of the wear map, and the power of the converged forces.
 #[derive(Debug, Deserialize)]
 struct WearReference {
     id: String,
@@ -24,10 +24,10 @@ struct WearReference {
     usfd_depth_nm: Vec<f64>,
 }
 
-/// A distribution across: middles, widths and values over the width.
+/// A distribution across the patch: centres, widths and values over the width.
 type Across<'a> = (&'a [f64], &'a dyn Fn(usize) -> f64, &'a [f64]);
 
-/// The sum right of `y`.
+/// Returns the integral of the distribution up to `y`.
 fn right_of((middles, width, values): Across, y: f64) -> f64 {
     let parts = middles.iter().zip(values).enumerate();
     let parts = parts.map(|(k, (middle, value))| {
@@ -37,7 +37,7 @@ fn right_of((middles, width, values): Across, y: f64) -> f64 {
     parts.sum()
 }
 
-/// The largest difference of the shares right of a line.
+/// Returns the largest difference between the shares of two distributions on one side of a line.
 fn difference(found: Across, expected: Across) -> f64 {
     let [of_found, of_expected] = [found, expected].map(|across| right_of(across, 1e3));
     let (first, last) = (expected.0[0], expected.0[expected.0.len() - 1]);

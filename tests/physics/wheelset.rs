@@ -1,4 +1,4 @@
-//! What must hold for a wheelset on both rails: mirror images, balance, closed forms of the conicity, and the single wheel in its place.
+//! Tests of laws for a wheelset on both rails: mirror images, balance, closed forms of the conicity, and agreement with single wheels.
 
 use railhead_contact::solution::words::answer::{Kinematics, Solution, WheelsetAnswer};
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use crate::profile_cases::put;
 use crate::profile_shapes::{rail_60e1, s1002};
 use crate::reference::solve;
 
-/// A wheelset of S1002 on 60E1 inclined 1:40, as the single wheels of these tests lie.
+/// Returns a wheelset of S1002 on 60E1 inclined 1:40, placed as the single wheels of these tests.
 fn wheelset() -> Value {
     on(
         json!({ "points_mm": rail_60e1() }),
@@ -55,7 +55,7 @@ fn a_mirrored_wheelset_has_its_sides_exchanged() {
     near(one.roll_rad, -other.roll_rad, 1e-7);
     near(one.centre_height_mm, other.centre_height_mm, 2e-4);
     near(one.radius_difference_mm, -other.radius_difference_mm, 1e-3);
-    // Shifted to the left, the left wheel runs on the larger radius.
+    // With a shift to the left, the left wheel runs on the larger radius.
     assert!(one.radius_difference_mm > 0.1);
     for (left, right) in [(&one.left, &other.right), (&one.right, &other.left)] {
         assert_eq!(left.patches.len(), right.patches.len());
@@ -67,7 +67,7 @@ fn a_mirrored_wheelset_has_its_sides_exchanged() {
     }
 }
 
-/// Motions of a list are answered as each by itself, together with positions and in a grid of both.
+/// Tests that motions of a list have the answers of separate cases, together with positions and in a grid of both.
 #[test]
 fn several_motions_are_those_of_cases_of_their_own() {
     let moving = |radius: f64| json!({ "speed_mm_per_s": 20000, "free_rolling_radius_mm": radius });
@@ -128,7 +128,7 @@ fn faulty_lists_of_motions_are_told() {
     assert_fault(&case, "/motion/wheelset", &["an object"]);
 }
 
-/// Vertical forces are those of the load, the totals are the sums of both wheels, and a torque that is given is balanced.
+/// Tests that vertical forces balance the load, that the totals are the sums of both wheels, and that a prescribed torque is balanced.
 #[test]
 fn a_wheelset_balances_its_load_and_its_torque() {
     let mut case = put(
@@ -196,7 +196,7 @@ fn a_single_wheel_in_the_place_of_one_of_a_wheelset_has_its_patch() {
 }
 
 fn arc(radius: f64, sign: f64, tilt: f64) -> Value {
-    // Heights over y, z down: a head that is convex, or a tread that is hollow, inclined by the tilt in its middle.
+    // Heights over y with z down: a convex head or a hollow tread, inclined by the tilt in its middle.
     let depth = |y: f64| sign * (radius - (radius * radius - y * y).sqrt()) - tilt * y;
     let points: Vec<[f64; 2]> = (-100..=100)
         .map(|k| 0.3 * f64::from(k))
@@ -208,14 +208,15 @@ fn arc(radius: f64, sign: f64, tilt: f64) -> Value {
 fn with_kinematics(mut case: Value) -> Value {
     case["contact"]["kinematics"] =
         json!({ "reach_mm": 5, "step_mm": 0.25, "amplitudes_mm": [1, 3] });
-    // The middle of the wheel over that of the rail.
+    // The middle of the wheel lies over that of the rail.
     case["contact"]["rail_origin_mm"] = json!(747.5);
     case["contact"]["flange_back_position_mm"] = json!(-67.5);
     case
 }
 
-/// Wickens 1965 for arcs: `λ = δ₀ R_w / (R_w − R_r) · (l + R_r δ₀) / (l − r δ₀)` with half the distance l of the contacts and the contact
-/// angle δ₀ in the middle; of a cone `R_w` is infinite. The second factor is that of the roll.
+/// Returns the conicity of arcs after Wickens 1965, `λ = δ₀ R_w / (R_w − R_r) · (l + R_r δ₀) / (l − r δ₀)`, with half the distance l of the contacts
+/// and the contact angle δ₀ in the middle, and the value without the second factor. For a cone, `R_w` is infinite. The second factor is due to the
+/// roll.
 fn wickens(slope: f64, rail: f64, wheel: f64, half: f64) -> [f64; 2] {
     let level = slope / (1.0 - rail / wheel);
     [
@@ -260,7 +261,7 @@ fn a_cone_on_any_crown_has_its_tangent_for_its_conicity() {
 fn two_arcs_have_wickens_conicity() {
     let wheel = arc(500.0, 1.0, 0.02);
     let found = kinematics(&with_kinematics(on(arc(300.0, 1.0, 0.0), wheel, 0.0)));
-    // Where the slopes agree: y/300 on the rail, 0.05 + (y − y₀)/500 on the wheel, from the angle that is found.
+    // The slopes agree at the contact: y/300 on the rail, 0.05 + (y − y₀)/500 on the wheel, with the contact angle that is found.
     let middle = found.lateral_shift_mm.len() / 2;
     let slope = found.left.contact_angle_rad[middle].tan();
     let [rolled, level] = wickens(slope, 300.0, 500.0, 0.5 * found.contact_distance_mm);
@@ -270,7 +271,7 @@ fn two_arcs_have_wickens_conicity() {
     }
 }
 
-/// With wheels of different radii the wheelset steers to where both roll on the same one.
+/// Tests that a wheelset with wheels of different radii moves to the position where both roll on the same radius.
 #[test]
 fn wheels_that_differ_move_the_equilibrium() {
     let cone: Vec<[f64; 2]> = (-60..=60).map(f64::from).map(|y| [y, -0.05 * y]).collect();
@@ -278,7 +279,7 @@ fn wheels_that_differ_move_the_equilibrium() {
     let mut case = with_kinematics(on(arc(300.0, 1.0, 0.0), cone, 0.0));
     case["contact"]["right"] = json!({ "rolling_radius_mm": 460.1 });
     let found = kinematics(&case);
-    // The left wheel needs 0.1 mm more: 1 mm of shift at a conicity of 0.05.
+    // The left wheel needs 0.1 mm more radius difference: 1 mm of shift at a conicity of 0.05.
     let shift = found.equilibrium_shift_mm.expect("an equilibrium");
     near(shift, 1.0, 1e-3);
 }
@@ -297,7 +298,7 @@ fn the_shipped_wheelset_answers_every_position_and_amplitude() {
     assert_eq!(solution.total.len(), 3);
     let kinematics = found.kinematics.as_ref().expect("kinematics");
     for position in &found.positions {
-        // The loaded wheels roll where the rigid ones touch, as near as a patch is wide.
+        // The loaded wheels roll where the rigid ones touch, within the width of a patch.
         let shifts = &kinematics.lateral_shift_mm;
         let at = shifts
             .iter()

@@ -1,4 +1,5 @@
-//! Forces prescribed under one wheel of a moving wheelset: its lateral and its angular velocity are found, with the wheel at rest under its load.
+//! Tests of forces prescribed under one wheel of a moving wheelset. The solver finds the lateral and the angular velocity, with the wheel in
+//! equilibrium under its load.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -14,7 +15,7 @@ use crate::reference::solve;
 const LIMIT: f64 = 0.3 * 75_000.0;
 const SPEED: f64 = 20_000.0;
 
-/// A wheel on the right rail (1) or, mirrored, on the left (−1), shifted in mm and yawed in rad, whose wheelset moves as given.
+/// Returns a wheel on the right rail (1) or, mirrored, on the left (−1), shifted in mm and yawed in rad, with this motion of the wheelset.
 fn moving([shift, yaw]: [f64; 2], side: f64, wheelset: &Value) -> Value {
     let mut case = generated();
     case["motion"] = json!({ "wheelset": { "speed_mm_per_s": SPEED } });
@@ -32,7 +33,7 @@ fn answer(place: [f64; 2], side: f64, wheelset: &Value) -> Solution {
 
 #[test]
 fn the_lateral_force_of_a_lateral_velocity_gives_the_velocity_back() {
-    // Tread without and with yaw, gauge corner and flange under yaw.
+    // Tread without and with yaw, gauge corner and flange with yaw.
     for (place, velocity) in [
         ([0.0, 0.0], 12.0),
         ([0.0, 0.006], 100.0),
@@ -55,7 +56,7 @@ fn the_lateral_force_of_a_lateral_velocity_gives_the_velocity_back() {
         assert!(off < 5e-5, "{place:?}: {lateral} {velocity}");
         assert!(found.angular_velocity_rad_per_s.is_none());
         assert_eq!(found.patches.len(), given.patches.len());
-        // The creepage along x is that of the angular velocity that was given, and all forces balance the load.
+        // The creepage along x is that of the given angular velocity, and all forces balance the load.
         let along = |solution: &Solution| solution.patches[0].points[0].motion.creepage_x;
         assert!((along(&found) - along(&given)).abs() < 1e-5);
         let vertical = found.total[0].force_z_n.expect("of profiles");
@@ -126,7 +127,7 @@ fn lateral_forces_that_a_wheelset_cannot_have_are_refused_by_name() {
     );
     let word = json!({ "free_rolling_radius_mm": radius, "force_y_n": "all" });
     assert_fault(&moving([0.0; 2], 1.0, &word), pointer, &["all"]);
-    // How fast the wheelset turns has to be said all the same.
+    // The angular velocity of the wheelset is still required.
     assert_fault(
         &moving([0.0; 2], 1.0, &json!({ "force_y_n": 100 })),
         "/motion/wheelset/angular_velocity_rad_per_s",

@@ -1,4 +1,4 @@
-//! Do iterations and products use the buffers of their workspaces alone, and can threads share what they only read?
+//! Tests that iterations and products use only the buffers of their workspaces, and that threads can share what they only read.
 
 use std::sync::Arc;
 
@@ -48,8 +48,7 @@ fn case(solver: &Value, motion: &Value) -> CheckedCase {
     check(&case, &Limits::default()).expect("a valid case")
 }
 
-/// Calls `work` with the equations of every rule on a mesh of 12 strips and 14 cells, whole and by parity, and with the padded bound
-/// and areas.
+/// Calls `work` with the equations of every rule on a mesh of 12 strips and 14 cells, whole and by parity, and with the padded bounds and areas.
 fn with_equations(precision_target: f64, work: impl Fn(&SlipEquations, [&[f64]; 2])) {
     let checked = case(
         &json!({ "method": "boundary_element", "target_error": precision_target }),
@@ -79,7 +78,7 @@ fn with_equations(precision_target: f64, work: impl Fn(&SlipEquations, [&[f64]; 
     }
 }
 
-/// The friction law with these rigid slips, bounds and areas, to a residual of 1e-7 in so many steps.
+/// Returns the friction law with these rigid slips, bounds and areas, for a residual of 1e-7 within `steps_max` steps.
 fn law<'a>(rigid: &'a [f64], [bound, area]: [&'a [f64]; 2], steps_max: u32) -> NewtonTask<'a> {
     NewtonTask {
         rigid,
@@ -95,7 +94,7 @@ fn law<'a>(rigid: &'a [f64], [bound, area]: [&'a [f64]; 2], steps_max: u32) -> N
 
 #[test]
 fn a_product_allocates_nothing_after_the_first() {
-    // Single and double precision.
+    // The targets select single and double precision.
     for target in [0.005, 0.0002] {
         with_equations(target, |equations, _| {
             let length = 2 * equations.padded();
@@ -139,7 +138,7 @@ fn newton_and_gmres_allocate_nothing_in_a_workspace_that_has_served_before() {
             solve();
             assert_eq!(during(&mut solve), 0, "{:?}", equations.rule);
         }
-        // There were steps to count.
+        // The iterations include steps that could allocate.
         assert!(iterations.iter().all(|count| *count > 2), "{iterations:?}");
     });
 }
@@ -164,7 +163,7 @@ fn a_workspace_that_has_served_other_motions_moves_no_answer() {
         let zero = vec![0.0; 2 * equations.padded()];
         let mut served = NewtonWorkspace::default();
         let first = solve(&mut served, STEPS_MAX, &zero, 0.50);
-        // So few steps that starts count as near.
+        // With this few steps, starts count as near.
         let near =
             |workspace: &mut NewtonWorkspace, creepage_x| solve(workspace, 8, &first, creepage_x);
         near(&mut served, 0.505);
@@ -182,7 +181,7 @@ fn a_small_solve_allocates_a_bounded_number_of_times() {
         let checked = case(solver, &motion);
         during(|| solve(&checked, &Unmonitored))
     };
-    // What the process makes once is made by another thread, whose allocations are not counted.
+    // Another thread computes what the process computes once. Its allocations are not counted.
     std::thread::scope(|scope| {
         scope
             .spawn(|| count(&json!({ "method": "boundary_element", "target_error": 0.02 })))
@@ -192,12 +191,12 @@ fn a_small_solve_allocates_a_bounded_number_of_times() {
     let on_mesh = count(&json!({ "mesh": { "strips": 8, "cells": 8 } }));
     let to_target = count(&json!({ "method": "boundary_element", "target_error": 0.005 }));
     println!("{on_mesh} allocations on a mesh of the client, {to_target} to the target");
-    // Most are made with meshes, operators and factors, each once.
+    // Most allocations are for meshes, operators and factors, each made once.
     assert!(on_mesh < 500, "{on_mesh} allocations on one mesh");
     assert!(to_target < 1450, "{to_target} allocations to the target");
 }
 
-/// On the three coarsest meshes, by a worker that has solved the like.
+/// Counts the allocations on the three coarsest meshes, by a worker that has solved similar cases.
 #[test]
 fn a_small_solve_takes_some_hundred_allocations() {
     let store = Arc::new(OperatorStore::default());

@@ -1,18 +1,18 @@
-//! Features of cases: forms of friction, pairs of bodies, contacts, ways to move, methods and outputs. Each feature has the expected outcome on every
-//! route. This is the list of combinations that are refused.
+//! Features of cases: forms of friction, pairs of bodies, contacts, ways to give the motion, methods and outputs. Each feature has the expected
+//! outcome on every route. This is the list of combinations that are refused.
 
 use serde_json::{Value, json};
 
 use crate::matrix::{Expected, Route};
 use crate::profile_shapes::{rail_60e1, s1002};
 
-/// Rows of a feature.
+/// Number of rows of a feature.
 pub const ROWS: usize = 3;
 
-/// A column: where its numbers stand in the case, and one for each row.
+/// A column: the pointer into the case, and a number for each row.
 pub type RowColumn = (&'static str, [f64; ROWS]);
 
-/// How several motions of one case are written.
+/// The form of several motions in one case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motions {
     /// A list, or a sweep, of creepages and forces.
@@ -21,7 +21,7 @@ pub enum Motions {
     Wheelset,
 }
 
-/// A case, and rows over it.
+/// A case with rows over it.
 #[derive(Debug, Clone)]
 pub struct Feature {
     pub name: String,
@@ -29,9 +29,9 @@ pub struct Feature {
     pub motions: Motions,
     /// Numbers that a job with several motions can vary.
     pub motion_columns: Vec<RowColumn>,
-    /// Numbers that only rows vary.
+    /// Numbers that only rows can vary.
     pub columns: Vec<RowColumn>,
-    /// Routes that do not give the answer of the case alone.
+    /// Routes whose outcome is not the answer of the case alone.
     pub exceptions: Vec<(Route, Expected)>,
 }
 
@@ -75,7 +75,7 @@ const CREEPAGES: [RowColumn; 3] = [
     ("/motion/spin_per_mm", [2e-4, -1e-4, 3e-4]),
 ];
 
-/// Forms of friction for steady rolling.
+/// Returns forms of friction for steady rolling.
 fn frictions() -> Vec<(&'static str, Value)> {
     let layer = json!({ "shear_modulus_mpa": 1500, "thickness_mm": 0.02 });
     let yielding = json!({ "shear_modulus_mpa": 1500, "thickness_mm": 0.02, "yield_mpa": 100, "hardening_mpa_per_mm": 2000 });
@@ -129,11 +129,11 @@ fn frictions() -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// Pairs of bodies.
+/// Returns pairs of bodies.
 fn bodies() -> Vec<(&'static str, Value)> {
     let steel = json!({ "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 });
     vec![
-        // K = −0.01, too small for pressure and tractions to be found together.
+        // K = −0.01, too small for pressure and tractions to be coupled.
         (
             "hardly unlike bodies",
             json!({ "upper": steel, "lower": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.3 } }),
@@ -222,7 +222,7 @@ fn wheel_on_rail() -> Value {
     })
 }
 
-/// A wheel of S1002 on 60E1 under the sum of its normal forces.
+/// Returns a wheel of S1002 on 60E1 under the sum of its normal forces.
 fn profiles() -> Feature {
     let contact = wheel_on_rail();
     let mut feature = feature("profiles", contact, json!({ "normal_force_n": 75_000 }));
@@ -234,7 +234,7 @@ fn profiles() -> Feature {
     feature
 }
 
-/// The same under a vertical force, of which friction carries a part, so that every motion has its own normal force.
+/// Returns the wheel under a vertical force. Friction carries a part of it, so that every motion has its own normal force.
 fn profiles_under_vertical_force() -> Feature {
     let mut feature = profiles()
         .named("profiles under a vertical force")
@@ -246,7 +246,7 @@ fn profiles_under_vertical_force() -> Feature {
     feature
 }
 
-/// The same moving with its wheelset.
+/// Returns the wheel moving with its wheelset.
 fn profiles_with_wheelset() -> Feature {
     let mut feature = profiles()
         .named("profiles moving with the wheelset")
@@ -265,7 +265,7 @@ fn profiles_with_wheelset() -> Feature {
     feature
 }
 
-/// A wheel on a rail with a guard rail. The back of the flange touches the guard rail in two of the three rows.
+/// Returns a wheel on a rail with a guard rail. The back of the flange touches the guard rail in two of the three rows.
 fn guard_rail() -> Feature {
     let text = include_str!("../../api/examples/guard-rail.case.json");
     let example: Value = serde_json::from_str(text).expect("an example");
@@ -299,7 +299,7 @@ fn wheelset() -> Feature {
     feature
 }
 
-/// A contact with a form of friction.
+/// Returns a contact with a form of friction.
 fn rubbing(mut feature: Feature, (name, friction): &(&'static str, Value)) -> Feature {
     feature.name = format!("{}, {name}", feature.name);
     feature.case["friction"] = friction.clone();
@@ -319,7 +319,7 @@ fn rubbing(mut feature: Feature, (name, friction): &(&'static str, Value)) -> Fe
     }
     let frictionless = friction["coefficient"] == json!(0.0);
     if frictionless && feature.expected(Route::List) == Expected::SharedPatches {
-        // Nothing but normal forces balances anything.
+        // Only normal forces balance the load.
         feature = feature
             .but(Route::List, Expected::Agrees)
             .but(Route::Sweep, Expected::Agrees);
@@ -327,14 +327,14 @@ fn rubbing(mut feature: Feature, (name, friction): &(&'static str, Value)) -> Fe
     feature
 }
 
-/// A contact between a pair of bodies.
+/// Returns a contact between a pair of bodies.
 fn between(mut feature: Feature, (name, material): &(&'static str, Value)) -> Feature {
     feature.name = format!("{}, {name}", feature.name);
     feature.case["material"] = material.clone();
     feature
 }
 
-/// Ways to ask about an ellipse: methods, outputs, loads, forces, histories.
+/// Returns questions on an ellipse: methods, outputs, loads, forces, histories.
 fn questions() -> Vec<Feature> {
     let mut approached = radii()
         .named("an approach")
@@ -428,7 +428,7 @@ fn histories() -> Vec<Feature> {
     ]
 }
 
-/// Forces that are prescribed in place of creepages.
+/// Returns cases with prescribed forces in place of creepages.
 fn forced() -> Vec<Feature> {
     let force_x: RowColumn = ("/motion/force_x_n", [9e3, -6e3, 4e3]);
     let force_y: RowColumn = ("/motion/force_y_n", [-4e3, 3e3, 5e3]);
@@ -481,7 +481,7 @@ fn contacts() -> Vec<Feature> {
     ]
 }
 
-/// Friction that a contact is tried with in the short selection, by its place in the list.
+/// Returns the indices of the forms of friction that a contact is combined with in the short selection.
 fn short(contact: &Feature) -> &'static [usize] {
     match &*contact.name {
         "radii" => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14],
@@ -491,7 +491,7 @@ fn short(contact: &Feature) -> &'static [usize] {
     }
 }
 
-/// Every form of friction, every contact and every question; with `full`, every form of friction on every contact between every pair of bodies.
+/// Returns every form of friction, every contact and every question. With `full`, combines every form of friction, contact and pair of bodies.
 pub fn selection(full: bool) -> Vec<Feature> {
     let (frictions, bodies) = (frictions(), bodies());
     let mut features = Vec::new();
@@ -509,7 +509,7 @@ pub fn selection(full: bool) -> Vec<Feature> {
         }
     }
     for pair in &bodies {
-        // Similar ellipses under coefficients of their own.
+        // Similar ellipses with different friction coefficients.
         let mut similar = rubbing(radii(), &frictions[0]);
         similar
             .columns

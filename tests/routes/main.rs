@@ -1,4 +1,4 @@
-//! Is the answer the same on every route?
+//! Tests that a case has the same answer on every route.
 
 mod features;
 mod matrix;
@@ -8,7 +8,7 @@ mod profile_shapes;
 use features::selection;
 use matrix::matrix;
 
-/// `RAILHEAD_ROUTES=wheelset` tries the features whose names contain this word.
+/// With `RAILHEAD_ROUTES=wheelset`, tests only the features whose names contain this word.
 #[test]
 fn every_feature_is_answered_on_every_route_as_the_case_alone() {
     let mut features = selection(false);

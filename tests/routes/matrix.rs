@@ -1,4 +1,4 @@
-//! Every feature of a case through every route: each answer is that of the case alone, within both estimates.
+//! Sends every feature of a case through every route. Each answer must agree with that of the case alone, within both estimates.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -18,7 +18,7 @@ use serde_json::{Map, Value, json};
 
 use crate::features::{Feature, Motions, ROWS};
 
-/// A way in which a case arrives.
+/// A way to submit a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Route {
     /// A job with a list of motions.
@@ -27,15 +27,15 @@ pub enum Route {
     Sweep,
     /// A run.
     Run,
-    /// A run with rows that differ in their motions alone.
+    /// A run with rows that differ only in their motions.
     RunOfMotions,
-    /// Rows at once.
+    /// Rows solved at once by `/v1/evaluate`.
     Evaluate,
-    /// Two wheels by themselves in the places of those of a wheelset.
+    /// Two separate wheels in the positions of those of a wheelset.
     TwoProfiles,
 }
 
-/// All of them.
+/// All routes.
 pub const ROUTES: [Route; 6] = [
     Route::List,
     Route::Sweep,
@@ -50,11 +50,11 @@ pub const ROUTES: [Route; 6] = [
 pub enum Expected {
     /// Each answer is that of the case alone.
     Agrees,
-    /// There is no such request.
+    /// The route has no such request.
     Absent,
-    /// The request is refused, with these words.
+    /// The request is refused with a message that contains this text.
     Refused(&'static str),
-    /// Forces are those of each motion, while patches are listed with the normal force of the first.
+    /// Forces are those of each motion, while patches are listed with the normal force of the first motion.
     SharedPatches,
 }
 
@@ -63,7 +63,7 @@ pub enum Expected {
 struct Answer {
     /// `F_x`, `F_y`, `M_z` and the normal force.
     numbers: [f64; 4],
-    /// Their estimated errors, NaN where there is none.
+    /// Estimated errors of the numbers, NaN where there is none.
     errors: [f64; 4],
     /// Creepages that were found for prescribed forces.
     creepages: [Option<f64>; 2],
@@ -71,16 +71,16 @@ struct Answer {
     scales: [f64; 2],
 }
 
-/// Error of an answer without an estimate, relative to μN: one on a given mesh, solved to a residual.
+/// Error of an answer without an estimate, relative to μN. Such an answer is solved to a residual on a given mesh.
 const WITHOUT_ESTIMATE: f64 = 1e-3;
 /// Rounding, relative to the normal force.
 const ROUNDING: f64 = 1e-6;
-/// Normal forces of patches that are found agree so well, relative to themselves.
+/// Allowed difference of the normal forces of patches that are found, relative to themselves.
 const NORMAL: f64 = 2e-3;
 /// Relative error of a creepage over the relative error of the force that prescribes it, for forces up to half the limit.
 const CREEPAGE: f64 = 5.0;
 
-/// The outcome of the matrix: a line for each feature, and faults.
+/// The result of the matrix: a line for each feature, and failures.
 #[derive(Debug, Default)]
 pub struct Shown {
     pub lines: String,
@@ -91,7 +91,7 @@ pub struct Shown {
 }
 
 impl Shown {
-    /// All of it as a table.
+    /// Returns the matrix as a table.
     pub fn table(&self) -> String {
         let titles = ROUTES.map(|route| format!("{route:?}")).join(" | ");
         let mut text = format!(
@@ -143,7 +143,7 @@ pub fn matrix(features: &[Feature]) -> Shown {
     shown
 }
 
-/// Compares a route with the cases alone: how many answers, and the largest difference over both estimates.
+/// Compares a route with the cases alone. Returns the number of answers, and the largest difference over both estimates.
 fn checked(
     feature: &Feature,
     alone: &mut Alone,
@@ -190,7 +190,7 @@ fn checked(
     }
 }
 
-/// The largest difference of two answers over the sum of their estimates.
+/// Returns the largest difference of two answers over the sum of their estimates.
 fn compare(found: &Answer, known: &Answer) -> Result<f64, String> {
     let [limit, moment] = known.scales;
     let scales = [limit, limit, moment, known.numbers[3]];
@@ -202,7 +202,7 @@ fn compare(found: &Answer, known: &Answer) -> Result<f64, String> {
             (_, true) => WITHOUT_ESTIMATE * scales[k],
             _ => answer.errors[k],
         };
-        // The lateral force of a wheel has a share of the normal forces, which is there without friction too.
+        // The lateral force of a wheel includes a component of the normal forces, which exists also without friction.
         let rounding = ROUNDING * scales[k].max(known.numbers[3]);
         let allowed = error(found) + error(known) + rounding;
         let off = (a - b).abs();
@@ -226,7 +226,7 @@ fn compare(found: &Answer, known: &Answer) -> Result<f64, String> {
     Ok(worst)
 }
 
-/// The cases of the rows, each solved alone when it is first asked for.
+/// The cases of the rows, each solved alone on first use.
 struct Alone<'a> {
     feature: &'a Feature,
     known: BTreeMap<(usize, bool), Answer>,
@@ -256,7 +256,8 @@ impl Alone<'_> {
 }
 
 impl Alone<'_> {
-    /// Is one of the cases refused alone for the same reason, apart from its numbers? Rows at once say only that they have no answer.
+    /// Returns whether one of the cases alone is refused for the same reason, apart from its numbers. Evaluated rows report only that they have no
+    /// answer.
     fn is_refused_alike(&mut self, why: &str, route: Route) -> bool {
         let words =
             |text: &str| text.replace(|c: char| c.is_ascii_digit() || "+-.".contains(c), "");
@@ -271,7 +272,7 @@ impl Alone<'_> {
     }
 }
 
-/// A case as a job solves it.
+/// Solves a case as a job does.
 fn solved(case: &Value) -> Result<Solution, String> {
     let checked = contact::check(case, &Limits::default()).map_err(|error| error.to_string())?;
     let solved = contact::solve_with(&Arc::new(OperatorStore::default()), &checked, &Unmonitored);
@@ -280,7 +281,7 @@ fn solved(case: &Value) -> Result<Solution, String> {
         .map_err(|error| error.to_string())
 }
 
-/// The answers of a solution, motion by motion.
+/// Returns the answers of a solution, motion by motion.
 fn answers(solution: &Solution) -> Vec<Answer> {
     let sum = |of: &dyn Fn(usize) -> f64| (0..solution.patches.len()).map(of).sum::<f64>();
     let area = sum(&|k| solution.patches[k].area_mm2);
@@ -334,7 +335,7 @@ fn answers(solution: &Solution) -> Vec<Answer> {
         .collect()
 }
 
-/// The answers of a route, `None` for rows that are left to the solver; or why it refuses.
+/// Returns the answers of a route, with `None` for rows that are left to the solver, or the reason for a refusal.
 fn through(feature: &Feature, route: Route) -> Result<Vec<Option<Answer>>, String> {
     match route {
         Route::List => of_motions(feature, false),
@@ -346,7 +347,7 @@ fn through(feature: &Feature, route: Route) -> Result<Vec<Option<Answer>>, Strin
     }
 }
 
-/// A job with all motions.
+/// Returns the answers of one job with all motions.
 fn of_motions(feature: &Feature, sweep: bool) -> Result<Vec<Option<Answer>>, String> {
     let mut case = feature.case.clone();
     match feature.motions {
@@ -436,7 +437,7 @@ fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
     let answer = evaluate_at_once(&task, &checked, &solve, &Unmonitored, step);
     let answer = answer.map_err(|error| format!("{error:?}"))?;
     let columns: BTreeMap<_, _> = answer.columns().into_iter().collect();
-    // The table answers neither the normal force nor the error of the moment.
+    // The table gives neither the normal force nor the error of the moment.
     let patches = match columns.contains_key("normal_force_n") {
         true => Vec::new(),
         false => {
@@ -476,7 +477,7 @@ fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
     rows.collect()
 }
 
-/// Both wheels of a wheelset by themselves, each under the vertical force that it carries there; their sums stand for the wheelset.
+/// Solves both wheels of a wheelset separately, each under the vertical force that it carries there, and returns the sums of their forces.
 fn two_profiles(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
     let mut found = Vec::new();
     for row in 0..ROWS {
@@ -498,7 +499,7 @@ fn two_profiles(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
         });
         let [left, right] = sides;
         let (left, right) = (left?, right?);
-        // Moments of the wheels are about origins of their own.
+        // Moments of the wheels are about different origins.
         let known = answers(&whole)[0].clone();
         let plus = |k: usize| left.numbers[k] + right.numbers[k];
         found.push(Some(Answer {
@@ -512,7 +513,7 @@ fn two_profiles(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
 }
 
 impl Feature {
-    /// The case of a row, with the motion of the row and, with columns, its other numbers.
+    /// Returns the case of a row, with the motion of the row and, if `with_columns`, its other numbers.
     pub fn case_of_row(&self, row: usize, with_columns: bool) -> Value {
         let columns = self.varied_columns(with_columns);
         case_of_row(&self.case, &columns, &BTreeMap::new(), row).expect("places of the case")

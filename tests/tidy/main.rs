@@ -1,4 +1,4 @@
-//! Rules that neither the compiler nor clippy checks: comments, links and examples.
+//! Tests of rules that neither the compiler nor clippy checks: comments, links and examples.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,7 +8,7 @@ fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
-/// The Rust files below some folders of the project, by their path from its root.
+/// Returns the Rust files below some folders of the project, by their path from its root.
 fn sources(folders: &[&str]) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     let mut folders: Vec<PathBuf> = folders.iter().map(|name| root().join(name)).collect();
@@ -27,8 +27,8 @@ fn sources(folders: &[&str]) -> BTreeMap<String, String> {
     found
 }
 
-/// Numbers of the physics are tuned, measured or chosen, and each says which: a constant has a line above it, or stands in a group
-/// whose first line speaks for all. In the files named for their constants every single one has its own.
+/// Requires a comment on every constant of the physics: on the line above it, or above the group that it belongs to. In files dedicated to
+/// constants, every constant needs its own.
 #[test]
 fn every_number_of_the_physics_says_what_it_is() {
     let mut bare = Vec::new();
@@ -66,7 +66,7 @@ fn every_file_says_what_it_is_for() {
     assert_eq!(silent, Vec::<String>::new());
 }
 
-/// Files that comments name, as `name.rs`, and that are neither in the package of the comment nor among tests and benches.
+/// Returns files that comments name as `name.rs` and that exist neither in the package of the comment nor among tests and benches.
 fn names_of_no_file(sources: &BTreeMap<String, String>) -> Vec<String> {
     let mut stale = Vec::new();
     for (path, text) in sources.iter().filter(|(path, _)| path.starts_with("src/")) {
@@ -107,7 +107,7 @@ fn files_that_comments_name_exist() {
     assert_eq!(found, Vec::<String>::new());
 }
 
-/// The targets of the relative links of a document that are not there.
+/// Returns the targets of a document's relative links that do not exist.
 fn dead_links(document: &Path, text: &str) -> Vec<String> {
     let folder = document.parent().expect("a folder");
     let links = text.split("](").skip(1);

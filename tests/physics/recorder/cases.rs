@@ -1,4 +1,4 @@
-//! What is asked: the shipped examples, references of every kind, and contacts by chance, the same on every machine.
+//! Recorded cases: the shipped examples, references of every kind, and random contacts, the same on every machine.
 
 use serde_json::{Value, json};
 
@@ -12,7 +12,7 @@ use crate::reference::{self, Ellipse, HERTZ_CLASSES};
 const ELLIPSES: usize = 60;
 const WHEELS: usize = 20;
 
-/// All cases with their names.
+/// Returns all cases with their names.
 pub fn all() -> Vec<(String, Value)> {
     let mut cases = examples();
     cases.extend(golden::cases());
@@ -22,7 +22,7 @@ pub fn all() -> Vec<(String, Value)> {
     cases.extend(methods());
     cases.extend(wheels());
     cases.extend(variants());
-    // Wheels on planes, and those by chance on the curve of the rail.
+    // Wheels on planes, and the random ones on the curve of the rail.
     for (_, case) in &mut cases {
         let contact = &mut case["contact"];
         let on_rails = ["profiles", "wheelset"]
@@ -35,14 +35,14 @@ pub fn all() -> Vec<(String, Value)> {
     cases.extend(on_the_curve());
     for (_, case) in &mut cases {
         round(case);
-        // Everything that is recorded has to be there.
+        // All recorded quantities must be in the outputs.
         case["outputs"] = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
     }
     cases
 }
 
-/// Rounds all numbers to twelve digits: what compilers make of powers and logarithms differs with the level of optimisation, and the same
-/// questions have to be asked by every build.
+/// Rounds all numbers to twelve digits. The results of powers and logarithms depend on the optimisation level, but every build must solve the same
+/// cases.
 fn round(value: &mut Value) {
     match value {
         Value::Number(number) if number.is_f64() => {
@@ -56,7 +56,7 @@ fn round(value: &mut Value) {
     }
 }
 
-/// The shipped examples that have an answer.
+/// Returns the shipped examples that have an answer.
 fn examples() -> Vec<(String, Value)> {
     let folder = format!(
         "{}/api/examples",
@@ -77,7 +77,7 @@ fn examples() -> Vec<(String, Value)> {
     cases
 }
 
-/// The ellipses and gaps that were solved elsewhere.
+/// Returns the ellipses and gaps with reference results.
 fn references() -> Vec<(String, Value)> {
     let ellipses = HERTZ_CLASSES
         .iter()
@@ -95,7 +95,7 @@ fn references() -> Vec<(String, Value)> {
     ellipses.chain(gaps).collect()
 }
 
-/// Ellipses, pressures and gaps from the population that the error estimate is judged on.
+/// Returns ellipses, pressures and gaps from the random population that calibrates the error estimate.
 fn by_chance() -> Vec<(String, Value)> {
     let classes = [
         (Class::Ellipse, ELLIPSES),
@@ -115,7 +115,7 @@ fn by_chance() -> Vec<(String, Value)> {
         .collect()
 }
 
-/// Sweeps of one component at each of two shapes, a map of two, and forces in the place of creepages.
+/// Returns sweeps of one component at each of two shapes, a map of two components, and forces in place of creepages.
 fn sweeps() -> Vec<(String, Value)> {
     let mut cases = Vec::new();
     for (shape, ratio) in [("wide", 0.4), ("long", 2.5)] {
@@ -158,7 +158,7 @@ fn sweeps() -> Vec<(String, Value)> {
     cases
 }
 
-/// The other methods, and explicit meshes.
+/// Returns cases with the other methods and with explicit meshes.
 fn methods() -> Vec<(String, Value)> {
     let solvers = [
         (
@@ -192,7 +192,7 @@ fn methods() -> Vec<(String, Value)> {
     cases
 }
 
-/// Wheels on rails: by chance from the population, and displaced step by step with the motion of their wheelset.
+/// Returns wheels on rails: random ones from the population, and ones displaced step by step with the motion of their wheelset.
 fn wheels() -> Vec<(String, Value)> {
     let mut cases: Vec<(String, Value)> = (0..WHEELS)
         .map(|number| {
@@ -210,7 +210,7 @@ fn wheels() -> Vec<(String, Value)> {
     cases
 }
 
-/// New and worn wheels on new and worn rails by chance, and wheelsets, on the curve of the rail.
+/// Returns random new and worn wheels on new and worn rails, and wheelsets, on the curve of the rail.
 fn on_the_curve() -> Vec<(String, Value)> {
     let mut cases = wheels();
     for (name, case) in &mut cases {
@@ -231,7 +231,7 @@ fn on_the_curve() -> Vec<(String, Value)> {
     cases
 }
 
-/// What else a case can say: other loads, unlike bodies, no friction, smoothed profiles.
+/// Returns cases of the remaining kinds: other loads, dissimilar bodies, no friction, smoothed profiles.
 fn variants() -> Vec<(String, Value)> {
     let mut cases = Vec::new();
     let mut add = |name: &str, base: &Value, members: Value| {

@@ -1,14 +1,14 @@
-//! What differs between two recordings, in words: the first differences of each kind, and the largest change of every quantity.
+//! Describes the differences between two recordings: the first differences of each kind, and the largest change of every quantity.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use crate::recorder::record::{Kind, Record, Recording, kind};
 
-/// Differences that are written out; the others are counted.
+/// Number of differences that are written out. The others are counted.
 const SHOWN: usize = 20;
 
-/// What is compared with another arithmetic where the region is found.
+/// Quantities that are compared between different arithmetics if the region is found by the solver.
 const RESULTANTS: [&str; 5] = [
     "force_x",
     "force_y",
@@ -17,21 +17,21 @@ const RESULTANTS: [&str; 5] = [
     "total_moment",
 ];
 
-/// What must be equal.
+/// How closely two recordings must agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Precision {
-    /// Everything, to the last bit.
+    /// All quantities agree to the last bit.
     Bits,
-    /// The numbers that a client reads, up to these changes.
+    /// The numbers that a client reads agree within these changes.
     Within {
-        /// Of contacts that are given.
+        /// Allowed change for given contacts.
         given: f64,
-        /// Of the resultants of contacts whose region is found.
+        /// Allowed change of the resultants of contacts whose region is found by the solver.
         found: f64,
     },
 }
 
-/// Empty if the recordings agree.
+/// Returns a description of the differences, or an empty string if the recordings agree.
 pub fn compare(recorded: &Recording, present: &Recording, precision: Precision) -> String {
     let mut differences = Differences::new(precision);
     let before: BTreeMap<&str, &Record> = recorded
@@ -56,7 +56,7 @@ pub fn compare(recorded: &Recording, present: &Recording, precision: Precision) 
 struct Differences {
     precision: Precision,
     lines: Vec<String>,
-    /// By quantity: how many lines differ, the largest change and where it is.
+    /// Per quantity: the number of differing lines, the largest change and its place.
     largest: BTreeMap<String, (usize, f64, String)>,
 }
 
@@ -135,7 +135,7 @@ impl Differences {
     }
 }
 
-/// What a change of this quantity is measured by.
+/// Returns the scale by which changes of this quantity are measured.
 fn scale(record: &Record, quantity: &str) -> f64 {
     let scales: Vec<f64> = record.get("scales").map_or_else(Vec::new, parsed);
     let [limit, length] = scales[..] else {
@@ -155,7 +155,7 @@ fn parsed(values: &[String]) -> Vec<f64> {
     values.iter().filter_map(|v| v.parse().ok()).collect()
 }
 
-/// The largest difference of the numbers over the scale; infinite if there are more or fewer of them, or other words.
+/// Returns the largest difference of the numbers over the scale. It is infinite if the count of numbers or the words differ.
 fn change(before: Option<&[String]>, now: Option<&[String]>, scale: f64) -> f64 {
     let (Some(before), Some(now)) = (before, now) else {
         return f64::INFINITY;
@@ -174,7 +174,7 @@ fn change(before: Option<&[String]>, now: Option<&[String]>, scale: f64) -> f64 
         .fold(0.0, f64::max)
 }
 
-/// The first values that differ, in words.
+/// Returns a description of the first values that differ.
 fn first_difference(before: Option<&[String]>, now: Option<&[String]>) -> String {
     match (before, now) {
         (None, _) => " was not there".to_owned(),

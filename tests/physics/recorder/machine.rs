@@ -1,4 +1,4 @@
-//! Names the arithmetic of a machine. A probe of everything that may differ decides whether two machines give the same bits.
+//! Names the arithmetic of a machine. A probe of all operations that may differ decides whether two machines give the same bits.
 
 use faer::Mat;
 use faer::prelude::Solve;
@@ -7,7 +7,7 @@ use realfft::RealFftPlanner;
 
 use crate::recorder::record::Digest;
 
-/// The SIMD level of the kernels, and a digest of results of the C library, a factorisation and a transform.
+/// Returns the SIMD level of the kernels, and a digest of results of the C library, a factorisation and a transform.
 pub fn arithmetic(level: SimdLevel) -> String {
     let mut digest = Digest::new();
     for index in 0..200 {

@@ -1,10 +1,9 @@
-//! Compares the answers with the recorded ones, for changes of structure that must not move a number.
+//! Compares the answers with the recorded ones, for refactorings that must not change a number.
 //!
-//! `RAILHEAD_RECORD=write cargo test --test physics recorder -- --nocapture` writes the present answers to `tests/data/recorded.txt`, at the
-//! SIMD level of the record, and prints what changed. Without the variable the test solves all cases at every SIMD level of the processor.
-//! A level whose arithmetic is that of the record (see [`machine`]) must reproduce every bit of every force, estimate and zone, and all
-//! iterations and meshes. Other levels sum in another order: there the numbers that a client reads are compared, within [`ELSEWHERE`] or
-//! [`FOUND_ELSEWHERE`].
+//! `RAILHEAD_RECORD=write cargo test --test physics recorder -- --nocapture` writes the present answers to `tests/data/recorded.txt`, at the SIMD
+//! level of the record, and prints the changes. Without the variable, the test solves all cases at every SIMD level of the processor. A level with
+//! the arithmetic of the record (see [`machine`]) must reproduce every bit of every force, estimate and zone, and all iterations and meshes. Other
+//! levels sum in another order. For them, the numbers that a client reads are compared, within [`ELSEWHERE`] or [`FOUND_ELSEWHERE`].
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -26,21 +25,21 @@ mod comparison;
 mod machine;
 mod record;
 
-/// Largest change of a given contact with another arithmetic, relative to the scale of the quantity: less than half of the usual target.
-/// Kernels without SIMD move creepages that are found for a force by 9e-4, peaks of the traction by 1.2e-4 and all other numbers by 7e-7.
+/// Largest change of a given contact with another arithmetic, relative to the scale of the quantity. It is less than half of the default target.
+/// Kernels without SIMD change creepages that are found for a force by 9e-4, peaks of the traction by 1.2e-4 and all other numbers by 7e-7.
 const ELSEWHERE: f64 = 2e-3;
-/// Largest change of the resultants of gaps and wheels, of which nothing else is compared. The last bits can turn decisions about grids and
-/// heights; answers then differ within the target (wheels without SIMD by 5e-3 of the friction limit).
+/// Largest change of the resultants of gaps and wheels, for which nothing else is compared. The last bits can change decisions about grids and
+/// heights. Answers then differ within the target (those of wheels without SIMD by 5e-3 of the friction limit).
 const FOUND_ELSEWHERE: f64 = 0.01;
 
-/// One in this number of cases is solved a second time, without the operators that earlier cases left.
+/// One in this number of cases is solved a second time, without the operators of earlier cases.
 const ALONE_EVERY: usize = 8;
 
 fn path() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/data/recorded.txt")
 }
 
-/// The answer to one case, or why there is none.
+/// Returns the answer to one case, or the reason why there is none.
 fn solved(operators: &Arc<OperatorStore>, case: &Value) -> Record {
     let checked = match contact::check(case, &Limits::default()) {
         Ok(checked) => checked,

@@ -1,23 +1,23 @@
-//! What is recorded of an answer, and its text: one quantity a line, numbers as the shortest decimals that give back every bit.
+//! The recorded quantities of an answer and their text: one quantity per line, with numbers as the shortest decimals that restore every bit.
 
 use std::fmt::{self, Display, Formatter};
 
 use railhead_contact::solution::words::answer::{Fields, PatchFields, PointSolution, Solution};
 
-/// How a change of a quantity is measured.
+/// The scale by which a change of a quantity is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Relative to the largest number of its line.
+    /// The largest number of the line.
     Number,
-    /// Relative to the friction limit μN.
+    /// The friction limit μN.
     Force,
-    /// Relative to μN√(A/π).
+    /// μN√(A/π).
     Moment,
-    /// Not at all: counts, meshes, remarks and digests are equal or not, and differ between machines.
+    /// No scale: counts, meshes, remarks and digests are equal or not, and differ between machines.
     Exact,
 }
 
-/// How changes of a quantity are measured.
+/// Returns the kind of a quantity.
 pub fn kind(quantity: &str) -> Kind {
     match quantity {
         "force_x"
@@ -40,7 +40,7 @@ pub fn kind(quantity: &str) -> Kind {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Record(pub Vec<(String, Vec<String>)>);
 
-/// The answers to all cases, and where they are from.
+/// The answers to all cases, with the revision and the arithmetic that gave them.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Recording {
     pub revision: u32,
@@ -56,19 +56,19 @@ fn numbers(values: impl IntoIterator<Item = f64>) -> Vec<String> {
     values.into_iter().map(number).collect()
 }
 
-/// A number that may be missing.
+/// Returns the text of a number that may be missing.
 fn optional(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), number)
 }
 
 impl Record {
-    /// There is no answer, for this reason.
+    /// Returns the record of a case without an answer, with the reason.
     pub fn refused(reason: &str) -> Record {
         let words = reason.split_whitespace().map(str::to_owned).collect();
         Record(vec![("refused".to_owned(), words)])
     }
 
-    /// The answer to a case with this friction coefficient.
+    /// Returns the record of the answer to a case with this friction coefficient.
     pub fn of(friction: f64, solution: &Solution, fields: &Fields) -> Record {
         let mut record = Record::default();
         let load: f64 = solution.patches.iter().map(|p| p.normal_force_n).sum();
@@ -98,7 +98,7 @@ impl Record {
         record
     }
 
-    /// Adds a quantity, unless there is nothing of it.
+    /// Adds a quantity, unless all its values are missing.
     fn put(&mut self, quantity: &str, values: Vec<String>) {
         if values.iter().any(|value| value != "-") {
             self.0.push((quantity.to_owned(), values));
@@ -201,14 +201,13 @@ impl Record {
         self.put("total_error", errors.collect());
     }
 
-    /// The values of a quantity.
     pub fn get(&self, quantity: &str) -> Option<&[String]> {
         let found = self.0.iter().find(|(name, _)| name == quantity);
         found.map(|(_, values)| values.as_slice())
     }
 }
 
-/// FNV-1a of 64 bits (Fowler, Noll, Vo): equal digests mean equal values to the last bit.
+/// FNV-1a with 64 bits (Fowler, Noll, Vo). Equal digests mean equal values to the last bit.
 pub struct Digest(u64);
 
 impl Digest {
@@ -225,7 +224,7 @@ impl Digest {
     fn values(&mut self, values: Option<&Vec<f64>>) {
         self.word(u64::from(values.is_some()));
         for value in values.into_iter().flatten() {
-            // Both zeros are one number.
+            // Positive and negative zero count as equal.
             self.word((value + 0.0).to_bits());
         }
     }
@@ -235,7 +234,7 @@ impl Digest {
     }
 }
 
-/// The cells of a motion, with their pressure.
+/// Returns the digest of the cells of a motion, with their pressure.
 fn mesh_digest(patch: &PatchFields, point: usize) -> String {
     let (cells, mut digest) = (patch.cells(point), Digest::new());
     for values in [&cells.x_mm, &cells.y_mm, &cells.dx_mm, &cells.dy_mm] {
@@ -248,7 +247,7 @@ fn mesh_digest(patch: &PatchFields, point: usize) -> String {
     format!("{}:{}", cells.x_mm.len(), digest.text())
 }
 
-/// Zones, tractions and slips of a motion.
+/// Returns the digest of zones, tractions and slips of a motion.
 fn value_digest(patch: &PatchFields, point: usize) -> String {
     let (values, mut digest) = (&patch.points[point], Digest::new());
     for zone in values.zone.iter().flatten() {
@@ -280,7 +279,7 @@ impl Display for Recording {
 }
 
 impl Recording {
-    /// Reads what [`Display`] wrote; nothing if it is something else.
+    /// Parses the output of [`Display`]. Returns `None` for any other text.
     pub fn read(text: &str) -> Option<Recording> {
         let mut recording = Recording::default();
         for line in text.lines().filter(|line| !line.is_empty()) {
