@@ -1,4 +1,5 @@
-// Frames of the page with much data: a run of a million rows, a field of 400 × 400 cells, a wheelset that is shifted, ten thousand jobs. Not a test: it prints times.
+// Measures frame times of the page with large data: a run of a million rows, a field of 400 × 400 cells, a shifted wheelset, ten thousand jobs. It
+// prints times and tests nothing.
 //   RAILHEAD_BINARY=target/release/railhead RAILHEAD_TEST_BROWSER=/usr/bin/chromium node tests/page/bench.mjs [rows]
 import { drawn, example, launch, Service, withFields } from './browser/harness.mjs';
 
@@ -69,7 +70,7 @@ try {
     await page.mouse.up();
     await page.locator('line-strips').press('Escape');
   }, 12);
-  // Few rows are searched at once.
+  // A run of few rows is searched at once, without this button.
   if (ROWS > 200_000) await page.getByRole('button', { name: /^Search all/ }).click();
   await frames('run: searching the worst rows', () => page.locator('[aria-labelledby="h-worst"] tbody tr').first().waitFor(), 1);
 
@@ -107,7 +108,7 @@ try {
   const steps = await page.evaluate(() => performance.getEntriesByName('shift').map(({ duration }) => Math.round(duration)).sort((one, two) => one - two));
   console.log(JSON.stringify({ name: 'wheelset: wheels, forces and pressures of a shift', steps: steps.length, median: steps[steps.length >> 1], longest: steps.at(-1) }));
 
-  // Each shift alone, several times: the least time of a shift is its own, without what else the machine does.
+  // Each shift is timed several times. The minimum excludes other load of the machine.
   const alone = await page.evaluate(async (rounds) => {
     const slider = /** @type {HTMLInputElement} */ (document.querySelector('.shifting input[type=range]'));
     const shifts = () => performance.getEntriesByName('shift');

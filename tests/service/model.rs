@@ -1,4 +1,4 @@
-//! A model of a job table: rows in a map, and the effect of each call.
+//! A model of a job table: rows in a map, and the effect of each call on them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,9 +6,9 @@ use railhead::jobs::State;
 use railhead::jobs::store::{CacheKey, Refusal};
 use uuid::Uuid;
 
-/// Attempts at a job before it fails.
+/// The number of attempts at a job before it fails.
 pub const ATTEMPTS_MAX: u32 = 2;
-/// Bounds of the queue: of all tenants, and of one.
+/// The limits of the queue for all tenants and for one tenant.
 pub const BOUNDS: (u64, u64) = (14, 9);
 
 #[derive(Debug, Clone)]
@@ -27,11 +27,11 @@ pub struct Row {
     pub cancel_requested: bool,
     pub ended_at: i64,
     pub cached: bool,
-    /// Key of the result.
+    /// The key of the result.
     pub blob: Option<String>,
-    /// Keys of the stored slices.
+    /// The keys of the stored slices.
     pub slices: Vec<String>,
-    /// Slices were ever stored.
+    /// Whether slices were ever stored.
     pub begun: bool,
 }
 
@@ -73,7 +73,7 @@ impl Row {
         }
     }
 
-    /// The one way in which a state changes here.
+    /// Changes the state and asserts that the transition is allowed.
     pub fn become_state(&mut self, state: State, now: i64) {
         assert!(self.state.may_become(state), "{:?} → {state:?}", self.state);
         self.state = state;
@@ -92,7 +92,7 @@ impl Row {
         self.group_size = group_size;
     }
 
-    /// Back to the queue without counting the attempt, unless it is to be cancelled.
+    /// Returns the job to the queue without counting the attempt, or cancels it if that was requested.
     pub fn released(&mut self, now: i64) {
         self.attempt -= 1;
         let state = match self.cancel_requested {
@@ -102,7 +102,7 @@ impl Row {
         self.become_state(state, now);
     }
 
-    /// Its lease has run out.
+    /// Applies the expiry of the lease.
     pub fn reaped(&mut self, now: i64) {
         if self.group_size > 1 {
             self.suspect = true;
@@ -132,7 +132,7 @@ impl Row {
 }
 
 impl Model {
-    /// Queued jobs and reserved places, of a tenant or of all.
+    /// Returns the number of queued jobs and reserved places, of one tenant or of all.
     fn taken(&self, tenant: Option<&str>) -> u64 {
         let of = |other: &str| tenant.is_none_or(|tenant| tenant == other);
         let rows = self.rows.values();
@@ -143,7 +143,7 @@ impl Model {
         queued.count() as u64 + reserved.sum::<u64>()
     }
 
-    /// Is there room for so many more?
+    /// Returns whether the queue has room for this many more jobs.
     pub fn admit(&self, tenant: &str, jobs: u64) -> Result<(), Refusal> {
         let of_tenant = self.taken(Some(tenant));
         let places = jobs
@@ -156,14 +156,14 @@ impl Model {
         }
     }
 
-    /// The batches whose jobs no worker may take.
+    /// Returns the incomplete batches, whose jobs no worker may claim.
     pub fn filling(&self) -> Vec<Uuid> {
         let batches = self.batches.iter();
         let filling = batches.filter(|(_, batch)| !batch.complete);
         filling.map(|(id, _)| *id).collect()
     }
 
-    /// The ids that a claim takes, in their order.
+    /// Returns the ids that a claim takes, in order.
     pub fn choose(&self, tenant: &str, jobs: usize, begun: bool, now: i64) -> Vec<Uuid> {
         let filling = self.filling();
         let rows = self.rows.iter().filter(|(_, row)| {
@@ -189,14 +189,14 @@ impl Model {
         chosen
     }
 
-    /// The row a claim still holds.
+    /// Returns the row if the claim still holds it.
     pub fn held(&mut self, id: Uuid, lease_token: u64) -> Option<&mut Row> {
         self.rows
             .get_mut(&id)
             .filter(|row| row.state == State::Running && row.lease_token == lease_token)
     }
 
-    /// A dead process leaves its jobs: those that were not certainly its cause count no attempt.
+    /// Takes the jobs of a dead process back. The attempt counts only for jobs that were certainly the cause.
     pub fn reap_dead(&mut self, now: i64) -> BTreeMap<Uuid, State> {
         let running = self.rows.values().filter(|row| row.state == State::Running);
         let running = running.count();
@@ -231,7 +231,7 @@ impl Model {
         taken
     }
 
-    /// The succeeded jobs that carry this key.
+    /// Returns the succeeded jobs with this cache key.
     pub fn sources(&self, key: CacheKey) -> Vec<Uuid> {
         let rows = self.rows.iter();
         let sources =
@@ -239,7 +239,7 @@ impl Model {
         sources.map(|(id, _)| *id).collect()
     }
 
-    /// The job gets the result of another, if that is there.
+    /// Gives the job the result of another job. Returns false if that result or the job does not exist.
     pub fn share(&mut self, id: Uuid, source: Uuid, now: i64) -> bool {
         let Some(blob) = self
             .rows
@@ -253,20 +253,20 @@ impl Model {
             return false;
         };
         (row.blob, row.cached, row.cache_key) = (blob, true, None);
-        // A submission that is answered at once was never queued for anybody to see.
+        // A submission that is answered from the cache is never visible as queued.
         (row.state, row.ended_at) = (State::Succeeded, now);
         row.slices.clear();
         true
     }
 
-    /// Keys of the results that something refers to.
+    /// Returns the keys of all referenced results.
     pub fn referenced(&self) -> BTreeSet<String> {
         let rows = self.rows.values();
         rows.flat_map(|row| row.blob.iter().chain(&row.slices).cloned())
             .collect()
     }
 
-    /// Removes what had ended before, oldest first, at most so many.
+    /// Removes at most `jobs` jobs that had ended by this time, oldest first.
     pub fn expire(&mut self, ended_before: i64, jobs: usize) -> u64 {
         let old = |id: &Uuid| i64::try_from(id.as_u128() >> 80).unwrap() <= ended_before;
         let gone: Vec<Uuid> = self

@@ -1,4 +1,4 @@
-//! Does a data folder that an earlier version wrote open in this one, with everything in it, whenever the process dies meanwhile?
+//! Tests that a data folder of an earlier version opens with all its data, even if the process dies during a start.
 
 use std::path::Path;
 use std::process::Command;
@@ -12,7 +12,7 @@ use crate::csv_table::Csv;
 use crate::server::{Answer, example, example_text};
 use crate::support::{Service, case, pause, railhead};
 
-/// A data folder of a form of the embedded table, and what the program that wrote it answered.
+/// Unpacks a data folder of a schema version. Returns it with the answers of the program that wrote it.
 fn of_form(form: u32) -> (TempDir, Value) {
     let folder = tempfile::tempdir().unwrap();
     let archive = format!("tests/data/data-folder-form-{form}.tar.gz");
@@ -43,14 +43,14 @@ impl Client<'_> {
         serde_json::from_str(&self.text(path).await).unwrap()
     }
 
-    /// Submits once more under a key.
+    /// Repeats a submission with its idempotency key.
     async fn send_again(&self, path: &str, key: &str, form: &str, body: String) -> Answer {
         let request = self.service.request(Method::POST, path).body(body);
         let request = request.bearer_auth(self.key).header("content-type", form);
         Answer::to(request.header("idempotency-key", key)).await
     }
 
-    /// The id that is answered then, and whether it is that of the first submission.
+    /// Repeats a submission. Returns the id in the answer, and whether the answer was a replay of the first one.
     async fn again(&self, path: &str, key: &str, form: &str, body: String) -> (Value, bool) {
         let answer = self.send_again(path, key, form, body).await;
         let replayed = answer.header("idempotency-replayed").is_some();
@@ -58,7 +58,7 @@ impl Client<'_> {
         (answer.json["id"].clone(), replayed)
     }
 
-    /// Submits again under a key that now stands for another digest.
+    /// Repeats a submission whose key now belongs to another digest. Asserts the conflict.
     async fn assert_conflict(&self, path: &str, key: &str, form: &str, body: String) {
         let answer = self.send_again(path, key, form, body).await.is(422);
         assert_eq!(answer.json["type"], "/problems/idempotency-conflict");
@@ -75,7 +75,7 @@ impl Client<'_> {
     }
 }
 
-/// Starts the service several times and kills it. A process may die at any moment of its first starts.
+/// Starts and kills the service several times, because a process may die at any moment of its first starts.
 fn kill_while_starting(folder: &Path) {
     for ms in [0, 5, 20, 50, 100, 200] {
         let mut program = railhead();
@@ -145,7 +145,7 @@ async fn opens_with_all_that_is_in_it(form: u32) {
         (json!(id("job")), true)
     );
     let table = "creepage_x,label:km,name\n0.001,1,first\n0.002,2,second\n".to_owned();
-    // Digests of tables and rows have changed since form 7: a key used again is a conflict, never a second batch or run.
+    // Digests of tables and rows have changed since schema version 7. A repeated key is then a conflict and never creates a second batch or run.
     let rows = example_text("run.json");
     let batch = format!("/v1/batches?template={}&name=table&label=line:7", id("job"));
     for (path, key_used, form, body) in [
@@ -159,7 +159,7 @@ async fn opens_with_all_that_is_in_it(form: u32) {
             assert_eq!(found, (json!(id(key_used)), true));
         }
     }
-    // Runs belong to their tenant.
+    // Runs are not listed as batches, and batches are not listed as runs.
     for (kind, other) in [("batches", "runs"), ("runs", "batches")] {
         let listed = client.get(&format!("/v1/{kind}?limit=100")).await;
         let listed = listed[kind].as_array().unwrap();
@@ -192,7 +192,7 @@ async fn opens_with_all_that_is_in_it(form: u32) {
     assert_stored_bytes_go(&client, [id("run"), id("batch")]).await;
 }
 
-/// Stored bytes are counted from now on, and go with the run and the batch they belong to.
+/// Asserts that stored bytes are counted, and that they are freed with their run and batch.
 async fn assert_stored_bytes_go(client: &Client<'_>, [run, batch]: [String; 2]) {
     let stored = async || {
         client.get("/v1/me").await["used"]["stored_bytes"]

@@ -1,4 +1,4 @@
-//! Priorities, deadlines, and clocks that jump: who is solved first, and who too late?
+//! Tests priorities, deadlines and clock jumps: the order in which jobs are solved, and which jobs are late.
 
 use std::time::Duration;
 
@@ -29,7 +29,7 @@ async fn late_jobs_fail_whether_queued_or_running_and_others_do_not() {
     });
     let turned = Turned::default();
     setup.options.clock = turned.clock();
-    // The jump shall not cost the running job its lease.
+    // The lease is so long that the clock jump does not expire it.
     setup.options.lease = Duration::from_secs(3600);
     let server = setup.start().await;
     let running = submit(&server, "?deadline_s=60", &case("endless")).await;

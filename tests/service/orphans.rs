@@ -1,4 +1,4 @@
-//! Orphaned results, which a process left behind when it was killed.
+//! Tests orphaned results, which a killed process left behind.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -9,7 +9,7 @@ use uuid::Uuid;
 use crate::lab::Lab;
 use crate::support::{case, pause};
 
-/// The file of the only result in this folder.
+/// Returns the file of the only result in this folder.
 fn only_solution(folder: &Path) -> PathBuf {
     let mut path = folder.to_owned();
     while path.is_dir() {
@@ -23,7 +23,7 @@ fn only_solution(folder: &Path) -> PathBuf {
     path
 }
 
-/// Stores the same result again, as the result of this job.
+/// Copies a stored result as the result of another job. Returns the path of the copy.
 fn copied(kept_file: &Path, of: Uuid, to: Uuid) -> PathBuf {
     let path = kept_file.to_str().unwrap();
     let copy = PathBuf::from(path.replace(&of.to_string(), &to.to_string()));
@@ -65,7 +65,7 @@ async fn a_result_of_an_earlier_attempt_is_swept_once_its_job_no_longer_runs() {
     while lab.gate.begun() < 2 {
         pause().await;
     }
-    // The number of an attempt that is over.
+    // The copy has the number of an earlier attempt.
     let earlier = copied(&kept_file, kept, again);
     let name = earlier.parent().unwrap().with_file_name("99");
     std::fs::rename(earlier.parent().unwrap(), &name).unwrap();

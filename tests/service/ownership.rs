@@ -1,4 +1,4 @@
-//! Does a stored result live for as long as any job refers to it, and no longer?
+//! Tests that a stored result lives exactly as long as a job refers to it.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -11,7 +11,7 @@ use crate::results::path_of;
 use crate::server::{Server, Setup, link};
 use crate::support::{Turned, case, files_below, loaded};
 
-/// A service that keeps every result in a folder, ended jobs for 30 days, and the clock that it uses.
+/// Starts a service that stores every result in a folder and keeps ended jobs for 30 days. Returns it with the folder and its clock.
 async fn in_folders() -> (Server, PathBuf, Turned) {
     let mut setup = Setup::new();
     setup.options.small_result_max_bytes = 0;
@@ -53,7 +53,7 @@ async fn deleting_a_batch_leaves_the_results_that_its_jobs_lent() {
     let lines = results(&server, &other, "").await;
     assert_eq!(lines[0]["result"]["cached"], true, "{}", lines[0]);
 
-    // The last reference goes with a batch, and the result with it.
+    // Deleting the batch removes the last reference, and with it the result.
     assert_eq!(server.delete(&path_of(&borrower)).await.status, 204);
     assert!(!files_below(&folder).is_empty());
     assert_eq!(server.delete(&own_path(&other)).await.status, 204);

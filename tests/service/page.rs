@@ -1,8 +1,8 @@
-//! The page at `/`: headers and caching of its files.
+//! Tests headers and caching of the page at `/` and of its files.
 
 use crate::server::Server;
 
-/// The paths of the scripts, styles and pictures that a text of HTML names.
+/// Returns the paths of the scripts, styles and pictures that an HTML text refers to.
 fn linked(text: &str) -> Vec<String> {
     let named = text
         .split(['"', '\''])
@@ -49,7 +49,7 @@ async fn files_of_the_page_may_be_kept_for_good_and_the_page_itself_not() {
         let lifetime = file.header("cache-control").expect("a lifetime");
         assert!(lifetime.contains("immutable"), "{path}: {lifetime}");
     }
-    // A page that was loaded before the service was renewed finds its files still, but must ask again.
+    // A page that was loaded before an update of the service still finds its files, but must revalidate them.
     let other = server.get("/page/0123456789abcdef/js/page.js").await;
     assert_eq!(other.status, 200, "{}", other.text);
     assert_eq!(other.header("cache-control"), Some("no-cache"));

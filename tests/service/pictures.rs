@@ -1,4 +1,4 @@
-//! Pictures: well-formed, to scale, harmless for any name of a case, readable without colour.
+//! Tests pictures: they are well-formed, to scale, safe for any name of a case, and readable without colour.
 
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::{Options, Tree};
@@ -61,7 +61,7 @@ async fn every_field_is_drawn_as_svg_and_as_png() {
     }
 }
 
-/// Lightness of a pixel, 0 to 255.
+/// Returns the lightness of a pixel, from 0 to 255.
 fn light(pixels: &Pixmap, x: u32, y: u32) -> f64 {
     let pixel = pixels.pixel(x, y).expect("a pixel");
     0.2126 * f64::from(pixel.red())
@@ -141,7 +141,7 @@ async fn pictures_that_cannot_be_drawn_say_why() {
     assert_problem(&answer, 409, "result-not-ready", "");
 }
 
-/// Every drawn shape: its fill, its stroke and its box `[x from, x to, y from, y to]` in units of the picture.
+/// Returns, for every shape, whether it is filled and its box `[left, right, top, bottom]` in units of the picture.
 fn shapes(svg: &str) -> Vec<(bool, [f64; 4])> {
     fn gather(group: &resvg::usvg::Group, into: &mut Vec<(bool, [f64; 4])>) {
         for node in group.children() {
@@ -162,7 +162,7 @@ fn shapes(svg: &str) -> Vec<(bool, [f64; 4])> {
     found
 }
 
-/// A case at default accuracy, of few cells.
+/// Returns a case of few cells at default accuracy.
 fn at_default_accuracy() -> Value {
     let mut case = asked("spin.case.json", &everything());
     case.as_object_mut().expect("a case").remove("solver");
@@ -177,7 +177,7 @@ async fn values_are_smooth_and_end_at_the_border_of_the_patch() {
         let svg = server
             .get(&format!("{path}/plot.svg?field={field}&width=160"))
             .await;
-        // A small picture shows only the patch; its ellipse of 16 mm by 8 mm is 156 wide.
+        // A small picture shows only the patch. Its ellipse of 16 mm by 8 mm is 156 units wide.
         let shapes = shapes(&svg.text);
         let filled: Vec<[f64; 4]> = shapes
             .iter()
@@ -195,7 +195,7 @@ async fn values_are_smooth_and_end_at_the_border_of_the_patch() {
             "{field}: {:?}",
             filled[0]
         );
-        // Places are rounded to a tenth, and curves may be missed by less than half a pixel.
+        // Coordinates are rounded to a tenth, and curves may deviate by less than half a pixel.
         for (_, inner) in &shapes {
             let inside = inner[0] >= left - 0.3 && inner[1] <= right + 0.3;
             let inside = inside && inner[2] >= top - 0.3 && inner[3] <= bottom + 0.3;
@@ -247,7 +247,7 @@ async fn pictures_share_a_scale_when_asked() {
 async fn small_pictures_are_small_files() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&at_default_accuracy()).await);
-    // Pixels of a large picture are not counted.
+    // The size of large PNG pictures is not limited.
     for (form, width, most) in [
         ("svg", 120, 10_000),
         ("png", 120, 10_000),
@@ -281,7 +281,7 @@ async fn a_creep_curve_has_a_bar_for_every_estimated_error() {
         .await;
     assert_eq!(Pixmap::decode_png(&png.bytes).expect("a PNG").width(), 640);
 
-    // A bar is as long as twice the error in the scale of the curve.
+    // The length of a bar is twice the error on the scale of the curve.
     let result = server.read(&format!("{path}/resultants")).await;
     let total = result["total"].as_array().expect("motions");
     let force = |k: usize| total[k]["force_x_n"].as_f64().expect("a force");

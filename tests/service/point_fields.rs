@@ -1,4 +1,4 @@
-//! All fields of a motion in one response: the values of the parts, with the border of the patch.
+//! Tests all fields of a motion in one response: the values of the parts and the border of the patch.
 
 use serde_json::{Value, json};
 

@@ -1,11 +1,11 @@
-//! Cross-sections as texts of files and in other units, on every route that takes them.
+//! Tests cross-sections as file texts and in other units, on every route that accepts them.
 
 use serde_json::{Value, json};
 
 use crate::results::number;
 use crate::server::{Server, example};
 
-/// The shipped wheel on a rail with both cross-sections as points, and these points.
+/// Returns the example of a wheel on a rail with both cross-sections as points, and these points.
 fn case() -> (Value, [Vec<[f64; 2]>; 2]) {
     let mut case = example("wheel-rail.case.json");
     let contact = &case["contact"];
@@ -40,14 +40,14 @@ fn with(case: &Value, rail: Value, wheel: Value) -> Value {
     case
 }
 
-/// Lateral and vertical place of the first touch of a case, in mm.
+/// Returns the lateral and vertical coordinate of the first contact of a case, in mm.
 async fn touch(server: &Server, case: &Value) -> [f64; 2] {
     let checked = server.post("/v1/cases/check", case).await.is(200);
     let touch = &checked.json["understood"]["placement"]["first_touch"];
     [1, 2].map(|axis| number(&touch["track_mm"][axis]))
 }
 
-/// Whether two places are less than a hundredth of a millimetre apart.
+/// Returns whether two points are less than 0.01 mm apart.
 fn is_near(found: [f64; 2], right: [f64; 2]) -> bool {
     (found[0] - right[0]).hypot(found[1] - right[1]) < 0.01
 }
@@ -104,7 +104,7 @@ async fn a_section_whose_size_says_another_unit_is_refused_or_remarked_with_it()
         let scaled_rail = scaled(&rail, factor);
         let plain = json!({ "points_mm": scaled_rail });
         let checked = server.post("/v1/profiles", &plain).await;
-        // A section in inches is too short to be one in mm.
+        // A section in inches is too small to be accepted in mm.
         let expected = if unit == "cm" { 201 } else { 422 };
         assert_eq!(checked.status, expected, "{}", checked.text);
         let words = format!("state unit: \\\"{unit}\\\"");

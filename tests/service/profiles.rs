@@ -1,4 +1,4 @@
-//! A wheel on a rail, from the shipped example to the parts of its result.
+//! Tests a wheel on a rail, from the example to the parts of its result.
 
 use crate::results::{number, path_of};
 use crate::server::{Server, count, example};
@@ -12,7 +12,7 @@ async fn a_wheel_on_a_rail_is_submitted_and_read() {
     assert_eq!(job["state"], "succeeded", "{job}");
     let (path, result) = (path_of(&job), &job["result"]);
     let patch = &result["patches"][0];
-    // How far the profiles can be trusted, before the solve and under the patch.
+    // The quality of the profiles is reported before the solve and under the patch.
     let checked = server.post("/v1/cases/check", &case).await.json;
     for (quality, name) in [
         (&checked["quality"], "check"),

@@ -1,4 +1,4 @@
-//! Invalid requests: bodies, queries and headers.
+//! Tests invalid requests: bodies, queries and headers.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -124,7 +124,7 @@ async fn a_byte_order_mark_is_skipped_before_lines_and_named_before_json() {
     }
 }
 
-/// Writes raw bytes to the service and reads the whole answer.
+/// Writes raw bytes to the service and returns the whole answer.
 async fn raw(server: &Server, request: &str) -> String {
     let mut stream = send(server.address, request).await;
     read_answer(&mut stream).await
@@ -183,11 +183,11 @@ async fn a_refusal_in_the_middle_of_a_body_leaves_the_connection_usable_or_says_
     assert!(answer.starts_with("HTTP/1.1 415"), "{answer}");
     assert!(answer.contains("HTTP/1.1 200"), "{answer}");
 
-    // More than is read away: the rest never comes.
+    // The declared length exceeds the bytes that the service discards, and the rest never arrives.
     let answer = raw(&server, &head(100_000_000)).await;
     assert!(answer.starts_with("HTTP/1.1 415"), "{answer}");
     assert!(answer.contains("connection: close"), "{answer}");
-    // A client that asks first is not told to send.
+    // A client that sends `Expect: 100-continue` is not asked to send its body.
     let asking = head(100).replace("\r\n\r\n{", "\r\nExpect: 100-continue\r\n\r\n");
     let answer = raw(&server, &asking).await;
     assert!(answer.starts_with("HTTP/1.1 415"), "{answer}");
@@ -270,7 +270,7 @@ async fn answers_that_exclude_json_are_refused() {
 
 #[tokio::test]
 async fn a_body_that_is_refused_early_may_be_sent_to_its_end() {
-    // Larger than every buffer on the way, so the client still writes when it is refused.
+    // The body exceeds every buffer on the way, so that the client is still writing when it is refused.
     const BYTES: usize = 40 << 20;
     let server = Server::idle().await;
     for path in ["/v1/jobs", "/v1/evaluate", "/v1/runs"] {

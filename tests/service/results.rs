@@ -1,4 +1,4 @@
-//! Results: fields, zones, grids and sweeps, compared with each other and with the solver.
+//! Tests results: fields, zones, grids and sweeps, compared with each other and with the solver.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::errors::assert_problem;
 use crate::server::{Server, Setup, example, link};
 
-/// The numbers of an array.
+/// Returns the numbers of an array.
 pub fn numbers(value: &Value) -> Vec<f64> {
     let items = value
         .as_array()
@@ -22,14 +22,14 @@ pub fn numbers(value: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// A number.
+/// Returns a JSON number.
 pub fn number(value: &Value) -> f64 {
     value
         .as_f64()
         .unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// The path of a job.
+/// Returns the path of a job.
 pub fn path_of(job: &Value) -> String {
     link(job, "self").to_owned()
 }
@@ -63,7 +63,7 @@ async fn a_result_is_read_without_a_look_at_the_case() {
     assert_eq!(checks.load(Ordering::SeqCst), before);
 }
 
-/// Area inside closed polygons; holes count negative.
+/// Returns the area inside closed polygons. Holes count as negative.
 pub fn area(polygons: &Value) -> f64 {
     let polygons = polygons
         .as_array()
@@ -119,7 +119,7 @@ async fn outlines_enclose_the_areas_of_the_zones() {
             count.as_u64().expect("a count"),
             "{word}"
         );
-        // The areas are shares of the patch's area, which the cells approximate.
+        // The areas are fractions of the area of the patch, which the cells approximate.
         let share = area(&zones["outlines"][word]) / cells;
         let expected = expected / (stick + slip);
         assert!(

@@ -1,4 +1,4 @@
-//! Ended jobs are kept for their retention time, and then removed with all their data.
+//! Tests that ended jobs are kept for their retention time and then removed with all their data.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::server::{Server, Setup};
 use crate::store::{claim_up_to, finish_one, new_job, open_beside, success};
 use crate::support::{DAY_MS, Turned, case, endless_case, files_below, loaded, pause};
 
-/// A service that keeps ended jobs for 30 days, and its clock.
+/// Returns the setup of a service that keeps ended jobs for 30 days, and its clock.
 fn keeping_30_days() -> (Setup, Turned) {
     let mut setup = Setup::new();
     let turned = Turned::default();
@@ -59,7 +59,7 @@ async fn an_ended_job_says_when_it_will_go_and_goes_then() {
         assert_eq!(server.get(&format!("{path}/result")).await.status, 200);
 
         turned.turn(1);
-        // Also before any sweep has come along.
+        // The job is expired even before a sweep removes it.
         assert_expired(&server, &path).await;
         assert_eq!(server.read("/v1/jobs").await["jobs"], json!([]));
         server.jobs.sweep_expired().await.unwrap();
@@ -72,7 +72,7 @@ async fn an_ended_job_says_when_it_will_go_and_goes_then() {
             "{foreign:?}"
         );
 
-        // The id is remembered for 30 days more.
+        // The id is remembered for another 30 days.
         turned.turn(29);
         server.jobs.sweep_expired().await.unwrap();
         assert_expired(&server, &path).await;
@@ -166,6 +166,6 @@ async fn the_database_shrinks_when_its_jobs_go() {
     let jobs = Jobs::open(options).await.unwrap();
     assert_eq!(jobs.sweep_expired().await.unwrap(), JOBS as u64);
     jobs.shutdown(Duration::ZERO).await;
-    // The remaining file is the reserve for the next jobs.
+    // The file keeps some space in reserve for later jobs.
     assert!(size() < full / 2, "{} of {full}", size());
 }

@@ -1,4 +1,4 @@
-//! Active requests when their key is revoked.
+//! Tests active requests when their key is revoked.
 
 use std::time::Duration;
 
@@ -16,15 +16,15 @@ use crate::runs::template;
 use crate::server::Setup;
 use crate::support::case;
 
-/// Ends of a guard: something hangs.
+/// Timeout of a test that hangs.
 const WITHIN: Duration = Duration::from_secs(45);
 
-/// A service that solves nothing.
+/// Starts a service without workers.
 async fn idle() -> Guarded {
     Guarded::start(Setup::idle(), |_| {}).await
 }
 
-/// Revokes the key of the north beside the running service.
+/// Revokes the key of the tenant `north` while the service runs.
 async fn revoke(guarded: &Guarded) {
     let folder = &guarded.server.jobs.options().data_dir;
     let keys = Keyring::open(folder).await.unwrap();
@@ -57,7 +57,7 @@ async fn requests_that_wait_end_long_before_their_time() {
             waiting(Method::GET, &result),
             waiting(Method::POST, "/v1/jobs"),
             async {
-                // The others are under way by then; it does not matter if they are not.
+                // The other requests have usually begun by then. The test does not depend on it.
                 tokio::time::sleep(Duration::from_millis(500)).await;
                 revoke(&guarded).await;
             }
@@ -75,7 +75,7 @@ async fn requests_that_wait_end_long_before_their_time() {
 async fn results_of_a_run_break_off_and_do_not_look_complete() {
     let guarded = idle().await;
     let north = &guarded.north;
-    // Rows that are expensive make short chunks, each of which is a piece of the answer. A cancelled run has them without solving.
+    // Expensive rows make short chunks, each of which is a piece of the answer. A cancelled run has these chunks without a solve.
     let mut template = template("boundary_element");
     template["solver"] =
         json!({ "method": "boundary_element", "mesh": { "strips": 32, "cells": 32 } });
@@ -99,7 +99,7 @@ async fn results_of_a_run_break_off_and_do_not_look_complete() {
         open.push((format, body));
     }
     revoke(&guarded).await;
-    // The key of an answer is looked up every 2 s.
+    // The key of an active answer is checked every 2 s.
     tokio::time::sleep(Duration::from_secs(3)).await;
     for (format, mut body) in open {
         let mut pieces = 0;
@@ -109,7 +109,7 @@ async fn results_of_a_run_break_off_and_do_not_look_complete() {
                 Some(Err(_)) => break true,
                 None => break false,
             }
-            // The look-up goes on meanwhile.
+            // The key is checked during the pause.
             tokio::time::sleep(Duration::from_millis(200)).await;
         };
         assert!(broken, "{format}: complete after {pieces} pieces");

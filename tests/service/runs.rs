@@ -1,4 +1,4 @@
-//! Runs: many rows that vary one case.
+//! Tests runs, which are many rows that vary one case.
 
 use railhead::tables::arrow::read;
 use railhead::tables::parquet::TableReader;
@@ -20,7 +20,7 @@ pub fn template(method: &str) -> Value {
     })
 }
 
-/// Columns of so many rows: loads, creepages, and where they were.
+/// Returns columns for this many rows: loads, creepages and positions.
 pub fn columns(rows: usize) -> Value {
     let each = |of: fn(usize) -> f64| (0..rows).map(of).collect::<Vec<_>>();
     json!({
@@ -36,21 +36,21 @@ pub async fn submit(server: &Server, body: &Value) -> String {
     answer.location()
 }
 
-/// A run or an evolution once it has ended.
+/// Waits for the end of a run or an evolution, and returns it.
 pub async fn ended(server: &Server, path: &str) -> Value {
     let answer = server.get(&format!("{path}?wait=240")).await.is(200);
     assert!(answer.json["ended_at"].is_string(), "{}", answer.text);
     answer.json
 }
 
-/// The answers of a run that has ended.
+/// Waits for the end of a run. Returns its answers.
 pub async fn answers(server: &Server, run: &str) -> Vec<Value> {
     ended(server, run).await;
     let results = format!("{run}/results?format=ndjson");
     server.get(&results).await.is(200).lines()
 }
 
-/// A refusal whose faults say this.
+/// Asserts that an answer refuses a case with an error that contains `word`.
 fn assert_faults(answer: &Answer, word: &str) {
     assert_problem(answer, 422, "faulty-case", "fault");
     assert!(
@@ -60,7 +60,7 @@ fn assert_faults(answer: &Answer, word: &str) {
     );
 }
 
-/// The forms in which the answers come hold the same numbers.
+/// Asserts that all formats of the answers have the same numbers.
 async fn assert_forms(server: &Server, results: &str, all: &[Value]) {
     let csv = server
         .get(&format!(
@@ -97,7 +97,7 @@ async fn assert_forms(server: &Server, results: &str, all: &[Value]) {
     );
 }
 
-/// The files of the manifest hold every row once.
+/// Asserts that the files of the manifest have every row once.
 async fn assert_manifest(server: &Server, run: &str, rows: u64) {
     let manifest = server.get(&format!("{run}/manifest")).await;
     let files = manifest.json["files"].as_array().expect("files").clone();
@@ -112,7 +112,7 @@ async fn assert_manifest(server: &Server, run: &str, rows: u64) {
     assert_eq!(first.status, 200, "{}", first.text);
 }
 
-/// Row 17 by itself is the case that it stands for, with the answer that the results have; there are no rows beyond the last.
+/// Asserts that row 17 has the expected case and answer, and that rows outside the run are not found.
 async fn assert_row(server: &Server, run: &str, sent: &Value, line: &Value) {
     let alone = server.get(&format!("{run}/rows/17")).await;
     assert_eq!(alone.status, 200, "{}", alone.text);
@@ -236,7 +236,7 @@ async fn a_row_that_cannot_be_solved_has_a_status_and_faults_of_a_run_are_named(
     let server = Server::start().await;
     let mut rows = json!({ "template": template("boundary_element"), "columns": { "/friction/coefficient": [0.3, 0.2], "/material/poisson_ratio": [0.28, 0.3] } });
     rows["template"]["load"]["normal_force_n"] = json!(8e4);
-    // A row's own fault, which no look at one column shows.
+    // This error of a single row cannot be detected in one column alone.
     rows["columns"]["/contact/gauge_mm"] = json!([1435.0, 1435.0]);
     let fault = server.post("/v1/runs", &rows).await;
     assert_faults(&fault, "gauge_mm");

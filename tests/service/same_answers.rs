@@ -1,5 +1,5 @@
-//! One question on every route over HTTP: each answer is that of the job alone, within both estimates. The full matrix of features and routes is
-//! `tests/routes`.
+//! Asks the same question on every route over HTTP. Each answer agrees with that of a single job within both error estimates. `tests/routes` covers
+//! all features and routes.
 
 use serde_json::{Value, json};
 
@@ -26,7 +26,7 @@ fn template(friction: &Value) -> Value {
     case
 }
 
-/// A coefficient, and friction that depends on the way of a point through the contact.
+/// Returns a constant coefficient, and friction that depends on the path of a point through the contact.
 fn frictions() -> [Value; 2] {
     [
         json!({ "coefficient": 0.3 }),
@@ -34,7 +34,7 @@ fn frictions() -> [Value; 2] {
     ]
 }
 
-/// Both forces and their estimates.
+/// Returns both forces and their error estimates.
 fn of_total(total: &Value) -> [[f64; 2]; 2] {
     let names = ["force_x_n", "force_y_n"];
     [
@@ -43,7 +43,7 @@ fn of_total(total: &Value) -> [[f64; 2]; 2] {
     ]
 }
 
-/// Returns both forces of a row, and its estimate, which is that of the less certain force, for both.
+/// Returns both forces of a row. The row has one error estimate, that of the less certain force, which is returned for both.
 fn of_row(row: &Value) -> [[f64; 2]; 2] {
     let estimate = number(&row["error_estimate"]);
     [
@@ -52,7 +52,7 @@ fn of_row(row: &Value) -> [[f64; 2]; 2] {
     ]
 }
 
-/// Forces that were found agree with those of the motions alone, within both estimates.
+/// Asserts that forces agree with those of single motions within both error estimates.
 fn assert_agrees(what: &str, found: &[[[f64; 2]; 2]], alone: &[[[f64; 2]; 2]]) {
     assert_eq!(found.len(), alone.len(), "{what}");
     for ([forces, errors], [known, known_errors]) in found.iter().zip(alone) {
@@ -66,7 +66,7 @@ fn assert_agrees(what: &str, found: &[[[f64; 2]; 2]], alone: &[[[f64; 2]; 2]]) {
     }
 }
 
-/// The two motions of a case, each alone.
+/// Returns the two motions of a case as single cases.
 fn singles(case: &Value) -> [Value; 2] {
     CREEPAGES.map(|[x, y]| {
         let mut single = case.clone();
@@ -81,7 +81,7 @@ fn totals(job: &Value) -> Vec<[[f64; 2]; 2]> {
     totals.iter().map(of_total).collect()
 }
 
-/// Jobs with several motions, and batches.
+/// Tests jobs with several motions, and batches.
 async fn assert_jobs(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]]) {
     let friction = &case["friction"];
     let singles = singles(case);
@@ -114,7 +114,7 @@ async fn assert_jobs(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]]) {
     }
 }
 
-/// Runs and rows at once.
+/// Tests runs and evaluations.
 async fn assert_rows(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]]) {
     let friction = &case["friction"];
     let columns = json!({

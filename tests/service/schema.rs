@@ -1,4 +1,4 @@
-//! Compares an answer with what the contract says about it.
+//! Compares answers with the contract.
 
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 static CONTRACT: LazyLock<Value> = LazyLock::new(contract);
 
-/// The contract, with shared responses, parameters and examples in the places that refer to them.
+/// Returns the contract with references to shared responses, parameters and examples resolved.
 pub fn contract() -> Value {
     let text = railhead::http::openapi_json();
     let mut document: Value = serde_json::from_str(&text).expect("the contract is JSON");
@@ -38,8 +38,8 @@ fn inline(value: &mut Value, components: &Value) {
     }
 }
 
-/// Checks that the contract knows this answer: the status, the content type, and every member of the body.
-/// Refusals of addresses that the contract does not list are not checked, and neither are pages for people.
+/// Asserts that the contract documents status, content type and every member of this answer. Refusals of unknown addresses, and pages for people,
+/// are not checked.
 pub fn assert_documented(
     method: &str,
     path: &str,
@@ -118,7 +118,7 @@ fn operation(method: &str, path: &str) -> Option<&'static Value> {
     item.get(method.to_lowercase())
 }
 
-/// Where a value differs from its schema, in words. Knows the part of JSON Schema that the contract uses.
+/// Returns the differences between a value and its schema as text. Supports the part of JSON Schema that the contract uses.
 fn faults(value: &Value, schema: &Value) -> Vec<String> {
     let mut found = Vec::new();
     compare(value, schema, "", &mut found);
@@ -192,7 +192,7 @@ fn compare_object(
     }
 }
 
-/// Compares the members with one schema and, through `allOf`, those it is made of; says whether others are allowed.
+/// Compares the members with a schema and the schemas in its `allOf`. Returns whether other members are allowed.
 fn gather(
     schema: &Value,
     members: &serde_json::Map<String, Value>,

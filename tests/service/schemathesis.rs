@@ -1,5 +1,5 @@
-//! The contract fuzzed by Schemathesis, against the real program: whatever it makes of the contract is answered as the
-//! contract says. `tests/schemathesis.toml` has the settings and the few exceptions.
+//! Fuzzes the contract with Schemathesis against the real program. Every answer must agree with the contract. `tests/schemathesis.toml` has the
+//! settings and the few exceptions.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -9,7 +9,7 @@ use crate::support::{Service, skip};
 /// The version that the settings are written for.
 const VERSION: &str = "4.32.5";
 
-/// A program of a Python package in this version: the one that the variable names, or the one on the path.
+/// Returns a program of a Python package in this version: the one that the variable names, or the one on the path.
 pub fn python_program(name: &str, package: &str, version: &str, variable: &str) -> Option<PathBuf> {
     let named = std::env::var_os(variable);
     let program = named.map_or_else(|| PathBuf::from(name), PathBuf::from);
@@ -23,12 +23,12 @@ pub fn python_program(name: &str, package: &str, version: &str, variable: &str) 
     None
 }
 
-/// Runs a program that has to succeed; what it prints.
+/// Runs a program. Returns its output, and panics if it fails.
 pub fn run(program: &Path, arguments: &[&str]) -> String {
     said_by(Command::new(program).args(arguments))
 }
 
-/// Like the function above, for a prepared command.
+/// Runs a prepared command. Returns its standard output, and panics if it fails.
 pub fn said_by(program: &mut Command) -> String {
     let output = program.output();
     let output = output.unwrap_or_else(|error| panic!("{program:?}: {error}"));

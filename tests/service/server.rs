@@ -20,7 +20,7 @@ use crate::schema::assert_documented;
 pub use crate::support::{Answer, unpacked};
 use crate::support::{pause, waiting};
 
-/// A running service. It ends with the test's runtime.
+/// A running service. It ends with the runtime of the test.
 pub struct Server {
     pub jobs: Jobs,
     pub address: SocketAddr,
@@ -28,18 +28,18 @@ pub struct Server {
     _folder: TempDir,
 }
 
-/// The setup of a service.
+/// The options of a service.
 pub struct Setup {
     pub options: Options,
     pub http: HttpOptions,
     pub recipe: Engine,
-    /// Without workers every job stays queued.
+    /// Whether the service has workers. Without workers every job stays queued.
     pub working: bool,
     folder: TempDir,
 }
 
 impl Setup {
-    /// The defaults: real physics, one worker. Checks estimate times by formulas alone.
+    /// Returns the defaults: real physics and one worker. Checks estimate times by formulas only.
     pub fn new() -> Setup {
         let folder = tempfile::tempdir().expect("a temporary folder");
         Setup {
@@ -54,7 +54,7 @@ impl Setup {
         }
     }
 
-    /// A server without workers, so that jobs stay queued.
+    /// Returns the setup of a service without workers, in which jobs stay queued.
     pub fn idle() -> Setup {
         Setup {
             working: false,
@@ -101,12 +101,12 @@ impl Setup {
 }
 
 impl Server {
-    /// A service with real physics and one worker.
+    /// Starts a service with real physics and one worker.
     pub async fn start() -> Server {
         Setup::new().start().await
     }
 
-    /// Services like [`Server::start`]: one on the embedded store and, where there is PostgreSQL, one on a database.
+    /// Starts services like [`Server::start`]: one on the embedded store and, if PostgreSQL is available, one on a database.
     pub async fn on_every_store() -> Vec<Server> {
         let embedded = Server::start().await;
         #[cfg(feature = "cluster")]
@@ -122,14 +122,14 @@ impl Server {
         vec![embedded]
     }
 
-    /// Like [`Server::start`], with one thing changed.
+    /// Starts a service like [`Server::start`] with changed options.
     pub async fn with(change: impl FnOnce(&mut Setup)) -> Server {
         let mut setup = Setup::new();
         change(&mut setup);
         setup.start().await
     }
 
-    /// Like [`Server::idle`], with one thing changed.
+    /// Starts a service like [`Server::idle`] with changed options.
     pub async fn idle_with(change: impl FnOnce(&mut Setup)) -> Server {
         let own = |setup: &mut Setup| {
             setup.working = false;
@@ -138,12 +138,12 @@ impl Server {
         Server::with(own).await
     }
 
-    /// A service that takes jobs and never solves them.
+    /// Starts a service that accepts jobs and never solves them.
     pub async fn idle() -> Server {
         Setup::idle().start().await
     }
 
-    /// Sends a request as `shape` completes it, and checks the answer against the contract.
+    /// Sends a request that `shape` completes, and checks the answer against the contract.
     pub async fn send(
         &self,
         method: Method,
@@ -172,12 +172,12 @@ impl Server {
             .await
     }
 
-    /// The JSON answer to a GET that has to succeed.
+    /// Returns the JSON answer to a GET that must succeed.
     pub async fn read(&self, path: &str) -> Value {
         self.get(path).await.is(200).json
     }
 
-    /// A GET with one more header.
+    /// Sends a GET with one more header.
     pub async fn get_with(&self, path: &str, name: &str, value: &str) -> Answer {
         self.send(Method::GET, path, |request| request.header(name, value))
             .await
@@ -189,7 +189,7 @@ impl Server {
         self.send(Method::POST, path, shape).await
     }
 
-    /// Sends a body of some media type.
+    /// Sends a body with this media type.
     pub async fn post_as(&self, path: &str, form: &str, body: impl Into<Body>) -> Answer {
         let shape = |request: RequestBuilder| request.header("content-type", form).body(body);
         self.send(Method::POST, path, shape).await
@@ -214,24 +214,24 @@ impl Server {
         }
     }
 
-    /// Submits a case to be filled in by the rows of tables; answers the id of the job.
+    /// Submits a case as the template of tables. Returns the id of the job.
     pub async fn keep(&self, template: &Value) -> String {
         self.submit(template).await["/v1/jobs/".len()..].to_owned()
     }
 
-    /// Submits a case without waiting; answers the path of the job.
+    /// Submits a case without waiting. Returns the path of the job.
     pub async fn submit(&self, case: &Value) -> String {
         self.post("/v1/jobs", case).await.is(202).location()
     }
 
-    /// Submits a case and waits for its end; answers the job.
+    /// Submits a case and waits for its end. Returns the job.
     pub async fn solve(&self, case: &Value) -> Value {
         let answer = self.post_with("/v1/jobs", "prefer", "wait=60", case).await;
         answer.is(200).json
     }
 }
 
-/// The text of a file in `api/examples`.
+/// Returns the text of a file in `api/examples`.
 pub fn example_text(file: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("api/examples")
@@ -239,17 +239,17 @@ pub fn example_text(file: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// A file in `api/examples`.
+/// Returns a JSON file in `api/examples`.
 pub fn example(file: &str) -> Value {
     serde_json::from_str(&example_text(file)).expect("an example is JSON")
 }
 
-/// A link of a job, a batch, a run or a result.
+/// Returns a link of a job, a batch, a run or a result.
 pub fn link<'a>(of: &'a Value, name: &str) -> &'a str {
     of["links"][name].as_str().expect("a link")
 }
 
-/// The number of entries of an array.
+/// Returns the number of entries of an array.
 pub fn count(of: &Value) -> usize {
     of.as_array().expect("an array").len()
 }

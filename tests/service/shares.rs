@@ -1,4 +1,4 @@
-//! Shares of tenants: rates, quotas, turns.
+//! Tests shares of tenants: rates, quotas, scheduling.
 
 use std::str::FromStr;
 
@@ -64,7 +64,7 @@ async fn an_address_without_a_key_may_ask_so_often_and_no_more() {
     }
 }
 
-/// The answer to a request from this address, with a key if there is one.
+/// Sends a request from this address, with a key if one is given.
 async fn ask(router: &axum::Router, address: &str, key: Option<&str>) -> Response {
     let mut request = axum::http::Request::get("/v1/jobs").header("host", "localhost");
     if let Some(key) = key {
@@ -80,7 +80,7 @@ async fn with_key(router: &axum::Router, address: &str, key: &str) -> u16 {
     ask(router, address, Some(key)).await.status().as_u16()
 }
 
-/// A key that no service knows.
+/// A key that does not exist.
 const WRONG: &str = "rh_0123456789ab_0";
 
 #[tokio::test]
@@ -94,7 +94,7 @@ async fn wrong_keys_lock_no_good_key_of_the_same_address_out() {
         assert_eq!(with_key(&router, "192.0.2.1", good).await, 200, "{round}");
     }
     assert_eq!(last, 429);
-    // Also a key that was not used before, and with many look-ups at once.
+    // A key that was not used before is accepted too, even with many concurrent look-ups.
     let wrong = (0..50).map(|_| with_key(&router, "192.0.2.1", WRONG));
     let wrong = futures_util::future::join_all(wrong);
     let good = with_key(&router, "192.0.2.1", &guarded.operator);
@@ -126,7 +126,7 @@ async fn clients_behind_a_trusted_proxy_are_counted_one_by_one() {
     assert_eq!(ask(&proxied, other, WRONG).await, 401);
     assert_eq!(ask(&proxied, told, &proxied.north).await, 200);
 
-    // Nobody else is believed.
+    // The header is ignored if it does not come from a trusted proxy.
     let direct = Guarded::start(Setup::new(), |_| {}).await;
     for _ in 0..25 {
         assert_eq!(ask(&direct, told, WRONG).await, 401);

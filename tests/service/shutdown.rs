@@ -1,4 +1,4 @@
-//! Running jobs when the service stops or is killed.
+//! Tests running jobs when the service stops or is killed.
 
 use std::time::Duration;
 
@@ -29,7 +29,7 @@ async fn a_running_job_goes_back_to_the_queue_uncounted() {
 
 #[tokio::test]
 async fn a_job_that_ends_within_the_grace_period_is_not_run_again() {
-    // Taken one by one, so that the second is still queued whenever it comes.
+    // Jobs are claimed one by one, so that the second one is still queued.
     let mut lab = Lab::start(|options| options.group_max = 1).await;
     let first = lab.begin(case("deaf to the end")).await;
     let second = lab.submit(case("still queued")).await;
@@ -57,7 +57,7 @@ async fn a_job_that_kills_every_process_fails_in_the_end() {
     let mut lab = Lab::idle(|options| options.attempts_max = 3).await;
     let id = lab.submit(case("poison")).await;
     for attempt in 1..=3 {
-        // A process that claims the job and dies: nothing after the claim reaches the table.
+        // Simulates a process that claims the job and dies: nothing after the claim reaches the table.
         lab.jobs.shutdown(Duration::ZERO).await;
         let store = open_beside(lab.folder.path()).await;
         let claims = claim_up_to(&*store, 0, i64::MAX / 2, 1).await;
@@ -142,7 +142,7 @@ async fn a_second_signal_ends_a_service_at_once_that_solves_or_waits_for_its_loa
 #[tokio::test]
 async fn a_service_says_that_it_is_not_ready_before_its_port_closes() {
     let (_folder, service) = Service::fresh(&["--drain-delay-s", "2"]);
-    // Each look is a connection of its own, as that of a load balancer may be.
+    // Each check uses a new connection, as a load balancer may do.
     let look = async || {
         let url = format!("http://{}/readyz", service.address());
         let client = reqwest::Client::builder().pool_max_idle_per_host(0);
@@ -172,7 +172,7 @@ async fn a_service_whose_table_hangs_is_gone_within_five_seconds_after_the_grace
     let service = Service::start(folder.path(), &flags);
     let id = service.submit(&endless_case("long")).await;
     service.until(&id, "running").await;
-    // Another process holds the only place for writers, so the running job cannot be handed back.
+    // Another process holds the write lock of the table, so that the running job cannot be released.
     let table = folder.path().join("jobs.db");
     let other = rusqlite::Connection::open(table).unwrap();
     other.execute_batch("BEGIN IMMEDIATE").unwrap();

@@ -1,4 +1,4 @@
-//! Clients that send too slowly, do not read, or open too many connections are disconnected without effect on others.
+//! Tests that clients that send too slowly, do not read, or open too many connections are disconnected without effect on others.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
@@ -14,9 +14,9 @@ use crate::crowds::{read_answer, silent};
 use crate::server::{Server, example, link};
 use crate::support::{Service, long_case, pause};
 
-/// Between two bytes of a slow client.
+/// The time between two bytes of a slow client.
 const DRIP: Duration = Duration::from_millis(10);
-/// Far beyond every limit that the tests set.
+/// A time far beyond every limit that the tests set.
 const FOR_EVER: Duration = Duration::from_secs(60);
 
 async fn connect(server: &Server) -> TcpStream {
@@ -25,7 +25,7 @@ async fn connect(server: &Server) -> TcpStream {
         .expect("a connection")
 }
 
-/// Sends bytes one by one until the service closes the connection; what it answered by then.
+/// Sends bytes one by one until the service closes the connection. Returns the answer up to then.
 async fn drip(mut stream: TcpStream, bytes: impl Iterator<Item = u8>) -> String {
     let (mut read, mut write) = stream.split();
     let mut answer = Vec::new();
@@ -39,7 +39,7 @@ async fn drip(mut stream: TcpStream, bytes: impl Iterator<Item = u8>) -> String 
         std::future::pending::<()>().await;
     };
     tokio::select! {
-        // A connection that is reset has been closed as well.
+        // A reset connection is closed as well.
         _ = read.read_to_end(&mut answer) => {}
         () = sending => {}
         () = tokio::time::sleep(FOR_EVER) => panic!("the connection is still open"),
@@ -83,7 +83,7 @@ async fn bodies_that_come_byte_by_byte_are_cut_off() {
             "POST {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-type: application/json\r\ncontent-length: 1000000\r\n\r\n["
         );
         stream.write_all(head.as_bytes()).await.expect("sent");
-        // Each byte comes long before the time for a piece is over.
+        // Each byte arrives long before the timeout for a piece of the body.
         let answer = drip(stream, std::iter::repeat(b' ')).await;
         assert!(
             answer.starts_with("HTTP/1.1 408") && answer.contains("/problems/body-timeout"),
@@ -110,7 +110,7 @@ async fn rows_that_keep_coming_may_take_longer_than_a_piece_of_them() {
             body.len()
         );
         stream.write_all(head.as_bytes()).await.expect("sent");
-        // 3 s in all; no pause is near the 2 s that it may take.
+        // The upload takes 3 s in all. Its pauses are far below the timeout of 2 s.
         for piece in body.as_bytes().chunks(body.len() / 60) {
             stream.write_all(piece).await.expect("sent");
             tokio::time::sleep(Duration::from_millis(50)).await;
@@ -134,7 +134,7 @@ async fn an_answer_that_is_not_taken_is_given_up() {
     let start = Instant::now();
     until_closed(server.address, stream.local_addr().expect("an address")).await;
     let mut answer = Vec::new();
-    // Buffered data of the system still arrive before the end.
+    // Data in the buffers of the system arrive before the end.
     let _ = tokio::time::timeout(FOR_EVER, stream.read_to_end(&mut answer))
         .await
         .expect("an end");
@@ -146,7 +146,7 @@ async fn an_answer_that_is_not_taken_is_given_up() {
     );
 }
 
-/// Waits until the server's end of a connection is not open any more, as the system lists it.
+/// Waits until the server side of a connection is closed, according to the system.
 async fn until_closed(server: SocketAddr, client: SocketAddr) {
     let ports = [server, client].map(|address| format!(":{:04X}", address.port()));
     let start = Instant::now();
@@ -165,7 +165,7 @@ async fn until_closed(server: SocketAddr, client: SocketAddr) {
     }
 }
 
-/// The path of results that fill every buffer on the way, and their size in bytes.
+/// Returns the path of results that fill every buffer on the way, and their size in bytes.
 async fn large_results(server: &Server) -> (String, usize) {
     let cases: Vec<Value> = (0..24).map(|n| small_loaded("large", 50_000 + n)).collect();
     let batch = server.post("/v1/batches", &json!(cases)).await.json;
@@ -179,7 +179,7 @@ async fn large_results(server: &Server) -> (String, usize) {
 async fn clients_that_read_nothing_cost_little_memory() {
     const CLIENTS: usize = 60;
     let (_folder, service) = Service::fresh(&["--request-memory-mb", "64"]);
-    // The most motions there may be.
+    // This is the maximal number of motions.
     let mut case = long_case("large", 10_000);
     case["solver"]["mesh"] = json!({ "strips": 2, "cells": 2 });
     let batch = service.post("/v1/batches?wait=60", &json!([case])).await;
@@ -192,8 +192,8 @@ async fn clients_that_read_nothing_cost_little_memory() {
         "{line:.300}"
     );
     let job = format!("/v1/jobs/{}", line["id"].as_str().expect("an id"));
-    // A stored text is streamed to its client. Parts of it are held as numbers, which count against the limit of memory.
-    // The allocator keeps some of what was freed.
+    // A stored text is streamed to its client. Parts of it are parsed into numbers, which count against the memory limit. The allocator keeps some
+    // freed memory.
     let (streamed, counted) = (CLIENTS << 20, (64 + 64) << 20);
     for (path, allowed) in [
         (results, counted),

@@ -1,4 +1,4 @@
-//! A full or unwritable disk: nothing is lost, and the problems are clear.
+//! Tests a full or unwritable disk: no data are lost, and the problems are clear.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -14,13 +14,13 @@ use crate::server::Answer;
 use crate::support::{Service, case, endless_case, loaded, long_case, pause, railhead, skip};
 use crate::sweeps::sliced_case;
 
-/// A small file system of its own, unmounted when dropped.
+/// A small file system that is unmounted when dropped.
 struct Disk {
     folder: TempDir,
 }
 
 impl Disk {
-    /// `None` where this process may not mount.
+    /// Mounts a file system. Returns `None` if this process is not allowed to.
     fn mount(options: &str) -> Option<Disk> {
         let folder = tempfile::tempdir().unwrap();
         let mounted = Command::new("mount")
@@ -38,7 +38,7 @@ impl Disk {
         self.folder.path().join("data")
     }
 
-    /// A service with one worker that solves everything anew, on this disk.
+    /// Starts a service with one worker and without a cache on this disk.
     fn serve(&self, flags: &[&str]) -> Service {
         let own = ["--cache", "false", "--workers", "1"];
         Service::start(&self.data_dir(), &[&own[..], flags].concat())
@@ -50,12 +50,12 @@ impl Disk {
         assert!(mount.arg(self.folder.path()).status().unwrap().success());
     }
 
-    /// Takes all the room that is left.
+    /// Uses all the space that is left.
     fn fill(&self) -> PathBuf {
         self.fill_but(0)
     }
 
-    /// Takes all the room but this many bytes.
+    /// Uses all the space but this many bytes.
     fn fill_but(&self, spare: u64) -> PathBuf {
         use std::io::Write;
         let path = self.folder.path().join("ballast");
@@ -85,7 +85,7 @@ async fn ready(service: &Service) -> Answer {
     service.ask("/readyz").await
 }
 
-/// Submits until the service refuses; the jobs it acknowledged and the refusal.
+/// Submits jobs until the service refuses one. Returns the accepted jobs and the refusal.
 async fn submit_until_refused(service: &Service) -> (Vec<String>, Answer) {
     let mut accepted = Vec::new();
     for number in 0..5000 {
@@ -98,7 +98,7 @@ async fn submit_until_refused(service: &Service) -> (Vec<String>, Answer) {
     panic!("nothing was refused");
 }
 
-/// A job whose result lies outside the job table.
+/// Returns a case whose result is stored outside the job table.
 fn large_case() -> Value {
     let mut case = long_case("large", 150);
     case["outputs"] = json!(["resultants", "tractions"]);
@@ -133,7 +133,7 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     let cases = json!([case("a"), case("b")]);
     let batch = service.post("/v1/batches", &cases).await;
     assert_problem(&batch, 507, "storage-full", "");
-    // The result that is ready by then waits for room instead of being given up.
+    // A result that is ready now waits for space and is kept.
     while service.logged("could not be written yet") == 0 {
         pause().await;
     }
@@ -150,7 +150,7 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     assert_eq!(known, accepted.len() + 1, "no more than were acknowledged");
 }
 
-/// Sends a batch under a key.
+/// Sends a batch with an idempotency key.
 async fn send_batch(service: &Service, key: &str, cases: &[Value]) -> Answer {
     let request = service.request(Method::POST, "/v1/batches").json(cases);
     Answer::to(request.header("Idempotency-Key", key)).await
@@ -164,7 +164,7 @@ async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once(
         .map(|number| small_loaded(&number.to_string(), 50_000 + number))
         .collect();
     let bytes: usize = cases.iter().map(|case| case.to_string().len() + 1).sum();
-    // Room for the staged cases and some of the rows.
+    // The remaining space suffices for the staged cases and some of the rows.
     let ballast = disk.fill_but(bytes as u64 * 2 + (1 << 20));
     let refusal = send_batch(&service, "k", &cases).await;
     assert_problem(&refusal, 507, "storage-full", "");
@@ -189,7 +189,7 @@ async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once(
 
 #[tokio::test]
 async fn a_service_starts_on_a_full_disk_and_serves_what_it_has() {
-    // A kill leaves most to be done by a start, an orderly end the fewest files.
+    // After a kill a start has most to do. After an orderly shutdown there are the fewest files.
     for killed in [true, false] {
         starts_on_a_full_disk(killed).await;
     }
@@ -210,7 +210,7 @@ async fn starts_on_a_full_disk(killed: bool) {
     let service = disk.serve(&[]);
     service.get(&format!("/v1/jobs/{solved}/result")).await;
     if killed {
-        // The other one has the room that was kept for its start.
+        // After an orderly shutdown the service still has the space that was reserved for its start.
         let answer = submit(&service, &case("refused")).await;
         assert_problem(&answer, 507, "storage-full", "");
         assert_problem(&ready(&service).await, 507, "storage-full", "");
@@ -278,7 +278,7 @@ fn a_read_only_disk_is_named_at_the_start() {
     assert!(text.contains(&folder), "{text}");
 }
 
-/// Does the service say that its storage fails?
+/// Returns whether the service reports failing storage.
 async fn failing(service: &Service) -> bool {
     let metrics = service.ask("/metrics").await.text;
     metrics.contains("\nrailhead_storage_failing 1\n")
@@ -335,7 +335,7 @@ async fn a_body_that_fills_the_disk_is_told_until_there_is_room() {
     assert!(!failing(&service).await);
 }
 
-/// Lets a process write no file any more, or lets it again.
+/// Prevents a process from writing files, or allows it again.
 fn limit_files(service: &Service, limit: &str) {
     let limited = Command::new("prlimit")
         .arg(format!("--pid={}", service.id()))
@@ -347,7 +347,7 @@ fn limit_files(service: &Service, limit: &str) {
 #[tokio::test]
 async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     let folder = tempfile::tempdir().unwrap();
-    // A write beyond the limit shall be an error, as on a disk that fails, and not the end of the process.
+    // A write beyond the limit must be an error, as on a faulty disk, and must not end the process.
     let mut shell = Command::new("sh");
     shell.args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\""]);
     shell.arg(env!("CARGO_BIN_EXE_railhead"));

@@ -1,7 +1,7 @@
-//! Common parts of the tests of stores, whose suite is in `store_*.rs`.
+//! Common parts of the tests of stores, which are in `store_*.rs`.
 //!
-//! A test takes the kind of store that it is to open; `conformance!` runs it with each. A new store is one more kind, and one
-//! more module in the macro.
+//! Each test takes the kind of store to open, and `conformance!` runs it with every kind. A new store needs one more kind and one more module in
+//! the macro.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,7 +24,7 @@ use railhead::jobs::store::postgres::database::PostgresStore;
 
 pub const LEASE: i64 = 1_000;
 
-/// The stores there are.
+/// The kinds of stores.
 #[derive(Debug, Clone, Copy)]
 pub enum StoreKind {
     Sqlite,
@@ -54,12 +54,12 @@ macro_rules! conformance {
 }
 pub(crate) use conformance;
 
-/// An empty store.
+/// A store that is empty at first.
 pub struct Table {
     pub store: Arc<dyn Store>,
     pub folder: TempDir,
     pub kind: StoreKind,
-    /// Of the database, if it is on a server.
+    /// The URL of the database, if the store is on a server.
     pub url: Option<String>,
 }
 
@@ -97,12 +97,12 @@ impl Table {
         claim_up_to(&*self.store, now, LEASE, 1).await.pop()
     }
 
-    /// Ends one job; `None` if its lease was lost.
+    /// Ends one job and returns it, or `None` if its lease was lost.
     pub async fn finish(&self, claim: &Claim, ending: &Ending, now: i64) -> Option<Job> {
         finish_one(&*self.store, claim, ending, now).await
     }
 
-    /// Hands one job back; its new state.
+    /// Releases one job and returns its new state.
     pub async fn release(&self, claim: &Claim, now: i64) -> Option<State> {
         let why = ReleaseReason::NotBegun;
         let released = self
@@ -112,7 +112,7 @@ impl Table {
         Some(released.unwrap().first()?.1)
     }
 
-    /// The case of a job, and whether its cancellation was asked for.
+    /// Returns the case of a job and whether its cancellation was requested.
     pub async fn case(&self, id: Uuid) -> Option<(Bytes, bool)> {
         let claimed = self.store.claimed_cases(&[id]).await.unwrap().remove(&id)?;
         let (case, cancelled) = (claimed.case, claimed.cancel_requested);
@@ -120,7 +120,7 @@ impl Table {
         Some((case.body, cancelled))
     }
 
-    /// A job of the usual tenant.
+    /// Returns a job of the tenant `anonymous`.
     pub async fn job(&self, id: Uuid) -> Option<Job> {
         self.store.job("anonymous", id).await.unwrap()
     }
@@ -173,14 +173,14 @@ async fn open_store(kind: StoreKind, folder: &Path, url: Option<&str>) -> Arc<dy
     }
 }
 
-/// The store of a data folder, beside the service that uses it.
+/// Opens the store of a data folder while the service uses it.
 pub async fn open_beside(folder: &Path) -> Arc<dyn Store> {
     railhead::jobs::store::open::open_beside(folder)
         .await
         .unwrap()
 }
 
-/// The queue of the jobs of a tenant.
+/// Returns the queue of the single jobs of a tenant.
 pub fn queue_of(tenant: &str) -> Queue {
     Queue {
         tenant: tenant.into(),
@@ -188,7 +188,7 @@ pub fn queue_of(tenant: &str) -> Queue {
     }
 }
 
-/// A claim of at most `jobs` small jobs that were not begun.
+/// Returns a claim of at most `jobs` small jobs that have not begun.
 pub fn request(queue: &Queue, jobs: usize, now: i64) -> ClaimRequest<'_> {
     ClaimRequest {
         worker: "w",
@@ -235,7 +235,7 @@ pub async fn claim_up_to(store: &dyn Store, now: i64, lease_ms: i64, jobs: usize
     Vec::new()
 }
 
-/// Ends one job; `None` if its lease was lost.
+/// Ends one job and returns it, or `None` if its lease was lost.
 pub async fn finish_one(
     store: &dyn Store,
     claim: &Claim,

@@ -1,5 +1,5 @@
-//! A database that goes back to an earlier moment, as after a failover that lost the last commits or a restore: workers go on with claims
-//! that it knows nothing of.
+//! Tests a database that returns to an earlier state, as after a restore or a failover that lost the last commits. Workers then continue with
+//! claims that it does not know.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use crate::model::Model;
 use crate::store::StoreKind;
 use crate::store_moves::Pair;
 
-/// The tables of a PostgreSQL, those first that others refer to.
+/// The tables in PostgreSQL. A table comes after the tables that it refers to.
 #[cfg(feature = "cluster")]
 const TABLES: [&str; 13] = [
     "templates",
@@ -30,7 +30,7 @@ const TABLES: [&str; 13] = [
     "tombstones",
 ];
 
-/// The state at a moment to which the database is reset.
+/// A saved state of the model and the test, to which the database can return.
 #[derive(Debug)]
 pub struct Saved {
     model: Model,
@@ -40,7 +40,7 @@ pub struct Saved {
 }
 
 impl Pair {
-    /// The file of an embedded store, and its copy.
+    /// Returns the paths of the file of an embedded store and of its copy.
     fn files(&self) -> [PathBuf; 2] {
         ["jobs.db", "saved.db"].map(|name| self.table.folder.path().join(name))
     }
@@ -54,7 +54,7 @@ impl Pair {
         connection.close().await.unwrap();
     }
 
-    /// Keeps the database as it is.
+    /// Saves the state of the database.
     pub async fn save(&mut self) {
         match self.table.kind {
             StoreKind::Sqlite => {
@@ -81,7 +81,7 @@ impl Pair {
         });
     }
 
-    /// The database is as it was when it was kept. The claims that were made since are still in the hands of workers.
+    /// Restores the saved state of the database. Workers keep the claims that were made since.
     pub async fn go_back(&mut self) {
         let Some(saved) = &self.saved else {
             return;

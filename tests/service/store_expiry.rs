@@ -1,4 +1,4 @@
-//! Removal of expired work with all its data.
+//! Tests the removal of expired work with all its data.
 
 use railhead::jobs::model::Kind;
 use railhead::jobs::store::{Claim, NewBatch, NewJob, RetentionRule};
@@ -12,7 +12,7 @@ async fn end(table: &Table, claim: &Claim, now: i64) {
     assert_eq!(table.store.finish(&ends, now).await.unwrap().len(), 1);
 }
 
-/// How many jobs are removed of those that ended at a time or before.
+/// Removes jobs that ended at this time or before. Returns their number.
 async fn expire(table: &Table, ended_before: i64) -> u64 {
     let rule = RetentionRule {
         now: ended_before,

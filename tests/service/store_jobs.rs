@@ -1,4 +1,4 @@
-//! Single jobs, claims and leases of a store.
+//! Tests single jobs, claims and leases of a store.
 
 use bytes::Bytes;
 use railhead::jobs::State;
@@ -94,7 +94,7 @@ async fn an_end_that_is_written_again_because_its_answer_was_lost_keeps_its_resu
     table.add(new_job()).await;
     let claim = table.claim(0).await.unwrap();
     assert!(table.finish(&claim, &success(), 1).await.is_some());
-    // The worker takes the job for lost and leaves the result to be removed.
+    // The worker considers the job lost and leaves the result to be removed.
     assert_eq!(table.finish(&claim, &success(), 2).await, None);
     table.store.abandon_blob("results/1").await.unwrap();
     assert!(table.released_blobs(&[], 9).await.is_empty());

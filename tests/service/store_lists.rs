@@ -1,4 +1,4 @@
-//! Lists of jobs show every job once, for any filter and during changes.
+//! Tests that lists of jobs show every job once, for any filter and during changes.
 
 use railhead::jobs::store::{Filter, NewJob};
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ async fn pages_neither_repeat_nor_skip_while_jobs_arrive(kind: StoreKind) {
         let after = cursor.map(|cursor| filter.read_cursor(&cursor).unwrap());
         let page = table.list(&filter, after, 10).await;
         seen.extend(page.entries.iter().map(|job| job.id));
-        // A newcomer belongs before the first page; a job that ends stays where it is.
+        // A new job belongs before the first page. A job that ends keeps its place.
         table.add(new_job()).await;
         let claim = table.claim(0).await.unwrap();
         table.finish(&claim, &success(), 1).await.unwrap();
@@ -79,7 +79,7 @@ async fn a_label_within_a_batch_is_listed_page_by_page() {
     for _ in 0..3 {
         let sent = server.post("/v1/batches", &json!(cases)).await;
         batches.push(sent.json["id"].as_str().expect("an id").to_owned());
-        // Of the same label, in no batch, between the batches.
+        // This job has the same label and belongs to no batch. It lies between the batches.
         assert_eq!(server.post("/v1/jobs", &labelled("a")).await.status, 202);
     }
     for (line, expected) in [("a", 4), ("b", 3), ("c", 0)] {

@@ -1,5 +1,5 @@
-//! Does a store behave like a plain model of it, whatever is asked in whatever order? Tenants, priorities, groups, batches,
-//! deadlines, slices, shared results, expiry, clocks that are set, a database that goes back in time: by the calls that production makes.
+//! Compares a store with a plain model after random sequences of calls. The calls cover tenants, priorities, groups, batches, deadlines, slices,
+//! shared results, expiry, clocks that are set, and a database that returns to an earlier state.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -137,7 +137,7 @@ impl Pair {
         }
     }
 
-    /// The store says the same as the model: of every job, every batch, every blob.
+    /// Asserts that the store agrees with the model in every job, batch and stored result.
     async fn compare(&self) {
         for tenant in TENANTS {
             let page = self
@@ -210,7 +210,7 @@ impl Pair {
     }
 }
 
-/// Batches.
+/// Calls for batches.
 impl Pair {
     async fn begin_batch(&mut self, tenant: &'static str, count: u32) {
         let new = NewBatch {
@@ -277,7 +277,7 @@ impl Pair {
         self.model.batches.remove(&id);
     }
 
-    /// The tenant of a batch and its jobs that `is` tells, in their order.
+    /// Returns the tenant of a batch and the ids of its jobs that satisfy `is`, in order.
     fn of_batch(&self, id: Uuid, is: impl Fn(&Row) -> bool) -> Option<(&'static str, Vec<Uuid>)> {
         let batch = self.model.batches.get(&id)?;
         let rows = self.model.rows.iter();
@@ -335,7 +335,7 @@ fn agrees(kind: StoreKind, steps: Vec<Move>) {
             batches: Vec::new(),
             groups: Vec::new(),
             given: BTreeSet::new(),
-            // Later than the ids that will be made.
+            // The time is later than that of the ids to be created.
             now: i64::try_from(Uuid::now_v7().as_u128() >> 80).unwrap() + 100_000,
         };
         for step in steps {
@@ -357,7 +357,7 @@ proptest! {
 
 #[cfg(feature = "cluster")]
 proptest! {
-    // The statements are those of the embedded store; each case takes the tenth part of a second on a server.
+    // The statements are those of the embedded store, and each case takes a tenth of a second on a server.
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]

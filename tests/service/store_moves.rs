@@ -1,4 +1,4 @@
-//! Each call of a store and what it makes of the model beside it.
+//! Calls of a store, with their effect on its model.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
@@ -22,7 +22,7 @@ pub const LEASE: i64 = 10;
 const KEPT: i64 = 15;
 pub const TENANTS: [&str; 2] = ["a", "b"];
 
-/// A store and its model, side by side.
+/// A store and its model.
 pub struct Pair {
     pub table: Table,
     pub store: Arc<dyn Store>,
@@ -31,7 +31,7 @@ pub struct Pair {
     pub ids: Vec<Uuid>,
     pub batches: Vec<Uuid>,
     pub groups: Vec<Vec<Claim>>,
-    /// Keys of large results that the store was given.
+    /// The keys of the large results that the store has received.
     pub given: BTreeSet<String>,
     pub now: i64,
 }
@@ -226,7 +226,7 @@ impl Pair {
         }
     }
 
-    /// A new large result, or a small one.
+    /// Returns a successful ending with a large or a small result, and the key of a large result.
     pub fn success(&mut self, claim: &Claim, large: bool) -> (Ending, Option<String>) {
         let key = large.then(|| format!("{}/{}", claim.id, claim.lease_token));
         self.given.extend(key.clone());
@@ -265,7 +265,7 @@ impl Pair {
         }
     }
 
-    /// The first of a group is solved, the others get its result.
+    /// Ends a group. Its first job is solved and the others share its result.
     pub async fn finish_group(&mut self, group: &[Claim]) {
         let (first, blob) = self.success(&group[0], true);
         let mut ends = vec![(group[0].clone(), first)];

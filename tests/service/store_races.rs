@@ -1,4 +1,4 @@
-//! Concurrent calls of a store through separate connections.
+//! Tests concurrent calls of a store through separate connections.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use uuid::Uuid;
 
 use crate::store::*;
 
-/// A store opened twice, as by two processes.
+/// Opens a store twice, as two processes do.
 async fn two(kind: StoreKind) -> (Table, [Arc<dyn Store>; 2]) {
     let table = Table::new(kind).await;
     let other = table.open_again().await;
@@ -17,7 +17,7 @@ async fn two(kind: StoreKind) -> (Table, [Arc<dyn Store>; 2]) {
     (table, stores)
 }
 
-/// Submits jobs at the same moment, to one store and the other in turn.
+/// Submits jobs at the same time, alternately to both stores.
 async fn submit(
     stores: &[Arc<dyn Store>; 2],
     jobs: Vec<NewJob>,
@@ -48,7 +48,7 @@ async fn one_key_makes_one_job_whoever_asks_at_the_same_moment(kind: StoreKind) 
         };
     }
     assert_eq!((created, ids.len()), (1, 1));
-    // Another case with the same key is a conflict; a key that nobody has used is free.
+    // Another case with the same key is a conflict. An unused key is accepted.
     let conflict = Some(Enqueued::Conflict);
     assert_eq!(table.job_by_key("k", &[2; 32]).await, conflict);
     assert_eq!(table.job_by_key("other", &[7; 32]).await, None);
@@ -90,7 +90,7 @@ async fn one_key_makes_one_batch_and_is_known_once_it_is_acknowledged(kind: Stor
     begin(&*stores[0], &first, []).await;
     let begun = stores[1].begin_batch(&second, &filled, QueueBounds::NONE);
     assert_eq!(begun.await.unwrap(), BatchBegun::Unfinished);
-    // No job of it is claimed before all are there.
+    // No job of the batch is claimed before all of them are stored.
     stores[0]
         .fill_batch(first.id, &[(0, new_job())])
         .await
@@ -106,7 +106,7 @@ async fn what_was_given_up_is_neither_filled_nor_acknowledged(kind: StoreKind) {
     let (_table, stores) = two(kind).await;
     let batch = new_batch("anonymous", 3);
     begin(&*stores[0], &batch, [new_job(), new_job()]).await;
-    // Somebody else takes it for abandoned and has begun to remove it.
+    // Another process considers the batch abandoned and has begun to remove it.
     assert!(!stores[1].drop_batch(batch.id, 1).await.unwrap());
     let late = [(2, new_job())];
     assert!(stores[0].fill_batch(batch.id, &late).await.is_err());
@@ -126,7 +126,7 @@ async fn each_job_is_claimed_and_ended_once_by_many(kind: StoreKind) {
         let store = stores[number % 2].clone();
         tokio::spawn(async move {
             let mut ended = Vec::new();
-            // Others may hold what is left for a moment.
+            // Other workers may hold the remaining jobs for a moment.
             while store.stats().await.unwrap().jobs[&railhead::jobs::State::Queued] > 0 {
                 for claim in claim_up_to(&*store, 0, LEASE, 4).await {
                     let job = finish_one(&*store, &claim, &success(), 1).await;

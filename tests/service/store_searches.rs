@@ -1,4 +1,4 @@
-//! Searches for jobs and batches by states, labels and names, and notification of their changes.
+//! Tests searches for jobs and batches by states, labels and names, and notification of their changes.
 
 use railhead::jobs::State;
 use railhead::jobs::model::Kind;
@@ -15,7 +15,7 @@ conformance!(
     batches_are_listed_with_their_counts_and_found_by_name_and_label,
 );
 
-/// Twelve jobs with names and labels: 0 to 3 have ended, 4 runs.
+/// Creates twelve jobs with names and labels. Jobs 0 to 3 have ended and job 4 is running.
 async fn twelve(table: &Table) -> Vec<Uuid> {
     let mut ids = Vec::new();
     for number in 0..12 {
@@ -41,7 +41,7 @@ async fn twelve(table: &Table) -> Vec<Uuid> {
     ids
 }
 
-/// The places of the jobs found, read page by page, and how many there are.
+/// Reads a list page by page. Returns the indices of the jobs found and the total.
 async fn pages(table: &Table, ids: &[Uuid], filter: &Filter) -> (Vec<usize>, Total) {
     let (mut found, mut after, mut total) = (Vec::new(), None, None);
     loop {
@@ -195,7 +195,7 @@ async fn changes_are_told_in_their_order_once_and_to_their_tenant_alone(kind: St
     assert_eq!(store.changes("other", 0, None, 9).await.unwrap(), []);
 }
 
-/// Four batches of two jobs, the last one never acknowledged; one job of the first has succeeded.
+/// Creates four batches of two jobs. The last batch is never acknowledged, and one job of the first has succeeded.
 async fn four_batches(table: &Table) -> Vec<Uuid> {
     let store = &table.store;
     let mut ids = Vec::new();

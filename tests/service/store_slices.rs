@@ -1,4 +1,4 @@
-//! The job table keeps the slices of a sweep until the sweep is complete.
+//! Tests that the job table keeps the slices of a sweep until the sweep is complete.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use uuid::Uuid;
 
 use crate::store::*;
 
-/// Claims a job of which some slices are solved.
+/// Claims a job with some slices solved.
 async fn claim_begun(store: &dyn Store, now: i64) -> Option<Claim> {
     let queue = queue_of("anonymous");
     let request = ClaimRequest {
@@ -48,7 +48,7 @@ async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attemp
     let table = Table::new(kind).await;
     let store = &*table.store;
     let id = table.add(new_job()).await.id;
-    // Two attempts die alone.
+    // Two attempts die while the job runs alone.
     for _ in 0..2 {
         claim_up_to(store, 0, 1000, 1).await;
         store.reap(Reap::Dead, 1, 5).await.unwrap();
@@ -81,7 +81,7 @@ async fn a_stored_slice_is_fenced_and_stored_once_and_begins_the_count_of_attemp
     assert_eq!((claim.attempt, claim.slices), (1, 2));
     let notes = store.slices(id).await.unwrap();
     assert_eq!(notes, [slice(0, None).note, slice(1, None).note]);
-    // Another solver begins again: what was there from its number on is replaced.
+    // Another solver begins again. Its slice replaces the slices from this number on.
     let mut other = slice(0, Some("b"));
     other.note.digest = "e".to_owned();
     assert!(store.add_slice(&claim, &other).await.unwrap());

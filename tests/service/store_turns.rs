@@ -1,4 +1,4 @@
-//! The order in which jobs are claimed, and the attempts counted when their process dies.
+//! Tests the order in which jobs are claimed, and the attempts counted when their process dies.
 
 use railhead::jobs::model::Kind;
 use railhead::jobs::store::{
@@ -21,13 +21,13 @@ async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
     for _ in 0..2 {
         assert_eq!(claim_up_to(store, 0, 1000, 1).await.len(), 1);
     }
-    // Both were being solved: nobody knows which of them it was.
+    // Both jobs were running, so that the cause is unknown.
     assert_eq!(store.reap(Reap::Dead, 1, 1).await.unwrap().len(), 2);
     for id in ids {
         let job = store.job("anonymous", id).await.unwrap().unwrap();
         assert_eq!((job.state, job.attempt), (State::Queued, 0));
     }
-    // Now each comes alone, and a process that solves one does not ask for the other.
+    // Each suspect is now claimed alone, and a process that solves one does not claim another.
     let suspect = claim_up_to(store, 2, 1000, 8).await;
     assert_eq!((suspect.len(), suspect[0].suspect), (1, true));
     let queue = queue_of("anonymous");
@@ -38,13 +38,13 @@ async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
     assert_eq!(store.claim(&without).await.unwrap(), []);
     let beside = table.add(new_job()).await.id;
     assert_eq!(store.claim(&without).await.unwrap()[0].id, beside);
-    // The suspect is to blame; what was solved beside it is not.
+    // The suspect is the cause. The job that ran beside it is not.
     let mut taken = store.reap(Reap::Dead, 3, 1).await.unwrap();
     taken.sort_unstable();
     assert_eq!(taken, [(ids[0], State::Failed), (beside, State::Queued)]);
     let job = store.job("anonymous", beside).await.unwrap().unwrap();
     assert_eq!(job.attempt, 0);
-    // A job that ran alone counts its attempt, suspect or not.
+    // A job that ran alone counts its attempt, whether it is a suspect or not.
     assert_eq!(claim_up_to(store, 4, 1000, 1).await[0].id, ids[1]);
     assert_eq!(
         store.reap(Reap::Dead, 5, 1).await.unwrap(),
@@ -101,7 +101,7 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
     store.complete_batch(run.id).await.unwrap();
     let job = table.add(of_kind(Kind::Case)).await.id;
 
-    // The quota is one for both.
+    // Both kinds share one quota.
     let bounds = QueueBounds {
         tenant: 3,
         ..QueueBounds::NONE
@@ -112,7 +112,7 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
         store.usage("anonymous").await.unwrap().jobs[&State::Queued],
         3
     );
-    // A chunk is no job for clients, and a run is no batch.
+    // Clients see neither a chunk as a job nor a run as a batch.
     let listed = store.list("anonymous", &Filter::default(), None, 9).await;
     let listed = listed.unwrap();
     assert_eq!(ids(&listed.entries), [job]);
@@ -127,7 +127,7 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
         let batch = store.batch("anonymous", kind, run.id).await.unwrap();
         assert_eq!(batch.is_some(), found == 1);
     }
-    // A key stands for a run and for a batch.
+    // The same key can belong to a run and to a batch.
     let batch = NewBatch {
         kind: Kind::Cases,
         ..run.clone()

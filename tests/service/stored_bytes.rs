@@ -1,4 +1,4 @@
-//! Stored bytes of a tenant are counted and limited, and templates are stored once.
+//! Tests that stored bytes of a tenant are counted and limited, and that templates are stored once.
 
 use railhead::jobs::store::{BatchBegun, NewBatch, QueueBounds};
 use reqwest::Method;
@@ -10,7 +10,7 @@ use crate::server::{Answer, Setup, example};
 use crate::store::{StoreKind, Table, conformance, new_batch};
 use crate::support::case;
 
-/// A case of about this many bytes, most of them the points of its gap.
+/// Returns a case of about this many bytes, most of which are the points of its gap.
 fn large(bytes: u32) -> Value {
     let mut case = example("paper-figure-3.case.json");
     let points = bytes / 16;
@@ -61,7 +61,7 @@ async fn a_template_is_stored_once_and_goes_with_its_last_user() {
         users.push(answer.location());
     }
     let after = stored(&guarded, key).await;
-    // One for batches and one for runs.
+    // The template is stored once for batches and once for runs.
     assert!(after - before < 3 * bytes, "{before} {after} {bytes}");
     for path in &users {
         assert_eq!(guarded.get(key, path).await.status, 200);
@@ -156,7 +156,7 @@ async fn one_body_serves_all_batches_of_a_tenant_with_this_template(kind: StoreK
     }
     let stored = async |tenant: &str| store.usage(tenant).await.unwrap().stored_bytes;
     assert_eq!((stored("north").await, stored("south").await), (1000, 1000));
-    // The template is there already; another one, or one more byte of cases, would be too much.
+    // The template is stored already. Another template, or one more byte of cases, would exceed the limit.
     let bounds = |stored| QueueBounds {
         stored: Some(stored),
         ..QueueBounds::NONE

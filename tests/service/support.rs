@@ -1,4 +1,4 @@
-//! Starts the service in this process, or the real program.
+//! The real program as a service, and common cases and helpers.
 
 use std::io::{BufRead, BufReader, Read};
 use std::net::SocketAddr;
@@ -19,7 +19,7 @@ use tempfile::TempDir;
 
 pub const DAY_MS: i64 = 24 * 3600 * 1000;
 
-/// A case of the handbook: a new wheel on the crown of a rail.
+/// Returns a case of the handbook: a new wheel on the crown of a rail.
 pub fn case(name: &str) -> Value {
     json!({
         "name": name,
@@ -34,26 +34,26 @@ pub fn case(name: &str) -> Value {
     })
 }
 
-/// A small case with this normal force. Cases with different forces have different digests.
+/// Returns a small case with this normal force. Cases with different forces have different digests.
 pub fn loaded(newtons: usize) -> Value {
     let mut case = case("one of many");
     case["load"]["normal_force_n"] = json!(newtons);
     case
 }
 
-/// An answer. `json` is null where the body is not JSON.
+/// A response. `json` is null if the body is not JSON.
 #[derive(Debug)]
 pub struct Answer {
     pub status: u16,
     pub headers: HeaderMap,
     pub bytes: Vec<u8>,
-    /// The body as text; what is not UTF-8 is replaced.
+    /// The body as text. Bytes that are not UTF-8 are replaced.
     pub text: String,
     pub json: Value,
 }
 
 impl Answer {
-    /// Sends a request and reads the whole answer.
+    /// Sends a request and reads the whole response.
     pub async fn to(request: RequestBuilder) -> Answer {
         let response = request.send().await.expect("an answer");
         let (status, headers) = (response.status().as_u16(), response.headers().clone());
@@ -67,19 +67,19 @@ impl Answer {
         }
     }
 
-    /// The answer, which has to have this status.
+    /// Returns the response after asserting its status.
     #[track_caller]
     pub fn is(self, status: u16) -> Answer {
         assert_eq!(self.status, status, "{}", self.text);
         self
     }
 
-    /// The address of the accepted work.
+    /// Returns the path of the accepted work.
     pub fn location(&self) -> String {
         self.header("location").expect("a location").to_owned()
     }
 
-    /// The lines of the body, each of them JSON.
+    /// Returns the lines of the body as JSON.
     pub fn lines(&self) -> Vec<Value> {
         let lines = self.text.lines();
         lines.map(|line| line.parse().expect("JSON")).collect()
@@ -90,7 +90,7 @@ impl Answer {
     }
 }
 
-/// A body without its content encoding.
+/// Returns a body without its content encoding.
 pub fn unpacked(headers: &HeaderMap, bytes: &[u8]) -> Vec<u8> {
     let coding = headers.get("content-encoding");
     match coding.map(|coding| coding.to_str().expect("a coding")) {
@@ -106,13 +106,13 @@ pub fn unpacked(headers: &HeaderMap, bytes: &[u8]) -> Vec<u8> {
     }
 }
 
-/// The real program, serving on a free port. Killed when dropped.
+/// The real program, serving on a free port. It is killed when dropped.
 pub struct Service {
     child: Child,
     address: SocketAddr,
     log: Arc<Mutex<Vec<Value>>>,
     client: reqwest::Client,
-    /// A data folder that goes with it.
+    /// A data folder that is removed together with the service.
     _folder: Option<TempDir>,
 }
 
@@ -123,14 +123,14 @@ impl Service {
         Service::spawn(&mut program, "serve", (data_dir, None), flags)
     }
 
-    /// Starts `railhead serve` on a data folder of its own.
+    /// Starts `railhead serve` on a new data folder.
     pub fn fresh(flags: &[&str]) -> (TempDir, Service) {
         let folder = tempfile::tempdir().unwrap();
         let service = Service::start(folder.path(), flags);
         (folder, service)
     }
 
-    /// A prepared `serve` or `worker` process with a data folder that is removed with it.
+    /// Starts a prepared `serve` or `worker` process with a data folder that is removed with it.
     #[cfg(feature = "cluster")]
     pub fn alone(program: &mut Command, role: &str, flags: &[&str]) -> Service {
         let folder = tempfile::tempdir().unwrap();
@@ -138,7 +138,7 @@ impl Service {
         Service::spawn(program, role, (&path, Some(folder)), flags)
     }
 
-    /// The real program as it was prepared, `serve` or `worker`.
+    /// Starts a prepared `serve` or `worker` process on a data folder.
     pub fn start_as(program: &mut Command, role: &str, data_dir: &Path, flags: &[&str]) -> Service {
         Service::spawn(program, role, (data_dir, None), flags)
     }
@@ -189,33 +189,33 @@ impl Service {
         }
     }
 
-    /// The address it listens on.
+    /// Returns the address on which the service listens.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// The id of its process.
+    /// Returns the id of the process.
     pub fn id(&self) -> u32 {
         self.child.id()
     }
 
-    /// A request to this service.
+    /// Returns a request to this service.
     pub fn request(&self, method: Method, path: &str) -> RequestBuilder {
         let url = format!("http://{}{path}", self.address);
         self.client.request(method, url)
     }
 
-    /// The JSON answer to a GET that has to succeed.
+    /// Returns the JSON answer to a GET that must succeed.
     pub async fn get(&self, path: &str) -> Value {
         self.ask(path).await.is(200).json
     }
 
-    /// The answer to a GET.
+    /// Returns the answer to a GET.
     pub async fn ask(&self, path: &str) -> Answer {
         Answer::to(self.request(Method::GET, path)).await
     }
 
-    /// The answer to JSON.
+    /// Posts JSON and returns the answer.
     pub async fn post(&self, path: &str, body: &Value) -> Answer {
         Answer::to(self.request(Method::POST, path).json(body)).await
     }
@@ -233,7 +233,7 @@ impl Service {
         job["id"].as_str().unwrap().to_owned()
     }
 
-    /// Waits until a job is in a state; it may not end in another one.
+    /// Waits until a job is in a state, and returns it. Panics if it ends in another state.
     pub async fn until(&self, id: &str, state: &str) -> Value {
         let path = waiting(&format!("/v1/jobs/{id}"), state);
         loop {
@@ -247,7 +247,7 @@ impl Service {
         }
     }
 
-    /// How many log events carry this message.
+    /// Returns the number of log events with this message.
     pub fn logged(&self, message: &str) -> usize {
         let log = self.log.lock().unwrap();
         log.iter()
@@ -255,13 +255,13 @@ impl Service {
             .count()
     }
 
-    /// Everything logged so far, as JSON text.
+    /// Returns all log events so far as lines of JSON.
     pub fn log_text(&self) -> String {
         let log = self.log.lock().unwrap();
         log.iter().map(|event| format!("{event}\n")).collect()
     }
 
-    /// Ends it with SIGKILL.
+    /// Kills the process with SIGKILL.
     pub fn kill(mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
@@ -279,14 +279,14 @@ impl Service {
         );
     }
 
-    /// Ends it in good order.
+    /// Shuts the service down and asserts that it succeeds.
     pub async fn stop(self) {
         self.signal("TERM");
         let status = tokio::task::spawn_blocking(|| self.wait());
         assert!(status.await.unwrap().success());
     }
 
-    /// Waits until it has ended by itself.
+    /// Waits until the process has ended by itself.
     pub fn wait(mut self) -> ExitStatus {
         self.child.wait().unwrap()
     }
@@ -294,13 +294,13 @@ impl Service {
 
 impl Drop for Service {
     fn drop(&mut self) {
-        // It may have ended already.
+        // The process may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// A clock that a test turns.
+/// A clock that a test sets.
 #[derive(Clone, Default)]
 pub struct Turned(Arc<AtomicI64>);
 
@@ -310,7 +310,7 @@ impl Turned {
         Clock::new(move || system.now_ms() + ahead.load(Ordering::SeqCst))
     }
 
-    /// Shows this many milliseconds more than the system's clock.
+    /// Sets how many milliseconds the clock is ahead of the system clock.
     pub fn set(&self, ahead_ms: i64) {
         self.0.store(ahead_ms, Ordering::SeqCst);
     }
@@ -320,7 +320,7 @@ impl Turned {
     }
 }
 
-/// Ticks until it is told to stop.
+/// Ticks until the monitor requests a stop.
 pub fn tick_forever(monitor: &dyn Monitor) -> SolveError {
     loop {
         if let ControlFlow::Break(stop) = monitor.tick(0.5) {
@@ -330,13 +330,13 @@ pub fn tick_forever(monitor: &dyn Monitor) -> SolveError {
     }
 }
 
-/// Says why a test was not run; on a machine of continuous integration that is a failure.
+/// Reports why a test is skipped. Panics if the variable `CI` is set.
 pub fn skip(reason: &str) {
     assert!(std::env::var_os("CI").is_none(), "not run: {reason}");
     eprintln!("SKIPPED: {reason}");
 }
 
-/// The files below a folder, which need not be there.
+/// Returns the files below a folder, which need not exist.
 pub fn files_below(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     let paths = entries.map(|entry| entry.unwrap().path());
@@ -347,7 +347,7 @@ pub fn files_below(folder: &Path) -> Vec<PathBuf> {
     files.collect()
 }
 
-/// The path of a piece of work, with a wait for its end if this state is one.
+/// Returns the path of a piece of work, with a wait for its end if this state is a final one.
 pub fn waiting(path: &str, state: &str) -> String {
     match ["queued", "running"].contains(&state) {
         true => path.to_owned(),
@@ -355,12 +355,12 @@ pub fn waiting(path: &str, state: &str) -> String {
     }
 }
 
-/// Between two looks at a service that can only be asked.
+/// Waits between two requests of a polling loop.
 pub async fn pause() {
     tokio::time::sleep(Duration::from_millis(5)).await;
 }
 
-/// The real program, without settings of the surroundings.
+/// Returns the real program without the variables `RAILHEAD_…` of the environment.
 pub fn railhead() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_railhead"));
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
@@ -369,7 +369,7 @@ pub fn railhead() -> Command {
     command
 }
 
-/// A case that keeps a worker busy for a good part of a second: several motions on a fine mesh.
+/// Returns a case that keeps a worker busy for a good part of a second: several motions on a fine mesh.
 pub fn long_case(name: &str, motions: u32) -> Value {
     let mut case = case(name);
     case["motion"] = json!({ "sweep": {
@@ -381,7 +381,7 @@ pub fn long_case(name: &str, motions: u32) -> Value {
     case
 }
 
-/// A case that no test waits for: the most motions there may be, on a fine mesh.
+/// Returns a case that never ends during a test: the maximal number of motions on a fine mesh.
 pub fn endless_case(name: &str) -> Value {
     let mut case = long_case(name, 10_000);
     case["solver"]["mesh"] = json!({ "strips": 32, "cells": 32 });

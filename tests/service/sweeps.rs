@@ -1,4 +1,4 @@
-//! Long sweeps continue after their last slice when the process ends, with the same result.
+//! Tests that long sweeps continue after their last slice when the process ends, with the same result.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,7 +18,7 @@ use crate::lab::{Gate, Lab};
 use crate::store::open_beside;
 use crate::support::{Service, files_below, long_case, pause};
 
-/// Slow by its estimate, and so cut into slices; fast in truth, since everything slips.
+/// Returns a case that is slow according to its estimate and is therefore cut into slices. It is fast in fact, since all cells slip.
 pub fn sliced_case(name: &str, motions: u32) -> Value {
     let mut case = long_case(name, motions);
     case["motion"] = json!({ "sweep": {
@@ -28,8 +28,8 @@ pub fn sliced_case(name: &str, motions: u32) -> Value {
     case
 }
 
-/// A service whose solver cuts every sweep after each second motion, counts slices, and holds the slices of a case named
-/// `held` beyond the first two until it is let go.
+/// A service whose solver cuts every sweep after each second motion and counts slices. From the third slice on, a case named `held` waits until the
+/// gate opens.
 struct Shop {
     lab: Lab,
     solved: Arc<AtomicUsize>,
@@ -58,7 +58,7 @@ impl Shop {
         };
         let own = |options: &mut Options| {
             options.slice = Duration::from_millis(10);
-            // Some parts lie in the table, others outside it.
+            // Some parts are stored in the table and others outside it.
             options.small_result_max_bytes = 4000;
             change(options);
         };
@@ -71,7 +71,7 @@ impl Shop {
         self.solved.load(Ordering::SeqCst)
     }
 
-    /// Files of stored results.
+    /// Returns the number of files of stored results.
     fn files(&self) -> usize {
         files_below(&self.lab.folder.path().join("results")).len()
     }
@@ -89,7 +89,7 @@ impl Shop {
     }
 }
 
-/// A sweep of so many motions on a coarse mesh.
+/// Returns a sweep of this many motions on a coarse mesh.
 fn sweep(name: &str, motions: u32) -> Value {
     let mut sweep = long_case(name, motions);
     sweep["solver"]["mesh"] = json!({ "strips": 6, "cells": 6 });
@@ -97,7 +97,7 @@ fn sweep(name: &str, motions: u32) -> Value {
     sweep
 }
 
-/// An answer without its times.
+/// Returns a solution without its times.
 fn timeless(mut solution: Solution) -> Value {
     let patches = solution.patches.iter_mut();
     for point in patches.flat_map(|patch| &mut patch.points) {
@@ -138,7 +138,7 @@ async fn a_sweep_goes_on_after_a_restart_and_solves_no_slice_twice() {
     shop.lab.succeeds_at_once(held).await;
     assert_eq!(shop.solved(), 12, "two slices were there already");
     let mut found = shop.answer(held).await;
-    // The name is part of the question and not of the answer; everything else is.
+    // The name belongs to the question and not to the answer. All other members belong to both.
     assert_eq!(found.0["patches"], expected.0["patches"]);
     found.0["case_digest"] = expected.0["case_digest"].clone();
     assert_eq!(found, expected);
@@ -187,7 +187,7 @@ async fn the_time_limit_counts_every_slice_and_every_process() {
     let about = open_beside(shop.lab.folder.path()).await;
     let spent = about.slices(id).await.unwrap()[1].spent;
     assert!(spent > Duration::ZERO && spent < limit, "{spent:?}");
-    // A limit that is used up by what the first process has stored.
+    // The slices stored by the first process have used up the time limit.
     shop.lab.options.time_limit = spent;
     shop.lab.reopen(Duration::ZERO).await;
     shop.lab.gate.set_open(true);
@@ -238,7 +238,7 @@ async fn parts_that_cannot_be_read_are_solved_again() {
     shop.lab.end().await;
 }
 
-/// The answer of a job without its times.
+/// Returns the result of a job without its times.
 async fn timeless_result(service: &Service, id: &str) -> Value {
     let mut result = service.get(&format!("/v1/jobs/{id}/result")).await;
     for patch in result["patches"].as_array_mut().unwrap() {

@@ -1,4 +1,4 @@
-//! Rows in every format of tables, in requests and responses, and limits of their number.
+//! Tests rows in every table format of requests and responses, and limits of their number.
 
 use std::io::Cursor;
 
@@ -20,20 +20,20 @@ pub const ARROW: &str = "application/vnd.apache.arrow.stream";
 pub const PARQUET: &str = "application/vnd.apache.parquet";
 pub const NPZ: &str = "application/x-npz";
 
-/// Submits the case that the rows of tables are filled into, and returns the id of its job.
+/// Submits a template for tables and returns the id of its job.
 pub async fn kept_template(server: &Server) -> String {
     let mut case = template("table");
     case["load"]["normal_force_n"] = json!(1e5);
     server.keep(&case).await
 }
 
-/// Sends rows over a kept template, and what else the query says.
+/// Sends rows for a kept template. `query` begins with its id and may add parameters.
 pub async fn send_rows(server: &Server, query: &str, form: &str, body: impl Into<Body>) -> Answer {
     let path = format!("/v1/runs?template={query}");
     server.post_as(&path, form, body).await
 }
 
-/// Rows with the columns `normal_force_n`, `creepage_x` and, if it is given, one of texts.
+/// Returns rows with the columns `normal_force_n`, `creepage_x` and, if a title is given, a column of texts.
 fn rows(texts: Option<&str>) -> RowTable {
     let numbers = [
         ("normal_force_n", vec![5e4, 6e4, 7e4]),
@@ -47,7 +47,7 @@ fn rows(texts: Option<&str>) -> RowTable {
     }
 }
 
-/// The table in every form that a request may have, with its media type. NPZ holds numbers only.
+/// Returns the table in every request format, with its media type. NPZ holds numbers only.
 pub fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
     let mut arrow = ArrowWriter::new(Vec::new(), &table.kinds()).expect("a stream");
     arrow.write(table.clone()).expect("a batch");
@@ -164,7 +164,7 @@ async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
     assert_problem(&refused, 422, "faulty-table", words);
 }
 
-/// The rows of an answer in some form of table, three of them.
+/// Returns the three rows of an answer in a table format.
 fn lines_of(format: &str, answer: &Answer) -> Vec<Value> {
     assert_eq!(answer.status, 200, "{format}: {}", answer.text);
     let lines: Vec<Value> = match format {
@@ -247,7 +247,7 @@ async fn a_batch_makes_the_same_cases_of_every_form_and_answers_them_alike_in_ev
             .get(&format!("{path}?format={format}&columns={columns}"))
             .await;
         let mut lines = lines_of(format, &answer);
-        // A text without letters is none in CSV.
+        // CSV does not distinguish an empty text from a missing one.
         for line in &mut lines {
             let cells = line.as_object_mut().expect("a row");
             cells.retain(|_, cell| *cell != json!("") && !cell.is_null());

@@ -1,4 +1,4 @@
-//! Do tables and evaluations of one tenant leave turns to others, and end?
+//! Tests that tables and evaluations of one tenant leave slots to others, and that they end.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::guarded::Guarded;
 use crate::server::{Answer, Setup, example};
 use crate::support::case;
 
-/// A case whose rows the simplified theory answers, each in tens of microseconds.
+/// Returns a case whose rows the simplified theory answers in tens of microseconds each.
 fn fastsim() -> Value {
     let mut template = example("spin.case.json");
     template["solver"] = json!({ "method": "fastsim", "mesh": { "strips": 30, "cells": 30 } });
@@ -20,7 +20,7 @@ fn fastsim() -> Value {
     template
 }
 
-/// Requests of a tenant with a table: a batch and a run with a template, a batch of lines, an evaluation.
+/// Sends every kind of request with a table: a batch and a run with a template, a batch of lines, and an evaluation.
 async fn every_table(guarded: &Guarded, key: &str, template: &str) -> Vec<(&'static str, Answer)> {
     let line = format!("{}\n", case("line"));
     let evaluate =
@@ -61,7 +61,7 @@ async fn long_evaluations_of_one_tenant_leave_turns_to_another() {
     let guarded = Guarded::start(setup, |_| {}).await;
     let template = guarded.submit(&guarded.south, &fastsim()).await;
     let template = template.rsplit('/').next().unwrap();
-    // Minutes for each turn that there is, as far as the answers are waited for.
+    // The requests would occupy every slot for minutes if their answers were awaited.
     let mut rows = String::with_capacity(7_000_000);
     (0..1_000_000)
         .for_each(|row| write!(rows, "{}0.00{}", if row > 0 { "," } else { "" }, row % 9).unwrap());
@@ -81,7 +81,7 @@ async fn long_evaluations_of_one_tenant_leave_turns_to_another() {
             tokio::spawn(request.send())
         })
         .collect();
-    // They have begun by then, or would take the turns right away.
+    // The long requests have usually begun by then. Otherwise they would take the slots soon.
     tokio::time::sleep(Duration::from_millis(500)).await;
     for round in 0..3 {
         for (what, answer) in every_table(&guarded, &guarded.south, template).await {
@@ -103,7 +103,7 @@ async fn a_table_that_takes_longer_than_it_may_is_refused_and_leaves_nothing() {
     let template = guarded.submit(&guarded.south, &fastsim()).await;
     let template = template.rsplit('/').next().unwrap();
     for (what, answer) in every_table(&guarded, &guarded.south, template).await {
-        // Columns of JSON are one step.
+        // Columns in JSON are processed in a single step.
         if what == "rows" {
             assert_eq!(answer.status, 202, "{}", answer.text);
             continue;

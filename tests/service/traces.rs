@@ -1,4 +1,4 @@
-//! Traces: one per job, from its submission to its stored result, also across processes.
+//! Tests traces: each job has one trace, from its submission to its stored result, also across processes.
 
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use crate::server::link;
 use crate::support::{Answer, Service, case, endless_case, loaded};
 
-/// A collector of spans, as OTLP over HTTP has it.
+/// A collector of spans by OTLP over HTTP.
 struct Collector {
     address: SocketAddr,
     spans: Arc<Mutex<Vec<Span>>>,
@@ -47,8 +47,8 @@ impl Collector {
         format!("http://{}", self.address)
     }
 
-    /// The spans of a trace: of requests first, then those of a job in the order of its life. (The beginning of `queue` is
-    /// the job's, in whole milliseconds, and so may lie before its request's.)
+    /// Returns the spans of a trace: first those of requests, then those of a job in the order of its life. (`queue` begins at the creation time of
+    /// the job in whole milliseconds, which may precede the request.)
     fn trace(&self, id: &str) -> Vec<Span> {
         let spans = self.spans.lock().unwrap();
         let mut found: Vec<Span> = spans
@@ -70,7 +70,7 @@ fn names(spans: &[Span]) -> Vec<&str> {
     spans.iter().map(|span| span.name.as_str()).collect()
 }
 
-/// The value of an attribute as text.
+/// Returns the value of an attribute as text.
 fn told(span: &Span, key: &str) -> String {
     use opentelemetry_proto::tonic::common::v1::any_value::Value as Told;
     let attribute = span.attributes.iter().find(|pair| pair.key == key);
@@ -83,7 +83,7 @@ fn told(span: &Span, key: &str) -> String {
     }
 }
 
-/// Sends a body inside a trace; the flags say whether the trace is wanted.
+/// Sends a body inside a trace. The flags tell whether the trace is sampled.
 async fn send(service: &Service, path: &str, body: &Value, trace: &str, flags: &str) -> Value {
     let request = service.request(Method::POST, path).json(body);
     let parent = format!("00-{trace}-00f067aa0ba902b7-{flags}");
@@ -197,7 +197,7 @@ async fn a_trace_goes_on_in_the_process_that_solves_the_job() {
     service.until(&untraced, "succeeded").await;
     service.until(&traced, "succeeded").await;
     service.stop().await;
-    // The process that died took its own spans with it.
+    // The spans of the killed process are lost.
     let spans = collector.trace(TRACE);
     let last = &spans[spans.len().saturating_sub(3)..];
     assert_eq!(names(last), ["queue", "solve", "store"]);
@@ -215,7 +215,7 @@ async fn a_trace_goes_on_in_the_process_that_solves_the_job() {
 #[tokio::test]
 async fn a_collector_that_is_not_there_holds_up_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    // Port 9 takes what it is sent and says nothing, or is closed.
+    // Port 9 is closed, or discards what it receives without an answer.
     let service = Service::start(folder.path(), &["--otlp-endpoint", "http://127.0.0.1:9"]);
     let job = send(
         &service,

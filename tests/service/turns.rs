@@ -1,4 +1,4 @@
-//! Are short jobs served beside long solves, and is the job found that has killed a process?
+//! Tests that short jobs are served beside long solves, and that a job that kills its process is found.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -16,7 +16,7 @@ use crate::lab::{AT_MOST, Lab};
 use crate::store::{claim_up_to, open_beside};
 use crate::support::{case, endless_case};
 
-/// A service with one worker and short slices.
+/// Opens a service with short slices. It has one worker unless `change` sets another number.
 async fn lab(change: impl FnOnce(&mut Options)) -> Lab {
     let short = |options: &mut Options| {
         options.slice = Duration::from_millis(20);
@@ -55,7 +55,7 @@ async fn short_jobs_are_served_beside_a_long_solve_which_goes_on() {
     let job = other.wait(theirs.unwrap().id, AT_MOST).await.unwrap();
     assert_eq!(job.state, State::Succeeded);
     lab.gate.set_open(true);
-    // It was not begun again.
+    // It was not started again.
     lab.succeeds_at_once(long).await;
     lab.end().await;
 }
@@ -76,7 +76,7 @@ async fn beside_a_long_solve_jobs_that_turn_out_to_be_long_go_back() {
     let last = lab.submit(small("short")).await;
     lab.jobs.start().unwrap();
     assert_eq!(lab.wait(last).await.state, State::Succeeded);
-    // One can be cancelled wherever it is.
+    // A long job can be cancelled whether it is queued or running.
     let cancelled = ids.remove(1);
     lab.jobs.cancel(cancelled).await.unwrap();
     assert_eq!(lab.wait(cancelled).await.state, State::Cancelled);
@@ -143,7 +143,7 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
     let long = long.unwrap().0.id;
     until_running(&lab, long).await;
     set.store(40 * 24 * 3600 * 1000, Ordering::SeqCst);
-    // Some looks of whoever watches deadlines, leases and ages.
+    // Leaves time for several checks of deadlines, leases and ages.
     tokio::time::sleep(Duration::from_millis(2500)).await;
     lab.jobs.sweep_expired().await.unwrap();
     let kept = lab.get(old).await.state;
@@ -151,7 +151,7 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
     let job = lab.get(long).await;
     assert_eq!((job.state, job.attempt), (State::Running, 1));
     lab.gate.set_open(true);
-    // Its solver was not told that it is late or that its job is lost.
+    // Its solver was neither told that it is late nor that its job is lost.
     lab.succeeds_at_once(long).await;
     lab.end().await;
 }

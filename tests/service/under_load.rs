@@ -1,4 +1,4 @@
-//! Is nothing lost and nothing doubled when the process is killed, or told to stop, while clients flood it?
+//! Tests that no work is lost or duplicated when the process is killed or stopped while clients send many requests.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -14,13 +14,13 @@ use crate::support::{Service, case};
 const KILLS: usize = 8;
 const STOPS: usize = 3;
 const CLIENTS: usize = 4;
-/// Most cases that a client submits between two kills.
+/// The maximal number of cases that a client submits between two kills.
 const CASES_PER_ROUND: usize = 25;
-/// Cases of the batch that is sent in every third round.
+/// The number of cases of the batch in every third round.
 const BATCH: usize = 30;
 const FLAGS: [&str; 4] = ["--workers", "2", "--shutdown-grace-s", "0"];
 
-/// Pseudo-random numbers, the same in every run.
+/// A reproducible generator of pseudo-random numbers.
 struct Random(u64);
 
 impl Random {
@@ -33,7 +33,7 @@ impl Random {
     }
 }
 
-/// A case that no other one of the test equals; every tenth one is larger.
+/// Returns a case that differs from all others of the test. Every tenth case is larger.
 fn distinct(number: usize) -> Value {
     let mut case = case(&format!("case {number}"));
     case["load"]["normal_force_n"] = json!(20_000 + number);
@@ -42,14 +42,14 @@ fn distinct(number: usize) -> Value {
     case
 }
 
-/// State of a client: the id answered for each idempotency key, and the keys without a response.
+/// The state of a client: the id answered for each idempotency key, and the keys without an answer.
 #[derive(Default)]
 struct Known {
     answered: BTreeMap<String, String>,
     open: Vec<(String, usize)>,
 }
 
-/// Submits under a key until it is answered or the service is gone. Whatever is answered is documented.
+/// Submits once with an idempotency key. Returns the id, or `None` if there is no answer or status 503.
 async fn submit(client: &Client, url: &str, path: &str, key: &str, body: &Value) -> Option<String> {
     let request = client.request(Method::POST, format!("{url}{path}"));
     let request = request.header("idempotency-key", key).json(body);
@@ -67,7 +67,7 @@ async fn submit(client: &Client, url: &str, path: &str, key: &str, body: &Value)
     Some(answer["id"].as_str().unwrap().to_owned())
 }
 
-/// One client between two kills: first what was not answered the last time, then new cases.
+/// Runs one client between two kills. It first repeats unanswered submissions and then sends new cases.
 async fn flood(
     mut known: Known,
     url: String,
@@ -97,14 +97,14 @@ async fn flood(
     known
 }
 
-/// The idempotency keys and batches known after a service was killed under load, and the jobs that had succeeded by then.
+/// The keys and batches known after a service was killed under load, and the jobs that had succeeded by then.
 struct Flooded {
     clients: Vec<Known>,
     batches: BTreeMap<String, Option<String>>,
     succeeded: BTreeMap<String, Value>,
 }
 
-/// Ends a service on this folder in the middle of a flood of requests, several times.
+/// Starts a service on this folder several times, and ends it each time while clients send requests.
 async fn ended_in_floods(folder: &Path, times: usize, end: impl Fn(Service)) -> Flooded {
     let mut random = Random(7);
     let mut clients: Vec<Known> = (0..CLIENTS).map(|_| Known::default()).collect();
@@ -150,7 +150,7 @@ async fn ended_in_floods(folder: &Path, times: usize, end: impl Fn(Service)) -> 
     }
 }
 
-/// Every job of the service that a query finds by id, page by page.
+/// Returns every job that a query finds, by id.
 async fn all_jobs(service: &Service, query: &str) -> BTreeMap<String, Value> {
     let (mut jobs, mut cursor) = (BTreeMap::new(), String::new());
     loop {
@@ -167,7 +167,7 @@ async fn all_jobs(service: &Service, query: &str) -> BTreeMap<String, Value> {
     }
 }
 
-/// A last service answers what was never answered; then every accepted case has one job, and it succeeds.
+/// Asserts that a new service answers the open submissions, and that every accepted case has one job, which succeeds.
 async fn assert_all_is_there(folder: &Path, flooded: Flooded) {
     let Flooded {
         clients, batches, ..
@@ -224,7 +224,7 @@ async fn assert_all_is_there(folder: &Path, flooded: Flooded) {
             .or_default() += 1;
     }
     for id in batches.values().flatten() {
-        // A batch that was acknowledged and is missing is lost.
+        // An acknowledged batch must not be missing.
         let lines = service.ask(&format!("/v1/batches/{id}/results")).await;
         for (index, line) in lines.is(200).lines().iter().enumerate() {
             assert_eq!(

@@ -1,4 +1,4 @@
-//! A table and its template in one request, as `multipart/form-data`.
+//! Tests a table and its template in one request, as `multipart/form-data`.
 
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -10,7 +10,7 @@ use crate::server::{Answer, Server};
 
 const BOUNDARY: &str = "a-boundary";
 
-/// Parts with their heads, as a body.
+/// Returns a body with these parts, each with its head.
 fn body(parts: &[(&str, &str)]) -> String {
     let parts = parts.iter();
     let parts = parts.map(|(head, text)| {
@@ -65,7 +65,7 @@ async fn a_run_takes_every_form_of_table_with_its_template() {
     let template = ("name=\"template\"", case.as_str());
     let mut answers = vec![answers_of(&server, &expected).await];
     for table in [
-        // Content types of programs that do not know the format of a file.
+        // Programs that do not know the format of a file send this content type.
         (
             "name=\"table\"; filename=\"rows.CSV\"\r\nContent-Type: application/octet-stream",
             csv,

@@ -1,10 +1,10 @@
-//! Fields for ParaView: legacy VTK files, read byte by byte.
+//! Tests fields for ParaView: legacy VTK files, read byte by byte.
 
 use crate::formats::flat;
 use crate::results::{numbers, path_of};
 use crate::server::{Server, example};
 
-/// A legacy VTK file, taken apart line by line and block by block.
+/// A parser of a legacy VTK file, with the bytes that remain.
 struct Vtk<'a>(&'a [u8]);
 
 impl<'a> Vtk<'a> {

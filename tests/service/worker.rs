@@ -1,4 +1,4 @@
-//! Do workers solve what is queued, and survive what they solve?
+//! Tests that workers solve queued jobs and survive failures of the solver.
 
 use std::sync::mpsc;
 use std::time::Duration;
@@ -14,7 +14,7 @@ use crate::support::{case, files_below, pause};
 
 #[tokio::test]
 async fn a_solved_job_keeps_its_answer_and_its_remarks() {
-    // Once in the database, once in a folder.
+    // The result is stored once in the database and once in a folder.
     for small_result_max_bytes in [1 << 20, 0] {
         keeps_its_answer(small_result_max_bytes).await;
     }
@@ -83,7 +83,7 @@ async fn keeps_its_answer(small_result_max_bytes: usize) {
 async fn a_ticking_solver_keeps_its_lease_and_shows_its_progress() {
     let lab = Lab::start(|options| options.lease = Duration::from_millis(1_500)).await;
     let id = lab.submit(case("long")).await;
-    // Two heartbeats reach the table: the version grows with the claim and with the first progress only.
+    // The version increases only with the claim and with the first progress. Two heartbeats reach the table.
     while lab.get(id).await.progress < 0.5 {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
@@ -105,7 +105,7 @@ async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
 
 #[tokio::test]
 async fn a_solver_deaf_to_its_cancellation_is_left_behind() {
-    // When its lease is over, and long before that.
+    // The solver is abandoned when its lease ends, and also with a lease that is much longer.
     for lease in [Duration::from_millis(300), Duration::from_secs(600)] {
         assert_eq!(end_of_deaf(lease, None).await, State::Cancelled);
     }
@@ -118,7 +118,7 @@ async fn a_solver_deaf_to_its_deadline_is_left_behind() {
     assert_eq!(ended, State::Failed);
 }
 
-/// How a job ends whose solver does not listen, at its deadline or else by cancellation; the next one is solved.
+/// Returns the final state of a job whose solver ignores its deadline or cancellation. Asserts that the next job is solved.
 async fn end_of_deaf(lease: Duration, deadline: Option<Duration>) -> State {
     let lab = Lab::start(|options| options.lease = lease).await;
     let asked = SubmitOptions {

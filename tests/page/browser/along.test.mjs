@@ -1,4 +1,4 @@
-// Compare and Line: several jobs side by side, and the cases of a batch along a label.
+// Tests the views Compare and Line: several jobs side by side, and the cases of a batch along a label.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -32,7 +32,7 @@ test('compared jobs share range and crosshair, and say how many errors they are 
   const difference = (other.result.patches[0].points[0].force_x_n - coarse.result.patches[0].points[0].force_x_n) / 1000;
   await page.waitForFunction(() => /× the error/.test(document.querySelector('tbody')?.textContent ?? ''));
   assert.ok(Math.abs(parsed((await numbers())[3]) / difference - 1) < 0.01);
-  // What differs is told in words, with values in the units of the form; what the form does not have by its pointer.
+  // Differences are named with the words and units of the form. Members without a field are named by their pointer.
   const different = await page.locator('section[aria-labelledby="h-cases"] tbody tr').evaluateAll((rows) => rows.map((row) => [...row.querySelectorAll('th, td')].map((cell) => cell.textContent?.trim())));
   assert.deepEqual(different.find(([name]) => name === 'friction coefficient')?.slice(1), ['0.3', '0.3', '0.15']);
   assert.ok(different.every(([name]) => !name?.startsWith('/') || name.startsWith('/solver/')), JSON.stringify(different));
@@ -69,7 +69,7 @@ test('a batch stands along its label, with limits, the worst places and the way 
   await page.locator('section[aria-labelledby="h-worst"] select').selectOption('pressure');
   const over = results.filter((entry) => entry.result.patches[0].pressure_max_mpa > 1200).length;
   await page.getByText(`${over} of 40 over the limit`).waitFor();
-  // Drag to zoom: all strips follow, and the address keeps it.
+  // Dragging zooms all strips, and the address stores the range.
   const area = await page.locator('line-strips .u-over').first().boundingBox();
   assert.ok(area);
   await page.mouse.move(area.x + 100, area.y + 40);
@@ -92,7 +92,7 @@ test('a batch stands along its label, with limits, the worst places and the way 
 test('a worn rail lies over a new one: difference, worn area, numbers of all patches, the same place on the rail', () => onPage('#/compose', async (page) => {
   const base = example('wheel-rail');
   const points = /** @type {[number, number][]} */ (base.contact.rail.points_mm);
-  // A hollow of half a cosine wave, 20 mm long and 0.5 mm deep, about y −8: 5 mm² are missing.
+  // A groove of half a cosine wave, 20 mm long and 0.5 mm deep, at y = −8 mm. The missing area is 5 mm².
   const groove = (/** @type {number} */ y) => (Math.abs(y + 8) < 10 ? 0.25 * (1 + Math.cos((Math.PI * (y + 8)) / 10)) : 0);
   const finer = points.flatMap(([y, z], at) => {
     const next = points[at + 1];
@@ -149,7 +149,7 @@ test('a run stands along its kilometres: totals by section, exceedances, the wor
     assert.equal(parsed(cells[0]), of.rows);
     assert.ok(Math.abs(parsed(cells[4]) - of.columns.friction_power_n.percentiles['100']) < 0.01 * of.columns.friction_power_n.percentiles['100'], cells.join());
   }
-  // A limit is drawn in, and what reaches it is counted by the service.
+  // A limit is drawn, and the service counts the rows that reach it.
   await page.getByLabel('Limit of wear number').fill('20');
   await page.getByLabel('Limit of wear number').blur();
   const over = totals.all.columns.friction_power_n.above['20'];
@@ -157,7 +157,7 @@ test('a run stands along its kilometres: totals by section, exceedances, the wor
   await page.waitForFunction(() => location.hash.includes('friction_power_n=20'));
   const curve = totals.sections.find((/** @type {{ value: string }} */ of) => of.value === 'curve');
   await page.waitForFunction((count) => [...document.querySelectorAll('table.sections tbody tr')].some((row) => row.querySelector('th')?.textContent === 'curve' && Number(row.lastElementChild?.textContent) === count), curve.columns.friction_power_n.above['20']);
-  // The worst row is the one of the largest value, and opens as a job with its fields.
+  // The worst row has the largest value, and opens as a job with its fields.
   const worst = page.locator('section[aria-labelledby="h-worst"] tbody tr').first();
   const value = parsed(await worst.locator('td').first().innerText());
   assert.ok(Math.abs(value - totals.all.columns.friction_power_n.max) < 0.01 * value, `${value}`);

@@ -1,4 +1,4 @@
-// Where a rail engineer begins: the first screen, files in odd forms, and what is set for a wheel on a rail.
+// Tests the first steps of a rail engineer: the first screen, files in unusual formats, and the settings of a wheel on a rail.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -28,7 +28,7 @@ test('the first screen says what it is for, asks for two files, and shows a resu
   assert.equal(await page.locator('.segs[aria-label="Kind of contact"] .seg').first().innerText(), 'Profiles');
   assert.doesNotMatch(await page.locator('body').innerText(), /\bSound\b|\bMB\b|approach/);
   await page.screenshot({ path: join(OUTPUT, 'first.png') });
-  // The name of the example tells its load: with another it is not that example.
+  // The name of the example includes its load. With another load the name is marked as changed.
   await page.getByLabel('Wheel load Q').fill('90');
   await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent?.endsWith(', changed'));
 }));
@@ -197,7 +197,7 @@ test('a cant changes the load normal to the track and not the roll of the wheels
   await page.getByLabel('Curve radius').fill('-500');
   await page.getByText('The track rolls by 100.2 mrad').waitFor();
   assert.equal(await page.getByLabel('Wheel load Q, static').inputValue(), '90');
-  // The wheel that is solved carries it, in axes of the track.
+  // The solved wheel carries this load, in track axes.
   const [, shown] = /([\d.]+) kN normal to the track/.exec(await page.locator('.form').innerText()) ?? [];
   assert.ok(Math.abs(Number(shown) - (await load()) / 1000) < 0.006);
   await ready(page);
@@ -207,7 +207,7 @@ test('a cant changes the load normal to the track and not the roll of the wheels
   const { total: [{ force_z_n: force }] } = await service.ask(`/v1/jobs/${job.id}/result`);
   await page.goBack();
   assert.ok(Math.abs(-force - (await load())) < 300, "within the tolerance of the vertical force");
-  // Another kind of motion has no curve: the load is the static one again.
+  // Another kind of motion has no curve, and the load is the static one again.
   await page.getByRole('radio', { name: 'Creepages' }).check();
   assert.deepEqual([await load(), (await json(page)).labels], [90_000, undefined]);
 }));

@@ -1,4 +1,4 @@
-// Compose: every example, the form and the JSON as faces of one document, faults, files, the result while typing.
+// Tests Compose: every example, the form and the JSON of one document, errors, files, and the result while typing.
 import assert from 'node:assert/strict';
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
@@ -37,10 +37,10 @@ test('every example can be chosen, is drawn, and is solved to a picture or a cur
     await page.goto(`${service.base}/#/compose`);
     await choose(page, file);
     await page.waitForFunction((name) => document.querySelector('#h-drawing')?.textContent === name, example(file).name);
-    // Fields are asked for, so that there is something to look at.
+    // Fields are requested, so that there is something to draw.
     assert.deepEqual(await json(page), { ...example(file), outputs: withAll(example(file).outputs) }, file);
     await sound(page);
-    // Where a wheelset stands on its rails is found by the solve.
+    // The solve determines the position of a wheelset on its rails.
     if (example(file).contact.type !== 'wheelset') await page.locator('.figure svg.drawing, .figure value-grid canvas').first().waitFor();
     await page.getByRole('button', { name: /^Solve/ }).click();
     await drawn(page);
@@ -56,13 +56,13 @@ test('faults stand at their fields and in a list that leads to them', () => onPa
     await page.locator(`#field-${id}[aria-invalid="true"]`).waitFor();
     assert.ok((await page.locator(`#field-${id}-fault`).innerText()).length > 10, id);
   }
-  // The limits are told in the unit of the field.
+  // The limits are shown in the unit of the field.
   assert.match(await page.locator('#field-load-normal_force_n-fault').innerText(), /more than 0 and at most 10⁹ kN/);
   const link = page.getByRole('button', { name: 'friction coefficient' });
   await link.focus();
   await page.keyboard.press('Enter');
   assert.equal(await page.evaluate(() => document.activeElement?.id), 'field-friction-coefficient');
-  // A member without a field: its place in the JSON.
+  // A member without a field is selected in the JSON.
   await page.getByRole('button', { name: '/motion/creepage_z' }).click();
   const chosen = await page.locator('.code textarea').evaluate((area) => {
     const { value, selectionStart, selectionEnd } = /** @type {HTMLTextAreaElement} */ (area);
@@ -97,7 +97,7 @@ test('rolling that changes is written in the form, and its forces stand over the
 }));
 
 test('a wheel on a rail moves across and rolls through a history in the form', () => onPage('', async (page) => {
-  // Before that the first example may still come and take the place of what is written.
+  // Before that, the first example could still arrive and replace the text.
   await sound(page);
   await write(page, JSON.stringify({ ...example('wheel-rail-flange'), load: { normal_force_n: 75_000 } }));
   await page.getByLabel('Lateral velocity').fill('-40');
@@ -132,7 +132,7 @@ test('form and JSON are faces of one document, and broken JSON loses nothing', (
   await page.getByText('Not JSON').waitFor();
   await area.fill(text);
   await sound(page);
-  // A field may be written character by character, and may hold what is no number.
+  // A field can be typed character by character, and may hold a text that is not a number.
   const friction = page.getByLabel('Friction coefficient');
   await friction.fill('');
   await friction.pressSequentially('0.05');
@@ -168,10 +168,10 @@ test('files dropped on the header or on another view are taken and lead to the c
     await dropFiles(page, place, files);
     await page.waitForFunction(() => location.hash.startsWith('#/compose') && document.querySelector('#h-drawing')?.textContent === 'a on a');
     await sound(page);
-    // Another name, so that the next drop shows.
+    // Another name makes the next drop visible.
     await write(page, JSON.stringify({ ...(await json(page)), name: 'a on a', contact: { type: 'radii', rolling_mm: 460, lateral_mm: 300 } }));
   }
-  // The browser does not open a file that nothing takes.
+  // The browser does not open a file that no element accepts.
   const prevented = await page.evaluate(() => {
     const data = new DataTransfer();
     data.items.add(new File(['1'], 'a.txt'));
@@ -190,7 +190,7 @@ test('two files dropped together replace both, and one file of unknown body is a
   await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'RUIC519A on SUIC519A');
   const after = (await json(page)).contact;
   assert.deepEqual([after.rail, after.wheel], [{ format: 'columns', text: rows.rail }, { format: 'columns', text: rows.wheel }]);
-  // The name of an example says nothing of other files.
+  // The name of an example does not apply to other files.
   await choose(page, 'wheel-rail');
   await page.waitForFunction((name) => document.querySelector('#h-drawing')?.textContent === name, example('wheel-rail').name);
   await dropFiles(page, '.form', { 'SUIC519A.dat': rows.rail, 'RUIC519A.dat': rows.wheel });
@@ -300,7 +300,7 @@ async function previewed(page, before, forces) {
 }
 
 test('a cheap case is solved while it is written, and leaves no job behind', () => onPage('', async (page) => {
-  // Pages that other tests have closed may have left theirs.
+  // Pages closed by other tests may have left jobs.
   const began = new Date().toISOString();
   await begin(page, 'hertz-steel');
   await previewed(page, '', ['', '100.1', '100.2', '100.3', '100.4']);

@@ -1,4 +1,4 @@
-// What a wheel of one's own does to a rail: wheel loads and Nadal's limit, wear, fatigue, stresses, temperature, remarks.
+// Tests the effects of a wheel on a rail: wheel loads and Nadal's limit, wear, fatigue, stresses, temperature, remarks.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -29,7 +29,7 @@ test('from own files to their damage without reading: drop, solve, see', () => o
   const loads = await entries(page.locator('[data-wheel]'));
   const { force_y_n, force_z_n } = result.total[0];
   assert.ok(Math.abs(parsed(loads['Q, vertical']) + force_z_n / 1000) < 0.01, loads['Q, vertical']);
-  // The wheel stands on the right rail: outward is to the right.
+  // The wheel stands on the right rail, so that outward is to the right.
   assert.ok(Math.abs(parsed(loads['Y, lateral']) + force_y_n / 1000) < 0.05, loads['Y, lateral']);
   assert.ok(Math.abs(parsed(loads['Y/Q']) - force_y_n / force_z_n) < 1e-3, loads['Y/Q']);
   const limit = Object.keys(loads).find((name) => name.startsWith("Nadal's limit, flange 70.0°"));
@@ -51,7 +51,7 @@ test('from own files to their damage without reading: drop, solve, see', () => o
   await chart(/^Stress over depth; von Mises/).waitFor();
   assert.ok(Math.abs(parsed(/von Mises (\S+) MPa/.exec(await chart(/^Stress over depth/).getAttribute('aria-label') ?? '')?.[1]) - worst.von_mises_mpa) < 0.01 * worst.von_mises_mpa);
   await chart(/^Temperature along rolling/).waitFor();
-  // What is not sure says so: the set of parameters, and models whose figures are not confirmed.
+  // Uncertain results are marked: the set of parameters, and models whose values are not confirmed.
   assert.match(await page.locator('.damage header').innerText(), /900a-r8t-1/);
   assert.ok((await page.locator('.damage abbr').count()) >= 3);
   await page.getByText('Parameters and their sources').click();
@@ -71,7 +71,7 @@ test('each wheel of a wheelset and its axle have their loads', async () => {
     await right.getByText("Nadal's limit").waitFor();
     const axle = await entries(page.locator('dl.table').filter({ hasText: 'axle' }));
     assert.ok(Math.abs(parsed(axle['ΣY, to the left']) - (position.left.force_y_n + position.right.force_y_n) / 1000) < 0.02);
-    // Damage was not asked for: it is one click away.
+    // Damage was not requested, and can be solved with one click.
     await page.getByRole('button', { name: 'Solve again with damage' }).click();
     await page.getByRole('img', { name: /^Patch 0: load factor/ }).waitFor({ timeout: 60_000 });
   });
@@ -87,12 +87,12 @@ test('forces of the patches add up to those of the wheel in track axes', async (
     const loads = await entries(page.locator('[data-wheel]'));
     assert.ok(Math.abs(sum(6) - parsed(loads['Y, lateral'])) < 0.03, 'Y');
     assert.ok(Math.abs(sum(7) - parsed(loads['Q, vertical'])) < 0.03, 'Q');
-    // Notes are folded, and what is said of several patches stands once.
+    // Notes are folded, and a remark about several patches appears once.
     assert.equal(await page.locator('.remark.info:visible').count(), 0);
     await page.getByText(/^\d+ notes$/).click();
     const texts = await page.locator('.remark:visible').allInnerTexts();
     assert.equal(new Set(texts).size, texts.length);
-    // The scale is that of the patch, or one for all that ends at the largest μp.
+    // The scale is that of the patch, or a common one that ends at the largest μp.
     const range = () => page.locator('field-map.main').evaluate((map) => /** @type {HTMLElement & { shown: { range: number[] } }} */ (map).shown.range[1]);
     const own = await range();
     await page.getByLabel('scale').selectOption('common');
@@ -113,7 +113,7 @@ test('from a noisy worn pair to its damage, smoothed, and against new profiles',
   await page.locator('.remark[data-code="profile-noise"]').first().waitFor();
   await page.getByRole('button', { name: 'Solve again with the wheel smoothed by 2.0 mm and the rail smoothed by 2.0 mm' }).click();
   await page.waitForFunction(() => document.querySelector('field-map.main') && !document.querySelector('.remark[data-code="profile-noise"]'));
-  // Of two patches the one that carries most is looked at.
+  // The patch with the largest load is selected.
   assert.ok(parsed(await page.locator('.figures .figure-of').filter({ has: page.locator('dt', { hasText: /^N$/ }) }).locator('b').innerText()) > 37.5);
   await page.getByRole('button', { name: 'Compare with new profiles' }).click();
   await page.getByText('Worn area').waitFor();

@@ -1,4 +1,4 @@
-// Firefox by Marionette, the remote protocol that it has without a driver.
+// Controls Firefox by Marionette, its built-in remote protocol.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { createConnection } from 'node:net';
@@ -21,7 +21,7 @@ export class Firefox {
 
   /** @param {string} program */
   async start(program) {
-    // Any free port; Firefox writes which one into its profile.
+    // Port 0 selects any free port, which Firefox writes into its profile.
     writeFileSync(join(this.profile, 'user.js'), 'user_pref("marionette.port", 0);\nuser_pref("datareporting.policy.dataSubmissionEnabled", false);\nuser_pref("browser.shell.checkDefaultBrowser", false);\n');
     this.process = spawn(program, ['--headless', '--marionette', '--no-remote', '--profile', this.profile, 'about:blank'], { stdio: 'ignore', env: { ...process.env, HOME: this.profile } });
     const port = join(this.profile, 'MarionetteActivePort');

@@ -1,4 +1,4 @@
-// Forecast: own sections under a traffic, the step that is looked at, two plans side by side, files that load elsewhere.
+// Tests the view Forecast: own sections under a traffic, the selected step, two plans side by side, and exported files.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -31,7 +31,7 @@ test('a planner forecasts the wear of own sections, and compares it with grindin
   const answer = await service.ask(`/v1/evolutions/${job.id}/result`);
   const last = answer.records.at(-1);
 
-  // The last step is shown first; the slider goes back to the start, where nothing is worn.
+  // The last step is shown first. The slider returns to the start, where there is no wear.
   const area = page.locator('[aria-labelledby="h-step"] tr').filter({ hasText: 'worn area of the rail' }).locator('td').first();
   const shown = async () => parsed((await area.innerText()).split('\n')[0]);
   assert.ok(Math.abs((await shown()) - last.rail.worn_area_mm2) <= 6e-3 * last.rail.worn_area_mm2, `${await shown()} is ${last.rail.worn_area_mm2}`);
@@ -48,7 +48,7 @@ test('a planner forecasts the wear of own sections, and compares it with grindin
   await page.getByRole('radio', { name: 'Losses' }).check();
   assert.ok((await curve.locator('.band').count()) >= 1, 'losses have the band of the coefficients');
   assert.equal(await curve.locator('.line.limit').count(), 2, 'the limit and its legend');
-  // A click at the left end of the curve goes to the start, and a film of contacts has a needle for each.
+  // A click at the left end of the curve selects the start. The drawing has a needle for each contact.
   const { width = 0, height = 0 } = (await curve.boundingBox()) ?? {};
   await curve.click({ position: { x: 0.14 * width, y: 0.4 * height } });
   await until(async () => (await shown()) === 0);
@@ -57,7 +57,7 @@ test('a planner forecasts the wear of own sections, and compares it with grindin
   await until(async () => (await shown()) > 0.9 * last.rail.worn_area_mm2);
   await page.screenshot({ path: join(OUTPUT, 'forecast.png'), fullPage: true });
 
-  // Files: a table, a picture, and a section that the page reads again.
+  // The exported files are a table, a picture, and a section that the page reads again.
   const saved = async (/** @type {string} */ name) => {
     const [download] = await Promise.all([page.waitForEvent('download'), page.getByRole('button', { name, exact: true }).click()]);
     return readFileSync(await download.path());
@@ -68,7 +68,7 @@ test('a planner forecasts the wear of own sections, and compares it with grindin
   const ground = (await saved('MiniProf')).toString();
   assert.match((await saved('Simpack')).toString(), /point\.begin/);
 
-  // A second plan that grinds to a section of the planner's own; both stand side by side as soon as it is computed.
+  // A second plan grinds to another section. Both plans are shown side by side as soon as it is computed.
   await page.getByRole('button', { name: 'Compare with another plan' }).click();
   await page.getByText('compared with leave it').waitFor();
   await page.getByText('own.ban, own.whl').waitFor();
@@ -101,7 +101,7 @@ test('a faulty traffic is refused with its place, and a table from a file is tak
   await page.locator('.faults code').filter({ hasText: /traffic.*friction/ }).first().waitFor();
   await page.locator('#traffic').setInputFiles({ name: 'year.csv', mimeType: 'text/csv', buffer: Buffer.from('axle load [t];shift [mm];passes\n20;0;3\n22,5;-1;1\n') });
   await page.getByText('year.csv: 2 rows').waitFor();
-  // Dropped with the sections, each file goes to its place; what is read of the table is in sight.
+  // Each dropped file goes to its place, and the columns that were read from the table are shown.
   await dropFiles(page, 'main', { 'own.whl': file('worn-wheel.whl'), 'line.csv': 'train;axle load [t];speed [km/h];radius [m];passes\nore;30;60;-400;3\ncoach;12;140;;9\n', 'own.ban': file('words-behind.ban') });
   await page.getByText('own.ban, own.whl').waitFor();
   await page.getByText('line.csv: 2 rows').waitFor();

@@ -1,4 +1,4 @@
-// A service of its own for each file of tests, and pages that fail the test for errors, violations of the policy and other origins.
+// Starts a service for each test file, and pages that fail the test on errors, policy violations and requests to other origins.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { mkdirSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -111,7 +111,7 @@ export function setUp(more = []) {
     const page = await context.newPage();
     page.on('pageerror', (error) => complaints.push(error.stack ?? error.message));
     page.on('console', (message) => {
-      // A refusal is logged by the browser though the page deals with it.
+      // The browser logs a refused request although the page handles it.
       if (message.type() === 'error' && !message.text().startsWith('Failed to load resource')) complaints.push(message.text());
     });
     page.on('request', (request) => {

@@ -1,4 +1,4 @@
-// Jobs: from the queue to the end by events, cancelling, a service that dies meanwhile, 10 000 jobs, keys.
+// Tests the list of jobs: from the queue to the end by events, cancellation, a service that dies, 10 000 jobs, keys.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { test } from 'node:test';
@@ -23,10 +23,10 @@ test('a job is followed from the queue to its end, and another is cancelled', ()
   await row(page, 'slow two').locator('.state.cancelled').waitFor();
   await page.getByRole('checkbox', { name: 'cancelled', exact: true }).check();
   await row(page, 'slow one').waitFor({ state: 'detached' });
-  // The list is empty until the answer with the new filter is there.
+  // The list is empty until the answer with the new filter arrives.
   await row(page, 'slow two').waitFor();
   assert.equal(await page.locator('.rows.job').count(), 1);
-  // Deleting can be undone for some seconds.
+  // A deletion can be undone for some seconds.
   await page.getByRole('button', { name: 'Delete slow two' }).click();
   await page.getByText('No jobs that are cancelled').waitFor();
   await page.getByRole('button', { name: 'Undo' }).click();
@@ -75,7 +75,7 @@ test('jobs of batches do not hide those submitted alone, and several are deleted
   await page.goto(`${service.base}/#/jobs`);
   await row(page, 'alone one').waitFor();
   assert.equal(await row(page, 'part ').count(), 0);
-  // Its jobs have no time of their own.
+  // Jobs answered from the cache have no time.
   await page.locator(`.batch[data-batch="${id}"]`).getByRole('button', { name: 'Its jobs' }).click();
   await row(page, 'part 399').waitFor();
   assert.equal(await row(page, 'alone').count(), 0);
@@ -84,7 +84,7 @@ test('jobs of batches do not hide those submitted alone, and several are deleted
   await row(page, 'alone one').waitFor();
   const { total } = await service.ask('/v1/jobs?batch=none&limit=1');
   assert.equal(await page.locator('#h-jobs').innerText(), `Jobs ${total}`);
-  // The list is searched while it is written.
+  // The list is searched while typing.
   await page.getByLabel('Name').pressSequentially('alone t');
   await row(page, 'alone one').waitFor({ state: 'detached' });
   await row(page, 'alone two').waitFor();
@@ -103,7 +103,7 @@ test('10 000 jobs scroll without a stutter, in few rows', () => onPage('#/compos
   await page.goto(`${service.base}/#/jobs`);
   await page.locator(`.batch[data-batch="${id}"]`).getByRole('button', { name: 'Its jobs' }).click();
   await row(page, 'case 9999').waitFor();
-  // To the end, page after page.
+  // Scrolls to the end, page by page.
   await page.waitForFunction(() => {
     const list = document.querySelector('.list');
     if (list) list.scrollTop = list.scrollHeight;
@@ -128,7 +128,7 @@ test('10 000 jobs scroll without a stutter, in few rows', () => onPage('#/compos
   console.log(`10 000 jobs: ${JSON.stringify(measured)}`);
   assert.ok(measured.rows <= 60, `${measured.rows} rows`);
   assert.ok(measured.height >= 10_000 * 44, `${measured.height}`);
-  // Back from a job the list is where it was.
+  // After returning from a job the list has the same scroll position.
   const name = await page.locator('.rows.job .name').nth(12).textContent();
   const place = await page.locator('.list').evaluate((list) => list.scrollTop);
   await page.locator('.rows.job .name').nth(12).click();
@@ -139,7 +139,7 @@ test('10 000 jobs scroll without a stutter, in few rows', () => onPage('#/compos
   assert.match((await page.locator('#h-jobs').innerText()).replace(/\u2009/g, ''), /Jobs 10000/);
   await page.getByLabel('Name').fill('case 99');
   await page.waitForFunction(() => document.querySelectorAll('.rows.job').length > 0 && [...document.querySelectorAll('.rows.job .name')].every((link) => link.textContent?.includes('case 99')));
-  // More than a browser asks for at once.
+  // There are more jobs than a browser requests at once.
   await page.getByLabel('Choose all jobs of the list').check();
   await page.getByRole('button', { name: 'Delete 111' }).click();
   await until(async () => (await service.ask('/v1/jobs?name=case+99&limit=200')).jobs.length === 0);

@@ -1,4 +1,4 @@
-// How the page looks and how long it takes: no serious findings of axe, no sideways scrolling, pictures to look at, times, Firefox.
+// Tests the appearance and speed of the page: no serious findings of axe, no horizontal scrolling, screenshots, times, Firefox.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
@@ -27,7 +27,7 @@ async function fits(page, what) {
 /** @param {import('playwright-core').Page} page @param {string[]} [rules] */
 async function findings(page, rules = RULES) {
   const { violations } = await page.evaluate(async ({ source, rules }) => {
-    // Axe is brought by the test: in a function of its own it needs no permission of the page's policy.
+    // The test injects axe as a function, so that it needs no permission of the page's policy.
     if (!('axe' in window)) throw new Error(`axe is missing (${source.length})`);
     return /** @type {{ axe: { run: (of: Document, how: object) => Promise<{ violations: { id: string, impact: string, nodes: { html: string, failureSummary: string }[] }[] }> } }} */ (/** @type {unknown} */ (window)).axe.run(document, { runOnly: rules, resultTypes: ['violations'] });
   }, { source: AXE, rules });
@@ -63,7 +63,7 @@ test('every view is sound for axe, has one heading and names, fits small windows
       assert.equal(await page.locator('.toast[role="status"][aria-live="polite"]').count(), 1);
       await fits(page, name);
       await page.screenshot({ path: join(OUTPUT, `light-${name}.png`) });
-      // Dark differs from light in its colours alone.
+      // Dark mode differs from light mode only in its colours.
       await page.emulateMedia({ colorScheme: 'dark' });
       await page.waitForFunction(() => document.documentElement.dataset.theme === 'dark');
       assert.deepEqual(await findings(page, ['color-contrast']), [], `${name}, dark`);
@@ -179,7 +179,7 @@ test('first load, solving and drawing are measured, and the page is small', () =
     waits.push(await page.evaluate(() => performance.getEntriesByName('solve to picture').at(-1)?.duration ?? NaN));
   }
   waits.sort((one, two) => one - two);
-  // A field of 400 × 400 cells, drawn anew with other values each time.
+  // A field of 400 × 400 cells is redrawn with other values each time.
   const redraw = await page.evaluate(async () => {
     const map = /** @type {HTMLElement & { shown: unknown, took: { picture: number } }} */ (document.querySelector('field-map.main'));
     const side = 400;

@@ -1,4 +1,4 @@
-// Result: the crosshair by mouse, touch and keys against the API, links, creep curves, several patches, downloads.
+// Tests the view Result: the crosshair by mouse, touch and keys compared with the API, links, creep curves, several patches, downloads.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
@@ -69,7 +69,7 @@ test('the colours of the map are those of the values', () => onPage('', async (p
   assert.ok(box);
   const far = [];
   for (let number = 0; number < 60; number += 1) {
-    // Places all over the picture, in no pattern of its own.
+    // The positions are spread over the whole picture in no regular pattern.
     const at = [0.05 + 0.6 * ((number * 0.618) % 1), 0.1 + 0.6 * ((number * 0.414) % 1)];
     const place = [Math.round(at[0] * box.width), Math.round(at[1] * box.height)];
     await page.mouse.move(box.x + place[0] + 0.5, box.y + place[1] + 0.5);
@@ -83,7 +83,7 @@ test('the colours of the map are those of the values', () => onPage('', async (p
       const { context, density } = { context: /** @type {HTMLCanvasElement} */ (canvas).getContext('2d'), density: devicePixelRatio || 1 };
       return [...(context?.getImageData(Math.round(left * density), Math.round(top * density), 1, 1).data ?? [])];
     }, place);
-    // Between the cells the map is interpolated: the colour is one of those between the least and the largest value around.
+    // The map interpolates between cells: the colour lies between those of the least and the largest value around.
     const shares = around.map(shareOf);
     const [low, high] = [Math.min(...shares), Math.max(...shares)];
     const distances = Array.from({ length: 65 }, (_, step) => hex('viridis', low + (high - low) * step / 64))
@@ -150,7 +150,7 @@ test('a click on the creep curve chooses the motion, and error bars reach as far
   const { points } = (await service.ask(`/v1/jobs/${id}/result`)).patches[0];
   const error = points[8].error_estimate.force_x_n / 1000;
   assert.ok(error > 0.05, 'the coarse mesh has errors that can be seen');
-  // Half-way between the point and the end of its bar there is the colour of the line; a little beyond the end there is not.
+  // The colour of the line appears halfway between the point and the end of its bar, and not a little beyond the end.
   const inked = await curve.evaluate((element, bar) => {
     const { plot } = /** @type {HTMLElement & { plot: { data: number[][], ctx: CanvasRenderingContext2D, valToPos: (value: number, scale: string, canvas: boolean) => number } }} */ (element);
     const colour = getComputedStyle(element).getPropertyValue('--c1').trim();
@@ -193,7 +193,7 @@ test('a wheelset shows Δr over its shift, its conicity and its positions, and a
   await page.waitForFunction(() => /** @type {any} */ (document.querySelector('creep-curve'))?.plot?.data.length === 4);
   const known = kinematics.conicity.filter((/** @type {{ conicity?: number }} */ of) => of.conicity !== undefined);
   assert.deepEqual((await data())[1], known.map((/** @type {{ conicity: number }} */ of) => of.conicity));
-  // Its form: another gauge is another case.
+  // In the form of the wheelset, another gauge makes another case.
   await page.getByRole('button', { name: 'Edit case' }).click();
   await page.getByRole('textbox', { name: 'Gauge' }).fill('1438');
   await page.waitForFunction(() => document.querySelector('textarea')?.value.includes('"gauge_mm": 1438'));
@@ -212,7 +212,7 @@ test('two patches have one scale of colours, and stand on the profiles', () => o
   assert.equal(ranges.length, 3);
   for (const range of ranges) assert.deepEqual(range, ranges[0]);
   const bound = example('wheel-rail-flange').friction.coefficient * Math.max(...result.patches.map((/** @type {{ pressure_max_mpa: number }} */ patch) => patch.pressure_max_mpa));
-  // Pressures with tractions may be a little larger than those of the patch.
+  // Pressures with tractions may be slightly larger than those of the patch.
   assert.ok(ranges[0][1] > 0.9999 * bound && ranges[0][1] < 1.1 * bound, `${ranges[0][1]}: ${bound}`);
   await page.locator('svg .patch .comb').nth(1).waitFor();
   await page.getByText(/^\d+ notes$/).click();
@@ -350,7 +350,7 @@ test('on the curve of the rail the pressure stands along the rail', () => onPage
   assert.ok(away < 1, `${away}`);
   await page.getByRole('radio', { name: 'Whole head' }).check();
   await page.getByRole('button', { name: 'Solve again with damage' }).waitFor();
-  // Across the patch is the arc length along the rail, in a comparison too.
+  // The coordinate across the patch is the arc length along the rail, in a comparison too.
   await page.waitForFunction(() => document.querySelectorAll('field-map.main .readout dt')[1]?.textContent === 's');
   const flat = await service.solved({ ...bent, contact: { ...bent.contact, reference_surface: 'plane' } });
   await page.goto(`${service.base}/#/compare/${id}/${flat.id}`);
@@ -391,7 +391,7 @@ test('a wheel on its running rail and on a guard rail stands where it touches, w
     await page.goto(`${service.base}/#/jobs/${job.id}`);
     await drawn(page);
     await page.locator('.drawing .patch .comb').waitFor();
-    // The patch is in the picture, on the line of the rail.
+    // The patch is visible, on the line of the rail.
     const dot = await page.locator('.drawing .patch .dot').evaluate((mark) => ['cx', 'cy'].map((name) => Number(mark.getAttribute(name))));
     const away = distanceTo(await pixels(page, '.drawing .rail'), dot);
     assert.ok(away < 4, `${away}`);

@@ -1,4 +1,4 @@
-// Every view of the page with something in it.
+// Addresses of every view of the page with data in it.
 import { readFileSync } from 'node:fs';
 import { example, withFields } from './harness.mjs';
 
@@ -14,7 +14,7 @@ export async function makeViews(service) {
   }));
   const batch = await service.ask('/v1/batches', { json: cases });
   await fetch(`${service.base}/v1/batches/${batch.id}/results?wait=30`).then((answer) => answer.text());
-  // With everything that a wheel does to a rail, and a run along a column.
+  // A job with all outputs on damage, and a run along a column.
   const damage = await service.solved({ ...example('maintenance'), contact: example('wheel-rail-flange').contact, load: { vertical_force_n: 75_000 }, motion: { wheelset: { speed_mm_per_s: 20_000, force_x_n: 0 } } });
   const worn = await service.solved({ ...withFields('wheel-rail'), load: { vertical_force_n: 60_000 }, contact: { ...example('wheel-rail').contact, rail: { ...example('wheel-rail').contact.rail, smoothing_mm: 6 } } });
   const rows = { km: Array.from({ length: 60 }, (_, i) => 10 + i / 10), section: Array.from({ length: 60 }, (_, i) => (i < 30 ? 'straight' : 'curve')), creepage_x: Array.from({ length: 60 }, (_, i) => 0.0005 + i * 2e-5) };

@@ -1,4 +1,4 @@
-// A wheelset that is shifted by hand, and its conicity against the windows of the standard.
+// Tests a wheelset that is shifted by hand, and its conicity compared with the windows of the standard.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -48,7 +48,7 @@ test('the slider of the shift moves both wheels, their patches and pressures', (
   await page.getByText(`4.5 mm, Δr ${kinematics.radius_difference_mm[place].toFixed(3)} mm`).waitFor();
   await until(async () => (await pressure.innerText()) !== before[0]);
   assert.notEqual(await wheel.getAttribute('d'), before[1]);
-  // The same wheel as a case of its own, at another target error, has the same pressure to the digits that are shown.
+  // The same wheel as a separate case, at another target error, has the same pressure to the displayed digits.
   const { right, kinematics: asked, combine, yaw_rad, ...contact } = wheelset.contact;
   const radius = (kinematics.left.rolling_radius_mm[place] + kinematics.right.rolling_radius_mm[place]) / 2;
   const alone = await service.solved({
@@ -57,7 +57,7 @@ test('the slider of the shift moves both wheels, their patches and pressures', (
   });
   const largest = Math.max(...alone.result.patches.map((/** @type {{ pressure_max_mpa: number }} */ patch) => patch.pressure_max_mpa));
   await until(async () => Math.abs(Number(await pressure.innerText()) - largest) < 2e-3 * largest);
-  // The place of contact that is drawn is that of the kinematics.
+  // The drawn contact point is that of the kinematics.
   const dot = await page.locator('.shifting .dot').first().evaluate((mark) => {
     const rail = /** @type {SVGGeometryElement} */ (mark.parentElement?.querySelector('.rail'));
     const [x, y] = ['cx', 'cy'].map((name) => Number(mark.getAttribute(name)));

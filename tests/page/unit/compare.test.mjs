@@ -1,4 +1,4 @@
-// Where a place of one patch is in another one on the same rail.
+// Tests the mapping of a place in one patch to another patch on the same rail.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { onSameRail } from '../../../src/http/page/web/js/placing.js';
@@ -29,7 +29,7 @@ test('on the curve of the rail a place keeps its distance along the rail', () =>
 });
 
 test('a place on a plane is found on the curve, and on the rail of the other side', () => {
-  // 3 mm along the plane that touches at 0.3 rad is beside the arc by 0.2 mm.
+  // A point 3 mm along the tangent plane at 0.3 rad is 0.2 mm away from the arc.
   const curve = onSameRail(side(0.3, 'plane'), side(0.3, 'curve'))?.({ x: 0, y: 3 });
   assert.ok(Math.abs((curve?.y ?? NaN) - RADIUS * Math.atan(3 / RADIUS)) < 0.05, `${curve?.y}`);
   const left = onSameRail(side(0.3, 'curve'), side(0.3, 'curve', { hand: 'left' }))?.({ x: 0, y: 3 });

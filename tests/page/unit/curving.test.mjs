@@ -1,4 +1,4 @@
-// The load of a wheel on a curve with cant.
+// Tests the load of a wheel on a curve with cant.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { CANT, curving, GRAVITY_MM_PER_S2, labelsWithCant, normalLoad, staticLoad, withLoadOfCurve } from '../../../src/http/page/web/js/curving.js';
@@ -14,9 +14,9 @@ const near = (/** @type {number} */ value, /** @type {number} */ wanted, toleran
 test('forces of a mass on a canted curve, resolved along the axes of the track', () => {
   for (const [radius, cant] of [[500_000, 100], [-500_000, 100], [-300_000, 160], [800_000, -40]]) {
     const curve = curving(on(radius, String(cant)));
-    // The force per weight that the mass exerts on the track, in horizontal axes: outward, which is −y on a curve to the left, and down.
+    // The force per weight that the mass exerts on the track, in horizontal axes: outward (−y on a curve to the left) and down.
     const [y, z] = [-(SPEED ** 2) / radius / GRAVITY_MM_PER_S2, -1];
-    // Axes of the track, rolled about x from y to z.
+    // The axes of the track are rolled about x from y to z.
     const [cos, sin] = [Math.cos(curve.roll), Math.sin(curve.roll)];
     near(curve.factor, -(-y * sin + z * cos));
     const toLeft = y * cos + z * sin;

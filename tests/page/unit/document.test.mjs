@@ -1,4 +1,4 @@
-// The case as a document: pointers, text, differences; and the addresses of the page.
+// Tests the case as a document (pointers, text, differences), and the addresses of the page.
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';

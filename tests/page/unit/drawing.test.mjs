@@ -1,4 +1,4 @@
-// What drawings compute, what files say, and the order of a case.
+// Tests computations for drawings, the parsing of files, and the order of members in a case.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { acrossSection, gapOf, unfolded } from '../../../src/http/page/web/js/placing.js';
@@ -9,7 +9,7 @@ import { parseGapCurve, parseGrid } from '../../../src/http/page/web/js/tables.j
 test('the gap is the vertical distance of the lower side of the wheel from the upper side of the rail', () => {
   /** @type {[number, number][]} */
   const rail = [[-5, -10], [-5, 0], [5, 0], [5, -10]];
-  // The wheel's flange hangs beside the rail; its tread rises to the left.
+  // The flange of the wheel hangs beside the rail, and its tread rises to the left.
   /** @type {[number, number][]} */
   const wheel = [[-8, 2], [-7, -6], [-6, 1], [6, 4]];
   const gap = gapOf(rail, wheel);
@@ -110,7 +110,7 @@ test('wear on the curve of the rail lies where the arc length leads, on planes a
   const position = { origin_track_mm: [0, y, z], track_mm: [0, y, z], contact_angle_rad: -at, rail_mm: [-30, 5], wheel_mm: [-35, 7], rolling_radius_mm: 465 };
   const patch = /** @type {import('../../../src/http/page/web/js/api.js').Patch} */ (/** @type {unknown} */ ({ position }));
   const standing = /** @type {import('../../../src/http/page/web/js/result.js').Standing} */ (/** @type {unknown} */ ({ placed: { rail }, cant: 0 }));
-  // To the left is toward the track centre: away from the field side on the right rail.
+  // On the right rail, left is toward the track centre and away from the field side.
   const bent = acrossSection(patch, 'rail', 'right', standing, true);
   for (const s of [-4, 0, 4]) assert.ok(Math.abs(bent(s) - (-30 - 13 * (Math.sin(at + s / 13) - Math.sin(at)))) < 0.01, `${s}: ${bent(s)}`);
   assert.ok(Math.abs(acrossSection(patch, 'wheel', 'right', standing, true)(4) - (bent(4) - 5)) < 1e-9);

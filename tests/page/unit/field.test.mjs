@@ -1,4 +1,4 @@
-// Fields: which cell is where, the border of the stick zone, interpolation.
+// Tests fields: the cell at a point, the border of the stick zone, interpolation.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { CellIndex, smoothLoop } from '../../../src/http/page/web/js/field/cells.js';
@@ -75,7 +75,7 @@ test('the border of the stick zone lies between cells of different zones', () =>
 });
 
 test('the border lies where the margin to friction is used up', () => {
-  // Along the middle strip the margin of the cells that stick is 2 and 1, so it is used up a third of a cell before the next middle.
+  // Along the middle strip the friction margin of the sticking cells is 2 and 0.75 MPa. Extrapolated, it vanishes at x = 0.6 mm.
   const zone = ['stick', 'stick', 'slip'];
   const row = (/** @type {number[]} */ values) => [...values, ...values, ...values];
   const index = square({
@@ -117,7 +117,7 @@ test('a smooth border goes through the corners it is given', () => {
 test('zones are smooth from strip to strip: half-way between two strips the border lies half-way', () => {
   const index = square({ zone: ['slip', 'stick', 'stick', 'slip', 'slip', 'stick', 'slip', 'stick', 'stick'] });
   const raster = rasterZones(index, NaN, FRAME);
-  // The first pixel that sticks in a row, in mm.
+  // Returns the x of the first sticking pixel in a row, in mm.
   const border = (/** @type {number} */ y) => {
     const row = Math.floor((1.5 - y) * 30);
     const column = Array.from({ length: 90 }, (_, at) => raster[row * 90 + at]).findIndex((distance) => distance < 0);

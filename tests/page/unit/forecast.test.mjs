@@ -1,4 +1,4 @@
-// Tables of a traffic, and what is drawn of sections that wear.
+// Tests tables of a traffic, and computations for drawings of worn sections.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { decisionOf, normalsInto } from '../../../src/http/page/web/js/forecastdata.js';
@@ -60,7 +60,7 @@ test('of two plans the one whose first limit comes later goes on longer, if othe
   /** @type {(...rows: import('../../../src/http/page/web/js/forecastdata.js').Life[][]) => ReturnType<typeof decisionOf>} */
   const decide = (...rows) => decisionOf(rows.map((lives, at) => ({ key: `${at}`, label: `limit ${at}`, limit: '1 mm', lives })));
   assert.deepEqual(decide([life(5, 3, 9), life(8, 4, null)]), { better: 1, sure: true, ends: [{ place: 5, label: 'limit 0' }, { place: 8, label: 'limit 0' }] });
-  // The first of several limits counts, and none within the extent is later than any.
+  // The first of several limits counts. A limit that is not reached within the extent is later than any other.
   assert.equal(decide([life(9), life(null)], [life(null), life(7)]).better, 0);
   assert.equal(decide([life(null), life(null)]).better, null);
   assert.equal(decide([life(5, 3, 9), life(8, 2, 12)]).sure, false);

@@ -1,4 +1,4 @@
-// Numbers, ticks and times as text.
+// Tests numbers, ticks and times as text.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { ago, degrees, fixed, number, seconds, tickLabel, ticks, withError } from '../../../src/http/page/web/js/format.js';

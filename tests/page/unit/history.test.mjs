@@ -1,4 +1,4 @@
-// Rolling that changes: its curve, and lists of numbers in the form.
+// Tests the curve of a rolling history, and lists of numbers in the form.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { curveOf } from '../../../src/http/page/web/js/curvedata.js';

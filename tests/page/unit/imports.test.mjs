@@ -1,4 +1,4 @@
-// No file of the page imports itself in a circle: what is loaded first never depends on what is loaded later.
+// Tests that the imports of the page have no cycles, so that no file depends on one that is loaded later.
 import assert from 'node:assert/strict';
 import { readdirSync, readFileSync } from 'node:fs';
 import { test } from 'node:test';

@@ -1,8 +1,8 @@
-// Line: rows from the lines of a table.
+// Tests the rows of the view Line, read from the lines of a table.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-// The key of the page is kept by the browser.
+// The page keeps its key in the storage of the browser.
 Object.assign(globalThis, { sessionStorage: { getItem: () => null, setItem() {} } });
 const { numericLabels, rowReader, splitLine, worstRows } = await import('../../../src/http/page/web/js/line.js');
 

@@ -1,8 +1,8 @@
-// The worst rows of a run, from its table as the service writes it.
+// Tests the worst rows of a run, read from its table as the service writes it.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-// The key of the page is kept by the browser.
+// The page keeps its key in the storage of the browser.
 Object.assign(globalThis, { sessionStorage: { getItem: () => null, setItem() {} } });
 const { worstOf } = await import('../../../src/http/page/web/js/run.js');
 

@@ -1,10 +1,10 @@
-// What arrives in pieces: events; and archives of arrays.
+// Tests events that arrive in pieces, and archives of arrays.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { deflateRawSync } from 'node:zlib';
 import { readNpz } from '../../../src/http/page/web/js/npz.js';
 
-// The key of the page is kept by the browser.
+// The page keeps its key in the storage of the browser.
 Object.assign(globalThis, { sessionStorage: { getItem: () => null, setItem() {} } });
 const { eventReader } = await import('../../../src/http/page/web/js/events.js');
 

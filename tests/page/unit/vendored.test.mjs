@@ -1,4 +1,4 @@
-// Vendored files are, byte for byte, those of the packages that the list names.
+// Tests that vendored files are identical to those of the listed packages.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { test } from 'node:test';

@@ -1,4 +1,4 @@
-// Cross-sections over each other: the worn area of known shapes, and a fit that finds a known shift.
+// Tests the comparison of cross-sections: the worn area of known shapes, and a fit that finds a known shift.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { bestFit, wearBetween } from '../../../src/http/page/web/js/wear.js';
@@ -9,7 +9,7 @@ const arc = Array.from({ length: 121 }, (_, i) => -30 + i / 2).map((y) => /** @t
 const head = /** @type {[number, number][]} */ ([[-30, -21.5], ...arc, [30, -21.5]]);
 
 test('a groove in the head is worn by its area and its depth, in whichever sense the line runs', () => {
-  // Half a cosine wave of 20 mm length and 1 mm depth has 10 mm².
+  // Half a cosine wave of 20 mm length and 1 mm depth has an area of 10 mm².
   const worn = head.map(([y, z]) => /** @type {[number, number]} */ ([y, Math.abs(y) < 10 ? z - 0.5 * (1 + Math.cos((Math.PI * y) / 10)) : z]));
   for (const [one, two] of [[head, worn], [[...head].reverse(), worn], [head, [...worn].reverse()]]) {
     const wear = wearBetween(one, two, 'rail', [0, 0]);
@@ -17,7 +17,7 @@ test('a groove in the head is worn by its area and its depth, in whichever sense
     assert.ok(wear.added < 0.05, `${wear.added}`);
     assert.ok(wear.most && Math.abs(wear.most.depth - 1) < 0.01 && Math.abs(wear.most.at[0]) < 0.3);
   }
-  // The other way round the groove is what the second has more.
+  // With the sections exchanged, the groove is added material.
   const grown = wearBetween(worn, head, 'rail', [0, 0]);
   assert.ok(grown.area < 0.05 && Math.abs(grown.added - 10) < 0.1);
   // The material of a wheel is above its line.
@@ -34,7 +34,7 @@ test('a fit finds the shift of a rail whose whole gauge side is worn', () => {
 });
 
 test('a fit finds the shift of a hollow wheel by the back of its flange, and of a wheel without a back by all of it', () => {
-  // Back, tip of a flange as half a circle, flank and a tread of 1:20.
+  // The back of a flange, its tip as half a circle, its flank, and a tread of 1:20.
   const tip = Array.from({ length: 31 }, (_, i) => (i / 30) * Math.PI).map((angle) => /** @type {[number, number]} */ ([-55 - 14 * Math.cos(angle), -14 - 14 * Math.sin(angle)]));
   const wheel = /** @type {[number, number][]} */ ([[-69, 10], [-69, -2], ...tip, [-38, -2], ...Array.from({ length: 90 }, (_, i) => /** @type {[number, number]} */ ([-36 + i, i / 20]))]);
   const hollow = wheel.map(([y, z]) => /** @type {[number, number]} */ ([y + 0.6, (y > -36 ? z + 1 : z) + 0.4]));
@@ -47,7 +47,7 @@ test('a fit finds the shift of a hollow wheel by the back of its flange, and of 
 
 test('the angle of a flange is that of its flank, and Nadal\'s limit follows from it', () => {
   const radians = (70 * Math.PI) / 180;
-  // Tread, flank of 70° and 20 mm height, back: on the right wheel the field side is at negative y.
+  // Tread, flank of 70° and 20 mm height, and back. On the right wheel the field side is at negative y.
   const flank = Array.from({ length: 21 }, (_, i) => /** @type {[number, number]} */ ([-720 - (i - 20) / Math.tan(radians), -20 + i]));
   const wheel = /** @type {[number, number][]} */ ([[-700, 10], [-700, -20], ...flank, ...Array.from({ length: 60 }, (_, i) => /** @type {[number, number]} */ ([-721 - i, i / 40]))]);
   wheel.sort(() => 0);

@@ -1,4 +1,4 @@
-// The curves of a wheelset.
+// Tests the curves of a wheelset.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { readFileSync } from 'node:fs';
@@ -63,7 +63,7 @@ test('a place on a turned rail is found by its y on the cross-section', () => {
   const cant = 0.05;
   for (const side of /** @type {const} */ (['left', 'right'])) {
     const sign = side === 'left' ? 1 : -1;
-    // Turned with its top toward the track centre, and laid 750 mm from it.
+    // The points are turned with their top toward the track centre, and lie 750 mm from it.
     const laid = own.map(([f, u]) => /** @type {[number, number]} */ ([sign * (750 + f * Math.cos(cant) - u * Math.sin(cant)), f * Math.sin(cant) + u * Math.cos(cant)]));
     const on = placeOn(laid, laid[3], 0, side, cant);
     for (const [at, [f]] of own.entries()) if (Math.abs(f) <= 20) assert.ok(Math.hypot(on(f)[0] - laid[at][0], on(f)[1] - laid[at][1]) < 1e-9, `${side} ${f}`);
