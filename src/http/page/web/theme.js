@@ -1,4 +1,4 @@
-// Runs before the first paint: the reader's own choice of light or dark, else what the system says, also when that changes.
+// Sets the light or dark theme before the first paint: the stored choice of the reader, or the setting of the system, whose changes are followed.
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
 function applyTheme() {
@@ -6,7 +6,7 @@ function applyTheme() {
   try {
     theme = localStorage.getItem('railhead.theme');
   } catch {
-    // Storage is switched off; the system's choice holds.
+    // Storage is disabled; the setting of the system applies.
   }
   const chosen = theme === 'light' || theme === 'dark';
   document.documentElement.dataset.theme = chosen ? theme : dark.matches ? 'dark' : 'light';
@@ -14,7 +14,7 @@ function applyTheme() {
 
 applyTheme();
 dark.addEventListener('change', applyTheme);
-// Paper is light.
+// Pages are printed in the light theme.
 addEventListener('beforeprint', () => {
   document.documentElement.dataset.theme = 'light';
 });

@@ -1,5 +1,5 @@
-// The public API and nothing else: requests, refusals, and one function for each call that the page makes.
-// The types are those of the contract, `/openapi.json`.
+// Client of the public API: requests, errors, and one function for each call of the page.
+// The types come from the contract, `/openapi.json`.
 
 /** @typedef {import('contract').components['schemas']} Schemas */
 /** @typedef {Schemas['Job']} Job */
@@ -21,13 +21,13 @@ let key = sessionStorage.getItem(KEY) ?? '';
 
 export const apiKey = () => key;
 
-/** @param {string} secret Kept until the tab is closed; empty for none. */
+/** @param {string} secret The API key, stored until the tab is closed. An empty string removes it. */
 export function useKey(secret) {
   key = secret.trim();
   sessionStorage.setItem(KEY, key);
 }
 
-/** The service refused a request, or did not answer: then `status` is 0. */
+/** Thrown when the service rejects a request or does not respond. In the latter case `status` is 0. */
 export class Refused extends Error {
   /** @param {Problem} problem */
   constructor(problem) {
@@ -56,7 +56,7 @@ const problem = (title, status, detail) => ({ type: 'about:blank', title, status
 /**
  * @param {string} path
  * @param {Asked} [asked]
- * @returns {Promise<Response>} An answer that is no refusal.
+ * @returns {Promise<Response>} A response with a status of success.
  * @throws {Refused}
  */
 export async function request(path, asked = {}) {
@@ -100,7 +100,7 @@ export const health = () => json('/readyz');
 export const checkCase = (text, signal) => json('/v1/cases/check', { method: 'POST', body: text, signal });
 
 /**
- * Submits a case. Within `wait` seconds the answer holds the result.
+ * Submits a case. The returned job contains its result if it ends within `wait` seconds.
  * @param {string} text
  * @param {{ wait?: number, signal?: AbortSignal }} [how]
  * @returns {Promise<Job>}
@@ -139,7 +139,7 @@ export const evolutionResult = (id) => json(`/v1/evolutions/${id}/result`);
 export const submitEvolution = (asked, name) => json(`/v1/evolutions?${search({ name })}`, { method: 'POST', body: JSON.stringify(asked) });
 
 /** @typedef {{ state?: readonly string[], batch?: string, label?: string, name?: string, fields?: string, cursor?: string, limit?: number }} Filter */
-/** @typedef {Omit<Schemas['JobPage'], 'jobs'> & { jobs: Job[] }} JobPage With all members of the jobs that are asked for. */
+/** @typedef {Omit<Schemas['JobPage'], 'jobs'> & { jobs: Job[] }} JobPage A page whose jobs have all requested members. */
 
 /**
  * @param {Filter} filter
@@ -184,12 +184,12 @@ export const cancel = (kind, id) => request(`/v1/${kind}/${id}/cancel`, { method
 /**
  * @param {'jobs' | 'batches' | 'evolutions'} kind
  * @param {string} id
- * @param {boolean} [keepalive] The request goes on when the page is left; a browser allows few of them at once.
+ * @param {boolean} [keepalive] The request continues after the page is left. Browsers limit the number of such requests.
  */
 export const remove = (kind, id, keepalive = false) => request(`/v1/${kind}/${id}`, { method: 'DELETE', keepalive });
 
 /**
- * Saves what a path answers as a file.
+ * Saves the response of a path as a file.
  * @param {string} path
  * @param {string} name
  */

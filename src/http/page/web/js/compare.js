@@ -1,4 +1,4 @@
-// Up to four jobs side by side: what is loaded of them, and what is chosen.
+// State of the comparison of up to four jobs: their data and the selection.
 
 import { caseOf, checkCase, job as jobOf, result as resultOf } from './api.js';
 import { at, numberAt } from './document.js';
@@ -27,13 +27,13 @@ import { firstPatch, oneWheel, outward, sideOf } from './wheelloads.js';
 
 /**
  * @typedef {object} Comparison
- * @property {string} key The ids.
+ * @property {string} key The ids of the jobs, joined.
  * @property {Side[]} sides
  * @property {string} quantity
- * @property {number} other Which side the first is compared with.
- * @property {Body} body Which cross-sections are laid over each other.
- * @property {boolean} fitted They are aligned by a best fit of what is not worn, not as they lie in the track and on the axle.
- * @property {boolean} sameRail Fields are subtracted at the same place on the rail, not of the patch.
+ * @property {number} other Index of the side that the first is compared with.
+ * @property {Body} body Body whose cross-sections are overlaid.
+ * @property {boolean} fitted Whether they are aligned by a best fit of their unworn parts, instead of by their position in the track or on the axle.
+ * @property {boolean} sameRail Whether fields are subtracted at the same place on the rail, instead of the same place in the patch.
  */
 
 /** @type {Comparison | null} */
@@ -79,21 +79,21 @@ async function loadSide(id, patch, point) {
   return { id, job, result, document, patch: which, point: chosen, field, sections };
 }
 
-/** The cross-sections of a case, as the service reads and places them. @param {JsonObject} document @returns {Promise<Sections | null>} */
+/** Requests the cross-sections of a case, as the service reads and places them. @param {JsonObject} document @returns {Promise<Sections | null>} */
 async function sectionsOf(document) {
   if (!hasSections(at(document, '/contact/type'))) return null;
   const { understood } = await checkCase(JSON.stringify(oneWheel(document, 'right', 0)), new AbortController().signal);
   return placed(understood?.placement);
 }
 
-/** Is a cross-section of two cases the same? @param {Side} one @param {Side} two @param {Body} body */
+/** Returns whether two cases have the same cross-section of a body. @param {Side} one @param {Side} two @param {Body} body */
 export const equal = (one, two, body) =>
   JSON.stringify(at(one.document, `/contact/${body}`)) === JSON.stringify(at(two.document, `/contact/${body}`));
 
 /** @type {{ key: string, wear: ReturnType<typeof wearBetween> } | null} */
 let wearBefore = null;
 
-/** Returns the area that the second cross-section lacks against the first; null if one of them has no cross-section. @param {Comparison} of */
+/** Returns the material that the second cross-section lacks compared with the first; null if one of them has no cross-section. @param {Comparison} of */
 export function wearOf({ sides, other, body, fitted }) {
   const [one, two] = [sides[0], sides[other]];
   if (!one?.sections || !two?.sections) return null;
@@ -107,7 +107,7 @@ export function wearOf({ sides, other, body, fitted }) {
 }
 
 /**
- * A cross-section with y to the field side from the track centre: a rail as it lies by its gauge, a wheel on its centred axle, with its running circle at z 0.
+ * Returns a cross-section with y measured from the track centre to the field side. A rail is placed by its gauge; a wheel is on its centred axle, with its running circle at z = 0.
  * @param {Side} side
  * @param {Sections} sections
  * @param {Body} body
@@ -121,10 +121,10 @@ export function shapeOf({ document }, sections, body) {
   return line.map(([y, z]) => [y, z - level]);
 }
 
-/** From the track centre to the circle at which wheels are measured, with the usual flange-back distance of 1360 mm. */
+/** Distance from the track centre to the running circle, for the usual flange-back distance of 1360 mm. */
 const RUNNING_CIRCLE_MM = 750;
 
-/** The height of a line at a place; that of its nearest point beyond its ends. @param {readonly Place[]} line @param {number} y */
+/** Returns the height of a line at y; beyond its ends, the height of the nearest point. @param {readonly Place[]} line @param {number} y */
 function heightAt(line, y) {
   for (let i = 1; i < line.length; i += 1) {
     const [[ya, za], [yb, zb]] = [line[i - 1], line[i]];
@@ -136,13 +136,13 @@ function heightAt(line, y) {
 /** @param {Pick<Side, 'id' | 'result' | 'patch' | 'point'>} side */
 const fieldOf = async ({ id, result, patch, point }) => (hasFields(result) ? loadField(id, result, patch, point) : null);
 
-/** A quantity that all sides have. @param {Comparison} of */
+/** Selects a quantity that all sides have, unless the current one is. @param {Comparison} of */
 function settle(of) {
   const all = common(of);
   if (!all.some(({ key }) => key === of.quantity)) of.quantity = (all.find(({ key }) => key === 'traction') ?? all[0])?.key ?? '';
 }
 
-/** The quantities that all sides have. @param {Comparison} of @returns {Quantity[]} */
+/** Returns the quantities that all sides have. @param {Comparison} of @returns {Quantity[]} */
 export function common({ sides }) {
   const fields = sides.map((side) => side.field);
   const [first] = fields;
@@ -182,16 +182,16 @@ function rememberComparison(app, { sides, quantity, other }) {
 /** @param {Side} side */
 export const frictionOf = ({ document }) => numberAt(document, '/friction/coefficient');
 
-/** One range of colours for all sides. @param {Comparison} of @param {Quantity} quantity */
+/** Returns a common range of colours for all sides. @param {Comparison} of @param {Quantity} quantity */
 export const rangeOfAll = ({ sides }, quantity) => rangeOf(quantity, sides.flatMap(({ field }) => (field ? [field.cells] : [])), NaN);
 
 /**
- * The difference of two fields at the cells of the first, where both have a value.
+ * Returns the difference of two fields at the cells of the first.
  * @param {Field} one
  * @param {Field} two
  * @param {Quantity} quantity
- * @param {((place: { x: number, y: number }) => { x: number, y: number }) | null} move From places of the first to those of the second; null for the same.
- * @returns {Quantity} One that is shown on the first field.
+ * @param {((place: { x: number, y: number }) => { x: number, y: number }) | null} move Maps places of the first field to places of the second; null for the identity.
+ * @returns {Quantity} The difference as a quantity of the first field.
  */
 function differenceOf(one, two, quantity, move) {
   const values = valuesOf(quantity, one.cells) ?? [];
@@ -201,7 +201,7 @@ function differenceOf(one, two, quantity, move) {
   const differences = Float64Array.from(x_mm, (x, cell) => {
     const place = move ? move({ x, y: y_mm[cell] }) : { x, y: y_mm[cell] };
     const other = index.nearest(place.x, place.y);
-    // Beyond its border the other patch has neither pressure nor traction.
+    // Outside the other patch, pressure and traction are 0.
     return other < 0 ? (quantity.vanishes ? -values[cell] : NaN) : others[other] - values[cell];
   });
   return {
@@ -213,7 +213,7 @@ function differenceOf(one, two, quantity, move) {
 /** @type {{ one: Field, two: Field, key: string, quantity: Quantity, field: Field } | null} */
 let differenceBefore = null;
 
-/** The difference of two sides, made once for each pair. @param {Side} first @param {Side} second @param {string} name @param {boolean} sameRail */
+/** Returns the difference of two sides; the last one is cached. @param {Side} first @param {Side} second @param {string} name @param {boolean} sameRail */
 export function knownDifference(first, second, name, sameRail) {
   const [one, two] = [first.field, second.field];
   const quantity = quantityOf(name);
@@ -221,7 +221,7 @@ export function knownDifference(first, second, name, sameRail) {
   const move = sameRail ? onSameRail(first, second) : null;
   const key = `${name} ${move !== null}`;
   if (differenceBefore?.one !== one || differenceBefore.two !== two || differenceBefore.key !== key) {
-    // A field of its own: values are kept by the cells that they belong to.
+    // A new object of cells is needed because values are cached by cells.
     const field = { cells: { ...one.cells, zone: undefined }, border: one.border };
     differenceBefore = { one, two, key, quantity: differenceOf(one, two, quantity, move), field };
   }

@@ -1,4 +1,4 @@
-// Compare: maps at one scale with one crosshair, the difference of two, their numbers against the errors, and what differs in the cases.
+// The view Compare: maps with a common scale and crosshair, the difference of two jobs, their numbers with errors, and the differences of their cases.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { chooseCompared, chooseSide, common, compared, equal, frictionOf, knownDifference, rangeOfAll, shapeOf, wearOf } from './compare.js';
@@ -21,13 +21,13 @@ import { inWords } from './remarks.js';
 
 const LETTERS = 'ABCD';
 const DIFFERENCES_MAX = 30;
-/** @type {readonly [unknown, keyof Point, string, number][]} Numbers of the chosen patch and motion, with their units. */
+/** @type {readonly [unknown, keyof Point, string, number][]} Results of the chosen patch and motion: label, member, unit, and divisor to that unit. */
 const NUMBERS = [
   [html`F<sub>x</sub>`, 'force_x_n', 'kN', 1000], [html`F<sub>y</sub>`, 'force_y_n', 'kN', 1000], [html`M<sub>z</sub>`, 'moment_z_n_mm', 'N·m', 1000],
   ['stick area', 'stick_area_mm2', 'mm²', 1], ['largest traction', 'traction_max_mpa', 'MPa', 1], ['friction power', 'friction_power_n', 'J/m', 1],
 ];
 
-/** Numbers of the wheel, over all its patches, with their errors. @type {readonly [string, string, (side: Side) => number | undefined, ((side: Side) => number | undefined)?][]} */
+/** Results of the wheel over all its patches: label, unit, value, and error. @type {readonly [string, string, (side: Side) => number | undefined, ((side: Side) => number | undefined)?][]} */
 const OF_WHEEL = [
   ['patches', '', ({ result }) => result.patches.length],
   ['Q', 'kN', (side) => loadOf(side, ({ q_n }) => q_n / 1000)],
@@ -50,13 +50,13 @@ const openPressure = ({ points }, point) => points[Math.min(point, points.length
 /** @param {readonly number[]} values */
 const total = (values) => values.reduce((sum, value) => sum + value, 0);
 
-/** A number of the load of the only wheel. @param {Side} side @param {(of: import('./wheelloads.js').WheelLoad) => number} pick */
+/** Returns a component of the load if the case has a single wheel. @param {Side} side @param {(of: import('./wheelloads.js').WheelLoad) => number} pick */
 function loadOf({ result, document, point }, pick) {
   const [load] = result.wheelset ? [] : wheelLoads(result, document, point);
   return load && pick(load);
 }
 
-/** The largest of a number of damage over the patches. @param {Side} side @param {(of: import('./api.js').Schemas['DamageAnswer']) => number | undefined} pick */
+/** Returns the largest value of a damage quantity over the patches. @param {Side} side @param {(of: import('./api.js').Schemas['DamageAnswer']) => number | undefined} pick */
 function damageOf({ result, point }, pick) {
   const values = result.patches.flatMap(({ points }) => {
     const { damage } = points[Math.min(point, points.length - 1)];
@@ -86,7 +86,7 @@ export function compareView(app) {
   </div>`;
 }
 
-/** The crosshair of one map moves that of the others. @param {CrosshairEvent} event */
+/** Moves the crosshairs of all other maps with that of one map. @param {CrosshairEvent} event */
 function together(event) {
   const { currentTarget, target, detail } = event;
   for (const map of /** @type {HTMLElement} */ (currentTarget).querySelectorAll('field-map')) {
@@ -145,7 +145,7 @@ function errorOf({ error_estimate: errors }, name) {
   return typeof value === 'number' ? value : 0;
 }
 
-/** How far apart two values are, in errors. @param {number} difference @param {number} error */
+/** Describes the difference of two values relative to its error. @param {number} difference @param {number} error */
 export function apart(difference, error) {
   if (!error) return '';
   const times = Math.abs(difference) / error;
@@ -175,7 +175,7 @@ function numbersPanel({ sides, other }) {
         points.map((point) => errorOf(point, name) / factor)))}</tbody></table></div></section>`;
 }
 
-/** The cross-sections over each other, and what one lacks against the other. @param {App} app @param {Comparison} of */
+/** Draws the cross-sections over each other and the material that one lacks compared with the other. @param {App} app @param {Comparison} of */
 function profilesPanel(app, of) {
   const wear = wearOf(of);
   const [one, two] = [of.sides[0], of.sides[of.other]];

@@ -1,4 +1,4 @@
-// The first view: how to begin, the form of a case, its drawing, what the service says of it, and the same case as JSON.
+// The first view: introduction, form of a case, its drawing, the report of the service, and the case as JSON.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { apiKey } from './api.js';
@@ -50,7 +50,7 @@ export function compose(app) {
     </div>`;
 }
 
-/** Introduction, and the two ways to begin: own files, or an example. @param {App} app @param {Compose} state */
+/** Introduction with the two ways to start: files of profiles or an example. @param {App} app @param {Compose} state */
 function intro(app, state) {
   const chosen = (/** @type {Event} */ event) => {
     const input = /** @type {HTMLInputElement} */ (event.target);
@@ -81,7 +81,7 @@ function examplePicker(app) {
 /** @type {{ of: unknown, drawn: ReturnType<typeof placed> } | null} */
 let placedBefore = null;
 
-/** Summary of the case: its interpretation by the service, or its numbers. @param {Compose} state @param {JsonObject} document */
+/** Draws the case: its interpretation by the service, or its own numbers. @param {Compose} state @param {JsonObject} document */
 export function drawing({ understood, lone }, document) {
   const type = at(document, '/contact/type');
   if (lone && hasSections(type)) return drawSection(lone.body, lone.line);
@@ -108,7 +108,7 @@ export function drawing({ understood, lone }, document) {
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
-/** Whether a case can be solved. @param {App} app @param {Compose} state @param {boolean} [timed] Says how long that takes. */
+/** Reports whether a case can be solved, with its faults and remarks. @param {App} app @param {Compose} state @param {boolean} [timed] Whether the estimated time is shown. */
 export function verdict(app, state, timed = true) {
   const { unreadable, faults, refusal, checked, document } = state;
   if (unreadable) return html`<p class="fault big">${unreadable}</p>`;
@@ -130,7 +130,7 @@ export function verdict(app, state, timed = true) {
     ${adviceOf(app)}${remarkList(checked.remarks)}`;
 }
 
-/** The smoothing that the noise of the files asks for, on one click. @param {App} app */
+/** Button that applies the smoothing which the service suggests for noisy files. @param {App} app */
 function adviceOf(app) {
   const { document, checked } = app.store.get().compose;
   const advised = BODIES.flatMap((body) => {
@@ -142,10 +142,10 @@ function adviceOf(app) {
   return html`<button class="small" @click=${smooth}>The points are noisy: smooth ${advised.map(({ body, length }) => `the ${body} by ${number(length, 2)} mm`).join(' and ')}, as advised</button>`;
 }
 
-/** Lines shown before and after the line at fault. */
+/** Number of lines shown before and after the faulty line. */
 const AROUND = 2;
 
-/** The line of a file that a fault names, between its neighbours. @param {Compose} state @param {import('./api.js').Fault} fault */
+/** Shows the line of a file that a fault names, with its neighbours. @param {Compose} state @param {import('./api.js').Fault} fault */
 function excerpt({ document, files }, { pointer, detail }) {
   const body = BODIES.find((known) => pointer === `/contact/${known}/text`);
   const number = Number(/\bline (\d+)/.exec(detail)?.[1]);
@@ -157,9 +157,9 @@ function excerpt({ document, files }, { pointer, detail }) {
     <ol start=${from + 1}>${lines.slice(from, number + AROUND).map((line, place) => html`<li class=${from + place === number - 1 ? 'at-fault' : ''}><code>${line || ' '}</code></li>`)}</ol></figure>`;
 }
 
-/** The result while typing: the numbers of the wheel, and the field of the patch that carries most. @param {App} app @param {Compose} state */
+/** Result while typing: loads of the wheel and the field of the patch with the largest load. @param {App} app @param {Compose} state */
 function previewOf(app, { preview, document, checked, understood }) {
-  // With faults the result is that of another case.
+  // A case with faults has no result; the last one belongs to an earlier case.
   if (!checked) return nothing;
   if (preview?.failure) return html`<section class="preview" aria-label="Result while typing"><p class="fault">Solving it fails: ${preview.failure}</p>
     ${preview.failure.includes('accept_rough_profiles') ? html`<button class="small" @click=${() => change(app, '/contact/accept_rough_profiles', true)}>Solve it anyway</button>` : nothing}</section>`;
@@ -231,7 +231,7 @@ function codePanel(app, state) {
   </details>`;
 }
 
-/** To the field of a fault, or to its place in the JSON. @param {App} app @param {string} pointer */
+/** Moves the focus to the field of a fault, or to its place in the JSON. @param {App} app @param {string} pointer */
 function lead(app, pointer) {
   const input = document.getElementById(fieldId(pointer));
   if (input) {

@@ -1,4 +1,4 @@
-// Fields of the kinds of contact, and the files that are dropped on them.
+// Form fields of the kinds of contact, and import of dropped files.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { at, isObject, numberAt, put } from './document.js';
@@ -64,7 +64,7 @@ function profileFields(app) {
 const SURFACES = /** @type {const} */ ([[undefined, 'curve of the rail'], ['plane', 'planes']]);
 const INFLUENCES = /** @type {const} */ ([[undefined, 'corrected for the bend'], ['half_space', 'as on a half-space']]);
 
-/** The surface on which the contact is solved. @param {App} app */
+/** Fields of the surface on which the contact is solved. @param {App} app */
 function surfaceFields(app) {
   const { document } = app.store.get().compose;
   const bent = isBent(document);
@@ -78,7 +78,7 @@ function surfaceFields(app) {
       : 'A plane of contact for each patch, for comparison. At a gauge corner the contact bends, and planes are off.'}</p></details>`;
 }
 
-/** Dimensions of the track and of the wheelset. @param {App} app */
+/** Fields of the dimensions of track and wheelset. @param {App} app */
 function trackFields(app) {
   const { document, checked } = app.store.get().compose;
   const found = checked?.remarks.find(({ code }) => code === 'flange-back-found');
@@ -96,7 +96,7 @@ function trackFields(app) {
       })}</div>`;
 }
 
-/** Places the rail by the origin of its cross-section, as a rail without a gauge face needs it, or by the gauge. @param {App} app @param {boolean} byOrigin */
+/** Places the rail by the origin of its cross-section, which a rail without a gauge face needs, or by the gauge. @param {App} app @param {boolean} byOrigin */
 function placeRail(app, byOrigin) {
   const { document } = app.store.get().compose;
   const contact = /** @type {JsonObject} */ (at(document ?? undefined, '/contact') ?? {});
@@ -139,10 +139,10 @@ function sectionZones(app) {
 
 const UNITS = /** @type {const} */ ([[undefined, 'as in the file, else mm'], ['mm', 'mm'], ['cm', 'cm'], ['m', 'm'], ['inch', 'inch']]);
 
-/** Bodies whose reading is unfolded. @type {Set<Body>} */
+/** Bodies whose import settings are unfolded. @type {Set<Body>} */
 const unfolded = new Set();
 
-/** How the file of a body is read: its unit, its senses with what was found, smoothing with what is advised. @param {App} app @param {Body} body */
+/** Import settings of the file of a body: unit, smoothing, and directions of the axes, with the detected and suggested values. @param {App} app @param {Body} body */
 function readingFields(app, body) {
   const { document, checked, faults } = app.store.get().compose;
   const pointer = `/contact/${body}`;
@@ -187,7 +187,7 @@ function sectionZone(app, body) {
 
 const STANDARD_NAMES = { rail: '60E1 rail', wheel: 'S1002 wheel' };
 
-/** The cross-section of an example of the service in place of one that is missing. @param {App} app @param {Body} body */
+/** Fills in a missing cross-section with the standard one of the examples. @param {App} app @param {Body} body */
 function useStandard(app, body) {
   const { document, examples } = app.store.get().compose;
   const section = standardSection(examples, body);
@@ -202,13 +202,13 @@ function pointsOf(app, pointer) {
 }
 
 /**
- * A place for a file: dropped on it, or chosen.
+ * An area on which a file can be dropped, or chosen by a click.
  * @param {string} title
  * @param {string} what Description of the present value.
  * @param {string} pointer
  * @param {App} app
  * @param {(file: File) => void} take
- * @param {string} [wanted] Description of the required value; without a value yet, this is not a fault.
+ * @param {string} [wanted] Description of a value that is still missing. It suppresses the fault of the value.
  */
 function dropZone(title, what, pointer, app, take, wanted) {
   const fault = wanted ? undefined : faultAt(app, pointer);
@@ -219,7 +219,7 @@ function dropZone(title, what, pointer, app, take, wanted) {
   const drop = (/** @type {DragEvent} */ event) => {
     over(event, false);
     const files = event.dataTransfer?.files;
-    // Several files belong to several places.
+    // Several files belong to several values; the listener of the page assigns them.
     if (!files || files.length !== 1) return;
     event.stopPropagation();
     take(files[0]);
@@ -254,17 +254,17 @@ async function takeGrid(app, file, member) {
   editDocument(app, put(document, '/contact', { type, x_mm: grid.x_mm, y_mm: grid.y_mm, [member]: grid.values }));
 }
 
-/** Returns the name of a case made of files. @param {import('./state.js').Compose['files']} files */
+/** Returns the name of a case from the names of its files. @param {import('./state.js').Compose['files']} files */
 function nameOf({ wheel, rail }) {
   const names = [wheel, rail].map((file) => file?.name.replace(/\.[^.]*$/, ''));
   return names.filter(Boolean).join(' on ');
 }
 
 /**
- * Takes files of cross-sections.
+ * Imports files of cross-sections into the case.
  * @param {App} app
  * @param {readonly File[]} files
- * @param {Body} [onto] The body whose place they were dropped on.
+ * @param {Body} [onto] The body on whose area they were dropped.
  */
 export async function takeProfiles(app, files, onto) {
   const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: decoded(await file.arrayBuffer()) }))).catch(() => null);
@@ -282,7 +282,7 @@ export async function takeProfiles(app, files, onto) {
     const file = bodies[body];
     if (!file) continue;
     document = put(document, `/contact/${body}`, { format: profileKind(file).format, text: file.text });
-    // The other side of a wheelset has the same body, unless it is changed in the JSON.
+    // The right side of a wheelset uses the same file, unless it is changed in the JSON.
     if (at(document, `/contact/right/${body}`)) document = put(document, `/contact/right/${body}`, undefined);
     known[body] = file;
     if (onto && body !== onto && files.length === 1) app.say(`${file.name} is a ${body}, by its contents or its name.`);
@@ -294,7 +294,7 @@ export async function takeProfiles(app, files, onto) {
   editDocument(app, document);
 }
 
-/** Takes rail and wheel for each other. @param {App} app */
+/** Exchanges the cross-sections of rail and wheel. @param {App} app */
 function exchange(app) {
   const { document, files } = app.store.get().compose;
   const [rail, wheel] = BODIES.map((body) => at(document ?? {}, `/contact/${body}`));

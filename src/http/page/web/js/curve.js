@@ -1,5 +1,5 @@
-// <creep-curve>: lines with the errors that the solver estimates: forces or the moment against the motion that varies, Δr of a wheelset against its
-// shift. A click chooses.
+// Custom element <creep-curve>: a chart of lines with estimated errors, such as forces over creepage or Δr of a wheelset over its shift. A click selects a
+// point.
 
 import uPlot from '../vendor/uPlot.esm.js';
 import { number, tickLabel } from './format.js';
@@ -9,9 +9,9 @@ import { adoptShown } from './adopt.js';
 /** @typedef {import('./curvedata.js').Line} Line */
 /** @typedef {{ curve: Curve, chosen: number, pick: (motion: number) => void }} Shown */
 
-/** Half the width of the end of an error bar, in pixels. */
+/** Half the width of the cap of an error bar, in pixels. */
 const CAP = 4;
-/** Values of a line that have marks and error bars; more of them would touch each other, and are a line. Chosen by judgement. */
+/** Largest number of values that are drawn with marks and error bars; those of longer lines would overlap. Chosen by judgement. */
 const MARKED_MAX = 60;
 
 export class CreepCurve extends HTMLElement {
@@ -79,7 +79,7 @@ export class CreepCurve extends HTMLElement {
       cursor: { points: { size: 9 }, drag: { x: false, y: false } },
       hooks: { draw: [(plot) => this.#annotate(plot, token, font)] },
     };
-    // Values that are missing are gaps of the line; NaN would spoil the scale.
+    // Missing values become gaps of the line; NaN would break the scale.
     this.#plot = new uPlot(options, [curve.x, ...curve.lines.map((line) => line.y.map((value) => (Number.isFinite(value) ? value : null)))], this);
     this.#plot.over.addEventListener('click', () => {
       const at = this.#plot?.cursor.idx;
@@ -88,7 +88,7 @@ export class CreepCurve extends HTMLElement {
   }
 
   /**
-   * Error bars, friction's bound and the chosen motion.
+   * Draws the error bars, the bound of friction, and the chosen motion.
    * @param {uPlot} plot
    * @param {(name: string) => string} token
    * @param {string} font

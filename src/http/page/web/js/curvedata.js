@@ -1,5 +1,5 @@
-// The values of a creep curve: forces or the moment of a patch against the component of motion that varies most, or, of rolling that
-// changes, against the distance rolled.
+// Data of a creep curve: forces or moment of a patch over the component of motion that varies most, or over the distance rolled
+// of a transient.
 
 /** @typedef {import('./api.js').Patch} Patch */
 
@@ -10,9 +10,9 @@
  * @property {string} xLabel
  * @property {string} yLabel
  * @property {number[]} x Increasing.
- * @property {number[]} order The motion of each place.
+ * @property {number[]} order Index of the motion of each value.
  * @property {Line[]} lines
- * @property {number} bound Friction's bound μN; NaN for none.
+ * @property {number} bound The bound of friction μN in kN; NaN for none.
  */
 
 const MOTIONS = /** @type {const} */ ([
@@ -23,7 +23,7 @@ const MOTIONS = /** @type {const} */ ([
 
 /** @typedef {'forces' | 'moment' | 'creepages'} CurveKind */
 
-/** Do the motions of a patch follow each other? @param {Patch} patch */
+/** Returns whether the motions of a patch are consecutive states of transient rolling. @param {Patch} patch */
 export const isHistory = ({ points }) => points.every(({ history }) => history);
 
 /**
@@ -42,7 +42,7 @@ function places(patch) {
 }
 
 /**
- * Creepages, given or found, over the distance rolled.
+ * Returns the creepages, prescribed or computed, over the distance rolled.
  * @param {Patch} patch
  * @returns {Curve}
  */
@@ -61,9 +61,9 @@ function creepageCurve(patch) {
 }
 
 /**
- * The curve of a patch.
+ * Returns the curve of a patch.
  * @param {Patch} patch
- * @param {CurveKind} kind Creepages for rolling that changes only.
+ * @param {CurveKind} kind `creepages` applies to transient rolling only.
  * @param {number} friction
  * @returns {Curve | null} Null for fewer than three motions.
  */

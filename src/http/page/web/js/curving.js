@@ -7,27 +7,27 @@ import { parse } from './written.js';
 
 export const GRAVITY_MM_PER_S2 = 9806.65;
 const GAUGE_MM = 1435;
-/** The rails' running circles are this much farther apart than the gauge: 1500 mm for 1435 mm (2b_A of EN 14363). */
+/** Distance of the running circles less the gauge: 1500 mm for a gauge of 1435 mm (2b_A of EN 14363). */
 const HEAD_MM = 65;
 const LOAD = '/load/vertical_force_n';
-/** Digits of a static load. The stored load has three more, so that the static one comes back exactly. */
+/** Significant digits of a static load. The stored load has three more, so that the static load is recovered exactly. */
 const DIGITS = 9;
-/** The label that keeps the cant in mm: a case has no member for it, because the track and the wheelset roll together. */
+/** Label that stores the cant in mm. A case has no member for it because track and wheelset roll together. */
 export const CANT = 'track_cant_mm';
 
 /**
  * @typedef {object} Curving
  * @property {number} base Distance of the rails' running circles in mm.
- * @property {number} cant Height of the outer rail over the inner one in mm, on straight track of the right one over the left one; 0 where none is given.
- * @property {boolean} wrong The cant that was written is not a number of mm below `base`.
- * @property {boolean} left Is the right rail the outer one? Also on straight track.
- * @property {number} roll Of the track in rad, positive from y to z.
- * @property {number} factor The load normal to the track, divided by the static load.
+ * @property {number} cant Height of the outer rail above the inner rail in mm; on straight track, of the right rail above the left one. 0 if not given.
+ * @property {boolean} wrong Whether the entered cant is not a number of mm below `base`.
+ * @property {boolean} left Whether the curve is to the left, with the right rail outside. Also true on straight track.
+ * @property {number} roll Roll angle of the track in rad, positive from y to z.
+ * @property {number} factor Ratio of the load normal to the track to the static load.
  * @property {number} balancing The cant in mm that balances the curve.
  * @property {number} lateral Unbalanced acceleration in the track plane in m/s², positive to the outer rail.
  */
 
-/** The curve and the cant of a case with the motion of a wheelset. @param {JsonObject | null} document @returns {Curving} */
+/** Returns the curve and the cant of a case with the motion of a wheelset. @param {JsonObject | null} document @returns {Curving} */
 export function curving(document) {
   const of = document ?? undefined;
   const origin = Math.abs(numberAt(of, '/contact/rail_origin_mm'));
@@ -36,7 +36,7 @@ export function curving(document) {
   const read = typeof written === 'string' ? parse(written) : undefined;
   const wrong = read !== undefined && !(typeof read === 'number' && Math.abs(read) < base);
   const cant = typeof read === 'number' && !wrong ? read : 0;
-  // v²/R with the yaw rate v/R, to the left.
+  // Acceleration to the left, v²/R, with the yaw rate v/R.
   const toLeft = numberAt(of, '/motion/wheelset/speed_mm_per_s') * numberAt(of, '/motion/wheelset/yaw_rate_rad_per_s') || 0;
   const left = toLeft >= 0;
   const [sin, gravities] = [cant / base, Math.abs(toLeft) / GRAVITY_MM_PER_S2];
@@ -47,7 +47,7 @@ export function curving(document) {
   };
 }
 
-/** The labels of a case with another cant; undefined for none. @param {JsonObject | null} document @param {string | undefined} cant */
+/** Returns the labels of a case with its cant replaced; undefined if none remains. @param {JsonObject | null} document @param {string | undefined} cant */
 export function labelsWithCant(document, cant) {
   const labels = at(document ?? undefined, '/labels');
   const { [CANT]: before, ...others } = isObject(labels) ? labels : {};
@@ -57,14 +57,14 @@ export function labelsWithCant(document, cant) {
 
 const rounded = (/** @type {number} */ value, digits = DIGITS) => Number(value.toPrecision(digits));
 
-/** The load normal to the track, in N. @param {number} load The static one. @param {Curving} on */
+/** Returns the load normal to the track, in N. @param {number} load The static load in N. @param {Curving} on */
 export const normalLoad = (load, { factor }) => rounded(load * factor, DIGITS + 3);
 
-/** The static load of a case in N; NaN where it has no vertical force. @param {JsonObject | null} document */
+/** Returns the static load of a case in N; NaN if it has no vertical force. @param {JsonObject | null} document */
 export const staticLoad = (document) => rounded(numberAt(document ?? undefined, LOAD) / curving(document).factor);
 
 /**
- * A changed case whose load normal to the track follows its curve, its speed and its cant, unless the load itself was changed.
+ * Returns an edited case with its load normal to the track adapted to its curve, speed and cant, unless the edit changed the load.
  * @param {JsonObject | null} before
  * @param {JsonObject} after
  */

@@ -1,4 +1,4 @@
-// Damage of one pass: wear, fatigue, shakedown, stresses below the surface, temperature; each with its parameters and what they leave open.
+// Damage of one pass: wear, fatigue, shakedown, stresses below the surface and temperature, with parameters and uncertainty.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { drawChart } from './drawing/axes.js';
@@ -19,7 +19,7 @@ import { sideOf } from './wheelloads.js';
 /** @typedef {Schemas['Ranged']} Ranged */
 /** @typedef {{ at: number, point: Point, patch: JobResult['patches'][number] }} Shown A patch with its chosen motion. */
 
-/** The limit of shakedown of a line contact, as a load factor (Johnson 1985, chapter 9). */
+/** Shakedown limit of a line contact as a load factor (Johnson 1985, chapter 9). */
 const SUBSURFACE_LIMIT = 4;
 
 /** @param {Point} point */
@@ -55,7 +55,7 @@ export function damagePanel(app, looked, answer, again) {
     ${figures ? sources(figures) : nothing}</section>`;
 }
 
-/** A value, and the interval that the errors of its inputs leave. @param {Ranged | undefined} of @param {number} [factor] */
+/** Shows a value with the interval due to the errors of its inputs. @param {Ranged | undefined} of @param {number} [factor] */
 function ranged(of, factor = 1) {
   if (!of) return '–';
   const { value, low, high } = of;
@@ -90,7 +90,7 @@ function table(shown, figures) {
     <p class="hint">Small: interval that the estimated errors leave. RCF below 0: wear removes cracks.${unconfirmed.size ? ' † Parameters not confirmed against their source.' : ''}</p>`;
 }
 
-/** Wear across the profiles. @param {App} app @param {Looked} looked @param {JobResult} answer @param {readonly Shown[]} shown */
+/** Chart of the wear depth across the profiles. @param {App} app @param {Looked} looked @param {JobResult} answer @param {readonly Shown[]} shown */
 function wearCard(app, looked, answer, shown) {
   if (!shown.some(({ point }) => point.damage?.across)) return nothing;
   const body = looked.wornBody;
@@ -127,7 +127,7 @@ function wearCard(app, looked, answer, shown) {
 /** @param {JobResult} answer @param {number} patch */
 const sideIn = ({ wheelset }, patch) => (wheelset?.positions.some(({ left }) => left.patches.includes(patch)) ? 'left' : 'right');
 
-/** The shakedown map with a point for each patch. @param {readonly Shown[]} shown @param {Schemas['DamageFiguresUsed'] | undefined | null} figures */
+/** Shakedown map with a point for each patch. @param {readonly Shown[]} shown @param {Schemas['DamageFiguresUsed'] | undefined | null} figures */
 function shakedownCard(shown, figures) {
   const places = shown.flatMap(({ at, point }) => (point.damage?.shakedown ? [{ at, place: point.damage.shakedown }] : []));
   if (!places.length) return nothing;
@@ -146,13 +146,13 @@ function shakedownCard(shown, figures) {
     <p class="hint">Yield in shear ${number(figures?.shear_yield_mpa ?? NaN, 3)} MPa; change it for your steel in the form.</p></div>`;
 }
 
-/** Stresses below the chosen patch. @param {App} app @param {Looked} looked @param {JobResult} answer @param {Shown} chosen @param {Schemas['DamageFiguresUsed'] | undefined | null} figures */
+/** Chart of the stresses below the chosen patch. @param {App} app @param {Looked} looked @param {JobResult} answer @param {Shown} chosen @param {Schemas['DamageFiguresUsed'] | undefined | null} figures */
 function depthCard(app, looked, answer, { at, patch, point }, figures) {
   const worst = point.subsurface?.worst;
   if (!point.subsurface) return nothing;
   const below = stressesBelow(app, looked, at);
   const depths = below?.points ?? [];
-  // The worst point is one of the line, if that goes through it.
+  // The worst point is added to the line if the line passes through it.
   const through = worst && depths.length && Math.hypot(depths[0].at_mm[0] - worst.at_mm[0], depths[0].at_mm[1] - worst.at_mm[1]) < 1e-6;
   const points = [...depths, ...(through ? [worst] : [])].sort((one, two) => one.at_mm[2] - two.at_mm[2]);
   const deepest = Math.max(1, ...points.map(({ at_mm }) => at_mm[2]));
@@ -175,7 +175,7 @@ function depthCard(app, looked, answer, { at, patch, point }, figures) {
     <p class="hint">Numerical error up to 0.3 % of the largest pressure (${number(0.003 * patch.pressure_max_mpa, 2)} MPa)${typeof open === 'number' ? `; the profiles leave the pressure open by ± ${number(open, 2)} MPa` : ''}.</p></div>`;
 }
 
-/** Temperature along the strip with the hottest place. @param {Looked} looked @param {Shown} chosen */
+/** Chart of the temperature along the strip with the hottest point. @param {Looked} looked @param {Shown} chosen */
 function temperatureCard(looked, { at, point }) {
   const heat = point.temperature;
   if (!heat) return nothing;

@@ -1,4 +1,4 @@
-// Deleting with a way back: jobs and batches vanish from the lists at once, and are removed a few seconds later unless that is undone.
+// Deletion with undo: jobs and batches disappear from the lists at once and are removed a few seconds later, unless the user undoes it.
 
 import { Refused, remove } from './api.js';
 
@@ -6,24 +6,24 @@ import { Refused, remove } from './api.js';
 /** @typedef {'jobs' | 'batches' | 'evolutions'} Kind */
 
 const UNDO_MS = 6000;
-/** Requests under way. */
+/** Number of concurrent requests. */
 const AT_ONCE = 4;
-/** Requests that outlive the page: Chromium allows 20. */
+/** Number of requests that outlive the page. Chromium allows 20. */
 const KEPT_ALIVE_MAX = 16;
 
 /** @type {{ kind: Kind, ids: readonly string[], timer: number } | null} */
 let pending = null;
-/** What has been deleted, so that an older answer does not bring it back. @type {Set<string>} */
+/** Ids that have been deleted, so that an older response does not restore them. @type {Set<string>} */
 const gone = new Set();
 
-/** Is a job or a batch still there for the reader? @param {{ id: string }} of */
+/** Returns whether a job or a batch has not been deleted here. @param {{ id: string }} of */
 export const isThere = ({ id }) => !gone.has(id);
 
 /**
  * @param {App} app
  * @param {Kind} kind
  * @param {readonly string[]} ids
- * @param {string} what What the message calls them.
+ * @param {string} what Name of the deleted items in the message.
  */
 export function removeLater(app, kind, ids, what) {
   flush(app);
@@ -42,7 +42,7 @@ export function removeLater(app, kind, ids, what) {
   app.redraw();
 }
 
-/** Removes what waits to be removed, a few at a time. @param {App} app */
+/** Removes the pending items, a few at a time. @param {App} app */
 function flush(app) {
   if (!pending) return;
   const { kind, ids, timer } = pending;
@@ -63,7 +63,7 @@ function flush(app) {
   for (let lane = 0; lane < AT_ONCE; lane += 1) next();
 }
 
-// Nothing more can be undone when the page is left.
+// When the page is left, pending deletions are carried out.
 addEventListener('pagehide', () => {
   for (const id of pending?.ids.slice(0, KEPT_ALIVE_MAX) ?? []) remove(pending?.kind ?? 'jobs', id, true).catch(() => {});
 });

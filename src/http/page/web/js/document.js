@@ -1,4 +1,4 @@
-// A case as a JSON document: parts of it by JSON pointer (RFC 6901), and the text that a person would write.
+// Access to a case as a JSON document: values by JSON pointer (RFC 6901), and formatted text.
 
 /** @typedef {null | boolean | number | string | JsonList | JsonObject} JsonValue */
 /** @typedef {JsonValue[]} JsonList */
@@ -20,7 +20,7 @@ export const escapeKey = (key) => key.replaceAll('~', '~0').replaceAll('/', '~1'
 export const isObject = (value) => typeof value === 'object' && value !== null && !Array.isArray(value);
 
 /**
- * The value at a pointer; undefined where there is none.
+ * Returns the value at a pointer; undefined if there is none.
  * @param {JsonValue | undefined} document
  * @param {string} pointer
  * @returns {JsonValue | undefined}
@@ -37,7 +37,7 @@ export function at(document, pointer) {
 }
 
 /**
- * The number at a pointer; NaN where there is none.
+ * Returns the number at a pointer; NaN if there is none.
  * @param {JsonValue | undefined} document
  * @param {string} pointer
  */
@@ -47,7 +47,7 @@ export function numberAt(document, pointer) {
 }
 
 /**
- * The numbers of a list at a pointer; an empty list where there is none.
+ * Returns the numbers of the list at a pointer; an empty list if there is none.
  * @param {JsonValue | undefined} document
  * @param {string} pointer
  */
@@ -57,7 +57,7 @@ export function numbersAt(document, pointer) {
 }
 
 /**
- * A copy with one value changed; undefined removes it. Objects on the way are made where they are missing.
+ * Returns a copy with one value replaced; undefined removes it. Missing parent objects are created.
  * @param {JsonValue | undefined} document
  * @param {string} pointer
  * @param {JsonValue | undefined} value
@@ -84,7 +84,7 @@ export function put(document, pointer, value) {
 }
 
 /**
- * JSON as a person writes it: short lists and objects on one line, long lists of numbers in lines of some width.
+ * Formats JSON for reading: short lists and objects on one line, long lists wrapped.
  * @param {JsonValue} value
  * @returns {string}
  */
@@ -110,7 +110,7 @@ export function pretty(value, indent = '') {
 }
 
 /**
- * Items one after another, broken into lines.
+ * Joins items into wrapped lines.
  * @param {string[]} items
  * @param {string} indent
  */
@@ -131,7 +131,7 @@ function filled(items, indent) {
 }
 
 /**
- * The places at which two documents differ, and what stands there. Long lists count as one value.
+ * Returns the pointers at which two documents differ. A long list counts as one value.
  * @param {JsonValue | undefined} one
  * @param {JsonValue | undefined} other
  * @returns {string[]} Pointers.
@@ -151,7 +151,7 @@ export function differences(one, other, pointer = '') {
 }
 
 /**
- * Where in a text the value at a pointer stands; null where it is not found.
+ * Returns the range of the key of a pointer in a text; null if it is not found.
  * @param {string} text JSON
  * @param {string} pointer
  * @returns {[number, number] | null}

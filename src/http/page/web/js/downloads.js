@@ -1,4 +1,4 @@
-// Downloads of a result: pictures, tables and arrays of the chosen part.
+// Download buttons of a result: pictures, tables and arrays of the chosen patch and motion.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { download, save } from './api.js';
@@ -7,7 +7,7 @@ import { FieldMap } from './fieldmap.js';
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./result.js').Looked} Looked */
 
-/** The output that a quantity is part of, and its name in `plot.svg`. @type {Record<string, { part: string, plot: string }>} */
+/** Output that contains each quantity, and the name of the quantity in `plot.svg`. @type {Record<string, { part: string, plot: string }>} */
 const PARTS = {
   pressure: { part: 'pressure', plot: 'pressure' },
   traction: { part: 'tractions', plot: 'traction' },
@@ -19,7 +19,7 @@ const PARTS = {
 };
 const TABLES = ['csv', 'npz', 'vtk'];
 
-/** A name for files. @param {string} name */
+/** Returns a name in a form suitable for files. @param {string} name */
 export const fileName = (name) => name.toLowerCase().replace(/[^a-z0-9.]+/g, '-').replace(/^-|-$/g, '').slice(0, 48) || 'result';
 
 /** @param {App} app @param {Looked} looked */
@@ -37,7 +37,7 @@ export function downloads(app, { job, patch, point, quantity }) {
     <button class="small" @click=${get('resultants?format=csv', 'resultants.csv')}>Numbers</button>`;
 }
 
-/** The map as it is on the screen, at double density. @param {string} name */
+/** Saves the map as shown on the screen, at double density. @param {string} name */
 async function savePicture(name) {
   const map = document.querySelector('field-map.main');
   const picture = map instanceof FieldMap ? await map.png() : null;

@@ -1,4 +1,4 @@
-// Editing of a case: changes, checks while typing, the live result, solving.
+// Editing of a case: changes, validation and live result while typing, and solving.
 
 import { cancel, checkCase, examples as examplesOf, Refused, remove, result as resultOf, submit } from './api.js';
 import { withLoadOfCurve } from './curving.js';
@@ -20,11 +20,11 @@ const KEPT = 'railhead.case';
 const PAUSE_MS = 120;
 const WAIT_S = 10;
 const TYPED_WAIT_S = 8;
-/** A job that is cancelled may still run for a moment, and cannot be removed before. */
+/** Time to wait before a cancelled job is removed: it may still run for a moment and cannot be removed until it ends. */
 const CANCELLED_MS = 1500;
-/** The example that a new tab begins with: a new wheel on a new rail, rolling freely. */
+/** Example that a new tab starts with: a new wheel on a new rail, rolling freely. */
 const FIRST = 'wheel-rail';
-/** Estimated seconds up to which a case is solved while it is written; the first one may take longer, since nobody waits for the next. */
+/** Largest estimated time in seconds for solving while typing. The first case of a page may take longer. */
 const LIVE_SECONDS_MAX = 1;
 const FIRST_SECONDS_MAX = 10;
 
@@ -32,14 +32,14 @@ let timer = 0;
 let began = -Infinity;
 let asking = new AbortController();
 const CHANGED = ', changed';
-/** The text of the example as it was opened. */
+/** Text of the example when it was opened. */
 let opened = '';
-/** Is a case being solved while it is written? */
+/** Whether a live result is being computed. */
 let previewing = false;
-/** Was any case solved or written since the page was opened? */
+/** Whether no live result has been requested since the page was opened. */
 let first = true;
 
-/** The case as it was left in this tab, or the first example. @param {App} app */
+/** Opens the case that was last edited in this tab, or the first example. @param {App} app */
 export async function openKept(app) {
   const kept = sessionStorage.getItem(KEPT);
   if (kept) editText(app, kept);
@@ -65,7 +65,7 @@ export function editText(app, text) {
   take(app, document, text, unreadable);
 }
 
-/** A case that the form has changed. @param {App} app @param {JsonObject} document */
+/** Replaces the case after a change in the form. @param {App} app @param {JsonObject} document */
 export function editDocument(app, document) {
   const loaded = withLoadOfCurve(app.store.get().compose.document, document);
   take(app, loaded, pretty(loaded), '');
@@ -80,17 +80,17 @@ export function change(app, pointer, value) {
   const { document, example, examples } = app.store.get().compose;
   const changed = put(document ?? {}, pointer, value);
   const known = at(/** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case)), '/name');
-  // The name of an example tells its numbers.
+  // The name of an example describes its unchanged values.
   editDocument(app, known && pointer !== '/name' && changed.name === known ? { ...changed, name: `${known}${CHANGED}` } : changed);
 }
 
-/** An example with all fields. @param {App} app @param {string} name */
+/** Opens an example with all fields requested. @param {App} app @param {string} name */
 export function openExample(app, name) {
   const example = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (app.store.get().compose.examples.find((known) => known.name === name)?.case));
   if (example) openCase(app, name, { ...example, outputs: withFields(example.outputs) });
 }
 
-/** The case that a new tab begins with: with damage, stresses and temperature. @param {App} app */
+/** Opens the case that a new tab starts with, including damage, stresses and temperature. @param {App} app */
 function openFirst(app) {
   const example = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (app.store.get().compose.examples.find((known) => known.name === FIRST)?.case));
   if (example) openCase(app, FIRST, withEverything({ ...example, motion: freeRolling('profiles') }));
@@ -104,7 +104,7 @@ function openCase(app, name, document) {
   take(app, ordered, opened, '');
 }
 
-/** Is the case an example that nobody has changed? @param {import('./state.js').Compose} state */
+/** Returns whether the case is an unchanged example. @param {import('./state.js').Compose} state */
 export const isUntouched = ({ example, text }) => example !== '' && text === opened;
 
 /**
@@ -117,7 +117,7 @@ function take(app, document, text, unreadable) {
   app.compose({ document, text, unreadable, refusal: '', ...(unreadable ? { faults: [], checked: null } : {}) });
   sessionStorage.setItem(KEPT, text);
   asking.abort();
-  // The first change is checked at once, those of a moving slider one after another.
+  // The first change is checked at once; rapid changes, such as of a slider, at intervals.
   timer ||= window.setTimeout(() => check(app), Math.max(0, began + PAUSE_MS - performance.now()));
 }
 
@@ -136,7 +136,7 @@ async function check(app) {
       const wheel = type === 'wheelset' ? checkCase(JSON.stringify(oneWheel(document, 'left', firstShift(document))), mine.signal).catch(() => null) : null;
       const [whole, one] = await Promise.all([checkCase(text, mine.signal), wheel]);
       if (mine.signal.aborted) return;
-      // Of a wheelset the left wheel is drawn.
+      // For a wheelset, the left wheel is drawn.
       const checked = one ? { ...whole, quality: one.quality, understood: one.understood } : whole;
       const understood = checked.understood ? { type, of: checked.understood } : null;
       app.compose({ checked, understood, lone: null, faults: [], refusal: '' });
@@ -147,20 +147,20 @@ async function check(app) {
   }
 }
 
-/** The first lateral shift of a wheelset, in mm. @param {JsonObject} document */
+/** Returns the first lateral shift of a wheelset, in mm. @param {JsonObject} document */
 function firstShift(document) {
   const [number, from, first] = ['', '/from', '/values/0'].map((end) => numberAt(document, `/contact/lateral_shift_mm${end}`));
   return [number, from, first].find(Number.isFinite) ?? 0;
 }
 
-/** The only cross-section of a case that has one of the two. @param {JsonObject} document @returns {'rail' | 'wheel' | null} */
+/** Returns the body whose cross-section is given if the other one is missing; null otherwise. @param {JsonObject} document @returns {'rail' | 'wheel' | null} */
 function loneSection(document) {
   const there = BODIES.filter((body) => hasSections(at(document, '/contact/type')) && !lacksSection(document, body));
   return there.length === 1 ? there[0] : null;
 }
 
 /**
- * Reads a cross-section without its counterpart: a new one of the standard stands in for that.
+ * Checks a single cross-section, with a standard one in place of its missing counterpart.
  * @param {App} app
  * @param {JsonObject} document
  * @param {'rail' | 'wheel'} body
@@ -192,7 +192,7 @@ function showRefusal(app, error) {
   }
 }
 
-/** Solves the case while it is written, if that takes little time: one after the other, and always the newest. @param {App} app */
+/** Solves the case while typing if that is fast. One job runs at a time, always of the newest case. @param {App} app */
 async function preview(app) {
   if (previewing) return;
   previewing = true;
@@ -203,7 +203,7 @@ async function preview(app) {
   }
 }
 
-/** The digest of a case that is to be solved while it is written; empty for none. @param {App} app */
+/** Returns the digest of the case that is to be solved while typing; empty for none. @param {App} app */
 function wanted(app) {
   const { document, checked, live, preview: known } = app.store.get().compose;
   if (!checked || known?.digest === checked.digest) return '';
@@ -213,7 +213,7 @@ function wanted(app) {
 }
 
 /**
- * Solves the case without damage and what else is not shown, and removes the job as soon as its answer is here.
+ * Solves the case without outputs that the preview does not show, and removes the job after its response.
  * @param {App} app
  * @param {string} digest
  */
@@ -232,7 +232,7 @@ async function solveTyped(app, digest) {
       answer = { ...answer, result, patch, point, field: hasFields(result) ? await loadField(job.id, result, patch, point) : null };
     }
   } finally {
-    // An answer that comes after the switch was turned off is not shown.
+    // A result that arrives after the option was switched off is not shown.
     app.compose({ preview: app.store.get().compose.live ? answer : null });
     const open = job.state === 'queued' || job.state === 'running';
     if (open) await cancel('jobs', job.id).catch(() => {});

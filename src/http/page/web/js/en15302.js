@@ -1,9 +1,9 @@
-// Windows of the equivalent conicity of the reference pairs of EN 15302:2021, the acceptance test of every program that computes it.
+// Tolerance windows of the equivalent conicity for the reference profiles of EN 15302:2021.
 
 /** Amplitudes in mm: 1 to 7.4 in steps of 0.2. */
 const AMPLITUDES = Array.from({ length: 33 }, (_, step) => (5 + step) / 5);
 
-/** @typedef {{ label: string, low: readonly number[], high: readonly number[] }} Window Limits at every amplitude. */
+/** @typedef {{ label: string, low: readonly number[], high: readonly number[] }} Window Limits at each amplitude. */
 
 /** Reference wheels on reference rail A. @type {Record<string, Window>} */
 export const WINDOWS = {
@@ -65,7 +65,7 @@ export const WINDOWS = {
 };
 
 /**
- * The window at an amplitude; null beyond those of the standard.
+ * Returns the window at an amplitude, interpolated linearly; null outside the amplitudes of the standard.
  * @param {string} pair
  * @param {number} amplitude In mm.
  * @returns {[number, number] | null}

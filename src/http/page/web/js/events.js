@@ -1,4 +1,4 @@
-// Server-sent events read from `fetch`: `EventSource` cannot send a key.
+// Server-sent events over `fetch`, because `EventSource` cannot send an API key.
 
 import { Refused, request } from './api.js';
 
@@ -8,8 +8,8 @@ const LONGEST_PAUSE_MS = 15_000;
 /** @typedef {{ id: string, event: string, data: string }} ServerEvent */
 
 /**
- * Takes a stream of events apart, whatever the pieces in which it arrives.
- * @returns {(piece: string) => ServerEvent[]} Takes the next piece and answers the events that it completes.
+ * Creates a parser for a stream of events that arrives in arbitrary pieces.
+ * @returns {(piece: string) => ServerEvent[]} Parses the next piece and returns the events that it completes.
  */
 export function eventReader() {
   let rest = '';
@@ -36,11 +36,11 @@ function readEvent(block) {
 }
 
 /**
- * Follows a stream of events until it ends or `signal` says so. A broken connection is made again, after pauses that grow.
+ * Follows a stream of events until it ends or `signal` aborts. Reconnects after a broken connection, with increasing pauses.
  * @param {string} path
- * @param {(event: ServerEvent) => boolean | void} take True ends it.
+ * @param {(event: ServerEvent) => boolean | void} take Handles an event. Returning true ends the stream.
  * @param {AbortSignal} signal
- * @throws {Refused} The service refuses the stream for good.
+ * @throws {Refused} If the service rejects the stream with a client error other than 429.
  */
 export async function follow(path, take, signal) {
   let last = '';

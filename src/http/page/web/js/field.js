@@ -1,4 +1,4 @@
-// One field of the form: a value of the case at a JSON pointer, in the unit that engineers use, with its fault.
+// Input fields of the form: a value of the case at a JSON pointer, in a common engineering unit, with its fault.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { at } from './document.js';
@@ -14,27 +14,27 @@ import { parse, parseList, textOf } from './written.js';
  * @typedef {object} FieldLook
  * @property {number} [factor] Factor from the shown unit to the unit of the API.
  * @property {string} [hint]
- * @property {string} [empty] Shown where nothing is given.
- * @property {boolean} [text] Takes any text, not only numbers.
- * @property {boolean} [list] Takes one number or several.
+ * @property {string} [empty] Placeholder of an empty field.
+ * @property {boolean} [text] Accepts any text, not only numbers.
+ * @property {boolean} [list] Accepts one number or several.
  * @property {(value: JsonValue | undefined) => string} [format] Formats a value without a unit.
- * @property {(written: string) => JsonValue | undefined} [read] The value of what was written.
- * @property {(value: JsonValue | undefined) => void} [take] Changes the case where more than this value follows from it.
+ * @property {(written: string) => JsonValue | undefined} [read] Parses the text of the field.
+ * @property {(value: JsonValue | undefined) => void} [take] Applies the value to the case, if more than this value changes.
  */
 
-/** The id of the field of a pointer. @param {string} pointer */
+/** Returns the element id of the field of a pointer. @param {string} pointer */
 export const fieldId = (pointer) => `field${pointer.replaceAll('/', '-')}`;
 
 /**
  * @param {App} app
  * @param {string} pointer
- * @returns {Fault | undefined} The fault of this value or of what is inside it.
+ * @returns {Fault | undefined} The fault of this value or of one of its members.
  */
 export const faultAt = (app, pointer) =>
   app.store.get().compose.faults.find((fault) => fault.pointer === pointer || fault.pointer?.startsWith(`${pointer}/`));
 
 /**
- * A field for one value of the case.
+ * An input field for one value of the case.
  * @param {App} app
  * @param {string} pointer
  * @param {string} label
@@ -67,12 +67,12 @@ export function field(app, pointer, label, unit, look = {}) {
 }
 
 /**
- * A choice for one value of the case.
+ * A drop-down list for one value of the case.
  * @param {App} app
  * @param {string} pointer
  * @param {string} label
- * @param {readonly (readonly [JsonValue | undefined, string])[]} options Values and their texts; the first is undefined, the default of the service.
- * @param {{ hint?: string, take?: (value: JsonValue | undefined) => void }} [look] As of a field.
+ * @param {readonly (readonly [JsonValue | undefined, string])[]} options Values and their texts. The value undefined stands for the default of the service.
+ * @param {{ hint?: string, take?: (value: JsonValue | undefined) => void }} [look] The same options as of `field`.
  */
 export function choice(app, pointer, label, options, { hint, take = (value) => change(app, pointer, value) } = {}) {
   const value = at(app.store.get().compose.document ?? undefined, pointer);

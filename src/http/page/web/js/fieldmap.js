@@ -1,5 +1,5 @@
-// <field-map>: a field of one patch with a crosshair and its sections. Two canvases: the picture, drawn anew when what it shows
-// changes, and above it what follows the pointer.
+// Custom element <field-map>: a field of one patch with a crosshair and its sections. It has two canvases: the picture, which is redrawn when its data
+// change, and an overlay that follows the pointer.
 
 import { indexOf } from './field/cells.js';
 import { layoutCompact, layoutMap } from './field/layout.js';
@@ -16,16 +16,16 @@ import { drawSections } from './field/sections.js';
  * @typedef {object} Shown
  * @property {Field} field
  * @property {Quantity} quantity
- * @property {readonly [number, number]} [range] The range of colours, where others share it.
+ * @property {readonly [number, number]} [range] Range of colours that is shared with other maps.
  * @property {number} [friction]
  * @property {boolean} [border]
  * @property {boolean} [arrows]
  * @property {boolean} [mesh]
  * @property {boolean} [sections]
- * @property {number} [scale] Pixels per mm: a small picture without axes.
- * @property {{ x: number, y: number } | null} [held] Where the crosshair is held.
- * @property {number} [tallest] Most pixels of the map's height.
- * @property {boolean} [bent] Across is the arc length along the rail.
+ * @property {number} [scale] Pixels per mm of a small picture without axes.
+ * @property {{ x: number, y: number } | null} [held] Fixed position of the crosshair.
+ * @property {number} [tallest] Largest height of the map in pixels.
+ * @property {boolean} [bent] Whether the lateral coordinate is the arc length along the rail.
  * @property {string} [name] Accessible name.
  */
 
@@ -46,7 +46,7 @@ export class FieldMap extends HTMLElement {
   #over = document.createElement('canvas');
   #readout = document.createElement('dl');
   #live = document.createElement('output');
-  /** Milliseconds of the last drawing of the picture and of the crosshair. */
+  /** Duration of the last drawing of the picture and of the crosshair, in ms. */
   took = { picture: 0, crosshair: 0 };
   #resized = new ResizeObserver(() => requestAnimationFrame(() => this.draw()));
   #themed = new MutationObserver(() => this.draw());
@@ -67,7 +67,7 @@ export class FieldMap extends HTMLElement {
     this.#scheme.removeEventListener('change', this.#redraw);
   }
 
-  /** The shown data; the map is drawn again only if they change. @param {Shown | null} shown */
+  /** Sets the shown data. The map is redrawn only if they change. @param {Shown | null} shown */
   set shown(shown) {
     const before = this.#shown;
     const keys = /** @type {(keyof Shown)[]} */ ([...new Set([...Object.keys(before ?? {}), ...Object.keys(shown ?? {})])]);
@@ -86,7 +86,7 @@ export class FieldMap extends HTMLElement {
     return this.#shown;
   }
 
-  /** Moves the crosshair without telling anybody: it follows that of another map. @param {{ x: number, y: number }} place */
+  /** Moves the crosshair without dispatching an event, to follow the crosshair of another map. @param {{ x: number, y: number }} place */
   follow(place) {
     this.#place = place;
     this.#paint();
@@ -108,7 +108,7 @@ export class FieldMap extends HTMLElement {
     this.#over.addEventListener('keydown', (event) => this.#key(event));
   }
 
-  /** Draws everything. */
+  /** Draws the picture and the crosshair. */
   draw() {
     const shown = this.#shown;
     if (!shown || !this.isConnected) return;
@@ -155,7 +155,7 @@ export class FieldMap extends HTMLElement {
     this.append(this.#over, this.#readout, this.#live);
   }
 
-  /** Where the value is largest: there the crosshair waits. */
+  /** Returns the position of the largest value, where the crosshair rests. */
   #largest() {
     const scene = this.#scene;
     if (!scene) return null;
@@ -266,7 +266,7 @@ export class FieldMap extends HTMLElement {
   }
 
   /**
-   * The picture as it is on the screen, on the ground of the theme.
+   * Renders the picture as shown on the screen as PNG, on the background of the theme.
    * @param {number} density
    * @returns {Promise<Blob | null>}
    */
@@ -327,7 +327,7 @@ function drawHair(over, { map, X, Y }, place, held) {
 }
 
 /**
- * Where a key moves the crosshair: to the middle of a cell.
+ * Returns the cell centre to which a key moves the crosshair; null for other keys.
  * @param {import('./field/cells.js').CellIndex} index
  * @param {{ x: number, y: number }} place
  * @param {string} key

@@ -1,14 +1,14 @@
-// The fields of one patch and one motion: cells in strips along rolling, and the border of the patch.
+// Loads the fields of one patch and motion: cells in strips along rolling, and the border of the patch.
 
 import { request } from './api.js';
 import { readNpz } from './npz.js';
 
 /** @typedef {import('./api.js').JobResult} JobResult */
-/** @typedef {[number, number][]} Loop A closed line, its first point not repeated. */
+/** @typedef {[number, number][]} Loop A closed line whose first point is not repeated. */
 
 /**
  * @typedef {object} Cells
- * One value for each cell; cells stand strip by strip, each strip along rolling.
+ * Columns with one value for each cell. Cells are ordered strip by strip, each strip along rolling.
  * @property {number[]} x_mm
  * @property {number[]} y_mm
  * @property {number[]} dx_mm
@@ -25,17 +25,17 @@ import { readNpz } from './npz.js';
 
 /** @typedef {{ cells: Cells, border: Loop[] | null }} Field */
 
-/** Parts of a result that are fields, by the name of the output that a case asks for. */
+/** Outputs of a case that are fields. */
 const PARTS = ['pressure', 'tractions', 'slip', 'zones', 'temperature'];
-/** Cells beyond which arrays are loaded instead of text. */
+/** Number of cells above which arrays are loaded instead of JSON. */
 const TEXT_CELLS_MAX = 4000;
 
-/** Did the case ask for any field? @param {JobResult} result */
+/** Returns whether the case requested any field. @param {JobResult} result */
 export const hasFields = ({ links }) => PARTS.some((part) => part in links);
 
 /**
- * Loads all fields that a result has of a patch and a motion, as exactly as a picture needs them.
- * @param {string} id The job.
+ * Loads all fields of a patch and a motion in single precision.
+ * @param {string} id Id of the job.
  * @param {JobResult} result
  * @param {number} patch
  * @param {number} point
@@ -43,7 +43,7 @@ export const hasFields = ({ links }) => PARTS.some((part) => part in links);
  */
 export async function loadField(id, result, patch, point) {
   const { mesh } = result.patches[patch].points[point].solver;
-  // A method that knows resultants only has neither mesh nor fields.
+  // A method that computes only resultants has neither mesh nor fields.
   const large = mesh !== undefined && mesh.strips * mesh.cells > TEXT_CELLS_MAX;
   const answer = await request(`/v1/jobs/${id}/fields?patch=${patch}&point=${point}&precision=single&format=${large ? 'npz' : 'json'}`);
   if (large) return fromArrays(await readNpz(await answer.arrayBuffer()));

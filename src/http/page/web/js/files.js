@@ -1,17 +1,17 @@
-// Files that people drop: their encoding, their format, and the body that they describe. The service reads what they hold.
+// Detection of the encoding, format and body of dropped files. The service parses their contents.
 
 /** @typedef {'simpack' | 'miniprof' | 'columns'} ProfileFormat */
 /** @typedef {'rail' | 'wheel'} Body */
 /** @typedef {{ name: string, text: string }} DroppedFile */
 
 /**
- * The text of a file in UTF-8, UTF-16 or, if it is none of these, Windows-1252.
+ * Decodes a file in UTF-8, UTF-16 or, as a fallback, Windows-1252.
  * @param {ArrayBuffer} buffer
  */
 export function decoded(buffer) {
   const bytes = new Uint8Array(buffer);
   const marked = bytes[0] === 0xff && bytes[1] === 0xfe ? 'utf-16le' : bytes[0] === 0xfe && bytes[1] === 0xff ? 'utf-16be' : '';
-  // Without a mark every other byte of numbers in UTF-16 is 0.
+  // In UTF-16 without a byte order mark, every other byte of ASCII text is 0.
   const unmarked = bytes[1] === 0 && bytes[3] === 0 ? 'utf-16le' : bytes[0] === 0 && bytes[2] === 0 ? 'utf-16be' : '';
   if (bytes.length > 3 && (marked || unmarked)) return new TextDecoder(marked || unmarked).decode(buffer);
   try {
@@ -22,8 +22,8 @@ export function decoded(buffer) {
 }
 
 /**
- * The format of a file by its keywords, else by the end of its name; and the body by its keywords, else by its name. The body is null if neither
- * says it.
+ * Returns the format of a file by its keywords or else its extension, and its body by its keywords or else its name. The body is null if
+ * neither identifies it.
  * @param {DroppedFile} file
  * @returns {{ format: ProfileFormat, body: Body | null }}
  */
@@ -45,12 +45,12 @@ export function profileKind({ name, text }) {
 }
 
 /**
- * Which file becomes which body. Two files always become both bodies. One file becomes the body that it or its name says, else the one that it was
- * dropped on, else the one that is missing.
+ * Assigns files to bodies. Two files become one body each. A single file becomes the body of its keywords or format, else the one that it was
+ * dropped on, else the one in its name, else the missing one.
  * @param {readonly DroppedFile[]} files
  * @param {readonly Body[]} missing Bodies of the case without a cross-section.
- * @param {Body} [onto] The body that it was dropped on.
- * @returns {Partial<Record<Body, DroppedFile>> | string} Or why that cannot be decided.
+ * @param {Body} [onto] The body on whose area it was dropped.
+ * @returns {Partial<Record<Body, DroppedFile>> | string} The files by body, or the reason why they cannot be assigned.
  */
 export function bodiesOf(files, missing, onto) {
   const kinds = files.map(profileKind);
@@ -61,7 +61,7 @@ export function bodiesOf(files, missing, onto) {
     const turned = one === 'wheel' || two === 'rail';
     return turned ? { rail: files[1], wheel: files[0] } : { rail: files[0], wheel: files[1] };
   }
-  // Keywords and names of formats count before the place; a word in the name of a plain table does not.
+  // Keywords and extensions of formats take precedence over the drop area; a word in the name of a plain table does not.
   const certain = kinds[0].format === 'columns' ? null : kinds[0].body;
   const body = certain ?? onto ?? kinds[0].body ?? missing[0];
   return body ? { [body]: files[0] } : `${files[0].name} does not say whether it is a rail or a wheel. Drop it on one of the two.`;

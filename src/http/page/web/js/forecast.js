@@ -1,4 +1,4 @@
-// Profiles that wear under a traffic: the form, what was computed, and the step that is looked at.
+// State of the view Forecast, the wear of profiles under a traffic: its form, the computed evolutions, and the displayed step.
 
 import { evolution as evolutionOf, evolutionRequest, evolutionResult, evolutions as evolutionsOf, submitEvolution } from './api.js';
 import { takeProfiles } from './contactform.js';
@@ -22,26 +22,26 @@ import { parse } from './written.js';
 /** @typedef {import('./traffic.js').Row} Row */
 
 export const EVENTS = /** @type {const} */ ([['grind', 'grind the rail'], ['friction', 'friction changes, as by a lubricator'], ['reprofile', 'turn the wheel']]);
-/** The sections that are ground and turned to, where no file says another one. */
+/** Default target sections of grinding and turning. */
 export const TARGETS = { grind: 'a new 60E1', reprofile: 'a new S1002' };
 
 /**
  * @typedef {object} Maintenance
  * @property {'grind' | 'friction' | 'reprofile'} kind
  * @property {string} at
- * @property {string} value The depth beyond the target, or the coefficient of friction.
- * @property {{ name: string, section: JsonObject } | null} target The section that a file has.
+ * @property {string} value Depth below the target section in mm, or the coefficient of friction.
+ * @property {{ name: string, section: JsonObject } | null} target Target section from a file; null for the default.
  */
 
 /**
  * @typedef {object} Form
- * Everything as it is written.
+ * The form; values are stored as entered.
  * @property {string} name
  * @property {Row[]} rows
- * @property {import('./traffic.js').Table & { name: string } | null} table A table from a file, in place of the rows.
+ * @property {import('./traffic.js').Table & { name: string } | null} table A table from a file, which replaces the rows.
  * @property {'rail' | 'wheel' | 'both'} wearing
  * @property {'usfd_wear' | 'archard_wear'} law
- * @property {string} states The most representative states; those of the service if empty.
+ * @property {string} states Largest number of representative states; empty for the default of the service.
  * @property {string} mgt
  * @property {string} km
  * @property {string} records
@@ -49,7 +49,7 @@ export const TARGETS = { grind: 'a new 60E1', reprofile: 'a new S1002' };
  * @property {Maintenance[]} events
  */
 
-/** A mixed traffic to begin with: straight track, curves, and a share with much shift. @returns {Form} */
+/** Initial form with a mixed traffic: straight track, curves, and a share with a large shift. @returns {Form} */
 const firstForm = () => ({
   name: '',
   rows: [
@@ -62,7 +62,7 @@ const firstForm = () => ({
 
 /**
  * @typedef {object} Side
- * An evolution that is looked at.
+ * A displayed evolution.
  * @property {Job} job
  * @property {Answer | null} answer
  */
@@ -73,16 +73,16 @@ const firstForm = () => ({
  * @property {boolean} sending
  * @property {string} refusal
  * @property {readonly { pointer?: string, detail: string }[]} faults
- * @property {Job | null} against The one that the next is compared with.
+ * @property {Job | null} against Evolution that the next submitted one is compared with.
  * @property {readonly Job[] | null} listed
  * @property {Set<string>} ticked
- * @property {string[]} ids Those that are looked at; none for the list.
+ * @property {string[]} ids Displayed evolutions; empty for the list.
  * @property {Side[]} sides
- * @property {number} step The record of the first of them.
+ * @property {number} step Displayed record of the first evolution.
  * @property {Body} body
- * @property {number} factor By which wear is drawn larger.
+ * @property {number} factor Magnification of the drawn wear.
  * @property {string} curve
- * @property {number} playing The timer of the film; 0 while it stands.
+ * @property {number} playing Timer of the animation; 0 while it is stopped.
  */
 
 /** @type {Forecast} */
@@ -90,7 +90,7 @@ const forecast = {
   form: firstForm(), sending: false, refusal: '', faults: [], against: null, listed: null, ticked: new Set(), ids: [], sides: [], step: 0, body: 'rail', factor: 1, curve: 'losses', playing: 0,
 };
 
-/** By how much wear is drawn larger, and the depth that it has then at most, in mm. */
+/** Magnifications of the drawn wear. The initial one is the largest with which the drawn depth does not exceed `DRAWN_MM`. */
 export const FACTORS = [1, 5, 20, 100];
 const DRAWN_MM = 3;
 const POLL_MS = 1000;
@@ -107,7 +107,7 @@ export function chooseForecast(app, change) {
 /** @param {App} app @param {Partial<Form>} change */
 export const writeForm = (app, change) => chooseForecast(app, { form: { ...forecast.form, ...change } });
 
-/** Opens the list, one evolution, or two side by side. @param {App} app @param {string[]} ids */
+/** Opens the list, one evolution, or a comparison of two. @param {App} app @param {string[]} ids */
 export async function openForecast(app, ids) {
   stopFilm();
   const wanted = ids.slice(0, 2);
@@ -121,7 +121,7 @@ export async function openForecast(app, ids) {
   }
 }
 
-/** Leaves the view: nothing is asked for any longer. */
+/** Leaves the view and stops its requests. */
 export function leaveForecast() {
   stopFilm();
   forecast.ids = ['-'];
@@ -161,14 +161,14 @@ async function watchSides(app, ids) {
   }
 }
 
-/** The record of a side at the step that is looked at: that of the same share of the extent. @param {Side} side @returns {WornRecord | null} */
+/** Returns the record of an evolution at the displayed step, by the share of the extent. @param {Side} side @returns {WornRecord | null} */
 export function recordOf({ answer }) {
   const wanted = forecast.sides[0]?.answer?.records[forecast.step]?.progress.share;
   if (!answer || wanted === undefined) return null;
   return answer.records.reduce((best, record) => (Math.abs(record.progress.share - wanted) <= Math.abs(best.progress.share - wanted) ? record : best));
 }
 
-/** Plays the steps as a film, or stops it. @param {App} app */
+/** Starts or stops the animation of the steps. @param {App} app */
 export function playFilm(app) {
   if (forecast.playing) {
     stopFilm();
@@ -189,7 +189,7 @@ function stopFilm() {
   forecast.playing = 0;
 }
 
-/** The case that lends its sections, or why it cannot. @param {App} app @returns {JsonObject | string} */
+/** Returns the case whose profiles are used, or the reason why it cannot be used. @param {App} app @returns {JsonObject | string} */
 export function templateOf(app) {
   const { document } = app.store.get().compose;
   if (!document || at(document, '/contact/type') !== 'profiles') return 'Choose a wheel on a rail (Profiles) in the view Contact first: its files, inclination, speed and friction are taken from there.';
@@ -197,10 +197,10 @@ export function templateOf(app) {
   return isObject(damage) && damage.parameters ? { ...template, damage: { parameters: damage.parameters } } : template;
 }
 
-/** The speed of a case in mm/s. @param {JsonObject} template */
+/** Returns the speed of a case in mm/s. @param {JsonObject} template */
 const speedOf = (template) => numberAt(template, '/motion/wheelset/speed_mm_per_s');
 
-/** What is submitted. @param {App} app @param {JsonObject} template @returns {JsonObject} */
+/** Returns the request of the form. @param {App} app @param {JsonObject} template @returns {JsonObject} */
 function requestOf(app, template) {
   const { form } = forecast;
   const { examples } = app.store.get().compose;
@@ -223,14 +223,14 @@ function requestOf(app, template) {
   };
 }
 
-/** What a forecast is called that was given no name: its maintenance. @param {Form} form */
+/** Returns the default name of a forecast, which describes its maintenance. @param {Form} form */
 export function nameOf({ events, wearing }) {
   const unit = wearing === 'wheel' ? 'km' : 'MGT';
   const what = { grind: 'grind', reprofile: 'turn', friction: 'μ' };
   return events.map(({ kind, at: when, value }) => `${what[kind]}${kind === 'friction' ? ` ${value}` : ''} at ${when} ${unit}`).join(', ') || 'no maintenance';
 }
 
-/** Submits what the form says, and shows it: beside another one, if it is compared with that. @param {App} app */
+/** Submits the form and opens the evolution, compared with another one if that is chosen. @param {App} app */
 export async function startForecast(app) {
   const template = templateOf(app);
   if (typeof template === 'string') return app.say(template);
@@ -250,10 +250,10 @@ export async function startForecast(app) {
   }
 }
 
-/** What this tab has sent. @type {Map<string, { form: Form, document: JsonObject, files: import('./state.js').Compose['files'] }>} */
+/** Forms and cases submitted by this tab, by evolution. @type {Map<string, { form: Form, document: JsonObject, files: import('./state.js').Compose['files'] }>} */
 const sent = new Map();
 
-/** The form as an evolution was asked for, to change something of it and to compare both. @param {App} app @param {Job} job */
+/** Fills the form with the request of an evolution, so that a changed one can be compared with it. @param {App} app @param {Job} job */
 export async function repeatForecast(app, job) {
   const asked = await evolutionRequest(job.id);
   const template = isObject(asked.template) ? asked.template : {};
@@ -276,7 +276,7 @@ export async function repeatForecast(app, job) {
     states: text(at(asked, '/accuracy/states_max')), mgt: text(at(asked, '/extent/mgt')) || first.mgt, km: text(at(asked, '/extent/wheel_distance_km')) || first.km, records: text(asked.records) || first.records,
     limits: Object.fromEntries(LOSSES.map(({ key }) => [key, text(at(asked, `/limits/${key}`))])), events: /** @type {JsonObject[]} */ (asked.events ?? []).map(eventOf),
   };
-  // What this tab has sent has the names of its files.
+  // The forms submitted by this tab still have the names of their files.
   const known = sent.get(job.id);
   chooseForecast(app, { form: known ? { ...known.form, name: '' } : form, against: job.state === 'succeeded' ? job : null, refusal: '', faults: [] });
   app.compose({ example: '', files: known?.files ?? {} });
@@ -284,7 +284,7 @@ export async function repeatForecast(app, job) {
   app.go(formatRoute('forecast'));
 }
 
-/** Takes files that were dropped or chosen: a table of the traffic, cross-sections. @param {App} app @param {readonly File[]} files */
+/** Imports dropped or chosen files: a table of the traffic or cross-sections. @param {App} app @param {readonly File[]} files */
 export async function takeForecastFiles(app, files) {
   const read = await Promise.all(files.map(async (file) => ({ file, text: decoded(await file.arrayBuffer()) })));
   const tables = read.filter(({ file, text }) => profileKind({ name: file.name, text }).format === 'columns' && isTraffic(text));
@@ -294,14 +294,14 @@ export async function takeForecastFiles(app, files) {
   if (sections.length) await takeProfiles(app, sections);
 }
 
-/** Takes the text of a table of the traffic. @param {App} app @param {string} name @param {string} text */
+/** Imports a table of the traffic. @param {App} app @param {string} name @param {string} text */
 function takeTable(app, name, text) {
   const parsed = parseTraffic(text);
   if (typeof parsed === 'string') app.say(`${name}: ${parsed}.`);
   else writeForm(app, { table: { name, ...parsed } });
 }
 
-/** Takes the file of a section that is ground or turned to. @param {App} app @param {number} place That of the event. @param {File} file */
+/** Imports the target section of grinding or turning. @param {App} app @param {number} place Index of the event. @param {File} file */
 export async function takeTarget(app, place, file) {
   const text = decoded(await file.arrayBuffer());
   const { format } = profileKind({ name: file.name, text });

@@ -1,4 +1,4 @@
-// Data of the drawings of a forecast: sections with their wear, and curves over the traffic.
+// Data of the drawings of a forecast: worn sections and curves over the traffic.
 
 /** @typedef {import('./forecast.js').Answer} Answer */
 /** @typedef {import('./forecast.js').WornRecord} WornRecord */
@@ -6,7 +6,7 @@
 /** @typedef {import('./drawing/axes.js').ChartLine} ChartLine */
 /** @typedef {import('./drawing/axes.js').Point} Point y to the field side and z up, in mm. */
 
-/** Losses with a limit, the body that they belong to. */
+/** Losses that can have a limit, with their bodies. */
 export const LOSSES = /** @type {const} */ ([
   { key: 'height_mm', label: 'rail height, W1', body: 'rail' },
   { key: 'gauge_face_mm', label: 'gauge face, W2', body: 'rail' },
@@ -19,7 +19,7 @@ export const CURVES = /** @type {const} */ ([
   ['losses', 'Losses'], ['area', 'Worn area'], ['pressure', 'Pressure'], ['yq', 'Y/Q'], ['conicity', 'Conicity'], ['damage', 'RCF damage'],
 ]);
 
-/** How far an evolution has come, in the unit that its events have. @param {WornRecord['progress']} progress */
+/** Returns the progress of an evolution in the unit of its events. @param {WornRecord['progress']} progress */
 export const distanceOf = ({ mgt, axle_passes, wheel_distance_km, share }) => mgt ?? axle_passes ?? wheel_distance_km ?? 100 * share;
 
 /** @param {Answer} answer */
@@ -28,13 +28,13 @@ export function distanceUnit({ records: [first] }) {
   return mgt !== undefined ? 'MGT' : axle_passes !== undefined ? 'axles' : wheel_distance_km !== undefined ? 'km' : '% of the extent';
 }
 
-/** Worn area below which a body has no wear, in mm²: what is left of rounding. */
+/** Worn area in mm² below which a body counts as not worn: rounding errors are smaller. */
 const NO_WEAR_MM2 = 1e-6;
 
-/** Does a body wear? @param {Answer} answer @param {Body} body */
+/** Returns whether a body wears. @param {Answer} answer @param {Body} body */
 export const wears = ({ records }, body) => records.some((record) => record[body].worn_area_mm2 > NO_WEAR_MM2);
 
-/** Unit normals of a section into the body. @param {readonly Point[]} line @param {Body} body @returns {Point[]} */
+/** Returns the unit normals of a section, pointing into the body. @param {readonly Point[]} line @param {Body} body @returns {Point[]} */
 export function normalsInto(line, body) {
   const normals = line.map((_, at) => {
     const [[y0, z0], [y1, z1]] = [line[Math.max(0, at - 1)], line[Math.min(line.length - 1, at + 1)]];
@@ -47,7 +47,7 @@ export function normalsInto(line, body) {
 }
 
 /**
- * A section at the start and at a step, its wear drawn larger by a factor, and the band in which it lies with a probability of 90 %.
+ * Returns a section at the start and at a step with magnified wear, and its band of 90 % probability.
  * @param {Answer} answer
  * @param {WornRecord} record
  * @param {Body} body
@@ -67,7 +67,7 @@ export function sectionOf(answer, record, body, factor) {
   return { start, now, normals, low: edge(low), high: edge(high) };
 }
 
-/** The numerical part of the uncertainty, relative: of the steps, the states and the contact. @param {WornRecord} record @param {Body} body */
+/** Returns the relative numerical uncertainty: the root sum of squares of the parts due to steps, states and contact. @param {WornRecord} record @param {Body} body */
 export const numericalOf = (record, body) => {
   const { steps, states, contact } = record[body].uncertainty;
   return Math.hypot(steps, states, contact);
@@ -75,17 +75,17 @@ export const numericalOf = (record, body) => {
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 const LOOKS = ['one', 'two', 'three', 'four'];
-/** Less than this is rounding of no loss, in mm. */
+/** Loss in mm below which it counts as 0. */
 const NO_LOSS_MM = 1e-4;
 
-/** Lines of one evolution over its records, those of one body. @param {Answer} answer @param {string} kind @param {Body} body @returns {(ChartLine & { limited?: boolean })[]} */
+/** Returns the chart lines of one body of an evolution over its records. @param {Answer} answer @param {string} kind @param {Body} body @returns {(ChartLine & { limited?: boolean })[]} */
 function linesOf(answer, kind, body) {
   const { records, limits } = answer;
   const places = records.map(({ progress }) => distanceOf(progress));
   /** @type {(label: string, look: number, of: (record: WornRecord) => number | null | undefined) => ChartLine} */
   const line = (label, look, of) => ({ label, look: LOOKS[look], points: records.map((record, at) => [places[at], of(record) ?? NaN]) });
   const limit = (/** @type {string} */ label, /** @type {number} */ value) => ({ label, look: 'limit', points: /** @type {Point[]} */ ([[places[0], value], [places[places.length - 1], value]]) });
-  /** With error bars of the numerical part, and the band of the coefficients; what was ground or turned off has neither. @type {(of: (record: WornRecord) => number) => Pick<ChartLine, 'errors' | 'band'>} */
+  /** Adds error bars of the numerical uncertainty and the band of the wear coefficients. Machined material has no uncertainty. @type {(of: (record: WornRecord) => number) => Pick<ChartLine, 'errors' | 'band'>} */
   const uncertain = (of) => {
     let machined = 0;
     const parts = records.map((record, at) => {
@@ -98,7 +98,7 @@ function linesOf(answer, kind, body) {
   };
   switch (kind) {
     case 'losses':
-      // The largest depth has no limit: beside one it would seem to pass it.
+      // The largest depth is omitted if a loss has a limit: it has none itself, but would seem to exceed it.
       return [...(LOSSES.some((loss) => loss.body === body && limits.some((known) => known.loss === loss.key)) ? []
         : [{ ...line('largest depth', 0, (record) => deepest(record, body)), ...uncertain((record) => deepest(record, body)) }]), ...LOSSES.filter((loss) => loss.body === body).flatMap(({ key, label }, at) => {
         const of = (/** @type {WornRecord} */ record) => record.losses[key] ?? 0;
@@ -121,7 +121,7 @@ function linesOf(answer, kind, body) {
   }
 }
 
-/** The largest worn depth, in mm. @param {WornRecord} record @param {Body} body */
+/** Returns the largest worn depth, in mm. @param {WornRecord} record @param {Body} body */
 export const deepest = (record, body) => Math.max(0, ...record[body].depth_mm);
 
 /** @param {WornRecord} record @param {Body} body */
@@ -130,7 +130,7 @@ export const worstDamage = (record, body) => Math.max(0, ...record[body].damage)
 const Y_LABELS = { losses: 'loss / mm', area: 'worn area / mm²', pressure: 'largest pressure / MPa', yq: 'Y/Q', conicity: 'equivalent conicity', damage: 'RCF damage, net of wear' };
 
 /**
- * Curves over the traffic, of one body of one evolution or of two.
+ * Returns the chart over the traffic for one body of one or two evolutions.
  * @param {readonly Answer[]} answers
  * @param {string} kind
  * @param {Body} body
@@ -138,23 +138,23 @@ const Y_LABELS = { losses: 'loss / mm', area: 'worn area / mm²', pressure: 'lar
 export function forecastChart(answers, kind, body) {
   const compared = answers.length > 1;
   const lines = answers.flatMap((answer, side) => linesOf(answer, kind, body)
-    // The limits of the first hold for both.
+    // The limits of the first evolution apply to both.
     .filter(({ look }) => !(side && look === 'limit'))
-    // Of two, the bands of what has a limit tell most, and more would cover each other.
+    // With two evolutions, only losses with a limit have bands; more bands would overlap.
     .map((line) => (compared && line.look !== 'limit' ? { ...line, band: line.limited ? line.band : undefined, label: `${'AB'[side]}: ${line.label}`, look: `${line.look} ${side ? 'dashed' : 'solid'}` } : line)));
   const y = Y_LABELS[/** @type {keyof typeof Y_LABELS} */ (kind)] ?? '';
   return { name: `${CURVES.find(([key]) => key === kind)?.[1]} over the traffic`, x: `traffic / ${distanceUnit(answers[0])}`, y, lines };
 }
 
 /**
- * @typedef {object} Life When a limit is reached; null for not within the extent.
+ * @typedef {object} Life Progress at which a limit is reached; null if it is not reached within the extent.
  * @property {number | null} mean
  * @property {number | null} earliest
  * @property {number | null} latest
  */
 /** @typedef {{ key: string, label: string, limit: string, lives: Life[] }} Reached */
 
-/** When limits are reached, and a visible crack. @param {readonly Answer[]} answers @returns {Reached[]} */
+/** Returns when the limits of losses and a visible crack are reached. @param {readonly Answer[]} answers @returns {Reached[]} */
 export function reachedOf(answers) {
   const losses = LOSSES.flatMap(({ key, label }) => {
     const [limit] = answers.flatMap(({ limits }) => limits.filter(({ loss }) => loss === key));
@@ -170,7 +170,7 @@ export function reachedOf(answers) {
   return [...losses, ...cracks.filter(({ lives }) => lives.some(({ mean }) => mean !== null))];
 }
 
-/** When the damage of a body reaches a visible crack. @param {Answer} answer @param {Body} body @returns {Life} */
+/** Returns when the damage of a body reaches a visible crack, interpolated between records. @param {Answer} answer @param {Body} body @returns {Life} */
 function crackOf({ records }, body) {
   const worst = records.map((record) => worstDamage(record, body));
   const after = worst.findIndex((damage) => damage >= 1);
@@ -180,7 +180,7 @@ function crackOf({ records }, body) {
   return { mean, earliest: mean, latest: mean };
 }
 
-/** The first limit of each evolution. @param {readonly Reached[]} reached @param {number} side @param {keyof Life} when */
+/** Returns the limit that an evolution reaches first. @param {readonly Reached[]} reached @param {number} side @param {keyof Life} when */
 function firstOf(reached, side, when) {
   const ended = reached.flatMap((each) => {
     const place = each.lives[side][when];
@@ -190,9 +190,9 @@ function firstOf(reached, side, when) {
 }
 
 /**
- * Which of two plans goes on longer until its first limit, and whether the lowest and the highest wear coefficients, which hold for both, say the same.
+ * Decides which of two plans lasts longer until its first limit, and whether the result is the same for the lowest and highest wear coefficients.
  * @param {readonly Reached[]} reached
- * @returns {{ better: 0 | 1 | null, sure: boolean, ends: { place: number, label: string }[] }} `better` is null where neither reaches a limit, or both at once.
+ * @returns {{ better: 0 | 1 | null, sure: boolean, ends: { place: number, label: string }[] }} `better` is null if neither reaches a limit, or both at the same time.
  */
 export function decisionOf(reached) {
   const ahead = (/** @type {keyof Life} */ when) => {

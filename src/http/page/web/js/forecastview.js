@@ -1,4 +1,4 @@
-// Forecast: what a traffic does to a rail and a wheel, step by step: the form, the sections with their band, curves, limits, two plans side by side.
+// The view Forecast: form, worn sections with their bands, curves, limits, and the comparison of two plans.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { cancel, download } from './api.js';
@@ -73,7 +73,7 @@ function formPanel(app, forecast) {
 /** @param {Event} event */
 const valueOf = ({ target }) => /** @type {HTMLInputElement} */ (target).value;
 
-/** Takes a file that was chosen. @param {(file: File) => unknown} take */
+/** Returns an event handler that passes the chosen file on. @param {(file: File) => unknown} take */
 const chosen = (take) => (/** @type {Event} */ { target }) => {
   const input = /** @type {HTMLInputElement} */ (target);
   const [file] = input.files ?? [];
@@ -81,10 +81,10 @@ const chosen = (take) => (/** @type {Event} */ { target }) => {
   input.value = '';
 };
 
-/** The value of a row without a value of its own. @type {Partial<Record<import('./traffic.js').ColumnKey, string>>} */
+/** Placeholders of empty cells of a row. @type {Partial<Record<import('./traffic.js').ColumnKey, string>>} */
 const EMPTY = { passes: '1', radius: 'straight', shift: '0', yaw: '0' };
 
-/** Rows of the traffic, written by hand. @param {App} app @param {Forecast['form']} form @param {import('./document.js').JsonObject | null} document */
+/** Table for entering the rows of the traffic. @param {App} app @param {Forecast['form']} form @param {import('./document.js').JsonObject | null} document */
 function rowsOf(app, { rows }, document) {
   const set = (/** @type {number} */ row, /** @type {import('./traffic.js').ColumnKey} */ key) => (/** @type {Event} */ event) =>
     writeForm(app, { rows: rows.map((old, at) => (at === row ? { ...old, [key]: valueOf(event) } : old)) });
@@ -95,7 +95,7 @@ function rowsOf(app, { rows }, document) {
     <p><button class="small" ?disabled=${rows.length >= ROWS_MAX} @click=${() => writeForm(app, { rows: [...rows, { ...rows[rows.length - 1] }] })}>Add a row</button> <span class="hint">Passes are shares or numbers: only their ratios count. On the right rail a shift to the right, below 0, brings the flange to the gauge. Radii are positive to the left.</span></p>`;
 }
 
-/** Describes a table that was read. @param {App} app @param {NonNullable<Forecast['form']['table']>} table */
+/** Describes an imported table. @param {App} app @param {NonNullable<Forecast['form']['table']>} table */
 function tableOf(app, { name, rows, values, others, unused }) {
   const range = (/** @type {readonly number[]} */ list) => list.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]).map((value) => number(value, 3)).join(' … ');
   const lacking = COLUMNS.filter(({ key }) => !values[key] && key !== 'passes').map(({ label }) => label);
@@ -201,7 +201,7 @@ function resultView(app, forecast) {
 /** @param {Answer} answer @param {number} place */
 const nearestStep = ({ records }, place) => records.reduce((best, { progress }, at) => (Math.abs(distanceOf(progress) - place) <= Math.abs(distanceOf(records[best].progress) - place) ? at : best), 0);
 
-/** Contacts of all states on a section as it is drawn. @param {WornRecord} record @param {'rail' | 'wheel'} body @param {ReturnType<typeof sectionOf>} shape @returns {import('./drawing/worn.js').WornContact[]} */
+/** Returns the contacts of all states on the drawn section. @param {WornRecord} record @param {'rail' | 'wheel'} body @param {ReturnType<typeof sectionOf>} shape @returns {import('./drawing/worn.js').WornContact[]} */
 function contactsOf(record, body, { now, normals }) {
   const { states, [body]: { points_mm: points } } = record;
   const all = states.flatMap(({ share, patches }) => patches.map((patch) => ({ place: body === 'rail' ? patch.rail_mm : patch.wheel_mm, load: share * patch.normal_force_n, pressure: patch.pressure_max_mpa })));
@@ -213,7 +213,7 @@ function contactsOf(record, body, { now, normals }) {
   });
 }
 
-/** Depth and damage over the section. @param {{ side: Side, record: WornRecord }[]} shapes @param {'rail' | 'wheel'} body @param {(at: number) => string} label @param {string} title */
+/** Panel with wear depth and damage across the section. @param {{ side: Side, record: WornRecord }[]} shapes @param {'rail' | 'wheel'} body @param {(at: number) => string} label @param {string} title */
 function depthPanel(shapes, body, label, title) {
   const points = (/** @type {WornRecord} */ record, /** @type {'depth_mm' | 'damage'} */ what, factor = 1) => record[body].points_mm.map(([y], at) => /** @type {[number, number]} */ ([y, factor * record[body][what][at]]));
   const looks = ['one', 'two'];
@@ -227,7 +227,7 @@ function depthPanel(shapes, body, label, title) {
     <div class="card">${savable(`${title} fatigue ${body}`, drawChart({ name: `Fatigue across the ${body}`, x: axis, y: 'RCF damage net of wear (1: visible crack)', lines: shapes.map((shape, at) => ({ label: label(at), look: looks[at], points: points(shape.record, 'damage') })) }))}</div></div></section>`;
 }
 
-/** When limits are reached, and which of two plans goes on longer. @param {readonly Answer[]} answers @param {readonly Side[]} sides */
+/** Panel that shows when limits are reached and which of two plans lasts longer. @param {readonly Answer[]} answers @param {readonly Side[]} sides */
 function limitsPanel(answers, sides) {
   const reached = reachedOf(answers);
   const unit = distanceUnit(answers[0]);
@@ -240,7 +240,7 @@ function limitsPanel(answers, sides) {
       : html`<p class="pad quiet">${answers.some(({ limits }) => limits.length) ? 'No limit is reached.' : 'No limits were given.'}</p>`}</section>`;
 }
 
-/** Which of two plans goes on longer. @param {readonly Answer[]} answers @param {readonly Side[]} sides */
+/** Describes which of two plans lasts longer. @param {readonly Answer[]} answers @param {readonly Side[]} sides */
 function decisionText(answers, sides) {
   const { better, sure, ends } = decisionOf(reachedOf(answers));
   const unit = distanceUnit(answers[0]);
@@ -265,14 +265,14 @@ function decisionText(answers, sides) {
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
-/** A loss with its numerical error. @param {WornRecord} record @param {typeof LOSSES[number]['key']} key @param {'rail' | 'wheel'} body */
+/** Formats a loss with its numerical error. @param {WornRecord} record @param {typeof LOSSES[number]['key']} key @param {'rail' | 'wheel'} body */
 function lossText(record, key, body) {
   const loss = record.losses[key] ?? NaN;
   const error = loss * numericalOf(record, body);
   return error >= 5e-4 ? plusMinus(loss, error) : fixed(loss, 3);
 }
 
-/** Numbers of the step. @param {readonly WornRecord[]} records @param {readonly ('rail' | 'wheel')[]} bodies The bodies that wear. @param {boolean} compared */
+/** Panel with the numbers of the displayed step. @param {readonly WornRecord[]} records @param {readonly ('rail' | 'wheel')[]} bodies The bodies that wear. @param {boolean} compared */
 function numbersPanel(records, bodies, compared) {
   /** @type {[string, (record: WornRecord) => unknown][]} */
   const rows = [

@@ -1,4 +1,4 @@
-// The form: fields for the common parts of a case, in engineers' units. Members that it does not show stay unchanged in the JSON.
+// The form: fields for the common parts of a case, in engineering units. Members without a field remain unchanged in the JSON.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { CANT, curving, GRAVITY_MM_PER_S2, labelsWithCant, normalLoad, staticLoad } from './curving.js';
@@ -26,7 +26,7 @@ const COMPONENTS = /** @type {const} */ ([
   { key: 'spin_per_mm', label: 'Spin', unit: '1/m', factor: 0.001 },
 ]);
 
-/** Another kind of contact. @param {App} app @param {string} kind */
+/** Changes the kind of contact. @param {App} app @param {string} kind */
 function chooseContact(app, kind) {
   const { document, example, examples } = app.store.get().compose;
   const known = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case));
@@ -35,7 +35,7 @@ function chooseContact(app, kind) {
   editDocument(app, hasSections(kind) ? withEverything(next) : next);
 }
 
-/** A case without cant, as where no wheelset moves through a curve. @param {JsonObject} document */
+/** Returns a case without cant, for motions that are not those of a wheelset. @param {JsonObject} document */
 const withoutCant = (document) => put(document, '/labels', labelsWithCant(document, undefined));
 
 /** @param {App} app */
@@ -101,7 +101,7 @@ function motionFields(app, type) {
 }
 
 /**
- * How a wheel turns: the member of the motion, its name, and the value that it begins with.
+ * Ways to prescribe the rotation of a wheel: member of the motion, label, and initial value.
  * @type {readonly { member: string, label: string, unit: string, factor: number, start: number, only?: string }[]}
  */
 const TURNING = [
@@ -115,13 +115,13 @@ const SIDEWAYS = [
   { member: 'force_y_n', label: 'Lateral force, to the left', unit: 'kN', factor: 1000, start: 4000 },
 ];
 
-/** The motion of a wheel or a wheelset. @param {App} app @param {string} type */
+/** Fields of the motion of a wheel or a wheelset. @param {App} app @param {string} type */
 function wheelFields(app, type) {
   const { document, typing } = app.store.get().compose;
   const given = /** @type {JsonObject} */ (at(document ?? {}, '/motion/wheelset') ?? {});
   const ways = TURNING.filter(({ only }) => !only || only === type);
   const way = ways.find(({ member }) => member in given);
-  // A force of 0 is free rolling, but not while it is being written.
+  // A force or torque of 0 means free rolling, except while it is being entered.
   const free = way && given[way.member] === 0 && (way.only !== undefined) && typing?.pointer !== `/motion/wheelset/${way.member}`;
   const across = SIDEWAYS.find(({ member }) => member in given) ?? SIDEWAYS[0];
   const turn = (/** @type {Event} */ event) => {
@@ -137,7 +137,7 @@ function wheelFields(app, type) {
   };
   const speed = numberAt(given, '/speed_mm_per_s');
   const rate = numberAt(given, '/yaw_rate_rad_per_s');
-  // Another speed on the same curve.
+  // A change of speed keeps the curve radius.
   const drive = (/** @type {JsonValue | undefined} */ next) => change(app, '/motion/wheelset', {
     ...given, speed_mm_per_s: next ?? null, ...(rate && speed && Number(next) > 0 ? { yaw_rate_rad_per_s: (rate * Number(next)) / speed } : {}),
   });
@@ -162,9 +162,9 @@ function wheelFields(app, type) {
 }
 
 /**
- * Inputs of a curve and its cant for a wheelset and its load.
+ * Describes the effect of a curve and its cant on a wheelset and its load.
  * @param {JsonObject | null} document
- * @param {number} radius In mm.
+ * @param {number} radius Curve radius in mm.
  * @param {import('./curving.js').Curving} curve
  * @returns {string[]}
  */
@@ -212,7 +212,7 @@ function sweepFields(app, sweep) {
   });
 }
 
-/** Another kind of motion. Damage and temperature are those of steady rolling. @param {App} app @param {string} kind @param {string} type */
+/** Changes the kind of motion. Transient rolling has no damage or temperature, which assume steady rolling. @param {App} app @param {string} kind @param {string} type */
 function chooseMotion(app, kind, type) {
   const document = app.store.get().compose.document ?? {};
   const next = put(kind === 'wheelset' ? document : withoutCant(document), '/motion', startMotion(kind, type, document.motion));

@@ -1,14 +1,14 @@
-// Numbers as engineers read them: thousands in groups, a true minus, as many digits as the error allows.
+// Formatting of numbers: grouped thousands, a typographic minus, and as many digits as the error allows.
 
 const THIN_SPACE = '\u2009';
 const MINUS = '\u2212';
 const NONE = '–';
-/** Less than this is rounding of what should be 0. */
+/** Magnitude below which a number counts as 0. */
 const ROUNDING = 1e-15;
 const SUPERSCRIPT = '⁰¹²³⁴⁵⁶⁷⁸⁹';
 
 /**
- * A number with so many decimals.
+ * Formats a number with a fixed number of decimals.
  * @param {number} value
  * @param {number} decimals
  */
@@ -22,7 +22,7 @@ export function fixed(value, decimals) {
 }
 
 /**
- * A number to so many significant digits, with a power of ten where it is very large or small.
+ * Formats a number to a number of significant digits, with a power of ten if it is very large or small.
  * @param {number | null | undefined} value
  */
 export function number(value, digits = 4) {
@@ -42,7 +42,7 @@ function superscript(exponent) {
 }
 
 /**
- * A value and its error, both to the second digit of the error.
+ * Formats a value and its error, both to the second significant digit of the error.
  * @param {number} value
  * @param {number | null | undefined} error
  * @returns {{ value: string, error: string }}
@@ -54,7 +54,7 @@ export function withError(value, error) {
   return { value: fixed(value, decimals), error: fixed(error, decimals) };
 }
 
-/** A value with its error in one text. @param {number} value @param {number | null | undefined} error */
+/** Formats a value with its error as one text. @param {number} value @param {number | null | undefined} error */
 export function plusMinus(value, error) {
   const text = withError(value, error);
   return text.error ? `${text.value} ± ${text.error}` : text.value;
@@ -74,7 +74,7 @@ export const count = (value) => fixed(value, 0);
 export const degrees = (radians) => `${fixed((radians * 180) / Math.PI, 1)}°`;
 
 /**
- * Ticks at 1, 2 and 5 times a power of ten, some `wanted` of them.
+ * Returns ticks with steps of 1, 2 or 5 times a power of ten, about `wanted` of them.
  * @param {number} low
  * @param {number} high
  * @param {number} wanted
@@ -90,7 +90,7 @@ export function ticks(low, high, wanted) {
 }
 
 /**
- * The label of one of these ticks: as many decimals as the steps need.
+ * Returns the label of a tick with as many decimals as the step needs.
  * @param {number} value
  * @param {readonly number[]} all
  */
@@ -98,14 +98,14 @@ export function tickLabel(value, all) {
   const largest = Math.max(...all.map(Math.abs));
   if (largest > 0 && (largest < 1e-3 || largest >= 1e6)) return number(value, 2);
   const step = all.length > 1 ? Math.abs(all[1] - all[0]) : Math.abs(value) || 1;
-  // Steps of 2.5 have a digit more than their size tells.
+  // A step such as 2.5 needs one more digit than its magnitude.
   const tens = Math.floor(Math.log10(step) + 1e-9);
   const whole = Math.abs(Math.round(step / 10 ** tens) - step / 10 ** tens) < 1e-6;
   return fixed(value, Math.max(0, (whole ? 0 : 1) - tens));
 }
 
 /**
- * How long ago a time was.
+ * Describes how long ago a time was.
  * @param {string} time
  */
 export function ago(time, now = Date.now()) {

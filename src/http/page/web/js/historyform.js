@@ -1,4 +1,4 @@
-// The form of rolling that changes: what is rolled over, and what the motion is there.
+// Form fields of transient rolling: distances rolled and the motion at each of them.
 
 import { html } from '../vendor/lit-html.js';
 import { at } from './document.js';
@@ -18,10 +18,10 @@ const COURSES = /** @type {const} */ ([
   { key: 'shift_y_mm', label: 'Shift y', unit: 'μm', factor: 0.001 },
 ]);
 
-/** A history to begin with: a creepage that begins at once. */
+/** Initial history: a step of creepage. */
 export const FIRST_HISTORY = /** @type {JsonObject} */ ({ history: { distance_mm: [0.5, 1, 2, 3, 5, 8, 12, 20], creepage_x: 0.001 }, start: 'rest' });
 
-/** @param {App} app @param {string} type Type of the contact; patches of a wheel on a rail share creepages, and do not grow similar to themselves. */
+/** @param {App} app @param {string} type Type of the contact. Forces and the start `pressed` are not available for profiles, whose patches share creepages and do not grow self-similarly. */
 export function historyFields(app, type) {
   const wheel = type === 'profiles';
   const courses = COURSES.filter(({ key }) => !wheel || !key.startsWith('force'));

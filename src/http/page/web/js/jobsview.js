@@ -1,4 +1,4 @@
-// Jobs: batches with their progress, and a list of which only the rows in view exist.
+// The view Jobs: batches with their progress, and a virtual list of jobs that renders only the visible rows.
 
 import { html, nothing, svg } from '../vendor/lit-html.js';
 import { cancel, download } from './api.js';
@@ -15,7 +15,7 @@ import { formatRoute } from './routes.js';
 
 const ROW = 44;
 const SPARE_ROWS = 8;
-/** Batches that have ended and are still shown. */
+/** Number of ended batches that are shown. */
 const ENDED_SHOWN = 3;
 const STATES = /** @type {const} */ (['queued', 'running', 'succeeded', 'failed', 'cancelled']);
 /** @type {Record<State, string>} */
@@ -26,7 +26,7 @@ export function jobsView(app) {
   const queue = queueSeen();
   const jobs = jobsShown();
   const newest = [...queue.batches.values()].filter(isThere).sort((one, two) => (one.id < two.id ? 1 : -1));
-  // Unfinished jobs are always shown; of the others, the newest few.
+  // Unfinished batches are always shown, ended ones only if they are among the newest.
   const shown = newest.filter((batch, at) => !batch.ended || at < ENDED_SHOWN);
   const number = queue.loaded ? html` <span class="quiet n">${count(Math.max(queue.total, jobs.length))}${queue.more ? ' or more' : ''}</span>` : nothing;
   return html`<h1 class="visually-hidden">Jobs</h1>
@@ -40,7 +40,7 @@ export function jobsView(app) {
     </section>`;
 }
 
-/** Returns the usage of the tenant, if it waits or is anonymous. @param {import('./api.js').Schemas['Me'] | null} me */
+/** Shows the use of the queue by the tenant; nothing for an anonymous tenant without queued jobs. @param {import('./api.js').Schemas['Me'] | null} me */
 function usage(me) {
   if (!me || (me.tenant === 'anonymous' && !me.used.queued)) return nothing;
   const share = me.used.queued / Math.max(1, me.quota.queued);
@@ -48,7 +48,7 @@ function usage(me) {
     ${count(me.quota.queued)} places of the queue in use</p>`;
 }
 
-/** Pause after a letter before the list is asked for. */
+/** Delay after a key press before the list is requested. */
 const TYPING_MS = 250;
 let typing = 0;
 
@@ -58,7 +58,7 @@ function filters(app) {
   const text = (/** @type {'label' | 'name'} */ what) => (/** @type {Event} */ event) => {
     const { value } = /** @type {HTMLInputElement} */ (event.target);
     clearTimeout(typing);
-    // A label is complete with its value.
+    // A label without a value is incomplete.
     if (what === 'label' && value && !/^[^:]+:.+/.test(value)) return;
     typing = window.setTimeout(() => value !== queue[what] && filterQueue(app, { [what]: value }), TYPING_MS);
   };
@@ -77,14 +77,14 @@ function filters(app) {
     <label class="inline">Label <input class="search" placeholder="line:A12" .value=${queue.label} @input=${text('label')}></label>`;
 }
 
-/** Ticks all jobs that are loaded, or none. @param {App} app @param {readonly Job[]} jobs */
+/** Checkbox that selects all loaded jobs, or none. @param {App} app @param {readonly Job[]} jobs */
 function allMark(app, jobs) {
   const ids = jobs.map(({ id }) => id);
   const all = ids.length > 0 && marked().size >= ids.length && ids.every((id) => marked().has(id));
   return html`<input type="checkbox" aria-label="Choose all jobs of the list" .checked=${all} @change=${() => mark(app, all ? [] : ids)}>`;
 }
 
-/** Returns the actions on the selected jobs. @param {App} app @param {readonly Job[]} shown */
+/** Bar with the actions on the selected jobs. @param {App} app @param {readonly Job[]} shown */
 function chosenBar(app, shown) {
   const jobs = marked().size ? shown.filter(({ id }) => marked().has(id)) : [];
   if (!jobs.length) return nothing;
@@ -127,7 +127,7 @@ function list(app, jobs) {
   </div>`;
 }
 
-/** The height of rows that are not in view. @param {number} rows */
+/** Spacer with the height of rows that are not rendered. @param {number} rows */
 const spacer = (rows) => svg`<svg class="spacer" width="1" height=${rows * ROW} aria-hidden="true"></svg>`;
 
 /** @param {App} app @param {Job} job */
@@ -154,7 +154,7 @@ function row(app, job) {
 /** @param {Job} job */
 function took(job) {
   if (job.cached) return 'solved before';
-  // Jobs of a batch are solved in groups, whose time is that of none of them.
+  // Jobs of a batch are solved in groups, so that a single job has no time of its own.
   if (job.batch_id) return '';
   if (!job.started_at || !job.ended_at) return '';
   const time = (Date.parse(job.ended_at) - Date.parse(job.started_at)) / 1000;

@@ -1,8 +1,8 @@
-// Elements that are loaded when they are needed.
+// Lazy loading of custom elements.
 
 let loading = false;
 
-/** Loads the elements that draw curves and strips: they are a third of the page, and composing a case does not need them. */
+/** Loads the elements that draw curves and strips. They are a third of the page, and the first view does not need them. */
 export function loadCurves() {
   if (loading) return;
   loading = true;

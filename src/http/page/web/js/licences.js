@@ -1,4 +1,4 @@
-// Licences of what the page holds that others wrote.
+// The view of the licences of third-party parts.
 
 import { html } from '../vendor/lit-html.js';
 

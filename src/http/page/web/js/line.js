@@ -1,4 +1,4 @@
-// The jobs of a batch along a label that is a number, such as the chainage: what the strips show of each.
+// The jobs of a batch along a numeric label such as the chainage, with the quantities of the strips.
 
 import { batch as batchOf, batches as batchesOf, jobs as jobsOf, request, runs as runsOf } from './api.js';
 import { formatRoute } from './routes.js';
@@ -23,9 +23,9 @@ export const STRIPS = [
  * @property {number} count
  * @property {Row[]} rows
  * @property {boolean} done
- * @property {string[]} labels Labels with numbers.
- * @property {string} by The label along which the rows stand; empty for their order.
- * @property {string} worst The strip whose largest values are listed.
+ * @property {string[]} labels Labels with numeric values.
+ * @property {string} by Label by which the rows are sorted; empty for their order in the batch.
+ * @property {string} worst Strip whose largest values are listed.
  * @property {Partial<Record<StripKey, number>>} limits
  * @property {{ from: number, to: number } | null} zoom
  */
@@ -42,7 +42,7 @@ export const lineSeen = () => line;
 /** @type {Offered | null} */
 let offeredHere = null;
 
-/** Batches and runs to choose from; null as long as they are being loaded. */
+/** Returns the batches and runs to choose from; null while they are loading. */
 export const offeredLines = () => offeredHere;
 
 /** @param {App} app @param {string | undefined} id @param {Record<string, string>} query */
@@ -79,10 +79,10 @@ export async function openLine(app, id, query) {
   }
 }
 
-/** Columns of every patch that the strips need, besides labels. */
+/** Columns of the patches that the strips need, without labels. */
 const COLUMNS = ['id', 'index', 'point', 'patch', 'normal_force_n', 'force_x_n', 'force_y_n', 'friction_power_n', 'pressure_max_mpa', 'area_mm2', 'stick_share'];
 
-/** The narrow table of the batch arrives in pieces, one line for each patch and motion. @param {App} app @param {Line} mine */
+/** Reads the table of the batch as a stream, with one line for each patch and motion. @param {App} app @param {Line} mine */
 async function readRows(app, mine) {
   const [first] = (await jobsOf({ batch: mine.batch, limit: 1, fields: 'labels' })).jobs;
   const labels = Object.keys(first?.labels ?? {}).filter((key) => !key.includes(','));
@@ -109,10 +109,10 @@ async function readRows(app, mine) {
 }
 
 /**
- * Makes rows of the lines of a table: the first motion of all patches of a job together.
+ * Creates a reader that combines the lines of a table into rows: the first motion of all patches of a job.
  * @param {readonly string[]} labels
- * @returns {(text: string) => Row | null} Answers a row when the line of the next job, or an empty one, has come; lines without a result are
- *   left out, as the header is.
+ * @returns {(text: string) => Row | null} Returns a row when the line of the next job, or an empty line, has arrived. It skips the header and lines
+ *   without a result.
  */
 export function rowReader(labels) {
   /** @type {{ row: Row, force: number, load: number, area: number, stick: number } | null} */
@@ -145,20 +145,20 @@ export function rowReader(labels) {
   };
 }
 
-/** The cells of a line of CSV. @param {string} text */
+/** Splits a line of CSV into cells. @param {string} text */
 export function splitLine(text) {
   const cells = text.match(/(?<=^|,)("(?:[^"]|"")*"|[^,]*)/g) ?? [''];
   return cells.map((cell) => (cell.startsWith('"') ? cell.slice(1, -1).replaceAll('""', '"') : cell));
 }
 
-/** Labels that are a number in every row. @param {readonly Row[]} rows */
+/** Returns the labels that are numeric in every row. @param {readonly Row[]} rows */
 export function numericLabels(rows) {
   const [first] = rows;
   if (!first) return [];
   return Object.keys(first.labels).filter((key) => rows.every(({ labels }) => labels[key] !== '' && Number.isFinite(Number(labels[key]))));
 }
 
-/** Where a row stands along the line. @param {Row} row @param {string} by */
+/** Returns the position of a row along the track. @param {Row} row @param {string} by */
 export const placeOf = (row, by) => (by ? Number(row.labels[by]) : row.index);
 
 /** @param {Line} of */
@@ -176,7 +176,7 @@ export function chooseLine(app, choice) {
   app.redraw();
 }
 
-/** The rows with the largest values, within what is zoomed to. @param {Line} of @param {number} howMany @returns {Row[]} */
+/** Returns the rows with the largest values within the zoomed range. @param {Line} of @param {number} howMany @returns {Row[]} */
 export function worstRows({ rows, worst, by, zoom }, howMany) {
   const key = STRIPS.find((strip) => strip.key === worst)?.key ?? 'wear';
   const seen = rows.filter((row) => !zoom || (placeOf(row, by) >= zoom.from && placeOf(row, by) <= zoom.to));

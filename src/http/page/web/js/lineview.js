@@ -1,4 +1,4 @@
-// Track: strips along a label that is a number, limits, the worst places, and the way from there to the contact.
+// The view Track: strips along a numeric label, limits, and the worst places with links to their contacts.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { chooseLine, lineSeen, offeredLines, placeOf, STRIPS, worstRows } from './line.js';
@@ -16,7 +16,7 @@ const WORST = 8;
 /** @type {{ rows: readonly import('./line.js').Row[], by: string, x: number[], strips: import('./strips.js').Strip[] } | null} */
 let made = null;
 
-/** The data of the strips, computed once for the rows in order. @param {Line} of */
+/** Returns the data of the strips, cached by the rows and their order. @param {Line} of */
 function stripsOf({ rows, by }) {
   if (made?.rows !== rows || made.by !== by) {
     const strips = STRIPS.map(({ key, label, unit, colour }) => ({ key, label, unit, colour, lines: [{ label, values: rows.map((row) => row[key]) }] }));
@@ -48,7 +48,7 @@ export function lineView(app) {
     : html`<progress max=${line.count || 1} .value=${line.rows.length} aria-label="Loading"></progress>`}</div>`;
 }
 
-/** The view before a choice. @param {import('./line.js').Offered | null} offered */
+/** View for choosing a batch or a run. @param {import('./line.js').Offered | null} offered */
 function choice(offered) {
   if (!offered) return html`<p class="pad quiet">Loading …</p>`;
   const { batches, runs } = offered;
@@ -62,7 +62,7 @@ function choice(offered) {
     <a class="button" href="#/jobs">To the jobs</a></section>`;
 }
 
-/** Limits are drawn into the strips. @param {App} app @param {Line} line */
+/** Fields for the limits that are drawn in the strips. @param {App} app @param {Line} line */
 function limits(app, line) {
   const set = (/** @type {StripKey} */ key) => (/** @type {Event} */ event) => {
     const text = /** @type {HTMLInputElement} */ (event.target).value.trim();

@@ -1,4 +1,4 @@
-// The loads of each wheel on its rail, the margin to Nadal's limit, and the forces of every patch in its own and in track axes.
+// Panel with the loads of each wheel on its rail, the margin to Nadal's limit, and the forces of every patch in local and track axes.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { degrees, fixed, number, plusMinus } from './format.js';
@@ -11,7 +11,7 @@ import { positionOf } from './wheelsetview.js';
 /** @typedef {import('./api.js').JobResult} JobResult */
 /** @typedef {import('./wheelloads.js').WheelLoad} WheelLoad */
 
-/** Patches shown together: those of a wheelset's position, else all. @param {JobResult} answer @param {number} patch The chosen one. */
+/** Returns the patches that are shown together: those of one position of a wheelset, else all. @param {JobResult} answer @param {number} patch The chosen patch. */
 export function patchesWith({ wheelset, patches }, patch) {
   const position = wheelset?.positions[positionOf(wheelset, patch)];
   return position ? [...position.left.patches, ...position.right.patches] : [...patches.keys()];

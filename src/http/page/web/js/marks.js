@@ -1,14 +1,14 @@
-// The jobs that are ticked, for comparing or deleting them.
+// The selection of jobs for comparison or deletion.
 
 /** @typedef {import('./state.js').App} App */
 
-// As many as stand side by side in a window; chosen by judgement.
+// Largest number of compared jobs, so that they fit side by side in a window; chosen by judgement.
 export const COMPARED_MAX = 4;
 
 /** @type {ReadonlySet<string>} */
 let ids = new Set();
 
-/** In the order in which they were ticked. */
+/** Returns the selected ids in the order of selection. */
 export const marked = () => ids;
 
 /** @param {App} app @param {Iterable<string>} wanted */
@@ -17,5 +17,5 @@ export function mark(app, wanted) {
   app.redraw();
 }
 
-/** Ticks a job, or takes the tick away. @param {App} app @param {string} id */
+/** Selects or deselects a job. @param {App} app @param {string} id */
 export const toggleMark = (app, id) => mark(app, ids.has(id) ? [...ids].filter((other) => other !== id) : [...ids, id]);

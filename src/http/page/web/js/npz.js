@@ -1,4 +1,4 @@
-// NumPy archives as typed arrays, unpacked by the browser itself.
+// Reads NumPy archives into typed arrays. The browser decompresses them.
 
 /** @typedef {Float64Array | Float32Array | Int32Array | Uint32Array | Int8Array | Uint8Array} Values */
 /** @typedef {{ shape: number[], values: Values }} NamedArray */
@@ -9,7 +9,7 @@ const STORED = 0;
 /**
  * @param {ArrayBuffer} archive
  * @returns {Promise<Record<string, NamedArray>>}
- * @throws {Error} The archive is broken, or holds a kind of numbers that the service does not write.
+ * @throws {Error} If the archive is broken or has an unsupported number type.
  */
 export async function readNpz(archive) {
   const view = new DataView(archive);

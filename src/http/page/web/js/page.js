@@ -1,4 +1,4 @@
-// The start of the page: its state, the way from addresses to views, and what every view may ask for.
+// Entry point of the page: its state, routing, and the functions that all views use.
 
 import { health, Refused } from './api.js';
 import { openComparison } from './compare.js';
@@ -49,7 +49,7 @@ const app = {
     if (location.hash === address) follow();
     else location.hash = address;
   },
-  // Writing the address takes milliseconds, and browsers refuse to do it often.
+  // Changes of the address are slow, and browsers limit their rate.
   remember(address) {
     clearTimeout(addressTimer);
     addressTimer = window.setTimeout(() => {
@@ -59,7 +59,7 @@ const app = {
   },
 };
 
-/** Shows what the address says. */
+/** Opens the view of the address. */
 function follow() {
   clearTimeout(addressTimer);
   const before = store.get().route;
@@ -97,7 +97,7 @@ addEventListener('keydown', (event) => {
   event.preventDefault();
   solve(app);
 });
-// Files may be dropped anywhere. The browser would open them in place of the page.
+// Files can be dropped anywhere. Without these handlers the browser would open them instead of the page.
 addEventListener('dragover', (event) => {
   if (event.dataTransfer?.types.includes('Files')) event.preventDefault();
 });
@@ -110,14 +110,14 @@ addEventListener('drop', (event) => {
   app.go(formatRoute('compose'));
   takeProfiles(app, files).catch(app.refused);
 });
-// The first picture after "Solve" ends the time that the reader waited.
+// The first picture after "Solve" ends the measured waiting time.
 root.addEventListener('drawn', () => {
   if (store.get().route.view !== 'result' || !performance.getEntriesByName('solve').length) return;
   performance.measure('solve to picture', 'solve');
   performance.clearMarks('solve');
 });
 setInterval(lookAtHealth, HEALTH_MS);
-// Ready before they are needed, but not before the page is.
+// The elements are loaded in advance, but after the page itself.
 setTimeout(loadCurves, CURVES_MS);
 lookAtHealth();
 openKept(app);

@@ -1,4 +1,4 @@
-// Cross-sections of rail and wheel where the service places them, and the gap between the two.
+// Cross-sections of rail and wheel as placed by the service, the gap between them, and coordinates on them.
 
 import { isSolvedBent } from './starts.js';
 import { outward, sideOf } from './wheelloads.js';
@@ -11,12 +11,12 @@ import { nearest } from './wheelsetdata.js';
 /**
  * @typedef {object} Placed
  * @property {Place[]} rail
- * @property {Place[]} wheel At the height of first touch.
- * @property {Place} touch Where it touches first.
- * @property {Place[]} gap y and the vertical distance of the two.
+ * @property {Place[]} wheel Wheel at the height of first contact.
+ * @property {Place} touch Point of first contact.
+ * @property {Place[]} gap y and the vertical distance between rail and wheel.
  */
 
-/** Samples per mm at which the two are compared. */
+/** Samples per mm of the gap. */
 const PER_MM = 5;
 
 /**
@@ -33,7 +33,7 @@ export function placed(placement) {
 }
 
 /**
- * The vertical distance of the wheel's lower side from the rail's upper one, where both are.
+ * Returns the vertical distance from the top of the rail to the bottom of the wheel, where both exist.
  * @param {readonly Place[]} rail
  * @param {readonly Place[]} wheel
  * @returns {Place[]}
@@ -46,7 +46,7 @@ export function gapOf(rail, wheel) {
 }
 
 /**
- * The highest or lowest point of a line at every step.
+ * Returns the highest or lowest point of a line at every sample.
  * @param {readonly Place[]} line
  * @param {(one: number, two: number) => number} pick
  */
@@ -66,9 +66,10 @@ function envelope(line, pick) {
 }
 
 /**
- * Places over a line by the arc length from one of its points, positive to the left, and the height along its normal.
+ * Returns a map from arc length and height to track axes: the arc length is measured along a line from one of its points, positive to the left,
+ * and the height along its normal.
  * @param {readonly Readonly<Place>[]} line From end to end.
- * @param {Readonly<Place>} from A place on the line, or close to it.
+ * @param {Readonly<Place>} from Origin of the arc length, on the line or close to it.
  * @returns {(along: number, height: number) => Place}
  */
 export function unfolded(line, from) {
@@ -98,9 +99,9 @@ export function unfolded(line, from) {
 }
 
 /**
- * The y of a cross-section, positive to the field side, of places in track axes.
- * @param {Place} from A place in track axes,
- * @param {number} fromY its y on the cross-section,
+ * Returns a map from places in track axes to the y coordinate of a cross-section, positive to the field side.
+ * @param {Place} from A place in track axes.
+ * @param {number} fromY The y coordinate of `from` on the cross-section.
  * @param {import('./wheelloads.js').Side} side
  * @param {number} cant Turn of the cross-section with its top toward the track centre, in rad.
  * @returns {(place: Place) => number}
@@ -108,10 +109,10 @@ export function unfolded(line, from) {
 const onSection = (from, fromY, side, cant) => ([y, z]) => fromY + outward(side, y - from[0]) * Math.cos(cant) + (z - from[1]) * Math.sin(cant);
 
 /**
- * The place on a line whose coordinate of the cross-section, y to the field side, is given.
+ * Returns a map from the y coordinate of a cross-section, positive to the field side, to the highest such place on its line.
  * @param {readonly Place[]} line In track axes.
- * @param {Place} from A place of the line in track axes,
- * @param {number} fromY its y on the cross-section,
+ * @param {Place} from A place of the line in track axes.
+ * @param {number} fromY The y coordinate of `from` on the cross-section.
  * @param {import('./wheelloads.js').Side} side
  * @param {number} cant Turn of the cross-section with its top toward the track centre, in rad.
  * @returns {(y: number) => Place}
@@ -132,11 +133,11 @@ export function placeOn(line, from, fromY, side, cant) {
 }
 
 /**
- * Places over the surface of a patch, by the coordinate across the patch and the height over it: a plane, or the rail itself.
+ * Returns a map from the lateral coordinate of a patch and the height above its surface to track axes. The surface is a plane or the rail itself.
  * @param {import('./api.js').Patch} patch
  * @param {readonly Readonly<Place>[]} rail
  * @param {boolean} bent
- * @returns {((across: number, height: number) => Place) | null} Null for a patch without a place.
+ * @returns {((across: number, height: number) => Place) | null} Null for a patch without a position.
  */
 export function surfaceOf({ position }, rail, bent) {
   if (!position) return null;
@@ -147,11 +148,11 @@ export function surfaceOf({ position }, rail, bent) {
 }
 
 /**
- * The y on a cross-section, positive to the field side, by the coordinate across a patch on it.
+ * Returns a map from the lateral coordinate of a patch to the y coordinate of a cross-section, positive to the field side.
  * @param {import('./api.js').Patch} patch
  * @param {'rail' | 'wheel'} body
  * @param {import('./wheelloads.js').Side} side
- * @param {import('./result.js').Standing | undefined} standing The wheel on its rail, once it is known; a plane is taken before.
+ * @param {import('./result.js').Standing | undefined} standing The placed wheel and rail; a plane is used while undefined.
  * @param {boolean} bent
  * @returns {(across: number) => number}
  */
@@ -166,14 +167,14 @@ export function acrossSection(patch, body, side, standing, bent) {
 
 /** @typedef {Pick<import('./compare.js').Side, 'result' | 'patch' | 'document' | 'sections' | 'field'>} OnRail A patch of a result. */
 
-/** Places across the second patch among which that of a place of the first is found. */
+/** Number of samples across the second patch among which the nearest point is searched. */
 const SAMPLES = 400;
 
 /**
- * Where a place of one patch is in the other, if both lie on the same place of the rail.
+ * Returns a map from places of one patch to places of the other at the same position on the rail.
  * @param {OnRail} one
  * @param {OnRail} two
- * @returns {((place: { x: number, y: number }) => { x: number, y: number }) | null} Null where the patches have no place.
+ * @returns {((place: { x: number, y: number }) => { x: number, y: number }) | null} Null if the patches have no position.
  */
 export function onSameRail(one, two) {
   const [first, second] = [one, two].map(onRail);
@@ -182,7 +183,7 @@ export function onSameRail(one, two) {
   const [low, high] = [Math.min(...ys) - 1, Math.max(...ys) + 1];
   const places = Array.from({ length: SAMPLES + 1 }, (_, at) => low + ((high - low) * at) / SAMPLES);
   const points = places.map(second.of);
-  /** Cells of a strip lie at one y. @type {Map<number, number>} */
+  /** Cache by y; all cells of a strip have the same y. @type {Map<number, number>} */
   const known = new Map();
   return ({ x, y }) => {
     if (!known.has(y)) {
@@ -194,7 +195,7 @@ export function onSameRail(one, two) {
   };
 }
 
-/** Points of the rail, y to the field side and z up, by the coordinate across a patch: along its plane, or along the rail. @param {OnRail} side */
+/** Returns a map from the lateral coordinate of a patch, along its plane or along the rail, to points of the rail with y to the field side and z up. @param {OnRail} side */
 function onRail({ result, patch, document, sections }) {
   const { position } = result.patches[patch];
   if (!position) return null;
@@ -202,7 +203,7 @@ function onRail({ result, patch, document, sections }) {
   const hand = y0 > 0 ? 'left' : 'right';
   /** @type {readonly Place[]} */
   const rail = isSolvedBent(document, result, patch) && sections ? sections.rail : [];
-  // The rail on the left is that on the right, mirrored.
+  // The left rail is the mirrored right rail.
   const own = sideOf(document) === hand ? rail : rail.map(([y, z]) => /** @type {Place} */ ([-y, z]));
   const surface = surfaceOf(result.patches[patch], own, own.length > 0);
   return { x, of: (/** @type {number} */ across) => {

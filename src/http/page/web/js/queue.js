@@ -1,4 +1,4 @@
-// The jobs and batches of the tenant: what is loaded of them, and how events keep them up to date.
+// The loaded jobs and batches of the tenant, updated by events.
 
 import { batches as batchesOf, jobs as jobsOf, me as askMe } from './api.js';
 import { isThere } from './deleting.js';
@@ -11,26 +11,26 @@ import { isTyped } from './typed.js';
 
 /**
  * @typedef {object} Queue
- * @property {Job[]} jobs The newest first, as far as they are loaded.
- * @property {string} cursor Where the next page begins; empty at the end.
+ * @property {Job[]} jobs Loaded jobs, newest first.
+ * @property {string} cursor Cursor of the next page; empty at the end.
  * @property {boolean} loaded
- * @property {number} total Of all that pass the filter.
- * @property {boolean} more There are more than `total`.
- * @property {string[]} states Only jobs in one of these; none for all.
- * @property {string} label Only jobs with this label, `key:value`; empty for all.
- * @property {string} name Only jobs whose name contains this.
- * @property {string} batch Only jobs of this batch; `none` for those that were submitted alone, empty for all.
+ * @property {number} total Number of jobs that match the filter.
+ * @property {boolean} more Whether there may be more than `total`.
+ * @property {string[]} states Filter by state; empty for all.
+ * @property {string} label Filter by label, `key:value`; empty for all.
+ * @property {string} name Filter by a part of the name.
+ * @property {string} batch Filter by batch; `none` for jobs without a batch, empty for all.
  * @property {Map<string, Batch>} batches
- * @property {import('./api.js').Schemas['Me'] | null} me Who asks, and what is used.
- * @property {number} top Pixels that the list is scrolled by.
+ * @property {import('./api.js').Schemas['Me'] | null} me The tenant and its usage.
+ * @property {number} top Scroll position of the list in pixels.
  */
 
 const PAGE = 200;
 const MORE = 1000;
 const BATCHES = 20;
-/** Events of batches say nothing of their jobs: these are looked at again, but not more often than this. */
+/** Minimum interval of refreshing the jobs after events of batches, which do not include their jobs. */
 const REFRESH_MS = 1000;
-/** Deletions by other clients are not reported by events. */
+/** Interval of a regular refresh: events do not report deletions by other clients. */
 const SELDOM_MS = 20_000;
 
 /** @type {Queue} */
@@ -45,15 +45,15 @@ let loadingMore = false;
 
 export const queueSeen = () => queue;
 
-/** The jobs of the list, without those that are being deleted. */
+/** Returns the jobs of the list without deleted ones. */
 export const jobsShown = () => queue.jobs.filter(isThere);
 
-/** Shows the lists, and follows everything of the tenant in one stream. @param {App} app */
+/** Loads the lists and follows all events of the tenant in one stream. @param {App} app */
 export function startQueue(app) {
   stopQueue();
   stopping = new AbortController();
   const { signal } = stopping;
-  // The list is where it was left, as soon as its rows are there.
+  // The scroll position is restored when the rows have been rendered.
   requestAnimationFrame(() => {
     const list = document.querySelector('.list');
     if (list) list.scrollTop = queue.top;
@@ -82,7 +82,7 @@ const filter = () => ({
   fields: 'batch_id,id,state,name,labels,created_at,started_at,ended_at,cached,progress',
 });
 
-/** Loads batches and the newest page again, and puts it before what is loaded. @param {App} app */
+/** Reloads the batches and the newest page of jobs; older loaded jobs are kept. @param {App} app */
 async function refresh(app) {
   const { signal } = stopping;
   const mine = turn;
@@ -91,7 +91,7 @@ async function refresh(app) {
     if (signal.aborted || mine !== turn) return;
     const fresh = new Set(page.jobs.map((job) => job.id));
     const oldest = page.jobs[page.jobs.length - 1]?.id ?? '';
-    // Ids sort by time: what is older than the page stays as it was loaded.
+    // Ids sort by time, so that jobs older than the page are kept as loaded.
     const older = page.next_cursor ? queue.jobs.filter((job) => job.id < oldest && !fresh.has(job.id)) : [];
     queue.jobs = [...page.jobs.filter((job) => !isTyped(job)), ...older];
     if (!older.length) queue.cursor = page.next_cursor ?? '';
@@ -107,16 +107,16 @@ async function refresh(app) {
   }
 }
 
-/** Loads more where the list is scrolled to its end; it is as high as its rows after the next frame. @param {App} app */
+/** Loads more if the list is scrolled near its end. The height of the list is known after the next frame. @param {App} app */
 const fill = (app) => requestAnimationFrame(() => isNearEnd(document.querySelector('.list')) && loadMore(app));
 
-/** Pixels before the end of the list at which the next page is loaded. */
+/** Distance in pixels from the end of the list at which the next page is loaded. */
 const AHEAD = 40 * 44;
 
 /** @param {Element | null} list */
 export const isNearEnd = (list) => list !== null && list.scrollTop > 0 && list.scrollTop + list.clientHeight > list.scrollHeight - AHEAD;
 
-/** Looks again before long, after something was changed. @param {App} app */
+/** Schedules a refresh after a change. @param {App} app */
 export function refreshSoon(app, pause = 0) {
   soon ||= window.setTimeout(() => {
     soon = 0;
@@ -124,7 +124,7 @@ export function refreshSoon(app, pause = 0) {
   }, pause);
 }
 
-/** A job that was submitted alone has changed. @param {App} app @param {Job} job */
+/** Handles an event of a job without a batch. @param {App} app @param {Job} job */
 function takeJob(app, job) {
   if (isTyped(job)) return;
   const known = queue.jobs.some(({ id }) => id === job.id);
@@ -150,7 +150,7 @@ export function filterQueue(app, wanted) {
   refresh(app);
 }
 
-/** Loads the next page, when the list is scrolled near its end. @param {App} app */
+/** Loads the next page if there is one. @param {App} app */
 export async function loadMore(app) {
   if (loadingMore || !queue.cursor) return;
   loadingMore = true;

@@ -1,4 +1,4 @@
-// Remarks of the service: warnings first, notes folded, and what is said several times said once.
+// Remarks of the service: warnings first, notes folded, and equal remarks merged.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { wordsOf } from './words.js';
@@ -8,7 +8,7 @@ import { wordsOf } from './words.js';
 /** @typedef {{ patch?: number, point?: number }} Place */
 
 /**
- * Remarks with the same text but for their places, together.
+ * Groups remarks that differ only in their patch or motion.
  * @param {readonly Remark[]} remarks
  * @returns {Group[]}
  */
@@ -26,9 +26,9 @@ export function grouped(remarks) {
 }
 
 /**
- * Warnings in sight, notes folded.
+ * Shows warnings, and notes in a folded section.
  * @param {readonly Remark[]} remarks
- * @param {(place: Place) => void} [go] To the patch or motion that a remark is about.
+ * @param {(place: Place) => void} [go] Opens the patch or motion of a remark.
  */
 export function remarkList(remarks, go) {
   const groups = grouped(remarks);
@@ -39,7 +39,7 @@ export function remarkList(remarks, go) {
     ${notes.length ? html`<details class="notes"><summary>${notes.length === 1 ? '1 note' : `${notes.length} notes`}</summary>${notes.map((group) => entry(group, go))}</details>` : nothing}</div>`;
 }
 
-/** The name of a value of the case; its pointer where it has none. @param {string} pointer */
+/** Shows the name of a value of the case, or its pointer if it has no name. @param {string} pointer */
 export function inWords(pointer) {
   const { label, known } = wordsOf(pointer);
   return known ? html`<span title=${pointer}>${label}</span>` : html`<code>${pointer}</code>`;

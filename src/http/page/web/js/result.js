@@ -1,4 +1,4 @@
-// The result that is being looked at: what is loaded of it, and which part is chosen.
+// State of the view Result: the loaded data of a job and the selection.
 
 import { caseOf, checkCase, job as jobOf, Refused, result as resultOf, stresses as stressesOf } from './api.js';
 import { follow } from './events.js';
@@ -21,38 +21,38 @@ import { firstPatch, flangeAngle, oneWheel, sideOf } from './wheelloads.js';
 
 /**
  * @typedef {object} Standing
- * A wheel on its rail in track axes.
+ * A wheel on its rail, in track axes.
  * @property {import('./placing.js').Placed} placed
  * @property {import('./placing.js').Placement['first_touch']} touch
- * @property {number} shift Of the wheelset to the left, in mm.
- * @property {number} cant Of the rail, in rad.
+ * @property {number} shift Shift of the wheelset to the left, in mm.
+ * @property {number} cant Inclination of the rail, in rad.
  */
 
 /**
  * @typedef {object} Looked
- * A job with its result, and what is chosen of it.
+ * A job with its result and the selection.
  * @property {Job} job
  * @property {JobResult | null} result
  * @property {JsonObject | null} document The case.
- * @property {import('./placing.js').Placed | null} placed Its cross-sections.
+ * @property {import('./placing.js').Placed | null} placed Placed cross-sections of a single wheel and rail.
  * @property {Map<string, Promise<Field>>} asked Fields by patch and motion.
  * @property {(Field | undefined)[]} fields Fields of the chosen motion, by patch.
- * @property {Map<string, Stresses | null>} stresses Below the surface, by patch and motion; null while they are being loaded.
+ * @property {Map<string, Stresses | null>} stresses Stresses below the surface, by patch and motion; null while loading.
  * @property {Partial<Record<'left' | 'right', Standing>>} wheels Wheels of a wheelset.
- * @property {Partial<Record<'left' | 'right', number>>} flange Angle of the flange of each wheel in rad, where it has one.
- * @property {'rail' | 'wheel'} wornBody On which cross-section wear is shown.
- * @property {boolean} ownScale Colours of one patch and motion alone, not one range for all.
- * @property {boolean} near Of the profiles, only what is around the patches is drawn.
+ * @property {Partial<Record<'left' | 'right', number>>} flange Flange angle of each wheel in rad; absent for a wheel without a flange.
+ * @property {'rail' | 'wheel'} wornBody Body on which wear is shown.
+ * @property {boolean} ownScale Whether the range of colours is that of the shown patch and motion, instead of a common one.
+ * @property {boolean} near Whether only the surroundings of the patches are drawn, instead of the whole profiles.
  * @property {number} patch
  * @property {number} point
- * @property {string} quantity Its key; empty if there is no field.
- * @property {{ x: number, y: number } | null} held Where the crosshair is held.
+ * @property {string} quantity Key of the shown quantity; empty if there is no field.
+ * @property {{ x: number, y: number } | null} held Fixed position of the crosshair.
  * @property {boolean} border
  * @property {boolean} arrows
  * @property {boolean} mesh
  * @property {import('./curvedata.js').CurveKind} curve
  * @property {import('./wheelsetdata.js').Kind} wheelset
- * @property {string} window The pair of EN 15302 whose window is drawn; empty for none.
+ * @property {string} window Pair of EN 15302 whose window is drawn; empty for none.
  */
 
 /** @type {Looked | null} */
@@ -61,7 +61,7 @@ let following = new AbortController();
 
 export const lookedAt = () => looked;
 
-/** The motion that tells most: the force nearest to 65 % of the largest. @param {readonly Point[]} points */
+/** Returns the motion to show first, whose force is nearest to 65 % of the largest. @param {readonly Point[]} points */
 export function tellingPoint(points) {
   const forces = points.map((point) => Math.hypot(point.force_x_n, point.force_y_n));
   const wanted = 0.65 * Math.max(...forces);
@@ -75,7 +75,7 @@ const fresh = (job) => ({
 });
 
 /**
- * A job that has just been submitted, with its case: it need not be asked for again.
+ * Opens a job that has just been submitted, without requesting its case again.
  * @param {App} app
  * @param {Job} job
  * @param {JsonObject} document
@@ -88,7 +88,7 @@ export function adoptJob(app, job, document) {
 }
 
 /**
- * Opens what an address names.
+ * Opens the job of an address.
  * @param {App} app
  * @param {string} id
  * @param {Record<string, string>} query
@@ -168,7 +168,7 @@ function show(app, result) {
   loadFields(app).catch(app.refused);
 }
 
-/** Asks where the cross-sections of the case lie, and how steep the flanges are. @param {App} app */
+/** Requests the placement of the cross-sections and computes the flange angles. @param {App} app */
 async function placeProfiles(app) {
   const mine = looked;
   if (!mine?.document) return;
@@ -190,7 +190,7 @@ async function placeProfiles(app) {
   if (looked === mine) app.redraw();
 }
 
-/** The stresses below a patch for the chosen motion; asked for when they are first needed. @param {App} app @param {Looked} of @param {number} patch */
+/** Returns the stresses below a patch for the chosen motion. They are requested at the first call. @param {App} app @param {Looked} of @param {number} patch */
 export function stressesBelow(app, of, patch) {
   const { job, point, result } = of;
   const name = `${patch}/${point}`;
@@ -224,7 +224,7 @@ async function loadFields(app) {
 }
 
 /**
- * Chooses another part of the result, and writes it into the address.
+ * Changes the selection and writes it into the address.
  * @param {App} app
  * @param {Partial<Looked>} choice
  */
@@ -249,7 +249,7 @@ export function rememberView(app) {
 /** Returns the coefficient of friction; NaN if the case has another law. @param {Looked} of */
 export const frictionOf = ({ document }) => numberAt(document ?? undefined, '/friction/coefficient');
 
-/** The range of colours: of the chosen patch and motion alone, or one for all of them. @param {Looked} of @param {Quantity} quantity */
+/** Returns the range of colours: that of the chosen patch and motion, or a common one. @param {Looked} of @param {Quantity} quantity */
 export function rangeShown(of, quantity) {
   const own = of.fields[of.patch];
   if (of.ownScale && own) return rangeOf(quantity, [own.cells], NaN);
@@ -259,5 +259,5 @@ export function rangeShown(of, quantity) {
   return rangeOf(quantity, cells, bound);
 }
 
-/** Was the job removed since? @param {unknown} error @returns {error is Refused} */
+/** Returns whether an error means that the job no longer exists. @param {unknown} error @returns {error is Refused} */
 export const isGone = (error) => error instanceof Refused && (error.status === 404 || error.status === 410);

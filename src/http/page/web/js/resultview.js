@@ -1,4 +1,4 @@
-// Result: the numbers with their errors, the field, the patches on the profiles, the creep curve, and how it was computed.
+// The view Result: numbers with errors, fields, patches on the profiles, creep curve, and details of the computation.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { cancel, submit } from './api.js';
@@ -57,7 +57,7 @@ function edit(app, looked) {
 
 const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
-/** Is this a wheel on a rail that are not both new ones of the examples? @param {App} app @param {JsonObject | null} document */
+/** Returns whether a case of profiles differs from the standard profiles of the examples. @param {App} app @param {JsonObject | null} document */
 function isWorn(app, document) {
   const { examples } = app.store.get().compose;
   const differs = (/** @type {'rail' | 'wheel'} */ body) => JSON.stringify(at(document ?? undefined, `/contact/${body}`)) !== JSON.stringify(standardSection(examples, body));
@@ -73,14 +73,14 @@ async function compareWithNew(app, { document, job }) {
   app.go(formatRoute('compare', [other.id, job.id]));
 }
 
-/** Solves a case whose profiles are too rough. @param {App} app @param {Looked} looked */
+/** Solves a case in spite of its rough profiles. @param {App} app @param {Looked} looked */
 function allTheSame(app, looked) {
   if (!looked.document) return;
   editDocument(app, put(looked.document, '/contact/accept_rough_profiles', true));
   solve(app);
 }
 
-/** A job without a result. @param {App} app @param {Looked} looked */
+/** Panel of a job without a result. @param {App} app @param {Looked} looked */
 function waiting(app, looked) {
   const { job } = looked;
   switch (job.state) {
@@ -128,7 +128,7 @@ function loaded(app, looked, answer) {
     ${damagePanel(app, looked, answer, () => again(app, looked.document))}`;
 }
 
-/** Solves a case again with the smoothing that warnings on its profiles advise. @param {App} app @param {Looked} looked @param {JobResult} answer */
+/** Button that solves the case again with the smoothing suggested by warnings. @param {App} app @param {Looked} looked @param {JobResult} answer */
 function smoothAgain(app, looked, answer) {
   /** @type {Record<string, number>} */
   const lengths = {};
@@ -145,7 +145,7 @@ function smoothAgain(app, looked, answer) {
   return html`<p class="advice"><button class="small" @click=${solveSmooth}>Solve again with ${advised.map(([pointer, length]) => `the ${pointer.split('/').pop()} smoothed by ${number(length, 2)} mm`).join(' and ')}</button></p>`;
 }
 
-/** Solves a case again with all that is drawn. @param {App} app @param {JsonObject | null} document */
+/** Solves a case again with all outputs that the page draws. @param {App} app @param {JsonObject | null} document */
 function again(app, document) {
   if (!document) return;
   editDocument(app, isObject(document.motion) && 'history' in document.motion ? { ...document, outputs: withFields(document.outputs) } : withEverything(withSpeed(document)));
@@ -154,7 +154,7 @@ function again(app, document) {
 
 /** @param {Looked} looked @param {Patch} patch @param {Point} point */
 function figures(looked, patch, point) {
-  // Some motions have a region and a pressure of their own.
+  // Some motions have their own region and pressure.
   const region = { ...patch, ...point.region };
   const errors = point.error_estimate;
   const friction = frictionOf(looked);
@@ -210,7 +210,7 @@ function fieldPanel(app, looked, answer) {
   </section>`;
 }
 
-/** Colours of the chosen patch and motion alone, or one range for all, which ends at the largest μp. @param {App} app @param {Looked} looked @param {JobResult} answer */
+/** Choice between the range of colours of the chosen patch and motion and a common one, which extends to the largest μp for tractions. @param {App} app @param {Looked} looked @param {JobResult} answer */
 function scaleChoice(app, looked, answer) {
   const bounded = quantityOf(looked.quantity)?.bounded;
   if (!bounded && answer.patches.length < 2 && answer.patches[0].points.length < 2) return nothing;
@@ -218,7 +218,7 @@ function scaleChoice(app, looked, answer) {
     <option value="own" ?selected=${looked.ownScale}>own</option><option value="common" ?selected=${!looked.ownScale}>common${bounded ? ', to μp' : ''}</option></select></label>`;
 }
 
-/** Two maps of amounts, both for every kind of colour vision. */
+/** Choice between two colour maps, both suitable for colour-blind readers. */
 function colourChoice() {
   const pick = (/** @type {Event} */ event) => {
     chooseAmounts(/** @type {HTMLSelectElement} */ (event.target).value === 'cividis' ? 'cividis' : 'viridis');
@@ -227,7 +227,7 @@ function colourChoice() {
   return html`<label>colours <select class="slim" @change=${pick}>${['viridis', 'cividis'].map((name) => html`<option ?selected=${chosenAmounts() === name}>${name}</option>`)}</select></label>`;
 }
 
-/** Small maps of all patches, at one scale of length and one of colour. @param {App} app @param {Looked} looked @param {JobResult} answer */
+/** Small maps of all patches with common scales of length and colour. @param {App} app @param {Looked} looked @param {JobResult} answer */
 function thumbnails(app, looked, answer) {
   const quantity = quantityOf(looked.quantity);
   const indices = looked.fields.map((field) => field && indexOf(field));
@@ -244,16 +244,16 @@ function thumbnails(app, looked, answer) {
   })}</div>`;
 }
 
-/** The wheel and the shift that a patch of a wheelset belongs to. @param {JobResult} answer @param {number} patch */
+/** Shows the wheel and the shift of a patch of a wheelset. @param {JobResult} answer @param {number} patch */
 function wheelOf({ wheelset }, patch) {
   const position = wheelset?.positions.find(({ left, right }) => left.patches.includes(patch) || right.patches.includes(patch));
   return position ? html`<small>${position.left.patches.includes(patch) ? 'left' : 'right'}, shift ${fixed(position.lateral_shift_mm, 1)} mm</small>` : nothing;
 }
 
-/** The name of a column of cells, with its unit. @param {string} name @param {boolean} bent */
+/** Returns the heading of a column of cells, with its unit. @param {string} name @param {boolean} bent */
 const columnName = (name, bent) => (bent && name === 'y_mm' ? 's / mm' : name.replace(/_mm$/, ' / mm').replace(/_mpa$/, ' / MPa').replace(/_c$/, ' / °C').replaceAll('_', ' '));
 
-/** The field as a table, for those who read rather than look. @param {import('./fields.js').Field} field @param {boolean} bent */
+/** The field as an accessible table. @param {import('./fields.js').Field} field @param {boolean} bent */
 function cellTable({ cells }, bent) {
   const columns = /** @type {(keyof typeof cells)[]} */ (Object.keys(cells)).filter((name) => !['dx_mm', 'dy_mm', 'strip'].includes(name));
   const rows = Math.min(cells.x_mm.length, TABLE_ROWS);
@@ -321,7 +321,7 @@ function curvePanel(app, looked, patch) {
 /** @param {unknown} label @param {unknown} value */
 const row = (label, value) => html`<div><dt>${label}</dt><dd>${value}</dd></div>`;
 
-/** The sum of patches that have no place in a track. @param {JobResult} answer @param {number} point */
+/** Panel with the total of patches without positions in a track. @param {JobResult} answer @param {number} point */
 function totalPanel(answer, point) {
   const total = answer.total[point];
   if (!total) return nothing;

@@ -1,10 +1,10 @@
-// The address of the page: which view, and all that is needed to see the same again.
+// Conversion between the address of the page and its view with the selection.
 
 /**
  * @typedef {object} Route
  * @property {'compose' | 'jobs' | 'result' | 'compare' | 'line' | 'forecast' | 'licences'} view
- * @property {string[]} ids Jobs, or the batch, that the view is about.
- * @property {Record<string, string>} query What the view shows of them.
+ * @property {string[]} ids Ids of the shown jobs, batch, run or forecasts.
+ * @property {Record<string, string>} query Selection within the view.
  */
 
 const VIEWS = /** @type {const} */ (['compose', 'jobs', 'compare', 'line', 'forecast', 'licences']);
@@ -25,7 +25,7 @@ export function parseRoute(hash) {
 /**
  * @param {Route['view']} view
  * @param {readonly string[]} [ids]
- * @param {Record<string, string | number | undefined>} [query] Members that are undefined or empty are left out.
+ * @param {Record<string, string | number | undefined>} [query] Undefined and empty members are omitted.
  */
 export function formatRoute(view, ids = [], query = {}) {
   const path = ['#', view === 'result' ? 'jobs' : view, ...ids.map(encodeURIComponent)].join('/');

@@ -1,4 +1,4 @@
-// A run along a column that was carried along with its rows: totals of intervals and sections by the service, and the worst rows.
+// A run along one of its extra columns: totals by interval and section from the service, and the worst rows.
 
 import { request, run as runOf, runRow, runTotals, submit } from './api.js';
 import { ticks } from './format.js';
@@ -27,26 +27,26 @@ export const QUANTITIES = [
  * @typedef {object} RunLine
  * @property {string} id
  * @property {Run} run
- * @property {readonly string[]} numbers Columns of numbers along which rows may stand.
- * @property {readonly string[]} texts Columns of texts that part the rows.
- * @property {string} by Along which of the numbers.
- * @property {string} part By which column the sections are.
- * @property {number} width Of the intervals, if that is a column of numbers.
- * @property {RunTotals | null} along By intervals of `by`.
- * @property {number} step Their length.
+ * @property {readonly string[]} numbers Numeric columns by which rows can be ordered.
+ * @property {readonly string[]} texts Text columns by which rows can be divided into sections.
+ * @property {string} by Numeric column of the horizontal axis.
+ * @property {string} part Column that defines the sections.
+ * @property {number} width Width of the sections if `part` is numeric.
+ * @property {RunTotals | null} along Totals by intervals of `by`.
+ * @property {number} step Length of the intervals of `along`.
  * @property {RunTotals | null} sections
- * @property {string} worst The quantity whose largest values are listed.
+ * @property {string} worst Quantity whose largest values are listed.
  * @property {readonly WorstRow[] | null} rows
- * @property {number} searched Rows that were read for them.
- * @property {Record<string, number>} limits In the units of the quantities.
+ * @property {number} searched Number of rows read in the search for `rows`.
+ * @property {Record<string, number>} limits Limits in the units of the quantities.
  * @property {{ from: number, to: number } | null} zoom
  */
 
-/** Intervals of the strips: about one for every pixel. */
+/** Number of intervals of the strips, about one for each pixel. */
 const INTERVALS = 1000;
 const SECTIONS = 10;
 const WORST = 10;
-/** Rows up to which the worst are searched without being asked for. */
+/** Largest number of rows for which the worst rows are searched automatically. */
 const SEARCHED_MAX = 200_000;
 const POLL_MS = 1500;
 
@@ -86,13 +86,13 @@ export function leaveRun() {
   seen = null;
 }
 
-/** Asks for everything that the view shows. @param {App} app @param {RunLine} of */
+/** Requests the data of the view. @param {App} app @param {RunLine} of */
 async function load(app, of) {
   await Promise.all([loadAlong(app, of), loadSections(app, of)]);
   if (of.run.rows <= SEARCHED_MAX) await searchWorst(app);
 }
 
-/** The least and the largest number of a column. @param {RunLine} of @param {string} column */
+/** Returns the smallest and the largest value of a column. @param {RunLine} of @param {string} column */
 async function extent({ id, run }, column) {
   if (column === 'row') return [0, Math.max(1, run.rows)];
   const { all } = await runTotals(id, { columns: column, percentiles: '100' });
@@ -130,7 +130,7 @@ async function loadSections(app, of) {
 }
 
 /**
- * Reads all rows once, in pieces, and keeps those with the largest values.
+ * Reads all rows as a stream and keeps those with the largest values.
  * @param {App} app
  */
 export async function searchWorst(app) {
@@ -162,12 +162,12 @@ export async function searchWorst(app) {
 }
 
 /**
- * Keeps the rows with the largest sizes of a quantity.
- * @param {string} by The column of their places.
+ * Creates a reader that keeps the rows with the largest absolute values of a quantity.
+ * @param {string} by Column of their positions.
  * @param {string} worst
  * @param {number} howMany
- * @returns {(line: string) => readonly WorstRow[]} Takes a line of the table, of which the first names the columns, and answers what is kept, the
- *   largest first.
+ * @returns {(line: string) => readonly WorstRow[]} Reads a line of the table and returns the kept rows, largest first. The first line must be the
+ *   header.
  */
 export function worstOf(by, worst, howMany) {
   /** @type {string[] | null} */
@@ -183,7 +183,7 @@ export function worstOf(by, worst, howMany) {
       return kept;
     }
     const size = Math.abs(Number(cells[at] || NaN));
-    // Most rows are left after a look at one number.
+    // Most rows are rejected by this comparison alone.
     if (!(size >= 0) || (kept.length >= howMany && size <= kept[kept.length - 1].size)) return kept;
     const of = (/** @type {string} */ name) => cells[columns?.indexOf(name) ?? -1] ?? '';
     const values = Object.fromEntries(QUANTITIES.map(({ key }) => [key, Number(of(key))]));

@@ -1,4 +1,4 @@
-// A run along the track: strips by intervals, totals by section, exceedances, the worst rows and the way to their contacts.
+// The view Track for a run: strips by interval, totals by section, exceedances, and the worst rows with links to their contacts.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { count, number } from './format.js';
@@ -81,7 +81,7 @@ function worstPanel(app, of) {
     : html`<div class="pad"><button class="small" @click=${search}>Search all ${count(of.run.rows)} rows</button></div>`}</section>`;
 }
 
-/** How many rows reach a limit. @param {SectionTotals | undefined} all @param {typeof QUANTITIES[number]} quantity @param {number} limit */
+/** Describes how many rows reach a limit. @param {SectionTotals | undefined} all @param {typeof QUANTITIES[number]} quantity @param {number} limit */
 function exceeding(all, { key, factor, unit }, limit) {
   const over = above(all, key, limit * factor);
   return over === null || !all ? 'Counting …' : `${count(over)} of ${count(all.rows)} rows reach the limit of ${number(limit)} ${unit}`;

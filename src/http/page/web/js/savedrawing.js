@@ -1,4 +1,4 @@
-// A drawing of the page as a file of its own: with the looks that the style sheet gives it.
+// Saves a drawing of the page as an SVG file with the styles of the style sheet.
 
 import { html } from '../vendor/lit-html.js';
 import { save } from './api.js';
@@ -14,7 +14,7 @@ function saveDrawing(drawing) {
     const style = getComputedStyle(element);
     for (const look of LOOKS) to[at].setAttribute(look, style.getPropertyValue(look));
   });
-  // On its own ground: drawings in dark have light lines.
+  // The file gets a background, because drawings in the dark theme have light lines.
   const ground = document.createElementNS('http://www.w3.org/2000/svg', 'rect');
   Object.entries({ width: '100%', height: '100%', fill: getComputedStyle(drawing).getPropertyValue('--surface') }).forEach(([name, value]) => ground.setAttribute(name, value));
   copy.prepend(ground);
@@ -23,7 +23,7 @@ function saveDrawing(drawing) {
   return new XMLSerializer().serializeToString(copy);
 }
 
-/** A drawing with a button that saves it. @param {string} name @param {unknown} drawing */
+/** Adds a button to a drawing that saves it. @param {string} name @param {unknown} drawing */
 export function savable(name, drawing) {
   const press = (/** @type {Event} */ event) => {
     const svg = /** @type {Element} */ (event.currentTarget).parentElement?.querySelector('svg');

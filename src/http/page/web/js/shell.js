@@ -1,4 +1,4 @@
-// The frame around the views: top bar, the line for the API key, messages.
+// The frame around the views: top bar, input of the API key, and messages.
 
 import { html, nothing, render } from '../vendor/lit-html.js';
 import { apiKey, useKey } from './api.js';
@@ -83,6 +83,6 @@ function switchTheme() {
   try {
     localStorage.setItem('railhead.theme', theme);
   } catch {
-    // Storage is switched off; the choice holds until the page is left.
+    // Storage is disabled; the choice applies until the page is left.
   }
 }

@@ -1,4 +1,4 @@
-// A wheelset that is shifted by hand: both wheels with their axle level, what they carry, and the pressure on their rails.
+// Interactive shift of a wheelset with a level axle: its wheels, their loads, and the pressure on the rails.
 
 import { cancel, remove, submit } from './api.js';
 import { at, isObject, numberAt, put } from './document.js';
@@ -18,7 +18,7 @@ import { nearest } from './wheelsetdata.js';
 /** @typedef {import('./result.js').Standing} Standing */
 /** @typedef {import('./field/comb.js').Comb} Comb */
 /** @typedef {import('./api.js').Patch} Patch */
-/** @typedef {{ patch: Patch, comb: Comb | null, bent: boolean }} Pressed `bent`: the pressure stands along the rail. */
+/** @typedef {{ patch: Patch, comb: Comb | null, bent: boolean }} Pressed `bent`: whether the pressure is drawn along the curve of the rail. */
 
 /**
  * @typedef {object} Carried
@@ -34,24 +34,24 @@ import { nearest } from './wheelsetdata.js';
 /**
  * @typedef {object} Shifting
  * @property {Kinematics} kinematics
- * @property {number} at The place in the lists of the kinematics.
- * @property {boolean} apart Wheels are drawn over their rails, with lines between the places of contact.
+ * @property {number} at Index in the lists of the kinematics.
+ * @property {boolean} apart Whether the wheels are drawn above their rails, with lines between the points of contact.
  * @property {Partial<Record<Side, Carried>>} carried
  * @property {Partial<Record<Side, Pressed[]>>} pressed
- * @property {string} failure Why there are no numbers.
+ * @property {string} failure Reason why there are no results; empty if there are.
  */
 
 const SIDES = /** @type {const} */ (['left', 'right']);
 
 /** @type {Shifting | null} */
 let shifting = null;
-/** A look while the slider moves needs three digits. */
+/** Solver settings while the slider moves, where lower accuracy is sufficient. */
 const LOOK = { target_error: 0.01 };
-/** The shift that is being computed, or that is to be next. */
+/** Index of the newest requested shift. */
 let wanted = -1;
 let busy = false;
 
-/** The shifted wheelset of a result, at its first position to begin with. @param {Kinematics} kinematics @param {number} shift In mm. */
+/** Returns the shifted wheelset of a result. It starts at the given shift. @param {Kinematics} kinematics @param {number} shift In mm. */
 export function shiftingOf(kinematics, shift) {
   if (shifting?.kinematics !== kinematics) {
     shifting = { kinematics, at: nearest(kinematics.lateral_shift_mm, shift), apart: false, carried: {}, pressed: {}, failure: '' };
@@ -60,7 +60,7 @@ export function shiftingOf(kinematics, shift) {
   return shifting;
 }
 
-/** A rail and its wheel in track axes at a shift, the wheel on the rail with its axle level. @param {Standing} standing @param {number} shift In mm. */
+/** Returns a rail and its wheel in track axes at a shift, with the wheel touching the rail and a level axle. @param {Standing} standing @param {number} shift In mm. */
 export function shifted({ placed, shift: before }, shift) {
   const moved = placed.wheel.map(([y, z]) => /** @type {Place} */ ([y + shift - before, z]));
   const lift = Math.min(...gapOf(placed.rail, moved).map(([, gap]) => gap));
@@ -68,7 +68,8 @@ export function shifted({ placed, shift: before }, shift) {
 }
 
 /**
- * A case of one wheel that rolls with the wheelset: at the mean of both rolling radii, where the wheelset's motion is given.
+ * Returns a case of one wheel of a shifted wheelset. Its free rolling radius is the mean of both rolling radii, unless the case prescribes creepages
+ * or a history.
  * @param {JsonObject} document
  * @param {Side} side
  * @param {Kinematics} kinematics
@@ -83,12 +84,12 @@ function rollingWheel(document, side, { lateral_shift_mm: shifts, left, right },
   return put(one, '/motion', isObject(rolling) || !isObject(motion) || 'sweep' in motion ? { wheelset: { speed_mm_per_s: speed, free_rolling_radius_mm: radius } } : motion);
 }
 
-/** Computes the first shift, once. @param {App} app @param {JsonObject} document @param {Shifting} of */
+/** Computes the initial shift once. @param {App} app @param {JsonObject} document @param {Shifting} of */
 export function begin(app, document, of) {
   if (of === shifting && wanted < 0) setTimeout(() => shiftTo(app, document, of.at).catch(app.refused));
 }
 
-/** Moves the wheelset; the newest shift is computed as soon as the one before is. @param {App} app @param {JsonObject} document @param {number} place */
+/** Shifts the wheelset. One shift is computed at a time, always the newest next. @param {App} app @param {JsonObject} document @param {number} place */
 export async function shiftTo(app, document, place) {
   if (!shifting) return;
   shifting.at = wanted = place;
@@ -122,7 +123,7 @@ async function compute(app, of, document, place) {
  * Returns the load of a wheel and the pressures of its patches. The job is deleted.
  * @param {JsonObject} document
  * @param {Side} side
- * @returns {Promise<{ carried: Carried, pressed: Pressed[] } | null>} Null where it cannot be solved, as off the rail.
+ * @returns {Promise<{ carried: Carried, pressed: Pressed[] } | null>} Null if it has no result, for example off the rail.
  */
 async function solveWheel(document, side) {
   const job = await submit(JSON.stringify({ ...document, outputs: ['resultants', 'pressure'], ...TYPED }), { wait: 10 });

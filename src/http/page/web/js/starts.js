@@ -1,14 +1,14 @@
-// The beginning of a case of each kind of contact, and the order of its members.
+// Initial cases for each kind of contact, their outputs, and the order of members.
 
 import { at, isObject } from './document.js';
 
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 /** @typedef {import('./document.js').JsonValue} JsonValue */
 
-/** Parts of an answer that are fields; the page draws all of them. */
+/** Resultants and the fields that the page draws. */
 export const ALL_OUTPUTS = ['resultants', 'zones', 'tractions', 'pressure', 'slip'];
 
-/** Outputs beyond the fields, each with the member of the case that it needs, and what that is where nothing else is said. */
+/** Additional outputs, each with the member of the case that it needs. */
 const EXTRAS = /** @type {const} */ ({ damage: 'damage', subsurface: 'subsurface', temperature: 'thermal' });
 const DEPTHS_MM = [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1, 1.25, 1.5, 1.75, 2, 2.25, 2.5, 2.75, 3, 3.5, 4, 4.5, 5, 6, 7, 8, 10, 12];
 /** @type {Record<keyof typeof EXTRAS, JsonObject>} */
@@ -22,13 +22,13 @@ const SPEED = { speed_mm_per_s: 20000 };
 const STEEL = { shear_modulus_mpa: 82000, poisson_ratio: 0.28 };
 const GAP_YS = [-12, -9, -6, -3, 0, 3, 6, 9, 12];
 
-/** A wheel on a rail without their cross-sections. */
+/** Contact of a wheel on a rail without cross-sections. */
 export const PROFILES = /** @type {JsonObject} */ ({ type: 'profiles', rail: {}, wheel: {}, side: 'right', rolling_radius_mm: 460, cant_rad: 0.025, lateral_shift_mm: 0 });
 
-/** One motion to begin with. */
+/** Initial single motion. */
 export const ONE_MOTION = /** @type {JsonObject} */ ({ creepage_x: 0.001, creepage_y: 0, spin_per_mm: 0, ...SPEED });
 
-/** A wheel that rolls freely: the rail carries no longitudinal force. @param {unknown} type Type of the contact. @returns {JsonObject} */
+/** Returns the motion of free rolling, without longitudinal force or torque. @param {unknown} type Type of the contact. @returns {JsonObject} */
 export const freeRolling = (type) => ({ wheelset: { ...SPEED, ...(type === 'wheelset' ? { drive_torque_n_mm: 0 } : { force_x_n: 0 }) } });
 
 /** @type {Record<string, { contact: JsonObject, load?: JsonObject, motion: JsonObject }>} */
@@ -69,14 +69,14 @@ const STARTS = {
   },
 };
 
-/** Is a contact of this kind given by cross-sections? @param {unknown} type */
+/** Returns whether a kind of contact is defined by cross-sections. @param {unknown} type */
 export const hasSections = (type) => type === 'profiles' || type === 'wheelset';
 
-/** Contacts of one family have loads and motions alike. @param {unknown} type */
+/** Returns the family of a kind of contact. Contacts of one family have the same kinds of loads and motions. @param {unknown} type */
 const family = (type) => (hasSections(type) ? type : 'patch');
 
 /**
- * A case with another kind of contact: material, friction, name and labels stay, and what else still fits.
+ * Returns a case with another kind of contact. All other members that remain valid are kept.
  * @param {JsonObject | null} document
  * @param {string} type
  * @returns {JsonObject}
@@ -100,14 +100,14 @@ export function withContact(document, type) {
   };
 }
 
-/** All fields that are drawn, and what else is asked for. @param {JsonValue | undefined} asked @returns {JsonValue[]} */
+/** Adds all drawn fields to the requested outputs. @param {JsonValue | undefined} asked @returns {JsonValue[]} */
 export function withFields(asked) {
   const others = Array.isArray(asked) ? asked.filter((output) => !ALL_OUTPUTS.includes(String(output))) : [];
   return [...ALL_OUTPUTS, ...others];
 }
 
 /**
- * A case that asks for one more output or one less, with the settings that it needs.
+ * Returns a case with one output added or removed, together with its settings.
  * @param {JsonObject} document
  * @param {string} output
  * @param {boolean} wanted
@@ -129,15 +129,15 @@ const isExtra = (output) => Object.hasOwn(EXTRAS, output);
 /** @param {JsonObject} document @param {boolean} wanted @returns {JsonObject} */
 const withExtras = (document, wanted) => Object.keys(EXTRAS).reduce((/** @type {JsonObject} */ of, output) => withOutput(of, output, wanted), document);
 
-/** A case that asks for all that is drawn: fields, damage, stresses below the surface, temperature. @param {JsonObject} document */
+/** Returns a case with all drawn outputs: fields, damage, stresses below the surface and temperature. @param {JsonObject} document */
 export const withEverything = (document) => withExtras({ ...document, outputs: withFields(document.outputs) }, true);
 
-/** Does a case ask for the curve of the rail, which is the default? @param {JsonObject | null} document */
+/** Returns whether a case has the curved surface of the rail as contact surface, which is the default. @param {JsonObject | null} document */
 export const isBent = (document) => ['profiles', 'wheelset'].includes(String(at(document ?? undefined, '/contact/type')))
   && at(document ?? undefined, '/contact/reference_surface') !== 'plane';
 
 /**
- * Was a patch solved there? The remark on planes is on all patches, or on the first of a wheel of a wheelset.
+ * Returns whether a patch was solved on the curved surface. The remark on planes applies to all patches, or to the patches of one wheel of a wheelset.
  * @param {JsonObject | null} document
  * @param {Pick<import('./api.js').JobResult, 'remarks' | 'wheelset'>} result
  * @param {number} patch
@@ -148,20 +148,20 @@ export function isSolvedBent(document, { remarks, wheelset }, patch) {
   return isBent(document) && !remarks?.some((remark) => remark.code === 'on-planes' && (typeof remark.patch !== 'number' || here.includes(remark.patch)));
 }
 
-/** A case with a speed, which temperature and Archard's wear need; lists of motions have theirs. @param {JsonObject} document @returns {JsonObject} */
+/** Returns a case with a speed, which temperature and Archard's wear law need. Lists of motions are unchanged. @param {JsonObject} document @returns {JsonObject} */
 export function withSpeed(document) {
   const { motion } = document;
   if (!isObject(motion) || 'wheelset' in motion || 'history' in motion) return document;
   return { ...document, motion: isObject(motion.sweep) ? { ...motion, sweep: { ...SPEED, ...motion.sweep } } : { ...SPEED, ...motion } };
 }
 
-/** A case that asks for fields only. @param {JsonObject} document */
+/** Returns a case without additional outputs. @param {JsonObject} document */
 export const withoutExtras = (document) => withExtras(document, false);
 
 /** @param {JsonObject} document @returns {string[]} */
 export const outputsOf = ({ outputs }) => (Array.isArray(outputs) ? outputs.map(String) : ['resultants', 'zones']);
 
-/** Are nothing but the empty braces of a cross-section there yet? @param {JsonObject} document @param {'rail' | 'wheel'} body */
+/** Returns whether a cross-section is still an empty object. @param {JsonObject} document @param {'rail' | 'wheel'} body */
 export function lacksSection({ contact }, body) {
   if (!isObject(contact) || !hasSections(contact.type)) return false;
   const section = contact[body];
@@ -169,7 +169,7 @@ export function lacksSection({ contact }, body) {
 }
 
 /**
- * The new cross-section of a body that examples of the service have.
+ * Returns the standard cross-section of a body, from the examples of the service.
  * @param {readonly import('./api.js').Schemas['ExampleCase'][]} examples
  * @param {'rail' | 'wheel'} body
  */
@@ -179,7 +179,7 @@ export function standardSection(examples, body) {
 }
 
 /**
- * A case without the name and the labels that it has from an example: they say nothing of another contact.
+ * Removes the name and the labels that a case has from an example, because they do not describe a changed contact.
  * @param {JsonObject} document
  * @param {JsonObject | undefined} example
  */
@@ -193,7 +193,7 @@ export function withoutNameOf(document, example) {
 const MEMBERS = ['name', 'labels', 'material', 'friction', 'contact', 'load', 'motion', 'solver', 'outputs', 'damage', 'subsurface', 'thermal'];
 
 /**
- * A case with its members as a person would order them: the kind of contact first, what is in no list last.
+ * Returns a case with ordered members: the type of the contact first within it, and unlisted members last.
  * @param {JsonObject} document
  * @returns {JsonObject}
  */

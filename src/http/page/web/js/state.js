@@ -1,4 +1,4 @@
-// State of the page, and functions of the shell for all views.
+// State of the page and functions of the shell for all views.
 
 /** @typedef {import('./api.js').Job} Job */
 /** @typedef {import('./api.js').JobResult} JobResult */
@@ -11,33 +11,33 @@
 /**
  * @typedef {object} Preview
  * A result while typing.
- * @property {string} digest Of the case that it belongs to.
- * @property {JobResult | null} result Null if it could not be solved in a short time.
- * @property {string} failure Why it has no result; empty if that is for lack of time.
- * @property {number} patch The one that carries most.
+ * @property {string} digest Digest of its case.
+ * @property {JobResult | null} result Null if the case was not solved in time or failed.
+ * @property {string} failure Reason of a failure; empty if there is none.
+ * @property {number} patch Patch with the largest load.
  * @property {number} point
- * @property {Field | null} field Of this patch and motion, where the case asks for one.
+ * @property {Field | null} field Field of this patch and motion, if the case requests one.
  */
 
 /**
  * @typedef {object} Compose
- * @property {JsonObject | null} document The case; null as long as the text is no JSON.
+ * @property {JsonObject | null} document The case; null until the text is valid JSON.
  * @property {string} text The document as text.
- * @property {string} unreadable Why the text is no JSON.
- * @property {{ pointer: string, text: string } | null} typing The field that is being written in, as it is written.
+ * @property {string} unreadable Reason why the text is not JSON; empty if it is.
+ * @property {{ pointer: string, text: string } | null} typing Focused field with its text as entered.
  * @property {CheckedCase | null} checked Report of the service on a valid case.
- * @property {{ type: unknown, of: NonNullable<CheckedCase['understood']> } | null} understood Interpretation of the last valid case, by its
- *   kind of contact: the drawing stays while faults are being corrected.
- * @property {{ body: 'rail' | 'wheel', line: readonly (readonly number[])[] | null } | null} lone The only cross-section of a case that lacks the other.
+ * @property {{ type: unknown, of: NonNullable<CheckedCase['understood']> } | null} understood Interpretation of the last valid case, with its
+ *   kind of contact. It keeps the drawing while faults are corrected.
+ * @property {{ body: 'rail' | 'wheel', line: readonly (readonly number[])[] | null } | null} lone The cross-section of a case that lacks the other one.
  * @property {readonly Fault[]} faults
- * @property {string} refusal Why it could not be checked, where that is no fault of the case.
+ * @property {string} refusal Reason why the case could not be checked, other than its faults.
  * @property {readonly import('./api.js').Schemas['ExampleCase'][]} examples Examples of the service.
- * @property {string} example The one that is chosen; empty for none.
- * @property {Partial<Record<'rail' | 'wheel', { name: string, text: string }>>} files The files that cross-sections were taken from.
+ * @property {string} example Chosen example; empty for none.
+ * @property {Partial<Record<'rail' | 'wheel', { name: string, text: string }>>} files Files of the cross-sections.
  * @property {boolean} solving
- * @property {boolean} live Solve while typing, where it costs milliseconds.
+ * @property {boolean} live Whether fast cases are solved while typing.
  * @property {Preview | null} preview
- * @property {boolean} code Is the JSON unfolded?
+ * @property {boolean} code Whether the JSON is unfolded.
  */
 
 /** @typedef {{ label: string, act: () => void }} Action */
@@ -46,12 +46,12 @@
  * @typedef {object} PageState
  * @property {Route} route
  * @property {{ ready: boolean, version: string } | null} health
- * @property {boolean} keyLine Is the line for the API key open?
+ * @property {boolean} keyLine Whether the input of the API key is open.
  * @property {string} toast
  * @property {Action | null} action Action of the toast.
- * @property {string} absent Why what the address names is not there; empty where it is.
+ * @property {string} absent Reason why the target of the address does not exist; empty if it does.
  * @property {Compose} compose
- * @property {number} turn Counts changes of what the views keep themselves.
+ * @property {number} turn Counter of changes of state outside the store.
  */
 
 /**
@@ -59,11 +59,11 @@
  * @property {import('./store.js').Store<PageState>} store
  * @property {(change: Partial<Compose>) => void} compose Changes the state of Compose.
  * @property {() => void} redraw
- * @property {(text: string, action?: Action, duration?: number) => void} say Shows a short message, for some milliseconds.
- * @property {(error: unknown) => void} refused Shows why something failed; a missing key opens its line.
- * @property {(error: unknown) => void} absent Shows why what the address names cannot be opened.
- * @property {(address: string) => void} go To an address of the page.
- * @property {(address: string) => void} remember Writes what is shown into the address, without a step in the history and some time later.
+ * @property {(text: string, action?: Action, duration?: number) => void} say Shows a message for a duration in ms.
+ * @property {(error: unknown) => void} refused Shows an error. Status 401 opens the input of the API key.
+ * @property {(error: unknown) => void} absent Shows why the target of the address cannot be opened.
+ * @property {(address: string) => void} go Navigates to an address of the page.
+ * @property {(address: string) => void} remember Replaces the address after a delay, without an entry in the history.
  */
 
 /** @returns {PageState} */

@@ -1,11 +1,11 @@
-// One object of state, and whoever wants to know when it changes.
+// A state object with listeners for its changes.
 
 /**
  * @template {object} T
  * @typedef {object} Store
- * @property {() => T} get The state as it is.
- * @property {(change: Partial<T>) => void} set Changes members; listeners hear of it once, after the running task.
- * @property {(listener: () => void) => void} on Calls the listener after every change.
+ * @property {() => T} get Returns the current state.
+ * @property {(change: Partial<T>) => void} set Changes members. Listeners are called once, in a microtask.
+ * @property {(listener: () => void) => void} on Adds a listener.
  */
 
 /**

@@ -1,4 +1,4 @@
-// <line-strips>: one strip for each quantity along the track, with one cursor; dragging zooms all, a double click opens the contact.
+// Custom element <line-strips>: one strip for each quantity along the track, with a common cursor. Dragging zooms all strips; a double click opens the contact.
 
 import uPlot from '../vendor/uPlot.esm.js';
 import { number, tickLabel } from './format.js';
@@ -10,7 +10,7 @@ import { adoptShown } from './adopt.js';
  * @property {string} label
  * @property {string} unit
  * @property {string} colour
- * @property {readonly { label: string, values: (number | null)[] }[]} lines The first is filled.
+ * @property {readonly { label: string, values: (number | null)[] }[]} lines The first line is filled.
  */
 
 /**
@@ -98,7 +98,7 @@ export class LineStrips extends HTMLElement {
     if (typeof at === 'number') this.#shown?.open(at);
   }
 
-  /** Arrow keys move the cursor of all strips, Enter opens the contact, Escape shows the whole line. @param {KeyboardEvent} event */
+  /** Handles keys: arrow keys move the cursor of all strips, Enter opens the contact, and Escape shows the whole track. @param {KeyboardEvent} event */
   #key(event) {
     const [first] = this.#plots;
     const length = this.#shown?.x.length ?? 0;
@@ -125,7 +125,7 @@ export class LineStrips extends HTMLElement {
    * @param {Strip} strip
    * @param {boolean} last
    * @param {string} key
-   * @param {HTMLElement} value Where the value at the cursor is told.
+   * @param {HTMLElement} value Element that shows the value at the cursor.
    * @returns {uPlot.Options}
    */
   #options({ key: strip, unit, colour, lines }, last, key, value) {

@@ -1,8 +1,8 @@
-// Tables in files that people drop: columns of numbers, and grids with their axes in the first row and column.
+// Parsing of dropped tables: columns of numbers, and grids with their axes in the first row and column.
 
 /**
- * The rows of numbers of a text; remarks after `#`, `!`, `%` and `//` and lines without numbers are left out. Commas are decimal if they stand in
- * numbers that blanks or semicolons separate, and no number has a decimal point.
+ * Returns the rows of numbers of a text. Comments after `#`, `!`, `%` and `//` and lines without numbers are skipped. Commas are decimal if blanks or
+ * semicolons separate the numbers and no number has a decimal point.
  * @param {string} text
  * @returns {number[][]}
  */
@@ -18,9 +18,9 @@ export function rowsOf(text) {
 }
 
 /**
- * Two columns y and gap, sorted by y.
+ * Parses two columns y and gap, and sorts them by y.
  * @param {string} text
- * @returns {{ y_mm: number[], gap_mm: number[] } | null} Null if there are no two columns.
+ * @returns {{ y_mm: number[], gap_mm: number[] } | null} Null if there are fewer than three rows with two numbers.
  */
 export function parseGapCurve(text) {
   const rows = rowsOf(text).filter((row) => row.length >= 2 && row.slice(0, 2).every(Number.isFinite));
@@ -30,9 +30,9 @@ export function parseGapCurve(text) {
 }
 
 /**
- * A grid: the first row holds x, behind a corner cell that may be empty; every further row y and its values.
+ * Parses a grid: the first row contains x after an optional corner cell; every further row contains y and its values.
  * @param {string} text
- * @returns {{ x_mm: number[], y_mm: number[], values: number[][] } | null} Null if that is not its shape.
+ * @returns {{ x_mm: number[], y_mm: number[], values: number[][] } | null} Null if the text is not such a grid.
  */
 export function parseGrid(text) {
   const rows = rowsOf(text);

@@ -1,4 +1,4 @@
-// The traffic of a forecast: rows that are written by hand, or a table from a file.
+// The traffic of a forecast: rows entered by hand or a table from a file.
 
 import { parse } from './written.js';
 
@@ -6,12 +6,12 @@ import { parse } from './written.js';
 /**
  * @typedef {object} Table
  * @property {number} rows
- * @property {Partial<Record<ColumnKey, number[]>>} values In the units that are shown.
- * @property {Record<string, number[]>} others By JSON pointers, in the units of the API.
- * @property {string[]} unused Titles of columns that are left out.
+ * @property {Partial<Record<ColumnKey, number[]>>} values Known columns in the shown units.
+ * @property {Record<string, number[]>} others Other columns by JSON pointer, in the units of the API.
+ * @property {string[]} unused Titles of ignored columns.
  */
 
-/** Columns of the traffic: what a person writes, and what one of that is in the unit of the API. A radius becomes a yaw rate. */
+/** Columns of the traffic. `factor` converts the shown unit to that of the API; a radius is converted to a yaw rate. */
 export const COLUMNS = /** @type {const} */ ([
   { key: 'passes', label: 'passes', unit: '', pointer: '', factor: 1, title: /pass|axles|count|share|^n(umber)?\b/i, units: {} },
   { key: 'load', label: 'wheel load Q', unit: 'kN', pointer: '/load/vertical_force_n', factor: 1000, title: /load|vertical_force|^q\b/i, units: { kn: 1, n: 0.001, t: 9.80665 } },
@@ -24,21 +24,21 @@ export const COLUMNS = /** @type {const} */ ([
 /** @typedef {typeof COLUMNS[number]['key']} ColumnKey */
 /** @typedef {Record<ColumnKey, string>} Row */
 
-/** Rows of a traffic that are written by hand. */
+/** Largest number of rows entered by hand. */
 export const ROWS_MAX = 24;
 const DIGITS = 12;
 const rounded = (/** @type {number} */ value) => Number(value.toPrecision(DIGITS));
 
-/** The unit at the end of a title, as `[kN]`, `/ kN` or `_kn`. @param {string} title @param {Record<string, number>} units */
+/** Returns the unit at the end of a title, such as `[kN]`, `/ kN` or `_kn`; undefined if there is none. @param {string} title @param {Record<string, number>} units */
 function unitOf(title, units) {
   const end = title.toLowerCase().replaceAll('_per_', '/').replace(/[\])\s]+$/, '');
   return Object.keys(units).find((unit) => end.endsWith(unit) && !/[a-z]/.test(end.at(-1 - unit.length) ?? ' '));
 }
 
 /**
- * A table of a traffic: its first row has titles such as `Q [kN]`, `shift / mm`, `passes`, or JSON pointers. Columns of text and those of other titles are left out.
+ * Parses a table of the traffic. Its first row contains titles such as `Q [kN]`, `shift / mm`, `passes`, or JSON pointers. Text columns and unknown titles are ignored.
  * @param {string} text
- * @returns {Table | string} Or what is wrong with it.
+ * @returns {Table | string} The table, or a description of its fault.
  */
 export function parseTraffic(text) {
   const lines = text.split(/\r\n?|\n/).filter((line) => line.trim() && !/^\s*[#%]/.test(line));
@@ -51,7 +51,7 @@ export function parseTraffic(text) {
     const pointer = title.startsWith('/');
     const known = COLUMNS.find((column) => (pointer ? column.pointer === title : column.title.test(title)));
     const cells = rows.map((row) => row[place] ?? '');
-    // A row without a radius is on straight track.
+    // A row without a radius means straight track.
     const values = cells.map((cell) => (cell === '' && known?.key !== 'radius' ? NaN : Number(mark === ',' ? cell : cell.replace(',', '.'))));
     const wrong = values.findIndex((value) => !Number.isFinite(value));
     const text = wrong >= 0 && values.every((value) => !Number.isFinite(value));
@@ -76,14 +76,14 @@ export function parseTraffic(text) {
   return known ? table : `no column of the table is known: ${COLUMNS.map(({ label }) => label).join(', ')}, or JSON pointers of the case`;
 }
 
-/** Is a text that was dropped a table of a traffic? A cross-section with titles has at most a y. @param {string} text */
+/** Returns whether a text is a table of the traffic. A cross-section with titles has at most one known column, y. @param {string} text */
 export function isTraffic(text) {
   const table = parseTraffic(text);
   return typeof table === 'string' ? /^row \d|^the unit/.test(table) : Object.keys(table.values).length + Object.keys(table.others).length > 1;
 }
 
 /**
- * The columns of the rows that were written, or of the table; those without any value are left to the case.
+ * Returns the columns of the table or of the entered rows. Columns without values are omitted; the case supplies them.
  * @param {{ rows: readonly Row[], table: Table | null }} form
  * @param {number} speed Speed of the case in mm/s, for radii without a speed.
  */
@@ -110,7 +110,7 @@ export function trafficOf({ rows, table }, speed) {
 }
 
 /**
- * The table of a traffic that was computed.
+ * Converts the traffic of a request to a table.
  * @param {Record<string, number[]>} columns
  * @param {number[] | undefined} passes
  * @param {number} speed Speed of the case in mm/s.
@@ -127,7 +127,7 @@ export function tableOf(columns, passes, speed) {
   return { rows, values, others, unused: [] };
 }
 
-/** The rows of a table, to be changed by hand; null for more than fit, and for other columns. @param {Table} table @returns {Row[] | null} */
+/** Converts a table to editable rows; null if it has too many rows or other columns. @param {Table} table @returns {Row[] | null} */
 export function rowsOf({ rows, values, others }) {
   if (rows > ROWS_MAX || Object.keys(others).length) return null;
   const text = (/** @type {ColumnKey} */ key, /** @type {number} */ row) => {

@@ -1,4 +1,4 @@
-// One cross-section over another: how they are aligned, and how far the second lies inside the first, which is the wear.
+// Comparison of two cross-sections: their alignment, and the wear as the distance by which the second lies inside the first.
 
 /** @typedef {import('./placing.js').Place} Place */
 /** @typedef {'rail' | 'wheel'} Body */
@@ -6,22 +6,22 @@
 /**
  * @typedef {object} Wear
  * @property {readonly Place[]} moved The second cross-section, aligned with the first.
- * @property {readonly [number, number][]} curve Length along the first cross-section in mm, and what the second lacks there in mm.
- * @property {number} area Total missing area, in mm².
- * @property {number} added Additional area, in mm².
- * @property {{ depth: number, at: Place } | null} most Where it lacks most.
+ * @property {readonly [number, number][]} curve Length along the first cross-section and depth of missing material, in mm.
+ * @property {number} area Total area of missing material, in mm².
+ * @property {number} added Total area of additional material, in mm².
+ * @property {{ depth: number, at: Place } | null} most Largest depth and its position.
  */
 
 const ROUNDS = 30;
-/** Rounds of a fit in which all points count; then the share of them that lies nearest, since the others are worn. Chosen by judgement. */
+/** Iterations of a fit that use all points. Later ones use only the nearest share `FITTED`, because the others are worn. Chosen by judgement. */
 const WHOLE_ROUNDS = 6;
 const FITTED = 0.75;
-/** Farther away a line is another part of the cross-section. */
+/** Distance beyond which a line belongs to another part of the cross-section. */
 const REACH_MM = 20;
-/** A shift of less than this ends the fit, in mm. */
+/** Change of the shift in mm below which the fit ends. */
 const SETTLED_MM = 1e-4;
 
-/** The nearest place on a line; `end` if that is one of its ends. @param {readonly Place[]} line @param {Place} from */
+/** Returns the nearest place on a line; `end` is true if the point lies beyond an end of the line. @param {readonly Place[]} line @param {Place} from */
 function nearestOn(line, [y, z]) {
   let best = { distance: Infinity, place: line[0], end: true };
   for (let at = 1; at < line.length; at += 1) {
@@ -37,7 +37,7 @@ function nearestOn(line, [y, z]) {
   return best;
 }
 
-/** A line with one point for about every length. @param {readonly Place[]} line @param {number} step In mm. */
+/** Resamples a line with an approximate spacing. @param {readonly Place[]} line @param {number} step In mm. */
 function resampled(line, step) {
   /** @type {Place[]} */
   const points = [line[0]];
@@ -55,7 +55,7 @@ function resampled(line, step) {
   return kept;
 }
 
-/** The normal of a line at a point, to the left of its sense. @param {readonly Place[]} line @param {number} at @returns {Place} */
+/** Returns the unit normal of a line at a point, to the left of its direction. @param {readonly Place[]} line @param {number} at @returns {Place} */
 function normalAt(line, at) {
   const [before, after] = [line[Math.max(0, at - 1)], line[Math.min(line.length - 1, at + 1)]];
   const [dy, dz] = [after[0] - before[0], after[1] - before[1]];
@@ -63,10 +63,10 @@ function normalAt(line, at) {
   return [-dz / length, dy / length];
 }
 
-/** Least mean product of the normals' spread over which a part of a cross-section fixes both shifts. Chosen by judgement. */
+/** Determinant of the mean products of the normals' components above which a part of a cross-section determines both shifts. Chosen by judgement. */
 const SPREAD_MIN = 0.01;
 
-/** The part that traffic does not wear: the field side of a rail, the back of a wheel's flange up to its tip. @param {readonly Place[]} line @param {Body} body */
+/** Returns a test for the unworn part: the field side of a rail, or the back of a wheel's flange up to its tip. @param {readonly Place[]} line @param {Body} body */
 function unworn(line, body) {
   const ys = line.map(([y]) => y);
   const middle = (Math.min(...ys) + Math.max(...ys)) / 2;
@@ -75,9 +75,9 @@ function unworn(line, body) {
 }
 
 /**
- * The shift of the second line that brings what traffic does not wear of it onto the first: least squares of the distances along its normals, first
- * of all points, then of those that lie nearest. All of the line counts where that part does not fix both shifts.
- * @param {readonly Place[]} one With y to the field side, as the second.
+ * Returns the shift of the second line that fits its unworn part to the first line, by least squares of the distances along its normals. The first
+ * iterations use all points, later ones the nearest. The whole line is used if the unworn part does not determine both shifts.
+ * @param {readonly Place[]} one Both lines have y to the field side.
  * @param {readonly Place[]} two
  * @param {Body} body
  * @returns {Place} In mm.
@@ -110,7 +110,7 @@ export function bestFit(one, two, body) {
   return [sy, sz];
 }
 
-/** How far from a point, along a direction, a line is met; the nearest place, to either side. @param {readonly Place[]} line @param {Place} from @param {Place} direction */
+/** Returns the signed distance from a point along a direction to the nearest intersection with a line; NaN if there is none within reach. @param {readonly Place[]} line @param {Place} from @param {Place} direction */
 function metAlong(line, [y, z], [ny, nz]) {
   let best = NaN;
   for (let at = 1; at < line.length; at += 1) {
@@ -127,11 +127,11 @@ function metAlong(line, [y, z], [ny, nz]) {
 }
 
 /**
- * Returns the area that the second cross-section lacks against the first.
+ * Returns the material that the second cross-section lacks compared with the first.
  * @param {readonly Place[]} one
  * @param {readonly Place[]} two
  * @param {Body} body The material of a rail is below its line, that of a wheel above.
- * @param {Place} shift Of the second, in mm.
+ * @param {Place} shift Shift of the second, in mm.
  * @returns {Wear}
  */
 export function wearBetween(one, two, body, [sy, sz]) {
@@ -139,7 +139,7 @@ export function wearBetween(one, two, body, [sy, sz]) {
   const moved = two.map(([y, z]) => /** @type {Place} */ ([y + sy, z + sz]));
   const outward = body === 'rail' ? 1 : -1;
   const top = first.reduce((best, [, z], at) => (outward * z > outward * first[best][1] ? at : best), 0);
-  // The sense in which the line runs decides which side is out.
+  // The direction of the line determines which side is outside.
   const sense = Math.sign(normalAt(first, top)[1]) === outward ? 1 : -1;
   /** @type {[number, number][]} */
   const curve = [];
@@ -169,7 +169,7 @@ export function wearBetween(one, two, body, [sy, sz]) {
   return { moved, curve, area, added, most };
 }
 
-/** The area between four corners. @param {Place[]} corners */
+/** Returns the area of a quadrangle. @param {Place[]} corners */
 function quadrangle(...corners) {
   const twice = corners.reduce((sum, [y, z], at) => {
     const [yb, zb] = corners[(at + 1) % corners.length];

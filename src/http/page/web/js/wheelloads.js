@@ -1,4 +1,4 @@
-// Wheel loads as railways write them: Q down and Y outward on the rail, Y/Q and Nadal's limit.
+// Wheel loads in railway convention: Q down and Y outward on the rail, Y/Q and Nadal's limit.
 
 import { at, numberAt, put } from './document.js';
 
@@ -18,24 +18,24 @@ import { at, numberAt, put } from './document.js';
  * @property {number | undefined} [x_error_n]
  */
 
-/** Length of a chord of the flank by which its angle is measured, in mm. */
+/** Length of the chord over which the flange angle is measured, in mm. */
 const CHORD_MM = 2;
-/** A flank that is less steep is no flange. */
+/** Smallest angle of a flange. */
 const FLANGE_MIN_RAD = 0.7;
-/** Less steep than this is the tread. */
+/** Largest angle of the tread. */
 const TREAD_MAX_RAD = 0.35;
 
-/** Positive to the field side. @param {Side} side @param {number} toTheLeft */
+/** Converts a component from positive to the left to positive to the field side. @param {Side} side @param {number} toTheLeft */
 export const outward = (side, toTheLeft) => (side === 'left' ? toTheLeft : -toTheLeft);
 
 /** @param {JsonObject | null} document @returns {Side} */
 export const sideOf = (document) => (at(document ?? undefined, '/contact/side') === 'left' ? 'left' : 'right');
 
 /**
- * The loads of the wheels: one of `profiles`, two of `wheelset`, none of other contacts.
+ * Returns the loads of the wheels: one for `profiles`, two for `wheelset`, none for other contacts.
  * @param {JobResult} result
  * @param {JsonObject | null} document
- * @param {number} at The motion, or the position of a wheelset.
+ * @param {number} at Index of the motion, or of the position of a wheelset.
  * @returns {WheelLoad[]}
  */
 export function wheelLoads(result, document, at) {
@@ -53,13 +53,13 @@ export function wheelLoads(result, document, at) {
 }
 
 /**
- * Forces of a patch on the rail in track axes, with its normal force.
- * @param {Patch} patch One with a position.
+ * Returns the force of a patch on the rail in track axes, including the normal force.
+ * @param {Patch} patch A patch with a position.
  * @param {number} point
  * @returns {{ x_n: number, left_n: number, down_n: number }}
  */
 export function inTrackAxes({ position, normal_force_n: normal, points }, point) {
-  // On the curve of the rail the normals of a patch differ: its force is that of the service.
+  // On a curved contact surface the normals vary over the patch, so that the service reports the force.
   const { force_track_n: force } = /** @type {{ force_track_n?: number[] }} */ (points[point]);
   if (force) return { x_n: force[0], left_n: force[1], down_n: -force[2] };
   const angle = position?.contact_angle_rad ?? 0;
@@ -68,15 +68,15 @@ export function inTrackAxes({ position, normal_force_n: normal, points }, point)
 }
 
 /**
- * Nadal's limit of Y/Q, beyond which a wheel may climb the rail.
- * @param {number} angle Of the flange, in rad.
+ * Returns Nadal's limit of Y/Q, above which a wheel may climb the rail.
+ * @param {number} angle Flange angle in rad.
  * @param {number} friction
  */
 export const nadal = (angle, friction) => (Math.tan(angle) - friction) / (1 + friction * Math.tan(angle));
 
 /**
- * The steepest angle of a wheel's flange on the side of the tread, over a chord of 2 mm.
- * @param {readonly Place[]} wheel Its cross-section in track axes.
+ * Returns the largest angle of a wheel's flange on the side of the tread, over a chord of 2 mm.
+ * @param {readonly Place[]} wheel Cross-section in track axes.
  * @param {Side} side
  * @returns {number} In rad; NaN for a wheel without a flange.
  */
@@ -91,7 +91,7 @@ export function flangeAngle(wheel, side) {
     const [y, z] = [line[to][0] - line[from][0], line[to][1] - line[from][1]];
     if (Math.hypot(y, z) < CHORD_MM) continue;
     const angle = Math.atan2(z, Math.max(y, 0));
-    // The tread begins; a steep face behind it is that of the rim.
+    // The tread starts here; a steep face beyond it belongs to the rim.
     if (steepest >= FLANGE_MIN_RAD && angle < TREAD_MAX_RAD) break;
     steepest = Math.max(steepest, angle);
   }
@@ -99,7 +99,7 @@ export function flangeAngle(wheel, side) {
 }
 
 /**
- * A case of one wheel of a wheelset, which says where its cross-sections lie. A case of one wheel is itself.
+ * Returns a case of one wheel of a wheelset, for example to request the placement of its cross-sections. Other cases are returned unchanged.
  * @param {JsonObject} document
  * @param {Side} side
  * @param {number} shift In mm.
@@ -115,6 +115,6 @@ export function oneWheel(document, side, shift) {
   return put({ ...plain, contact: own, load: { vertical_force_n: load }, outputs: ['resultants'] }, '/motion', { creepage_x: 0, creepage_y: 0, spin_per_mm: 0 });
 }
 
-/** The patch to look at first: of one wheel that which carries most. @param {JobResult} result */
+/** Returns the patch to show first: the first one of a wheelset, else the one with the largest load. @param {JobResult} result */
 export const firstPatch = ({ patches, wheelset }) =>
   wheelset ? 0 : patches.reduce((most, { normal_force_n: load }, at) => (load > patches[most].normal_force_n ? at : most), 0);

@@ -1,4 +1,4 @@
-// The curves of a wheelset: Δr and contact angles over its shift, equivalent conicity over the amplitude.
+// Curves of a wheelset: Δr and contact angles over its shift, and equivalent conicity over the amplitude.
 
 import { windowAt } from './en15302.js';
 
@@ -12,11 +12,11 @@ export const KINDS = /** @type {const} */ ([['radii', 'Δr'], ['angles', 'Contac
 const DEGREE = Math.PI / 180;
 
 /**
- * A curve of the rigid wheelset without yaw.
+ * Returns a curve of the rigid wheelset without yaw.
  * @param {Kinematics} kinematics
  * @param {Kind} kind
- * @param {string} [pair] The pair of EN 15302 whose window stands at the conicity.
- * @returns {Curve | null} Null where there are fewer than two values.
+ * @param {string} [pair] Pair of EN 15302 whose window is drawn with the conicity.
+ * @returns {Curve | null} Null if there are fewer than two values.
  */
 export function wheelsetCurve(kinematics, kind, pair = '') {
   const curve = kind === 'conicity' ? conicity(kinematics, pair) : overShift(kinematics, kind);
@@ -46,7 +46,7 @@ function overShift(kinematics, kind) {
   };
 }
 
-/** Amplitudes without a stable equilibrium, or beyond the shifts that were asked for, have no conicity. @param {Kinematics} kinematics @param {string} pair @returns {Curve} */
+/** Returns the curve of the conicity. Amplitudes without a stable equilibrium, or outside the computed shifts, have no conicity. @param {Kinematics} kinematics @param {string} pair @returns {Curve} */
 function conicity(kinematics, pair) {
   const known = kinematics.conicity.filter((of) => typeof of.conicity === 'number');
   const of = (/** @type {'conicity' | 'conicity_with_roll' | 'conicity_harmonic'} */ name) => known.map((at) => at[name] ?? NaN);
@@ -70,11 +70,11 @@ function conicity(kinematics, pair) {
   };
 }
 
-/** The index of the value nearest to another. @param {readonly number[]} values @param {number} wanted */
+/** Returns the index of the value nearest to the wanted one. @param {readonly number[]} values @param {number} wanted */
 export const nearest = (values, wanted) =>
   values.reduce((best, value, at) => (Math.abs(value - wanted) < Math.abs(values[best] - wanted) ? at : best), 0);
 
-/** Amplitudes in mm at which the conicity is outside the window of a pair of EN 15302, and how many are inside. @param {Kinematics} kinematics @param {string} pair */
+/** Returns the amplitudes in mm at which the conicity is outside the window of a pair of EN 15302, and the number of those inside. @param {Kinematics} kinematics @param {string} pair */
 export function againstWindow({ conicity }, pair) {
   /** @type {number[]} */
   const outside = [];

@@ -1,4 +1,4 @@
-// A wheelset: a slider of its shift that moves both wheels, what it does as a rigid body, and the positions that were solved.
+// Panel of a wheelset: slider of its shift, curves of the rigid wheelset, and the solved positions.
 
 import { html, nothing } from '../vendor/lit-html.js';
 import { drawChart } from './drawing/axes.js';
@@ -23,15 +23,15 @@ import { againstWindow, KINDS, nearest, wheelsetCurve } from './wheelsetdata.js'
 const SIDES = /** @type {const} */ (['left', 'right']);
 /** Contact lines are drawn at multiples of this shift, in mm. */
 const LINES_MM = 0.5;
-/** Values of a curve on paper up to which error bars do not touch each other. */
+/** Largest number of values of a printed curve with error bars; more would overlap. */
 const SHIFTS_WITH_BARS = 40;
-/** The amplitude of vehicle acceptance, in mm. */
+/** Amplitude used for vehicle acceptance, in mm. */
 const ACCEPTANCE_MM = 3;
 
 /** @type {{ wheelset: Wheelset, kind: string, window: string, curve: Curve | null } | null} */
 let drawn = null;
 
-/** The position that a patch belongs to; -1 for none. @param {Wheelset} wheelset @param {number} patch */
+/** Returns the index of the position of a patch; -1 for none. @param {Wheelset} wheelset @param {number} patch */
 export const positionOf = ({ positions }, patch) =>
   positions.findIndex(({ left, right }) => left.patches.includes(patch) || right.patches.includes(patch));
 
@@ -52,7 +52,7 @@ export function wheelsetPanel(app, looked, wheelset) {
 /** @type {{ wheelset: Wheelset, window: string, there: number, part: unknown } | null} */
 let printed = null;
 
-/** Contact lines and all curves together, for print; the screen shows them one at a time. @param {Looked} looked @param {Wheelset} wheelset @param {Kinematics} kinematics @param {Shifting} moving */
+/** Contact lines and all curves for print. The screen shows one at a time. @param {Looked} looked @param {Wheelset} wheelset @param {Kinematics} kinematics @param {Shifting} moving */
 function paperPart(looked, wheelset, kinematics, moving) {
   const { window, wheels } = looked;
   const there = SIDES.filter((side) => wheels[side]).length;
@@ -70,7 +70,7 @@ function paperPart(looked, wheelset, kinematics, moving) {
   return printed.part;
 }
 
-/** Conicity of vehicle acceptance, and where the wheelset rolls in balance. @param {Kinematics} kinematics */
+/** Shows the conicity at the acceptance amplitude and the equilibrium shift. @param {Kinematics} kinematics */
 function headline({ conicity, equilibrium_shift_mm: balance, contact_distance_mm: distance, reason }) {
   const accepted = conicity.find(({ amplitude_mm }) => amplitude_mm === ACCEPTANCE_MM);
   const error = Math.hypot(accepted?.error_estimate ?? 0, accepted?.profile_uncertainty ?? 0);
@@ -79,7 +79,7 @@ function headline({ conicity, equilibrium_shift_mm: balance, contact_distance_mm
     : `no shift is in balance: ${reason ?? 'Δr does not rise through 0 in this range of shifts'}`}`;
 }
 
-/** The slider, both wheels, and what they carry. @param {App} app @param {Looked} looked @param {Shifting} moving */
+/** Slider, drawing of both wheels, and table of their loads. @param {App} app @param {Looked} looked @param {Shifting} moving */
 function shiftPart(app, looked, moving) {
   const { kinematics, at, apart } = moving;
   const shifts = kinematics.lateral_shift_mm;
@@ -98,7 +98,7 @@ function shiftPart(app, looked, moving) {
     ${carriedTable(moving)}</div>`;
 }
 
-/** The sides whose cross-sections are there. @param {Looked} looked @param {Shifting} moving */
+/** Returns the drawn sides whose cross-sections are loaded. @param {Looked} looked @param {Shifting} moving */
 const sidesOf = (looked, moving) => Object.fromEntries(SIDES.flatMap((side) => (looked.wheels[side] ? [[side, drawnSide(looked, moving, side)]] : [])));
 
 /** @param {Looked} looked @param {Shifting} moving @param {Side} side */
@@ -156,7 +156,7 @@ function curvePart(app, looked, wheelset, kinematics, moving) {
     ${overShift ? nothing : windowPart(app, looked, kinematics)}</div>`;
 }
 
-/** The windows of the standard, for its reference profiles. @param {App} app @param {Looked} looked @param {Kinematics} kinematics */
+/** Choice of a window of EN 15302, and whether the conicity lies inside. @param {App} app @param {Looked} looked @param {Kinematics} kinematics */
 function windowPart(app, looked, kinematics) {
   const pick = (/** @type {Event} */ event) => choose(app, { window: /** @type {HTMLSelectElement} */ (event.target).value });
   const { inside, outside } = againstWindow(kinematics, looked.window);
@@ -166,7 +166,7 @@ function windowPart(app, looked, kinematics) {
       ? `Outside the window at ${outside.map((amplitude) => number(amplitude, 2)).join(', ')} mm.` : `Inside the window at all ${inside} amplitudes.`}</p>` : nothing}`;
 }
 
-/** Goes to the left patch of a position. @param {App} app @param {Wheelset['positions'][number]} position */
+/** Selects the first patch of a position. @param {App} app @param {Wheelset['positions'][number]} position */
 const choosePosition = (app, { left, right }) => choose(app, { patch: [...left.patches, ...right.patches][0] });
 
 /** @param {App} app @param {Wheelset['positions']} positions @param {number} chosen */

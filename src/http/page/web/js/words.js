@@ -1,11 +1,11 @@
-// Names of the values of a case in the form, by JSON pointer.
+// Names of the values of a case by JSON pointer.
 
 import { at, isObject } from './document.js';
 import { inclinationText, textOf } from './written.js';
 
 /** @typedef {import('./document.js').JsonObject} JsonObject */
 
-/** The name of a value, its unit, and what one of it is in the unit of the API. @type {Record<string, readonly [string, string?, number?]>} */
+/** Name of each value, its shown unit, and the factor from that to the unit of the API. @type {Record<string, readonly [string, string?, number?]>} */
 const WORDS = {
   '/name': ['name'],
   '/contact/type': ['kind of contact'],
@@ -56,10 +56,10 @@ const WORDS = {
   '/damage/parameters/shear_yield_mpa': ['yield stress in shear', 'MPa'],
 };
 
-/** A section counts as one value, wherever in it two cases differ. */
+/** Members of a cross-section, which counts as one value in comparisons. */
 const SECTION = /^(\/contact(?:\/right)?\/(?:rail|wheel))\/(?:format|text|points_mm)$/;
 
-/** The pointer of what is named, and its name. @param {string} pointer @returns {{ pointer: string, label: string, known: boolean }} */
+/** Returns the name of a value with the pointer of the named part. @param {string} pointer @returns {{ pointer: string, label: string, known: boolean }} */
 export function wordsOf(pointer) {
   const whole = SECTION.exec(pointer)?.[1] ?? pointer;
   const part = /^\/contact\/(rail|wheel)\/(\w+)$/.exec(whole);
@@ -67,7 +67,7 @@ export function wordsOf(pointer) {
   return { pointer: whole, label: label ?? pointer, known: label !== undefined };
 }
 
-/** A value of a case as the form writes it. @param {JsonObject} document @param {string} pointer */
+/** Formats a value of a case as in the form. @param {JsonObject} document @param {string} pointer */
 export function valueInWords(document, pointer) {
   const value = at(document, pointer);
   const [, unit = pointer.endsWith('_mm') ? 'mm' : '', factor = 1] = WORDS[pointer] ?? [];

@@ -1,11 +1,11 @@
-// Numbers as they are written in the fields of the form, in the unit of the field.
+// Parsing and formatting of numbers in the fields of the form, in the unit of the field.
 
 /** @typedef {import('./document.js').JsonValue} JsonValue */
 
 /**
- * What a field shows of a value.
+ * Returns the text of a value in a field.
  * @param {JsonValue | undefined} value
- * @param {number} [factor] What one of the shown units is in the unit of the API.
+ * @param {number} [factor] Factor from the shown unit to the unit of the API.
  * @returns {string}
  */
 export function textOf(value, factor) {
@@ -17,7 +17,7 @@ export function textOf(value, factor) {
 }
 
 /**
- * What was written as a number, or as text where it is none: then the service says what is wrong with it.
+ * Parses a number. Other text is returned as it is, so that the service reports the fault.
  * @param {string} written
  * @param {number} [factor]
  * @returns {JsonValue | undefined}
@@ -30,8 +30,8 @@ export function parse(written, factor = 1) {
 }
 
 /**
- * What was written as numbers with spaces or semicolons between them, or with commas where there is neither; one number stands for all
- * places. What begins with a brace is JSON.
+ * Parses a list of numbers separated by spaces or semicolons, or by commas if there are neither. A single number is returned as a number. Text
+ * that starts with a brace is parsed as JSON.
  * @param {string} written
  * @param {number} [factor]
  * @returns {JsonValue | undefined}
@@ -51,24 +51,24 @@ export function parseList(written, factor) {
   return items.map((item) => parse(item, factor) ?? null);
 }
 
-/** An inclination as people write it: 1:40 for 0.025 rad. @param {JsonValue | undefined} value */
+/** Formats an inclination as a ratio if possible: 1:40 for 0.025 rad. @param {JsonValue | undefined} value */
 export function inclinationText(value) {
   if (typeof value !== 'number' || value === 0) return textOf(value);
   const ratio = Number((1 / value).toPrecision(6));
   return Number.isInteger(ratio) ? `${ratio < 0 ? '-' : ''}1:${Math.abs(ratio)}` : `${value}`;
 }
 
-/** The inclination in rad that was written as 1:40, 1/40, or in rad. @param {string} written */
+/** Parses an inclination such as 1:40, 1/40, or a number in rad. @param {string} written */
 export function parseInclination(written) {
   const ratio = /^\s*([-\u2212]?)\s*1\s*[:/]\s*(\d+(?:[.,]\d+)?)\s*$/.exec(written);
   const steps = ratio ? Number(ratio[2].replace(',', '.')) : 0;
   return ratio && steps > 0 ? (ratio[1] ? -1 : 1) * Number((1 / steps).toPrecision(12)) : parse(written);
 }
 
-/** A curve radius in m, positive to the left, of a yaw rate; empty on straight track. @param {JsonValue | undefined} rate In rad/s. @param {number} speed In mm/s. */
+/** Formats a yaw rate as a curve radius in m, positive to the left; empty on straight track. @param {JsonValue | undefined} rate In rad/s. @param {number} speed In mm/s. */
 export const radiusText = (rate, speed) => (typeof rate !== 'number' ? textOf(rate) : rate === 0 ? '' : textOf(Number((speed / rate / 1000).toPrecision(6))));
 
-/** The yaw rate in rad/s on a curve whose radius was written in m; undefined on straight track. @param {string} written @param {number} speed In mm/s. */
+/** Parses a curve radius in m into a yaw rate in rad/s; undefined on straight track. @param {string} written @param {number} speed In mm/s. */
 export function parseRadius(written, speed) {
   const radius = parse(written, 1000);
   return typeof radius !== 'number' ? radius : radius === 0 || !(speed > 0) ? undefined : speed / radius;

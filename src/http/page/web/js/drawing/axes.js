@@ -1,4 +1,4 @@
-// Paths, and grid lines with numbers, for all drawings.
+// Paths, grids, charts and overlaid cross-sections as SVG.
 
 import { nothing, svg } from '../../vendor/lit-html.js';
 import { smoothLine } from '../field/cells.js';
@@ -6,7 +6,7 @@ import { tickLabel, ticks } from '../format.js';
 
 /** @typedef {readonly [number, number]} Point */
 
-/** A line with gaps where a value is missing. @param {readonly Point[]} points In pixels. */
+/** Returns the path of a line with gaps at missing values. @param {readonly Point[]} points In pixels. */
 export const path = (points) => points.map(([x, y], place) => {
   if (!Number.isFinite(y)) return '';
   return `${place && Number.isFinite(points[place - 1][1]) ? 'L' : 'M'}${x.toFixed(2)} ${y.toFixed(2)}`;
@@ -22,14 +22,14 @@ export const path = (points) => points.map(([x, y], place) => {
  * @property {readonly [number, number]} y The values at bottom and top.
  */
 
-/** From values to pixels. @param {Axes} axes @returns {(point: Point) => Point} */
+/** Returns the map from values to pixels. @param {Axes} axes @returns {(point: Point) => Point} */
 export const scaleOf = ({ left, right, top, bottom, x, y }) => ([h, v]) => [
   left + ((h - x[0]) / (x[1] - x[0])) * (right - left),
   bottom - ((v - y[0]) / (y[1] - y[0])) * (bottom - top),
 ];
 
 /**
- * Lines and numbers of a grid.
+ * Draws the lines and labels of a grid.
  * @param {Axes} axes
  * @param {{ x: string, y: string, columns?: number, rows?: number }} labels
  */
@@ -54,11 +54,11 @@ export function grid(axes, labels) {
 /**
  * @typedef {object} ChartLine
  * @property {string} label
- * @property {string} look Its class: `one`, `two`, `three` or `limit`; with `solid` or `dashed`.
+ * @property {string} look CSS classes: `one`, `two`, `three`, `four` or `limit`, optionally with `solid` or `dashed`.
  * @property {readonly Point[]} points
- * @property {boolean} [smooth] They are few points of a smooth curve.
- * @property {readonly (number | null)[]} [errors] Of the points: half the length of their bars.
- * @property {readonly [readonly Point[], readonly Point[]]} [band] Its edges.
+ * @property {boolean} [smooth] Whether a smooth curve is drawn through the points.
+ * @property {readonly (number | null)[]} [errors] Errors of the points, half the lengths of their error bars.
+ * @property {readonly [readonly Point[], readonly Point[]]} [band] Edges of a band.
  */
 
 /**
@@ -70,16 +70,16 @@ export function grid(axes, labels) {
  * @property {readonly [number, number]} [xRange]
  * @property {readonly [number, number]} [yRange] Bottom and top.
  * @property {readonly { at: Point, label: string }[]} [marks]
- * @property {{ x: number, pick: (x: number) => void }} [chosen] The place that is looked at; a click chooses another.
+ * @property {{ x: number, pick: (x: number) => void }} [chosen] The chosen x; a click chooses another one.
  */
 
-/** The height is that above the legend. */
+/** Size of a chart in pixels. The height excludes the legend. */
 const CHART = { width: 460, height: 268 };
-/** A character of the legend, and the line before it, in pixels. */
+/** Widths of a character and of the sample line of the legend, and the height of its rows, in pixels. */
 const LEGEND = { character: 6.4, before: 34, row: 18 };
 const CAP = 3;
 
-/** Lines over two axes with their legend. @param {Chart} chart */
+/** Draws lines over two axes with a legend. @param {Chart} chart */
 export function drawChart({ name, x, y, lines, xRange, yRange, marks = [], chosen }) {
   const all = [...lines.flatMap(({ points, band = [] }) => [points, ...band].flat()), ...marks.map((mark) => mark.at)].filter((point) => point.every(Number.isFinite));
   const axes = {
@@ -105,7 +105,7 @@ export function drawChart({ name, x, y, lines, xRange, yRange, marks = [], chose
     </svg>
     ${marks.map(({ at, label }, order) => {
       const [px, py] = T(at);
-      // Labels of neighbours stand on either side.
+      // Labels of neighbouring marks are drawn on alternating sides.
       const right = px > CHART.width * 0.8 || (px > CHART.width * 0.2 && order % 2 === 1);
       return svg`<g class="mark"><circle cx=${px} cy=${py} r="5"/><text x=${px + (right ? -9 : 9)} y=${py < axes.top + 14 ? py + 18 : py - 6} text-anchor=${right ? 'end' : 'start'}>${label}</text></g>`;
     })}
@@ -116,27 +116,27 @@ export function drawChart({ name, x, y, lines, xRange, yRange, marks = [], chose
   </svg>`;
 }
 
-/** Bars of errors with caps. @param {readonly Point[]} points @param {readonly (number | null)[]} errors @param {(point: Point) => Point} T */
+/** Returns the path of error bars with caps. @param {readonly Point[]} points @param {readonly (number | null)[]} errors @param {(point: Point) => Point} T */
 const bars = (points, errors, T) => points.map(([x, y], at) => {
   const [[px, low], [, high]] = [T([x, y - (errors[at] ?? 0)]), T([x, y + (errors[at] ?? 0)])];
   return errors[at] ? `M${px} ${low}V${high}M${px - CAP} ${low}h${2 * CAP}M${px - CAP} ${high}h${2 * CAP}` : '';
 }).join('');
 
-/** From the least to the largest value, with 0. @param {readonly number[]} values @returns {[number, number]} */
+/** Returns the range of values, extended to include 0. @param {readonly number[]} values @returns {[number, number]} */
 function rangeOf(values) {
   const [low, high] = [Math.min(0, ...values), Math.max(0, ...values)];
   return high > low ? [low, high + 0.06 * (high - low)] : [0, 1];
 }
 
 /**
- * Cross-sections over each other, to scale, with y to the field side.
+ * Draws overlaid cross-sections to scale, with y to the field side.
  * @param {{ name: string, shapes: readonly ChartLine[], mark: { at: Point, label: string } | null }} of
  */
 export function drawShapes({ name, shapes, mark }) {
   const all = shapes.flatMap(({ points }) => points);
   const [ys, zs] = [all.map(([y]) => y), all.map(([, z]) => z)];
   const [y0, y1, z0, z1] = [Math.min(...ys) - 4, Math.max(...ys) + 4, Math.min(...zs) - 4, Math.max(...zs) + 4];
-  // Text keeps its size: on a narrow screen the picture is smaller.
+  // The drawing is narrower on a narrow screen, so that the text keeps its size.
   const width = Math.min(640, Math.max(380, innerWidth - 60));
   const scale = (width - 60) / (y1 - y0);
   const bottom = 26 + (z1 - z0) * scale;

@@ -1,4 +1,4 @@
-// Numbers that a case brings: a gap across rolling as a curve, gaps and pressures on a grid as tones.
+// Drawings of the data of a case: a gap curve, and gaps or pressures on a grid.
 
 import { html } from '../../vendor/lit-html.js';
 import { at, numbersAt } from '../document.js';
@@ -44,7 +44,7 @@ export function drawGrid(document) {
   </figure>`;
 }
 
-/** How far coordinates reach; 1 where that is not known. @param {JsonObject} document @param {string} pointer */
+/** Returns the extent of coordinates; 1 if it is not positive or unknown. @param {JsonObject} document @param {string} pointer */
 function extent(document, pointer) {
   const places = numbersAt(document, pointer);
   const length = places[places.length - 1] - places[0];
@@ -60,10 +60,10 @@ function rowsOf(document, pointer) {
 
 const LONGER_SIDE = 640;
 
-/** <value-grid>: numbers on a grid as colours, to scale and without smoothing. */
+/** Custom element <value-grid>: numbers on a grid as colours, to scale and without smoothing. */
 class ValueGrid extends HTMLElement {
   #canvas = document.createElement('canvas');
-  /** Small values are the bright ones. */
+  /** Whether small values are bright. */
   reversed = false;
   /** Width over height. */
   aspect = 1;
@@ -75,7 +75,7 @@ class ValueGrid extends HTMLElement {
     this.#draw();
   }
 
-  /** Row by row, the lowest y first. @param {number[][]} values */
+  /** Sets the values by rows, lowest y first. @param {number[][]} values */
   set values(values) {
     this.#values = values;
     queueMicrotask(() => this.#draw());

@@ -1,4 +1,4 @@
-// The patch from above, before anything is solved: an ellipse with its semi-axes, creepages and spin.
+// Drawing of the contact ellipse of a case from above, with its semi-axes, creepages and spin.
 
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { at, isObject, numberAt } from '../document.js';
@@ -16,7 +16,7 @@ const ARROW = 70;
 
 /**
  * @param {JsonObject} document A case of the types `ellipse` or `radii`.
- * @param {KnownPatch | undefined} known Its patch, as the service understood it.
+ * @param {KnownPatch | undefined} known Its patch, as interpreted by the service.
  */
 export function drawEllipse(document, known) {
   if (!known?.semi_axes_mm) return html`<p class="quiet pad">The drawing appears when the contact is complete.</p>`;
@@ -54,7 +54,7 @@ function firstMotion(document) {
 }
 
 /**
- * The directions of creepage and spin.
+ * Draws the directions of creepage and spin.
  * @param {JsonValue | undefined} motion
  * @param {number} x
  * @param {number} y

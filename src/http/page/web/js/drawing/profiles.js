@@ -1,4 +1,4 @@
-// Wheel on rail, seen along rolling with the left on the left, and the gap between the two below it.
+// Drawing of a wheel on a rail, seen along rolling with the left side on the left, and of the gap between them.
 
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { degrees, number, tickLabel, ticks } from '../format.js';
@@ -18,18 +18,18 @@ import { grid, path, scaleOf } from './axes.js';
  * @property {readonly (Comb | null)[]} combs
  * @property {number} chosen
  * @property {(patch: number) => void} choose
- * @property {boolean} bent The patches follow the curve of the rail.
- * @property {boolean} near Only the surroundings of the patches are drawn, not the whole head.
+ * @property {boolean} bent Whether the patches follow the curve of the rail.
+ * @property {boolean} near Whether only the surroundings of the patches are drawn, instead of the whole head.
  */
 
 const WIDTH = 560;
 const TOP_MM = 27;
-/** Heights of the largest pressure and of the number of a patch, as parts of the width that is drawn. */
+/** Heights of the largest pressure and of the number of a patch, relative to the drawn width. */
 const COMB = 0.12;
 const TAG = 0.17;
-/** The width of a pressure beside the number of a patch, in pixels. */
+/** Width of the text of a pressure beside the number of a patch, in pixels. */
 const LABEL = 84;
-/** Surroundings of the patches, as a part of their width. */
+/** Width of the surroundings of the patches, relative to the size of the patches. */
 const NEAR = 0.3;
 
 /**
@@ -62,7 +62,7 @@ export function drawProfiles(placed, standing) {
   </svg>`;
 }
 
-/** Ranges of the drawing of the whole head, across and up. @param {readonly Point[]} rail @param {readonly Patch[]} patches @returns {[Point, Point]} */
+/** Returns the ranges of the drawing of the whole head, lateral and vertical. @param {readonly Point[]} rail @param {readonly Patch[]} patches @returns {[Point, Point]} */
 function wholeHead(rail, patches) {
   const ys = rail.map(([y]) => y);
   const [y0, y1] = [Math.min(...ys) - 12, Math.max(...ys) + 12];
@@ -71,7 +71,7 @@ function wholeHead(rail, patches) {
   return [[Math.min(y0, ...tips), Math.max(y1, ...tips)], [low, TOP_MM]];
 }
 
-/** Ranges of the drawing around the patches, with space for their pressure, across and up. @param {Placed} placed @param {Standing} standing @returns {[Point, Point]} */
+/** Returns the ranges of the drawing around the patches with space for their pressure, lateral and vertical. @param {Placed} placed @param {Standing} standing @returns {[Point, Point]} */
 function aroundPatches({ rail }, standing) {
   const places = standing.patches.flatMap((patch) => {
     const on = surfaceOf(patch, rail, standing.bent);
@@ -86,7 +86,7 @@ function aroundPatches({ rail }, standing) {
 }
 
 /**
- * One cross-section alone.
+ * Draws a single cross-section.
  * @param {'rail' | 'wheel'} body
  * @param {readonly (readonly number[])[] | null} line In track axes; null if it could not be read.
  */
@@ -109,7 +109,7 @@ export function drawSection(body, line) {
 /** @param {readonly Point[]} line */
 const mean = (line) => (Math.min(...line.map(([y]) => y)) + Math.max(...line.map(([y]) => y))) / 2;
 
-/** A line closed beyond the picture. @param {readonly Point[]} line @param {number} edge */
+/** Returns the path of a line that is closed outside the picture. @param {readonly Point[]} line @param {number} edge */
 const closed = (line, edge) => `${path(line)}L${line[line.length - 1][0]} ${edge}L${line[0][0]} ${edge}Z`;
 
 /** @param {Point} touch */
@@ -133,7 +133,7 @@ function lattice([y0, y1], [low, high], T, height) {
 }
 
 /**
- * The numbers of the lattice, in front of the bodies.
+ * Draws the labels of the lattice in front of the bodies.
  * @param {Point} across
  * @param {Point} up
  * @param {(point: Point) => Point} T
@@ -152,10 +152,10 @@ function latticeNumbers([y0, y1], [low, high], T, height) {
 }
 
 /**
- * Pressure stands on the rail at every patch; a click chooses one.
+ * Draws the pressure of every patch on the rail. A click chooses a patch.
  * @param {Standing} standing
  * @param {readonly Point[]} rail
- * @param {number} width Of what is drawn, in mm.
+ * @param {number} width Width of the drawing, in mm.
  * @param {(point: Point) => Point} T
  */
 function standPatches({ patches, combs, chosen, choose, bent, near }, rail, width, T) {
@@ -169,7 +169,7 @@ function standPatches({ patches, combs, chosen, choose, bent, near }, rail, widt
     const shape = comb && combShape(comb, surface, scale, T);
     const [x, top] = T([y - TAG * width * Math.sin(angle), z + TAG * width * Math.cos(angle)]);
     const [cx, cy] = T([y, z]);
-    // The pressure is written away from the patch, where there is room for it.
+    // The text of the pressure is on the side away from the patch if there is space.
     const beside = x < cx && x > LABEL;
     return svg`<g class=${`patch ${at === chosen ? 'chosen' : ''}`} data-patch=${at} @click=${() => choose(at)}>
       ${shape ? svg`<path class="comb" d=${`${path(shape)}Z`}/>` : nothing}
@@ -182,7 +182,7 @@ function standPatches({ patches, combs, chosen, choose, bent, near }, rail, widt
   });
 }
 
-/** The gap from 0 to 1 mm near the first touch: whether a second contact is near. @param {Placed | null} placed */
+/** Draws the gap from 0 to 1 mm near the point of first contact, which shows whether a second contact is close. @param {Placed | null} placed */
 export function drawGap(placed) {
   if (!placed) return nothing;
   const { touch } = placed;

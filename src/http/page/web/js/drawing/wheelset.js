@@ -1,4 +1,4 @@
-// Both wheels of a wheelset on their rails: with the pressure on the rails, or apart, with lines between the places that touch.
+// Drawing of both wheels of a wheelset: on their rails with the pressure, or above them with lines between the points of contact.
 
 import { html, nothing, svg } from '../../vendor/lit-html.js';
 import { fixed, number } from '../format.js';
@@ -10,26 +10,26 @@ import { path } from './axes.js';
 /** @typedef {import('../wheelloads.js').Side} Side */
 /** @typedef {import('./axes.js').Point} Point */
 
-/** @typedef {{ shift: number, rail: Place, wheel: Place }} Touch Where a wheel touches at a shift; the place on the wheel as the wheel is drawn. */
+/** @typedef {{ shift: number, rail: Place, wheel: Place }} Touch Points of contact on rail and wheel at a shift, in the coordinates of the drawing. */
 
 /**
  * @typedef {object} DrawnSide
  * @property {readonly Place[]} rail
  * @property {readonly Place[]} wheel
- * @property {Touch} touch At the shift that is drawn.
- * @property {readonly Touch[]} lines At other shifts.
+ * @property {Touch} touch Contact at the drawn shift.
+ * @property {readonly Touch[]} lines Contacts at other shifts.
  * @property {readonly import('../shifting.js').Pressed[]} pressed
  */
 
 const WIDTH = 900;
-/** Space drawn beside the rail: to the field side, and to the track centre, where the flange is. */
+/** Space beside the rail on the field side and on the flange side. */
 const FIELD_MM = 12;
 const FLANGE_MM = 40;
 const BETWEEN = 26;
-/** Height of a wheel over its rail when they are drawn apart. */
+/** Height of a wheel above its rail when they are drawn apart. */
 export const APART_MM = 30;
 const COMB_MM = 16;
-/** Least distance of the numbers at contact lines, in pixels. */
+/** Smallest distance between the labels of contact lines, in pixels. */
 const APART_PX = 30;
 
 /** @param {Partial<Record<Side, DrawnSide>>} sides @param {boolean} apart @param {number} shift */
@@ -63,7 +63,7 @@ export function drawWheelset(sides, apart, shift) {
     })}</svg>`;
 }
 
-/** Lines between the places that touch; a number at the rail where there is room for it. @param {DrawnSide} side @param {(point: Point) => Point} T */
+/** Draws lines between the points of contact, with labels at the rail where there is space. @param {DrawnSide} side @param {(point: Point) => Point} T */
 function contactLines({ lines, touch }, T) {
   /** @type {Point[]} */
   const numbered = [T(touch.rail)];
@@ -77,7 +77,7 @@ function contactLines({ lines, touch }, T) {
   return [...lines.map((other) => line(other, 'touching')), line(touch, 'touching chosen')];
 }
 
-/** @param {import('../api.js').Patch} patch @param {import('../field/comb.js').Comb | null} comb @param {ReturnType<typeof surfaceOf>} surface @param {number} size Of the largest pressure, in mm. @param {(point: Point) => Point} T */
+/** @param {import('../api.js').Patch} patch @param {import('../field/comb.js').Comb | null} comb @param {ReturnType<typeof surfaceOf>} surface @param {number} size Height of the largest pressure, in mm. @param {(point: Point) => Point} T */
 function pressure(patch, comb, surface, size, T) {
   if (!surface || !comb) return nothing;
   return svg`<path class="comb" d=${`${path(combShape(comb, surface, size / patch.pressure_max_mpa, T))}Z`}/>`;

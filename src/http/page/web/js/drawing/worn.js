@@ -1,4 +1,4 @@
-// A section that wears: new, at a step with the band of its uncertainty, and the contacts of the traffic on it.
+// Drawing of a worn section: at the start, at a step with its uncertainty band, and with the contacts of the traffic.
 
 import { nothing, svg } from '../../vendor/lit-html.js';
 import { grid, path, scaleOf } from './axes.js';
@@ -9,7 +9,7 @@ import { grid, path, scaleOf } from './axes.js';
  * @typedef {object} WornShape
  * @property {string} label
  * @property {readonly Point[]} now
- * @property {readonly Point[]} low The edges of the band.
+ * @property {readonly Point[]} low Edge of the band; `high` is the other one.
  * @property {readonly Point[]} high
  * @property {readonly WornContact[]} contacts
  */
@@ -17,19 +17,19 @@ import { grid, path, scaleOf } from './axes.js';
 /**
  * @typedef {object} WornContact
  * @property {Point} at
- * @property {Point} normal Into the body.
- * @property {number} size Its share of the load.
- * @property {number} pressure The largest, in MPa.
+ * @property {Point} normal Unit normal into the body.
+ * @property {number} size Share of the load.
+ * @property {number} pressure Largest pressure in MPa.
  */
 
-/** The radius of all of the load, and the length of the largest pressure, in pixels. */
+/** Radius of a circle for the whole load, and length of the needle of the largest pressure, in pixels. */
 const LARGEST = 15;
 const NEEDLE = 60;
 const LOOKS = ['one', 'two'];
 
-/** @param {{ name: string, start: readonly Point[], strongest: number, shapes: readonly WornShape[] }} of `strongest`: the pressure of the longest needle, in MPa. */
+/** @param {{ name: string, start: readonly Point[], strongest: number, shapes: readonly WornShape[] }} of `strongest`: pressure of the longest needle, in MPa. */
 export function drawWorn({ name, start, strongest, shapes }) {
-  // Text keeps its size: on a narrow screen the picture is smaller.
+  // The drawing is narrower on a narrow screen, so that the text keeps its size.
   const width = Math.min(1150, Math.max(420, innerWidth - 40));
   const all = [...start, ...shapes.flatMap(({ now }) => now)];
   const [ys, zs] = [all.map(([y]) => y), all.map(([, z]) => z)];

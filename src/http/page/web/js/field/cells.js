@@ -1,4 +1,4 @@
-// The cells of a field by strip: which cell is at a place, how far the patch reaches, and its border.
+// Index of the cells of a field by strip, with lookup by position, extent and border of the patch.
 
 /** @typedef {import('../fields.js').Cells} Cells */
 /** @typedef {import('../fields.js').Field} Field */
@@ -6,14 +6,14 @@
 
 /**
  * @typedef {object} Strip
- * @property {number} y Its middle.
+ * @property {number} y Centre of the strip.
  * @property {number} low
  * @property {number} high
- * @property {number} first Its first cell.
- * @property {number} end The cell after its last.
- * @property {number} left Where its first cell begins.
- * @property {number} right Where its last cell ends.
- * @property {boolean} whole Its cells touch each other.
+ * @property {number} first Index of the first cell.
+ * @property {number} end Index after the last cell.
+ * @property {number} left Start of the first cell.
+ * @property {number} right End of the last cell.
+ * @property {boolean} whole Whether the cells have no gaps between them.
  */
 
 export class CellIndex {
@@ -29,13 +29,13 @@ export class CellIndex {
     this.y1 = Math.max(...across.map(([, y]) => y), ...this.strips.map((strip) => strip.high));
   }
 
-  /** Can values be interpolated from strip to strip? Not over holes. */
+  /** Whether values can be interpolated between strips, which requires a patch without holes. */
   get whole() {
     return this.border.length === 1 && this.strips.length > 2 && this.strips.every((strip) => strip.whole);
   }
 
   /**
-   * The strip at a height; -1 outside.
+   * Returns the strip at y; -1 outside.
    * @param {number} y
    */
   stripAt(y) {
@@ -52,8 +52,8 @@ export class CellIndex {
   }
 
   /**
-   * The cell of a strip at a place along rolling; -1 outside.
-   * @param {number} at The strip.
+   * Returns the cell of a strip at x; -1 outside.
+   * @param {number} at Index of the strip.
    * @param {number} x
    */
   cellIn(at, x) {
@@ -81,7 +81,7 @@ export class CellIndex {
   }
 
   /**
-   * The cell at a place or close beside it: the outermost cells of two meshes of one patch do not quite meet.
+   * Returns the cell at a place or close to it, because the outermost cells of two meshes of one patch differ slightly; -1 for none.
    * @param {number} x
    * @param {number} y
    */
@@ -98,12 +98,12 @@ export class CellIndex {
     return Math.hypot(x - this.cells.x_mm[beside], y - strip.y) <= reach ? beside : -1;
   }
 
-  /** Cells across rolling at a place along it, one of every strip that reaches there. @param {number} x */
+  /** Returns the cells at x, one of each strip that extends to it. @param {number} x */
   column(x) {
     return this.strips.map((_, at) => this.cellIn(at, x)).filter((cell) => cell >= 0);
   }
 
-  /** The cells of a strip. @param {number} at */
+  /** Returns the cells of a strip. @param {number} at */
   row(at) {
     const strip = this.strips[at];
     return strip ? Array.from({ length: strip.end - strip.first }, (_, place) => strip.first + place) : [];
@@ -113,7 +113,7 @@ export class CellIndex {
 /** @type {WeakMap<Field, CellIndex>} */
 const known = new WeakMap();
 
-/** The index of a field, made once. @param {Field} field */
+/** Returns the cached index of a field. @param {Field} field */
 export function indexOf(field) {
   const index = known.get(field) ?? new CellIndex(field);
   known.set(field, index);
@@ -144,7 +144,7 @@ function stripsOf({ x_mm, y_mm, dx_mm, dy_mm, strip }) {
 }
 
 /**
- * The border of a patch of which only the strips are known: around their ends.
+ * Returns an approximate border of a patch around the ends of its strips.
  * @param {Strip[]} strips
  * @returns {Loop}
  */
@@ -161,14 +161,14 @@ function outline(strips) {
   ];
 }
 
-/** Points that a segment of a border is divided by. */
+/** Number of parts into which each segment of a border is divided. */
 const FINER = 6;
-/** Cosine of the turn from which on a corner is one: 75°. Few strips give an ellipse turns of 60° at its ends. */
+/** Cosine of 75°, the smallest turn of a sharp corner. With few strips, the border of an ellipse turns by 60° at its ends. */
 const CORNER = 0.26;
 
 /**
- * A closed smooth curve through the corners of a border (centripetal Catmull-Rom; Yuksel, Schaefer and Keyser, 2011): the border of most
- * patches has no corners, but few strips give it some. Sharp corners stay.
+ * Returns a closed smooth curve through the points of a border (centripetal Catmull-Rom; Yuksel, Schaefer and Keyser, 2011). Most patches have
+ * smooth borders, which few strips approximate by polygons. Sharp corners are kept.
  * @param {Loop} loop
  * @returns {Loop}
  */
@@ -187,7 +187,7 @@ export function smoothLoop(loop) {
 }
 
 /**
- * Smooths a line with two ends.
+ * Returns a smooth curve through the points of an open line.
  * @param {[number, number][]} line
  * @returns {[number, number][]}
  */
@@ -205,7 +205,7 @@ export function smoothLine(line) {
  * @param {[number, number]} one
  * @param {[number, number]} two
  * @param {[number, number]} after
- * @param {number} share Of the way from `one` to `two`.
+ * @param {number} share Fraction of the way from `one` to `two`.
  * @returns {[number, number]}
  */
 function between(before, one, two, after, share) {
@@ -223,7 +223,7 @@ function between(before, one, two, after, share) {
   return [along(0), along(1)];
 }
 
-/** The cosine of the turn at a corner. @param {[number, number]} before @param {[number, number]} at @param {[number, number]} after */
+/** Returns the cosine of the turn at a corner. @param {[number, number]} before @param {[number, number]} at @param {[number, number]} after */
 function turn(before, at, after) {
   const [x1, y1, x2, y2] = [at[0] - before[0], at[1] - before[1], after[0] - at[0], after[1] - at[1]];
   return (x1 * x2 + y1 * y2) / (Math.hypot(x1, y1) * Math.hypot(x2, y2));

@@ -1,8 +1,8 @@
-// The largest pressure of every strip of a patch, as it is drawn on the profiles.
+// The largest pressure of each strip of a patch, for drawing on the profiles.
 
 import { indexOf, smoothLine } from './cells.js';
 
-/** @typedef {{ y: number[], pressure: number[] }} Comb The largest pressure of every strip, across the patch. */
+/** @typedef {{ y: number[], pressure: number[] }} Comb Largest pressure of each strip over the lateral coordinate, with 0 at both ends. */
 
 /** @param {import('../fields.js').Field | undefined} field @returns {Comb | null} */
 export function combOf(field) {
@@ -16,11 +16,11 @@ export function combOf(field) {
 /** @typedef {[number, number]} Place */
 
 /**
- * The outline of a comb over the surface of its patch.
+ * Returns the outline of a comb above the surface of its patch, in pixels.
  * @param {Comb} comb
  * @param {(across: number, height: number) => Place} surface
- * @param {number} scale Height of a MPa, in mm.
- * @param {(place: Place) => readonly [number, number]} T To pixels.
+ * @param {number} scale Height of 1 MPa, in mm.
+ * @param {(place: Place) => readonly [number, number]} T Map to pixels.
  */
 export function combShape({ y, pressure }, surface, scale, T) {
   const pixels = (/** @type {number} */ across, /** @type {number} */ height) => /** @type {Place} */ ([...T(surface(across, height))]);

@@ -1,4 +1,4 @@
-// Where everything of a field map is, in CSS pixels.
+// Layout of a field map in CSS pixels.
 
 /** @typedef {{ x0: number, x1: number, y0: number, y1: number }} Extent In mm. */
 
@@ -12,16 +12,16 @@
 
 /**
  * @typedef {object} Layout
- * @property {number} width Of the whole picture.
+ * @property {number} width Width of the whole picture.
  * @property {number} height
  * @property {Box} map
  * @property {Box | null} along The section along rolling, below the map.
- * @property {Box | null} across The section across, on the right.
+ * @property {Box | null} across The lateral section, on the right.
  * @property {number} scale Pixels per mm, the same in both directions.
- * @property {number} x0 Least x of the map, in mm.
+ * @property {number} x0 Smallest x of the map, in mm.
  * @property {number} y1
  * @property {boolean} narrow
- * @property {(x: number) => number} X From mm to pixels.
+ * @property {(x: number) => number} X Maps mm to pixels.
  * @property {(y: number) => number} Y
  */
 
@@ -42,7 +42,7 @@ export function layoutMap(extent, width, { sections, tallest }) {
   const least = beside ? Math.min(200, width * 0.24) : 0;
   const free = width - MARGIN.left - MARGIN.right - gap;
   const scale = Math.min((free - least) / (x1 - x0), tallest / (y1 - y0));
-  // The space beside a tall patch goes to the section across, then to the margin of the map.
+  // The space beside a tall patch is used by the lateral section first, then by the margin of the map.
   const mapWidth = beside ? Math.max(scale * (x1 - x0), Math.min(free - least, free * 0.6)) : free;
   const map = { left: MARGIN.left, top: MARGIN.top, width: mapWidth, height: scale * (y1 - y0) };
   const left = x0 - (mapWidth / scale - (x1 - x0)) / 2;
@@ -56,7 +56,7 @@ export function layoutMap(extent, width, { sections, tallest }) {
 }
 
 /**
- * A small picture without axes, at a scale that others share.
+ * Returns the layout of a small picture without axes, at a given scale.
  * @param {Extent} extent
  * @param {number} scale Pixels per mm.
  * @returns {Layout}

@@ -1,4 +1,4 @@
-// Colours of values: tables of 256 colours, and the theme that decides among them.
+// Colour maps of values, selected by scale, theme and preference.
 
 import { COLOURS } from './colours.js';
 
@@ -22,13 +22,13 @@ function kept() {
   }
 }
 
-/** @param {'viridis' | 'cividis'} name The map of amounts. */
+/** @param {'viridis' | 'cividis'} name Colour map of amounts. */
 export function chooseAmounts(name) {
   amounts = name;
   try {
     localStorage.setItem(KEPT, name);
   } catch {
-    // Storage is switched off; the choice holds until the page is left.
+    // Storage is disabled; the choice applies until the page is left.
   }
 }
 
@@ -39,14 +39,14 @@ export function isDark() {
 }
 
 /**
- * The map of a scale on the ground of the theme: signed values are pale in the middle on light ground, dark on dark.
+ * Returns the colour map of a scale. The centre of the map of signed values is pale in the light theme and dark in the dark theme.
  * @param {Scale} scale
  * @returns {MapName}
  */
 export const mapOf = (scale) => (scale === 'signed' ? (isDark() ? 'berlin' : 'vik') : amounts);
 
 /**
- * 256 colours as the words of an `ImageData` on a little-endian machine.
+ * Returns 256 colours as 32-bit words of an `ImageData` on a little-endian machine.
  * @param {MapName} name
  */
 export function wordsOf(name) {
@@ -71,7 +71,7 @@ export function hex(name, share) {
 }
 
 /**
- * Colours values into pixels; where there is no value nothing is painted.
+ * Writes the colours of values into pixels. NaN is transparent.
  * @param {Float32Array} values
  * @param {Uint32Array} pixels
  * @param {MapName} name

@@ -1,4 +1,4 @@
-// The picture of a field: colours inside the border, the border of the stick zone, arrows, axes and the colour bar.
+// Draws the picture of a field: colours inside the border, border of the stick zone, arrows, axes and colour bar.
 
 import { fixed, number, tickLabel, ticks } from '../format.js';
 import { colourise, hex, mapOf } from './palette.js';
@@ -19,12 +19,12 @@ import { stickBorder } from './stick.js';
  * @property {Quantity} quantity
  * @property {ArrayLike<number>} values
  * @property {readonly [number, number]} range
- * @property {number} friction The coefficient; NaN if it is not known.
- * @property {boolean} border Draw the border of the stick zone.
+ * @property {number} friction Coefficient of friction; NaN if unknown.
+ * @property {boolean} border Whether the border of the stick zone is drawn.
  * @property {boolean} arrows
- * @property {boolean} mesh Show the cells as they were computed.
+ * @property {boolean} mesh Whether the computed cells are shown without interpolation.
  * @property {boolean} compact
- * @property {boolean} bent The coordinate across is the arc length along the rail.
+ * @property {boolean} bent Whether the lateral coordinate is the arc length along the rail.
  */
 
 const ARROW_STEP = 30;
@@ -132,8 +132,8 @@ function drawValues(pen, scene, layout, density, ink) {
 }
 
 /**
- * Stick and slip inside the border. Slip is hatched too, since colour must not be the only sign.
- * @param {Float32Array} distances From the border of the stick zone, negative where it sticks, by pixels.
+ * Paints stick and slip. Slip is also hatched, because colour must not be the only distinction.
+ * @param {Float32Array} distances Distance of each pixel from the border of the stick zone, negative in the stick zone.
  * @param {Uint32Array} pixels
  * @param {number} width
  * @param {number} density
@@ -150,7 +150,7 @@ function paintZones(distances, pixels, width, density, ink) {
   }
 }
 
-/** A colour as the word of an `ImageData` on a little-endian machine. @param {string} colour As `#rrggbb`. @param {number} light */
+/** Returns a colour as a 32-bit word of an `ImageData` on a little-endian machine. @param {string} colour A colour `#rrggbb`. @param {number} light Brightness factor. */
 function wordOf(colour, light) {
   const rgb = parseInt(colour.slice(1), 16);
   const part = (/** @type {number} */ shift) => Math.round(((rgb >> shift) & 255) * light);
@@ -158,7 +158,7 @@ function wordOf(colour, light) {
 }
 
 /**
- * Zones of cells as they were computed; slip is hatched too, since colour must not be the only sign.
+ * Draws the zones of the computed cells. Slip is also hatched, because colour must not be the only distinction.
  * @param {Pen} pen
  * @param {Scene} scene
  * @param {Layout} layout
@@ -172,7 +172,7 @@ function drawZones(pen, { index, values }, layout, ink) {
   for (let cell = 0; cell < x_mm.length; cell += 1) {
     const left = X(x_mm[cell] - dx_mm[cell] / 2);
     const top = Y(y_mm[cell] + dy_mm[cell] / 2);
-    // Half a pixel more hides the seams between neighbours.
+    // An extra half pixel hides the seams between neighbours.
     areas[values[cell] ? 1 : 0].rect(left, top, dx_mm[cell] * scale + 0.5, dy_mm[cell] * scale + 0.5);
   }
   pen.fillStyle = ink.stick;
@@ -250,7 +250,7 @@ function drawBorders(pen, scene, layout, ink) {
   pen.restore();
 }
 
-/** White on a dark edge: seen on every colour. @param {Pen} pen @param {Path2D} path @param {[number, number]} widths */
+/** Strokes a white line with a dark edge, visible on every colour. @param {Pen} pen @param {Path2D} path @param {[number, number]} widths */
 function twoTone(pen, path, [outer, inner]) {
   pen.strokeStyle = '#000000b0';
   pen.lineWidth = outer;
@@ -261,7 +261,7 @@ function twoTone(pen, path, [outer, inner]) {
 }
 
 /**
- * Arrows on a lattice, a quarter to all of its spacing long.
+ * Draws arrows on a lattice, with lengths that increase with the magnitude.
  * @param {Pen} pen
  * @param {Scene} scene
  * @param {Layout} layout
@@ -290,9 +290,9 @@ function drawArrows(pen, { index, quantity, range }, layout) {
 
 /**
  * @param {Path2D} path
- * @param {number} x Its middle.
+ * @param {number} x Centre of the arrow.
  * @param {number} y
- * @param {number} dx Its whole length.
+ * @param {number} dx Component of its length.
  * @param {number} dy
  */
 function addArrow(path, x, y, dx, dy) {
@@ -342,11 +342,11 @@ function drawAxes(pen, layout, ink, across) {
 }
 
 /**
- * Where the colour bar is.
+ * Returns the box of the colour bar.
  * @param {Layout} layout
  */
 export function barBox({ map, narrow }) {
-  // The heading needs its room.
+  // The bar leaves space for the heading.
   const width = Math.max(60, Math.min(260, map.width * (narrow ? 0.46 : 0.55), map.width - 130));
   return { left: map.left + map.width - width, top: 12, width, height: 10 };
 }
@@ -405,7 +405,7 @@ function drawLegend(pen, right, top, ink) {
 }
 
 /**
- * The mark of a value on the colour bar.
+ * Draws the mark of a value on the colour bar.
  * @param {Pen} pen
  * @param {Scene} scene
  * @param {Layout} layout
@@ -424,7 +424,7 @@ export function drawBarMark(pen, { range, quantity }, layout, value, ink) {
   pen.fill();
 }
 
-/** All colours and the font that a picture needs, from the styles of an element. @param {Element} element @returns {Ink} */
+/** Returns the colours and the font of a picture from the styles of an element. @param {Element} element @returns {Ink} */
 export function inkOf(element) {
   const style = getComputedStyle(element);
   const token = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
@@ -435,10 +435,10 @@ export function inkOf(element) {
 }
 
 /**
- * Returns names and values with units of a field at a cell, for the readout.
+ * Returns the names and values with units at a cell, for the readout.
  * @param {Scene} scene
  * @param {{ x: number, y: number }} place
- * @param {number} cell -1 outside.
+ * @param {number} cell Index of the cell; -1 outside.
  * @returns {[string, string][]}
  */
 export function tell({ index, friction, quantity, values, bent }, place, cell) {

@@ -1,19 +1,19 @@
-// The quantities of a field that can be shown: values, units and scales.
+// Quantities of a field that can be shown, with their values, units and scales.
 
 /** @typedef {import('../fields.js').Cells} Cells */
 /** @typedef {import('./palette.js').Scale} Scale */
 
 /**
  * @typedef {object} Quantity
- * @property {string} key Its name in addresses.
- * @property {string} label Its button.
- * @property {string} heading Above the map.
+ * @property {string} key Name in addresses.
+ * @property {string} label Text of its button.
+ * @property {string} heading Title above the map.
  * @property {string} unit
  * @property {Scale} scale
- * @property {boolean} vanishes It is 0 at the border of the patch.
- * @property {boolean} bounded Friction bounds it by μp.
- * @property {(cells: Cells) => ArrayLike<number> | null} values One for each cell; null where the field has none.
- * @property {(cells: Cells) => [number[], number[]] | null} vector The arrows, along and across rolling.
+ * @property {boolean} vanishes Whether it is 0 at the border of the patch.
+ * @property {boolean} bounded Whether it is bounded by μp.
+ * @property {(cells: Cells) => ArrayLike<number> | null} values Returns one value for each cell; null if the field has none.
+ * @property {(cells: Cells) => [number[], number[]] | null} vector Returns the longitudinal and lateral components of arrows; null for no arrows.
  */
 
 /** @param {number[] | undefined} along @param {number[] | undefined} across */
@@ -63,7 +63,7 @@ export const QUANTITIES = [
 const known = new WeakMap();
 
 /**
- * The values of a quantity, computed once for each field.
+ * Returns the values of a quantity, cached by cells.
  * @param {Quantity} quantity
  * @param {Cells} cells
  */
@@ -74,18 +74,18 @@ export function valuesOf(quantity, cells) {
   return of.get(quantity.key) ?? null;
 }
 
-/** @param {Cells} cells The quantities that a field has. */
+/** Returns the quantities of a field. @param {Cells} cells */
 export const offered = (cells) => QUANTITIES.filter((quantity) => valuesOf(quantity, cells));
 
 /** @param {string | undefined} key */
 export const quantityOf = (key) => QUANTITIES.find((quantity) => quantity.key === key);
 
 /**
- * The range of colours: from 0, or symmetric. Tractions end at the largest bound of friction, so that motions, patches and cases
- * compare by eye.
+ * Returns the range of colours, from 0 or symmetric. With a given bound, tractions extend to it, so that motions, patches and cases
+ * can be compared.
  * @param {Quantity} quantity
- * @param {readonly Cells[]} fields All that share the range.
- * @param {number} bound The largest μp in MPa; NaN if it is not known.
+ * @param {readonly Cells[]} fields Fields that share the range.
+ * @param {number} bound Largest μp in MPa; NaN for none.
  * @returns {[number, number]}
  */
 export function rangeOf(quantity, fields, bound) {

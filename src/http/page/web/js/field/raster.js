@@ -1,4 +1,4 @@
-// Values of cells at the pixels of a picture: as they were computed, or interpolated inside the border of the patch.
+// Rasterises values of cells to pixels, without interpolation or interpolated inside the border of the patch.
 
 import { slipDistances } from './stick.js';
 
@@ -6,7 +6,7 @@ import { slipDistances } from './stick.js';
 
 /**
  * @typedef {object} Frame
- * Pixels of a picture: the middle of pixel (column, row) is at x0 + (column + ½)·step, y1 − (row + ½)·step.
+ * Pixels of a picture. The centre of pixel (column, row) is at x0 + (column + ½)·step, y1 − (row + ½)·step.
  * @property {number} width
  * @property {number} height
  * @property {number} x0 Left edge in mm.
@@ -14,11 +14,11 @@ import { slipDistances } from './stick.js';
  * @property {number} step Side of a pixel in mm.
  */
 
-/** Samples along a strip; those of neighbouring strips are interpolated at equal shares of their lengths. */
+/** Number of samples along a strip. Neighbouring strips are interpolated at equal fractions of their lengths. */
 const SAMPLES = 512;
 
 /**
- * Every cell in its own value.
+ * Returns a raster with a constant value in each cell.
  * @param {CellIndex} index
  * @param {ArrayLike<number>} values
  * @param {Frame} frame
@@ -40,11 +40,11 @@ export function rasterCells(index, values, frame) {
 }
 
 /**
- * Values between the middles of cells, along the strips and from strip to strip, inside the border.
- * @param {CellIndex} index One that is `whole`.
+ * Returns a raster of values interpolated between cell centres, along the strips and between them, inside the border.
+ * @param {CellIndex} index A `whole` index.
  * @param {ArrayLike<number>} values
  * @param {Frame} frame
- * @param {boolean} vanishes The value is 0 at the border.
+ * @param {boolean} vanishes Whether the value is 0 at the border.
  * @returns {Float32Array} Row by row from the top; NaN outside.
  */
 export function rasterSmooth(index, values, frame, vanishes) {
@@ -52,8 +52,8 @@ export function rasterSmooth(index, values, frame, vanishes) {
 }
 
 /**
- * How far from the border of the stick zone, as a share of the strip: negative where it sticks.
- * @param {CellIndex} index One that is `whole`, with zones.
+ * Returns a raster of distances from the border of the stick zone as fractions of the strip, negative in the stick zone.
+ * @param {CellIndex} index A `whole` index with zones.
  * @param {number} friction
  * @param {Frame} frame
  */
@@ -79,7 +79,7 @@ function rasterSamples(index, samples, frame, vanishes) {
     const share = below === above ? 0 : (y - strips[below].y) / (strips[above].y - strips[below].y);
     const fade = below === above && vanishes ? edgeFade(index, strips[below], y) : 1;
     const [left, right] = span;
-    // Two pixels more on either side: the border is cut by the path of the picture, not here.
+    // Two extra pixels on either side are clipped later by the path of the border.
     const from = Math.max(0, Math.floor((left - frame.x0) / frame.step) - 2);
     const to = Math.min(frame.width, Math.ceil((right - frame.x0) / frame.step) + 2);
     const perMm = SAMPLES / (right - left || 1);
@@ -95,7 +95,7 @@ function rasterSamples(index, samples, frame, vanishes) {
 }
 
 /**
- * Beyond the middle of the outermost strip values that vanish at the border go there.
+ * Returns the factor by which values that vanish at the border decrease beyond the centre of the outermost strip.
  * @param {CellIndex} index
  * @param {import('./cells.js').Strip} strip
  * @param {number} y
@@ -105,10 +105,10 @@ function edgeFade(index, strip, y) {
   return Math.sqrt(Math.max(0, (edge - y) / (edge - strip.y || 1)));
 }
 
-/** By whether the value is 0 at the border. @type {[WeakMap<ArrayLike<number>, Float32Array>, WeakMap<ArrayLike<number>, Float32Array>]} */
+/** Cached samples, indexed by whether the value is 0 at the border. @type {[WeakMap<ArrayLike<number>, Float32Array>, WeakMap<ArrayLike<number>, Float32Array>]} */
 const sampled = [new WeakMap(), new WeakMap()];
 
-/** The samples of values, taken once. @param {CellIndex} index @param {ArrayLike<number>} values @param {boolean} vanishes */
+/** Returns the cached samples of values. @param {CellIndex} index @param {ArrayLike<number>} values @param {boolean} vanishes */
 function samplesOf(index, values, vanishes) {
   const of = sampled[vanishes ? 1 : 0];
   const known = of.get(values) ?? sampleStrips(index, values, vanishes);
@@ -116,18 +116,18 @@ function samplesOf(index, values, vanishes) {
   return known;
 }
 
-/** Points of a section. */
+/** Number of points of a section. */
 const SECTION_POINTS = 80;
 
 /**
- * Interpolated values on a line through the patch, from border to border.
- * @param {CellIndex} index One that is `whole`.
+ * Returns interpolated values on a line through the patch, from border to border.
+ * @param {CellIndex} index A `whole` index.
  * @param {ArrayLike<number>} values
- * @param {boolean} along The line is along rolling, else across.
- * @param {{ x: number, y: number }} place Where the line passes.
- * @param {boolean} vanishes The value is 0 at the border.
+ * @param {boolean} along Whether the line is longitudinal, else lateral.
+ * @param {{ x: number, y: number }} place A point on the line.
+ * @param {boolean} vanishes Whether the value is 0 at the border.
  * @param {number} [points]
- * @returns {[number, number][]} Places on the line in mm, with their values.
+ * @returns {[number, number][]} Positions on the line in mm, with their values.
  */
 export function sectionSmooth(index, values, along, place, vanishes, points = SECTION_POINTS) {
   const [loop] = index.border;
@@ -171,7 +171,7 @@ function sampleStrips({ strips, cells: { x_mm } }, values, vanishes) {
 }
 
 /**
- * Where a loop begins and ends at a height.
+ * Returns the smallest and the largest x of a loop at y; null if it does not reach y.
  * @param {readonly (readonly [number, number])[]} loop
  * @param {number} y
  * @returns {[number, number] | null}

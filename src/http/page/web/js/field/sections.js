@@ -1,4 +1,4 @@
-// The two sections of a field at the crosshair: along rolling below the map, across on its right. They share its axes.
+// Draws the two sections of a field at the crosshair: longitudinal below the map and lateral on its right, with common axes.
 
 import { fixed, tickLabel, ticks } from '../format.js';
 import { smoothLine } from './cells.js';
@@ -10,7 +10,7 @@ import { sectionSmooth } from './raster.js';
 /** @typedef {import('./picture.js').Ink} Ink */
 /** @typedef {import('./picture.js').Pen} Pen */
 
-/** Cells of a section up to which a curve is drawn between their middles, and the points among which these are found. More cells are smooth by themselves. */
+/** Largest number of cells of a section with a smooth curve through their centres, and the number of points from which the centres are taken. */
 const FEW = 60;
 const FINE = 160;
 
@@ -21,10 +21,10 @@ const FINE = 160;
  * @property {number[]} cells
  * @property {readonly [number, number]} range
  * @property {boolean} bounded
- * @property {(cell: number) => number} from The begin of a cell on the section's axis, in pixels.
+ * @property {(cell: number) => number} from Start of a cell on the section's axis, in pixels.
  * @property {(cell: number) => number} middle
  * @property {(cell: number) => number} to
- * @property {(value: number) => number} value To pixels.
+ * @property {(value: number) => number} value Maps a value to pixels.
  */
 
 /**
@@ -105,7 +105,7 @@ function drawSection(pen, scene, section, layout, place, here, ink) {
 }
 
 /**
- * A section from border to border, interpolated as the map is; of cells as they were computed where the map shows these.
+ * Returns a section from border to border: interpolated like the map, or the values of the cells if the map shows those.
  * @param {Scene} scene
  * @param {Section} section
  * @param {ArrayLike<number>} values
@@ -121,7 +121,7 @@ function lineOf({ index, mesh }, { along, cells }, values, vanishes, place) {
   return cells.map((cell) => [middle[cell], values[cell]]);
 }
 
-/** A section at its ends and at the middles of its cells, between which a curve is drawn. @param {[number, number][]} line @param {readonly number[]} middles */
+/** Reduces a section to its ends and the centres of its cells, for drawing a smooth curve. @param {[number, number][]} line @param {readonly number[]} middles */
 function atCells(line, middles) {
   const last = line.length - 1;
   if (middles.length < 3 || last < 1) return line;
@@ -175,7 +175,7 @@ function shadeStick(pen, { along, box, cells, from, to }, zone, ink) {
  * @param {Pen} pen
  * @param {Section} section
  * @param {Layout} layout
- * @param {readonly [number, number][]} line Places in mm, with their values.
+ * @param {readonly [number, number][]} line Positions in mm, with their values.
  * @param {string} colour
  * @param {number} width
  * @param {number[]} dash
@@ -183,7 +183,7 @@ function shadeStick(pen, { along, box, cells, from, to }, zone, ink) {
 function drawLine(pen, { along, box, value }, layout, line, colour, width, dash) {
   pen.save();
   pen.beginPath();
-  // Friction's bound may lie far above a scale of its own.
+  // The bound of friction may lie far outside the range of the values.
   pen.rect(box.left - 2, box.top - 2, box.width + 4, box.height + 4);
   pen.clip();
   pen.beginPath();

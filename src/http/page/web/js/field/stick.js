@@ -1,9 +1,9 @@
-// The border between stick and slip: along every strip where the traction reaches friction's bound, joined from strip to strip.
+// Border between stick and slip: the points of each strip where the traction reaches the bound of friction, joined from strip to strip.
 
 /** @typedef {import('./cells.js').CellIndex} CellIndex */
 /** @typedef {[number, number][]} Line */
 
-/** Where stick and slip meet in every strip. @param {CellIndex} index One with zones. @param {number} friction */
+/** Returns the x of each border between stick and slip, by strip. @param {CellIndex} index An index with zones. @param {number} friction */
 function crossingsOf(index, friction) {
   const { zone = [] } = index.cells;
   return index.strips.map((strip) => {
@@ -17,15 +17,15 @@ function crossingsOf(index, friction) {
   });
 }
 
-/** How far from stick, in lengths of the strip, a strip counts that slips all along. Chosen by judgement: zones that end between two strips are rounded. */
+/** Largest distance, as a fraction of the strip; also that of strips without a border. It rounds zones that end between two strips. Chosen by judgement. */
 const WHOLE = 0.25;
 
 /**
- * How far every sample of a strip is from the nearest place where stick and slip meet, as a share of the strip; positive where it slips. Between
- * strips 0 is the border of the stick zone.
- * @param {CellIndex} index One with zones.
+ * Returns the distance of each sample of a strip from the nearest border between stick and slip, as a fraction of the strip; positive in slip.
+ * Interpolated between strips, the level 0 is the border of the stick zone.
+ * @param {CellIndex} index An index with zones.
  * @param {number} friction
- * @param {number} count Samples of a strip.
+ * @param {number} count Number of samples of a strip.
  */
 export function slipDistances(index, friction, count) {
   const { zone = [] } = index.cells;
@@ -49,9 +49,9 @@ export function slipDistances(index, friction, count) {
 }
 
 /**
- * Lines between stick and slip.
+ * Returns the lines between stick and slip.
  * @param {CellIndex} index
- * @param {number} friction Its coefficient; NaN if it is not known, then the border lies between the cells.
+ * @param {number} friction Coefficient of friction. If it is NaN, the border lies between the cells.
  * @returns {Line[]}
  */
 export function stickBorder(index, friction) {
@@ -80,7 +80,7 @@ export function stickBorder(index, friction) {
 }
 
 /**
- * A line that ends in the middle of the outermost strip is continued over its other half; the picture is cut at the border.
+ * Extends a line that ends at the centre of an outermost strip over its outer half. The picture is clipped at the border.
  * @param {Line} line
  * @param {CellIndex} index
  */
@@ -95,10 +95,10 @@ function reachOut(line, { strips }) {
 }
 
 /**
- * Assigns lines to positions of the next strip: in order if their numbers are equal, else the nearest.
+ * Assigns lines to positions of the next strip: in order if there are equally many, else by distance.
  * @param {readonly Line[]} open
  * @param {readonly number[]} places
- * @returns {number[]} The line of every place; -1 where one begins.
+ * @returns {number[]} The line of each position; -1 if a new line starts there.
  */
 function join(open, places) {
   if (open.length === places.length) return places.map((_, place) => place);
@@ -112,7 +112,7 @@ function join(open, places) {
 }
 
 /**
- * A zone that ends between two strips is closed: its two sides meet half-way. A single line goes on in its direction.
+ * Closes lines that end between two strips: two lines meet half-way, and other lines continue in their directions.
  * @param {readonly Line[]} ending
  * @param {number} y
  */
@@ -130,8 +130,8 @@ function meet(ending, y) {
 }
 
 /**
- * Where between the middles of a cell and the one before it the traction reaches μp: the margin μp − |t| of the last two cells
- * that stick, continued; half-way where that is not known.
+ * Returns the x between the centres of a cell and the previous one where the traction reaches μp. The margin μp − |t| of the last two
+ * cells in stick is extrapolated; without it, the common edge of the cells is returned.
  * @param {CellIndex} index
  * @param {number} cell
  * @param {number} friction
