@@ -179,7 +179,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .merge(case)
         .route_layer(from_fn(etag::immutable));
     let finished = contract::conditional(finished);
-    // These check their parameters themselves.
+    // These handlers check their parameters themselves.
     let lists = OpenApiRouter::new()
         .routes(routes!(jobs::submit))
         .routes(routes!(batches::submit))
@@ -205,7 +205,7 @@ fn resources() -> OpenApiRouter<AppState> {
         .routes(routes!(runs::totals))
         .merge(lists)
         .route_layer(from_fn(accept::require_json));
-    // These choose among several forms themselves.
+    // These handlers negotiate their formats themselves.
     let parts = OpenApiRouter::new()
         .routes(routes!(results::resultants))
         .routes(routes!(fields::zones))

@@ -218,7 +218,7 @@ impl Pace {
     }
 }
 
-/// Returns an error that nobody receives.
+/// Returns an error for a client that has disconnected.
 fn client_left() -> ApiError {
     ApiError::internal("the client has left")
 }
@@ -597,7 +597,7 @@ mod tests {
                 let _turn = turns.take(tenant).await;
                 order.lock().unwrap().push(tenant);
             }));
-            // They queue in this order.
+            // Yielding makes the tasks queue in this order.
             tokio::task::yield_now().await;
         }
         drop(held);
@@ -647,7 +647,7 @@ mod tests {
             assert_eq!(short.unwrap(), 7);
         }
         endless.abort();
-        // Its turn comes back, and it stays.
+        // The abandoned computation gives its turn back.
         drop(turns.take("b").await);
         while turns.free.available_permits() == 0 {
             tokio::task::yield_now().await;

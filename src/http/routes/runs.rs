@@ -695,7 +695,7 @@ fn totals_of(
     percentiles: &[f64],
     above: &[f64],
 ) -> SectionTotals {
-    // Without rows there are no columns yet.
+    // A section without rows has no columns.
     let columns = numbers
         .columns
         .into_iter()

@@ -372,7 +372,7 @@ mod tests {
             assert_eq!(unread(), 1);
         }
         assert_eq!((read, unread()), (data.clone(), 0));
-        // An answer without data so far is not unread, and its connection not overdue.
+        // A response that has not produced data does not count as unread, and its connection is not overdue.
         let silent =
             Body::from_stream(futures_util::stream::pending::<Result<Bytes, axum::Error>>());
         let mut silent = connection.begin_request().send(silent);

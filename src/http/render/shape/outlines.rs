@@ -466,7 +466,7 @@ mod tests {
         let loops = outlines::<Zone>(&fields, None, None);
         assert_eq!(loops.len(), 1);
         assert_eq!(loops[0].len(), 4);
-        // A real gap, however narrow, stays.
+        // A gap is kept even if it is narrow.
         for (x, dx) in fields.x_mm.iter_mut().zip(&mut fields.dx_mm).take(1) {
             *x -= 1e-7;
             *dx -= 1e-7;

@@ -577,7 +577,7 @@ mod stick_tests {
         let sheet = Sheet::new(&cells).expect("one piece");
         let loops = sheet.stick(&cells, &values).expect("zones are known");
         assert_eq!(loops.len(), 1, "one zone, no stray cells");
-        // Its trailing end at y: chord − 2 (chord − shrink).
+        // The trailing end of the zone at y is at chord − 2 (chord − shrink).
         let trailing = loops[0].iter().filter(|[_, y]| y.abs() < 1.6);
         for [x, y] in trailing {
             let chord = a * (1.0 - (y / b).powi(2)).sqrt();
