@@ -1,4 +1,4 @@
-//! Prints where `liu_hsu` converges, by rule, mesh and region. Nothing is timed but the whole row.
+//! Prints where `liu_hsu` converges, by rule, mesh and region. Only whole rows are timed.
 
 use std::time::Instant;
 

@@ -1,7 +1,7 @@
-//! Time of the normal and the tangential problem on the reference gaps; one run, one thread.
+//! Measures the time of the normal and the tangential problem on the reference gaps, in one run on one thread.
 //!
-//! `cargo bench --bench gaps` prints for every case: the share of both problems in the time of a default solve in µs, and
-//! the errors of approach, area and largest pressure against the converged reference.
+//! For every case, `cargo bench --bench gaps` prints the time of both problems in a default solve in µs, and the errors of approach, area and
+//! largest pressure against the converged reference.
 
 use std::hint::black_box;
 
@@ -62,7 +62,7 @@ fn row(case: &Value) -> [f64; 2] {
     [normal, tangential]
 }
 
-/// A stored case as a question.
+/// Returns a stored case as a question.
 fn question(case: &Value) -> Value {
     json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },

@@ -1,4 +1,4 @@
-//! Cost of the parts of a solve: rows of the influence, one product, a whole level, by mesh and storage.
+//! Measures the cost of the parts of a solve, by mesh and storage: rows of influence coefficients, one product, the solve on a whole mesh.
 
 use std::hint::black_box;
 

@@ -1,4 +1,4 @@
-//! Shared by the benches: a clock that ignores other processes, medians, and the unit of machine speed.
+//! Common to the benches: a clock that ignores other processes, medians, and the unit of machine speed.
 
 #![allow(dead_code, reason = "every bench uses its part")]
 
@@ -7,26 +7,26 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::factor;
 use faer::{Mat, Par};
 
-/// Seconds this thread spends on a core for one call of `work`.
+/// Returns the seconds that this thread spends on a core for one call of `work`.
 pub fn seconds_of<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let clock = ThreadTime::now();
     let answer = work();
     (clock.elapsed().as_secs_f64(), answer)
 }
 
-/// Median of the values.
+/// Returns the median of the values.
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }
 
-/// Value below which a share of the values lies.
+/// Returns the value below which a share of the values lies.
 pub fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     values[((values.len() as f64 * share) as usize).min(values.len() - 1)]
 }
 
-/// Seconds of one 500 × 500 f64 LU, factored in place: the unit of machine speed.
+/// Returns the seconds of one 500 × 500 f64 LU factorisation in place: the unit of machine speed.
 pub fn lu_seconds() -> f64 {
     let n = 500;
     let matrix = Mat::<f64>::from_fn(n, n, |i, j| {

@@ -1,4 +1,4 @@
-//! Draws the forces of a wheel on its rail over the lateral shift of the wheelset, and says how smooth they are.
+//! Draws the forces of a wheel on its rail over the lateral shift of the wheelset, and prints how smooth they are.
 
 use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
@@ -8,14 +8,14 @@ use serde_json::{Value, json};
 use crate::drawing::{Curve, Frame, Picture};
 use crate::machine::{median, quantile};
 
-/// Shifts in mm toward the rail, and the step between them.
+/// Largest shift in mm toward the rail. `STEP` is the step between shifts.
 const SHIFT_MAX: f64 = 8.0;
 const STEP: f64 = 0.05;
 const FRICTION: f64 = 0.3;
-/// Bends that are named.
+/// Number of second differences that are printed.
 const NAMED: usize = 24;
 
-/// A pair with its wheel load in N, and the yaw in rad.
+/// A pair with its wheel load in N and the yaw in rad.
 pub(crate) struct Shifted {
     pub(crate) name: &'static str,
     pub(crate) pair: Value,
@@ -24,7 +24,7 @@ pub(crate) struct Shifted {
 }
 
 impl Shifted {
-    /// Shift in mm with F_x and F_y in kN, of the shifts that have an answer on the curve.
+    /// Returns the shift in mm with F_x and F_y in kN, for the shifts that have an answer on the curve.
     fn forces(&self) -> Vec<[f64; 3]> {
         let count = (SHIFT_MAX / STEP).round() as u32;
         let at = |k: u32| {
@@ -52,7 +52,7 @@ impl Shifted {
     }
 }
 
-/// Draws all pairs beside each other and prints how much the forces bend from step to step.
+/// Draws all pairs side by side and prints the second differences of the forces.
 pub(crate) fn draw(pairs: &[Shifted]) -> Picture {
     println!("| pair | bend of F_x, F_y in % of μN: median | 90 % | largest |\n|---|---|---|---|");
     let mut picture = Picture::new(
@@ -101,7 +101,7 @@ pub(crate) fn draw(pairs: &[Shifted]) -> Picture {
     picture
 }
 
-/// The largest bends in %, each with its shift in mm.
+/// Returns a text with the largest second differences in % and their shifts in mm.
 fn largest(mut bends: Vec<[f64; 2]>) -> String {
     bends.sort_by(|a, b| b[0].total_cmp(&a[0]));
     let text = |[size, shift]: &[f64; 2]| format!("{:.2} at {shift:.2} mm", 100.0 * size);

@@ -1,9 +1,9 @@
-//! Wheels on rails by their profiles: what a solve and the check of the case take, and what rows of one pair take.
+//! Measures wheels on rails by their profiles: the time of a solve, of the check of the case, and of rows of one pair.
 //!
-//! `cargo bench --bench wheels` prints times in LU (the report's unit), best of several; `-- rows 1000` the means of so many rows that differ in
-//! shift, yaw and load, solved one after the other as a run solves them, at a target of 0.02 and without fields.
-//! `-- shift` draws forces over the shift of the wheelset into `docs/wheel-rail/shift.svg`; the worn pair needs the reference files.
-//! `-- curve 20` prints the ratio of the time on the reference curve to that on planes, for 20 random placements of each class.
+//! `cargo bench --bench wheels` prints the best of several times in LU (the report's unit). `-- rows 1000` prints the means over this number of
+//! rows, which differ in shift, yaw and load. They are solved one after the other as in a run, at a target of 0.02 and without fields. `-- shift`
+//! draws forces over the shift of the wheelset into `docs/wheel-rail/shift.svg`; the worn pair needs the reference files. `-- curve 20` prints the
+//! ratio of the time on the reference curve to that on planes, for 20 random placements of each class.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -27,12 +27,12 @@ mod worn_pair;
 /// Lateral shifts of the wheelset in mm, from the tread to the gauge corner.
 const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];
 const REPEATS: usize = 15;
-/// Rows that are measured in the same LU.
+/// Number of rows measured with the same LU.
 const ROWS_PER_LU: usize = 50;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Run by `cargo test --benches` as well, where there is nothing to print.
+    // `cargo test --benches` also runs this program, and then it prints nothing.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
@@ -96,12 +96,12 @@ fn rows(count: usize) {
     let pair = example("wheel-rail.case.json");
     let (operators, known) = (Arc::default(), KnownPair::default());
     let (mut lu, mut units) = (0.0, Vec::new());
-    // The first solve of a process reads the table of creep forces.
+    // The first solve of a process loads the table of creep forces.
     let first = check_with(&known, &row(&pair, count), &Limits::default()).expect("a valid case");
     drop(solve_with(&operators, &first, &Unmonitored));
     let (mut checks, mut solves, mut failed) = (Vec::new(), Vec::new(), 0);
     for k in 0..count {
-        // The machine does not keep its speed.
+        // The speed of the machine varies.
         if k % ROWS_PER_LU == 0 {
             lu = lu_seconds();
             units.push(lu);
@@ -125,7 +125,7 @@ fn rows(count: usize) {
     );
 }
 
-/// Numbers between two ends, the same on every machine.
+/// Returns a function that gives random numbers between two ends, the same on every machine.
 fn random(seed: usize) -> impl FnMut(f64, f64) -> f64 {
     let mut state = (seed as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     move |low: f64, high: f64| {
@@ -136,7 +136,7 @@ fn random(seed: usize) -> impl FnMut(f64, f64) -> f64 {
     }
 }
 
-/// The case of a row, on the tread and at the gauge corner.
+/// Returns the case of a row, on the tread or at the gauge corner.
 fn row(pair: &Value, number: usize) -> Value {
     let mut between = random(number);
     let mut case = pair.clone();
@@ -158,11 +158,12 @@ struct Class {
     yaw: [f64; 2],
     /// Vertical forces in N.
     force: [f64; 2],
-    /// Solved once one after the other with a common store of operators, at a target error of 0.02; otherwise alone, at 0.005.
+    /// Whether the placements are solved one after the other with a common store of operators at a target of 0.02. Otherwise they are solved
+    /// separately at 0.005.
     rows: bool,
 }
 
-/// Contact on the reference curve against contact on planes: ratios of processor time of single solves and of rows of one pair.
+/// Compares contact on the reference curve with contact on planes: ratios of processor time of single solves and of rows of one pair.
 fn curve(count: usize) {
     println!(
         "| class | cases | patches | plane, ms | curve, ms | ratio: median | 90 % | largest | without an answer |\n|---|---|---|---|---|---|---|---|---|"
@@ -280,7 +281,7 @@ fn shift() {
     println!("{path}");
 }
 
-/// The worn pair of the reference files, for the right-hand rail; `None` without the files.
+/// Returns the worn pair of the reference files for the right-hand rail, or `None` without the files.
 fn worn_case() -> Option<Value> {
     let [rail, wheel] = worn_pair()?;
     Some(json!({

@@ -1,7 +1,7 @@
-//! A worn wheel on a worn rail in 336 states: which come to rest, and how smoothly forces follow the load.
+//! Solves a worn wheel on a worn rail in 336 states, and prints which reach equilibrium and how smoothly forces depend on the load.
 //!
-//! `cargo bench --bench worn` needs the reference files beside the checkout (or `RAILHEAD_REFERENCE`). It ends with an error if
-//! more than one state in a hundred has no answer.
+//! `cargo bench --bench worn` needs the reference files beside the checkout (or `RAILHEAD_REFERENCE`). It ends with an error if more than one state
+//! in a hundred has no answer.
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;

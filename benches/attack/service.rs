@@ -1,4 +1,4 @@
-//! The real program on a data folder of its own, with keys of two tenants.
+//! The real program on a separate data folder, with keys of two tenants.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -8,27 +8,27 @@ use std::time::{Duration, Instant};
 use reqwest::{Method, RequestBuilder};
 use serde_json::Value;
 
-/// How long the program may take to listen.
+/// Maximum time until the program listens.
 const STARTS_WITHIN: Duration = Duration::from_secs(20);
-/// Linux tells times of processes in these.
+/// Unit in which Linux gives process times.
 const TICKS_PER_SECOND: f64 = 100.0;
 
-/// A running service; killed when dropped.
+/// A running service, which is killed on drop.
 pub struct Service {
     child: Child,
-    /// Where it listens: address and port.
+    /// Address and port on which it listens.
     pub address: String,
     /// Its data folder.
     pub data: PathBuf,
-    /// A key of the tenant that attacks.
+    /// Key of the attacking tenant.
     pub attacker: String,
-    /// A key of the tenant that is not to notice.
+    /// Key of the tenant that must not be affected.
     pub other: String,
     client: reqwest::Client,
     _folder: tempfile::TempDir,
 }
 
-/// An answer with the time that it took in s.
+/// A response with its time in s.
 #[derive(Debug)]
 pub struct Answer {
     pub status: u16,
@@ -68,7 +68,7 @@ impl Service {
         }
     }
 
-    /// A request with a key, as `shape` completes it.
+    /// Sends a request with a key, completed by `shape`.
     pub async fn send(
         &self,
         key: &str,
@@ -90,12 +90,12 @@ impl Service {
         }
     }
 
-    /// A GET with a key.
+    /// Sends a GET request with a key.
     pub async fn get(&self, key: &str, path: &str) -> Answer {
         self.send(key, Method::GET, path, |request| request).await
     }
 
-    /// A body of this type with a key.
+    /// Sends a body of this type with a key.
     pub async fn post(
         &self,
         key: &str,
@@ -109,7 +109,7 @@ impl Service {
         .await
     }
 
-    /// Submits a case; the id of its job.
+    /// Submits a case and returns the id of its job.
     pub async fn submit(&self, key: &str, case: &Value) -> String {
         let answer = self
             .post(key, "/v1/jobs", "application/json", case.to_string())
@@ -118,7 +118,7 @@ impl Service {
         answer.json()["id"].as_str().expect("an id").to_owned()
     }
 
-    /// Submits a body that has to be accepted; the path of what it makes.
+    /// Submits a body that must be accepted, and returns the path of the created resource.
     pub async fn make(&self, path: &str, media_type: &str, body: String) -> String {
         let answer = self.post(&self.attacker, path, media_type, body).await;
         assert_eq!(answer.status, 202, "{}", answer.text);
@@ -126,7 +126,7 @@ impl Service {
         format!("{}/{id}", path.split('?').next().unwrap_or(path))
     }
 
-    /// Waits until a job, a batch or a run has ended; what it is then.
+    /// Waits until a job, a batch or a run has ended, and returns its last representation.
     pub async fn ended(&self, key: &str, path: &str) -> Value {
         loop {
             let answer = self.get(key, path).await;
@@ -139,7 +139,7 @@ impl Service {
         }
     }
 
-    /// Revokes a key beside the running service.
+    /// Revokes a key while the service runs.
     pub fn revoke(&self, key: &str) {
         let id = key.split('_').nth(1).expect("an id");
         let revoked = program()
@@ -149,11 +149,11 @@ impl Service {
         assert!(revoked.expect("the program").status.success());
     }
 
-    /// Processor time of the process so far in s.
+    /// Returns the processor time of the process so far in s.
     pub fn processor_s(&self) -> f64 {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id()));
         let stat = stat.expect("the process lives");
-        // Fields 14 and 15; the second, a name, may have spaces and ends with a bracket.
+        // Fields 14 and 15. The second field, a name, may contain spaces and ends with a parenthesis.
         let ticks = stat.rsplit(')').next().expect("its fields").split(' ');
         let ticks = ticks.skip(12).take(2).map(str::parse::<f64>);
         ticks.sum::<Result<f64, _>>().expect("ticks") / TICKS_PER_SECOND
@@ -161,7 +161,7 @@ impl Service {
 }
 
 impl Answer {
-    /// The body as JSON.
+    /// Returns the body as JSON.
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.text).unwrap_or(Value::Null)
     }
@@ -174,7 +174,7 @@ impl Drop for Service {
     }
 }
 
-/// The real program without settings of the surroundings.
+/// Returns the real program without `RAILHEAD_` variables of the environment.
 fn program() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_railhead"));
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
@@ -183,7 +183,7 @@ fn program() -> Command {
     command
 }
 
-/// Makes a key of a tenant beside the running service.
+/// Creates a key for a tenant while the service runs.
 pub fn make_key(data: &Path, tenant: &str) -> String {
     let made = program()
         .args(["keys", "create", "--tenant", tenant, "--data-dir"])
@@ -201,7 +201,7 @@ pub fn make_key(data: &Path, tenant: &str) -> String {
         .to_owned()
 }
 
-/// The address that the event `listening` names.
+/// Returns the address in the log event `listening`.
 fn listening(log: &Path) -> String {
     let start = Instant::now();
     while start.elapsed() < STARTS_WITHIN {

@@ -1,4 +1,4 @@
-//! How much does the estimate jump along a sweep?
+//! Prints how much the estimate changes between neighbours of a sweep.
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -20,7 +20,7 @@ fn case(motion: &Value, target: f64) -> Value {
     })
 }
 
-/// Estimates of all motions of a case, and the cells of their meshes.
+/// Returns the estimates of all motions of a case, and the numbers of cells of their meshes.
 fn estimates(case: &Value) -> Vec<(f64, u32)> {
     let problem = contact::check(case, &Limits::default()).expect("a sound case");
     let (solution, _) = contact::solve(&problem, &Unmonitored).expect("an answer");
@@ -35,7 +35,7 @@ fn estimates(case: &Value) -> Vec<(f64, u32)> {
     points.map(of).collect()
 }
 
-/// Changes of the logarithm of the estimate between neighbours of a sweep of the longitudinal creepage at fixed spin.
+/// Prints the changes of the logarithm of the estimate between neighbours of a sweep of the longitudinal creepage at fixed spin.
 pub fn table() {
     println!(
         "| sweep | target | spin 1/mm | change of ln(estimate): median | 90 % | largest | meshes changed |"

@@ -1,4 +1,4 @@
-//! Finds truths: the same contact on meshes much finer than any target asks for.
+//! Computes reference results: the same contact on much finer meshes than any target needs.
 
 use std::sync::Arc;
 
@@ -21,22 +21,22 @@ use crate::patches::{self, PatchAnswer};
 use crate::population::{Class, on_planes};
 use crate::truth::{Frame, TrueResultants, Truth, distance, print};
 
-/// Cells of the two meshes that make a truth.
+/// Numbers of cells of the two meshes that give a reference result.
 const CELLS: [u32; 2] = [1024, 2048];
-/// Uncertainty beside half of the extrapolated change.
+/// Minimum uncertainty, added to half of the extrapolated change.
 const LEAST: f64 = 2e-5;
-/// Targets that stand for region and pressure of a gap much finer than asked for, and for all of a wheel on a rail.
+/// Targets for the reference results: of region and pressure of a gap, and of a wheel on a rail.
 const TARGET_GAP: f64 = 4e-4;
 const TARGET_PROFILES: f64 = 4e-4;
-/// Targets of two solves on the curve of the rail: the second is the truth, and off by no more than it differs from the first.
+/// Targets of two solves on the curve of the rail. The second solve is the reference result, and its difference from the first is the uncertainty.
 const TARGETS_CURVE: [f64; 2] = [5e-4, 2e-4];
-/// Share of the estimate of a wheel on a rail that its truth is taken to be off by.
+/// Uncertainty of the reference result of a wheel on a rail, as a share of its estimate.
 const SHARE_PROFILES: f64 = 0.5;
 
-/// Finds the truth of a case.
+/// Returns the reference result of a case.
 ///
 /// # Errors
-/// Why the case has no answer.
+/// Returns the reason if the case has no answer.
 pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
     match class {
         Class::Profiles => return of_profiles(case),
@@ -52,7 +52,7 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
     let mut uncertainty = change + LEAST;
     let value = frame.relative(value);
     if matches!(checked.problem.task, NormalTask::Gap(_)) {
-        // The change from a coarser normal problem, which errs about three times as much.
+        // The change from a coarser normal problem, whose error is about three times as large.
         let mut coarse = case.clone();
         coarse["solver"] = json!({ "target_error": 0.001 });
         let checked = contact::check(&coarse, &Limits::default()).map_err(|e| e.to_string())?;
@@ -78,7 +78,7 @@ pub fn find(class: Class, case: &Value) -> Result<Truth, String> {
     })
 }
 
-/// Units and centre of a problem's resultants.
+/// Returns the units and the centre of a problem's resultants.
 fn frame_of(checked: &CheckedCase, footprint: &Footprint) -> Frame {
     let patches = footprint.patches();
     let load: f64 = patches.iter().map(|p| p.normal_force).sum();
@@ -94,7 +94,7 @@ fn frame_of(checked: &CheckedCase, footprint: &Footprint) -> Frame {
     }
 }
 
-/// The sum of the resultants from two fine meshes, and half of what they say is left, relative to μN.
+/// Returns the sum of the resultants, extrapolated from two fine meshes by half, and the remaining change relative to μN.
 fn two_meshes(
     checked: &CheckedCase,
     footprint: &Footprint,
@@ -114,7 +114,7 @@ fn two_meshes(
     Ok((value, change))
 }
 
-/// The sum of the resultants on a mesh of so many cells, in double precision, and how many there are.
+/// Returns the sum of the resultants on a mesh of about `cells` cells in double precision, and the actual number of cells.
 fn one_mesh(
     checked: &CheckedCase,
     footprint: &Footprint,
@@ -154,7 +154,7 @@ fn one_mesh(
     Ok((sum, solved.mesh.mesh.cells()))
 }
 
-/// Tangential resultants of a wheel on a rail on planes of contact, patch by patch, from a fine target.
+/// Returns the tangential resultants of a wheel on a rail on planes of contact, patch by patch, from a fine target.
 fn of_profiles(case: &Value) -> Result<Truth, String> {
     let mut fine = case.clone();
     fine["solver"] = json!({ "target_error": TARGET_PROFILES });
@@ -178,7 +178,8 @@ fn of_patches(
     }
 }
 
-/// Tangential resultants of a wheel on the curve of its rail, patch by patch, from a fine target; uncertain by the change from a coarser one.
+/// Returns the tangential resultants of a wheel on the curve of its rail, patch by patch, from a fine target. The uncertainty is the change from a
+/// coarser one.
 fn of_curve(case: &Value) -> Result<Truth, String> {
     let of_target = |target: f64| {
         let mut fine = case.clone();
@@ -202,7 +203,7 @@ fn of_curve(case: &Value) -> Result<Truth, String> {
     Ok(truth)
 }
 
-/// The resultants of a patch as its truth.
+/// Returns the resultants of a patch as its reference result.
 fn of_patch(patch: &PatchAnswer) -> TrueResultants {
     let frame = Frame {
         centre: [0.0; 2],

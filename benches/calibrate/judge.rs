@@ -1,4 +1,4 @@
-//! How far an answer is from the truth.
+//! Compares an answer with the reference result.
 
 use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::rolling::answer::Resultants;
@@ -8,8 +8,8 @@ use crate::patches::{self, PatchAnswer, left_open};
 use crate::population::Class;
 use crate::truth::{Judged, Truth};
 
-/// Pairs of estimated and true error of an answer: one for the sum, or one for each patch of a wheel on a rail. The estimates of patches exclude the
-/// part for the turn factors, which mesh refinement cannot show. Returns `None` without an estimate.
+/// Returns pairs of estimated and true error of an answer: one for the sum, or one for each patch of a wheel on a rail. The estimates of patches
+/// exclude the part for the factors for the curvature, which mesh refinement does not show. Returns `None` without an estimate.
 pub fn judged(
     class: Class,
     truth: &Truth,

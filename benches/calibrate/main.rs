@@ -1,9 +1,9 @@
-//! Is the error estimate right? Solves random contacts for three targets and compares with meshes much finer.
+//! Checks the error estimate: solves random contacts for three targets and compares them with much finer meshes.
 //!
-//! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for
-//! checking; of wheels on rails every patch counts); with names of classes (`ellipse smooth jump gap profiles curve`) those alone. Truths come from
-//! `tests/data/finer_meshes.json`; `-- truths [classes]` finds the missing ones, some seconds each; `-- continuity`
-//! prints how the estimate changes along a sweep, `-- sweeps` how right it is along many, `-- case gap 42` one case as JSON.
+//! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for checking; every patch of
+//! wheels on rails counts). With names of classes (`ellipse smooth jump gap profiles curve`), it prints only these. The reference results are in
+//! `tests/data/finer_meshes.json`. `-- truths [classes]` computes missing ones, which takes some seconds each. `-- continuity` prints how the
+//! estimate changes along a sweep, `-- sweeps` the accuracy of the estimate along many sweeps, `-- case gap 42` one case as JSON.
 
 use cpu_time::ThreadTime;
 use judge::judged;
@@ -39,7 +39,7 @@ const TARGETS: [f64; 3] = [0.02, 0.005, 0.001];
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Run by `cargo test --benches` as well, where there is nothing to print.
+    // `cargo test --benches` also runs this program, and then it prints nothing.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
@@ -72,7 +72,7 @@ fn main() {
     }
 }
 
-/// Finds what is missing in the file, writing after every case.
+/// Computes the reference results that the file lacks, and writes the file after every case.
 fn find_truths(class: Class) {
     for number in 0..class.count() {
         let question = case(class, number);
@@ -99,11 +99,11 @@ fn find_truths(class: Class) {
     }
 }
 
-/// One estimate against the truth.
+/// One estimate and its true error.
 struct Outcome {
     judged: Judged,
     met: bool,
-    /// Of the whole answer.
+    /// Processor time of the whole answer.
     seconds: f64,
 }
 
@@ -156,7 +156,7 @@ fn tables(class: Class, truths: &Truths, each: bool) {
     }
 }
 
-/// One outcome, with the mesh of the first patch.
+/// Prints one outcome, with the mesh of the first patch.
 fn print_one((class, number, target): (Class, usize, f64), found: &Outcome, solution: &Solution) {
     let mesh = solution.patches[0].points[0].solver.mesh.expect("a mesh");
     let Judged {
@@ -182,7 +182,7 @@ fn row(name: &str, target: f64, outcomes: &[Outcome]) {
         values.sort_by(f64::total_cmp);
         values
     };
-    // Between two values, their mean by nearness.
+    // Interpolates linearly between two values.
     let at = |values: &[f64], part: f64| {
         let place = part * values.len().saturating_sub(1) as f64;
         let value = |k: f64| values.get(k as usize).copied().unwrap_or(f64::NAN);

@@ -1,4 +1,4 @@
-//! Wheels on rails: each patch has its own frame, its own estimate, and a moment about its own load centre.
+//! Patches of wheels on rails. Each patch has its own frame, its own estimate, and a moment about its own load centre.
 
 use railhead_contact::geometry::reference_curve::ReferenceCurve;
 use railhead_contact::normal::footprint::NormalTask;
@@ -8,7 +8,7 @@ use railhead_contact::solution::words::answer::{Fields, PatchSolution, Solution}
 
 use crate::truth::{Judged, TrueResultants, Truth};
 
-/// The tangential answer of a patch, or the sums over several.
+/// The tangential answer of a patch, or the sums over several patches.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PatchAnswer {
     /// Forces in N in the axes of the patch, and the moment in N·mm about its load centre.
@@ -22,7 +22,8 @@ pub struct PatchAnswer {
 }
 
 impl PatchAnswer {
-    /// The patches of an answer, whose estimates have a part of μN for what no mesh shows; none without an estimate.
+    /// Returns the patches of an answer, with `open` times μN subtracted from each estimate. That part of the estimate does not depend on the mesh.
+    /// Returns `None` without an estimate.
     pub fn of_solution(solution: &Solution, open: f64) -> Option<Vec<PatchAnswer>> {
         let patches = solution.patches.iter();
         patches.map(|patch| PatchAnswer::new(patch, open)).collect()
@@ -61,8 +62,8 @@ impl PatchAnswer {
     }
 }
 
-/// Error of the forces on the curve of the rail due to the factors for its turn, relative to μN: a fifth of the standard deviation of the
-/// angle over the load in rad, and at most 3.5 % (`docs/wheel-rail.md`).
+/// Returns the error of the forces on the curve of the rail due to the factors for its curvature, relative to μN: a fifth of the standard deviation
+/// of the angle over the load in rad, and at most 3.5 % (`docs/wheel-rail.md`).
 pub fn left_open(case: &CheckedCase, solution: &Solution, fields: &Fields) -> f64 {
     let NormalTask::Wheel(contact) = &case.problem.task else {
         unreachable!("a wheel on a rail")
@@ -95,14 +96,14 @@ pub fn left_open(case: &CheckedCase, solution: &Solution, fields: &Fields) -> f6
     (0.2 * deviation).min(0.035)
 }
 
-/// The sums over patches.
+/// Returns the sums over patches.
 pub fn sum(patches: &[PatchAnswer]) -> PatchAnswer {
     patches
         .iter()
         .fold(PatchAnswer::default(), PatchAnswer::plus)
 }
 
-/// Patch by patch; the sums if the finer answer has another number of patches.
+/// Compares patch by patch, or the sums if the reference result has another number of patches.
 pub fn judged(truth: &Truth, found: &[PatchAnswer]) -> Vec<Judged> {
     if found.len() > 1 && found.len() == truth.patches.len() {
         let pairs = found.iter().zip(&truth.patches);

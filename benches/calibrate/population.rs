@@ -1,4 +1,4 @@
-//! Random contacts of four classes that the error estimate is judged on, the same on every machine.
+//! Random contacts of six classes for checking the error estimate, the same on every machine.
 
 use std::f64::consts::PI;
 
@@ -7,25 +7,25 @@ use serde_json::{Value, json};
 use crate::profile_shapes::{rail_60e1, rail_head, s1002};
 use crate::random::Random;
 
-/// Where region and pressure come from.
+/// Class of contacts by the source of region and pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Class {
     /// Hertz's ellipse with a/b from 1/20 to 20.
     Ellipse,
     /// Smooth pressures on a grid.
     Smooth,
-    /// Pressures with a hole, or a narrow ridge that is cut off.
+    /// Pressures with a hole, or with a narrow ridge that is cut off.
     Jump,
-    /// Crowns of arcs, quartics, two parabolas, skew parabolas, blended radii; as profiles and as grids.
+    /// Crowns of arcs, quartics, two parabolas, skew parabolas and blended radii, as profiles and as grids.
     Gap,
-    /// S1002 on 60E1, moved sideways and yawed, on planes of contact.
+    /// S1002 on 60E1, shifted and yawed, on planes of contact.
     Profiles,
     /// New and worn wheels on new and worn rails, on the tread, at gauge corner and flange, on the curve of the rail.
     Curve,
 }
 
 impl Class {
-    /// The name in the file of truths and on the command line.
+    /// Returns the name in the file of reference results and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Class::Ellipse => "ellipse",
@@ -37,12 +37,12 @@ impl Class {
         }
     }
 
-    /// A wheel on a rail, whose patches have an estimate each.
+    /// Returns whether the contacts are wheels on rails, whose patches have separate estimates.
     pub fn is_wheel(self) -> bool {
         matches!(self, Class::Profiles | Class::Curve)
     }
 
-    /// Cases of the population. The first half is for fitting, the second for checking.
+    /// Returns the number of cases. The first half is for fitting, the second for checking.
     pub fn count(self) -> usize {
         match self {
             Class::Ellipse => 400,
@@ -55,7 +55,7 @@ impl Class {
     }
 }
 
-/// Case `number` of a class, without a solver.
+/// Returns case `number` of a class, without a solver.
 pub fn case(class: Class, number: usize) -> Value {
     let seed = 20_261_121 + 1_000_003 * (class as u64 + 1) + number as u64;
     let random = &mut Random(seed.wrapping_mul(0x2545_F491));
@@ -69,7 +69,7 @@ pub fn case(class: Class, number: usize) -> Value {
     }
 }
 
-/// Asks for planes of contact if those of a class were solved on them.
+/// Sets planes of contact if the reference results of a class were computed on them.
 pub fn on_planes(class: Class, case: &mut Value) {
     if class == Class::Profiles {
         case["contact"]["reference_surface"] = "plane".into();
@@ -106,7 +106,7 @@ impl Setting {
         })
     }
 
-    /// Creepages and spin for a patch with c = √(A/π) under a load, in the proportions of practice.
+    /// Returns creepages and spin for a patch with c = √(A/π) under a load, in practical proportions.
     fn motion(&self, c: f64, force: f64, random: &mut Random) -> Value {
         let unit = self.friction * force * (1.0 - self.poisson) / (2.0 * MODULUS * c * c);
         let (x, y, spin) = match random.below(20) {
@@ -129,7 +129,7 @@ impl Setting {
         })
     }
 
-    /// √(ab) of the Hertz contact of two radii, roughly.
+    /// Returns an approximation of √(ab) of the Hertz contact of two radii.
     fn hertz(&self, force: f64, radii: [f64; 2]) -> f64 {
         let radius = (radii[0] * radii[1]).sqrt();
         (0.75 * force * radius * (1.0 - self.poisson) / MODULUS).cbrt()
@@ -190,7 +190,7 @@ fn pressures(class: Class, setting: &Setting, random: &mut Random) -> Value {
     setting.case(contact, setting.motion(c, force, random))
 }
 
-/// A crown under a wheel.
+/// Returns a crown under a wheel.
 fn gap(setting: &Setting, random: &mut Random) -> Value {
     let rolling = random.decades(160.0, 1000.0);
     let force = random.decades(5_000.0, 160_000.0);
@@ -259,7 +259,7 @@ fn gap(setting: &Setting, random: &mut Random) -> Value {
     case
 }
 
-/// Heights of a given curvature with their least value 0 at y = 0, by integrating twice in small steps.
+/// Returns heights of a given curvature with a minimum of 0 at y = 0, by integrating twice in small steps.
 fn curved(places: &[f64], curvature: impl Fn(f64) -> f64) -> Vec<f64> {
     const PARTS: u32 = 50;
     let height = |end: &f64| {
@@ -275,7 +275,7 @@ fn curved(places: &[f64], curvature: impl Fn(f64) -> f64) -> Vec<f64> {
     places.iter().map(height).collect()
 }
 
-/// A wheelset displaced on its track.
+/// Returns a wheelset displaced on its track.
 fn profiles(setting: &Setting, random: &mut Random) -> Value {
     let contact = json!({
         "type": "profiles", "rail": { "points_mm": rail_60e1() },
@@ -292,7 +292,7 @@ fn profiles(setting: &Setting, random: &mut Random) -> Value {
     case
 }
 
-/// A wheel that may have worn hollow on a rail that may have worn to other radii.
+/// Returns a wheel on a rail. The wheel may have worn hollow, and the rail may have worn to other radii.
 fn curve(setting: &Setting, random: &mut Random) -> Value {
     let mut rail = rail_head([
         (300.0, 0.0, 10.25),
@@ -331,15 +331,15 @@ fn curve(setting: &Setting, random: &mut Random) -> Value {
     };
     let mut case = setting.case(contact, motion);
     case["load"] = json!({ "vertical_force_n": force });
-    // The error due to the factors for the turn follows from the pressures.
+    // The error due to the factors for the curvature follows from the pressures.
     case["outputs"] = json!(["resultants", "pressure"]);
     case
 }
 
-/// Sine of the angle of a side inclined 1:20.
+/// Sine of the angle between the horizontal and a side inclined 1:20.
 const FACE: f64 = 0.998_752_338_877_845_2;
 
-/// A head with arcs of other radii than 60E1, tangent to each other at the same half widths.
+/// Returns a head with arcs of other radii than 60E1, tangent to each other at the same half widths.
 fn rail_of_arcs([crown, shoulder, corner]: [f64; 3]) -> Vec<[f64; 2]> {
     let second = 10.25 * (1.0 - shoulder / crown);
     let third = 26.05 - corner * (26.05 - second) / shoulder;

@@ -1,5 +1,5 @@
-//! Sweeps of near motions, which share what judges them: is the estimate of each as right as that of a motion alone, and what does a motion
-//! cost?
+//! Compares the estimates in sweeps of neighbouring motions, which share corrections, with those of separate motions, and measures the cost of a
+//! motion.
 
 use std::f64::consts::TAU;
 
@@ -14,13 +14,13 @@ use crate::population::{Class, case};
 use crate::random::Random;
 use crate::truth::{Frame, Judged, distance};
 
-/// Sweeps of every form; the first half is for fitting, the second for checking.
+/// Number of sweeps of every form. The first half is for fitting, the second for checking.
 const SWEEPS: usize = 40;
-/// Contacts of the population of ellipses from this number on, which no other table shows.
+/// First number of the contacts in the population of ellipses. No other table uses these.
 const FIRST: usize = 1000;
-/// Motions of a sweep whose errors are looked at, each at a place of its own.
+/// Number of motions of a sweep whose errors are checked, at different places.
 const LOOKED_AT: usize = 6;
-/// Target of the answers that stand for the truth, and the share of their estimates by which they may be off.
+/// Target of the reference results, and their uncertainty as a share of their estimates.
 const TARGET_TRUE: f64 = 4e-4;
 const SHARE_TRUE: f64 = 0.5;
 const TARGETS: [f64; 3] = [0.02, 0.005, 0.001];
@@ -30,19 +30,19 @@ const TARGETS: [f64; 3] = [0.02, 0.005, 0.001];
 enum Form {
     /// Creepages and spin grow together.
     Ray,
-    /// The largest creepage grows, all else stays.
+    /// The largest creepage grows, the others are constant.
     Curve,
-    /// Both creepages over a grid, spin stays.
+    /// Both creepages over a grid, at constant spin.
     Map,
-    /// Motions about one, in no order.
+    /// Motions about one motion, in random order.
     Cloud,
-    /// Motions as a simulation steps through them: each component swings with its own frequency, to both sides.
+    /// Motions in the order of a simulation: each component oscillates with its own frequency, to both sides.
     Steps,
 }
 
 const FORMS: [Form; 5] = [Form::Ray, Form::Curve, Form::Map, Form::Cloud, Form::Steps];
 
-/// The motions of a sweep up to the given creepages and spin.
+/// Returns the motions of a sweep up to the given creepages and spin.
 fn motions(form: Form, end: [f64; 3], random: &mut Random) -> Vec<[f64; 3]> {
     let count = random.decades(15.0, 120.0) as usize;
     let from = random.between(0.0, 0.3);
@@ -86,7 +86,7 @@ fn motions(form: Form, end: [f64; 3], random: &mut Random) -> Vec<[f64; 3]> {
     }
 }
 
-/// Case `number` of a form with all its motions, and the numbers of those that are looked at.
+/// Returns case `number` of a form with all its motions, and the indices of the checked motions.
 fn sweep(form: Form, number: usize) -> (Value, Vec<[f64; 3]>, Vec<usize>) {
     let mut question = case(Class::Ellipse, FIRST + number);
     let seed = 7_000_003 * (form as u64 + 1) + number as u64;
@@ -104,7 +104,7 @@ fn words(motion: &[f64; 3]) -> Value {
     json!({ "creepage_x": motion[0], "creepage_y": motion[1], "spin_per_mm": motion[2] })
 }
 
-/// The answer to a question at a target, and the seconds of the core.
+/// Returns the answer to a question at a target, and its processor time in s.
 fn solved(question: &Value, motion: Value, target: f64) -> Option<(Solution, f64)> {
     let mut question = question.clone();
     question["motion"] = motion;
@@ -115,7 +115,7 @@ fn solved(question: &Value, motion: Value, target: f64) -> Option<(Solution, f64
     Some((solution, began.elapsed().as_secs_f64()))
 }
 
-/// Resultants and estimate of a motion, relative to μN.
+/// Returns the resultants and the estimate of a motion, relative to μN.
 fn relative(question: &Value, solution: &Solution, k: usize) -> Option<([f64; 3], f64)> {
     let number = |part: &Value| part.as_f64().expect("a number");
     let limit =
@@ -135,14 +135,14 @@ fn relative(question: &Value, solution: &Solution, k: usize) -> Option<([f64; 3]
     Some((frame.relative(sum), total.error_estimate?.force_x_n / limit))
 }
 
-/// Counts over the sweeps of one form at one target.
+/// Sums over the sweeps of one form at one target.
 #[derive(Default)]
 struct Sum {
     found: Vec<Judged>,
-    /// The values of these motions solved alone.
+    /// Results of the same motions solved separately.
     alone: Vec<Judged>,
     motions: usize,
-    /// Motions with an estimate from their neighbours.
+    /// Motions with an estimate interpolated from neighbours.
     lent: usize,
     seconds: f64,
     products: u64,
@@ -203,7 +203,7 @@ pub fn tables(each: bool) {
     }
 }
 
-/// The resultants of a motion, and what they may be off by.
+/// Returns the resultants of a motion, and their uncertainty.
 fn truth(question: &Value, motion: &[f64; 3]) -> Option<([f64; 3], f64)> {
     let (solution, _) = solved(question, words(motion), TARGET_TRUE)?;
     let (value, estimate) = relative(question, &solution, 0)?;

@@ -1,4 +1,4 @@
-//! Converged resultants of cases, kept in a file, and the distance of other resultants from them.
+//! Converged resultants of cases, stored in a file, and the distance of other resultants from them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use serde_json::Value;
 pub struct Truth {
     /// Fingerprint of the case.
     pub print: u64,
-    /// The resultants; for several patches of a wheel on a rail their sums, moments about the load centre of each patch.
+    /// The resultants. For several patches of a wheel on a rail, their sums, with moments about the load centre of each patch.
     #[serde(flatten)]
     pub whole: TrueResultants,
-    /// The patches of a wheel on a rail one by one, if there are several.
+    /// The separate patches of a wheel on a rail, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub patches: Vec<TrueResultants>,
 }
@@ -25,9 +25,9 @@ pub struct Truth {
 pub struct TrueResultants {
     /// F_x, F_y over μN and M_z over μN times `length`.
     pub value: [f64; 3],
-    /// Their uncertainty.
+    /// Uncertainty of the values.
     pub uncertainty: f64,
-    /// Where moments are about; zero for a wheel on a rail, where it is the load centre that the answer gives.
+    /// Reference point of moments. It is zero for a wheel on a rail, where the answer gives the load centre.
     pub centre: [f64; 2],
     /// √(A/π) in mm.
     pub length: f64,
@@ -36,7 +36,7 @@ pub struct TrueResultants {
 }
 
 impl TrueResultants {
-    /// How far an answer is from them: its resultants, and its estimate in N.
+    /// Returns the distance of the resultants `found` with their estimate in N.
     pub fn judged(&self, found: Resultants, estimate: f64) -> Judged {
         let frame = Frame {
             centre: self.centre,
@@ -51,15 +51,15 @@ impl TrueResultants {
     }
 }
 
-/// All truths that are known: by class, then by number.
+/// All reference results: by class, then by number.
 pub type Truths = BTreeMap<String, BTreeMap<usize, Truth>>;
 
-/// The file of truths.
+/// Returns the path of the file of reference results.
 pub fn file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/finer_meshes.json")
 }
 
-/// The truths of the file; none if there is no file.
+/// Returns the reference results of the file, or none if there is no file.
 pub fn read() -> Truths {
     std::fs::read_to_string(file())
         .ok()
@@ -67,9 +67,9 @@ pub fn read() -> Truths {
         .unwrap_or_default()
 }
 
-/// Returns a number that changes with the case (FNV-1a; readers of JSON may round integers beyond 52 bits).
+/// Returns a fingerprint of the case (FNV-1a, without the bits that JSON parsers may round).
 ///
-/// Numbers count with ten digits: the last bits of a random case depend on how the compiler optimises its arithmetic.
+/// Numbers are rounded to ten digits because the last bits of a random case depend on the optimisation of its arithmetic.
 pub fn print(case: &Value) -> u64 {
     let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
     let text = rounded(case).to_string();
@@ -90,7 +90,7 @@ fn rounded(value: &Value) -> Value {
     }
 }
 
-/// Largest difference of components.
+/// Returns the largest difference of components.
 pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter()
         .zip(b)
@@ -100,7 +100,7 @@ pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 /// Units and centre of a problem's resultants.
 pub struct Frame {
-    /// Where moments are about, in mm.
+    /// Reference point of moments in mm.
     pub centre: [f64; 2],
     /// √(A/π) in mm.
     pub length: f64,
@@ -109,7 +109,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// F_x, F_y over μN and M_z over μN times the length.
+    /// Returns F_x, F_y over μN and M_z over μN times the length.
     pub fn relative(&self, sum: Resultants) -> [f64; 3] {
         let about = sum.about(self.centre);
         [
@@ -120,13 +120,13 @@ impl Frame {
     }
 }
 
-/// One error estimate of an answer and what it is an estimate of, relative to μN.
+/// One error estimate of an answer and the true error, relative to μN.
 #[derive(Debug, Clone, Copy)]
 pub struct Judged {
-    /// Largest difference of the resultants from the truth.
+    /// Largest difference of the resultants from the reference result.
     pub error: f64,
-    /// The estimate of the answer.
+    /// Error estimate of the answer.
     pub estimate: f64,
-    /// The uncertainty of the truth.
+    /// Uncertainty of the reference result.
     pub uncertainty: f64,
 }

@@ -1,8 +1,8 @@
-//! Outlines and curves on linear axes, as SVG.
+//! Draws outlines and curves on linear axes, as SVG.
 
 use std::fmt::Write as _;
 
-/// Inks that differ in lightness too, with the dashes of their lines.
+/// Colours that also differ in lightness, with the dashes of their lines.
 const INKS: [(&str, &str); 6] = [
     ("#08306b", "none"),
     ("#d95f02", "9 3"),
@@ -12,7 +12,7 @@ const INKS: [(&str, &str); 6] = [
     ("#666666", "2 3"),
 ];
 
-/// How something is drawn.
+/// The style of a drawn curve.
 #[derive(Clone, Copy)]
 pub enum Curve {
     /// The edge of a patch.
@@ -73,7 +73,7 @@ impl Frame {
     }
 }
 
-/// Round values in a range, about five.
+/// Returns about five round values in a range.
 fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
     let rough = (high - low) / 5.0;
     let power = 10.0_f64.powf(rough.log10().floor());
@@ -93,7 +93,7 @@ fn label(value: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A picture that grows.
+/// The body of an SVG picture.
 pub struct Picture {
     body: String,
 }
@@ -123,7 +123,7 @@ impl Picture {
         ));
     }
 
-    /// Closed loops.
+    /// Draws closed loops.
     pub fn loops(&mut self, frame: &Frame, loops: &[Vec<[f64; 2]>], curve: Curve) {
         let data: String = loops.iter().map(|l| frame.path(l) + "Z").collect();
         self.add(&format!("<path d=\"{data}\" {}/>", curve.style()));
@@ -146,7 +146,7 @@ impl Picture {
         ));
     }
 
-    /// Ticks with values below and at the left, and the names of the axes.
+    /// Draws ticks with values below and at the left, and the names of the axes.
     pub fn axes(&mut self, frame: &Frame, x: &str, y: &str) {
         for value in ticks(frame.x) {
             let [at, _] = frame.place([value, frame.y[0]]);
@@ -171,7 +171,7 @@ impl Picture {
         self.upright(18.0, frame, y);
     }
 
-    /// Ticks with values at the right, and the axis's name.
+    /// Draws ticks with values at the right, and the name of the axis.
     pub fn right_axis(&mut self, frame: &Frame, y: &str) {
         for value in ticks(frame.y) {
             let [_, at] = frame.place([frame.x[0], value]);

@@ -1,7 +1,7 @@
-//! Redraws figures 3, 4 and 5 of Liu and Hsu's paper on a patch without mirror symmetry across, from the examples
+//! Redraws figures 3, 4 and 5 of Liu and Hsu's paper on a patch that is not symmetric about the rolling direction, from the examples
 //! `api/examples/paper-figure-*.case.json` on a fine mesh.
 //!
-//! `cargo bench --bench figures` writes `docs/paper-figures/*.svg` and prints what they show in numbers.
+//! `cargo bench --bench figures` writes `docs/paper-figures/*.svg` and prints the values of the figures.
 
 use std::path::{Path, PathBuf};
 
@@ -23,12 +23,12 @@ mod drawing;
 )]
 mod shape;
 
-/// Fine enough for a border without steps that the eye minds.
+/// Mesh size that gives visually smooth borders.
 const STRIPS: u32 = 44;
 const CELLS: u32 = 56;
 
 fn main() {
-    // Run by `cargo test --benches` as well, where there is nothing to draw.
+    // `cargo test --benches` also runs this program, and then it draws nothing.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
@@ -66,7 +66,7 @@ impl Figure {
         let text = std::fs::read_to_string(path).expect("an example");
         let mut case: Value = serde_json::from_str(&text).expect("an example is JSON");
         case["solver"] = json!({ "mesh": { "strips": STRIPS, "cells": CELLS } });
-        // The border between stick and slip is found from the margin to the bound.
+        // The border between stick and slip is computed from the margin to the bound.
         case["outputs"] = json!(["resultants", "zones", "pressure", "tractions"]);
         let limits = Limits {
             memory_bytes: 8 << 30,
@@ -95,7 +95,7 @@ impl Figure {
         points.map(|point| point.motion.into()).collect()
     }
 
-    /// The paper's Φ of a motion.
+    /// Returns the paper's Φ of a motion.
     fn spin(&self, motion: &Motion) -> f64 {
         motion.spin_per_mm * self.half_length / self.creepage
     }
@@ -106,7 +106,7 @@ impl Figure {
         sheets.map(|sheet| sheet.border()).collect()
     }
 
-    /// Where it sticks.
+    /// Returns the borders of the stick zone.
     fn stick(&self, point: usize) -> Vec<Vec<[f64; 2]>> {
         let patches = self.fields.patches.iter();
         let borders = patches.filter_map(|patch| {
@@ -159,7 +159,7 @@ impl Figure {
     }
 }
 
-/// Figure 3: borders of the stick zone under one creepage and several spins.
+/// Draws figure 3: borders of the stick zone under one creepage and several spins.
 fn borders(figure: &Figure) -> Picture {
     let motions = figure.motions();
     let mut picture = Picture::new(
@@ -182,7 +182,7 @@ fn borders(figure: &Figure) -> Picture {
     picture
 }
 
-/// Figure 4: both zones under pure spin.
+/// Draws figure 4: both zones under pure spin.
 fn zones(figure: &Figure) -> Picture {
     const ACROSS: usize = 4;
     let motions = figure.motions();
@@ -210,7 +210,7 @@ fn zones(figure: &Figure) -> Picture {
     picture
 }
 
-/// Figure 5: force and moment against longitudinal creepage.
+/// Draws figure 5: force and moment against longitudinal creepage.
 fn forces(figure: &Figure) -> Picture {
     let motions = figure.motions();
     let x: Vec<f64> = motions
@@ -229,7 +229,7 @@ fn forces(figure: &Figure) -> Picture {
     }
     let mut picture = Picture::new(660.0, 400.0, "Force and moment under longitudinal creepage");
     let largest = moment.iter().fold(0.0_f64, |m, value| m.max(value.abs()));
-    // The moment is small: its scale is its own, on the right.
+    // The moment is small and has its own scale, on the right.
     let scale = 10.0_f64.powf(largest.log10().floor());
     let top = (largest / scale).ceil() * scale;
     let frame = |high: f64| Frame {

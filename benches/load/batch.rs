@@ -1,5 +1,4 @@
-//! One batch of 20 000 default Hertz cases with distinct loads and creepages, from the first byte sent to the last result line
-//! received.
+//! Measures one batch of 20 000 default Hertz cases with distinct loads and creepages, from the first byte sent to the last result line received.
 
 use std::time::{Duration, Instant};
 
@@ -16,7 +15,7 @@ const CASES: usize = 20_000;
 const BARE_TIME: Duration = Duration::from_secs(10);
 const SAMPLE: Duration = Duration::from_millis(200);
 
-/// Runs the batch and says what came of it.
+/// Runs the batch and returns its figures.
 pub async fn run(workers: usize) -> Vec<Row> {
     let lines: Vec<String> = (0..CASES).map(|number| hertz(number).to_string()).collect();
     let body = lines.join("\n");
@@ -56,7 +55,7 @@ pub async fn run(workers: usize) -> Vec<Row> {
     ]
 }
 
-/// Sends the batch and reads all results; seconds until it was accepted and until the last line.
+/// Sends the batch and reads all results. Returns the seconds until it was accepted and until the last line.
 async fn send(url: String, body: String, start: Instant) -> (f64, f64) {
     let mut client = Client::new(&url);
     let answer = client.send(Method::POST, "/v1/batches", &[202], |request| {

@@ -1,4 +1,4 @@
-//! The cases of the load, all distinct, and how fast the bare solver is on them.
+//! The distinct cases of the load, and the speed of the solver alone on them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -11,12 +11,12 @@ use serde_json::{Value, json};
 
 use crate::machine::{median, seconds_of};
 
-/// Meshes of n × n cells among which one of the wanted time is looked for.
+/// Sizes n of meshes of n × n cells, from which one with the wanted time is chosen.
 const SIZES: [u32; 12] = [8, 10, 12, 14, 16, 18, 20, 23, 26, 29, 32, 36];
 
-/// A Hertz case of its own for each number, with default settings: loads and creepages are spread over a range.
+/// Returns a distinct Hertz case for each number, with default settings. Loads and creepages are spread over a range.
 pub fn hertz(number: usize) -> Value {
-    // Multiples of irrational numbers fill a range evenly and never meet again.
+    // Multiples of irrational numbers fill a range evenly and are all distinct.
     let spread = |step: f64| (number as f64 * step).fract();
     json!({
         "name": format!("case {number}"),
@@ -32,14 +32,14 @@ pub fn hertz(number: usize) -> Value {
     })
 }
 
-/// The same on a mesh of `size` × `size` cells.
+/// Returns the case on a mesh of `size` × `size` cells.
 pub fn meshed(number: usize, size: u32) -> Value {
     let mut case = hertz(number);
     case["solver"] = json!({ "mesh": { "strips": size, "cells": size } });
     case
 }
 
-/// The mesh on which one case takes about `seconds`, and how long it does take.
+/// Returns the mesh size for which one case takes about `seconds`, and its actual time.
 pub fn size_of(seconds: f64) -> (u32, f64) {
     let engine = Engine::contact();
     let time = |size| {
@@ -60,7 +60,7 @@ pub fn size_of(seconds: f64) -> (u32, f64) {
         .expect("there are sizes")
 }
 
-/// Cases per second of the bare solver on so many threads, measured for about `time`.
+/// Returns the cases per second of the solver alone on this number of threads, measured for about `time`.
 pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value + Sync) -> f64 {
     let (engine, next) = (Engine::contact(), AtomicUsize::new(0));
     let start = Instant::now();
@@ -76,7 +76,7 @@ pub fn bare_rate(threads: usize, time: Duration, case: impl Fn(usize) -> Value +
     next.into_inner() as f64 / start.elapsed().as_secs_f64()
 }
 
-/// Solves like a worker, with the operators that the process keeps.
+/// Solves a case as a worker does, with the operators that the process keeps.
 fn solve_one(engine: &Engine, case: &Value) {
     let problem = check(case, &Limits::default()).expect("a case");
     for slice in (engine.slices)(&problem) {

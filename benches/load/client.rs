@@ -1,4 +1,4 @@
-//! One client of the service: a connection of its own, and what it met.
+//! A client of the service with its own connection, and the refusals that it received.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -6,19 +6,19 @@ use std::time::{Duration, Instant};
 use reqwest::{Method, RequestBuilder, Response};
 use serde_json::Value;
 
-/// Pause after a refusal that says to come back later.
+/// Pause after a refusal.
 const REFUSED: Duration = Duration::from_secs(1);
 
-/// A client, and the refusals it was given: documented `429` and `503`, by status.
+/// A client and its refusals: documented `429` and `503`, by status.
 pub struct Client {
     client: reqwest::Client,
     url: String,
-    /// How often it was told to come back later.
+    /// Number of refusals by status.
     pub refused: BTreeMap<u16, usize>,
 }
 
 impl Client {
-    /// A client of the service at this address.
+    /// Returns a client of the service at this address.
     pub fn new(url: &str) -> Client {
         let client = reqwest::Client::builder()
             .pool_max_idle_per_host(1)
@@ -31,7 +31,7 @@ impl Client {
         }
     }
 
-    /// A request that `shape` completes, sent again after each refusal; its answer must have one of the statuses.
+    /// Sends a request that `shape` completes, again after each refusal. Its response must have one of the statuses.
     pub async fn send(
         &mut self,
         method: Method,
@@ -63,7 +63,7 @@ impl Client {
         }
     }
 
-    /// The bytes of an answer with 200, and the seconds from the request to the last of them.
+    /// Returns the bytes of a response with status 200, and the seconds from the request to the last byte.
     pub async fn get(&mut self, path: &str) -> (Vec<u8>, f64) {
         let start = Instant::now();
         let answer = self
@@ -73,13 +73,13 @@ impl Client {
         (bytes, start.elapsed().as_secs_f64())
     }
 
-    /// The JSON answer to a GET.
+    /// Returns the JSON response to a GET request.
     pub async fn json(&mut self, path: &str) -> Value {
         let (bytes, _) = self.get(path).await;
         serde_json::from_slice(&bytes).expect("JSON")
     }
 
-    /// Submits a case; the job as answered.
+    /// Submits a case and returns the representation of its job.
     pub async fn submit(&mut self, case: &Value, prefer: Option<&str>) -> Value {
         let answer = self.send(Method::POST, "/v1/jobs", &[202, 200], |request| {
             let request = request.json(case);
@@ -91,7 +91,7 @@ impl Client {
         answer.await.json().await.expect("JSON")
     }
 
-    /// A figure of `/metrics`, 0 if it is not there.
+    /// Returns a figure of `/metrics`, or 0 if it is absent.
     pub async fn metric(&mut self, name: &str) -> f64 {
         let (text, _) = self.get("/metrics").await;
         let text = String::from_utf8_lossy(&text).into_owned();
@@ -102,7 +102,7 @@ impl Client {
     }
 }
 
-/// The id of a job.
+/// Returns the id of a job.
 pub fn id_of(job: &Value) -> String {
     job["id"].as_str().expect("an id").to_owned()
 }

@@ -1,5 +1,5 @@
-//! Crowds of silent connections, followers, large bodies and unread answers: is everybody else still answered within a
-//! second, and how much memory does it take?
+//! Measures the response times of other clients and the memory of the service during crowds of silent connections, followers, large bodies and
+//! unread responses.
 
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -13,15 +13,15 @@ use crate::cases::meshed;
 use crate::client::{Client, id_of};
 use crate::service::Service;
 
-/// How long anybody else may wait, in s.
+/// Maximum waiting time of other clients in s.
 const WITHIN: f64 = 1.0;
 /// Largest memory of the process in MB.
 const MEMORY_MB: f64 = 1024.0;
-/// How long each crowd is watched.
+/// Time for which each crowd is observed.
 const WATCHED: Duration = Duration::from_secs(10);
 const BODY_BYTES: usize = 8 << 20;
 
-/// Measures all crowds, each on a service of its own.
+/// Measures all crowds, each on a separate service.
 pub async fn run(workers: usize) -> Vec<Row> {
     // Both ends of every connection need a descriptor.
     let _ = rlimit::increase_nofile_limit(u64::MAX);
@@ -46,7 +46,7 @@ async fn send(service: &Service, request: &str) -> TcpStream {
     stream
 }
 
-/// The slowest of the probes and requests of somebody else, each on a new connection, and the most memory so far.
+/// Returns the slowest of the probes and requests of another client, each on a new connection, and the peak memory so far.
 async fn watched(service: &Service, what: &str, path: &str) -> Vec<Row> {
     let (mut slowest, mut asked) = (0.0_f64, 0);
     let begun = Instant::now();
@@ -76,7 +76,7 @@ async fn watched(service: &Service, what: &str, path: &str) -> Vec<Row> {
     ]
 }
 
-/// 2 000 connections that say nothing and 1 000 followers that read nothing.
+/// Measures 2 000 connections that send nothing and 1 000 followers that read nothing.
 async fn silent(workers: usize) -> Vec<Row> {
     let service = Service::start(workers, &[]);
     let mut client = Client::new(&service.url);
@@ -99,7 +99,7 @@ async fn silent(workers: usize) -> Vec<Row> {
     rows
 }
 
-/// 40 bodies of 8 MiB at once, as they are or packed to some 12 kB.
+/// Measures 40 simultaneous bodies of 8 MiB, uncompressed or compressed to about 12 kB.
 async fn bodies(workers: usize, packed: bool) -> Vec<Row> {
     let service = Service::start(workers, &[]);
     let repeated = |element: &str| {
@@ -146,7 +146,7 @@ async fn bodies(workers: usize, packed: bool) -> Vec<Row> {
     rows
 }
 
-/// So many clients that ask for a grid and read nothing of it.
+/// Measures `count` clients that request a grid and read nothing of it.
 async fn grids(workers: usize, count: usize, format: &str, grid: &str) -> Vec<Row> {
     let service = Service::start(workers, &["--grid-max-samples", "1000000"]);
     let mut client = Client::new(&service.url);

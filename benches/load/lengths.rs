@@ -1,4 +1,4 @@
-//! One long sweep and 200 short jobs on one worker: how long the short ones take from submission to end, with the sweep and without.
+//! Measures the time of 200 short jobs on one worker from submission to end, with one long sweep and without.
 
 use std::time::{Duration, Instant};
 
@@ -15,7 +15,7 @@ const SHORT: usize = 200;
 const EVERY: Duration = Duration::from_millis(200);
 const SIZE: u32 = 10;
 
-/// Runs both and says what came of it.
+/// Runs both and returns the figures.
 pub async fn run() -> Vec<Row> {
     let service = Service::start(1, &["--cache", "false"]);
     let alone = short_jobs(&service.url).await;
@@ -66,7 +66,7 @@ fn progress(job: &Value) -> f64 {
     job["progress"].as_f64().expect("a progress")
 }
 
-/// Seconds from submission to end of short jobs that come one after the other, each waited for by a client of its own.
+/// Returns the seconds from submission to end of short jobs submitted one after the other. A separate client waits for each.
 async fn short_jobs(url: &str) -> Vec<f64> {
     let mut waiting = Vec::with_capacity(SHORT);
     for number in 0..SHORT {

@@ -1,12 +1,12 @@
-//! Measures the service under load against the bare solver on the same machine in the same run.
+//! Measures the service under load against the solver alone on the same machine in the same run.
 //!
-//! `cargo bench --bench load [-- PART … [workers=N] [jobs=N]]` starts the real program on loopback with a data folder of its own and
-//! prints a table. The parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, one by one, removed after a
-//! while; `jobs=N` for another number), `batch` (20 000 cases in one request), `crowds` (silent connections, followers, large bodies,
-//! unread answers), `claims`, `lists` (filters that match nothing among 200 000 jobs), `mixed-lengths` (a long sweep
-//! and short jobs on one worker), `rows` (`/v1/evaluate` and runs of a million rows), `memory` (four workers and
-//! mixed cases), `shared` (claims and ends on the PostgreSQL that `RAILHEAD_TEST_POSTGRES` names); all of them without a name. The driver runs on one thread of the same
-//! machine. A broken promise (a wrong answer, a lost or doubled job) ends it with a panic; missed goals are printed.
+//! `cargo bench --bench load [-- PART … [workers=N] [jobs=N]]` starts the real program on loopback with a separate data folder and prints a table.
+//! Without names, it runs all parts: `mixed` (64 clients for a minute), `soak` (20 000 small jobs, submitted one by one and removed after a while;
+//! `jobs=N` sets another number), `batch` (20 000 cases in one request), `crowds` (silent connections, followers, large bodies, unread responses),
+//! `claims`, `lists` (filters that match nothing among 200 000 jobs), `mixed-lengths` (a long sweep and short jobs on one worker), `rows`
+//! (`/v1/evaluate` and runs of a million rows), `memory` (four workers and mixed cases), `shared` (claims and ends on the PostgreSQL in
+//! `RAILHEAD_TEST_POSTGRES`). The driver runs on one thread of the same machine. A violated guarantee (a wrong answer, a lost or duplicated job)
+//! ends it with a panic. Missed goals are printed.
 
 #[path = "../machine.rs"]
 mod machine;
@@ -24,7 +24,7 @@ mod shared;
 mod soak;
 mod table;
 
-/// The parts of the bench; see above.
+/// Names of the parts.
 const PARTS: [&str; 10] = [
     "mixed",
     "soak",
@@ -38,17 +38,17 @@ const PARTS: [&str; 10] = [
     "shared",
 ];
 
-/// One line of the table: what was measured, the figure, and the goal if there is one.
+/// One line of the table: the quantity, the figure, and the goal if there is one.
 pub struct Row(pub String, pub String, pub String);
 
 impl Row {
-    /// A figure with a goal that it meets or misses.
+    /// Returns a figure with a goal that it meets or misses.
     pub fn judged(what: &str, figure: String, goal: &str, met: bool) -> Row {
         let verdict = if met { "met" } else { "MISSED" };
         Row(what.to_owned(), figure, format!("{goal}: {verdict}"))
     }
 
-    /// A figure without a goal.
+    /// Returns a figure without a goal.
     pub fn plain(what: &str, figure: String) -> Row {
         Row(what.to_owned(), figure, String::new())
     }
@@ -56,7 +56,7 @@ impl Row {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Run by `cargo test --benches` as well, where there is nothing to measure.
+    // `cargo test --benches` also runs this program, and then it measures nothing.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }

@@ -1,4 +1,4 @@
-//! Memory that four workers keep after mixed cases. With `MALLOC_ARENA_MAX=16` in the environment the C library's own settings apply.
+//! Measures the memory that four workers keep after mixed cases. With `MALLOC_ARENA_MAX=16` in the environment, the C library's own settings apply.
 
 use reqwest::Method;
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use crate::service::Service;
 
 const WORKERS: usize = 4;
 const CASES: usize = 400;
-/// Shipped examples, as submitted: ellipses, and a wheel on the crown of a rail and at its gauge corner.
+/// Shipped examples as submitted: ellipses, and a wheel on the crown of a rail and at its gauge corner.
 const EXAMPLES: [&str; 4] = [
     include_str!("../../api/examples/spin.case.json"),
     include_str!("../../api/examples/hertz-steel.case.json"),
@@ -17,7 +17,7 @@ const EXAMPLES: [&str; 4] = [
     include_str!("../../api/examples/wheel-rail-flange.case.json"),
 ];
 
-/// Examples in turn, without fields, with loads that differ, four in ten to the finest target.
+/// Returns the examples in turn, without fields and with different loads. Four in ten have the finest target.
 fn case(number: usize) -> Value {
     let mut case: Value = serde_json::from_str(EXAMPLES[number % EXAMPLES.len()]).expect("JSON");
     let share = (number * 197 % CASES) as f64 / CASES as f64;
@@ -34,7 +34,7 @@ fn case(number: usize) -> Value {
     case
 }
 
-/// Resident memory of the process when it is idle, at its peak and afterwards, and its processor time.
+/// Measures the resident memory of the process when idle, at its peak and afterwards, and its processor time.
 pub async fn run() -> Vec<Row> {
     let service = Service::start(WORKERS, &[]);
     let idle = service.usage().memory_mb;

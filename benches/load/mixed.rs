@@ -1,5 +1,5 @@
-//! 64 clients for a minute: each submits a case, looks at its job until it has ended, fetches parts of the result, and now and
-//! then waits for the answer or lists jobs.
+//! Measures 64 clients for a minute. Each submits a case, polls its job until it has ended, and fetches parts of the result. Sometimes it waits for
+//! the response or lists jobs.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -15,22 +15,22 @@ use crate::service::{Service, Usage};
 const CLIENTS: usize = 64;
 const TIME: Duration = Duration::from_secs(60);
 const BARE_TIME: Duration = Duration::from_secs(10);
-/// Wanted time of one solve in s.
+/// Target time of one solve in s.
 const SOLVE_SECONDS: f64 = 0.005;
-/// Pause between two looks of a client at its job.
+/// Pause between two polls of a job.
 const PAUSE: Duration = Duration::from_millis(50);
-/// Looks at an idle service.
+/// Number of polls of an idle service.
 const IDLE_LOOKS: usize = 2000;
 /// Pause between two samples of memory.
 const SAMPLE: Duration = Duration::from_millis(500);
-/// Jobs of one page of the list.
+/// Number of jobs on one page of the list.
 const PAGE: usize = 1000;
 
 /// Counts and times of one client.
 #[derive(Default)]
 struct Record {
     accepted: Vec<String>,
-    /// Jobs whose result was in hand before the time was over.
+    /// Number of jobs whose result arrived before the end.
     done: usize,
     requests: usize,
     looks: Vec<f64>,
@@ -52,7 +52,7 @@ impl Record {
     }
 }
 
-/// Runs the load and says what came of it.
+/// Runs the load and returns its figures.
 pub async fn run(workers: usize) -> Vec<Row> {
     let (size, seconds) = size_of(SOLVE_SECONDS);
     let bare = bare_rate(workers, BARE_TIME, |number| meshed(number, size));
@@ -121,7 +121,7 @@ pub async fn run(workers: usize) -> Vec<Row> {
     ]
 }
 
-/// Resources that the service uses, sampled from time to time.
+/// Returns periodic samples of the resources that the service uses.
 async fn usage_until(service: &Service, end: Instant) -> Vec<Usage> {
     let mut samples = Vec::new();
     while Instant::now() < end {
@@ -131,7 +131,7 @@ async fn usage_until(service: &Service, end: Instant) -> Vec<Usage> {
     samples
 }
 
-/// Memory over the time; flat if the last quarter uses at most a tenth more than the second.
+/// Returns the memory over time. It is flat if the mean of the last quarter exceeds that of the second by at most a tenth.
 pub fn memory(what: &str, samples: &[Usage]) -> Row {
     let mean = |from: usize, to: usize| {
         let part = &samples[samples.len() * from / 8..(samples.len() * to / 8).max(1)];
@@ -143,7 +143,7 @@ pub fn memory(what: &str, samples: &[Usage]) -> Row {
     Row::judged(what, format!("{text} MB"), "flat", flat)
 }
 
-/// Times of looks at an ended job while nothing else happens.
+/// Returns the times of polls of an ended job on an idle service.
 async fn idle_looks(service: &Service) -> Vec<f64> {
     let mut client = Client::new(&service.url);
     let job = client
@@ -166,7 +166,7 @@ async fn client(url: String, number: usize, size: u32, end: Instant) -> Record {
             break;
         }
         let case = meshed(1 + round * CLIENTS + number, size);
-        // Every eighth job is waited for instead of looked at.
+        // Every eighth job is waited for instead of polled.
         let prefer = (round % 8 == 7).then_some("wait=30");
         let start = Instant::now();
         let job = client.submit(&case, prefer).await;
@@ -192,7 +192,7 @@ async fn client(url: String, number: usize, size: u32, end: Instant) -> Record {
     record
 }
 
-/// Fetches a part of the result, which one depends on the round.
+/// Fetches a part of the result. The round selects the part.
 async fn fetch(client: &mut Client, record: &mut Record, id: &str, round: usize) {
     let result = client.json(&format!("/v1/jobs/{id}/result")).await;
     assert!(result["total"][0]["force_x_n"].is_number(), "{result}");
@@ -207,7 +207,7 @@ async fn fetch(client: &mut Client, record: &mut Record, id: &str, round: usize)
     record.requests += 1;
 }
 
-/// Every accepted job, and no other but the one of the idle looks, has succeeded, at the first attempt.
+/// Checks that all accepted jobs and the job of the idle polls, and no others, have succeeded at the first attempt.
 async fn verify(service: &Service, accepted: &[String]) {
     let mut client = Client::new(&service.url);
     let mut seen = BTreeMap::new();

@@ -1,4 +1,4 @@
-//! Rows: how many a second does `/v1/evaluate` answer, and how long does a run of a million take?
+//! Measures the rows per second of `/v1/evaluate`, and the time of a run of a million rows.
 
 use std::fmt::Write;
 use std::time::Instant;
@@ -12,12 +12,12 @@ use crate::Row;
 use crate::client::Client;
 use crate::service::Service;
 
-/// Rows of one request of `/v1/evaluate` as CSV, whose text stays below 64 MiB.
+/// Number of rows of one request of `/v1/evaluate` as CSV, whose text stays below 64 MiB.
 const EVALUATED: usize = 500_000;
-/// Rows of a run by the table, and of one by the fast solver.
+/// Numbers of rows of a run by the table, and of one by the fast solver.
 const BY_TABLE: usize = 1_000_000;
 const BY_SOLVER: usize = 100_000;
-/// Rows of a run of one pair as a simulation steps through it.
+/// Number of rows of a run of one pair, in the order of a simulation.
 const BY_STEPS: usize = 20_000;
 
 const NAMES: [&str; 7] = [
@@ -30,7 +30,7 @@ const NAMES: [&str; 7] = [
     "spin_per_mm",
 ];
 
-/// Columns of rows of a line: loads, radii, friction, creepages, spin.
+/// Returns columns of rows of a line: loads, radii, friction, creepages, spin.
 fn columns(rows: usize) -> Vec<Vec<f64>> {
     let ranges = [
         [2e4, 1.2e5],
@@ -54,7 +54,7 @@ fn columns(rows: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Columns of rows of one pair, step by step: a wheelset swings, and load and friction with it.
+/// Returns columns of rows of one pair, step by step: a wheelset oscillates, and load and friction with it.
 fn steps(rows: usize) -> Vec<Vec<f64>> {
     let all = |of: fn(f64) -> f64| (0..rows).map(|row| of(0.05 * row as f64)).collect();
     vec![
@@ -85,7 +85,7 @@ fn csv(columns: &[Vec<f64>]) -> Vec<u8> {
     for row in 0..columns[0].len() {
         for (place, column) in columns.iter().enumerate() {
             let before = if place == 0 { "" } else { "," };
-            // Nine digits, as measured data have at most.
+            // Nine digits, the maximum of measured data.
             write!(text, "{before}{:.8e}", column[row]).expect("a text");
         }
         text.push('\n');
@@ -111,7 +111,6 @@ fn arrow(columns: &[Vec<f64>]) -> Vec<u8> {
     std::mem::take(writer.inner_mut())
 }
 
-/// The figures.
 pub async fn run(workers: usize) -> Vec<Row> {
     let service = Service::start(workers, &[]);
     let mut client = Client::new(&service.url);
@@ -222,7 +221,7 @@ async fn run_of(
     )
 }
 
-/// Seconds of a row by the bare solver on one thread.
+/// Returns the seconds per row of the solver alone on one thread.
 fn bare(columns: &[Vec<f64>]) -> f64 {
     use railhead::contact;
     use railhead::contact::case::solver::Limits;

@@ -1,4 +1,4 @@
-//! The real program on a data folder of its own, and what it uses: memory, descriptors, files, bytes.
+//! The real program on a separate data folder, and its use of memory, descriptors, files and disk space.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -7,45 +7,45 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-/// How long the program may take to listen.
+/// Maximum time until the program listens.
 const STARTS_WITHIN: Duration = Duration::from_secs(20);
 
-/// Linux tells times of processes in these.
+/// Unit in which Linux gives process times.
 const TICKS_PER_SECOND: f64 = 100.0;
 
-/// A running service; killed when dropped.
+/// A running service, which is killed on drop.
 pub struct Service {
     child: Child,
-    /// Where it listens, without a slash at the end.
+    /// URL on which it listens, without a trailing slash.
     pub url: String,
     data: PathBuf,
     _folder: tempfile::TempDir,
 }
 
-/// Resources that the service uses at one moment.
+/// Resources in use at one moment.
 #[derive(Debug, Clone, Copy)]
 pub struct Usage {
     /// Resident memory in MB.
     pub memory_mb: f64,
-    /// Most resident memory so far in MB.
+    /// Peak resident memory so far in MB.
     pub peak_mb: f64,
-    /// Processor time so far in s, of the program and of the kernel for it.
+    /// Processor time so far in s, in user and kernel mode.
     pub processor_s: f64,
     /// Open descriptors.
     pub descriptors: usize,
     /// Files in the data folder.
     pub files: usize,
-    /// Bytes of the data folder in MB.
+    /// Size of the data folder in MB.
     pub stored_mb: f64,
 }
 
 impl Service {
-    /// Starts `railhead serve` and returns when it listens. Its log goes to a file, as on a real machine.
+    /// Starts `railhead serve` and returns when it listens. Its log goes to a file, as in production.
     pub fn start(workers: usize, flags: &[&str]) -> Service {
         Service::start_program(env!("CARGO_BIN_EXE_railhead"), workers, flags)
     }
 
-    /// As [`Service::start`], with another program.
+    /// Starts another program in the same way as [`Service::start`].
     pub fn start_program(program: &str, workers: usize, flags: &[&str]) -> Service {
         let folder = tempfile::tempdir().expect("a folder");
         let (data, log) = (folder.path().join("data"), folder.path().join("log"));
@@ -66,7 +66,7 @@ impl Service {
         }
     }
 
-    /// The process.
+    /// Returns the process id.
     pub fn pid(&self) -> u32 {
         self.child.id()
     }
@@ -84,7 +84,7 @@ impl Service {
                 / 1024.0
         };
         let stat = std::fs::read_to_string(process.join("stat")).expect("the process lives");
-        // Fields 14 and 15, in ticks; the second, a name, may have spaces and ends with a bracket.
+        // Fields 14 and 15, in ticks. The second field, a name, may contain spaces and ends with a parenthesis.
         let ticks = stat.rsplit(')').next().expect("its fields").split(' ');
         let processor = ticks.skip(12).take(2).map(str::parse::<f64>);
         let descriptors = std::fs::read_dir(process.join("fd")).expect("its descriptors");
@@ -107,7 +107,7 @@ impl Drop for Service {
     }
 }
 
-/// The address that the event `listening` names.
+/// Returns the address in the log event `listening`.
 fn listening(log: &Path) -> String {
     let start = Instant::now();
     while start.elapsed() < STARTS_WITHIN {
@@ -127,7 +127,7 @@ fn listening(log: &Path) -> String {
     );
 }
 
-/// Number and bytes of the files below a folder; what vanishes meanwhile does not count.
+/// Returns the number and the bytes of the files below a folder. Files that vanish meanwhile do not count.
 fn below(folder: &Path) -> (usize, u64) {
     let (mut files, mut bytes) = (0, 0);
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {

@@ -1,4 +1,4 @@
-//! The job table that several nodes share: what claims and ends cost on a PostgreSQL, whose URL `RAILHEAD_TEST_POSTGRES` says.
+//! Measures claims and ends on a job table shared by several nodes, on the PostgreSQL whose URL is in `RAILHEAD_TEST_POSTGRES`.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -16,7 +16,7 @@ const QUEUED: usize = 20_000;
 const GROUP: usize = 32;
 const RESULT_BYTES: usize = 4096;
 
-/// Claims in groups of 32 and ends with results of 4 kB, by 1 and by 8 workers, until the queue is empty.
+/// Claims groups of 32 jobs and ends them with results of 4 kB, with 1 and with 8 workers, until the queue is empty.
 pub async fn ends() -> Vec<Row> {
     let name = "shared: jobs claimed and ended per second, groups of 32, results of 4 kB, 1 worker; 8 workers";
     let Ok(url) = std::env::var("RAILHEAD_TEST_POSTGRES") else {

@@ -1,5 +1,5 @@
-//! Many small jobs, submitted one by one and removed some seconds after their end: do memory, files and the job table stay
-//! in proportion to what is kept?
+//! Submits many small jobs one by one, which are removed some seconds after their end, and checks that memory, files and the job table stay in
+//! proportion to the stored jobs.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,15 +12,15 @@ use crate::mixed::memory;
 use crate::service::{Service, Usage};
 
 const CLIENTS: usize = 64;
-/// Jobs before those that are watched: bounded caches have to be full first.
+/// Number of jobs before the observed ones, which fill the bounded caches.
 const BEFORE: usize = 40_000;
-/// How long ended jobs are kept.
+/// Retention of ended jobs.
 const KEPT: &str = "5s";
 const SAMPLE: Duration = Duration::from_millis(500);
-/// How long the end may take, and the removal of the last jobs.
+/// Maximum time of the end, and of the removal of the last jobs.
 const ENDS_WITHIN: Duration = Duration::from_secs(60);
 
-/// Runs the soak and says what came of it.
+/// Runs the soak test and returns its figures.
 pub async fn run(workers: usize, jobs: usize) -> Vec<Row> {
     let service = Service::start(workers, &["--retention", KEPT]);
     let before = service.usage();
@@ -92,20 +92,20 @@ pub async fn run(workers: usize, jobs: usize) -> Vec<Row> {
     ]
 }
 
-/// Jobs that have ended in this state.
+/// Returns the number of jobs that have ended in this state.
 async fn jobs_ended(watch: &mut Client, state: &str) -> f64 {
     let metric = format!("railhead_jobs_ended_total{{state=\"{state}\"}}");
     watch.metric(&metric).await
 }
 
-/// Waits until the last jobs have expired; what the service uses then.
+/// Waits until the last jobs have expired, and returns the usage of the service.
 async fn emptied(service: &Service, watch: &mut Client) -> Usage {
     let last = Instant::now();
     while kept(watch).await > 0.0 {
         assert!(last.elapsed() < ENDS_WITHIN, "expired jobs are removed");
         tokio::time::sleep(SAMPLE).await;
     }
-    // The log of the table and its free pages are given back in portions.
+    // The log of the table and its free pages are released in portions.
     let mut after = service.usage();
     while after.stored_mb > 90.0 && last.elapsed() < ENDS_WITHIN {
         tokio::time::sleep(SAMPLE).await;
@@ -114,7 +114,7 @@ async fn emptied(service: &Service, watch: &mut Client) -> Usage {
     after
 }
 
-/// Jobs in the table, whatever their state.
+/// Returns the number of jobs in the table, in any state.
 async fn kept(watch: &mut Client) -> f64 {
     let mut kept = 0.0;
     for state in ["queued", "running", "succeeded", "failed", "cancelled"] {

@@ -1,5 +1,4 @@
-//! The job table by itself, in this process: what a claim costs for one and for many workers, and lists that find nothing among
-//! 200 000 jobs.
+//! Measures the job table alone, in this process: the cost of a claim for one and for many workers, and lists that match nothing among 200 000 jobs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -26,7 +25,7 @@ const LISTS: usize = 50;
 const CHUNK: usize = 1000;
 pub const TENANT: &str = "anonymous";
 
-/// A claim of one group.
+/// Measures the claim of one group.
 pub async fn claims() -> Vec<Row> {
     let folder = tempfile::tempdir().expect("a folder");
     let store = open(folder.path()).await;
@@ -66,7 +65,7 @@ pub async fn claims() -> Vec<Row> {
     )]
 }
 
-/// Lists whose filters match nothing, beside one that fills its page.
+/// Measures lists whose filters match nothing, and one that fills its page.
 pub async fn lists() -> Vec<Row> {
     let folder = tempfile::tempdir().expect("a folder");
     let store = open(folder.path()).await;
@@ -91,7 +90,7 @@ pub async fn lists() -> Vec<Row> {
     rows
 }
 
-/// Filters with the number of jobs that they find on a page of 50.
+/// Returns filters with the number of jobs that they match on a page of 50.
 fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
     let label = vec![("run".to_owned(), "big".to_owned())];
     let failed = vec![State::Failed];
@@ -165,7 +164,7 @@ async fn open(folder: &Path) -> Arc<dyn Store> {
     Arc::new(store.expect("a table"))
 }
 
-/// Queues so many small jobs with one label as a batch.
+/// Queues `jobs` small jobs with one label as a batch.
 pub async fn fill(store: &dyn Store, jobs: usize) -> Uuid {
     let batch = NewBatch {
         id: Uuid::now_v7(),

@@ -1,9 +1,9 @@
-//! Measures the cost of the service beside the solver.
+//! Measures the cost of the service in addition to the solver.
 //!
-//! `cargo bench --bench overhead [-- program=PATH]` starts the real program with one worker on loopback and prints a table: processor time of the
-//! server for a job (300 sequential `POST /v1/jobs` with `Prefer: wait`) and for a case of a batch, the time of one row by `/v1/evaluate`, and
-//! that of a step of a simulation on a pair of profiles. Where `strace` is installed, also the system calls of a job. Another program is
-//! measured with `program=PATH`, such as `target/release/railhead`.
+//! `cargo bench --bench overhead [-- program=PATH]` starts the real program with one worker on loopback and prints a table: the server's processor
+//! time for a job (300 sequential `POST /v1/jobs` with `Prefer: wait`) and for a case of a batch, the time of one row by `/v1/evaluate`, and the
+//! time of a simulation step on a pair of profiles. If `strace` is installed, it also prints the system calls of a job. `program=PATH` measures
+//! another program, such as `target/release/railhead`.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -25,15 +25,15 @@ mod machine;
 #[expect(dead_code, reason = "other benches use the rest")]
 mod service;
 
-/// Requests of each kind.
+/// Number of requests of each kind.
 const JOBS: usize = 300;
 const CASES: usize = 2000;
 const ROWS: usize = 2000;
 const STEPS: usize = 200;
-/// Requests before anything is measured.
+/// Number of requests before the measurement.
 const FIRST: usize = 20;
 
-/// A connection that is kept.
+/// A persistent connection.
 struct Connection {
     stream: BufReader<TcpStream>,
 }
@@ -48,7 +48,7 @@ impl Connection {
         }
     }
 
-    /// Sends a request; the answer, which must have status 200 or 202.
+    /// Sends a request and returns the response body. The status must be 200 or 202.
     fn send(&mut self, method: &str, path: &str, header: &str, body: &[u8]) -> Vec<u8> {
         let head = format!(
             "{method} {path} HTTP/1.1\r\nhost: localhost\r\ncontent-length: {}\r\n{header}\r\n",
@@ -108,7 +108,7 @@ impl Connection {
     }
 }
 
-/// A case that is solved in a fraction of a millisecond; each number has its own.
+/// Returns a case that is solved in a fraction of a millisecond. Each number gives a distinct case.
 fn small(number: usize) -> Value {
     json!({
         "material": { "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 },
@@ -136,7 +136,7 @@ fn row(what: &str, figure: f64, unit: &str, goal: Option<f64>) {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Run by `cargo test --benches` as well, where there is nothing to measure.
+    // `cargo test --benches` also runs this program, and then it measures nothing.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
@@ -201,7 +201,7 @@ fn batch(service: &Service, connection: &mut Connection) {
     );
 }
 
-/// Times of requests to `/v1/evaluate`, in ms.
+/// Returns the times of requests to `/v1/evaluate` in ms.
 fn evaluated(
     connection: &mut Connection,
     number: usize,
@@ -233,7 +233,7 @@ fn rows(connection: &mut Connection) {
     row("one row, p99", quantile(times, 0.99), "ms", None);
 }
 
-/// The load of a wheel as it varies from step to step, in N.
+/// Returns the load of a wheel in N, which varies from step to step.
 fn load(step: usize) -> f64 {
     75_000.0 + 5_000.0 * (0.3 * step as f64).sin()
 }
@@ -264,7 +264,7 @@ fn steps(connection: &mut Connection) {
     );
 }
 
-/// System calls of a job, as `strace` counts them.
+/// Prints the system calls of a job, as `strace` counts them.
 fn system_calls(service: &Service, connection: &mut Connection) {
     const TRACED: usize = 100;
     let counts = tempfile::NamedTempFile::new().expect("a file");

@@ -1,14 +1,14 @@
-//! Counts what a thread allocates on the heap.
+//! Counts the heap allocations of a thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 thread_local! {
-    // Without a first value to compute and without a destructor, so that the allocator itself may use it at any time.
+    // Constant initialisation without a destructor, so that the allocator itself may use it at any time.
     static COUNT: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, with a count of its calls.
+/// The system's allocator with a count of its calls.
 pub struct Counting;
 
 // SAFETY: every call goes to the system's allocator unchanged.
@@ -16,23 +16,23 @@ pub struct Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.set(COUNT.get() + 1);
-        // SAFETY: as the caller promises.
+        // SAFETY: the caller upholds the contract.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as the caller promises.
+        // SAFETY: the caller upholds the contract.
         unsafe { System.dealloc(pointer, layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         COUNT.set(COUNT.get() + 1);
-        // SAFETY: as the caller promises.
+        // SAFETY: the caller upholds the contract.
         unsafe { System.realloc(pointer, layout, size) }
     }
 }
 
-/// Allocations of this thread during one call of `work`.
+/// Returns the number of allocations of this thread during one call of `work`.
 pub fn during<T>(work: impl FnOnce() -> T) -> u64 {
     let before = COUNT.get();
     let answer = work();

@@ -1,4 +1,4 @@
-//! Error against run time for contacts from gaps, with CONTACT's own runs beside ours.
+//! Error against run time for contacts from gaps, with CONTACT's own runs for comparison.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::questions::{number, problem, stored, timed};
 
 const REPEATS: usize = 3;
 const TARGETS: [f64; 5] = [0.05, 0.02, 0.005, 0.002, 0.001];
-/// CONTACT's runs of every case, from coarse to fine.
+/// Number of CONTACT's runs of every case, from coarse to fine.
 const RUNS: usize = 3;
 
 pub fn section(lu: f64, pictures: &Path) -> String {
@@ -63,7 +63,7 @@ pub fn section(lu: f64, pictures: &Path) -> String {
     format!("{text}\n{shown}")
 }
 
-/// Median time in LU and median error.
+/// Returns the median time in LU and the median error.
 fn run(cases: &[&Value], solver: &Value) -> (f64, f64) {
     let lu = lu_seconds();
     let (mut times, mut errors) = (Vec::new(), Vec::new());
@@ -79,7 +79,7 @@ fn run(cases: &[&Value], solver: &Value) -> (f64, f64) {
     (median(times), median(errors))
 }
 
-/// The errors of CONTACT's own runs, if every case has one of this fineness.
+/// Returns the median time in LU and the median error of CONTACT's own runs, or `None` unless every case has a run of this fineness.
 fn of_contact(cases: &[&Value], run: usize, lu: f64) -> Option<(f64, f64)> {
     let runs: Option<Vec<&Value>> = cases
         .iter()

@@ -1,4 +1,4 @@
-//! Contacts found from measured gaps and from profiles: the normal problem beside the tangential one.
+//! Contacts found from measured gaps and from profiles: the normal and the tangential problem.
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ use crate::questions::{number, problem, stored, timed};
 
 const REPEATS: usize = 11;
 
-/// Classes of the reference: heading, what it is, and how the names of its cases begin.
+/// Classes of the reference: heading, description, and the prefix of the names of its cases.
 pub const CLASSES: [(&str, &str, &str); 4] = [
     (
         "Wheel on rail",
@@ -49,7 +49,7 @@ pub fn section() -> String {
     text + &wheels()
 }
 
-/// One class against its reference.
+/// Returns the table of one class against its reference.
 fn table<'a>(cases: impl Iterator<Item = &'a Value>) -> String {
     let mut text = "| case | LU | normal problem, LU | error of resultants | estimate | approach | area | largest pressure |\n\
                     |---|---|---|---|---|---|---|---|\n"
@@ -97,7 +97,7 @@ fn table<'a>(cases: impl Iterator<Item = &'a Value>) -> String {
     text + "\n"
 }
 
-/// Largest error of the resultants and the largest estimate, both as the report counts errors.
+/// Returns the largest error of the resultants and the largest estimate, both in the report's units.
 pub fn error(case: &Value, solution: &Solution, area: f64) -> (f64, f64) {
     let total = &solution.total[0];
     let bound = 0.3 * number(case, "normal_force_n");
@@ -122,7 +122,7 @@ pub fn error(case: &Value, solution: &Solution, area: f64) -> (f64, f64) {
     )
 }
 
-/// A stored case as a question.
+/// Returns a stored case as a question.
 pub fn question(case: &Value) -> Value {
     let contact = if case["gap_mm"].is_array() {
         json!({ "type": "gap_grid", "x_mm": case["x_mm"], "y_mm": case["y_mm"], "gap_mm": case["gap_mm"] })
@@ -139,7 +139,7 @@ pub fn question(case: &Value) -> Value {
     })
 }
 
-/// The gap of a stored case that is given by a formula, 2 mm beyond its window on either side.
+/// Returns the gap of a stored case that is given by a formula, up to 2 mm beyond its window on either side.
 fn profile(case: &Value) -> Value {
     let window = numbers(&case["window_y_mm"]);
     let (low, high) = (window[0] - 2.0, window[1] + 2.0);
@@ -157,7 +157,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     elements.map(|v| v.as_f64().expect("a number")).collect()
 }
 
-/// The gap at x = 0, by the formulas that `tests/data/README.md` explains.
+/// Returns the gap at x = 0, by the formulas in `tests/data/README.md`.
 fn across(formula: &Value, y: f64) -> f64 {
     let rows = |name: &str| -> Option<Vec<Vec<f64>>> {
         Some(formula[name].as_array()?.iter().map(numbers).collect())
@@ -168,7 +168,7 @@ fn across(formula: &Value, y: f64) -> f64 {
     }
     if let Some(arcs) = rows("arcs") {
         let last = arcs.len() - 1;
-        // ∫(y − t)/R(t) dt from 0 to y, arc by arc; the outer ones go on.
+        // ∫(y − t)/R(t) dt from 0 to y, arc by arc. The outer arcs extend to infinity.
         let part = |(k, arc): (usize, &Vec<f64>)| {
             let from = if k == 0 { f64::NEG_INFINITY } else { arc[0] };
             let to = if k == last { f64::INFINITY } else { arc[1] };
@@ -189,7 +189,7 @@ fn across(formula: &Value, y: f64) -> f64 {
 /// Lateral shifts of the wheelset in mm, from the tread to the gauge corner.
 const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];
 
-/// Wheel on rail by profiles. There are no converged results in the repository; the errors are the solver's estimates.
+/// Returns the section on wheel on rail by profiles. The repository has no converged results for it, so that the errors are the solver's estimates.
 fn wheels() -> String {
     let mut text = "### Wheel on rail by profiles\n\nS1002 on 60E1 as in `api/examples/wheel-rail.case.json`, by lateral shift of the wheelset, and the \
                     flange contact of `wheel-rail-flange.case.json`; 75 kN vertical, target 0.005.\n\n\

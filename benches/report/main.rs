@@ -1,8 +1,8 @@
-//! Writes `docs/accuracy-and-speed.md` and its pictures: error against run time, the cost and honesty of targets, growth with
-//! the number of cells, and what skipping saves. One run, one thread.
+//! Writes `docs/accuracy-and-speed.md` and its pictures: error against run time, the cost of targets and whether they are met, scaling with the
+//! number of cells, and the savings by skipped work. Everything is measured in one run on one thread.
 //!
-//! `cargo bench --bench report`. Times are of the thread, not of the wall, and in units of one 500 × 500 f64 LU (faer,
-//! factored in place) of the same run. Without the reference cases of `tests/data` nothing is written.
+//! Run it with `cargo bench --bench report`. Times are thread times, in units of one 500 × 500 f64 LU (faer, factorised in place) of the same run.
+//! Without the reference cases of `tests/data`, nothing is written.
 
 #[path = "../machine.rs"]
 mod machine;
@@ -35,7 +35,7 @@ solutions extrapolated to infinitely many elements (`tests/data/README.md`; thei
 **1 LU**: one 500 × 500 f64 LU factorisation of faer in place, the unit of machine speed: ";
 
 fn main() {
-    // Run by `cargo test --benches` as well, where there is nothing to measure.
+    // `cargo test --benches` also runs this program, and then it measures nothing.
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }

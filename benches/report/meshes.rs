@@ -1,4 +1,4 @@
-//! Error against run time: explicit meshes, targets and methods, with CONTACT's grids beside them.
+//! Error against run time: explicit meshes, targets and methods, with CONTACT's grids for comparison.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,10 +10,10 @@ use crate::plot::{Plot, Series};
 use crate::questions::{CLASSES, hertz, hertz_error, number, timed};
 
 const REPEATS: usize = 5;
-/// CONTACT's grids: elements along a side of the window.
+/// CONTACT's grids, as numbers of elements along a side of the window.
 const GRIDS: [u64; 3] = [15, 30, 60];
 
-/// Errors and seconds of the cases that were solved.
+/// Errors and seconds of the solved cases.
 #[derive(Default)]
 struct Run {
     classes: Vec<String>,
@@ -34,7 +34,7 @@ impl Run {
         run
     }
 
-    /// CONTACT's own runs on one grid.
+    /// Returns CONTACT's own runs on one grid.
     fn of_contact(cases: &[Value], grid: u64) -> Run {
         let mut run = Run::default();
         for case in cases {
@@ -57,7 +57,7 @@ impl Run {
         self.seconds.push(seconds);
     }
 
-    /// Median time in LU and median error over one class.
+    /// Returns the median time in LU and the median error over one class.
     fn point(&self, class: &str, lu: f64) -> Option<(f64, f64)> {
         let pick = |values: &[f64]| -> Vec<f64> {
             let pairs = self.classes.iter().zip(values);
@@ -141,7 +141,7 @@ pub fn section(cases: &[Value], lu: f64, pictures: &Path) -> String {
     text
 }
 
-/// Errors of a class of cases against their times, a series for each method.
+/// Returns a plot of the errors of a class of cases against their times, with a series for each method.
 fn plot(class: &str, series: &[(&str, Vec<Run>)], lu: f64) -> Plot {
     Plot {
         title: format!("{class}: median error against median time"),

@@ -1,4 +1,4 @@
-//! A picture of points on two logarithmic axes.
+//! Draws points on two logarithmic axes.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ const LEFT: f64 = 70.0;
 const RIGHT: f64 = 170.0;
 const TOP: f64 = 34.0;
 const BOTTOM: f64 = 48.0;
-/// Colours that differ in lightness too, and a mark for each.
+/// Colours that also differ in lightness, with a mark for each.
 const INKS: [(&str, Mark); 5] = [
     ("#08306b", Mark::Disc),
     ("#d95f02", Mark::Square),

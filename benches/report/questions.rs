@@ -18,7 +18,7 @@ pub const CLASSES: [&str; 5] = [
     "hertz_xyspin",
 ];
 
-/// A stored list of reference data.
+/// Returns a stored list of reference data.
 pub fn stored(name: &str) -> Vec<Value> {
     let path = format!(
         "{}/tests/data/{name}.json",
@@ -32,12 +32,12 @@ pub fn hertz_cases() -> Vec<Value> {
     CLASSES.iter().flat_map(|class| stored(class)).collect()
 }
 
-/// A number of a stored case.
+/// Returns a number of a stored case.
 pub fn number(case: &Value, name: &str) -> f64 {
     case[name].as_f64().expect("a number")
 }
 
-/// A stored Hertz case as a problem.
+/// Returns a stored Hertz case as a problem.
 pub fn hertz(case: &Value, solver: &Value, outputs: &Value) -> CheckedCase {
     let question = json!({
         "material": { "shear_modulus_mpa": case["shear_modulus_mpa"], "poisson_ratio": case["poisson_ratio"] },
@@ -51,7 +51,7 @@ pub fn hertz(case: &Value, solver: &Value, outputs: &Value) -> CheckedCase {
     problem(&question)
 }
 
-/// A question as a problem; meshes beyond the usual limit of memory are allowed.
+/// Returns a question as a problem. Meshes beyond the default memory limit are allowed.
 pub fn problem(question: &Value) -> CheckedCase {
     let limits = Limits {
         memory_bytes: 8 << 30,
@@ -60,7 +60,7 @@ pub fn problem(question: &Value) -> CheckedCase {
     check(question, &limits).expect("a valid case")
 }
 
-/// The answer if there is one, and the median time of a solve over `repeats`, fewer where one takes long.
+/// Returns the answer, if there is one, and the median time of a solve over `repeats`, or fewer for slow solves.
 pub fn timed(checked: &CheckedCase, repeats: usize) -> (Option<Solution>, f64) {
     let (first, answer) = seconds_of(|| solve(checked, &Unmonitored));
     let Ok((solution, _)) = answer else {
@@ -71,7 +71,7 @@ pub fn timed(checked: &CheckedCase, repeats: usize) -> (Option<Solution>, f64) {
     (Some(solution), median(seconds.collect()))
 }
 
-/// Largest error of the resultants of a Hertz case, and the uncertainty of the reference.
+/// Returns the largest error of the resultants of a Hertz case, and the uncertainty of the reference.
 pub fn hertz_error(total: &Total, case: &Value) -> (f64, f64) {
     let bound = number(case, "friction") * number(case, "normal_force_n");
     let length = (number(case, "a_mm") * number(case, "b_mm")).sqrt();

@@ -1,4 +1,4 @@
-//! Savings from skipping work that a case does not need.
+//! Savings by skipping work that a case does not need.
 
 use std::fmt::Write as _;
 use std::hint::black_box;
@@ -15,7 +15,7 @@ use crate::machine::{lu_seconds, median, seconds_of};
 use crate::questions::{hertz, hertz_cases, problem, timed};
 
 const REPEATS: usize = 21;
-/// Of one of the references beside the creep curve, and how often both are timed.
+/// Repeats of each reference solve in the comparison with the creep curve. `TURNS` is the number of alternations between both.
 const REPEATS_EACH: usize = 3;
 const TURNS: usize = 9;
 const HEAD: &str = "## What skipping saves\n\nWheel on rail (radii 460 and 300 mm, 100 kN, μ 0.3), target 0.005. Times are those of solves on their own, \
@@ -94,7 +94,7 @@ pub fn section() -> String {
     text
 }
 
-/// The points of the creep curve as cases of their own.
+/// Solves the points of the creep curve as separate cases.
 fn one_by_one() -> String {
     let lu = lu_seconds();
     let resultants = json!(["resultants"]);
@@ -110,7 +110,7 @@ fn one_by_one() -> String {
     )
 }
 
-/// The creep curve in solves of the reference cases, in turns.
+/// Compares the creep curve with solves of the reference cases, measured alternately.
 fn beside_the_median(curve: &Value) -> String {
     let outputs = json!(["resultants"]);
     let curve = problem(&question(curve, &outputs, 0.3, 100_000.0));
@@ -130,7 +130,7 @@ fn beside_the_median(curve: &Value) -> String {
     )
 }
 
-/// Both creepages over a grid, at one spin, in one job.
+/// Solves both creepages over a grid, at one spin, in one job.
 fn creep_map() -> String {
     let lu = lu_seconds();
     let [along, across] = [40_u32, 25];
@@ -149,7 +149,7 @@ fn creep_map() -> String {
     )
 }
 
-/// Cases of one shape under many loads and motions, each on its own and with the influence kept.
+/// Solves cases of one shape under many loads and motions, each separately and with the stored influence coefficients.
 fn one_shape() -> String {
     let lu = lu_seconds();
     let problems: Vec<CheckedCase> = (0..CASES_OF_A_SHAPE)
@@ -182,7 +182,7 @@ fn one_shape() -> String {
     )
 }
 
-/// Cost of one solve.
+/// The cost of one solve.
 struct Cost {
     seconds: f64,
     products: u32,

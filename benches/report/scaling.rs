@@ -16,7 +16,7 @@ use serde_json::json;
 use crate::plot::{Plot, Series};
 use crate::questions::{problem, timed};
 
-/// One mesh: cells, entries touched, seconds, bytes of the influence.
+/// One mesh: cells, touched entries, seconds, bytes of the influence coefficients.
 struct Size {
     cells: f64,
     work: f64,
@@ -92,7 +92,7 @@ pub fn section(lu: f64, pictures: &Path) -> String {
     text
 }
 
-/// Time and memory against the number of cells.
+/// Returns a plot of time and memory against the number of cells.
 fn plot(sizes: &[Size], lu: f64) -> Plot {
     let series = |name: &str, value: fn(&Size) -> f64, unit: f64| Series {
         name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! Cost of a target, whether it is met, and whether the estimate covers the error.
+//! The cost of a target, whether it is met, and whether the estimate covers the error.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use crate::questions::{hertz, hertz_error, number, timed};
 
 const REPEATS: usize = 7;
 
-/// One solve of one case.
+/// The result of one solve of one case.
 struct Outcome {
     error: f64,
     uncertainty: f64,

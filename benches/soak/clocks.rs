@@ -1,5 +1,5 @@
-//! Nodes whose clocks are 40 s off, and set again and again while they work: is a lease ever lost by that, is a job ended twice, and is a
-//! killed worker noticed as soon as with right clocks?
+//! Tests nodes whose clocks are up to 40 s off and are changed repeatedly: no lease is lost, no job ends twice, and a killed worker is detected as
+//! soon as with correct clocks.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,10 +21,10 @@ use crate::{postgres, row};
 const JOBS: usize = 2000;
 const LEASE: Duration = Duration::from_secs(3);
 
-/// The lease, a round of whoever takes jobs from silent workers (a third of it), one second for everything else.
+/// Time limit to free a job: the lease, one round of the check for silent workers (a third of the lease), and one second for everything else.
 const FREE_WITHIN: Duration = Duration::from_secs(5);
 
-/// Roles and how far their clocks are ahead at the start, in seconds.
+/// Roles, and the initial lead of their clocks in seconds.
 const NODES: [(&str, i32); 4] = [
     ("serve", 0),
     ("serve", -10),
@@ -32,7 +32,7 @@ const NODES: [(&str, i32); 4] = [
     ("worker", -40),
 ];
 
-/// How long a clock stays as it was set: longer than nodes take to find out, and shorter.
+/// Time between changes of the clocks: longer and shorter than nodes take to detect a change.
 const SET_EVERY: [Duration; 2] = [Duration::from_secs(7), Duration::from_secs(2)];
 
 const RUNNING: &str = "SELECT COUNT(*) FROM jobs WHERE state = 'running'";
@@ -41,7 +41,7 @@ fn clock_of(folder: &TempDir, node: usize) -> std::path::PathBuf {
     folder.path().join(format!("clock-{node}"))
 }
 
-/// Sets all clocks but the first again and again; how often.
+/// Changes all clocks except the first repeatedly until stopped. Returns the number of changes.
 async fn set_clocks(folder: Arc<TempDir>, stop: Arc<AtomicBool>) -> usize {
     let mut rounds = 0;
     while !stop.load(Ordering::Relaxed) {
@@ -55,7 +55,7 @@ async fn set_clocks(folder: Arc<TempDir>, stop: Arc<AtomicBool>) -> usize {
     rounds
 }
 
-/// Jobs that no worker ends, one for each; they are running.
+/// Starts an endless job for each worker and waits until all of them run.
 async fn hold(cluster: &Cluster, pool: &PgPool) -> Vec<String> {
     let mut held = Vec::new();
     for number in 0..2 {
@@ -120,7 +120,7 @@ pub async fn run() {
         cluster.add(role, &[&flags[..], &["--cache", "false"]].concat());
     }
 
-    // Both workers hold a job for many leases, and many small ones pass by, while clocks are set.
+    // Both workers hold a job for many leases, and many small jobs are processed, while the clocks are changed.
     let held = hold(&cluster, &pool).await;
     let (began, stop) = (Instant::now(), Arc::new(AtomicBool::new(false)));
     let setting = tokio::spawn(set_clocks(folder.clone(), stop.clone()));
@@ -154,13 +154,13 @@ pub async fn run() {
     freed(&cluster, &pool, &folder).await;
 }
 
-/// How long the job of a killed worker is held whose clock is ahead, and of one whose clock is behind.
+/// Measures how long the job of a killed worker is held, with its clock ahead and behind.
 async fn freed(cluster: &Arc<Cluster>, pool: &PgPool, folder: &TempDir) {
     for (node, what) in [(2, "ahead"), (3, "behind")] {
         for node in [2, 3] {
             set_ahead(&clock_of(folder, node), NODES[node].1);
         }
-        // By then the other worker has found out how its clock was set, and takes jobs from the dead all the same.
+        // By then the other worker has detected the change of its clock and still takes over jobs.
         let held = hold(cluster, pool).await;
         block_in_place(|| cluster.kill(node));
         let killed = Instant::now();

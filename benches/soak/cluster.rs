@@ -1,4 +1,4 @@
-//! Nodes on one database, as real processes, that are killed and started again.
+//! Nodes on one database, as real processes that are killed and restarted.
 
 use std::net::SocketAddr;
 use std::process::Command;
@@ -11,10 +11,10 @@ use tempfile::TempDir;
 
 use crate::support::Service;
 
-/// How the program of a node is started: the real one, with what surrounds it. It is given the number of the node.
+/// Returns the command that starts the node with this number.
 type Prepare = Box<dyn Fn(usize) -> Command + Send + Sync>;
 
-/// One node; between a kill and a start there is no process.
+/// A node. Between a kill and a restart it has no process.
 struct Node {
     role: &'static str,
     flags: Vec<String>,
@@ -26,7 +26,7 @@ struct Node {
 pub struct Cluster {
     prepare: Prepare,
     nodes: Mutex<Vec<Node>>,
-    /// Where requests can be sent at the moment.
+    /// Addresses that accept requests at the moment.
     apis: Mutex<Vec<SocketAddr>>,
     client: Client,
 }
@@ -42,7 +42,7 @@ impl Cluster {
         })
     }
 
-    /// Adds a node and starts it; its number.
+    /// Adds a node, starts it and returns its number.
     pub fn add(&self, role: &'static str, flags: &[&str]) -> usize {
         let mut nodes = self.nodes.lock().expect("the nodes");
         nodes.push(Node {
@@ -57,7 +57,7 @@ impl Cluster {
         number
     }
 
-    /// Starts a node that has ended. It panics if the node does not start, and may be called again then.
+    /// Starts a node that has ended. Panics if the node does not start, and may then be called again.
     pub fn start(&self, number: usize) {
         let (role, flags, folder) = {
             let nodes = self.nodes.lock().expect("the nodes");
@@ -71,7 +71,7 @@ impl Cluster {
         self.list(&nodes);
     }
 
-    /// Ends a node with SIGKILL.
+    /// Kills a node with SIGKILL.
     pub fn kill(&self, number: usize) {
         let mut nodes = self.nodes.lock().expect("the nodes");
         let service = nodes[number].service.take();
@@ -79,7 +79,7 @@ impl Cluster {
         service.expect("it runs").kill();
     }
 
-    /// Ends a node in good order.
+    /// Shuts a node down gracefully.
     pub fn stop(&self, number: usize) {
         let mut nodes = self.nodes.lock().expect("the nodes");
         let service = nodes[number].service.take().expect("it runs");
@@ -98,12 +98,12 @@ impl Cluster {
         *self.apis.lock().expect("the list") = apis.collect();
     }
 
-    /// The nodes that answer requests.
+    /// Returns the addresses of the nodes that answer requests.
     pub fn apis(&self) -> Vec<SocketAddr> {
         self.apis.lock().expect("the list").clone()
     }
 
-    /// The status and the text of an answer; `None` if there was none, or not all of it.
+    /// Returns the status and the text of a response, or `None` if it is missing or incomplete.
     pub async fn ask_text(
         &self,
         api: SocketAddr,
@@ -117,7 +117,7 @@ impl Cluster {
         Some((status, answer.text().await.ok()?))
     }
 
-    /// The status and the JSON of an answer; `None` if there was none.
+    /// Returns the status and the JSON of a response, or `None` if there is none.
     pub async fn ask(
         &self,
         api: SocketAddr,
@@ -129,13 +129,13 @@ impl Cluster {
         Some((status, serde_json::from_str(&text).ok()?))
     }
 
-    /// Submits a case under a key, at one API node after the other, until it is accepted; the id of the job, and how often it was
-    /// tried again.
+    /// Submits a case with an idempotency key to one API node after the other until it is accepted. Returns the id of the job and the number of
+    /// retries.
     pub async fn submit(&self, case: &Value, key: &str, place: usize) -> (String, usize) {
         self.submit_to("/v1/jobs", case, key, place).await
     }
 
-    /// Like the above, for jobs submitted to another node.
+    /// Submits a body to this path in the same way as [`Cluster::submit`].
     pub async fn submit_to(
         &self,
         path: &str,
@@ -162,7 +162,7 @@ impl Cluster {
         }
     }
 
-    /// Everything that the nodes that run have logged and that has this text.
+    /// Returns the log lines of the running nodes that contain this text.
     pub fn logged(&self, text: &str) -> Vec<String> {
         let nodes = self.nodes.lock().expect("the nodes");
         let services = nodes.iter().filter_map(|node| node.service.as_ref());
@@ -172,7 +172,7 @@ impl Cluster {
     }
 }
 
-/// Notes every end of a job in a table, so that a job that ends twice is seen.
+/// Records every end of a job in a table, to detect jobs that end twice.
 pub async fn note_ends(pool: &sqlx::PgPool) {
     let statements = "CREATE TABLE soak_ends (job text NOT NULL, state text NOT NULL); \
         CREATE FUNCTION soak_end() RETURNS trigger LANGUAGE plpgsql AS $$ \
@@ -186,7 +186,7 @@ pub async fn note_ends(pool: &sqlx::PgPool) {
         .expect("a table");
 }
 
-/// A number that a statement counts; asked again while the database is away.
+/// Returns the number that a statement counts. Retries while the database is unavailable.
 pub async fn counted(pool: &sqlx::PgPool, statement: &'static str) -> i64 {
     loop {
         match sqlx::query_scalar(statement).fetch_one(pool).await {

@@ -1,30 +1,30 @@
-//! Hosts on one machine: namespaces of the network, joined by a bridge, that can be cut off.
+//! Hosts on one machine: network namespaces joined by a bridge, which can be disconnected.
 
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-/// Set in the process that has a network of its own.
+/// Set in the process inside the separate network namespace.
 const INSIDE: &str = "RAILHEAD_SOAK_INSIDE";
 
-/// The address of the bridge, on which this process and the database are.
+/// Address of this process and of the database on the bridge.
 pub const HERE: &str = "10.77.0.1";
 
-/// How a host is cut off.
+/// The way in which a host is disconnected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Cut {
-    /// Everything is swallowed, in both directions.
+    /// All packets are dropped, in both directions.
     BlackHole,
-    /// The cable is pulled: to send fails at once.
+    /// The link is down, so that sending fails at once.
     Cable,
-    /// Messages from the host arrive; messages to it do not.
+    /// Packets from the host arrive. Packets to it do not.
     OneWay,
-    /// Only connections to this port of others are swallowed.
+    /// Only packets to this port of other hosts are dropped.
     Port(u16),
 }
 
-/// Runs this program again in a network of its own, which goes with it, and says that it did; `false` in that one.
+/// Runs this program again in a separate network namespace, which is removed at its end, and returns `true`. Returns `false` inside that namespace.
 pub fn moved_into_a_network_of_its_own() -> bool {
     if std::env::var_os(INSIDE).is_some() {
         run("ip", "link set lo up");
@@ -56,15 +56,15 @@ fn run(program: &str, words: &str) {
     assert!(done.success(), "{program} {words}");
 }
 
-/// A host with an address of its own.
+/// A host with its own address.
 pub struct Host {
     pub address: String,
-    /// Keeps the namespace; it ends with its standard input, and so with this process.
+    /// Keeps the namespace alive. It ends with its standard input, and so with this process.
     keeper: Child,
 }
 
 impl Host {
-    /// The host with this number, 2 to 254.
+    /// Creates the host with this number, from 2 to 254.
     pub fn new(number: u8) -> Host {
         let keeper = Command::new("unshare")
             .args(["--net", "cat"])
@@ -89,7 +89,7 @@ impl Host {
         host
     }
 
-    /// A program on this host.
+    /// Returns the command for a program on this host.
     pub fn command(&self, program: &str) -> Command {
         let mut command = Command::new("nsenter");
         let id = self.keeper.id().to_string();
@@ -115,7 +115,7 @@ impl Host {
         assert!(nft.wait().is_ok_and(|done| done.success()), "nft {rules}");
     }
 
-    /// Cuts it off.
+    /// Disconnects the host.
     pub fn cut(&self, how: Cut) {
         let input = "chain i { type filter hook input priority 0; iif lo accept; drop; };";
         let output = "chain o { type filter hook output priority 0; oif lo accept; drop; };";
@@ -130,7 +130,7 @@ impl Host {
         }
     }
 
-    /// Joins it again.
+    /// Reconnects the host.
     pub fn heal(&self, how: Cut) {
         match how {
             Cut::Cable => self.ip("link set eth0 up"),
@@ -141,7 +141,7 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        // It may have ended already.
+        // The process may have ended already.
         let _ = self.keeper.kill();
         let _ = self.keeper.wait();
     }

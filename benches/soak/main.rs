@@ -1,10 +1,11 @@
-//! Do several nodes keep their promises for long, while everything fails, and what does that cost?
+//! Tests over a long time that several nodes keep their guarantees under all kinds of failures, and measures the cost.
 //!
-//! `cargo bench --bench soak -- NAME …` with PostgreSQL's programs, and for `nodes` SeaweedFS (`weed`), on this machine; the names:
-//! `nodes` (kills, restarts and faults of the object store under load; `jobs=` and `rows=` say how many), `clocks` (clocks that are off, and
-//! set meanwhile; needs libfaketime), `starts` (five nodes at once on databases of every age), `skew` (tables are brought forward under load,
-//! then the nodes are replaced; `old=` names a program of an earlier version), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot`
-//! (claims while somebody holds an old snapshot), `rate` (8 workers), `simulation` (1 to 100 nodes with the costs measured here), `network` (hosts that are cut off; needs root or namespaces for users, `ip` and `nft`). Without a name nothing is run. A broken promise ends it with a panic. `--profile dev` takes the build of the tests.
+//! `cargo bench --bench soak -- NAME …` needs PostgreSQL's programs and, for `nodes`, SeaweedFS (`weed`) on this machine. The names are: `nodes`
+//! (kills, restarts and faults of the object store under load; `jobs=` and `rows=` set the numbers), `clocks` (wrong clocks that change meanwhile;
+//! needs libfaketime), `starts` (five simultaneous nodes on databases of every age), `skew` (migration of the tables under load, then replacement of
+//! the nodes; `old=` names a program of an earlier version), `queue` (claims with 10⁴ and 10⁶ queued jobs), `snapshot` (claims while an old snapshot
+//! is held), `rate` (8 workers), `simulation` (1 to 100 nodes with measured costs), `network` (disconnected hosts; needs root or user namespaces,
+//! `ip` and `nft`). Without a name, nothing runs. A violated guarantee ends it with a panic. `--profile dev` uses the build of the tests.
 
 #[path = "../../tests/service/cluster/cable.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
@@ -41,7 +42,7 @@ mod starts;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    // Run by `cargo test --benches` as well, where there is nothing to measure.
+    // `cargo test --benches` also runs this program, and then it measures nothing.
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }

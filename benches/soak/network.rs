@@ -1,5 +1,5 @@
-//! Nodes on hosts of their own while one of them is cut off, or stands still for longer than its lease: when are its jobs free, does it
-//! change anything afterwards, and when does it work again?
+//! Tests nodes on separate hosts while one of them is disconnected or paused for longer than its lease: when its jobs become free, that it changes
+//! nothing afterwards, and when it works again.
 
 use std::time::{Duration, Instant};
 
@@ -17,14 +17,14 @@ use crate::{postgres, row};
 
 const LEASE: Duration = Duration::from_secs(3);
 
-/// By then what a cut-off node held is free: the lease, a round of whoever takes jobs from silent workers (a third of it), one second for
-/// everything else.
+/// Time limit to free the jobs of a disconnected node: the lease, one round of the check for silent workers (a third of the lease), and one second
+/// for everything else.
 const FREE_WITHIN: Duration = Duration::from_secs(5);
 
-/// Ends of a guard: something hangs.
+/// Time limit after which something is considered to hang.
 const WITHIN: Duration = Duration::from_secs(120);
 
-/// Notes which host claims what, and ends claims of the second host slowly while a row says so.
+/// Records which host claims which job, and delays claims of the hosts in `soak_slow` by a second.
 const NOTES: &str = "CREATE TABLE soak_claims (job text NOT NULL, host text NOT NULL); \
     CREATE TABLE soak_slow (host text NOT NULL); \
     CREATE FUNCTION soak_claim() RETURNS trigger LANGUAGE plpgsql AS $$ \
@@ -35,26 +35,26 @@ const NOTES: &str = "CREATE TABLE soak_claims (job text NOT NULL, host text NOT 
 
 const OPEN: &str = "SELECT COUNT(*) FROM jobs WHERE ended_at IS NULL";
 
-/// Everything that an end or a stale owner could change.
+/// Digest of everything that an end or a stale owner could change.
 const AS_THEY_ARE: &str = "SELECT COALESCE(md5(string_agg(concat_ws(',', id, state, ended_at, lease_token, blob_id, attempt, version), ' ' ORDER BY id)), '') \
     FROM jobs WHERE ended_at IS NOT NULL";
 
-/// A resource that the node loses.
+/// The way in which a node is lost.
 #[derive(Debug, Clone, Copy)]
 enum Away {
     Cut(Cut),
-    /// Its process stands still.
+    /// The process of the node is paused.
     Paused,
 }
 
-/// The database and an API node here, and two workers on hosts of their own.
+/// The database and an API node on this host, and two workers on separate hosts.
 struct Network {
     pool: PgPool,
     url: String,
     api: Service,
     hosts: [Host; 2],
     workers: [Service; 2],
-    /// Theirs.
+    /// Data folders of the workers.
     _folders: Vec<TempDir>,
 }
 
@@ -101,7 +101,7 @@ impl Network {
         })
     }
 
-    /// Jobs of some seconds, and many small ones behind them.
+    /// Submits jobs of some seconds, and many small ones after them.
     async fn submit(&self, long: usize, small: usize) {
         for number in 0..long {
             let mut case = long_case(&format!("long {number}"), 150);
@@ -113,7 +113,7 @@ impl Network {
         }
     }
 
-    /// How often the first host has claimed a job.
+    /// Returns the number of claims of the first host.
     async fn claims(&self) -> i64 {
         counted(
             &self.pool,
@@ -122,7 +122,7 @@ impl Network {
         .await
     }
 
-    /// The running jobs that the first host has claimed last, with their tokens.
+    /// Returns the running jobs last claimed by the first host, with their tokens.
     async fn held(&self) -> Vec<(String, i64)> {
         sqlx::query_as(
             "SELECT id, lease_token FROM jobs WHERE state = 'running' \
@@ -159,7 +159,7 @@ impl Network {
         }
     }
 
-    /// Takes the first host away for three leases while it solves.
+    /// Disconnects or pauses the first host for three leases while it solves.
     async fn lose(&self, how: Away) {
         self.submit(6, 60).await;
         until("the first host solves", async || {
@@ -168,7 +168,7 @@ impl Network {
         .await;
         let lost = Instant::now();
         self.take_away(how);
-        // The jobs that it held at that moment; it may have ended some since.
+        // The jobs that it held at that moment. It may have ended some since.
         let held = self.held().await;
         let (ids, tokens): (Vec<_>, Vec<_>) = held.into_iter().unzip();
         until("its jobs are free", async || {
@@ -228,7 +228,7 @@ impl Network {
         );
     }
 
-    /// Cuts the first host off while a claim of it is not committed: nobody else can take the rows until the server ends its session.
+    /// Disconnects the first host during an uncommitted claim. Nobody else can take the rows until the server ends its session.
     async fn lose_in_a_transaction(&self) {
         let slow = "INSERT INTO soak_slow VALUES ('10.77.0.2')";
         sqlx::raw_sql(slow).execute(&self.pool).await.expect("slow");
@@ -262,7 +262,7 @@ impl Network {
         assert!(free < FREE_WITHIN, "its rows were free after {free:?}");
     }
 
-    /// An API node whose way to the database swallows everything: what do clients hear, and when does it serve them again?
+    /// Disconnects an API node from the database, and tests the responses to clients and when it serves them again.
     async fn lose_the_database(&self) {
         let (host, folder) = (Host::new(4), tempfile::tempdir().expect("a folder"));
         let node = start(&host, "serve", &self.url, &folder);
@@ -300,7 +300,7 @@ impl Network {
         })
         .await;
         let ready = back.elapsed().as_secs_f64();
-        // Hears of the cancellation at another node by the notification, or looks.
+        // The node learns of the cancellation at another node by the notification or by polling.
         let cancel = format!("/v1/jobs/{running}/cancel");
         let cancelled = self.api.request(Method::POST, &cancel).send().await;
         assert_eq!(cancelled.expect("an answer").status(), 202);
@@ -320,7 +320,7 @@ async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
     }
 }
 
-/// All of it, one after the other.
+/// Runs all tests, one after the other.
 pub async fn run() {
     let Some(network) = Network::new().await else {
         return;

@@ -1,6 +1,6 @@
-//! Two API nodes and three workers while nodes are killed at random, PostgreSQL crashes, all nodes are replaced one by one, and the object
-//! store fails now and then: is every job that was accepted ended once, and is its result read at every API node? Has a run that goes on
-//! meanwhile an answer to each of its rows?
+//! Tests two API nodes and three workers while nodes are killed at random, PostgreSQL crashes, all nodes are replaced one by one, and the object
+//! store sometimes fails. Every accepted job must end once, every API node must return its result, and a concurrent run must have an answer to each
+//! of its rows.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -22,10 +22,10 @@ use crate::{postgres, row, seaweed};
 const CLIENTS: usize = 6;
 const OPEN: &str = "SELECT COUNT(*) FROM jobs WHERE ended_at IS NULL";
 
-/// Ends of a guard: something hangs.
+/// Time limit after which something is considered to hang.
 const ENDED_WITHIN: Duration = Duration::from_secs(900);
 
-/// Mostly small cases; each twentieth takes a good part of a second and has a result that goes to the object store.
+/// Returns mostly small cases. Every twentieth takes a large part of a second and has a result that goes to the object store.
 fn mixed(number: usize) -> Value {
     let name = format!("case {number}");
     if !number.is_multiple_of(20) {
@@ -39,7 +39,7 @@ fn mixed(number: usize) -> Value {
     case
 }
 
-/// Submits so many jobs from a number on, and returns their ids and how often one was tried again.
+/// Submits `jobs` jobs, numbered from `from`. Returns their ids and the number of retries.
 pub async fn submit(cluster: &Arc<Cluster>, from: usize, jobs: usize) -> (Vec<String>, usize) {
     let next = Arc::new(AtomicUsize::new(from));
     let mut clients = JoinSet::new();
@@ -64,10 +64,10 @@ pub async fn submit(cluster: &Arc<Cluster>, from: usize, jobs: usize) -> (Vec<St
     (all.into_iter().flat_map(|(ids, _)| ids).collect(), again)
 }
 
-/// Kills a node and starts it again, another one each time, until it is told to stop; the number of kills.
+/// Kills and restarts a random node repeatedly until stopped. Returns the number of kills.
 async fn kill_at_random(cluster: Arc<Cluster>, nodes: Vec<usize>, stop: Arc<AtomicBool>) -> usize {
     let mut kills = 0;
-    // A generator of its own, so that a run can be repeated.
+    // A separate generator, so that a run is repeatable.
     let mut seed: u64 = 0x2545_f491_4f6c_dd1d;
     while !stop.load(Ordering::Relaxed) {
         seed ^= seed << 13;
@@ -77,14 +77,14 @@ async fn kill_at_random(cluster: Arc<Cluster>, nodes: Vec<usize>, stop: Arc<Atom
         let node = nodes[usize::try_from(seed >> 33).expect("a number") % nodes.len()];
         block_in_place(|| cluster.kill(node));
         sleep(Duration::from_millis(seed % 1500)).await;
-        // While PostgreSQL is away a node does not start; it is tried again then.
+        // A node does not start while PostgreSQL is unavailable. The start is retried.
         while !started(&cluster, node).await {}
         kills += 1;
     }
     kills
 }
 
-/// Starts a node; says whether it did.
+/// Starts a node and returns whether it succeeded.
 async fn started(cluster: &Cluster, node: usize) -> bool {
     let tried = block_in_place(|| {
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| cluster.start(node)))
@@ -131,10 +131,10 @@ async fn read_everywhere(cluster: &Cluster, ids: &[&String]) {
     }
 }
 
-/// Two API nodes and three workers with short leases.
+/// Adds two API nodes and three workers with short leases.
 fn add_nodes(cluster: &Cluster, url: &str) -> Vec<usize> {
     let shared = "--results-url s3://soak/results --cache false --lease-s 3 --attempts-max 20 --shutdown-grace-s 2 --drain-delay-s 0";
-    // A worker is killed every few seconds, and a chunk takes some seconds: by chance the same one is hit several times.
+    // A worker is killed every few seconds, and a chunk takes some seconds. By chance, the same chunk is hit several times.
     let roles = [
         ("serve", "0"),
         ("serve", "0"),
@@ -163,7 +163,7 @@ pub async fn run(jobs: usize, rows: usize) {
     let cluster = Cluster::new(move |_| seaweed::railhead_at(s3));
     let all = add_nodes(&cluster, &url);
 
-    // Kills at random, and one crash of the database.
+    // Kills at random times, and one crash of the database.
     let began = Instant::now();
     let (stop, first) = (Arc::new(AtomicBool::new(false)), jobs * 3 / 5);
     let killing = tokio::spawn(kill_at_random(cluster.clone(), all.clone(), stop.clone()));
@@ -198,7 +198,7 @@ pub async fn run(jobs: usize, rows: usize) {
     row("faults of the object store", made);
 }
 
-/// Replaces all nodes one by one while jobs are submitted: nobody waits for a lease, and no attempt counts.
+/// Replaces all nodes one by one while jobs are submitted. Nobody waits for a lease, and no attempt counts.
 async fn roll(
     cluster: &Arc<Cluster>,
     pool: &PgPool,

@@ -1,5 +1,5 @@
-//! The job table in PostgreSQL by itself: what claims and ends cost with 10⁴ and with 10⁶ queued jobs, and while somebody keeps a
-//! transaction open that needs all dead rows.
+//! Measures the job table in PostgreSQL alone: the cost of claims and ends with 10⁴ and with 10⁶ queued jobs, and during an open transaction that
+//! needs all dead rows.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -23,13 +23,13 @@ const GROUP: usize = 32;
 const WORKERS: usize = 4;
 const RESULT_BYTES: usize = 4096;
 
-/// How long claims and ends are measured.
+/// Duration of the measurement of claims and ends.
 const MEASURED: Duration = Duration::from_secs(10);
 
-/// How long the old snapshot is held.
+/// Time for which the old snapshot is held.
 const HELD: Duration = Duration::from_secs(60);
 
-/// Adds queued jobs behind those that are there; their ids grow, as those of submissions do.
+/// Adds queued jobs after the existing ones. Their ids increase, as those of submissions do.
 pub async fn fill(pool: &PgPool, from: i64, to: i64) {
     let statement = "INSERT INTO jobs (id, tenant, state, labels, method, outputs, cost_us, slice_us, bypass_cache, rank, created_at, updated_at) \
          SELECT lpad(to_hex(n), 8, '0') || '-0000-7000-8000-000000000000', $3, 'queued', '{}', 'auto', '[]', 3000, 3000, 1, 1, n, n \
@@ -47,7 +47,7 @@ pub async fn fill(pool: &PgPool, from: i64, to: i64) {
         .expect("figures");
 }
 
-/// Text of numbers, as solutions are; it hardly compresses.
+/// Returns a text of numbers like a solution, which hardly compresses.
 fn solution() -> Vec<u8> {
     let mut seed: u64 = 0x2545_f491_4f6c_dd1d;
     let mut text = Vec::new();
@@ -61,7 +61,7 @@ fn solution() -> Vec<u8> {
     text
 }
 
-/// Jobs that the workers ended in some time, and the seconds of each claim and of each end.
+/// Number of jobs that the workers ended in some time, and the seconds of each claim and of each end.
 #[derive(Default)]
 struct Work {
     jobs: usize,
@@ -113,12 +113,12 @@ async fn work(store: Arc<PostgresStore>, until: Instant, group: usize) -> Work {
     done
 }
 
-/// Claims and ends by several workers at once, in groups of 32.
+/// Measures claims and ends by several concurrent workers, in groups of 32.
 async fn measure(store: &Arc<PostgresStore>, how_long: Duration) -> Work {
     measure_as(store, how_long, WORKERS, GROUP).await
 }
 
-/// Runs the measurement with a number of workers and of jobs in a group.
+/// Measures with this number of workers and of jobs in a group.
 async fn measure_as(
     store: &Arc<PostgresStore>,
     how_long: Duration,
@@ -191,7 +191,7 @@ async fn open() -> Option<(Arc<PostgresStore>, PgPool, String)> {
     Some((Arc::new(store), pool, url))
 }
 
-/// 10⁴ queued jobs, kept full, against 10⁶.
+/// Compares 10⁴ queued jobs, kept constant, with 10⁶.
 pub async fn depth() {
     let Some((store, pool, _)) = open().await else {
         return;
@@ -237,7 +237,7 @@ pub async fn depth() {
     );
 }
 
-/// Medians, in ms, of what clients and operators look at: a page of a list, one of queued jobs, figures, use of a tenant.
+/// Returns the median times in ms of typical queries of clients and operators: a page of a list, a page of queued jobs, figures, usage of a tenant.
 async fn look(store: &Arc<PostgresStore>) -> [f64; 4] {
     let store: &dyn Store = &**store;
     let queued = Filter {
@@ -265,13 +265,14 @@ async fn look(store: &Arc<PostgresStore>) -> [f64; 4] {
     times.map(|mut times| median(&mut times) * 1e3)
 }
 
-/// Claims and ends per second by 8 workers, in groups of 32 with results of 4 kB, and what each job costs the server; 3·10⁵ queued.
+/// Measures claims and ends per second by 8 workers, in groups of 32 with results of 4 kB, and the cost of each job for the server, with 3·10⁵
+/// queued jobs.
 pub async fn rate() {
     let Some((store, pool, _)) = open().await else {
         return;
     };
     fill(&pool, 0, 300_000).await;
-    // Connections and plans are made before; pages are written whole once after a checkpoint.
+    // The warm-up opens connections and prepares plans. After a checkpoint, each page is first written in full.
     measure_as(&store, MEASURED / 10, 8, GROUP).await;
     let before = (server_seconds(&pool).await, written(&pool).await);
     let work = measure_as(&store, MEASURED, 8, GROUP).await;
@@ -291,13 +292,13 @@ pub async fn rate() {
     );
 }
 
-/// Bytes that the server has written to its log.
+/// Returns the bytes that the server has written to its write-ahead log.
 async fn written(pool: &PgPool) -> i64 {
     let asked = sqlx::query_scalar("SELECT CAST(pg_current_wal_lsn() - '0/0' AS bigint)");
     asked.fetch_one(pool).await.expect("its log")
 }
 
-/// Processor seconds of everything that the server runs.
+/// Returns the processor seconds of all processes of the server.
 async fn server_seconds(pool: &PgPool) -> f64 {
     let processes: Vec<i32> = sqlx::query_scalar("SELECT pid FROM pg_stat_activity")
         .fetch_all(pool)
@@ -305,7 +306,7 @@ async fn server_seconds(pool: &PgPool) -> f64 {
         .expect("its processes");
     let ticks = processes.iter().map(|process| {
         let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
-        // After the name, which may hold anything: state, then ten numbers, then user and system time in hundredths of seconds.
+        // After the name, which may contain any characters: the state, then ten numbers, then user and system time in hundredths of a second.
         let numbers = stat.rsplit(')').next().unwrap_or_default();
         let ticks = numbers.split_whitespace().skip(11).take(2);
         ticks
@@ -315,13 +316,13 @@ async fn server_seconds(pool: &PgPool) -> f64 {
     ticks.sum::<f64>() / 100.0
 }
 
-/// Cost of a claim and its end for the server, and of each further job of the claim.
+/// Returns the cost of a claim and its end for the server, and of each further job of the claim.
 pub async fn costs() -> Option<Costs> {
     let (store, pool, _) = open().await?;
     fill(&pool, 0, 300_000).await;
     let mut measured = Vec::new();
     for group in [1, 64] {
-        // Connections and plans are made before.
+        // The warm-up opens connections and prepares plans.
         measure_as(&store, MEASURED / 10, 4, group).await;
         let before = server_seconds(&pool).await;
         let done = measure_as(&store, MEASURED, 4, group).await;
@@ -344,7 +345,7 @@ pub async fn costs() -> Option<Costs> {
     })
 }
 
-/// Claims before, and in the last quarter of a minute in which somebody holds an old snapshot.
+/// Compares claims before an old snapshot is held with those in the last quarter of a minute with it.
 pub async fn snapshot() {
     let Some((store, pool, url)) = open().await else {
         return;

@@ -1,4 +1,4 @@
-//! A run of many rows beside the jobs: has each row one answer, in its place, and the same at every API node?
+//! Tests a run of many rows concurrent with the jobs: each row has one answer in its place, the same at every API node.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -10,16 +10,16 @@ use sqlx::PgPool;
 use crate::cluster::Cluster;
 use crate::row;
 
-/// Ends of a guard: something hangs.
+/// Time limit after which something is considered to hang.
 const READ_WITHIN: Duration = Duration::from_secs(120);
 
-/// A run that was accepted.
+/// An accepted run.
 pub struct SentRun {
     id: String,
     rows: usize,
 }
 
-/// One case with loads and creepages of its own for each row; each takes about a millisecond.
+/// Returns one case with distinct loads and creepages for each row. Each row takes about a millisecond.
 fn body(rows: usize, name: &str) -> Value {
     let each = |of: fn(usize) -> f64| (0..rows).map(of).collect::<Vec<_>>();
     #[expect(clippy::cast_precision_loss, reason = "far fewer rows than 2^53")]
@@ -43,7 +43,7 @@ fn body(rows: usize, name: &str) -> Value {
 }
 
 impl SentRun {
-    /// Sends a run under a key, until it is accepted.
+    /// Sends a run with an idempotency key until it is accepted.
     pub async fn send(cluster: &Arc<Cluster>, rows: usize, name: &str) -> SentRun {
         let (id, _) = cluster
             .submit_to("/v1/runs", &body(rows, name), name, 0)
@@ -51,7 +51,7 @@ impl SentRun {
         SentRun { id, rows }
     }
 
-    /// Requires an answer to every row at every API node; most attempts of its chunks.
+    /// Requires an answer to every row at every API node. Returns the largest number of attempts of its chunks.
     pub async fn verify(&self, cluster: &Cluster, pool: &PgPool) -> i64 {
         let chunks: Vec<(String, i64, i64)> = sqlx::query_as(
             "SELECT state, COUNT(*), MAX(attempt) FROM jobs WHERE batch_id = $1 GROUP BY state",

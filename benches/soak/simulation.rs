@@ -1,9 +1,9 @@
-//! How many nodes does one PostgreSQL carry? Events of workers that claim, solve and end are played through with the costs of claims and
-//! ends as they are measured here; what is simulated is who waits for whom.
+//! Estimates how many nodes one PostgreSQL can serve. It simulates the events of workers that claim, solve and end, with the measured costs of
+//! claims and ends. The waiting times are simulated.
 //!
-//! The server is some cores that serve statements in the order in which they come. A worker claims a group or one chunk, solves it, and
-//! ends it; a claim or an end keeps a core for a time of its own and one for each job, and takes a round trip on top, in which the server
-//! does something else. Times of solves vary evenly by a half.
+//! The server has some cores that run statements in the order of arrival. A worker claims a group or one chunk, solves it, and ends it. A claim or
+//! an end occupies a core for a constant time plus a time for each job. It also takes a round trip, during which the server does other work. Times
+//! of solves are uniform within ±25 %.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -13,9 +13,9 @@ use crate::row;
 /// Time in µs for which a statement occupies a core of the server, and the time of its round trip.
 #[derive(Debug, Clone, Copy)]
 pub struct Costs {
-    /// Of a claim and the end that follows, whatever is claimed.
+    /// Time of a claim and its end, independent of what is claimed.
     pub group_us: f64,
-    /// Of each job of the group.
+    /// Time for each job of the group.
     pub job_us: f64,
     pub round_trip_us: f64,
 }
@@ -24,7 +24,7 @@ pub struct Costs {
 #[derive(Debug, Clone, Copy)]
 struct Work {
     name: &'static str,
-    /// Units that are claimed and ended together.
+    /// Number of units that are claimed and ended together.
     group: usize,
     unit_us: f64,
     /// Number of results of a unit: one job, or the rows of a chunk.
@@ -56,10 +56,10 @@ const NODES: [usize; 6] = [1, 2, 4, 10, 30, 100];
 const WORKERS_OF_A_NODE: usize = 16;
 const SERVER_CORES: usize = 4;
 
-/// Simulated time, in µs; the first tenth is not counted.
+/// Simulated time in µs. The first tenth is not counted.
 const LASTS_US: f64 = 60e6;
 
-/// A moment; moments are never NaN.
+/// A point in time, which is never NaN.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 struct At(f64);
 
@@ -72,14 +72,14 @@ impl Ord for At {
     }
 }
 
-/// The outcome: units per second, and the share of the time of the workers and of the server that is used.
+/// The result: units per second, and the utilisation of workers and server.
 struct Figures {
     per_s: f64,
     workers: f64,
     server: f64,
 }
 
-/// A worker asks the server at a moment: to end what it has solved, and for the next group.
+/// Simulates workers. Each asks the server to end its solved group and for the next group.
 fn play(work: Work, workers: usize, costs: Costs) -> Figures {
     let mut cores = BinaryHeap::from([Reverse(At(0.0)); SERVER_CORES]);
     let mut seed: u64 = 0x9e37_79b9_7f4a_7c15;
@@ -94,7 +94,7 @@ fn play(work: Work, workers: usize, costs: Costs) -> Figures {
     #[expect(clippy::cast_precision_loss, reason = "few")]
     let (group, counts) = (work.group as f64, work.counts as f64);
     let solve_us = group * work.unit_us;
-    // All begin within one solve.
+    // All workers begin within the time of one solve.
     let mut asks: BinaryHeap<_> = (0..workers)
         .map(|_| Reverse(At(random() * solve_us)))
         .collect();
@@ -127,7 +127,7 @@ fn play(work: Work, workers: usize, costs: Costs) -> Figures {
     }
 }
 
-/// Plays nodes from 1 to 100 through, for small jobs and for chunks of runs.
+/// Simulates 1 to 100 nodes, for small jobs and for chunks of runs.
 pub fn run(costs: Costs) {
     row(
         "costs: of a claim with its end, of each job in it, round trips",

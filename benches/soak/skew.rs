@@ -1,6 +1,6 @@
-//! Tables are brought forward while nodes of the version before work, which are then replaced one by one: does anybody notice?
+//! Tests a migration of the tables under load on nodes of the previous version, which are then replaced one by one: no request must fail.
 //!
-//! Without a program of an earlier version the present one plays it, and the tables become what the next version could make of them.
+//! Without a program of an earlier version, the present one takes its place, and the tables change as a next version might change them.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -20,7 +20,7 @@ use crate::{postgres, row};
 
 const JOBS: usize = 3000;
 
-/// Objects that a version adds to tables in use: a column, an index, a table. Adding a table does not block writers.
+/// Statements for objects that a version adds to tables in use: a column, an index, a table. Adding a table does not block writers.
 const NEXT: [&str; 4] = [
     "SET lock_timeout = '2s'",
     "ALTER TABLE jobs ADD COLUMN later bigint NOT NULL DEFAULT 0; CREATE TABLE later (id bigint PRIMARY KEY)",
@@ -28,7 +28,7 @@ const NEXT: [&str; 4] = [
     "CREATE INDEX CONCURRENTLY jobs_later ON jobs (later) WHERE later > 0",
 ];
 
-/// The program of the version before, or the present one.
+/// Returns the program of the previous version, or the present one.
 fn before(old: Option<&PathBuf>) -> Command {
     let Some(old) = old else { return railhead() };
     let mut command = Command::new(old);
@@ -38,7 +38,7 @@ fn before(old: Option<&PathBuf>) -> Command {
     command
 }
 
-/// Brings the tables forward; tried again where somebody holds them for too long.
+/// Migrates the tables. Retries if they are locked for too long.
 async fn advance(url: &str, old: bool) {
     if old {
         migrate(url).await.expect("the tables are brought forward");
@@ -106,7 +106,7 @@ pub async fn run(old: Option<String>) {
     );
     sleep(Duration::from_secs(3)).await;
     assert!(!submitting.is_finished(), "more jobs are needed");
-    // Workers first, then those that answer requests.
+    // Workers first, then the API nodes.
     is_new.store(true, Ordering::Relaxed);
     for node in [2, 3, 0, 1] {
         block_in_place(|| cluster.stop(node));
@@ -127,7 +127,7 @@ pub async fn run(old: Option<String>) {
     verify(&cluster, &pool, jobs).await;
 }
 
-/// Each job ended once, at its first attempt, and nobody complained.
+/// Requires that each job ended once, at its first attempt, and that no node logged a panic or an error.
 async fn verify(cluster: &Cluster, pool: &PgPool, jobs: i64) {
     let ended = "SELECT COUNT(*) FROM jobs WHERE state = 'succeeded' AND attempt = 1";
     assert_eq!(counted(pool, ended).await, jobs, "at the first attempt");

@@ -1,5 +1,5 @@
-//! Five nodes that start at once, tables first, on databases of every age with many jobs in them: are the tables brought forward once, and
-//! do all nodes work afterwards?
+//! Tests five nodes that start at once, each migrating the tables first, on databases of every age with many jobs. The tables must be migrated once,
+//! and all nodes must work afterwards.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -15,13 +15,13 @@ use crate::queue::fill;
 use crate::support::{Service, case, railhead};
 use crate::{old_tables, postgres, row};
 
-/// Jobs that are in the tables already.
+/// Number of jobs that are already in the tables.
 const JOBS: i64 = 100_000;
 
-/// Ends of a guard: something hangs.
+/// Time limit after which something is considered to hang.
 const WITHIN: Duration = Duration::from_secs(60);
 
-/// The tables first, then the node; what the first command said.
+/// Migrates the tables, then starts the node. Returns the output of the migration as well.
 fn start(url: &str, number: usize) -> (String, Service, TempDir) {
     let folder = tempfile::tempdir().expect("a folder");
     let mut migrate = railhead();
@@ -35,7 +35,7 @@ fn start(url: &str, number: usize) -> (String, Service, TempDir) {
     (said, service, folder)
 }
 
-/// Nodes 0, 2 and 4 answer requests: what one takes is told by the next.
+/// Checks that nodes 0, 2 and 4 answer requests: each submitted job is read at the next of these nodes.
 async fn work(nodes: &[(String, Service, TempDir)]) {
     for number in [0, 2, 4] {
         let mut urgent = case(&format!("of node {number}"));
@@ -59,7 +59,7 @@ async fn work(nodes: &[(String, Service, TempDir)]) {
     }
 }
 
-/// The form of tables that the present program makes.
+/// Returns the schema version that the present program makes.
 fn newest() -> u32 {
     let steps = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/jobs/store/postgres/steps");
     let names = std::fs::read_dir(steps).expect("the steps");

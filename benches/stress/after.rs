@@ -1,4 +1,4 @@
-//! Cost of outputs for maintenance relative to the solve at a target of 0.005, on ellipses of many shapes.
+//! Measures the cost of outputs for maintenance relative to the solve at a target of 0.005, on ellipses of many shapes.
 
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -12,7 +12,7 @@ const SHAPES: [f64; 6] = [0.3, 0.6, 1.0, 1.5, 2.5, 4.0];
 const MOTIONS: [[f64; 3]; 3] = [[8e-4, 0.0, 0.0], [1e-3, 5e-4, 2e-4], [2e-4, 0.0, 1.2e-3]];
 const REPEATED: usize = 3;
 
-/// Names of what is asked for, and its members of the case.
+/// Returns the names of the outputs, and their members of the case.
 fn options() -> [(&'static str, Value); 9] {
     let axis = |reach: f64, points: u32| json!({ "from": -reach, "to": reach, "points": points });
     let depths = json!({ "from": 0.2, "to": 8, "points": 25 });
@@ -54,7 +54,7 @@ fn options() -> [(&'static str, Value); 9] {
     ]
 }
 
-/// The table, medians over all contacts.
+/// Returns the table with medians over all contacts.
 pub fn table() -> String {
     let mut seconds = vec![Vec::new(); options().len()];
     for ratio in SHAPES {
@@ -101,7 +101,7 @@ pub fn table() -> String {
     text
 }
 
-/// The least of several times of a solve, in s.
+/// Returns the least of several times of a solve, in s.
 fn least(case: &Value) -> f64 {
     let checked = contact::check(case, &Limits::default()).expect("a valid case");
     let once = |_| {

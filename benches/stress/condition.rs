@@ -1,4 +1,4 @@
-//! How ill-conditioned are the equations? Singular values of the whole map from tractions to slips.
+//! Measures the condition of the equations by singular values of the whole map from tractions to slips.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use railhead_contact::rolling::strip_mesh::StripMesh;
 use railhead_contact::{check, normal_stage};
 use serde_json::json;
 
-/// Largest over smallest singular value of the map of a rule, ν = 0.28.
+/// Returns the ratio of the largest to the smallest singular value of the map of a rule, for ν = 0.28.
 fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
     let case = json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },

@@ -1,4 +1,4 @@
-//! Cases from all over the allowed ground: shapes, loads, materials, motions, meshes, units.
+//! Cases over the whole allowed range: shapes, loads, materials, motions, meshes, units.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,17 +6,16 @@ use serde_json::{Value, json};
 
 use super::random::Random;
 
-/// One case to solve.
+/// A case to solve.
 pub struct Sample {
-    /// The row of the report it belongs to.
+    /// Row of the report that the case belongs to.
     pub kind: &'static str,
-    /// Name for messages.
+    /// Number of the case for messages.
     pub number: usize,
-    /// The question.
     pub case: Value,
 }
 
-/// Which kinds come how often, out of twenty-one.
+/// Kinds of cases, with their frequencies out of twenty-one.
 const KINDS: [&str; 21] = [
     "ellipse, mesh",
     "ellipse, target",
@@ -40,10 +39,10 @@ const KINDS: [&str; 21] = [
     "two patches nearly touching",
     "two unequal patches",
 ];
-/// Beside these, one case in so many has a huge mesh.
+/// In addition to these, one case in this number has a huge mesh.
 const HUGE_EVERY: usize = 500;
 
-/// The first `count` cases of a seed.
+/// Returns the first `count` cases of a seed.
 pub fn samples(count: usize, seed: u64) -> impl Iterator<Item = Sample> {
     (0..count).map(move |number| {
         let mut random = Random(
@@ -66,7 +65,7 @@ pub fn samples(count: usize, seed: u64) -> impl Iterator<Item = Sample> {
     })
 }
 
-/// Load and stiffness of a contact, and what makes motions of the usual size.
+/// Load and stiffness of a contact, for motions of the usual size.
 struct Setting {
     force: f64,
     modulus: f64,
@@ -88,7 +87,7 @@ impl Setting {
         }
     }
 
-    /// Creepages in 1 and spin in 1/mm for a patch of half width `c`: a creepage of `unit` comes near saturation.
+    /// Returns creepages in 1 and spin in 1/mm for a patch of half width `c`. A creepage of `unit` is near saturation.
     fn motion(&self, c: f64, random: &mut Random) -> Value {
         let unit = self.friction * self.force * (1.0 - self.poisson) / (2.0 * self.modulus * c * c);
         let size = match random.below(8) {
@@ -125,7 +124,7 @@ impl Setting {
         case
     }
 
-    /// Half width of a circle that the load would make on spheres of this radius of curvature.
+    /// Returns the half width of the circle that the load would give on spheres of this radius of curvature.
     fn hertz(&self, radius: f64) -> f64 {
         (0.75 * self.force * radius * (1.0 - self.poisson) / self.modulus).cbrt()
     }
@@ -140,7 +139,7 @@ fn target(random: &mut Random) -> Value {
     json!({ "target_error": target })
 }
 
-/// How a case of this kind is to be solved.
+/// Returns solver settings for a case of this kind.
 fn solver(kind: &str, random: &mut Random) -> Value {
     match kind {
         "ellipse, huge mesh" => mesh(44, 50),
@@ -181,7 +180,7 @@ fn case(kind: &str, random: &mut Random) -> Value {
             } else {
                 gap(kind, random)
             };
-            // Gaps come in the size of rails; loads and stiffness that make patches of 1 to 15 mm.
+            // Gaps have the size of rails, with loads and stiffness that give patches of 1 to 15 mm.
             let setting = Setting {
                 force: random.decades(3e2, 3e5),
                 modulus: 82_000.0,
@@ -217,7 +216,7 @@ fn case(kind: &str, random: &mut Random) -> Value {
     }
 }
 
-/// Two bumps of very different radii side by side under a wheel.
+/// Returns two bumps of very different radii side by side under a wheel.
 fn unequal(random: &mut Random) -> Value {
     let rolling = random.decades(100.0, 2000.0);
     let radii = [random.decades(100.0, 600.0), random.decades(1.0, 60.0)];
@@ -232,7 +231,7 @@ fn unequal(random: &mut Random) -> Value {
     json!({ "type": "gap_profile", "rolling_mm": rolling, "y_mm": y, "gap_mm": gap })
 }
 
-/// Crowns of powers, two bumps, kinks and roughness under a wheel.
+/// Returns crowns of powers, two bumps, kinks and roughness under a wheel.
 fn gap(kind: &str, random: &mut Random) -> Value {
     let rolling = random.decades(50.0, 5000.0);
     let shape = random.below(4);
@@ -250,7 +249,7 @@ fn gap(kind: &str, random: &mut Random) -> Value {
     let across = |y: f64| match shape {
         0 => square * y * y + fourth * y.powi(4),
         1 => (square * (y - half).powi(2)).min(square * (y + half).powi(2) + offset),
-        // Another curvature, and a kink beside the contact.
+        // Another curvature on one side, and a kink beside the contact.
         2 => square * y * y * if y > 0.0 { 1.0 } else { 3.0 } + 0.01 * (y - half).max(0.0),
         _ => square * y * y,
     };
@@ -279,8 +278,8 @@ fn gap(kind: &str, random: &mut Random) -> Value {
     json!({ "type": "gap_profile", "rolling_mm": rolling, "y_mm": y, "gap_mm": gap })
 }
 
-/// Sampled pressures: lens, egg, hollow, ridge with numbers too small to be normal; or two lenses that nearly touch.
-/// Returns √(A/π), roughly, too.
+/// Returns sampled pressures: lens, egg, hollow, ridge with denormal numbers, or two lenses that nearly touch. Returns an approximation of √(A/π),
+/// too.
 fn pressures(kind: &str, setting: &Setting, random: &mut Random) -> (Value, f64) {
     let c = random.decades(0.5, 20.0);
     let count = 12 + random.below(24);
@@ -306,7 +305,7 @@ fn pressures(kind: &str, setting: &Setting, random: &mut Random) -> (Value, f64)
                     .max(lens(x, (y + 0.5 * (1.0 + apart)) / half))
             }
         };
-        // The ridge runs out in denormal numbers.
+        // The ridge ends in denormal numbers.
         if shape == 3 && p > 0.0 && p < 1e-9 {
             1e-310
         } else {
@@ -322,8 +321,7 @@ fn pressures(kind: &str, setting: &Setting, random: &mut Random) -> (Value, f64)
     (contact, c)
 }
 
-/// The same contact in other units: lengths times `length`, stresses times `stress`. The names of the members tell what
-/// they are.
+/// Returns the contact in other units: lengths times `length`, stresses times `stress`. The names of the members give their units.
 pub fn scaled(case: &Value, length: f64, stress: f64) -> Value {
     fn walk(value: &mut Value, factor: Option<f64>, length: f64, stress: f64) {
         match value {
@@ -356,7 +354,7 @@ pub fn scaled(case: &Value, length: f64, stress: f64) -> Value {
     case
 }
 
-/// The same contact with the motion, or the prescribed force, turned round.
+/// Returns the contact with the motion, or the prescribed force, reversed.
 pub fn reversed(case: &Value) -> Value {
     let mut case = case.clone();
     for (_, member) in case["motion"].as_object_mut().into_iter().flatten() {

@@ -1,4 +1,4 @@
-//! Damaged profiles: sound pairs of rail and wheel, what measuring and exporting does to them, and what the answer then says.
+//! Damaged profiles: sound pairs of rail and wheel, the damage by measuring and exporting, and the remarks of the answer.
 
 use std::f64::consts::TAU;
 
@@ -14,7 +14,7 @@ use crate::profile_reference_files::reference_file;
 use crate::profile_shapes::{rail_60e1, s1002};
 use crate::random::Random;
 
-/// Points of one cross-section, y to the field side and z down.
+/// Points of one cross-section, with y to the field side and z down.
 pub type Points = Vec<[f64; 2]>;
 
 /// A rail and a wheel without damage.
@@ -23,37 +23,37 @@ pub struct Pair {
     pub rail: Points,
     pub wheel: Points,
     pub placement: Value,
-    /// Lateral shifts in mm between which places are drawn.
+    /// Lateral shifts in mm, between which positions are drawn at random.
     pub shifts: [f64; 2],
 }
 
-/// A wheelset on a pair.
+/// A position of a wheelset on a pair.
 pub struct Place {
     pub case: Value,
-    /// The case with sound profiles.
+    /// Solution of the case with sound profiles.
     pub sound: Solution,
-    /// The contact of the main patch along rail and wheel, as number of the nearest point.
+    /// Positions of the main patch on the rail and wheel profiles in mm.
     pub at: [[f64; 2]; 2],
 }
 
-/// The damage to the points.
+/// A kind of damage to the points.
 #[derive(Debug, Clone, Copy)]
 pub enum Damage {
-    /// Points this far apart.
+    /// Points with this spacing.
     Coarse(f64),
     /// No points over this length.
     Hole(f64),
     /// Chords of this length, resampled linearly.
     Polygon(f64),
-    /// Coordinates in multiples of this.
+    /// Coordinates rounded to multiples of this.
     Rounded(f64),
-    /// White noise of this deviation.
+    /// White noise with this standard deviation.
     Noise(f64),
-    /// One point off by this much.
+    /// One point off by this distance.
     Outlier(f64),
-    /// All points on one side higher by this much.
+    /// All points on one side raised by this height.
     Step(f64),
-    /// Waves of this amplitude and length.
+    /// Waves with this amplitude and wavelength.
     Waves(f64, f64),
 }
 
@@ -63,7 +63,7 @@ impl Damage {
         "coarse", "hole", "polygon", "rounded", "noise", "outlier", "step", "waves",
     ];
 
-    /// Any damage of a kind, from harmless to grave.
+    /// Returns a random damage of a kind, from harmless to severe.
     pub fn random(kind: usize, random: &mut Random) -> Damage {
         match kind {
             0 => Damage::Coarse(random.decades(0.5, 10.0)),
@@ -80,10 +80,10 @@ impl Damage {
         }
     }
 
-    /// How many kinds there are.
+    /// Number of kinds.
     pub const KINDS: usize = 8;
 
-    /// The points with the damage at or near a place.
+    /// Returns the points with the damage at or near a place.
     pub fn done_to(self, points: &[[f64; 2]], at: [f64; 2], random: &mut Random) -> Points {
         let even = |step: f64| resampled(points, step);
         let nearest = |points: &[[f64; 2]]| {
@@ -160,7 +160,7 @@ fn curve(points: &[[f64; 2]]) -> Profile {
     Profile::new(Body::Rail, points, reading).expect("a sound profile")
 }
 
-/// True points at equal distances.
+/// Returns true points at equal distances.
 pub fn resampled(points: &[[f64; 2]], step: f64) -> Points {
     let curve = curve(points);
     let places = curve.parameters(step);
@@ -171,7 +171,7 @@ pub fn resampled(points: &[[f64; 2]], step: f64) -> Points {
         .collect()
 }
 
-/// So many points at equal distances on the chords.
+/// Returns `count` points at equal distances on the chords.
 pub fn linear(points: &[[f64; 2]], count: usize) -> Points {
     let mut along = vec![0.0];
     for pair in points.windows(2) {
@@ -191,7 +191,7 @@ pub fn linear(points: &[[f64; 2]], count: usize) -> Points {
         .collect()
 }
 
-/// Points moved along the normal of their curve by what a function of number and length says.
+/// Returns the points moved along the normal of their curve by a function of number and length.
 pub fn off_normal(points: &[[f64; 2]], mut by: impl FnMut(usize, f64) -> f64) -> Points {
     let mut along = 0.0;
     (0..points.len())
@@ -211,7 +211,7 @@ pub fn off_normal(points: &[[f64; 2]], mut by: impl FnMut(usize, f64) -> f64) ->
         .collect()
 }
 
-/// A profile worn by a smooth depth, at a place and over a width.
+/// Returns a profile with smooth wear, each mark with its place, width and depth.
 fn worn(points: &[[f64; 2]], marks: &[[f64; 3]]) -> Points {
     let points = resampled(points, 0.2);
     off_normal(&points.clone(), |k, _| {
@@ -229,7 +229,7 @@ fn placed(cant: f64) -> Value {
     })
 }
 
-/// Pairs that no threshold was chosen on: other wear, other inclinations.
+/// Returns pairs on which no threshold was chosen, with other wear and other inclinations.
 pub fn held_out() -> Vec<Pair> {
     let pair = |rail, wheel, cant, shifts| Pair {
         rail,
@@ -239,21 +239,21 @@ pub fn held_out() -> Vec<Pair> {
     };
     vec![
         pair(
-            // 60E1 and S1002 with wear.
+            // 60E1 and S1002, both worn.
             worn(&rail_60e1(), &[[-24.0, 9.0, 0.6], [2.0, 16.0, 0.35]]),
             worn(&s1002(), &[[-4.0, 22.0, 0.5], [-33.0, 9.0, 0.4]]),
             0.025,
             [-7.0, 7.0],
         ),
         pair(
-            // 60E1 not inclined, S1002 hollow.
+            // 60E1 without inclination, S1002 worn hollow.
             rail_60e1(),
             worn(&s1002(), &[[3.0, 15.0, 0.9]]),
             0.0,
             [-6.0, 6.0],
         ),
         pair(
-            // 60E1 inclined 1:20, S1002.
+            // 60E1 inclined 1:20 and worn, S1002.
             worn(&rail_60e1(), &[[-15.0, 12.0, 0.3]]),
             s1002(),
             0.05,
@@ -262,7 +262,7 @@ pub fn held_out() -> Vec<Pair> {
     ]
 }
 
-/// Pairs of the kind that the thresholds were chosen on; the benchmark's where its files are there.
+/// Returns pairs on which the thresholds were chosen, with the benchmark's if its files are available.
 pub fn tuned_on() -> Vec<Pair> {
     let mut pairs = vec![Pair {
         rail: rail_60e1(),
@@ -287,7 +287,7 @@ pub fn tuned_on() -> Vec<Pair> {
 }
 
 impl Pair {
-    /// A place where the sound pair has an answer.
+    /// Returns a random position in which the sound pair has an answer.
     pub fn place(&self, random: &mut Random) -> Option<Place> {
         let mut contact = self.placement.clone();
         let members = contact.as_object_mut().expect("an object");
@@ -320,7 +320,7 @@ impl Pair {
     }
 }
 
-/// The case with these points.
+/// Returns the case with these points.
 pub fn with(
     case: &Value,
     rail: &[[f64; 2]],
@@ -335,7 +335,7 @@ pub fn with(
     case
 }
 
-/// The answer, if there is one.
+/// Returns the answer, if there is one.
 pub fn answer(case: &Value) -> Option<Solution> {
     let checked = check(case, &Limits::default()).ok()?;
     solve(&checked, &Unmonitored)
@@ -343,7 +343,7 @@ pub fn answer(case: &Value) -> Option<Solution> {
         .map(|(solution, _)| solution)
 }
 
-/// Remarks that blame a profile, or the place of the contact on it.
+/// Codes of remarks that blame a profile, or the place of the contact on it.
 const BLAMES: [&str; 9] = [
     "profile-outlier",
     "profile-step",
@@ -356,7 +356,7 @@ const BLAMES: [&str; 9] = [
     "contact-at-profile-end",
 ];
 
-/// Codes of the remarks that blame a profile.
+/// Returns the codes of the remarks that blame a profile.
 pub fn blamed(solution: &Solution) -> Vec<String> {
     let codes = solution.remarks.iter().map(|remark| remark.code.clone());
     codes
@@ -364,7 +364,7 @@ pub fn blamed(solution: &Solution) -> Vec<String> {
         .collect()
 }
 
-/// Largest pressure of all patches in MPa.
+/// Returns the largest pressure of all patches in MPa.
 pub fn pressure_max(solution: &Solution) -> f64 {
     let all = solution.patches.iter().map(|patch| patch.pressure_max_mpa);
     all.fold(0.0, f64::max)

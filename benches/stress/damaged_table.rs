@@ -1,4 +1,4 @@
-//! The class *damaged profile*: how many wrong answers are told, how many right ones are blamed, what the uncertainty covers.
+//! The class *damaged profile*: how many wrong answers get a remark, how many right ones get one, and how often the uncertainty covers the error.
 
 use std::fmt::Write as _;
 
@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 use crate::damaged::{Damage, held_out, tuned_on};
 use crate::damaged_trials::{Counts, rows_of};
 
-/// Places on each pair.
+/// Number of positions on each pair.
 const PLACES: usize = 12;
 
-/// The tables over held-out pairs and over those of the thresholds, without smoothing and with `auto`.
+/// Returns the tables over held-out pairs and over those of the thresholds, without smoothing and with `auto`.
 pub fn tables(seed: u64) -> String {
     let mut text = "## Damaged profiles\n\nSound pairs at random places (shift, yaw, load), their points damaged at or near the contact: coarse, holes, polygons, rounding,\n\
          white noise, outliers, steps, waves of 1 to 4 mm. *Wrong*: the largest pressure by more than 10 % or a force by more than 3 % of μN; *right*: within 3 % and\n\

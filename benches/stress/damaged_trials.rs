@@ -1,32 +1,32 @@
-//! Trials on damaged profiles: how wrong the answers are, and what they say of it.
+//! Trials on damaged profiles: the errors of the answers, and their remarks.
 
 use serde_json::{Value, json};
 
 use crate::damaged::{Damage, Pair, Place, answer, blamed, pressure_max, with};
 use crate::random::Random;
 
-/// Results of the trials of one kind, or of all.
+/// Results of the trials of one kind of damage, or of all.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Counts {
-    /// Places with sound profiles, and how many of them were blamed.
+    /// Positions with sound profiles, and how many of them were blamed.
     pub sound: usize,
     pub sound_blamed: usize,
     /// Damaged profiles, and how many of them had no answer.
     pub damaged: usize,
     pub refused: usize,
-    /// Wrong by more than 10 % in the largest pressure or 3 % of μN in a force, and how many carry a remark.
+    /// Answers that are wrong by more than 10 % in the largest pressure or 3 % of μN in a force, and how many have a remark.
     pub wrong: usize,
     pub wrong_told: usize,
-    /// Right within 3 % and 1 %, and how many carry a remark all the same.
+    /// Answers that are right within 3 % and 1 %, and how many still have a remark.
     pub right: usize,
     pub right_told: usize,
-    /// Answers whose error is within the uncertainty, of pressure and of forces.
+    /// Answers whose error of pressure or of forces is within the uncertainty.
     pub pressure_covered: usize,
     pub force_covered: usize,
 }
 
 impl Counts {
-    /// The sum of both.
+    /// Returns the sum of both.
     pub fn and(mut self, other: &Counts) -> Counts {
         self.sound += other.sound;
         self.sound_blamed += other.sound_blamed;
@@ -66,8 +66,7 @@ impl Counts {
     }
 }
 
-/// Result of one damaged case: errors of the largest pressure (relative) and of the force (relative to μN), and what the answer says of
-/// them.
+/// Result of one damaged case: errors of the largest pressure (relative) and of the force (relative to μN), and whether the answer remarks on them.
 enum Trial {
     Refused,
     Answered {
@@ -78,7 +77,7 @@ enum Trial {
     },
 }
 
-/// The counts by kind of damage, or of one kind, over the pairs at so many places each; the answer counts the sound places.
+/// Counts by kind of damage, or for one kind, over the pairs at `places` positions each. Returns the counts of the sound positions.
 pub fn rows_of(
     pairs: &[Pair],
     seed: u64,

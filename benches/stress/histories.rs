@@ -1,4 +1,4 @@
-//! Rolling that changes: random histories held against laws.
+//! Transient rolling: random histories checked against laws.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::physics;
 use crate::random::Random;
 
-/// A class, how many histories of it are solved, and how one is made.
+/// A class, the number of its histories, and the function that makes one.
 type Class = (&'static str, usize, fn(&mut Random, &mut Value));
 
 const CLASSES: [Class; 7] = [
@@ -24,37 +24,37 @@ const CLASSES: [Class; 7] = [
     ("a wheel on a rail", 40, wheel),
 ];
 
-/// Contact lengths of rolling with nothing that changes, after which rolling is steady. On a patch two and a half times as wide as long the force
-/// was 0.003 of the limit from steady after 4, on meshes from 12 × 16 to 40 × 54 alike, and a twentieth of that after 6.
+/// Contact lengths of constant rolling after which rolling is steady. On a patch two and a half times as wide as long, the force differed from the
+/// steady one by 0.003 of the limit after 4 lengths, on meshes from 12 × 16 to 40 × 54 alike, and by a twentieth of that after 6.
 const LENGTHS_STEADY: f64 = 6.0;
-/// The same where friction falls with slip: bounds lag by up to two contact lengths. Chosen by judgement, long.
+/// Contact lengths where friction falls with slip: bounds lag by up to two contact lengths. Chosen conservatively by judgement.
 const LENGTHS_FALLING: f64 = 38.0;
-/// A length in mm that no patch of the wheels below reaches; the distances are scaled to it. Chosen by judgement.
+/// A length in mm that exceeds every patch of the wheels below. The distances are scaled to it. Chosen by judgement.
 const WHEEL_PATCH: f64 = 25.0;
-/// S1002 on 60E1.
+/// The example of S1002 on 60E1.
 const WHEEL: &str = include_str!("../../api/examples/wheel-rail-flange.case.json");
-/// By how much the work of friction may fall from point to point, over friction limit times half-length and over the work so far: it is the
-/// difference of two terms that are as exact as forces.
+/// Allowed decrease of the frictional work from point to point, over friction limit times half-length and over the work so far. The work is the
+/// difference of two terms that have the accuracy of forces.
 const DISSIPATION: [f64; 2] = [2e-4, 0.01];
-/// How far forces may be beyond the friction limit, or beside the force that was prescribed, of the limit.
+/// Allowed excess of forces over the friction limit, and allowed error of a prescribed force, relative to the limit.
 const FORCES: [f64; 2] = [0.02, TARGET];
 
-/// Target of the histories: a finer one takes seconds each.
+/// Target of the histories. A finer one takes seconds each.
 const TARGET: f64 = 0.02;
 
 /// Result of a history.
 struct Shown {
     target_met: bool,
-    /// Distance of the last point from steady rolling over the sum of their estimates, where it is one.
+    /// Distance of the last point from steady rolling over the sum of their estimates, if the history ends in steady rolling.
     from_steady: Option<f64>,
 }
 
-/// Half the length of the patch of `physics::base` in mm.
+/// Returns half the length of the patch of `physics::base` in mm.
 fn half_length(case: &Value) -> f64 {
     case["contact"]["a_mm"].as_f64().unwrap_or(1.0)
 }
 
-/// Distances in mm: some points at random, then one far behind, where rolling is steady.
+/// Returns distances in mm: some random points, then a distant one where rolling is steady.
 fn distances(random: &mut Random, a: f64, first: f64) -> Vec<f64> {
     let mut all = vec![first * a];
     for _ in 0..3 + random.below(8) {
@@ -64,14 +64,14 @@ fn distances(random: &mut Random, a: f64, first: f64) -> Vec<f64> {
     all
 }
 
-/// Random values, the last two of them equal.
+/// Returns random values, of which the last two are equal.
 fn values(random: &mut Random, count: usize, size: f64) -> Vec<f64> {
     let mut all: Vec<f64> = (0..count).map(|_| random.between(-size, size)).collect();
     all[count - 1] = all[count - 2];
     all
 }
 
-/// A creepage that makes a patch slip in part: up to three times what saturates.
+/// Returns a creepage that causes partial slip, up to three times the creepage of saturation.
 fn size(random: &mut Random) -> f64 {
     random.decades(1e-4, 0.02)
 }
@@ -104,7 +104,7 @@ fn forces(random: &mut Random, case: &mut Value) {
     });
 }
 
-/// There and back without rolling, as in fretting, then rolling.
+/// Shifts back and forth without rolling, as in fretting, then rolling.
 fn shifts(random: &mut Random, case: &mut Value) {
     let a = half_length(case);
     let mut distance = vec![0.0; 2 + random.below(3)];
@@ -143,8 +143,8 @@ fn along(random: &mut Random, case: &mut Value) {
     case["friction"] = json!({ "along": { "x_mm": x, "coefficient": mu } });
 }
 
-/// Creepages under a coefficient that falls, by stability numbers from a tenth of what is answered on; bounds lag by up to two contact lengths,
-/// so that rolling is steady later than elsewhere.
+/// Creepages with a falling friction coefficient, with stability numbers from a tenth of the allowed one. Bounds lag by up to two contact lengths,
+/// so that rolling becomes steady later than elsewhere.
 fn falling(random: &mut Random, case: &mut Value) {
     creepages(random, case);
     let a = half_length(case);
@@ -152,7 +152,7 @@ fn falling(random: &mut Random, case: &mut Value) {
     let load = case["load"]["normal_force_n"].as_f64().unwrap_or(0.0);
     let pressure = 1.5 * load / (std::f64::consts::PI * a * b);
     let (part, half_speed) = (random.between(0.05, 0.25), random.decades(30.0, 1000.0));
-    // 1.7 V max|μ′| p_max/G, of an exponential law.
+    // 1.7 V max|μ′| p_max/G of an exponential law.
     let of_speed = 1.7 * std::f64::consts::LN_2 * part / half_speed * pressure / 82_000.0;
     let speed = random.between(0.1, 0.95) / of_speed;
     case["friction"] = json!({
@@ -172,7 +172,7 @@ fn pressed(random: &mut Random, case: &mut Value) {
     case["motion"] = json!({ "history": { "distance_mm": 0 }, "start": "pressed" });
 }
 
-/// Creepages under one wheel at a place of its own, from the flange to the field side.
+/// Creepages under one wheel in a random position, from the flange to the field side.
 fn wheel(random: &mut Random, case: &mut Value) {
     creepages(random, case);
     let mut motion = case["motion"].take();
@@ -192,7 +192,7 @@ fn wheel(random: &mut Random, case: &mut Value) {
     case["motion"] = motion;
 }
 
-/// The table; cases that failed or broke a law are written out below it.
+/// Returns the table. Cases that failed or broke a law are listed below it.
 pub fn table(seed: u64) -> String {
     let mut text = String::from(
         "## Rolling that changes\n\n*Laws*: forces are finite, and within the largest coefficient times the load; friction takes no work back; forces that are prescribed \
@@ -244,7 +244,7 @@ pub fn table(seed: u64) -> String {
     text + "\n" + &troubles
 }
 
-/// Solves a history and holds it against the laws; nothing if it was refused.
+/// Solves a history and checks it against the laws. Returns `None` if it was refused.
 fn one(case: &Value) -> Result<Option<Shown>, String> {
     let Some(patches) = solved(case)? else {
         return Ok(None);
@@ -271,7 +271,7 @@ fn one(case: &Value) -> Result<Option<Shown>, String> {
     Ok(Some(shown))
 }
 
-/// The laws of one patch, whose friction limit in N is given.
+/// Checks the laws of one patch with its friction limit in N.
 fn held(case: &Value, patch: &PatchSolution, limit: f64) -> Result<(), String> {
     let history = &case["motion"]["history"];
     let half_length = 0.5 * (patch.extent_mm[1] - patch.extent_mm[0]);
@@ -317,7 +317,7 @@ fn solved(case: &Value) -> Result<Option<Vec<PatchSolution>>, String> {
     Ok(Some(solution.patches))
 }
 
-/// Steady rolling with the last motion of a history, if it ends in rolling.
+/// Solves steady rolling with the last motion of a history, if it ends in rolling.
 fn steady(case: &Value, rolled: &[PatchSolution]) -> Result<Option<Vec<PatchSolution>>, String> {
     if case["motion"]["start"] == json!("pressed") {
         return Ok(None);
@@ -338,7 +338,7 @@ fn steady(case: &Value, rolled: &[PatchSolution]) -> Result<Option<Vec<PatchSolu
     solved(&steady)
 }
 
-/// How far two points are from each other, over the sum of both estimates.
+/// Returns the distance between two points over the sum of both estimates.
 fn apart(one: &PointSolution, other: &PointSolution, limit: f64) -> f64 {
     let estimate = |point: &PointSolution| point.error_estimate.map_or(0.0, |e| e.force_x_n);
     let off = (one.force_x_n - other.force_x_n)
@@ -347,7 +347,7 @@ fn apart(one: &PointSolution, other: &PointSolution, limit: f64) -> f64 {
     off / (estimate(one) + estimate(other)).max(1e-6 * limit)
 }
 
-/// The largest coefficient of a table along the track, the one at rest of a law, or the one there is.
+/// Returns the largest coefficient of a table along the track, the coefficient of a law at rest, or the single coefficient.
 fn largest_coefficient(friction: &Value) -> f64 {
     let terms = friction["terms"].as_array().into_iter().flatten();
     let falls: f64 = terms.filter_map(|term| term["coefficient"].as_f64()).sum();

@@ -7,15 +7,15 @@ use railhead_contact::solution::words::answer::{
 };
 use serde_json::Value;
 
-/// Rounding, relative to the largest value of its kind.
+/// Rounding error, relative to the largest value of its kind.
 const ROUNDING: f64 = 1e-9;
 /// Allowed error of sums over cells in single precision.
 const SUMS: f64 = 1e-6;
 
-/// The target of a case that names none.
+/// The target of a case without one.
 const TARGET: f64 = 0.005;
 
-/// Fewer cells cannot tell where power goes: one alone takes a moment for none.
+/// Minimum number of cells to check the power. With fewer cells the balance is too inaccurate: a single cell has no moment.
 const CELLS_FOR_POWER: usize = 9;
 
 /// Scales of one patch.
@@ -28,11 +28,11 @@ struct Scales {
     arm: f64,
     /// Largest rigid slip.
     slip: f64,
-    /// How far resultants and sums of tractions may be apart, in N.
+    /// Allowed difference between resultants and sums of tractions, in N.
     apart: f64,
 }
 
-/// The laws that an answer breaks, in words.
+/// Returns a message for each law that an answer breaks.
 pub fn broken(case: &Value, solution: &Solution, fields: &Fields) -> Vec<String> {
     let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.0);
     let mut broken = Vec::new();
@@ -51,7 +51,7 @@ pub fn broken(case: &Value, solution: &Solution, fields: &Fields) -> Vec<String>
     broken
 }
 
-/// Friction takes power, all patches together, as far as their estimated errors tell; one patch may get some from another.
+/// Checks that friction dissipates power in all patches together, up to their estimated errors. One patch may receive power from another.
 fn power(friction: f64, solution: &Solution, fields: &Fields, broken: &mut Vec<String>) {
     let cells: usize = fields
         .patches
@@ -70,13 +70,13 @@ fn power(friction: f64, solution: &Solution, fields: &Fields, broken: &mut Vec<S
     }
 }
 
-/// Largest distance of the patch from the origin.
+/// Returns the largest distance of the patch from the origin.
 fn reach(patch: &PatchSolution) -> f64 {
     let corners = patch.extent_mm;
     corners.iter().fold(0.0_f64, |m, c| m.max(c.abs()))
 }
 
-/// Size of the rigid slip.
+/// Returns the size of the rigid slip.
 fn slip_size(patch: &PatchSolution) -> f64 {
     let motion = &patch.points[0].motion;
     motion.creepage_x.hypot(motion.creepage_y) + motion.spin_per_mm.abs() * reach(patch)
@@ -127,10 +127,10 @@ fn tangential(
     if case["solver"]["traction_bound"] != "parabolic" {
         coulomb(friction, &scales, cells, fields, broken);
     }
-    // Resultants with a target are extrapolated: they differ from the sums as their estimated errors allow.
+    // Resultants with a target are extrapolated: they differ from the sums within their estimated errors.
     let targeted = point.target_met.is_some();
     let estimate = point.error_estimate.filter(|_| targeted);
-    // With `auto` they may be those of the table, and the tractions those of a mesh that meets the target.
+    // With `auto`, the resultants may be those of the table, and the tractions those of a mesh that meets the target.
     let of_mesh = match point.solver.method {
         MethodName::Table => case["solver"]["target_error"].as_f64().unwrap_or(TARGET),
         _ => 0.0,
@@ -141,17 +141,17 @@ fn tangential(
     };
     sums(&scales, &found, cells, fields, broken);
     if let (Some(stick), Some(slip)) = (point.stick_area_mm2, point.slip_area_mm2) {
-        // `fastsim` sums up its cells, the others share out the patch.
+        // `fastsim` sums its cells, the other methods divide the area of the patch.
         if ((stick + slip) / patch.area_mm2 - 1.0).abs() > SUMS && fields.slip_x.is_some() {
             broken.push(format!("{stick} + {slip} mm² of {}", patch.area_mm2));
         }
     }
 }
 
-/// Cells of one strip adjoin where less than this part of one lies between them.
+/// Cells of one strip are adjacent if the gap between them is less than this fraction of a cell.
 const JOINED: f64 = 1e-6;
 
-/// Coulomb's law cell by cell: the bound holds, slip is along the traction, what sticks does not slip.
+/// Checks Coulomb's law cell by cell: the bound holds, slip is along the traction, and sticking cells do not slip.
 fn coulomb(
     friction: f64,
     scales: &Scales,
@@ -167,7 +167,7 @@ fn coulomb(
         return;
     };
     let (Some(sx), Some(sy), Some(zone)) = (&fields.slip_x, &fields.slip_y, &fields.zone) else {
-        return; // `fastsim` knows no slips.
+        return; // `fastsim` has no slips.
     };
     let mut worst = [0.0_f64; 3];
     for i in 0..tx.len() {
@@ -175,7 +175,7 @@ fn coulomb(
         let [u, v] = [sx[i], sy[i]].map(|s| s / scales.slip.max(f64::MIN_POSITIVE));
         worst[0] = worst[0].max(x.hypot(y) - friction * pressure[i] / scales.bound);
         worst[1] = worst[1].max(x.hypot(y) * u.hypot(v) - (x * u + y * v));
-        // The last cell of a strip may stick on the whole and slip at its trailing end.
+        // The last cell of a strip may stick on average and slip at its trailing end.
         let end = |i: usize, side: f64| cells.x_mm[i] + 0.5 * side * cells.dx_mm[i];
         let last = i == 0
             || cells.y_mm[i - 1] != cells.y_mm[i]
@@ -198,7 +198,7 @@ fn coulomb(
     }
 }
 
-/// The resultants are the sums of the tractions, up to what extrapolation changes.
+/// Checks that the resultants are the sums of the tractions, up to the change by extrapolation.
 fn sums(
     scales: &Scales,
     found: &[f64; 3],
@@ -225,7 +225,7 @@ fn sums(
     }
 }
 
-/// F_x/μN, F_y/μN and M_z/(μN√(A/π)) of the sum over the patches, and the estimate of their error.
+/// Returns F_x/μN, F_y/μN and M_z/(μN√(A/π)) of the sum over the patches, and the estimate of their error.
 pub fn relative(case: &Value, solution: &Solution) -> ([f64; 3], f64) {
     let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.0);
     let load: f64 = solution.patches.iter().map(|p| p.normal_force_n).sum();
@@ -241,8 +241,8 @@ pub fn relative(case: &Value, solution: &Solution) -> ([f64; 3], f64) {
     (relative, estimate)
 }
 
-/// Largest difference of F_x/μN, F_y/μN and M_z/(μN√(A/π)) of two answers to one case, about the middle of the load of the second and in
-/// its units: moments about a distant origin would tell the difference of the areas.
+/// Returns the largest difference of F_x/μN, F_y/μN and M_z/(μN√(A/π)) of two answers to one case, about the load centre of the second and in its
+/// units. Moments about a distant origin would include the difference of the areas.
 pub fn difference(case: &Value, answer: &Solution, exact: &Solution) -> f64 {
     let friction = case["friction"]["coefficient"].as_f64().unwrap_or(0.0);
     let (mut load, mut area, mut centre) = (0.0, 0.0, [0.0; 2]);
@@ -267,7 +267,7 @@ pub fn difference(case: &Value, answer: &Solution, exact: &Solution) -> f64 {
     sum(answer).distance(&sum(exact), friction * load, length)
 }
 
-/// Power that the cells turn to heat over what the motion puts in, minus 1, where enough slips to tell.
+/// Returns the power dissipated by the cells over the power of the motion, minus 1, or `None` if too little slips.
 pub fn energy(solution: &Solution, fields: &Fields) -> Option<f64> {
     let mut heat = 0.0;
     for cells in &fields.patches {

@@ -1,8 +1,9 @@
-//! Stability: thousands of cases from all over the allowed ground, every answer held against the laws of contact.
+//! Stability test: thousands of cases over the whole allowed range, with every answer checked against the laws of contact.
 //!
-//! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`; it ends with an error if a
-//! case crashes, hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `histories`, `rows`, `routes`, `creep-map`, `sweep-with-zones` or
-//! `damaged-profile` prints one section, `-- --case 1511` one case as JSON, of another run with its seed behind the number.
+//! `cargo bench --bench stress [-- cases seed]` prints the table and writes it to `docs/stability.md`. It ends with an error if a case crashes,
+//! hangs or breaks a law. `-- --only` with `times`, `after`, `physics`, `maintenance`, `histories`, `rows`, `routes`, `creep-map`,
+//! `sweep-with-zones` or `damaged-profile` prints one section. `-- --case 1511` prints one case as JSON. A seed after the number selects another
+//! run.
 
 mod after;
 mod condition;
@@ -42,7 +43,7 @@ use trial::{End, Trial, trial};
 
 const CASES: usize = 5000;
 const SEED: u64 = 20_261_121;
-/// Names of cases in the report.
+/// Maximum number of cases named in the report.
 const NAMED_MAX: usize = 40;
 
 /// Results of the cases of one kind.
@@ -56,7 +57,7 @@ struct Row {
     residual: f64,
     energy: Vec<f64>,
     from_liu_hsu: Vec<f64>,
-    /// True error and estimate.
+    /// True errors with their estimates.
     errors: Vec<(f64, f64)>,
     times: times::Times,
 }
@@ -291,7 +292,7 @@ fn report(count: usize, seed: u64, rows: &BTreeMap<&str, Row>, troubles: &Troubl
     text
 }
 
-/// True errors against answers eight times as exact.
+/// Compares answers with answers to an eight times smaller target.
 fn accuracy(rows: &BTreeMap<&str, Row>) -> String {
     let mut text = "## Against finer meshes\n\nCases with a target, against the answer for a target eight times smaller (at least 0.0003). *Covered*: the\n\
          difference is at most the sum of both estimates.\n\n| cases | compared | covered | difference: median | largest |\n|---|---|---|---|---|\n"

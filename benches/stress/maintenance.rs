@@ -1,4 +1,4 @@
-//! Stresses below the surface, damage and heat: random cases held against laws.
+//! Stresses below the surface, damage and heat: random cases checked against laws.
 
 use std::fmt::Write as _;
 
@@ -11,9 +11,9 @@ use serde_json::{Value, json};
 use crate::physics;
 use crate::random::Random;
 
-/// A law: what it was broken by, if it was. It is given the answer and the case.
+/// A law that checks an answer to a case, given in this order. It returns a message if the law is broken.
 type Law = fn(&Value, &Value) -> Result<(), String>;
-/// A class, how many cases of it are solved, how one is made, and the law that holds for it.
+/// A class, the number of its cases, the function that makes one, and its law.
 type Class = (&'static str, usize, fn(&mut Random, &mut Value), Law);
 
 const CLASSES: [Class; 3] = [
@@ -27,10 +27,10 @@ const CLASSES: [Class; 3] = [
     ("temperature", 700, heated, heat_warms),
 ];
 
-/// Half the side of the horizontal plane of stresses and its depth, in half-widths of the patch; points along a side. Of the load, the part
-/// `(depth / half side)³` is outside.
+/// Half the side of the horizontal plane of stresses and its depth, in half-widths of the patch, and the number of points along a side. The fraction
+/// `(depth / half side)³` of the load is outside.
 const PLANE: (f64, f64, usize) = (8.0, 0.8, 49);
-/// How far sums over that plane may be from the load: the part outside and that of the trapezoidal rule.
+/// Allowed difference between sums over that plane and the load: the part outside, and the error of the trapezoidal rule.
 const BALANCE: f64 = 0.01;
 
 fn stressed(random: &mut Random, case: &mut Value) {
@@ -93,7 +93,7 @@ fn contact_type(random: &mut Random, case: &mut Value) {
     }
 }
 
-/// A length of the order of the patch in mm.
+/// Returns a length of the order of the patch in mm.
 fn half_width(case: &Value) -> f64 {
     let contact = &case["contact"];
     let number = |name: &str| contact[name].as_f64();
@@ -116,7 +116,7 @@ fn held(holds: bool, what: impl FnOnce() -> String) -> Result<(), String> {
     if holds { Ok(()) } else { Err(what()) }
 }
 
-/// The stress across a plane below carries the load, and no point of it is worse than the worst one.
+/// Checks that the stress on a plane below carries the load, and that no point of the plane is worse than the worst point.
 fn stresses_are_in_balance(answer: &Value, case: &Value) -> Result<(), String> {
     let load = case["load"]["normal_force_n"].as_f64().unwrap_or(f64::NAN);
     let places = answer["stresses"].as_array().ok_or("no stresses")?;
@@ -143,7 +143,7 @@ fn stresses_are_in_balance(answer: &Value, case: &Value) -> Result<(), String> {
     residual_stresses_help(&point(answer)["subsurface"]["passage"])
 }
 
-/// Shakedown never needs more yield in shear than staying elastic does, as closely as the worst places are found.
+/// Checks that shakedown does not need a higher yield stress in shear than elastic behaviour, within the accuracy of the worst points.
 fn residual_stresses_help(passage: &Value) -> Result<(), String> {
     if passage.is_null() {
         return Ok(());
@@ -155,7 +155,7 @@ fn residual_stresses_help(passage: &Value) -> Result<(), String> {
     })
 }
 
-/// Every figure lies in its interval, wear is not negative, and Tγ is the power of the resultants.
+/// Checks that every figure lies in its interval, that wear is not negative, and that Tγ is the power of the resultants.
 fn damage_follows_its_resultants(answer: &Value, _: &Value) -> Result<(), String> {
     let point = point(answer);
     let damage = &point["damage"];
@@ -182,7 +182,7 @@ fn damage_follows_its_resultants(answer: &Value, _: &Value) -> Result<(), String
     Ok(())
 }
 
-/// Friction warms, and the heat goes into the two bodies.
+/// Checks that friction heats, and that the heat is divided between the two bodies.
 fn heat_warms(answer: &Value, _: &Value) -> Result<(), String> {
     let temperature = &point(answer)["temperature"];
     let number = |name: &str| {
@@ -200,7 +200,7 @@ fn heat_warms(answer: &Value, _: &Value) -> Result<(), String> {
     })
 }
 
-/// The table; cases that failed or broke a law are written out below it.
+/// Returns the table. Cases that failed or broke a law are listed below it.
 pub fn table(seed: u64) -> String {
     let mut text = String::from(
         "## Stresses below the surface, damage, heat\n\n*Laws*: a plane below carries the load within 1 %, and no point of it is worse than the worst point; damage \
@@ -234,7 +234,7 @@ pub fn table(seed: u64) -> String {
     text + "\n" + &troubles
 }
 
-/// Whether the target was met; nothing if the case was refused.
+/// Returns whether the target was met, or `None` if the case was refused.
 fn one(case: &Value, law: Law) -> Result<Option<bool>, String> {
     let Ok(checked) = contact::check(case, &Limits::default()) else {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! Friction that falls with slip or temperature, varies across or has a layer below it, and bodies that differ: random cases held against laws.
+//! Friction that falls with slip or temperature, varies laterally or has a layer, and dissimilar bodies: random cases checked against laws.
 
 use std::fmt::Write as _;
 
@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 
 use crate::random::Random;
 
-/// A class, how many cases of it are solved, and how one is made.
+/// A class, the number of its cases, and the function that makes one.
 type Class = (&'static str, usize, fn(&mut Random, &mut Value));
 
-/// A wheel on a rail, tread on crown.
+/// A wheel on a rail, with the tread on the crown.
 const WHEEL: &str = include_str!("../../api/examples/wheel-rail.case.json");
 
 const CLASSES: [Class; 8] = [
@@ -100,7 +100,7 @@ fn unlike_wheel(random: &mut Random, case: &mut Value) {
     case["outputs"] = json!(["resultants"]);
 }
 
-/// A case to begin with: like bodies, a coefficient of friction, an ellipse, creepages of a wheel on a rail.
+/// Returns a basic case: like bodies, one friction coefficient, an ellipse, creepages of a wheel on a rail.
 pub fn base(random: &mut Random) -> Value {
     let ratio = random.decades(0.3, 3.0).sqrt();
     json!({
@@ -117,7 +117,7 @@ pub fn base(random: &mut Random) -> Value {
     })
 }
 
-/// The table; cases that failed or broke a law are written out below it.
+/// Returns the table. Cases that failed or broke a law are listed below it.
 pub fn table(seed: u64) -> String {
     let mut text = String::from(
         "## Friction as it is, bodies that differ\n\n| cases | tried | refused | solved | target met | several states | failed |\n|---|---|---|---|---|---|---|\n",
@@ -153,7 +153,7 @@ pub fn table(seed: u64) -> String {
     text + "\n" + &troubles
 }
 
-/// Whether the target was met in all points and a second state found; nothing if the case was refused.
+/// Returns whether the target was met at all points and whether a second state was found, or `None` if the case was refused.
 fn one(case: &Value) -> Result<Option<[bool; 2]>, String> {
     let Ok(checked) = contact::check(case, &Limits::default()) else {
         return Ok(None);

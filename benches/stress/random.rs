@@ -4,7 +4,7 @@
 pub struct Random(pub u64);
 
 impl Random {
-    /// Uniform from 0 to 1.
+    /// Returns a uniform number from 0 to 1.
     pub fn part(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
@@ -17,12 +17,12 @@ impl Random {
         low + (high - low) * self.part()
     }
 
-    /// Every decade equally likely.
+    /// Returns a number whose logarithm is uniform.
     pub fn decades(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.part())
     }
 
-    /// A number below `count`.
+    /// Returns an integer below `count`.
     pub fn below(&mut self, count: usize) -> usize {
         ((self.part() * count as f64) as usize).min(count - 1)
     }

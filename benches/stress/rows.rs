@@ -1,4 +1,4 @@
-//! The table, rows at once and many rows: random contacts and motions held against laws, against the solver, and against each other.
+//! The table, evaluated rows and many rows: random contacts and motions checked against laws, the solver, and each other.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -19,15 +19,15 @@ use serde_json::{Value, json};
 
 use crate::random::Random;
 
-/// Templates of each class, and rows of each template.
+/// Number of templates of each class, and of rows of each template.
 const TABLE: [usize; 2] = [40, 50];
 const EVALUATE: [usize; 2] = [60, 400];
 const RUNS: [usize; 2] = [24, 12];
-/// One row of the table in so many is solved as well.
+/// One row of the table in this number is also solved.
 const SOLVED_EVERY: usize = 20;
-/// A second answer to the same question differs by no more, relative to μN: what the last bits of its numbers make of it.
+/// Allowed difference between two answers to the same question, relative to μN, due to the last bits of its numbers.
 const SAME: f64 = 1e-9;
-/// The same by the simplified theory, whose rows share the mesh of a circle.
+/// Allowed difference for the simplified theory, whose rows share the mesh of a circle.
 const SAME_FASTSIM: f64 = 3e-3;
 
 /// Results of a class: rows, rows with an answer, further figures, and failures.
@@ -35,14 +35,14 @@ const SAME_FASTSIM: f64 = 3e-3;
 struct Class {
     rows: usize,
     answered: usize,
-    /// Rows that were solved as well, those whose bound holds, and the largest difference over the bound.
+    /// Rows that were also solved, rows whose bound holds, and the largest difference over the bound.
     solved: usize,
     held: usize,
     worst: f64,
     broken: Vec<String>,
 }
 
-/// Rows over one template: numbers of loads, shapes, friction and motions over decades.
+/// Rows over one template: random numbers for loads, shapes, friction and motions over decades.
 struct Draw {
     template: Value,
     columns: Vec<VariedColumn>,
@@ -117,7 +117,7 @@ impl Draw {
         self.of("/friction/coefficient", row) * self.of("/load/normal_force_n", row)
     }
 
-    /// c = √(ab) of a row in mm.
+    /// Returns c = √(ab) of a row in mm.
     fn length(&self, row: usize) -> f64 {
         let across = self
             .template
@@ -126,7 +126,7 @@ impl Draw {
         (self.of("/contact/a_mm", row) * across.expect("a number")).sqrt()
     }
 
-    /// The answers of all rows at once.
+    /// Returns the answers of all evaluated rows.
     fn evaluated(&self) -> Result<RowsAnswer, String> {
         let checked =
             contact::check(&self.template, &Limits::default()).map_err(|e| e.to_string())?;
@@ -135,7 +135,7 @@ impl Draw {
     }
 }
 
-/// The table of all three classes; rows that broke a law are written out below it.
+/// Returns the table of all three classes. Rows that broke a law are listed below it.
 pub fn table(seed: u64) -> String {
     let mut text = String::from(
         "## The table, rows at once, many rows\n\nEllipses a/b 0.12 to 8, ν 0 to ½, loads, friction, creepages and spin over decades, with none of a motion's parts in some. *Laws*: \
@@ -174,7 +174,7 @@ pub fn table(seed: u64) -> String {
     format!("{text}\n{troubles}")
 }
 
-/// Cases with `"method": "table"`, some of them beside the solver.
+/// Checks cases with `"method": "table"`, some of them also against the solver.
 fn by_table(seed: u64) -> Class {
     let mut class = Class::default();
     let mut random = Random(seed ^ 0x7AB1E);
@@ -222,7 +222,7 @@ fn by_table(seed: u64) -> Class {
     class
 }
 
-/// Forces, the larger of their estimates twice, and power of a case by itself; nothing if it has no answer, which is noted.
+/// Returns forces, twice the larger of their estimates, and power of a single case. Returns `None` if it has no answer, which is recorded.
 fn alone(case: &Value, class: &mut Class) -> Option<[[f64; 2]; 3]> {
     let solved = contact::check(case, &Limits::default())
         .map_err(|error| error.to_string())
@@ -254,7 +254,7 @@ fn alone(case: &Value, class: &mut Class) -> Option<[[f64; 2]; 3]> {
     }
 }
 
-/// Rows at once, by the table and by the simplified theory, beside single cases.
+/// Compares evaluated rows, by the table and by the simplified theory, with single cases.
 fn evaluated(seed: u64) -> Class {
     let mut class = Class::default();
     let mut random = Random(seed ^ 0xE7A1);
@@ -312,7 +312,7 @@ fn evaluated(seed: u64) -> Class {
     class
 }
 
-/// Runs with faulty rows among sound ones: every row is answered as its case alone.
+/// Checks runs with faulty rows among valid ones: every row has the answer of its case alone.
 fn runs(seed: u64) -> Class {
     let mut class = Class::default();
     let mut random = Random(seed ^ 0x9005);

@@ -1,4 +1,4 @@
-//! Long sweeps: memory of creep maps at fixed spin, where every motion would like a mesh of its own, and sweeps with zones.
+//! Long sweeps: memory of creep maps at fixed spin, where every motion would prefer its own mesh, and sweeps with zones.
 
 use std::fmt::Write as _;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use railhead_contact::rolling::operator_store::OperatorStore;
 use railhead_contact::{check, solve, solve_with};
 use serde_json::{Value, json};
 
-/// Motions along a side of the maps: 900 and 10 000 in all.
+/// Numbers of motions along a side of the maps: 900 and 10 000 in all.
 const SIDES: [u32; 2] = [30, 100];
 const SPIN: f64 = 0.003;
 
@@ -39,7 +39,7 @@ fn creep_map(side: u32) -> CheckedCase {
     case(json!({ "sweep": sweep }), 0.001, &json!(["resultants"]))
 }
 
-/// A line of this process' status in MiB; nothing where there is no such table.
+/// Returns a line of this process' status in MiB, or `None` where there is no such file.
 fn status(name: &str) -> Option<f64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find(|line| line.starts_with(name))?;
@@ -47,13 +47,13 @@ fn status(name: &str) -> Option<f64> {
     Some(kibibytes / 1024.0)
 }
 
-/// Makes the largest resident size begin anew.
+/// Resets the peak resident size.
 fn forget_peak() {
-    // Elsewhere than on Linux there is nothing to forget.
+    // This has no effect on systems other than Linux.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Memory, time and verdicts of creep maps.
+/// Returns a table of memory, time and met targets of creep maps.
 pub fn creep_maps() -> String {
     let mut text = "## Creep maps\n\nRadii 460 and 300 mm, 100 kN, μ 0.3, spin 0.003/mm, creepages whose pole lies inside the patch, target 0.001, resultants only. *Peak*:\n\
          resident memory above that of the idle process, the operator store of 128 MiB included.\n\n\

@@ -1,4 +1,4 @@
-//! Time that `cases/check` expects beside time taken, kind by kind.
+//! Compares the time that `cases/check` expects with the actual time, kind by kind.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -13,12 +13,12 @@ use super::random::Random;
 use super::runtime_probe::{ProbedTime, USUAL_LIMIT, probe};
 use super::trial::attempt_timed;
 
-/// Shorter solves count as so long, in s: nobody plans by less.
+/// Shorter solves count as this time in s, since their duration does not matter.
 const SHORTEST: f64 = 1e-3;
 /// An estimate is good within this factor either way.
 const FACTOR: f64 = 3.0;
 
-/// Creep curves.
+/// Number of creep curves.
 const SWEEPS: usize = 60;
 
 /// Times of one case.
@@ -26,7 +26,7 @@ const SWEEPS: usize = 60;
 pub struct CaseTimes {
     /// Processor time of the solve in s.
     pub taken: f64,
-    /// Time by the formulas alone, in s.
+    /// Estimated time by the formulas alone, in s.
     pub formulas: f64,
     /// Time that `cases/check` returns.
     pub told: ProbedTime,
@@ -37,7 +37,7 @@ pub type Times = Vec<CaseTimes>;
 /// Returns the times that `cases/check` gives for a case.
 ///
 /// # Panics
-/// It is no case.
+/// Panics if the case is invalid.
 pub fn told(case: &Value) -> ProbedTime {
     let limits = Limits {
         memory_bytes: 4 << 30,
@@ -58,7 +58,7 @@ fn timed(case: &Value) -> Option<CaseTimes> {
     })
 }
 
-/// The table of the first `count` cases of a seed.
+/// Returns the table of the first `count` cases of a seed.
 pub fn table(count: usize, seed: u64) -> String {
     let mut kinds: BTreeMap<&'static str, Times> = BTreeMap::new();
     for sample in samples(count, seed) {
@@ -69,7 +69,7 @@ pub fn table(count: usize, seed: u64) -> String {
     section(kinds.iter().map(|(kind, times)| (*kind, times)), seed)
 }
 
-/// Creep curves: from rest to the creepage of a sample, at its spin, near motions and far ones.
+/// Returns creep curves from rest to the creepage of a sample at its spin, with neighbouring and distant motions.
 fn sweeps(seed: u64) -> impl Iterator<Item = Value> {
     let mut random = Random(seed);
     let radii = samples(usize::MAX, seed).filter(|sample| sample.kind == "radii, target");
@@ -92,7 +92,7 @@ fn sweeps(seed: u64) -> impl Iterator<Item = Value> {
     })
 }
 
-/// The section of the report, with creep curves made of the samples of a seed.
+/// Returns the section of the report, with creep curves made of the samples of a seed.
 pub fn section<'a>(kinds: impl Iterator<Item = (&'a str, &'a Times)>, seed: u64) -> String {
     let mut text = format!(
         "## Time expected and taken\n\nSeconds that `/v1/cases/check` tells beside processor time of the solve; less than {SHORTEST} s counts as \
@@ -115,7 +115,7 @@ pub fn section<'a>(kinds: impl Iterator<Item = (&'a str, &'a Times)>, seed: u64)
     text
 }
 
-/// Cases that take more than `FACTOR` times as long as expected, and less than that part of it.
+/// Returns the numbers of cases that take more than `FACTOR` times the expected time, and less than 1/`FACTOR` of it.
 fn beyond(times: &Times, expected: impl Fn(&CaseTimes) -> f64) -> [usize; 2] {
     let ratios = times.iter().map(|case| {
         let [taken, expected] = [case.taken, expected(case)].map(|seconds| seconds.max(SHORTEST));

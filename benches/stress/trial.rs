@@ -1,4 +1,4 @@
-//! Solves a case under watch, and looks at the answer from all sides.
+//! Solves a case with a time limit, and checks the answer in several ways.
 
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,31 +15,31 @@ use serde_json::{Value, json};
 use super::contacts::{Sample, reversed, scaled};
 use super::laws::{broken, difference, energy, relative};
 
-/// A solve that takes longer hangs.
+/// A solve that takes longer is considered to hang.
 const HANGS_AFTER: Duration = Duration::from_secs(60);
-/// Forces of twins on one mesh differ by no more: what converged iterations leave.
+/// Allowed difference of the forces of twins on one mesh, due to the residuals of the iterations.
 const TWINS: f64 = 2e-5;
-/// The same where region and pressure are found first, as exactly as a mesh needs them.
+/// Allowed difference where region and pressure are found first, as accurately as a mesh needs them.
 const TWINS_OF_GAPS: f64 = 3e-3;
-/// The same where a remark says that patches are coarse or the gap is rough: the last bit decides which grid of some hundred cells is the
-/// last one, and by that whether neighbouring asperities of the roughness are one patch.
+/// Allowed difference where a remark says that patches are coarse or the gap is rough. The last bit decides which grid of some hundred cells is the
+/// last one, and therefore whether neighbouring asperities are one patch.
 const TWINS_OF_ROUGH_GAPS: f64 = 3e-2;
 const ROUGH: [&str; 2] = ["patch-coarse", "gap-rough"];
-/// Lengths of a twin are so many times those of the case, and none beyond what a case may have, in mm.
+/// Factor between the lengths of a case and its twin. `LENGTH_MAX` is the largest allowed length in mm.
 const UNIT: f64 = 37.0;
 const LENGTH_MAX: f64 = 1e6;
-/// Cells up to which the method of Liu and Hsu is tried as well.
+/// Maximum number of cells for which the method of Liu and Hsu is also tried.
 const DENSE_CELLS_MAX: u64 = 120;
-/// How many times smaller the target of the finer answer is.
+/// Factor by which the target of the finer answer is smaller.
 const FINER: f64 = 8.0;
 
-/// How a case ended.
+/// The outcome of a case.
 pub enum End {
     Solved,
-    /// The case has no answer, and why.
+    /// The case has no answer, with the reason.
     Refused(String),
     NotConverged(String),
-    /// A crash, a hang or an error that should not be.
+    /// A crash, a hang or an unexpected error.
     Failed(String),
 }
 
@@ -52,9 +52,9 @@ pub struct Trial {
     pub energy: Option<f64>,
     /// Largest difference of the forces from those of the method of Liu and Hsu on the same mesh.
     pub from_liu_hsu: Option<f64>,
-    /// True error and estimate.
+    /// True error and its estimate.
     pub error: Option<(f64, f64)>,
-    /// Processor seconds taken, and expected.
+    /// Actual and expected processor seconds.
     pub times: Option<[f64; 2]>,
 }
 
@@ -92,7 +92,7 @@ fn attempt(case: &Value) -> Result<(Solution, Fields), End> {
     attempt_timed(case).map(|(answer, _)| answer)
 }
 
-/// The answer to a case, with the processor seconds it took and the expected ones.
+/// Returns the answer to a case, with its actual and expected processor seconds.
 pub fn attempt_timed(case: &Value) -> Result<((Solution, Fields), [f64; 2]), End> {
     let limits = Limits {
         memory_bytes: 4 << 30,
@@ -115,7 +115,7 @@ pub fn attempt_timed(case: &Value) -> Result<((Solution, Fields), [f64; 2]), End
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(End::Failed("crashes".to_owned())))
 }
 
-/// Solves a sample and whatever it is compared with.
+/// Solves a sample and all cases that it is compared with.
 pub fn trial(sample: &Sample) -> Trial {
     let mut trial = Trial::new();
     let (solution, fields) = match attempt_timed(&sample.case) {
@@ -183,7 +183,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
 }
 
-/// The largest length in mm that a case names, wherever it stands.
+/// Returns the largest length in mm in a case.
 fn longest(case: &Value) -> f64 {
     fn within(value: &Value, length: bool) -> f64 {
         match value {
@@ -204,7 +204,7 @@ fn longest(case: &Value) -> f64 {
     within(&case["contact"], false)
 }
 
-/// The same contact turned round and in other units must give the same forces.
+/// Checks that the contact reversed and in other units gives the same forces.
 fn twins(
     case: &Value,
     (found, estimate): ([f64; 3], f64),
@@ -214,7 +214,7 @@ fn twins(
     let (name, twin, sign) = if number.is_multiple_of(8) {
         ("reversed", reversed(case), -1.0)
     } else {
-        // A larger unit where a smaller one would take lengths beyond what a case may have.
+        // The unit is larger where a smaller one would exceed the allowed lengths.
         let unit = if longest(case) * UNIT < LENGTH_MAX {
             UNIT
         } else {
@@ -229,7 +229,7 @@ fn twins(
         .as_object()
         .is_some_and(|m| m.keys().any(|k| k.starts_with("force")));
     let same_mesh = if of_gap { twins_of_gap } else { TWINS };
-    // With a target, an estimate on the edge may end the climb one level apart.
+    // With a target, an estimate near the target may stop the refinement one mesh earlier or later.
     let climbs = case["solver"]["mesh"].is_null() || searched;
     let allowed = same_mesh + if climbs { 2.0 * estimate } else { 0.0 };
     match attempt(&twin) {

@@ -1,4 +1,4 @@
-//! From the solved columns to the values at the nodes of the table.
+//! Computes the values at the nodes of the table from the solved columns.
 
 use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
 use railhead_contact::rolling::methods::table::evaluate::{growth, linear, linear_part};
@@ -10,7 +10,7 @@ use railhead_contact::rolling::methods::table::spline::{
 use crate::nodes::column_of;
 use crate::solver::Answer;
 
-/// The columns of a pair of a/b and ν: `[direction][pole][size]`, all nodes by symmetry.
+/// Returns the columns of a pair of a/b and ν: `[direction][pole][size]`, with all nodes by symmetry.
 fn columns(node: [usize; 2]) -> Option<Vec<Vec<Answer>>> {
     let mut columns: Vec<Vec<Answer>> = (0..DIRECTIONS)
         .map(|chi| column_of(node, chi))
@@ -29,7 +29,7 @@ fn columns(node: [usize; 2]) -> Option<Vec<Vec<Answer>>> {
         if chi == 0 || chi == DIRECTIONS - 1 {
             columns[chi].iter_mut().for_each(|answer| answer[0] = 0.0);
         }
-        // Without spin along rolling there is neither lateral force nor moment.
+        // Without spin, longitudinal creepage gives neither lateral force nor moment.
         if chi == DIRECTIONS / 2 {
             columns[chi][..sizes]
                 .iter_mut()
@@ -39,7 +39,7 @@ fn columns(node: [usize; 2]) -> Option<Vec<Vec<Answer>>> {
     Some(columns)
 }
 
-/// The values at the nodes, as [`CreepTable`](railhead_contact::rolling::methods::table::evaluate::CreepTable) takes them.
+/// Returns the values at the nodes, as [`CreepTable`](railhead_contact::rolling::methods::table::evaluate::CreepTable) takes them.
 pub fn values() -> Vec<f32> {
     let mut values = vec![f32::NAN; VALUES];
     for node_ratio in 0..RATIOS {
@@ -72,7 +72,7 @@ pub fn values() -> Vec<f32> {
     values
 }
 
-/// Values of an answer that the table stores: forces over their growth without the part of linear theory, and the share that sticks.
+/// Returns the stored values of an answer: forces over their growth without the part of linear theory, and the stick share.
 fn stored(step: u8, answer: Answer, kalker: [f64; 4], direction: [f64; 3]) -> [f32; OUTPUTS] {
     let sigma = f64::from(step) / SIZE_STEPS;
     let stick = answer[3] as f32;

@@ -1,4 +1,4 @@
-//! Error bound of the table: how far each node is from a cubic through its neighbours, and a factor from held-out motions.
+//! Error bound of the table: the deviation of each node from a cubic through its neighbours, and a factor from held-out motions.
 
 use std::ops::Range;
 
@@ -7,19 +7,19 @@ use railhead_contact::rolling::methods::table::spline::{
     DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, size,
 };
 
-/// Nodes along a/b, pole, direction and size.
+/// Numbers of nodes along a/b, pole, direction and size.
 const NODES: [usize; 4] = [RATIOS, POLES, DIRECTIONS, SIZES.len()];
 
-/// Parts of the sizes that have bounds of their own: partial slip, and from σ = 0.79 on, where nearly all slips and errors are smaller beside the
-/// indicators. Of six divisions tried on the other half of the contacts too, which chose between them.
+/// Ranges of the sizes with separate bounds: partial slip, and σ ≥ 0.79, where nearly all cells slip and errors are smaller relative to the
+/// indicators. They were chosen among six divisions, with the other half of the contacts too.
 pub const PARTS: [Range<usize>; 2] = [0..17, 17..SIZES.len()];
 
-/// Which of the sizes a cell between nodes begins with.
+/// Returns the index of the size at the start of a cell between nodes.
 pub fn size_of(cell: usize) -> usize {
     cell % (SIZES.len() - 1)
 }
 
-/// Which of the parts a cell between nodes is in.
+/// Returns the index of the part that contains a cell between nodes.
 pub fn part_of(cell: usize) -> usize {
     let size = size_of(cell);
     PARTS
@@ -28,9 +28,9 @@ pub fn part_of(cell: usize) -> usize {
         .expect("a part")
 }
 
-/// Indicators of the cells between nodes, `[a/b][pole][direction][size]`: the mean over the corners of a cell of how far their values are
-/// from a cubic through two neighbouring sizes on each side, largest over ν, forces and moment. Differences along the other axes were
-/// tried too, alone and in sums: bounds from them are 5 to 100 % larger for the same share of motions.
+/// Returns the indicators of the cells between nodes, `[a/b][pole][direction][size]`. An indicator is the mean over the corners of a cell of the
+/// deviation from a cubic through two neighbouring sizes on each side, largest over ν, forces and moment. Differences along the other axes, alone
+/// and in sums, give bounds that are 5 to 100 % larger for the same share of motions.
 pub fn indicators(values: &[f32]) -> Vec<f32> {
     let mut of_nodes = vec![0.0_f32; NODES.iter().product()];
     for (at, largest) in of_nodes.iter_mut().enumerate() {
@@ -64,7 +64,7 @@ pub fn indicators(values: &[f32]) -> Vec<f32> {
         .collect()
 }
 
-/// How far a value is from the cubic through its neighbours; near the ends as at the nearest node that has them all.
+/// Returns the deviation of a value from the cubic through its neighbours. Near the ends, returns that of the nearest node with all neighbours.
 fn beside(value: &dyn Fn(usize) -> f64, node: usize) -> f64 {
     let middle = node.clamp(2, SIZES.len() - 3);
     let place = |k: usize| f64::from(SIZES[k]);

@@ -1,4 +1,4 @@
-//! Motions that the table was not made from.
+//! Motions that were not used to make the table.
 
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
@@ -15,14 +15,14 @@ use serde_json::{Value, json};
 use crate::random::Random;
 use crate::solver::{Contact, largest_error, print_errors, read, solve, write};
 
-/// Contacts; of each so many motions.
+/// Number of contacts. `MOTIONS` is the number of motions of each.
 pub const CONTACTS: usize = 400;
 pub const MOTIONS: usize = 15;
 pub const TARGET: f64 = 0.002;
 const THREADS: usize = 2;
 
-/// A contact and its motions: ln a/b and ν uniform, directions uniform on the sphere of (u_x, u_y, u_s) with x, z of any sign, σ
-/// uniform from 0.02 to 0.97.
+/// Returns a contact and its motions. ln a/b and ν are uniform, directions are uniform on the sphere of (u_x, u_y, u_s) with x, z of any sign, and σ
+/// is uniform from 0.02 to 0.97.
 pub fn contact(number: usize) -> (Contact, Vec<[f64; 3]>) {
     let random = &mut Random(0x7AB1_E000 + number as u64);
     let contact = Contact {
@@ -46,7 +46,7 @@ pub fn contact(number: usize) -> (Contact, Vec<[f64; 3]>) {
             ]
         })
         .collect();
-    // Neighbours in size follow each other: no more than a matter of time.
+    // Neighbours in size follow each other only to save time.
     motions.sort_by(|a, b| {
         let size = |m: &[f64; 3]| Shape::new(contact.ratio.sqrt(), [c11, c22]).size(*m, [c11, c22]);
         size(a).total_cmp(&size(b))
@@ -54,12 +54,12 @@ pub fn contact(number: usize) -> (Contact, Vec<[f64; 3]>) {
     (contact, motions)
 }
 
-/// The file of a contact.
+/// Returns the name of the file of a contact.
 pub fn name(number: usize) -> String {
     format!("motions-{number:04}.bin")
 }
 
-/// Solves the contacts that are missing.
+/// Solves the missing contacts.
 pub fn solve_all() {
     let missing: Vec<usize> = (0..CONTACTS)
         .filter(|k| read(&name(*k)).is_none())
@@ -70,7 +70,7 @@ pub fn solve_all() {
             scope.spawn(|| {
                 while let Some(number) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let (contact, motions) = contact(*number);
-                    // Each alone: nothing is carried from one to the next but operators.
+                    // The motions of a contact share one operator store.
                     let operators = Arc::new(OperatorStore::new(600 << 20));
                     let answers = solve(&operators, contact, &motions, TARGET);
                     write(&name(*number), answers.as_flattened());
@@ -86,7 +86,7 @@ pub fn solve_all() {
     });
 }
 
-/// A small part of what was held out, and not used for bounds, for the tests.
+/// Returns a small part of the held-out motions, not used for bounds, for the tests.
 pub fn sample() -> String {
     let contacts = (0..24).map(|k| 16 * k + 1).filter_map(|number| {
         let (contact, motions) = contact(number);
@@ -102,11 +102,11 @@ pub fn sample() -> String {
     format!("[\n{}\n]\n", contacts.collect::<Vec<String>>().join(",\n"))
 }
 
-/// Solves random motions anew and prints how far the table is from them.
+/// Solves random motions again and prints their distance from the table.
 pub fn recompute(count: usize, table: &CreepTable) {
     let mut errors = Vec::new();
     for number in 0..count.div_ceil(MOTIONS) {
-        // Contacts that no other set has.
+        // Contacts outside all other sets.
         let (contact, motions) = contact(CONTACTS + number);
         let operators = Arc::new(OperatorStore::default());
         let ellipse = table.ellipse(contact.ratio, contact.poisson);

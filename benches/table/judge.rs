@@ -1,4 +1,4 @@
-//! The errors of the table at motions that it was not made from.
+//! The errors of the table at motions that were not used to make it.
 
 use railhead_contact::rolling::linear_theory::coefficients;
 use railhead_contact::rolling::methods::table::evaluate::CreepTable;
@@ -27,7 +27,7 @@ impl Judged {
     }
 }
 
-/// All solved motions.
+/// Returns all solved motions.
 pub fn all(table: &CreepTable) -> Vec<Judged> {
     let mut all = Vec::new();
     for number in 0..CONTACTS {
@@ -146,7 +146,7 @@ pub fn print(all: &[Judged]) {
     }
 }
 
-/// Prints how the bounds of the table hold on the contacts that played no part in fitting them.
+/// Prints how the bounds of the table hold on the contacts that were not used to fit them.
 pub fn print_bounds(all: &[Judged]) {
     let others: Vec<&Judged> = all.iter().filter(|j| j.contact % 2 == 1).collect();
     let held = others.iter().filter(|j| j.largest() <= j.bound).count();
@@ -163,7 +163,7 @@ pub fn print_bounds(all: &[Judged]) {
     );
 }
 
-/// Bounds `factor × max(indicator, floor)^power`.
+/// Bounds of the form `factor × max(indicator, floor)^power`.
 #[derive(Debug, Clone, Copy)]
 pub struct Law {
     pub floor: f64,
@@ -176,12 +176,12 @@ impl Law {
         self.factor * f64::from(indicator).max(self.floor).powf(self.power)
     }
 
-    /// Its name in the file of the table.
+    /// Returns the JSON object of the law in the file of the table.
     pub fn described(&self) -> Value {
         json!({ "floor": self.floor, "power": self.power, "factor": self.factor })
     }
 
-    /// The law whose bound holds for this part of the motions and has the smallest median of bound over error.
+    /// Returns the law whose bound holds for this fraction of the motions with the smallest median of bound over error.
     pub fn sharpest(
         floors: &[f64],
         powers: &[f64],
@@ -203,7 +203,7 @@ impl Law {
             .expect("a law")
     }
 
-    /// The factor with which the bound holds for this part of the motions.
+    /// Returns the law with the factor for which the bound holds for this fraction of the motions.
     fn fitted(floor: f64, power: f64, part: f64, motions: &[&Judged], indicators: &[f32]) -> Law {
         let unit = Law {
             floor,

@@ -1,9 +1,9 @@
-//! The table of creep forces: makes it, and judges it by motions that it was not made from.
+//! Makes the table of creep forces, and checks it with motions that were not used to make it.
 //!
-//! `cargo bench --bench table -- generate` makes `table.bin` and `tests/data/creep_held_out.json` anew: 219 240 nodes and 6 000 motions that
-//! are held out, 36 minutes of processor time. What is solved stays in `target/table` (`RAILHEAD_TABLE_FOLDER`), so that a run that
-//! was stopped goes on. `-- report` prints errors and bounds from these motions, and solves those that are missing, `-- recompute` solves 200 random
-//! nodes and 200 random motions anew and compares, `-- speed` prints times of the table beside those of `fastsim`.
+//! `cargo bench --bench table -- generate` recomputes `table.bin` and `tests/data/creep_held_out.json`: 219 240 nodes and 6 000 held-out motions, in
+//! 36 minutes of processor time. Solved parts are stored in `target/table` (`RAILHEAD_TABLE_FOLDER`), so that an interrupted run continues. `--
+//! report` prints errors and bounds from the held-out motions and solves the missing ones. `-- recompute` solves 200 random nodes and 200 random
+//! motions again and compares them. `-- speed` prints times of the table and of `fastsim`.
 
 use std::path::Path;
 
@@ -24,9 +24,9 @@ mod random;
 mod solver;
 mod speed;
 
-/// Bounds are fitted for this part of half of the contacts, so that they hold for 99 % of the others.
+/// Bounds are fitted for this fraction of half of the contacts, so that they hold for 99 % of the others.
 const HELD: f64 = 0.992;
-/// Floors and powers of the bounds by indicators: those with the smallest median of bound over error on that half are taken.
+/// Candidate floors and powers of the bounds by indicators. Those with the smallest median of bound over error on that half are used.
 const FLOORS: [f64; 9] = [
     0.00003, 0.00005, 0.0001, 0.0002, 0.0003, 0.0005, 0.0007, 0.001, 0.0015,
 ];

@@ -16,12 +16,12 @@ use railhead_contact::rolling::operator_store::OperatorStore;
 use crate::random::Random;
 use crate::solver::{Answer, Contact, largest_error, print_errors, read, solve, write};
 
-/// The size that stands for infinity.
+/// The size that represents infinity.
 const MOST: f64 = 1e5;
-/// Threads.
+/// Number of threads.
 const THREADS: usize = 2;
 
-/// Target of the nodes of an a/b: long ellipses cost most, those of a/b 10 at ν = 1/2 a hundred times as much as a circle.
+/// Returns the target of the nodes of an a/b. Long ellipses cost most: those of a/b 10 at ν = 1/2 a hundred times as much as a circle.
 pub fn target(ratio: usize) -> f64 {
     match ratio {
         9 => 0.006,
@@ -30,7 +30,7 @@ pub fn target(ratio: usize) -> f64 {
     }
 }
 
-/// The size r of a node.
+/// Returns the size r of a node.
 fn size_of(node: usize) -> f64 {
     match SIZES[node] {
         last if f64::from(last) == SIZE_STEPS => MOST,
@@ -38,7 +38,7 @@ fn size_of(node: usize) -> f64 {
     }
 }
 
-/// One column: answers `[pole][size]` of a direction, none at the size 0, linear theory.
+/// Solves one column: answers `[pole][size]` of a direction. Nodes of size 0 belong to linear theory and are not solved.
 fn column(node: [usize; 2], chi: usize, target: f64) -> Vec<Answer> {
     let contact = Contact {
         ratio: ratio(node[0]),
@@ -54,7 +54,7 @@ fn column(node: [usize; 2], chi: usize, target: f64) -> Vec<Answer> {
     );
     let operators = Arc::new(OperatorStore::new(600 << 20));
     let mut answers = vec![[f64::NAN; 5]; POLES * SIZES.len()];
-    // Spin alone has no direction, and without spin ±χ mirror each other: those nodes are solved once.
+    // Pure spin has no direction, and without spin ±χ are mirror images. Those nodes are solved once.
     let first = usize::from(chi < DIRECTIONS / 2);
     let last = POLES - usize::from(chi != DIRECTIONS / 2);
     for k in 1..SIZES.len() {
@@ -87,13 +87,13 @@ fn name([ratio, poisson]: [usize; 2], chi: usize) -> String {
     format!("nodes-{ratio}-{poisson}-{chi:02}.bin")
 }
 
-/// A column that is solved.
+/// Returns a solved column.
 pub fn column_of(node: [usize; 2], chi: usize) -> Option<Vec<Answer>> {
     let numbers = read(&name(node, chi))?;
     Some(numbers.as_chunks::<5>().0.to_vec())
 }
 
-/// Solves the columns that are missing: first those of every other direction, of round ellipses before long ones.
+/// Solves the missing columns: first those of every other direction, and round ellipses before long ones.
 pub fn solve_all() {
     let mut missing = Vec::new();
     for odd in [false, true] {
@@ -131,7 +131,7 @@ pub fn solve_all() {
     });
 }
 
-/// Solves random nodes anew, each alone, and prints how far the table is from them.
+/// Solves random nodes again, each separately, and prints their distance from the table.
 pub fn recompute(count: usize, table: &CreepTable) {
     let random = &mut Random(0x7AB1_E001);
     let mut errors = Vec::new();

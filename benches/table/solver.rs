@@ -1,4 +1,4 @@
-//! Dimensionless creepages solved with the boundary-element method.
+//! Solves dimensionless creepages with the boundary-element method.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use railhead_contact::monitor::Unmonitored;
 use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::json;
 
-/// c = √(ab) in mm, G in MPa, and μN/(G c²): small, so that the largest creepages are still possible ones.
+/// c = √(ab) in mm, G in MPa, and μN/(G c²), which is small so that the largest creepages remain allowed.
 const LENGTH: f64 = 5.0;
 const MODULUS: f64 = 80_000.0;
 const CREEPAGE: f64 = 1e-6;
@@ -22,10 +22,10 @@ pub struct Contact {
     pub poisson: f64,
 }
 
-/// F_x/(μN), F_y/(μN), M_z/(μNc), the share of the patch that sticks, the estimated error.
+/// F_x/(μN), F_y/(μN), M_z/(μNc), the stick share of the patch, the estimated error.
 pub type Answer = [f64; 5];
 
-/// Solves creepages (x, y, z) one after the other, as one sweep.
+/// Solves creepages (x, y, z) as one sweep.
 pub fn solve(
     operators: &Arc<OperatorStore>,
     contact: Contact,
@@ -51,7 +51,7 @@ pub fn solve(
             println!("no answer: {case}: {error}");
             return vec![[f64::NAN; 5]];
         }
-        // The motion that has no answer stops its sweep: each by itself, and that one less exactly.
+        // A motion without an answer stops its sweep. Each motion is then solved separately, and a failing one with a larger target.
         Err(_) => {
             let coarser = if creepages.len() == 1 {
                 2.0 * target
@@ -79,7 +79,7 @@ pub fn solve(
     answers.collect()
 }
 
-/// The folder of what takes long to compute.
+/// Returns the folder of stored results.
 pub fn folder() -> PathBuf {
     // A bench runs in the folder of its own crate.
     let folder = std::env::var_os("RAILHEAD_TABLE_FOLDER").map_or_else(
@@ -90,7 +90,7 @@ pub fn folder() -> PathBuf {
     folder
 }
 
-/// Numbers in a file, or nothing.
+/// Returns the numbers in a file, or `None` if the file cannot be read.
 pub fn read(name: &str) -> Option<Vec<f64>> {
     let bytes = std::fs::read(folder().join(name)).ok()?;
     let numbers = bytes.chunks_exact(8);
@@ -101,7 +101,7 @@ pub fn read(name: &str) -> Option<Vec<f64>> {
     )
 }
 
-/// Writes numbers to a file, whole or not at all.
+/// Writes numbers to a file atomically.
 pub fn write(name: &str, numbers: &[f64]) {
     let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
     let half = folder().join(format!("{name}.part"));
@@ -109,13 +109,13 @@ pub fn write(name: &str, numbers: &[f64]) {
     std::fs::rename(half, folder().join(name)).expect("a file");
 }
 
-/// Largest of the errors of F_x/(μN), F_y/(μN) and M_z/(μNc).
+/// Returns the largest of the errors of F_x/(μN), F_y/(μN) and M_z/(μNc).
 pub fn largest_error(found: [f64; 3], answer: Answer) -> f64 {
     let errors = (0..3).map(|k| (found[k] - answer[k]).abs());
     errors.fold(0.0, f64::max)
 }
 
-/// Prints how far the table is from what was solved anew.
+/// Prints the distance of the table from the new solutions.
 pub fn print_errors(what: &str, mut errors: Vec<f64>) {
     errors.sort_by(f64::total_cmp);
     let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];

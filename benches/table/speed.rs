@@ -1,4 +1,4 @@
-//! How long a value takes: by the table and by the simplified theory, in one process.
+//! Measures the time of a value by the table and by the simplified theory, in one process.
 
 use cpu_time::ThreadTime;
 use railhead_contact as contact;
@@ -11,11 +11,10 @@ use serde_json::json;
 use crate::held_out::{CONTACTS, MOTIONS, contact};
 use crate::random::Random;
 
-/// Values of a measurement; the best of so many runs counts.
+/// Number of values of a measurement. The best of `RUNS` runs counts.
 const VALUES: usize = 100_000;
 const RUNS: usize = 7;
 
-/// Prints the times.
 pub fn print() {
     let inputs: Vec<_> = (0..CONTACTS)
         .flat_map(|number| {
@@ -46,7 +45,7 @@ pub fn print() {
     }
 }
 
-/// Time in ns of a row with load, creepages and spin of its own.
+/// Returns the time in ns of a row with its own load, creepages and spin.
 fn ns_of_row(method: &str, radii: bool) -> f64 {
     let random = &mut Random(7);
     let mut column = |pointer: &str, low: f64, high: f64| VariedColumn {
@@ -83,7 +82,7 @@ fn ns_of_row(method: &str, radii: bool) -> f64 {
     best(|| rows.evaluate().column("friction_power_n").iter().sum())
 }
 
-/// Time in ns of one of [`VALUES`] values, the best of some runs.
+/// Returns the time in ns of one of [`VALUES`] values, in the best of several runs.
 fn best(work: impl Fn() -> f64) -> f64 {
     let run = |_| {
         let began = ThreadTime::now();
