@@ -23,7 +23,7 @@ use crate::truth::{Frame, TrueResultants, Truth, distance, print};
 
 /// Numbers of cells of the two meshes that give a reference result.
 const CELLS: [u32; 2] = [1024, 2048];
-/// Minimum uncertainty, added to half of the extrapolated change.
+/// Uncertainty in addition to half of the extrapolated change, and the minimum change between two targets.
 const LEAST: f64 = 2e-5;
 /// Targets for the reference results: of region and pressure of a gap, and of a wheel on a rail.
 const TARGET_GAP: f64 = 4e-4;

@@ -140,7 +140,7 @@ pub async fn run() {
             began.elapsed().as_secs_f64()
         ),
     );
-    assert_eq!(again, 0, "nobody was turned away");
+    assert_eq!(again, 0, "no submission was retried");
     let more = "SELECT COUNT(*) FROM jobs WHERE attempt > 1";
     assert_eq!(counted(&pool, more).await, 0, "a lease was lost");
     let ended = "SELECT COUNT(*) FROM jobs WHERE state = 'succeeded'";

@@ -88,7 +88,7 @@ impl Cluster {
         service.signal("TERM");
         assert!(
             service.wait().success(),
-            "node {number} did not end in good order"
+            "node {number} did not shut down gracefully"
         );
     }
 

@@ -41,7 +41,7 @@ fn before(old: Option<&PathBuf>) -> Command {
 /// Migrates the tables. Retries if they are locked for too long.
 async fn advance(url: &str, old: bool) {
     if old {
-        migrate(url).await.expect("the tables are brought forward");
+        migrate(url).await.expect("a migration");
         return;
     }
     let pool = PgPool::connect(url).await.expect("the database");

@@ -222,7 +222,7 @@ fn by_table(seed: u64) -> Class {
     class
 }
 
-/// Returns forces, twice the larger of their estimates, and power of a single case. Returns `None` if it has no answer, which is recorded.
+/// Returns the forces, the larger of their estimates for both, and the power of a single case. Records a case without an answer and returns `None`.
 fn alone(case: &Value, class: &mut Class) -> Option<[[f64; 2]; 3]> {
     let solved = contact::check(case, &Limits::default())
         .map_err(|error| error.to_string())
@@ -376,5 +376,5 @@ fn solved(template: &Value, columns: &[VariedColumn]) -> ManyAnswer {
     let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
         contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
     };
-    solve_many(&task, &solve, &Unmonitored).expect("nobody stops it")
+    solve_many(&task, &solve, &Unmonitored).expect("never stopped")
 }

@@ -214,7 +214,7 @@ fn twins(
     let (name, twin, sign) = if number.is_multiple_of(8) {
         ("reversed", reversed(case), -1.0)
     } else {
-        // The unit is larger where a smaller one would exceed the allowed lengths.
+        // The lengths are divided by `UNIT` where their product would exceed the allowed lengths.
         let unit = if longest(case) * UNIT < LENGTH_MAX {
             UNIT
         } else {

@@ -118,7 +118,7 @@ fn with_hardly_any_friction_the_creepage_is_that_of_half_the_load() {
     let case = all
         .iter()
         .find(|case| case.friction < 1e-3)
-        .expect("there is one");
+        .expect("a case with little friction");
     let exact = -2.0 * case.difference * case.pressure_max() / case.shear_modulus_mpa * 0.9147;
     let found = case.found(exact, 200, false) / exact;
     println!("{found:.4} of the creepage");

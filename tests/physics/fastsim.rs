@@ -240,7 +240,7 @@ fn nothing_moves_nothing_rubs_and_no_friction_are_exact() {
             [0.0; 3]
         );
         assert_eq!(point.error_estimate.expect("an estimate").force_x_n, 0.0);
-        assert_eq!(point.target_met, None, "nobody asked for one");
+        assert_eq!(point.target_met, None, "no target was given");
     }
 }
 

@@ -126,7 +126,7 @@ fn against_table(
             let value = found
                 .iter()
                 .find(|(n, _)| *n == name)
-                .expect("the motion shows it")
+                .expect("a coefficient of the motion")
                 .1;
             let off = 100.0 * (value / reference - 1.0);
             if off.abs() > 100.0 * factor * allowed {

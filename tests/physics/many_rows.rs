@@ -50,7 +50,7 @@ fn solved_by(case: &Value, columns: &[VariedColumn], solve: &RowSolver) -> ManyA
         limits: &Limits::default(),
         time_limit: Duration::from_secs(60),
     };
-    solve_many(&task, solve, &Unmonitored).expect("nobody stops it")
+    solve_many(&task, solve, &Unmonitored).expect("never stopped")
 }
 
 /// Returns the numbers of a row as bits. Equal bits mean the same answer.

@@ -139,7 +139,7 @@ fn the_cost_counts_the_operators_that_a_case_leaves_in_the_store() {
             assert!(told <= bytes as f64 && cost.operator_store_bytes <= cost.bytes);
             assert!(
                 (kept / factor..=kept * factor).contains(&told),
-                "{told} told, {kept} kept of {bytes}: {case}"
+                "{told} estimated, {kept} kept of {bytes}: {case}"
             );
         }
     }

@@ -187,7 +187,7 @@ fn the_edge_of_an_egg_converges() {
     );
     assert!(
         coarse / fine > 10.0,
-        "third of the spacing squared at least: {coarse} {fine}"
+        "the error falls nearly with the square of the spacing: {coarse} {fine}"
     );
 }
 

@@ -40,7 +40,7 @@ fn the_force_of_a_creepage_gives_the_creepage_back() {
         assert!((creepage / x - 1.0).abs() < 0.01, "{creepage} {x}");
         assert!(found.angular_velocity_rad_per_s.is_none());
         // Both components together balance the load.
-        let vertical = found.total[0].force_z_n.expect("of profiles");
+        let vertical = found.total[0].force_z_n.expect("profiles");
         assert!((vertical / 75_000.0 + 1.0).abs() < 1e-3, "{vertical}");
     }
 }
@@ -101,9 +101,9 @@ fn forces_that_a_wheel_cannot_have_are_refused_by_name() {
 /// Returns the reason why a case that passes the checks has no answer.
 fn refusal(case: &Value) -> String {
     let checked =
-        contact::check(case, &Limits::default()).expect("the normal force is not known yet");
+        contact::check(case, &Limits::default()).expect("valid before the normal force is known");
     let Err(SolveError::NormalProblem { reason }) = contact::solve(&checked, &Unmonitored) else {
-        panic!("the rail does not carry it")
+        panic!("the force exceeds what the rail can carry")
     };
     reason
 }
@@ -139,7 +139,7 @@ fn the_lateral_force_of_a_creepage_gives_the_creepage_back() {
         assert!((creepage / y - 1.0).abs() < 0.02, "{shift}: {creepage} {y}");
         // The other creepage is unchanged, and all forces balance the load.
         assert_eq!(found.patches[0].points[0].motion.creepage_x, 0.0005);
-        let vertical = found.total[0].force_z_n.expect("of profiles");
+        let vertical = found.total[0].force_z_n.expect("profiles");
         assert!((vertical / 75_000.0 + 1.0).abs() < 1e-3, "{vertical}");
     }
 }
@@ -160,7 +160,7 @@ fn a_mirrored_wheel_needs_the_mirrored_lateral_creepage() {
 fn a_lateral_force_is_found_up_to_full_slip_and_refused_beyond() {
     // In full slip, friction adds its angle to that of the contact: V tan(α ± φ) if all patches have the same angle.
     let still = answer(&moving(json!({ "creepage_y": 0.0 })));
-    let position = still.patches[0].position.as_ref().expect("of profiles");
+    let position = still.patches[0].position.as_ref().expect("profiles");
     let angle = position.contact_angle_rad;
     for side in [-1.0, 1.0] {
         let most = 75_000.0 * (angle + side * f64::atan(0.3)).tan();
@@ -215,7 +215,7 @@ fn both_forces_of_a_motion_give_both_creepages_back() {
         let motion = found.patches[0].points[0].motion;
         let off = (motion.creepage_x - x).hypot(motion.creepage_y - y);
         assert!(off < 0.03 * x.hypot(y), "{shift}: {motion:?}");
-        let vertical = own.force_z_n.expect("of profiles");
+        let vertical = own.force_z_n.expect("profiles");
         assert!((vertical / 75_000.0 + 1.0).abs() < 1e-3, "{vertical}");
     }
 }
@@ -286,7 +286,7 @@ fn ratio_of_times(random: &mut Random, names: &[&str]) -> [f64; 2] {
     let timed = |case: &Value| {
         let checked = contact::check(case, &Limits::default()).expect("a case");
         let began = Instant::now();
-        let answer = contact::solve(&checked, &Unmonitored).expect("within reach");
+        let answer = contact::solve(&checked, &Unmonitored).expect("attainable forces");
         (
             answer.0,
             began.elapsed().as_secs_f64(),

@@ -33,11 +33,7 @@ fn moving(case: &Value, motion: Value) -> Solution {
 
 /// Returns the rear and front end of a patch along the track in mm.
 fn ends(patch: &PatchSolution) -> [f64; 2] {
-    let origin = patch
-        .position
-        .as_ref()
-        .expect("of profiles")
-        .origin_track_mm[0];
+    let origin = patch.position.as_ref().expect("profiles").origin_track_mm[0];
     [0, 1].map(|k| origin + patch.extent_mm[k])
 }
 
@@ -104,11 +100,11 @@ fn totals_are_sums_in_track_axes_at_every_distance() {
         let found = [
             total.force_x_n,
             total.force_y_n,
-            total.force_z_n.expect("of profiles"),
+            total.force_z_n.expect("profiles"),
         ];
         for (axis, found) in found.into_iter().enumerate() {
             let force =
-                |patch: &PatchSolution| patch.points[k].force_track_n.expect("of profiles")[axis];
+                |patch: &PatchSolution| patch.points[k].force_track_n.expect("profiles")[axis];
             let sum: f64 = solution.patches.iter().map(force).sum();
             assert!((sum - found).abs() < 1e-6 * 75e3, "{axis}: {sum} {found}");
         }
@@ -128,7 +124,7 @@ fn a_vertical_force_is_met_at_the_last_point_and_a_remark_tells_of_the_others() 
         let solution = moving(&case, rolled(&[0.0, 60.0], CREEPAGES));
         let code = "pressures-of-last-point";
         assert!(solution.remarks.iter().any(|remark| remark.code == code));
-        let vertical = |total: &Total| total.force_z_n.expect("of profiles");
+        let vertical = |total: &Total| total.force_z_n.expect("profiles");
         let [still, rolling] = [&solution.total[0], &solution.total[1]];
         assert!(
             (vertical(rolling) / -75e3 - 1.0).abs() < 1e-3,

@@ -280,7 +280,7 @@ fn places_are_answered_in_their_order_and_a_plane_is_a_product() {
         (places[0], places[4], places[9]),
         ([-6.0, 0.5, 1.0], [6.0, 0.5, 1.0], [6.0, 0.5, 2.5])
     );
-    let worst = worst.expect("left out means yes");
+    let worst = worst.expect("the default");
     assert!(
         found
             .iter()

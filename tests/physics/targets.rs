@@ -153,7 +153,7 @@ fn a_pole_on_the_edge_of_two_strips_counts() {
         let (rough, estimate) = solved(ratio, 0.02);
         let (fine, _) = solved(ratio, 0.005);
         let error = (rough - fine).abs();
-        // One estimate in twenty may be too small, but not by a factor of two.
+        // One estimate in twenty may be too small, but not by more than a factor of two.
         assert!(
             error <= 2.0 * estimate + 0.005,
             "{ratio}: {error} for {estimate}"

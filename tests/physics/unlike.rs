@@ -258,7 +258,7 @@ fn motions_of_a_list_are_those_of_cases_of_their_own() {
         case["motion"] = json!(motions);
         let checked = contact::check(&case, &Limits::default()).expect("a good case");
         println!(
-            "{} motions off by {apart:.5}, {together:.3} s together ({:.3} told), {:.3} s alone",
+            "{} motions off by {apart:.5}, {together:.3} s together ({:.3} estimated), {:.3} s alone",
             motions.len(),
             checked.cost().seconds,
             all - together
@@ -279,7 +279,7 @@ fn a_sweep_of_unlike_bodies_solved_by_slices_in_any_order_is_the_sweep_solved_at
     let began = std::time::Instant::now();
     let whole = timeless(contact::solve(&checked, &Unmonitored).expect("an answer"));
     println!(
-        "30 motions in {} slices, {:.2} s ({:.2} told)",
+        "30 motions in {} slices, {:.2} s ({:.2} estimated)",
         ranges.len(),
         began.elapsed().as_secs_f64(),
         checked.cost().seconds

@@ -59,7 +59,7 @@ fn the_lateral_force_of_a_lateral_velocity_gives_the_velocity_back() {
         // The creepage along x is that of the given angular velocity, and all forces balance the load.
         let along = |solution: &Solution| solution.patches[0].points[0].motion.creepage_x;
         assert!((along(&found) - along(&given)).abs() < 1e-5);
-        let vertical = found.total[0].force_z_n.expect("of profiles");
+        let vertical = found.total[0].force_z_n.expect("profiles");
         assert!((vertical / 75_000.0 + 1.0).abs() < 1e-3, "{vertical}");
     }
 }
@@ -139,9 +139,9 @@ fn lateral_forces_that_a_wheelset_cannot_have_are_refused_by_name() {
     falling["friction"] = json!({ "law": "exponential", "limit": 0.1, "terms": terms });
     assert_fault(&falling, pointer, &["falls", "lateral velocities"]);
     let checked = contact::check(&moving([0.0; 2], 1.0, &asked), &Limits::default());
-    let checked = checked.expect("the range is not known yet");
+    let checked = checked.expect("valid before the range is known");
     let Err(SolveError::NormalProblem { reason }) = contact::solve(&checked, &Unmonitored) else {
-        panic!("the rail does not carry it")
+        panic!("the force exceeds what the rail can carry")
     };
     assert!(reason.contains("force_y_n of 40000 N"), "{reason}");
     assert!(reason.contains(" N to "), "{reason}");

@@ -138,7 +138,7 @@ fn newton_and_gmres_allocate_nothing_in_a_workspace_that_has_served_before() {
             solve();
             assert_eq!(during(&mut solve), 0, "{:?}", equations.rule);
         }
-        // The iterations include steps that could allocate.
+        // Each solve takes several iterations, in which allocations would be counted.
         assert!(iterations.iter().all(|count| *count > 2), "{iterations:?}");
     });
 }
