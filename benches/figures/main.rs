@@ -92,7 +92,7 @@ impl Figure {
 
     fn motions(&self) -> Vec<Motion> {
         let points = self.solution.patches[0].points.iter();
-        points.map(|point| point.motion.into()).collect()
+        points.map(|point| point.motion).collect()
     }
 
     /// Returns the paper's Φ of a motion.

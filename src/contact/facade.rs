@@ -7,9 +7,8 @@ use std::collections::BTreeMap;
 use serde_json::to_value;
 use thiserror::Error;
 
-use crate::case::contact_task::{FLANGE_BACKS, GAUGE};
 use crate::case::solver::Limits;
-use crate::case::words::contact::{Contact, Load, SurfaceName};
+use crate::case::words::contact::{Contact, FLANGE_BACKS, GAUGE, Load, SurfaceName};
 use crate::case::words::cross_section::{CrossSection, Smoothing};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Elastic, Material};

@@ -6,6 +6,10 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
+use railhead_macros::Members;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
 use crate::numerics::roots;
 use crate::numerics::roots::{CloseEnough, Course};
 
@@ -329,12 +333,16 @@ pub fn strips_about(pole: f64, low: f64, high: f64, count: usize) -> Vec<(f64, f
         .collect()
 }
 
-/// The number of strips across every patch and of cells in each strip.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Members)]
 pub struct MeshSize {
     /// Strips across each patch.
+    #[schema(minimum = 1)]
+    #[member(1..=1000)]
     pub strips: u32,
     /// Cells along x in each strip.
+    #[schema(minimum = 1)]
+    #[member(1..=1000)]
     pub cells: u32,
 }
 

@@ -10,7 +10,7 @@ use uuid::Uuid;
 
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, Fault, ProblemBody, Result};
-use railhead_contact::case::words::motion::MotionWords;
+use railhead_contact::rolling::task::Motion;
 use railhead_contact::case::words::solver::{Case, Output};
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::answer::{
@@ -543,7 +543,7 @@ pub(crate) struct PointResultants {
     /// Index of the motion or of the position of the wheelset, from 0.
     pub point: usize,
     /// The motion.
-    pub motion: MotionWords,
+    pub motion: Motion,
     /// Normal force in N.
     pub normal_force_n: f64,
     /// Longitudinal force in N.

@@ -1,6 +1,4 @@
-//! What a case asks for beyond its contact: stresses below the surface, damage, temperatures.
-//!
-//! From words to task: where stresses below the surface are computed, and in which body.
+//! From the members of a case to the outputs that follow from the solved contact: stresses below the surface, damage and temperatures.
 
 use crate::case::solver::Limits;
 use crate::case::words::material::{Material, ThermalWords};
@@ -16,7 +14,7 @@ use crate::post::subsurface::states::{StressPlaces, SubsurfaceTask};
 use crate::problem::physics::AfterTasks;
 
 impl AfterTasks {
-    /// What a case asks for.
+    /// Returns the requested outputs of a case.
     pub(crate) fn new(case: &Case) -> AfterTasks {
         let subsurface = case.subsurface.as_ref();
         AfterTasks {
@@ -42,7 +40,7 @@ impl From<ThermalWords> for ThermalTask {
     }
 }
 
-/// Number of points of every motion.
+/// Returns the number of points at which stresses are computed for each motion.
 pub(crate) fn count(words: &SubsurfaceWords) -> usize {
     let grid = |grid: &StressGrid| {
         let sides = [&grid.x_mm, &grid.y_mm, &grid.depths_mm];
@@ -55,33 +53,30 @@ pub(crate) fn count(words: &SubsurfaceWords) -> usize {
     points.or(depths).or(grid).unwrap_or(0)
 }
 
-/// The fault of a case with more stresses than the limits allow.
-pub(crate) fn fault(words: &SubsurfaceWords, motions: usize, limits: &Limits) -> Option<Fault> {
-    let count = count(words).saturating_mul(motions);
-    (count > limits.samples_max).then(|| {
-        Fault::new(
-            "/subsurface",
-            format!(
-                "{count} points over all motions given; at most {} are allowed in one case",
-                limits.samples_max
-            ),
-        )
-    })
+/// Returns the faults of stresses at too many points, or of a passage together with a history.
+pub(crate) fn faults(
+    words: &SubsurfaceWords,
+    motion: &Motions,
+    motions: usize,
+    limits: &Limits,
+) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    let (count, most) = (count(words).saturating_mul(motions), limits.samples_max);
+    if count > most {
+        let detail = format!(
+            "{count} points over all motions given; at most {most} are allowed in one case"
+        );
+        faults.push(Fault::new("/subsurface", detail));
+    }
+    if matches!(motion, Motions::History { .. }) && words.passage.is_some() {
+        let detail = "given with a history; a passage is judged in steady rolling only";
+        faults.push(Fault::new("/subsurface/passage", detail));
+    }
+    faults
 }
 
-/// The fault of a passage judged beside a history.
-pub(crate) fn passage_fault(words: &SubsurfaceWords, motion: &Motions) -> Option<Fault> {
-    let history = matches!(motion, Motions::History { .. });
-    (history && words.passage.is_some()).then(|| {
-        Fault::new(
-            "/subsurface/passage",
-            "given with a history; a passage is judged in steady rolling only",
-        )
-    })
-}
-
-/// The task of a checked case.
-pub(crate) fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTask {
+/// Returns where and in which body stresses are computed.
+fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTask {
     let [lower, upper] = material.bodies();
     let elastic = match words.body {
         BodyName::Lower => lower,
@@ -121,8 +116,8 @@ fn places(words: &SubsurfaceWords) -> StressPlaces {
 }
 
 impl GridAxis {
-    /// Number of coordinates.
-    pub fn count(&self) -> usize {
+    /// The number of coordinates.
+    fn count(&self) -> usize {
         match self {
             GridAxis::One(_) => 1,
             GridAxis::List(list) => list.len(),
@@ -130,8 +125,8 @@ impl GridAxis {
         }
     }
 
-    /// The coordinates.
-    pub fn values(&self) -> Vec<f64> {
+    /// Returns the coordinates.
+    fn values(&self) -> Vec<f64> {
         match self {
             GridAxis::One(value) => vec![*value],
             GridAxis::List(list) => list.clone(),

@@ -1,17 +1,15 @@
-//! The last step of a check: words without faults become a [`CheckedCase`].
-//!
-//! A cross-section by itself: is it sound, whose is it, and how good are its points?
+//! The last step of a check: a case without faults becomes a [`CheckedCase`]. Cross-sections are also checked alone.
 
 use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::case::checks::{CheckedParts, missing_load, unusual_friction};
+use crate::case::checks::{CheckedParts, unusual_friction};
 use crate::case::digest::digest;
 use crate::case::draft::CaseDraft;
 use crate::case::motions::ExpandedMotions;
 use crate::case::solver::{KnownPair, Limits, resolution};
-use crate::case::wheel_task::profile;
+use crate::case::wheel_task::profile_at;
 use crate::case::words::cross_section::CrossSection;
 use crate::case::words::object::{Faults, Object};
 use crate::case::words::solver::Case;
@@ -31,20 +29,21 @@ use crate::solution::words::answer::Asked;
 use crate::solution::words::damage::{PairQuality, SectionQuality};
 
 impl CheckedCase {
-    /// Checks what was read of a case against physics and limits, and prepares its numbers; profiles that are known are not read again.
+    /// Checks the members of a case against physics and limits and prepares its numbers. Profiles in `known` are not read again.
     ///
     /// # Errors
-    /// The faults of the text, and every fault found, each with its JSON pointer.
+    /// All faults of the text and of the checks, each with its JSON pointer.
     pub(crate) fn new(
         draft: CaseDraft,
         mut faults: Vec<Fault>,
         limits: &Limits,
         known: &KnownPair,
     ) -> Result<CheckedCase, CaseError> {
-        let (parts, found) = CheckedParts::check(draft.given(known), limits);
+        let (parts, found) = CheckedParts::check(&draft, known, limits);
         faults.extend(found);
         if faults.is_empty() && parts.task.is_none() {
-            faults.push(missing_load());
+            let detail = "missing; exactly one of normal_force_n, approach_mm is needed";
+            faults.push(Fault::new("/load", detail));
         }
         let (true, Some(case), Some(elasticity), Some((task, remarks)), Some(motions)) = (
             faults.is_empty(),
@@ -67,7 +66,8 @@ impl CheckedCase {
             history,
         } = motions;
         let patches = task.known_patches().unwrap_or_default();
-        // Creepages that are searched are assessed once they are found.
+        let first_move = wheel_task::moves(&case.motion).into_iter().next();
+        // Creepages that the solver must find are assessed in the answer.
         let given = match forces.iter().all(|forces| *forces == [None; 2]) {
             true => &motions[..],
             false => &[],
@@ -92,8 +92,8 @@ impl CheckedCase {
             forces,
             speeds,
             history,
-            wheelset: wheel_task::wheelset(&case.motion),
-            drive_torque: wheel_task::drive_torque(&case.motion),
+            wheelset: first_move.map(|first| first.motion),
+            drive_torque: first_move.and_then(|first| first.drive_torque),
             wheelset_forces: wheel_task::wheelset_forces(&case.motion),
             checked: Checked::without_faults(),
         };
@@ -119,7 +119,7 @@ impl CheckedCase {
     }
 }
 
-/// How a case is to be solved, by its words.
+/// Returns how a case is solved.
 fn run(case: &Case, limits: &Limits) -> Run {
     Run {
         method: case.solver.method.into(),
@@ -136,24 +136,24 @@ fn run(case: &Case, limits: &Limits) -> Run {
     }
 }
 
-/// Contact modulus G/(1 − ν) of steel on steel in MPa, for the smoothing that is suggested.
+/// Contact modulus G/(1 − ν) of steel on steel in MPa, for the suggested smoothing.
 const STEEL_MPA: f64 = 82_000.0 / (1.0 - 0.28);
 
-/// What a cross-section was taken for.
+/// The result of checking a cross-section alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectionReport {
-    /// `rail` or `wheel`: the body that the file states, or that the points show.
+    /// `rail` or `wheel`: the body that the file states or that the points show.
     pub body: &'static str,
-    /// Its points, and the smoothing that suits them on steel beside another profile of this kind.
+    /// Quality of its points, with the smoothing that suits two steel bodies with such points.
     pub quality: SectionQuality,
-    /// How its points or its file were read.
+    /// Remarks on reading its points or its file.
     pub remarks: Vec<RemarkEntry>,
 }
 
-/// Reads and checks a cross-section as `rail` or `wheel` of a case has it.
+/// Reads and checks a cross-section in the form of `rail` or `wheel` of a case.
 ///
 /// # Errors
-/// Every fault, with pointers into the cross-section.
+/// All faults, with pointers into the cross-section.
 pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
     let mut faults = Faults::default();
     let read = Object::open(value, String::new(), &mut faults)
@@ -162,8 +162,8 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
     let Some(section) = read.filter(|_| listed.is_empty()) else {
         return Err(CaseError(listed));
     };
-    let read = [Body::Rail, Body::Wheel].map(|body| (body, profile(body, &section)));
-    // A shape in another unit may show the other body, so that the sizes of both are judged.
+    let read = [Body::Rail, Body::Wheel].map(|body| (body, profile_at("", body, &section)));
+    // In another unit the shape may look like the other body, so the sizes of both are assessed.
     let is_size = |remark: &&Remark| matches!(remark, Remark::ProfileSizeUnusual { .. });
     let profiles = read.iter().filter_map(|(_, profile)| profile.as_ref().ok());
     let sizes = profiles.flat_map(|profile| profile.remarks.iter().filter(is_size));
@@ -174,11 +174,7 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
             _ => (Body::Rail, rail),
         },
         [(body, Ok(only)), _] | [_, (body, Ok(only))] => (body, only),
-        [(_, Err(fault)), (_, Err(_))] => {
-            let own = fault.pointer.strip_prefix("/contact/rail");
-            let pointer = own.unwrap_or_default().to_owned();
-            return Err(CaseError(vec![Fault { pointer, ..fault }]));
-        }
+        [(_, Err(fault)), (_, Err(_))] => return Err(fault.into()),
     };
     let noise_level = checked_case::noise_level(&profile);
     let advised = advised_smoothing([noise_level; 2], STEEL_MPA, checked_case::PRESSURE_USUAL);
@@ -196,7 +192,7 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
 }
 
 impl CheckedCase {
-    /// How far the points of the profiles can be trusted, as far as that is known without the contact; only of a wheel on a rail.
+    /// Returns the quality of the profiles as far as it is known before the contact; only for a wheel on a rail.
     pub fn quality(&self) -> Option<PairQuality> {
         let NormalTask::Wheel(contact) = &self.problem.task else {
             return None;

@@ -1,15 +1,15 @@
-//! The checks of a case: each part is checked independently, and all faults are reported together.
+//! Checks the members of a case that could be read, independently of each other, so that all faults are reported together.
 //!
-//! Combines the elastic constants of two bodies into those of the pair.
+//! The elastic constants of two bodies are combined into those of the pair here.
 
-use crate::case::motions::{BesideHistory, ExpandedMotions};
+use crate::case::draft::CaseDraft;
+use crate::case::motions::ExpandedMotions;
 use crate::case::solver::{KnownPair, Limits, resolution};
-use crate::case::words::contact::{Contact, Load, SurfaceName};
+use crate::case::words::contact::{Contact, OnRails, SurfaceName};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, ThermalWords};
 use crate::case::words::motion::Motions;
-use crate::case::words::solver::{MethodName, Output, Solver};
-use crate::case::words::subsurface::{DamageModel, DamageWords, SubsurfaceWords};
+use crate::case::words::subsurface::DamageModel;
 use crate::case::{after_tasks, contact_task, motions, wheel_task, wheelsets};
 use crate::error::Fault;
 use crate::friction::law::FrictionLaw;
@@ -21,31 +21,14 @@ use crate::normal::wheel::ReferenceSurface;
 use crate::problem::memory::{SizeInput, length_over_width, segments, spinning};
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
-use crate::rolling::history::plan::{HistoryStart, HistoryTask};
+use crate::rolling::history::plan::HistoryStart;
 use crate::rolling::methods::table::solve as table;
 use crate::rolling::task::RelativeTo;
 
 /// Friction coefficient above which the answer carries a remark.
 const FRICTION_USUAL_MAX: f64 = 1.0;
 
-/// The parts of a case that could be read.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PartialCase<'a> {
-    pub(crate) material: Option<&'a Material>,
-    pub(crate) friction: Option<&'a Friction>,
-    pub(crate) contact: Option<&'a Contact>,
-    pub(crate) load: Option<&'a Load>,
-    pub(crate) motion: Option<&'a Motions>,
-    pub(crate) solver: Option<&'a Solver>,
-    pub(crate) outputs: &'a [Output],
-    pub(crate) subsurface: Option<&'a SubsurfaceWords>,
-    pub(crate) damage: Option<&'a DamageWords>,
-    pub(crate) thermal: Option<&'a ThermalWords>,
-    /// Cross-sections that were read for another case.
-    pub(crate) known: &'a KnownPair,
-}
-
-/// The parts of a problem, checked as far as they are independent of each other.
+/// The checked parts of a problem. A part is `None` if it is faulty or depends on a faulty member.
 #[derive(Debug)]
 pub(crate) struct CheckedParts {
     pub(crate) elasticity: Option<Elasticity>,
@@ -54,77 +37,51 @@ pub(crate) struct CheckedParts {
 }
 
 impl CheckedParts {
-    pub(crate) fn check(given: PartialCase, limits: &Limits) -> (CheckedParts, Vec<Fault>) {
+    pub(crate) fn check(
+        draft: &CaseDraft,
+        known: &KnownPair,
+        limits: &Limits,
+    ) -> (CheckedParts, Vec<Fault>) {
         let mut faults = Vec::new();
-        let elasticity = given.material.map(Elasticity::combine);
-        let method: Option<Method> = given.solver.map(|solver| solver.method.into());
-        // The table says it in its own words.
+        let elasticity = draft.material.as_ref().map(Elasticity::combine);
+        let method = draft.method().map(Method::from);
+        // The table has a fault of its own for unlike bodies.
         let uncoupled = elasticity.zip(method.filter(|method| *method != Method::Table));
         faults.extend(uncoupled.and_then(|(pair, method)| pair.uncoupled_fault(method)));
-        let motions = given.motion.map(|motion| motions::expand(motion, limits));
-        let motions = motions.and_then(|motions| collect_fault(motions, &mut faults));
-        let task = normal_task(given.contact, given.load, elasticity.as_ref(), limits);
-        let task = match (task, given.contact) {
-            (None, Some(contact)) if contact.has_profiles() => {
-                let (surface, remark) = surface(&given).unwrap_or_else(|found| {
-                    faults.push(found);
-                    (ReferenceSurface::Planes, None)
-                });
-                let task = on_rails(contact, &given, elasticity, surface, limits);
-                let mut task = task.unwrap_or_else(|found| {
-                    faults.extend(found);
-                    None
-                });
-                if let Some((_, remarks)) = &mut task {
-                    remarks.extend(remark.map(RemarkEntry::from));
-                }
-                task
-            }
-            (task, _) => task.and_then(|task| collect_fault(task, &mut faults)),
-        };
+        let motion = draft.motion.as_ref();
+        let motions = motion.map(|motion| motions::expand(motion, limits));
+        let motions = motions.and_then(|motions| {
+            let expanded = motions.map_err(|fault| faults.push(fault));
+            expanded.ok()
+        });
+        let task = draft.contact.as_ref().and_then(|contact| {
+            let task = normal_task(contact, draft, elasticity, known, limits);
+            task.map_err(|found| faults.extend(found)).ok().flatten()
+        });
         let region = task.as_ref().map(|(task, _)| task);
-        let force = normal_force(region, given.load);
-        faults.extend(motion_faults(&given, motions.as_ref(), force, limits));
-        if let Some(history) = motions.as_ref().and_then(|all| all.history.as_ref()) {
-            faults.extend(history_faults(&given, history, region, limits));
+        let patches = region.and_then(NormalTask::known_patches);
+        let patches = patches.unwrap_or_default();
+        if let Some((motions, motion)) = motions.as_ref().zip(motion) {
+            faults.extend(motion_faults(draft, motion, motions, &patches, limits));
         }
-        if let Some(solver) = given.solver {
-            let size = SizeInput {
-                method: solver.method.into(),
-                resolution: resolution(solver),
-                // Unknown quantities count with their least possible values.
-                segments: task
-                    .as_ref()
-                    .map_or_else(|| vec![1.0], |(task, _)| segments(task)),
-                motions: motions.as_ref().map_or(1, |m| m.motions.len())
-                    * task.as_ref().map_or(1, |(task, _)| task.positions()),
-                spinning: motions.as_ref().map_or(0, |m| spinning(&m.motions))
-                    * task.as_ref().map_or(1, |(task, _)| task.positions()),
-                history: motions.as_ref().is_some_and(|m| m.history.is_some()),
-                pressed: motions
-                    .as_ref()
-                    .and_then(|m| m.history.as_ref())
-                    .is_some_and(|h| h.start == HistoryStart::Pressed),
-                fields: given.outputs.iter().any(|output| output.is_per_cell()),
-                stress_points: given.subsurface.map_or(0, after_tasks::count),
-                ellipse: region.and_then(length_over_width),
-                store: limits.operator_store_bytes,
-            };
-            faults.extend(size.faults(limits));
+        if let Some(motions) = &motions {
+            faults.extend(history_faults(draft, motions, &patches, limits));
         }
-        let of_friction = friction_fault(&given).or_else(|| {
-            let patches = task.as_ref()?.0.known_patches().unwrap_or_default();
-            falls_too_fast(
-                given.friction?,
-                given.thermal,
+        faults.extend(size_faults(draft, region, motions.as_ref(), limits));
+        let of_friction = friction_fault(draft).or_else(|| {
+            let speeds = &motions.as_ref()?.speeds;
+            region?;
+            too_fast_fault(
+                draft.friction.as_ref()?,
+                draft.thermal.as_ref(),
                 elasticity?,
                 &patches,
-                &motions.as_ref()?.speeds,
+                speeds,
             )
         });
         faults.extend(of_friction);
         if method == Some(Method::Table) {
-            faults.extend(not_in_table(elasticity.as_ref(), region));
+            faults.extend(table_faults(elasticity.as_ref(), region));
         }
         let parts = CheckedParts {
             elasticity,
@@ -135,23 +92,59 @@ impl CheckedParts {
     }
 }
 
-/// The surface on which the contact of profiles is solved: the curve of the rail unless the case asks for planes. A case that leaves it open and that the
-/// curve does not support is solved on planes, with a remark.
+/// Returns the normal problem with its remarks; `None` without faults if it depends on a faulty member.
+fn normal_task(
+    contact: &Contact,
+    draft: &CaseDraft,
+    elasticity: Option<Elasticity>,
+    known: &KnownPair,
+    limits: &Limits,
+) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
+    let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
+    let load = draft.load.as_ref();
+    let Some(rails) = contact.on_rails() else {
+        let task = contact_task::task(contact, load, modulus, limits.samples_max);
+        return task.transpose().map_err(|fault| vec![fault]);
+    };
+    let (surface, on_planes, fault) = match surface(draft, &rails) {
+        Ok((surface, remark)) => (surface, remark, None),
+        Err(fault) => (ReferenceSurface::Planes, None, Some(fault)),
+    };
+    let unusual = contact_task::unusual(contact);
+    let task = match contact {
+        Contact::Wheelset { .. } => {
+            let motion = draft.motion.as_ref();
+            wheelsets::task(contact, load, motion, modulus, surface, (known, limits))
+        }
+        _ => wheel_task::task(contact, load, modulus, surface, known),
+    };
+    let task = task.map_err(|faults| contact_task::explained(faults, &unusual));
+    match (task, fault) {
+        (Ok(_), Some(fault)) => Err(vec![fault]),
+        (Err(faults), fault) => Err(fault.into_iter().chain(faults).collect()),
+        (Ok(task), None) => Ok(task.map(|(task, mut remarks)| {
+            remarks.extend(unusual);
+            remarks.extend(on_planes.map(RemarkEntry::from));
+            (task, remarks)
+        })),
+    }
+}
+
+/// Returns the surface on which the contact of cross-sections is solved: the curve of the rail, unless the case requests planes. A case that
+/// requests neither and whose method does not support the curve is solved on planes, with a remark.
 ///
 /// # Errors
-/// A method that the requested curve does not support.
-fn surface(given: &PartialCase) -> Result<(ReferenceSurface, Option<Remark>), Fault> {
-    let (asked, influence) = given.contact.map_or((None, None), Contact::surface);
-    if asked == Some(SurfaceName::Plane) {
+/// A method that does not support the requested curve.
+fn surface(
+    draft: &CaseDraft,
+    rails: &OnRails,
+) -> Result<(ReferenceSurface, Option<Remark>), Fault> {
+    let requested = rails.reference_surface;
+    if requested == Some(SurfaceName::Plane) {
         return Ok((ReferenceSurface::Planes, None));
     }
-    let required = asked.is_some() || influence.is_some();
-    let method = given.solver.map(|solver| solver.method);
-    let other_method = !matches!(
-        method,
-        None | Some(MethodName::Auto | MethodName::BoundaryElement)
-    );
-    if other_method {
+    let required = requested.is_some() || rails.influence.is_some();
+    if !draft.may_use_boundary_elements() {
         let reason = "only boundary_element is solved on the curve of the rail";
         if required {
             let detail = format!("{reason}; give contact.reference_surface \"plane\" for it");
@@ -161,29 +154,25 @@ fn surface(given: &PartialCase) -> Result<(ReferenceSurface, Option<Remark>), Fa
         return Ok((ReferenceSurface::Planes, Some(Remark::OnPlanes { reason })));
     }
     let surface = ReferenceSurface::Curve {
-        influence: influence.unwrap_or_default(),
+        influence: rails.influence.unwrap_or_default(),
         required,
     };
     Ok((surface, None))
 }
 
-/// Faults of a history beside what it has to go with.
+/// Returns the faults of a history; none if the motions are not one.
 fn history_faults(
-    given: &PartialCase,
-    history: &HistoryTask,
-    task: Option<&NormalTask>,
+    draft: &CaseDraft,
+    motions: &ExpandedMotions,
+    patches: &[Patch],
     limits: &Limits,
 ) -> Vec<Fault> {
-    let beside = BesideHistory {
-        contact: given.contact,
-        solver: given.solver,
-        outputs: given.outputs,
-        friction: given.friction,
-        patches: &task.and_then(NormalTask::known_patches).unwrap_or_default(),
+    let Some(history) = &motions.history else {
+        return Vec::new();
     };
-    let mut faults = motions::faults(history, &beside, limits);
-    let of_force = |solver: &&Solver| solver.relative_to == Some(RelativeTo::Force);
-    if given.solver.as_ref().is_some_and(of_force) {
+    let mut faults = motions::history_faults(history, draft, patches, limits);
+    let relative_to = draft.solver.and_then(|solver| solver.relative_to);
+    if relative_to == Some(RelativeTo::Force) {
         faults.push(Fault::new(
             "/solver/relative_to",
             "\"force\" given with a history, whose forces pass through 0; \"friction_limit\" is allowed",
@@ -192,80 +181,56 @@ fn history_faults(
     faults
 }
 
-/// The task of a wheel or a wheelset with its remarks; `None` without faults where something it depends on is not known.
-fn on_rails(
-    contact: &Contact,
-    given: &PartialCase,
-    elasticity: Option<Elasticity>,
-    surface: ReferenceSurface,
-    limits: &Limits,
-) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
-    let modulus = elasticity.map(|elasticity| elasticity.contact_modulus());
-    let unusual = contact_task::unusual(contact);
-    let task = match contact {
-        Contact::Wheelset { .. } => {
-            wheelsets::task(contact, given.load, given.motion, modulus, surface, limits)
-        }
-        _ => wheel_task::task(contact, given.load, modulus, surface, given.known),
-    };
-    let task = task.map_err(|faults| contact_task::explained(faults, &unusual))?;
-    Ok(task.map(|(task, mut remarks)| {
-        remarks.extend(unusual);
-        (task, remarks)
-    }))
-}
-
-/// Faults of motions beside what goes with them: contact, friction and its limit under a normal force, and outputs.
+/// Returns the faults of motions together with the contact, friction and outputs.
 fn motion_faults(
-    given: &PartialCase,
-    motions: Option<&ExpandedMotions>,
-    force: Option<f64>,
+    draft: &CaseDraft,
+    motion: &Motions,
+    expanded: &ExpandedMotions,
+    patches: &[Patch],
     limits: &Limits,
 ) -> Vec<Fault> {
-    let (Some(expanded), Some(motion)) = (motions, given.motion) else {
-        return Vec::new();
-    };
-    let of_profiles = matches!(given.contact, Some(Contact::Profiles { .. }));
-    let limit = given
-        .friction
-        .zip(force)
-        .map(|(mu, force)| mu.largest() * force);
+    let friction = draft.friction.as_ref();
+    let of_profiles = matches!(draft.contact, Some(Contact::Profiles { .. }));
+    let known = (!patches.is_empty()).then(|| patches.iter().map(|patch| patch.normal_force).sum());
+    let force: Option<f64> = draft.load.and_then(|load| load.normal_force_n).or(known);
+    let limit = friction.zip(force).map(|(mu, force)| mu.largest() * force);
     let mut faults = expanded.faults(motion, limit, of_profiles);
-    let lies_along = given
-        .friction
-        .is_some_and(|friction| friction.along.is_some());
+    let lies_along = friction.is_some_and(|friction| friction.along.is_some());
     if lies_along && expanded.history.is_none() {
         let detail = "given without a history; rolling is steady only where nothing changes along the track: give /motion/history, or a coefficient";
         faults.push(Fault::new("/friction/along", detail));
     }
-    if let Some(what) = given.friction.and_then(Friction::falls_with) {
-        // Temperatures need speeds whatever they are for, see `after_faults`.
+    if let Some(what) = friction.and_then(Friction::falls_with) {
+        // Temperatures need speeds in any case, see `after_faults`.
         if what == "slip" {
             faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
         }
         faults.extend(expanded.force_fault(motion, what));
-        faults.extend(pull_fault(motion, what));
+        faults.extend(wheelset_force_fault(motion, what));
     }
-    faults.extend(after_faults(given, motion, expanded, limits));
+    faults.extend(after_faults(draft, motion, expanded, limits));
     faults
 }
 
-/// Finds the faults of the tasks that follow the contact, such as subsurface stresses, damage and temperatures.
+/// Returns the faults of the outputs that are computed from the solved contact: stresses, damage and temperatures.
 fn after_faults(
-    given: &PartialCase,
+    draft: &CaseDraft,
     motion: &Motions,
     motions: &ExpandedMotions,
     limits: &Limits,
 ) -> Vec<Fault> {
     let mut faults = Vec::new();
-    if let Some(words) = given.subsurface {
-        faults.extend(after_tasks::fault(words, motions.motions.len(), limits));
-        faults.extend(after_tasks::passage_fault(words, motion));
+    if let Some(words) = &draft.subsurface {
+        faults.extend(after_tasks::faults(
+            words,
+            motion,
+            motions.motions.len(),
+            limits,
+        ));
     }
-    let archard = given
-        .damage
-        .is_some_and(|damage| damage.models.contains(&DamageModel::ArchardWear));
-    let needed = match (given.thermal, archard) {
+    let damage = draft.damage.as_ref();
+    let archard = damage.is_some_and(|damage| damage.models.contains(&DamageModel::ArchardWear));
+    let needed = match (draft.thermal, archard) {
         (Some(_), _) => Some("temperature"),
         (None, true) => Some("archard_wear"),
         (None, false) => None,
@@ -274,8 +239,36 @@ fn after_faults(
     faults
 }
 
-/// The fault of a force under a wheelset's wheel, where friction falls and two velocities may give it.
-fn pull_fault(motion: &Motions, what: &str) -> Option<Fault> {
+/// Returns the faults of a case that needs more cells, memory or motions than allowed. Unknown quantities count with their smallest values.
+fn size_faults(
+    draft: &CaseDraft,
+    region: Option<&NormalTask>,
+    motions: Option<&ExpandedMotions>,
+    limits: &Limits,
+) -> Vec<Fault> {
+    let Some(solver) = &draft.solver else {
+        return Vec::new();
+    };
+    let positions = region.map_or(1, NormalTask::positions);
+    let history = motions.and_then(|motions| motions.history.as_ref());
+    let size = SizeInput {
+        method: solver.method.into(),
+        resolution: resolution(solver),
+        segments: region.map_or_else(|| vec![1.0], segments),
+        motions: motions.map_or(1, |motions| motions.motions.len()) * positions,
+        spinning: motions.map_or(0, |motions| spinning(&motions.motions)) * positions,
+        history: history.is_some(),
+        pressed: history.is_some_and(|history| history.start == HistoryStart::Pressed),
+        fields: draft.outputs().iter().any(|output| output.is_per_cell()),
+        stress_points: draft.subsurface.as_ref().map_or(0, after_tasks::count),
+        ellipse: region.and_then(length_over_width),
+        store: limits.operator_store_bytes,
+    };
+    size.faults(limits)
+}
+
+/// Returns the fault of a force under the wheel of a wheelset, if friction falls so that two velocities may give the force.
+fn wheelset_force_fault(motion: &Motions, what: &str) -> Option<Fault> {
     let [along, across] = wheel_task::wheelset_forces(motion);
     let (name, velocity, several) = match (along, across) {
         (Some(_), _) => ("force_x_n", "angular velocity", "angular velocities"),
@@ -289,8 +282,8 @@ fn pull_fault(motion: &Motions, what: &str) -> Option<Fault> {
     Some(Fault::new(pointer, detail))
 }
 
-/// Faults of a case that the table does not cover, as far as that is known before patches are found.
-fn not_in_table(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> Vec<Fault> {
+/// Returns the faults of a case that the table does not cover, as far as they are known before patches are found.
+fn table_faults(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> Vec<Fault> {
     let unlike = elasticity.and_then(table::unlike);
     let ratio = task.and_then(length_over_width);
     let outside = ratio.and_then(table::outside);
@@ -300,8 +293,8 @@ fn not_in_table(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> V
         .collect()
 }
 
-/// The fault of friction that falls too fast on patches that are known.
-fn falls_too_fast(
+/// Returns the fault of friction that falls too fast on known patches.
+fn too_fast_fault(
     friction: &Friction,
     thermal: Option<&ThermalWords>,
     elasticity: Elasticity,
@@ -314,26 +307,24 @@ fn falls_too_fast(
     Some(Fault::new("/friction", detail))
 }
 
-/// The fault of friction that the method or the contact does not go with.
-fn friction_fault(given: &PartialCase) -> Option<Fault> {
-    let friction = given.friction?;
-    let angles = friction
-        .across
-        .as_ref()
-        .is_some_and(|across| across.angle_rad.is_some());
-    if angles && given.contact.is_some_and(|contact| !contact.has_profiles()) {
+/// Returns the fault of friction that the contact or the method does not support.
+fn friction_fault(draft: &CaseDraft) -> Option<Fault> {
+    let friction = draft.friction.as_ref()?;
+    let across = friction.across.as_ref();
+    let angles = across.is_some_and(|across| across.angle_rad.is_some());
+    let contact = draft.contact.as_ref();
+    if angles && contact.is_some_and(|contact| !contact.has_profiles()) {
         let detail = "given for another contact than \"type\": \"profiles\" or \"wheelset\"; give y_mm instead";
         return Some(Fault::new("/friction/across/angle_rad", detail));
     }
-    let method = given.solver?.method;
-    let covered = matches!(method, MethodName::Auto | MethodName::BoundaryElement);
-    if covered || friction.constant().is_some() {
+    if draft.may_use_boundary_elements() || friction.constant().is_some() {
         return None;
     }
     let detail = "only a coefficient is covered by this method; boundary_element covers laws, layers and reductions";
     Some(Fault::new("/friction", detail))
 }
 
+/// Returns the remark on an unusually large friction coefficient.
 pub(crate) fn unusual_friction(friction: &Friction) -> Option<RemarkEntry> {
     let coefficient = friction.largest();
     let member = match friction.coefficient {
@@ -347,66 +338,13 @@ pub(crate) fn unusual_friction(friction: &Friction) -> Option<RemarkEntry> {
     (coefficient > FRICTION_USUAL_MAX).then(|| remark.at_pointer(member))
 }
 
-fn collect_fault<T>(result: Result<T, Fault>, faults: &mut Vec<Fault>) -> Option<T> {
-    result.map_err(|fault| faults.push(fault)).ok()
-}
-
-/// The normal task and its remarks, if all that it depends on is known; profiles are left to [`wheel_task::task`].
-pub(crate) fn normal_task(
-    contact: Option<&Contact>,
-    load: Option<&Load>,
-    elasticity: Option<&Elasticity>,
-    limits: &Limits,
-) -> Option<Result<(NormalTask, Vec<RemarkEntry>), Fault>> {
-    let contact = contact.filter(|contact| !contact.has_profiles())?;
-    if let Contact::PressureGrid {
-        x_mm,
-        y_mm,
-        pressure_mpa,
-    } = contact
-    {
-        return Some(contact_task::given(
-            x_mm,
-            y_mm,
-            pressure_mpa,
-            limits.samples_max,
-        ));
-    }
-    let Some(load) = load else {
-        return Some(Err(missing_load()));
-    };
-    let modulus = elasticity?.contact_modulus();
-    if let Contact::GapProfile { .. } | Contact::GapGrid { .. } = contact {
-        let task = contact_task::gap(contact, load, modulus, limits.samples_max);
-        return Some(task.map(|task| (task, Vec::new())));
-    }
-    let task = contact_task::hertz(contact, load, modulus);
-    Some(task.map(|task| (task, Vec::new())))
-}
-
-/// The normal force of all patches in N, where it is known before the patches are.
-fn normal_force(task: Option<&NormalTask>, load: Option<&Load>) -> Option<f64> {
-    let given = load.and_then(|load| load.normal_force_n);
-    given.or_else(|| {
-        let patches = task?.known_patches()?;
-        Some(patches.iter().map(|patch| patch.normal_force).sum())
-    })
-}
-
-pub(crate) fn missing_load() -> Fault {
-    Fault::new(
-        "/load",
-        "missing; exactly one of normal_force_n, approach_mm is needed".to_owned(),
-    )
-}
-
-/// Largest |K| that methods which solve pressure and traction one after the other take.
+/// Largest |K| of methods that do not couple pressure and traction.
 const DIFFERENCE_UNCOUPLED: f64 = 0.05;
-/// Differences below this are rounding of equal materials written in two ways.
+/// Differences below this value are rounding errors of equal materials that are given by different moduli.
 const DIFFERENCE_NOISE: f64 = 1e-12;
 
 impl Elasticity {
-    /// Elastic constants of the pair: `1/G = ½(1/G₁ + 1/G₂)`, `ν/G = ½(ν₁/G₁ + ν₂/G₂)`,
+    /// Combines the elastic constants of two bodies: `1/G = ½(1/G₁ + 1/G₂)`, `ν/G = ½(ν₁/G₁ + ν₂/G₂)`,
     /// `K/G = ¼((1−2ν₁)/G₁ − (1−2ν₂)/G₂)` with 1 the upper and 2 the lower body; `G = E/(2(1+ν))` where Young's
     /// modulus is given. G in MPa, ν from 0 to 0.5. Source: Kalker 1990, eq. 1.44.
     pub fn combine(material: &Material) -> Elasticity {
@@ -433,7 +371,7 @@ impl Elasticity {
         }
     }
 
-    /// The fault of bodies that differ too much for a method that does not couple pressure and traction.
+    /// Returns the fault of bodies that differ too much for a method that does not couple pressure and traction.
     pub(crate) fn uncoupled_fault(&self, method: Method) -> Option<Fault> {
         let k = self.difference;
         let needed = method != Method::BoundaryElement && k.abs() > DIFFERENCE_UNCOUPLED;
@@ -446,7 +384,7 @@ impl Elasticity {
         })
     }
 
-    /// The remark an answer carries if the bodies differ and the method does not couple pressure and traction.
+    /// Returns the remark on bodies that differ if the method does not couple pressure and traction.
     pub(crate) fn remark(&self, method: Method) -> Option<Remark> {
         let difference_parameter = self.difference;
         let neglected = difference_parameter != 0.0 && method != Method::BoundaryElement;
@@ -456,7 +394,7 @@ impl Elasticity {
     }
 }
 
-/// A constant of two bodies; that of equal bodies if the two differ by rounding only.
+/// Returns a constant of the pair, or that of equal bodies if the two differ by rounding errors only.
 fn rounded(of_pair: f64, of_like_bodies: f64) -> f64 {
     match (of_pair - of_like_bodies).abs() < DIFFERENCE_NOISE {
         true => of_like_bodies,

@@ -1,12 +1,9 @@
-//! What a case asks of the normal problem: from the words of contact and load to a checked task. Wheel on rail: see `wheel_task.rs`.
-//!
-//! The position of a flange's back in the cross-section of a wheel: stated, or found from the points.
-//!
-//! Lengths of track and wheelset that would be usual in another unit than mm.
+//! From the members `contact` and `load` of a case to the normal problem. Cross-sections are placed in `wheel_task.rs`; the position of the back
+//! of a flange and the check of unusual lengths are here.
 
 use std::ops::RangeInclusive;
 
-use crate::case::words::contact::{Contact, Load};
+use crate::case::words::contact::{Contact, FLANGE_BACKS, GAUGE, Load};
 use crate::error::Fault;
 use crate::geometry::profile::{LengthUnit, Profile};
 use crate::normal::footprint::NormalTask;
@@ -18,151 +15,145 @@ use crate::remark::entry::RemarkEntry;
 use crate::remark::kind::short;
 use crate::remark::list::Remark;
 
-/// Largest pressures of a patch in MPa; others are a mistake rather than a contact.
+/// Plausible largest pressures of a patch in MPa.
 const PRESSURES: RangeInclusive<f64> = 1e-20..=1e12;
-/// Semi-axes in mm.
+/// Plausible semi-axes of a patch in mm.
 const SEMI_AXES: RangeInclusive<f64> = 1e-9..=1e6;
-/// Largest ratio of the semi-axes.
+/// Largest plausible ratio of the semi-axes.
 const SLENDERNESS_MAX: f64 = 1e4;
 
-/// Hertz's ellipse for `radii` or `ellipse`, with the contact modulus `E*` in MPa.
+/// Returns the normal problem of a contact without cross-sections with its remarks; `None` if it is not such a contact, or if its load or the
+/// contact modulus in MPa is unknown.
 ///
 /// # Errors
-/// A fault at `/load` or `/contact` if the patch is absurdly large, small, slender or heavily loaded.
-pub(crate) fn hertz(
+/// A fault at `/load` or `/contact`, if patches are absurdly large, small, slender or heavily loaded, or if samples are unsuitable.
+pub(crate) fn task(
     contact: &Contact,
-    load: &Load,
-    contact_modulus: f64,
-) -> Result<NormalTask, Fault> {
-    let loading = loading(load);
-    let ellipse = match *contact {
+    load: Option<&Load>,
+    contact_modulus: Option<f64>,
+    samples_max: usize,
+) -> Option<Result<(NormalTask, Vec<RemarkEntry>), Fault>> {
+    let loaded = || Some((loading(load?), contact_modulus?));
+    Some(match contact {
         Contact::Radii {
             rolling_mm,
             lateral_mm,
-        } => Ellipse::of_radii(rolling_mm, lateral_mm, loading, contact_modulus),
+        } => {
+            let (loading, modulus) = loaded()?;
+            hertz(Ellipse::of_radii(
+                *rolling_mm,
+                *lateral_mm,
+                loading,
+                modulus,
+            ))
+        }
         Contact::Ellipse { a_mm, b_mm } => {
-            Ellipse::of_semi_axes(a_mm, b_mm, loading, contact_modulus)
+            let (loading, modulus) = loaded()?;
+            hertz(Ellipse::of_semi_axes(*a_mm, *b_mm, loading, modulus))
         }
-        _ => {
-            return Err(Fault::new(
-                "/contact/type",
-                "neither gaps nor profiles nor pressures on a grid make an ellipse".to_owned(),
-            ));
+        Contact::GapProfile {
+            rolling_mm,
+            y_mm,
+            gap_mm,
+        } => {
+            let surface = || GapSurface::profile(*rolling_mm, y_mm, gap_mm);
+            gap(surface, y_mm.len(), samples_max, loaded()?)
         }
-    };
-    plausible(&ellipse.patch(), "/load")?;
-    Ok(NormalTask::Hertz(ellipse))
+        Contact::GapGrid { x_mm, y_mm, gap_mm } => {
+            let samples = x_mm.len().saturating_mul(y_mm.len());
+            let surface = || GapSurface::grid(x_mm, y_mm, gap_mm);
+            gap(surface, samples, samples_max, loaded()?)
+        }
+        Contact::PressureGrid {
+            x_mm,
+            y_mm,
+            pressure_mpa,
+        } => given(x_mm, y_mm, pressure_mpa, samples_max),
+        Contact::Profiles { .. } | Contact::Wheelset { .. } => return None,
+    })
 }
 
-/// A pressure given on a grid, with remarks for the answer;
-/// `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
-///
-/// # Errors
-/// A fault in `/contact` if the grid has too many samples, no contact or too many patches.
-pub(crate) fn given(
+fn hertz(ellipse: Ellipse) -> Result<(NormalTask, Vec<RemarkEntry>), Fault> {
+    plausible(&ellipse.patch(), "/load")?;
+    Ok((NormalTask::Hertz(ellipse), Vec::new()))
+}
+
+/// Returns the normal problem of a pressure on a grid; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
+fn given(
     x: &[f64],
     y: &[f64],
     pressure: &[Vec<f64>],
     samples_max: usize,
 ) -> Result<(NormalTask, Vec<RemarkEntry>), Fault> {
-    let samples = x.len().saturating_mul(y.len());
-    if samples > samples_max {
-        return Err(Fault::new(
-            "/contact/pressure_mpa",
-            format!("{samples} samples given; at most {samples_max} are allowed"),
-        ));
-    }
-    let (field, remarks) = PressureField::new(x, y, pressure)
-        .map_err(|detail| Fault::new("/contact/pressure_mpa", detail))?;
+    let pointer = "/contact/pressure_mpa";
+    require_few(x.len().saturating_mul(y.len()), samples_max, pointer)?;
+    let (field, remarks) =
+        PressureField::new(x, y, pressure).map_err(|detail| Fault::new(pointer, detail))?;
     for patch in field.patches() {
-        plausible(&patch, "/contact/pressure_mpa")?;
+        plausible(&patch, pointer)?;
     }
     Ok((NormalTask::Given(field), remarks))
 }
 
-/// The task of a gap, with the contact modulus `E*` in MPa.
-///
-/// # Errors
-/// A fault if the gap has too many samples, no least value inside, or an approach that does not reach it; or if the
-/// contact is no gap.
-pub(crate) fn gap(
-    contact: &Contact,
-    load: &Load,
-    contact_modulus: f64,
+/// Returns the normal problem of a gap.
+fn gap(
+    surface: impl FnOnce() -> GapSurface,
+    samples: usize,
     samples_max: usize,
-) -> Result<NormalTask, Fault> {
-    let (gap, samples) = match contact {
-        Contact::GapProfile {
-            rolling_mm,
-            y_mm,
-            gap_mm,
-        } => (GapSurface::profile(*rolling_mm, y_mm, gap_mm), y_mm.len()),
-        Contact::GapGrid { x_mm, y_mm, gap_mm } => {
-            let samples = x_mm.len().saturating_mul(y_mm.len());
-            (GapSurface::grid(x_mm, y_mm, gap_mm), samples)
-        }
-        _ => return Err(Fault::new("/contact/type", "not a gap".to_owned())),
-    };
-    if samples > samples_max {
-        return Err(Fault::new(
-            "/contact/gap_mm",
-            format!("{samples} samples given; at most {samples_max} are allowed"),
-        ));
-    }
+    (loading, contact_modulus): (NormalLoad, f64),
+) -> Result<(NormalTask, Vec<RemarkEntry>), Fault> {
+    require_few(samples, samples_max, "/contact/gap_mm")?;
     let contact = GapTask {
-        gap,
-        loading: loading(load),
+        gap: surface(),
+        loading,
         contact_modulus,
         seen: PreviewCache::default(),
     };
     contact
         .check()
         .map_err(|(pointer, reason)| Fault::new(pointer, reason))?;
-    Ok(NormalTask::Gap(Box::new(contact)))
+    Ok((NormalTask::Gap(Box::new(contact)), Vec::new()))
 }
 
-/// Refuses a patch that is absurdly large, small, slender or heavily loaded; `load_pointer` is what loads it.
+fn require_few(samples: usize, most: usize, pointer: &str) -> Result<(), Fault> {
+    if samples <= most {
+        return Ok(());
+    }
+    let detail = format!("{samples} samples given; at most {most} are allowed");
+    Err(Fault::new(pointer, detail))
+}
+
+/// Refuses a patch that is absurdly large, small, slender or heavily loaded; `load_pointer` points to the load.
 pub(crate) fn plausible(patch: &Patch, load_pointer: &str) -> Result<(), Fault> {
     let [x_min, x_max, y_min, y_max] = patch.extent;
     let (a, b) = (0.5 * (x_max - x_min), 0.5 * (y_max - y_min));
+    let refused = |pointer: &str, detail: String| Err(Fault::new(pointer, detail));
     if ![a, b].iter().all(|axis| SEMI_AXES.contains(axis)) {
-        return Err(Fault::new(
-            "/contact",
-            format!(
-                "a patch with semi-axes of {} mm by {} mm results; {:e} to {:e} mm are allowed",
-                short(a),
-                short(b),
-                SEMI_AXES.start(),
-                SEMI_AXES.end()
-            ),
-        ));
+        let (least, most) = (SEMI_AXES.start(), SEMI_AXES.end());
+        let (a, b) = (short(a), short(b));
+        let detail = format!(
+            "a patch with semi-axes of {a} mm by {b} mm results; {least:e} to {most:e} mm are allowed"
+        );
+        return refused("/contact", detail);
     }
     if patch.area.is_nan() || patch.area <= 0.0 {
-        return Err(Fault::new(
-            load_pointer,
-            "the edge of a patch cannot be determined from these samples; a finer or more even grid is needed".to_owned(),
-        ));
+        let detail = "the edge of a patch cannot be determined from these samples; a finer or more even grid is needed";
+        return refused(load_pointer, detail.to_owned());
     }
     if a.max(b) > SLENDERNESS_MAX * a.min(b) {
-        return Err(Fault::new(
-            "/contact",
-            format!(
-                "a patch with semi-axes of {} mm by {} mm results; a ratio of at most {SLENDERNESS_MAX:e} is allowed",
-                short(a),
-                short(b)
-            ),
-        ));
+        let (a, b) = (short(a), short(b));
+        let detail = format!(
+            "a patch with semi-axes of {a} mm by {b} mm results; a ratio of at most {SLENDERNESS_MAX:e} is allowed"
+        );
+        return refused("/contact", detail);
     }
     if !PRESSURES.contains(&patch.pressure_max) {
-        return Err(Fault::new(
-            load_pointer,
-            format!(
-                "the largest pressure of a patch is {} MPa; {:e} to {:e} MPa are allowed",
-                short(patch.pressure_max),
-                PRESSURES.start(),
-                PRESSURES.end()
-            ),
-        ));
+        let (least, most) = (PRESSURES.start(), PRESSURES.end());
+        let largest = short(patch.pressure_max);
+        let detail = format!(
+            "the largest pressure of a patch is {largest} MPa; {least:e} to {most:e} MPa are allowed"
+        );
+        return refused(load_pointer, detail);
     }
     Ok(())
 }
@@ -174,34 +165,32 @@ fn loading(load: &Load) -> NormalLoad {
     }
 }
 
-/// y of the back in mm where the origin is the running circle, as in EN 13715.
-const USUAL: f64 = -70.0;
-/// Difference in mm up to which the points agree with the usual position.
-const AGREES: f64 = 0.5;
-/// Difference in mm up to which the points agree with a stated position: backs are measured at different heights.
+/// y of the back of a flange in mm if the origin is the running circle, as in EN 13715.
+const BACK_USUAL: f64 = -70.0;
+/// Largest difference in mm at which the points agree with the usual position.
+const AGREES_WITH_USUAL: f64 = 0.5;
+/// Largest difference in mm at which the points agree with a stated position. Backs are measured at different heights.
 const AGREES_WITH_STATED: f64 = 5.0;
-/// Largest distance in mm from the last point of a flange to a back that was not measured. Flanges are up to 35 mm thick; made-up wheels are thicker.
+/// Largest distance in mm from the last point of a flange to a back that was not measured. Flanges are up to 35 mm thick; invented wheels are
+/// thicker.
 const THICKNESS_MAX: f64 = 60.0;
 
-/// y of the back of the flange in mm, with a remark at the pointer of the wheel.
+/// Returns y of the back of the flange in mm, with a remark if it was found from the points or contradicts them.
 ///
 /// # Errors
-/// A stated position outside the points of a flange, or none although the points do not show it.
+/// A stated position outside the points of the flange, or points that do not show a position that is not stated.
 pub(crate) fn position(
     wheel: &Profile,
-    pointer: &str,
     stated: Option<f64>,
     flange_back_distance: f64,
-) -> Result<(f64, Option<RemarkEntry>), Fault> {
+) -> Result<(f64, Option<Remark>), Fault> {
     let found = match stated {
-        // A wheel without a distance of backs is placed by its origin.
+        // Without a distance of the backs, the wheel is placed by its origin.
         Some(given) if flange_back_distance == 0.0 => Ok((given, None)),
         Some(given) => check_stated(wheel, given).map(|remark| (given, remark)),
         None => find(wheel),
     };
-    found
-        .map(|(back, remark)| (back, remark.map(|remark| remark.at_pointer(pointer))))
-        .map_err(|detail| Fault::new("/contact/flange_back_position_mm", detail))
+    found.map_err(|detail| Fault::new("/contact/flange_back_position_mm", detail))
 }
 
 fn check_stated(wheel: &Profile, given: f64) -> Result<Option<Remark>, String> {
@@ -234,9 +223,9 @@ fn check_stated(wheel: &Profile, given: f64) -> Result<Option<Remark>, String> {
 
 fn find(wheel: &Profile) -> Result<(f64, Option<Remark>), String> {
     match wheel.flange().and_then(|flange| flange.back) {
-        Some(back) if (back - USUAL).abs() <= AGREES => Ok((USUAL, None)),
+        Some(back) if (back - BACK_USUAL).abs() <= AGREES_WITH_USUAL => Ok((BACK_USUAL, None)),
         Some(back) => {
-            // Four decimals, as coordinates are answered.
+            // Coordinates in answers have four decimals.
             let back = (1e4 * back).round() / 1e4;
             let remark = Remark::FlangeBackFound {
                 profile: "wheel",
@@ -247,53 +236,31 @@ fn find(wheel: &Profile) -> Result<(f64, Option<Remark>), String> {
         // The usual position belongs to points whose y is 0 at the running circle.
         None => {
             let [first, last] = wheel.width();
-            let fits = first < 0.0 && last > 0.0 && first >= USUAL - AGREES;
-            fits.then_some((USUAL, None)).ok_or_else(|| {
+            let fits = first < 0.0 && last > 0.0 && first >= BACK_USUAL - AGREES_WITH_USUAL;
+            fits.then_some((BACK_USUAL, None)).ok_or_else(|| {
                 format!(
                     "no value given, and the points of the wheel, from y = {first:.2} to {last:.2} mm, do not show the back of its flange; \
-                     the usual {USUAL} mm holds only where y = 0 is the running circle: state the position"
+                     the usual {BACK_USUAL} mm holds only where y = 0 is the running circle: state the position"
                 )
             })
         }
     }
 }
 
-/// Usual gauge in mm: standard gauge.
-pub(crate) const GAUGE: f64 = 1435.0;
-/// Usual distance of the backs of the flanges in mm, on standard gauge.
-pub(crate) const FLANGE_BACKS: f64 = 1360.0;
-
-/// Remarks on the lengths of a wheel or a wheelset on rails, each with the pointer to its member.
+/// Returns remarks on lengths of a contact with cross-sections that would be usual in another unit.
 pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
-    let (Contact::Profiles {
-        gauge_mm,
-        rail_origin_mm,
-        flange_back_distance_mm,
-        rolling_radius_mm,
-        ..
-    }
-    | Contact::Wheelset {
-        gauge_mm,
-        rail_origin_mm,
-        flange_back_distance_mm,
-        rolling_radius_mm,
-        ..
-    }) = contact
-    else {
+    let Some(rails) = contact.on_rails() else {
         return Vec::new();
     };
-    // Usual values on standard gauge, for UIC wheels of 920 mm diameter.
+    // Usual values are those of standard gauge and of UIC wheels with a diameter of 920 mm.
+    let backs = Some(rails.flange_back_distance_mm);
     let lengths = [
-        ("/contact/gauge_mm", *gauge_mm, GAUGE),
-        ("/contact/rail_origin_mm", *rail_origin_mm, 752.5),
-        (
-            "/contact/flange_back_distance_mm",
-            Some(*flange_back_distance_mm),
-            FLANGE_BACKS,
-        ),
+        ("/contact/gauge_mm", rails.gauge_mm, GAUGE),
+        ("/contact/rail_origin_mm", rails.rail_origin_mm, 752.5),
+        ("/contact/flange_back_distance_mm", backs, FLANGE_BACKS),
         (
             "/contact/rolling_radius_mm",
-            Some(*rolling_radius_mm),
+            Some(rails.rolling_radius_mm),
             460.0,
         ),
     ];
@@ -306,7 +273,7 @@ pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
     lengths.into_iter().filter_map(remark).collect()
 }
 
-/// Faults of the placement, with the lengths that may be the reason.
+/// Appends the remarks on unusual lengths to faults of the placement, which may be their reason.
 pub(crate) fn explained(faults: Vec<Fault>, unusual: &[RemarkEntry]) -> Vec<Fault> {
     let explain = |mut fault: Fault| {
         let about_place = ["/contact", "/contact/rolling_radius_mm"];

@@ -1,17 +1,14 @@
-//! Between the words of a case and the types of the numerics: a change of a solver does not change the contract.
+//! Conversions from the members of a case to the types of the numerics.
 
 use crate::case::words::friction::Friction;
 use crate::case::words::material::ThermalWords;
-use crate::case::words::motion::MotionWords;
-use crate::case::words::solver::{MeshSizeWords, MethodName, Output};
+use crate::case::words::solver::MethodName;
 use crate::friction::coefficient_table::CoefficientTable;
 use crate::friction::law::{AcrossLaw, AcrossPlace, FrictionLaw};
 use crate::friction::path_dependent::{HeatedLaw, Interface, LayerYield};
 use crate::friction::velocity_weakening::{FallingLaw, SofteningTerm};
-use crate::mesh::MeshSize;
 use crate::method::Method;
 use crate::post::local_power::ThermalTask;
-use crate::rolling::task::Motion;
 
 impl From<Method> for MethodName {
     fn from(method: Method) -> MethodName {
@@ -24,32 +21,12 @@ impl From<Method> for MethodName {
     }
 }
 
-impl From<MotionWords> for Motion {
-    fn from(words: MotionWords) -> Motion {
-        Motion {
-            creepage_x: words.creepage_x,
-            creepage_y: words.creepage_y,
-            spin_per_mm: words.spin_per_mm,
-        }
-    }
-}
-
-impl From<Motion> for MotionWords {
-    fn from(motion: Motion) -> MotionWords {
-        MotionWords {
-            creepage_x: motion.creepage_x,
-            creepage_y: motion.creepage_y,
-            spin_per_mm: motion.spin_per_mm,
-        }
-    }
-}
-
 impl FrictionLaw {
-    /// The law of the words of a case; `thermal` belongs to a coefficient that falls with temperature.
+    /// Returns the friction law of a case. A coefficient that falls with temperature needs `thermal`.
     pub(crate) fn new(words: &Friction, thermal: Option<&ThermalWords>) -> FrictionLaw {
         if let Some(law) = &words.by_temperature {
             let task = thermal.map(|words| ThermalTask::from(*words));
-            // Without thermal constants, which is a fault, nothing is heated.
+            // Missing thermal constants are a fault of the case. Nothing is heated then.
             let (base, rise) = task.map_or((0.0, 0.0), |t| (t.without_heat(), t.rise_of(1.0)));
             let heated = HeatedLaw::new(&law.temperature_c, &law.coefficient, base, rise);
             return FrictionLaw::Heated(heated);
@@ -97,29 +74,6 @@ impl From<&Friction> for Interface {
                     hardening: layer.hardening_mpa_per_mm.unwrap_or(0.0),
                 })
             }),
-        }
-    }
-}
-
-impl From<MeshSizeWords> for MeshSize {
-    fn from(words: MeshSizeWords) -> MeshSize {
-        MeshSize {
-            strips: words.strips,
-            cells: words.cells,
-        }
-    }
-}
-
-impl Output {
-    /// Has it a value per cell?
-    pub fn is_per_cell(self) -> bool {
-        match self {
-            Output::Resultants | Output::Subsurface | Output::Damage | Output::Gradients => false,
-            Output::Zones
-            | Output::Tractions
-            | Output::Pressure
-            | Output::Slip
-            | Output::Temperature => true,
         }
     }
 }

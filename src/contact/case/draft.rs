@@ -1,71 +1,65 @@
-//! Reads a case from JSON and says everything that is wrong with it, at once.
+//! Reads a case from JSON and lists all of its faults.
 //!
-//! A member that is absent, of the wrong type, out of range, unknown or contradictory gets a fault with its JSON
-//! pointer (RFC 6901), the value received and what is allowed. Nothing is repaired.
+//! A member that is absent, of the wrong type, out of range, unknown or contradictory gets a fault with its JSON pointer (RFC 6901), the
+//! value received and what is allowed. Nothing is repaired.
 
 use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::case::checks::PartialCase;
-use crate::case::solver::KnownPair;
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, ThermalWords};
 use crate::case::words::motion::Motions;
 use crate::case::words::object::{Faults, Member, Object, has_controls, join, shown};
-use crate::case::words::solver::{Case, Output, Solver};
+use crate::case::words::solver::{Case, MethodName, Output, Solver};
 use crate::case::words::subsurface::{DamageWords, SubsurfaceWords};
 use crate::case::words::{contact, material, motion, solver, subsurface};
 use crate::error::{CaseError, Fault};
 use crate::method::Method;
 
-/// Most characters of the name of a case.
+/// Maximum number of characters of the name of a case.
 const NAME_LENGTH_MAX: usize = 200;
-/// Most labels of a case.
+/// Maximum number of labels of a case.
 const LABELS_MAX: usize = 32;
-/// Most characters of the key of a label.
+/// Maximum number of characters of the key of a label.
 const LABEL_KEY_LENGTH_MAX: usize = 64;
-/// Most characters of its value.
+/// Maximum number of characters of the value of a label.
 const LABEL_VALUE_LENGTH_MAX: usize = 256;
 
-/// What could be read of a case: the parts without a fault.
-///
-/// `None` in a required part means that it is faulty or absent; the fault is in the list that came with the draft.
+/// The members of a case that could be read. A member is `None` if it is absent or faulty.
 #[derive(Debug, Default)]
 pub(crate) struct CaseDraft {
     name: Option<String>,
     labels: BTreeMap<String, String>,
-    material: Option<Material>,
-    friction: Option<Friction>,
-    contact: Option<Contact>,
-    load: Option<Load>,
-    motion: Option<Motions>,
-    solver: Option<Solver>,
-    outputs: Option<Vec<Output>>,
-    /// Of these the inner `None` means that the case does not want them.
-    subsurface: Option<Option<SubsurfaceWords>>,
-    damage: Option<Option<DamageWords>>,
-    thermal: Option<Option<ThermalWords>>,
+    pub(crate) material: Option<Material>,
+    pub(crate) friction: Option<Friction>,
+    /// Also `None` if the contact needs a load and has none.
+    pub(crate) contact: Option<Contact>,
+    pub(crate) load: Option<Load>,
+    pub(crate) motion: Option<Motions>,
+    pub(crate) solver: Option<Solver>,
+    pub(crate) outputs: Option<Vec<Output>>,
+    pub(crate) subsurface: Option<SubsurfaceWords>,
+    pub(crate) damage: Option<DamageWords>,
+    pub(crate) thermal: Option<ThermalWords>,
 }
 
 impl Case {
     /// Reads a case from JSON.
     ///
-    /// Left-out `solver` and `outputs` get their defaults; `outputs` are sorted and named once.
+    /// Absent members `solver` and `outputs` get their defaults; `outputs` are sorted and without repetition.
     ///
     /// # Errors
-    /// Every fault of the text, at most the first hundred one by one.
+    /// All faults of the text; beyond the first hundred only their number.
     pub fn read(value: &Value) -> Result<Case, CaseError> {
         let (draft, faults) = draft(value);
-        draft
-            .complete()
-            .filter(|_| faults.is_empty())
-            .ok_or(CaseError(faults))
+        let case = draft.complete().filter(|_| faults.is_empty());
+        case.ok_or(CaseError(faults))
     }
 }
 
-/// Reads what can be read, and lists the faults of the rest.
+/// Reads the members of a case and returns them with the faults of the others.
 pub(crate) fn draft(value: &Value) -> (CaseDraft, Vec<Fault>) {
     let mut faults = Faults::default();
     let draft = Object::open(value, String::new(), &mut faults)
@@ -75,31 +69,25 @@ pub(crate) fn draft(value: &Value) -> (CaseDraft, Vec<Fault>) {
 }
 
 impl CaseDraft {
-    /// The parts that could be read. Without a load no patch of a contact can be found that needs one.
-    pub(crate) fn given<'a>(&'a self, known: &'a KnownPair) -> PartialCase<'a> {
-        let without_load = matches!(
-            self.contact,
-            Some(
-                Contact::PressureGrid { .. } | Contact::Profiles { .. } | Contact::Wheelset { .. }
-            )
-        );
-        let contact = self.contact.as_ref();
-        PartialCase {
-            known,
-            material: self.material.as_ref(),
-            friction: self.friction.as_ref(),
-            contact: contact.filter(|_| without_load || self.load.is_some()),
-            load: self.load.as_ref(),
-            motion: self.motion.as_ref(),
-            solver: self.solver.as_ref(),
-            outputs: self.outputs.as_deref().unwrap_or_default(),
-            subsurface: self.subsurface.as_ref().and_then(Option::as_ref),
-            damage: self.damage.as_ref().and_then(Option::as_ref),
-            thermal: self.thermal.as_ref().and_then(Option::as_ref),
-        }
+    /// The method, if the case names one that exists.
+    pub(crate) fn method(&self) -> Option<MethodName> {
+        self.solver.map(|solver| solver.method)
     }
 
-    /// The case, if every required part could be read.
+    /// Whether the method is `boundary_element`, `auto` or unknown.
+    pub(crate) fn may_use_boundary_elements(&self) -> bool {
+        matches!(
+            self.method(),
+            None | Some(MethodName::Auto | MethodName::BoundaryElement)
+        )
+    }
+
+    /// Returns the requested outputs.
+    pub(crate) fn outputs(&self) -> &[Output] {
+        self.outputs.as_deref().unwrap_or_default()
+    }
+
+    /// Returns the case, if all required members could be read.
     pub(crate) fn complete(self) -> Option<Case> {
         Some(Case {
             name: self.name,
@@ -111,9 +99,9 @@ impl CaseDraft {
             motion: self.motion?,
             solver: self.solver?,
             outputs: self.outputs?,
-            subsurface: self.subsurface?,
-            damage: self.damage?,
-            thermal: self.thermal?,
+            subsurface: self.subsurface,
+            damage: self.damage,
+            thermal: self.thermal,
         })
     }
 }
@@ -139,6 +127,11 @@ fn read(case: &mut Object) -> CaseDraft {
     let friction = Friction::read(case, "friction");
     let contact = contact::read(case);
     let load = contact::read_load(case);
+    // Faults of a contact without its load would only repeat that the load is missing.
+    let contact = contact.filter(|contact| {
+        let has_load = matches!(contact, Contact::PressureGrid { .. }) || contact.has_profiles();
+        load.is_some() || has_load
+    });
     let motion = motion::read(case);
     let solver = solver::read(case);
     let method = solver.as_ref().map(|solver| solver.method);
@@ -146,7 +139,7 @@ fn read(case: &mut Object) -> CaseDraft {
     let outputs = solver::read_outputs(case, without_fields);
     let asks = |output| outputs.as_ref().map(|outputs| outputs.contains(&output));
     let wanted = |output| asks(output).unwrap_or(true);
-    let subsurface = subsurface::read_subsurface(case, wanted(Output::Subsurface));
+    let subsurface = subsurface::read_subsurface(case, wanted(Output::Subsurface)).flatten();
     let damage = subsurface::read_damage(case, wanted(Output::Damage), without_fields.is_some());
     let heated = friction
         .as_ref()
@@ -156,7 +149,7 @@ fn read(case: &mut Object) -> CaseDraft {
         (Some(false), Some(false)) => Some(false),
         _ => None,
     };
-    let thermal = material::read_thermal(case, thermal);
+    let thermal = material::read_thermal(case, thermal).flatten();
     CaseDraft {
         name,
         labels,
@@ -168,7 +161,7 @@ fn read(case: &mut Object) -> CaseDraft {
         solver,
         outputs,
         subsurface,
-        damage,
+        damage: damage.flatten(),
         thermal,
     }
 }
@@ -178,54 +171,43 @@ fn labels(case: &mut Object) -> BTreeMap<String, String> {
     let Some(value) = case.value("labels") else {
         return labels;
     };
-    let pointer = case.pointer_to("labels");
     let Value::Object(members) = value else {
-        case.fault(
-            "labels",
-            format!("{} given; an object of texts is needed", shown(value)),
-        );
+        let given = shown(value);
+        let detail = format!("{given} given; an object of texts is needed");
+        case.fault("labels", detail);
         return labels;
     };
     if members.len() > LABELS_MAX {
-        case.fault(
-            "labels",
-            format!(
-                "{} labels given; at most {LABELS_MAX} are allowed",
-                members.len()
-            ),
-        );
+        let count = members.len();
+        let detail = format!("{count} labels given; at most {LABELS_MAX} are allowed");
+        case.fault("labels", detail);
         return labels;
     }
+    let pointer = case.pointer_to("labels");
     for (key, value) in members {
+        let pointer = join(&pointer, key);
         let length = key.chars().count();
         if length == 0 || length > LABEL_KEY_LENGTH_MAX {
-            case.faults().add(
-                join(&pointer, key),
-                format!(
-                    "a key of {length} characters given; 1 to {LABEL_KEY_LENGTH_MAX} are allowed"
-                ),
+            let detail = format!(
+                "a key of {length} characters given; 1 to {LABEL_KEY_LENGTH_MAX} are allowed"
             );
+            case.faults().add(&pointer, detail);
         } else if has_controls(key) || key.contains(':') {
-            case.faults().add(
-                join(&pointer, key),
-                format!(
-                    "the key {key:?} given; colons and control characters are not allowed in keys"
-                ),
+            let detail = format!(
+                "the key {key:?} given; colons and control characters are not allowed in keys"
             );
+            case.faults().add(&pointer, detail);
         }
-        match value.as_str() {
-            Some(text)
-                if text.chars().count() <= LABEL_VALUE_LENGTH_MAX && !has_controls(text) =>
-            {
-                labels.insert(key.clone(), text.to_owned());
-            }
-            _ => case.faults().add(
-                join(&pointer, key),
-                format!(
-                    "{} given; a text of at most {LABEL_VALUE_LENGTH_MAX} characters without control characters is needed",
-                    shown(value)
-                ),
-            ),
+        let is_sound =
+            |text: &&str| text.chars().count() <= LABEL_VALUE_LENGTH_MAX && !has_controls(text);
+        if let Some(text) = value.as_str().filter(is_sound) {
+            labels.insert(key.clone(), text.to_owned());
+        } else {
+            let given = shown(value);
+            let detail = format!(
+                "{given} given; a text of at most {LABEL_VALUE_LENGTH_MAX} characters without control characters is needed"
+            );
+            case.faults().add(&pointer, detail);
         }
     }
     labels

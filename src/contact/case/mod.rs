@@ -1,4 +1,4 @@
-//! The question: the words a client writes, how they are read, and what they become once checked.
+//! A case: the members that a client writes, how they are read and checked.
 
 pub mod after_tasks;
 pub mod check;

@@ -1,7 +1,6 @@
-//! Writes out the motions of a case: sweeps become lists.
-//!
-//! What a history goes with: contact, method, material and outputs, and how long it may be.
+//! Expands the motions of a case to lists, and checks them together with its other members.
 
+use crate::case::draft::CaseDraft;
 use crate::case::solver::Limits;
 use crate::case::words::contact::Contact;
 use crate::case::words::friction::Friction;
@@ -9,7 +8,7 @@ use crate::case::words::motion::{
     AskedMotion, Combine, History, HistoryCourse, Motions, Sweep, Swept, Wheelset,
 };
 use crate::case::words::object::FAULTS_MAX;
-use crate::case::words::solver::{MethodName, Output, Solver};
+use crate::case::words::solver::Output;
 use crate::error::Fault;
 use crate::normal::hertz::Patch;
 use crate::rolling::history::plan::{HistoryStart, HistoryTask};
@@ -19,20 +18,20 @@ use crate::rolling::task::{Motion, PrescribedForces};
 /// The motions of a case in order, never empty.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ExpandedMotions {
-    /// Creepages are 0 where a force is prescribed.
+    /// The motions. A creepage is 0 if its force is prescribed.
     pub(crate) motions: Vec<Motion>,
-    /// What is prescribed instead, motion by motion.
+    /// The prescribed forces of each motion.
     pub(crate) forces: Vec<PrescribedForces>,
-    /// Rolling speeds in mm/s, where they are given.
+    /// The rolling speed of each motion in mm/s, if it is given.
     pub(crate) speeds: Vec<Option<f64>>,
-    /// How they follow each other, where they are one history.
+    /// Distances and shifts, if the motions are one history.
     pub(crate) history: Option<HistoryTask>,
 }
 
-/// The motions and prescribed forces of a case.
+/// Returns the motions of a case.
 ///
 /// # Errors
-/// See [`list`].
+/// A fault at `/motion` if there are more motions than the limits allow.
 pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<ExpandedMotions, Fault> {
     let list = list(motions, limits)?;
     let motion = |asked: &AskedMotion| Motion {
@@ -52,8 +51,8 @@ pub(crate) fn expand(motions: &Motions, limits: &Limits) -> Result<ExpandedMotio
 }
 
 impl ExpandedMotions {
-    /// Faults of prescribed forces: more than friction can carry, where the limit μN is known, or a contact without
-    /// one common frame.
+    /// Returns the faults of prescribed forces that friction cannot carry, if the limit μN in N is known, or that a contact of profiles does
+    /// not support.
     pub(crate) fn faults(
         &self,
         given: &Motions,
@@ -62,8 +61,8 @@ impl ExpandedMotions {
     ) -> Vec<Fault> {
         let mut faults = Vec::new();
         for (index, forces) in self.forces.iter().enumerate() {
-            let Some(k) = larger(forces) else { continue };
-            let pointer = pointer(given, index, ["force_x_n", "force_y_n"][k]);
+            let Some(name) = larger(forces) else { continue };
+            let pointer = pointer(given, index, name);
             let [x, y] = forces.map(|force| force.unwrap_or(0.0));
             let length = x.hypot(y);
             let detail = if of_profiles && self.history.is_some() {
@@ -90,21 +89,19 @@ impl ExpandedMotions {
         }
         faults
     }
-}
 
-impl ExpandedMotions {
-    /// The fault of the first prescribed force, where friction falls with slip: the force has a maximum, below which two creepages give it.
+    /// Returns the fault of the first prescribed force together with friction that falls with `what`: two creepages may give the force.
     pub(crate) fn force_fault(&self, given: &Motions, what: &str) -> Option<Fault> {
         let mut forces = self.forces.iter().enumerate();
-        let (index, k) = forces.find_map(|(index, forces)| Some((index, larger(forces)?)))?;
-        let pointer = pointer(given, index, ["force_x_n", "force_y_n"][k]);
+        let (index, name) = forces.find_map(|(index, forces)| Some((index, larger(forces)?)))?;
+        let pointer = pointer(given, index, name);
         let detail = format!(
             "given with friction that falls with {what}, where two creepages may give one force; sweep the creepage instead"
         );
         Some(Fault::new(pointer, detail))
     }
 
-    /// The fault of the first motion without a rolling speed, where one is needed for `what`.
+    /// Returns the fault of the first motion without the rolling speed that `what` needs.
     pub(crate) fn speed_fault(&self, given: &Motions, what: &str) -> Option<Fault> {
         let first = self.speeds.iter().position(Option::is_none)?;
         let pointer = pointer(given, first, "speed_mm_per_s");
@@ -113,16 +110,17 @@ impl ExpandedMotions {
     }
 }
 
-/// The component with the larger prescribed force, if there is any.
-fn larger(forces: &PrescribedForces) -> Option<usize> {
+/// Returns the name of the larger prescribed force, if there is any.
+fn larger(forces: &PrescribedForces) -> Option<&'static str> {
     match forces {
         [None, None] => None,
-        [Some(_), None] => Some(0),
-        [None, Some(_)] => Some(1),
-        [Some(x), Some(y)] => Some(usize::from(y.abs() > x.abs())),
+        [Some(x), Some(y)] if y.abs() > x.abs() => Some("force_y_n"),
+        [Some(_), _] => Some("force_x_n"),
+        [None, Some(_)] => Some("force_y_n"),
     }
 }
 
+/// Returns the JSON pointer to the member `name` of motion `index`.
 fn pointer(given: &Motions, index: usize, name: &str) -> String {
     match given {
         Motions::Many(_) => format!("/motion/{index}/{name}"),
@@ -134,54 +132,47 @@ fn pointer(given: &Motions, index: usize, name: &str) -> String {
     }
 }
 
-/// The motions in order, never empty. In a grid the last named component varies fastest, in the fixed order
-/// `creepage_x`, `creepage_y`, `spin_per_mm`; a force stands in the place of its creepage.
-///
-/// # Errors
-/// A fault at `/motion` if there are more than the limits allow.
+/// Returns the motions in order, never empty. In a grid the last component of `creepage_x`, `creepage_y` and `spin_per_mm` varies fastest; a
+/// force takes the position of its creepage.
 fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
     let count = match motions {
-        // Those of a wheelset are counted with its positions.
+        // Motions of a wheelset are counted with its positions.
         Motions::One(_) | Motions::Wheelset { .. } | Motions::Wheelsets { .. } => 1,
         Motions::Many(list) => list.len() as u128,
         Motions::Sweep { sweep } => sweep_length(sweep),
         Motions::History { history, .. } => history.distance_mm.points() as u128,
     };
-    if count > limits.motions_max as u128 {
-        return Err(Fault::new(
-            "/motion",
-            format!(
-                "{count} motions given; at most {} are allowed in one case",
-                limits.motions_max
-            ),
-        ));
+    let most = limits.motions_max;
+    if count > most as u128 {
+        let detail = format!("{count} motions given; at most {most} are allowed in one case");
+        return Err(Fault::new("/motion", detail));
     }
     Ok(match motions {
         Motions::One(motion) => vec![*motion],
         Motions::Many(list) => list.clone(),
-        Motions::Sweep { sweep } => write_out(sweep),
-        Motions::History { history, .. } => point_by_point(history),
-        // Every patch gets its own creepages when it is found.
-        Motions::Wheelset { wheelset } => vec![still_at(wheelset)],
-        Motions::Wheelsets { wheelset } => wheelset.first().map(still_at).into_iter().collect(),
+        Motions::Sweep { sweep } => sweep_motions(sweep),
+        Motions::History { history, .. } => history_motions(history),
+        // Each patch gets its own creepages when it is found.
+        Motions::Wheelset { wheelset } => vec![placeholder(wheelset)],
+        Motions::Wheelsets { wheelset } => wheelset.first().map(placeholder).into_iter().collect(),
     })
 }
 
-/// What stands for the motion of a wheelset before patches are found.
-fn still_at(wheelset: &Wheelset) -> AskedMotion {
+/// Returns the motion that represents a wheelset until its patches are found.
+fn placeholder(wheelset: &Wheelset) -> AskedMotion {
     AskedMotion {
         speed_mm_per_s: Some(wheelset.speed_mm_per_s),
         ..AskedMotion::default()
     }
 }
 
-/// The values of a component at so many points, if it is given.
+/// Returns the value of a component at each point, if it is given.
 fn course(course: Option<&HistoryCourse>, points: usize) -> Option<Vec<f64>> {
     course.map(|course| course.values(points))
 }
 
-/// The motions at the points of a history.
-fn point_by_point(history: &History) -> Vec<AskedMotion> {
+/// Returns the motion at each point of a history.
+fn history_motions(history: &History) -> Vec<AskedMotion> {
     let points = history.distance_mm.points();
     let all = [
         &history.creepage_x,
@@ -205,7 +196,7 @@ fn point_by_point(history: &History) -> Vec<AskedMotion> {
     (0..points).map(motion).collect()
 }
 
-/// Distances and shifts of a history.
+/// Returns distances and shifts of a history.
 fn history_task(history: &History, start: HistoryStart) -> HistoryTask {
     let points = history.distance_mm.points();
     let shifts = [&history.shift_x_mm, &history.shift_y_mm, &history.turn_rad];
@@ -243,8 +234,8 @@ fn sweep_length(sweep: &Sweep) -> u128 {
     }
 }
 
-fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
-    let values = components(sweep).map(|swept| swept.map_or_else(|| vec![0.0], swept_values));
+fn sweep_motions(sweep: &Sweep) -> Vec<AskedMotion> {
+    let values = components(sweep).map(|swept| swept.map_or_else(|| vec![0.0], Swept::values));
     let [x, y, spin] = &values;
     let forced = [sweep.force_x_n.is_some(), sweep.force_y_n.is_some()];
     let motion = |i: usize, j: usize, k: usize| AskedMotion {
@@ -257,7 +248,7 @@ fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
     };
     match sweep.combine {
         Combine::Together => (0..sweep_length(sweep) as usize)
-            // One value, as of a component that is left out, serves every motion.
+            // A single value applies to every motion.
             .map(|n| {
                 motion(
                     n.min(x.len() - 1),
@@ -274,33 +265,10 @@ fn write_out(sweep: &Sweep) -> Vec<AskedMotion> {
     }
 }
 
-/// The values of a component in order.
-pub(crate) fn swept_values(swept: &Swept) -> Vec<f64> {
-    match swept {
-        Swept::Constant(value) => vec![*value],
-        Swept::Range(range) => range.values(),
-        Swept::List(list) => list.values.clone(),
-    }
-}
+/// Outputs that are computed for steady rolling only.
+const OUTPUTS_REFUSED: [Output; 3] = [Output::Damage, Output::Temperature, Output::Gradients];
 
-/// Outputs that hold for steady rolling only.
-const OUTPUTS_REFUSED: [(Output, &str); 3] = [
-    (Output::Damage, "damage"),
-    (Output::Temperature, "temperature"),
-    (Output::Gradients, "gradients"),
-];
-
-/// What of a case a history has to go with, as far as it could be read.
-pub(crate) struct BesideHistory<'a> {
-    pub(crate) contact: Option<&'a Contact>,
-    pub(crate) solver: Option<&'a Solver>,
-    pub(crate) outputs: &'a [Output],
-    pub(crate) friction: Option<&'a Friction>,
-    /// Those that are known before a solve.
-    pub(crate) patches: &'a [Patch],
-}
-
-/// The fault of friction that depends on all the slip behind a place of the contact.
+/// Returns the fault of friction that depends on the path of a particle through the contact.
 fn friction_fault(friction: &Friction) -> Option<Fault> {
     let yields = friction
         .layer
@@ -314,24 +282,25 @@ fn friction_fault(friction: &Friction) -> Option<Fault> {
     Some(Fault::new(pointer, detail))
 }
 
-/// The fault of a case that begins pressed together and whose patch would not stay similar to itself while it grows.
-fn pressed_fault(given: &BesideHistory) -> Option<Fault> {
-    let similar = given
-        .contact
-        .is_none_or(|c| matches!(c, Contact::Radii { .. } | Contact::Ellipse { .. }));
-    if !similar {
+/// Returns the fault of a history that starts with bodies pressed together, if the patch does not stay similar to itself while it grows.
+fn pressed_fault(draft: &CaseDraft) -> Option<Fault> {
+    let is_similar =
+        |contact: &Contact| matches!(contact, Contact::Radii { .. } | Contact::Ellipse { .. });
+    if !draft.contact.as_ref().is_none_or(is_similar) {
         let detail = "\"pressed\" given for another contact than \"type\": \"radii\" or \"ellipse\", whose patches stay similar while they grow; give \"rest\"";
         return Some(Fault::new("/motion/start", detail));
     }
-    let friction = given.friction?;
-    let (pointer, what) = match friction {
-        Friction {
-            across: Some(_), ..
-        } => ("/friction/across", "a coefficient that varies across"),
-        Friction { along: Some(_), .. } => ("/friction/along", "a coefficient that varies along"),
-        Friction { law: Some(_), .. } => ("/friction/law", "a coefficient that falls with slip"),
-        Friction { layer: Some(_), .. } => ("/friction/layer", "a layer"),
-        _ => return None,
+    let friction = draft.friction.as_ref()?;
+    let (pointer, what) = if friction.across.is_some() {
+        ("/friction/across", "a coefficient that varies across")
+    } else if friction.along.is_some() {
+        ("/friction/along", "a coefficient that varies along")
+    } else if friction.law.is_some() {
+        ("/friction/law", "a coefficient that falls with slip")
+    } else if friction.layer.is_some() {
+        ("/friction/layer", "a layer")
+    } else {
+        return None;
     };
     let detail = format!(
         "{what} given for bodies that are \"pressed\", whose patch stays similar while it grows with one coefficient and without a layer only"
@@ -339,36 +308,40 @@ fn pressed_fault(given: &BesideHistory) -> Option<Fault> {
     Some(Fault::new(pointer, detail))
 }
 
-/// Faults of a case with a history.
-pub(crate) fn faults(history: &HistoryTask, given: &BesideHistory, limits: &Limits) -> Vec<Fault> {
+/// Returns the faults of a history together with the other members of its case; `patches` are those known before a solve.
+pub(crate) fn history_faults(
+    history: &HistoryTask,
+    draft: &CaseDraft,
+    patches: &[Patch],
+    limits: &Limits,
+) -> Vec<Fault> {
     let mut faults = Vec::new();
-    if matches!(given.contact, Some(Contact::Wheelset { .. })) {
+    if matches!(draft.contact, Some(Contact::Wheelset { .. })) {
         let detail = "given with a wheelset, whose pose and forces are found for steady rolling; give one of its wheels as \"type\": \"profiles\"";
         faults.push(Fault::new("/motion/history", detail));
     }
-    let method = given.solver.map(|solver| solver.method);
-    if method.is_some_and(|m| !matches!(m, MethodName::Auto | MethodName::BoundaryElement)) {
+    if !draft.may_use_boundary_elements() {
         let detail = "only boundary_element (or auto) follows a history";
         faults.push(Fault::new("/solver/method", detail));
     }
     if history.start == HistoryStart::Pressed {
-        faults.extend(pressed_fault(given));
+        faults.extend(pressed_fault(draft));
     }
-    if given
-        .friction
-        .is_some_and(|friction| friction.largest() == 0.0)
-    {
-        let detail = "no friction given; without tractions a history has no effect";
-        faults.push(Fault::new("/friction", detail));
+    if let Some(friction) = &draft.friction {
+        if friction.largest() == 0.0 {
+            let detail = "no friction given; without tractions a history has no effect";
+            faults.push(Fault::new("/friction", detail));
+        }
+        faults.extend(friction_fault(friction));
     }
-    faults.extend(given.friction.and_then(friction_fault));
-    for (output, name) in OUTPUTS_REFUSED {
-        if given.outputs.contains(&output) {
+    for output in OUTPUTS_REFUSED {
+        if draft.outputs().contains(&output) {
+            let name = output.name();
             let detail = format!("{name} given with a history; it is computed for steady rolling");
             faults.push(Fault::new("/outputs", detail));
         }
     }
-    let extents: Vec<[f64; 4]> = given.patches.iter().map(|patch| patch.extent).collect();
+    let extents: Vec<[f64; 4]> = patches.iter().map(|patch| patch.extent).collect();
     if let Some(detail) = too_long(history, &extents, limits.motions_max) {
         faults.push(Fault::new("/motion/history/distance_mm", detail));
     }

@@ -1,9 +1,7 @@
-//! Expected solve time of a case, before it is queued: the time of one motion at its target or on its mesh, times motions and patches, plus
-//! that of the normal problem.
+//! Expected solve time of a case: that of one motion at its target or on its mesh, times motions and patches, plus that of the normal problem.
 //!
-//! The queue is ordered by these times; nothing else depends on them. `/v1/cases/check` measures instead: it solves a case for up to 0.2 s,
-//! which most cases need less than. Single cases differ from the figures here by a factor of 3 either way and more:
-//! `cargo bench --bench stress -- --only times` prints how many do, kind by kind.
+//! The queue is ordered by these times; nothing else depends on them. Single cases differ from them by a factor of 3 and more, which
+//! `cargo bench --bench stress -- --only times` prints by kind of case. `/v1/cases/check` measures instead: it solves a case for up to 0.2 s.
 
 use crate::geometry::profile_quality::advised_smoothing;
 use crate::method::Method;
@@ -15,31 +13,29 @@ use crate::problem::memory::segments;
 use crate::rolling::history::solve::usual_work;
 use crate::rolling::task::{Resolution, TARGET_LEAST, TARGET_USUAL};
 
-/// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`], from which on the bound of the creep table usually meets the
-/// target where the table is taken.
+/// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`].
 const MOTION_SECONDS: f64 = 3e-4;
-/// Power with which the time grows as the target falls.
+/// Negative exponent of the target in the time of a motion.
 const TARGET_POWER: f64 = 1.4;
-/// Factor of what makes a case slow: spin, a prescribed force or friction that depends on slip, each for its motion; profiles judged by other readings,
-/// for the wheel; a pose of a wheelset; a wheel that is to carry prescribed forces.
+/// Factor on the time for each property that makes a case slow: for a motion spin, a prescribed force or friction that depends on slip; for a
+/// wheel other smoothings of its profiles or prescribed forces; for a wheelset the search for its pose.
 const HARD_TIMES: f64 = 3.0;
-/// A motion by the table, with its place in the answer, in s; twice what a row of a run of a million takes on an idle machine
-/// (`cargo bench --bench load -- rows`).
+/// Time in s of a motion by the table: twice the measured time of a row (`cargo bench --bench load -- rows`).
 pub(crate) const TABLE_SECONDS: f64 = 5e-6;
-/// Time in s to find region and pressure of a gap with one patch. It grows with the square of their number.
+/// Time in s of the normal problem of a gap with one patch. It grows with the square of the number of patches.
 const GAP_SECONDS: f64 = 2.5e-3;
-/// Time in s to bring a wheel to rest on its rail.
+/// Time in s of the vertical equilibrium of a wheel on its rail.
 const WHEEL_SECONDS: f64 = 9e-3;
-/// Time in s to place the rigid wheelset at one shift, with two readings of its profiles.
+/// Time in s to place the rigid wheelset at one shift, with two interpolations of its profiles.
 const PLACEMENT_SECONDS: f64 = 2.5e-3;
-/// Time in s that pressure and opening of a gap take for each motion of unlike bodies (12 contacts of `tests/physics/unlike.rs`).
+/// Time in s of the normal problem of a gap for each motion of unlike bodies (12 contacts of `tests/physics/unlike.rs`).
 const COUPLED_SECONDS: f64 = 0.04;
 /// Time in s to find the worst point below a patch (`cargo bench --bench stress -- --only after`).
 const WORST_POINT_SECONDS: f64 = 2.5e-3;
-/// Time in s to find the worst passage below a patch by one criterion, from the same bench.
+/// Time in s to find the worst passage below a patch by one criterion (`cargo bench --bench stress -- --only after`).
 const PASSAGE_SECONDS: f64 = 0.04;
 
-/// Time in s to find region and pressure of a number of patches.
+/// Returns the time in s of the normal problem.
 fn normal_seconds(task: &NormalTask, patches: usize) -> f64 {
     match task {
         NormalTask::Hertz(_) | NormalTask::Given(_) => 0.0,
@@ -49,7 +45,7 @@ fn normal_seconds(task: &NormalTask, patches: usize) -> f64 {
     }
 }
 
-/// Time in s to bring a wheel to rest on its rail, with the other readings of its profiles where they are smoothed or should be.
+/// Returns the time in s of the vertical equilibrium of a wheel, including other smoothings of profiles that are smoothed or should be.
 fn at_rest(task: &WheelTask) -> f64 {
     let profiles = task.geometry.profiles();
     let levels = profiles.map(checked_case::noise_level);
@@ -60,7 +56,7 @@ fn at_rest(task: &WheelTask) -> f64 {
 }
 
 impl CheckedCase {
-    /// Expected time of this case in s, on one core of the machine the figures were taken on.
+    /// Returns the expected time of this case in s, on one core of the machine on which the constants were measured.
     pub fn solve_seconds(&self) -> f64 {
         let patches = segments(&self.problem.task).len();
         let normal = normal_seconds(&self.problem.task, patches);
@@ -88,7 +84,7 @@ impl CheckedCase {
         once * HARD_TIMES * task.moves.len() as f64 + kinematics
     }
 
-    /// Time of motion `k` over that of the easiest.
+    /// Returns the time of motion `k` relative to that of an easy one.
     fn hardness(&self, k: usize) -> f64 {
         let problem = &self.problem;
         let forces = problem.forces.get(k);
@@ -97,18 +93,16 @@ impl CheckedCase {
             forces.is_some_and(|forces| *forces != [None; 2]) && problem.pull().is_none(),
             problem.friction.depends_on_slip() || problem.interface.yielding.is_some(),
         ];
-        is_hard
-            .map(|hard| if hard { HARD_TIMES } else { 1.0 })
-            .iter()
-            .product()
+        let factors = is_hard.map(|hard| if hard { HARD_TIMES } else { 1.0 });
+        factors.iter().product()
     }
 
-    /// Time of a history: its steps on the level that a target usually leads to, or on the mesh given, with the coarser one before it.
+    /// Returns the time of a history: its steps on the usual mesh for a target, or on the given mesh and the coarser one before it.
     fn history_seconds(&self) -> f64 {
         let Some(history) = &self.problem.history else {
             return 0.0;
         };
-        // Patches that are found are about 10 mm long.
+        // Patches of unknown size are about 10 mm long.
         let extents = match self.problem.task.known_patches() {
             Some(patches) => patches.iter().map(|patch| patch.extent).collect(),
             None => vec![[-5.0, 5.0, -5.0, 5.0]],
@@ -119,11 +113,12 @@ impl CheckedCase {
         };
         let (steps, usual) = usual_work(history, &extents, along);
         let cells = along.map_or(usual, |_| self.size_input().cells());
-        // 33 to 97 points of `tests/data/transient.json` on 72 to 1152 cells.
+        // Fitted to 33 to 97 points of `tests/data/transient.json` on 72 to 1152 cells.
         steps * (5e-5 + 5e-9 * cells * cells)
     }
 
     fn to_target(&self, patches: usize, target: f64) -> f64 {
+        // From this target on, the error bound of the table usually meets it.
         let by_table = target >= TARGET_USUAL && !self.run.needs_cells();
         let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_POWER);
         let motions = 0..self.problem.motions.len();
@@ -146,35 +141,28 @@ impl CheckedCase {
         motions.map(|k| each * self.hardness(k)).sum()
     }
 
-    /// Estimated time in s of the outputs computed from one solved motion (damage, subsurface stresses, temperature) for a number of patches.
-    pub(crate) fn after_seconds(&self, patches: usize) -> f64 {
-        let after = &self.run.after;
+    /// Returns the time in s of the stresses below the patches for one motion. Other outputs take less than 0.1 ms.
+    fn after_seconds(&self, patches: usize) -> f64 {
+        let Some(task) = &self.run.after.subsurface else {
+            return 0.0;
+        };
         let patches = patches as f64;
-        let mut seconds = 0.0;
-        if let Some(task) = &after.subsurface {
-            let (count, below_worst) = match &task.places {
-                StressPlaces::Points(points) => (points.len() as f64, false),
-                StressPlaces::BelowWorst(depths) => (patches * depths.len() as f64, true),
-            };
-            let searched = if task.worst || below_worst {
-                patches
-            } else {
-                0.0
-            };
-            // Each stress; a fine mesh takes several times as long. Other outputs take less than 0.1 ms.
-            seconds += 4e-7 * count + WORST_POINT_SECONDS * searched;
-            if let Some(passage) = task.passage {
-                let judged = 1 + u8::from(passage.dang_van_slope.is_some());
-                seconds += PASSAGE_SECONDS * f64::from(judged) * patches;
-                if searched == 0.0 {
-                    seconds += WORST_POINT_SECONDS * patches;
-                }
-            }
+        let (count, below_worst) = match &task.places {
+            StressPlaces::Points(points) => (points.len() as f64, false),
+            StressPlaces::BelowWorst(depths) => (patches * depths.len() as f64, true),
+        };
+        let mut seconds = 4e-7 * count;
+        if task.worst || below_worst || task.passage.is_some() {
+            seconds += WORST_POINT_SECONDS * patches;
+        }
+        if let Some(passage) = task.passage {
+            let criteria = 1 + u8::from(passage.dang_van_slope.is_some());
+            seconds += PASSAGE_SECONDS * f64::from(criteria) * patches;
         }
         seconds
     }
 
-    /// Estimated time and memory of this solve: operators of the meshes, matrices of the dense method, and the answer. The time is rough.
+    /// Returns the estimated memory and time of this solve.
     pub fn cost(&self) -> Cost {
         let size = self.size_input();
         Cost {
@@ -185,19 +173,19 @@ impl CheckedCase {
     }
 }
 
-/// What a case will cost, estimated before it is queued.
+/// The estimated cost of a case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cost {
     /// Peak memory in bytes.
     pub bytes: u64,
-    /// Of these, what its operators take of the store of the process.
+    /// The part of `bytes` in the operator store of the process.
     pub operator_store_bytes: u64,
-    /// Solve time in s on one core of the machine the figures were taken on; rough.
+    /// Rough solve time in s on one core of the machine on which the constants were measured.
     pub seconds: f64,
 }
 
 impl Cost {
-    /// Memory in bytes that nobody shares.
+    /// Returns the memory in bytes outside the operator store, which other cases do not share.
     pub fn own_bytes(&self) -> u64 {
         self.bytes.saturating_sub(self.operator_store_bytes)
     }

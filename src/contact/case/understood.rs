@@ -1,4 +1,4 @@
-//! What a case is understood as: patches that are known without a solve, and wheel and rail in place.
+//! The interpretation of a case without solving it: patches that are known beforehand, and wheel and rail in place.
 
 use crate::geometry::contact_locus::ContactLocus;
 use crate::geometry::profile::{NEEDED_BEYOND, POINT_SPACING};
@@ -12,10 +12,10 @@ use crate::remark::list::Remark;
 use crate::solution::words::answer::{FirstTouch, KnownPatch, PlacedProfiles, Understanding};
 
 impl CheckedCase {
-    /// What can be said of the contact without solving it.
+    /// Returns what is known of the contact without solving it.
     ///
     /// # Errors
-    /// A sentence, if no part of the wheel lies above the rail.
+    /// The reason, if no part of the wheel lies above the rail.
     pub fn understood(&self) -> Result<Understanding, String> {
         let known = self.problem.task.known_footprint();
         let friction = &self.problem.friction;
@@ -33,10 +33,9 @@ impl CheckedCase {
             placement,
         })
     }
-}
 
-impl CheckedCase {
-    /// Remarks on the place of first touch: on the tip of the flange, or near the end of a profile. The solve judges every patch anew.
+    /// Returns remarks on a point of first touch that is on the tip of the flange or near the end of a profile. A solve assesses each patch
+    /// itself.
     pub fn touch_remarks(&self) -> Vec<RemarkEntry> {
         let sides = match &self.problem.task {
             NormalTask::Wheel(task) => vec![&task.geometry],
@@ -118,7 +117,7 @@ fn placed(task: &WheelTask) -> Result<PlacedProfiles, String> {
 fn first_touch(locus: &ContactLocus<'_>, geometry: &WheelRail) -> FirstTouch {
     let [rail, wheel] = locus.first_touch();
     let on_rail = geometry.rail_at(rail);
-    // The tangent toward the left, whichever way the curve runs.
+    // The tangent toward the left, for either direction of the curve.
     let [dy, dz] = on_rail.slope;
     let x = geometry.lowest(wheel).map_or(0.0, |[x, ..]| x);
     FirstTouch {
@@ -129,7 +128,7 @@ fn first_touch(locus: &ContactLocus<'_>, geometry: &WheelRail) -> FirstTouch {
     }
 }
 
-/// Coordinates with four decimals.
+/// Rounds coordinates to four decimals.
 fn rounded(at: [f64; 2]) -> [f64; 2] {
     at.map(|value| (value * 1e4).round() / 1e4)
 }

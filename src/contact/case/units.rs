@@ -1,9 +1,8 @@
-//! Which numbers of a case look as if they were given in another unit? Nothing is refused here.
+//! Remarks on numbers of a case that seem to be given in another unit. Nothing is refused here.
 //!
-//! The ranges are those that the number in the likely unit would have for wheels and rails: loads of 1 kN and more, speeds of 0.5 m/s and more,
-//! metals with a shear modulus of 10 to 1000 GPa, angles below 0.05 rad. Lengths of the wheel and the track are looked at in `length_units`.
+//! A number is suspect if it is unusual for wheel and rail in its own unit and usual in another one. Lengths of wheel and track are checked in
+//! `contact_task`.
 
-use crate::case::motions::swept_values;
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::material::{Elastic, Material};
 use crate::case::words::motion::{AskedMotion, HistoryCourse, Motions, Swept, Wheelset};
@@ -13,26 +12,26 @@ use crate::normal::hertz::Patch;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 
-/// A wheel carries at least this load in N.
+/// Smallest usual load of a wheel in N.
 const LOAD_LEAST: f64 = 1e3;
-/// A rolling radius of a wheel or a relative radius of wheel and rail has at least this length in mm.
+/// Smallest usual rolling radius of a wheel, or relative radius of wheel and rail, in mm.
 const RADIUS_LEAST: f64 = 250.0;
-/// A wheel rolls at least with this speed in mm/s.
+/// Smallest usual rolling speed of a wheel in mm/s.
 const SPEED_LEAST: f64 = 500.0;
-/// Shear moduli of metals in GPa; Young's moduli are 2.5 times as large.
+/// Range of the shear moduli of metals in GPa; Young's moduli are 2.5 times as large.
 const SHEAR_GPA: [f64; 2] = [10.0, 1000.0];
-/// Metals have a smaller Poisson's ratio; soft plastics, whose moduli have such numbers in MPa, a larger one.
+/// Poisson's ratio below which a body is a metal. Soft plastics, whose moduli in MPa have similar values, have a larger one.
 const POISSON_METAL: f64 = 0.36;
-/// Creepages that are per cent.
+/// Range of creepages that are probably given in per cent.
 const CREEPAGE_PERCENT: [f64; 2] = [0.05, 5.0];
 /// Largest yaw and roll of a wheelset in rad, and cant of a rail.
 const ANGLE_MOST: f64 = 0.05;
-/// Pressures of wheels on rails in MPa.
+/// Range of usual pressures of wheels on rails in MPa.
 const PRESSURES: [f64; 2] = [200.0, 3500.0];
-/// Pressure in MPa above which lengths are doubted where the patch follows from them alone: the static limit of ball bearings (ISO 76).
+/// Pressure in MPa above which the lengths that determine a patch are suspect: the static limit of ball bearings (ISO 76).
 const PRESSURE_DOUBTED: f64 = 4200.0;
 
-/// The remark on a number that looks as if it were in another unit.
+/// Returns the remark on a number that seems to be in another unit.
 fn suspect(pointer: &str, given: f64, unit: &str, likely_unit: &str) -> RemarkEntry {
     let remark = Remark::UnitSuspected {
         given,
@@ -46,7 +45,7 @@ fn is_within(value: f64, [low, high]: [f64; 2]) -> bool {
     (low..=high).contains(&value)
 }
 
-/// The remarks on numbers that are unusual for wheel and rail in their unit but usual in another one.
+/// Returns the remarks on numbers that seem to be in another unit.
 pub(crate) fn remarks(case: &Case, patches: &[Patch]) -> Vec<RemarkEntry> {
     let (contact, load) = (&case.contact, case.load.as_ref());
     let mut suspects = of_material(&case.material);
@@ -87,17 +86,13 @@ fn of_material(material: &Material) -> Vec<RemarkEntry> {
     suspects
 }
 
-/// Are both bodies of metal, in MPa or in GPa?
+/// Whether both bodies are metals, with moduli in MPa or in GPa.
 fn is_metal(material: &Material) -> bool {
     let suspects = of_material(material);
     bodies(material).into_iter().all(|(pointer, body)| {
-        let at_body = |suspect: &RemarkEntry| {
-            let own = suspect.pointer.as_deref();
-            own.is_some_and(|own| own.starts_with(pointer))
-        };
-        body.shear()
-            .is_some_and(|shear| shear >= 1e3 * SHEAR_GPA[0])
-            || suspects.iter().any(at_body)
+        let mut pointers = suspects.iter().filter_map(|one| one.pointer.as_deref());
+        let shear = body.shear().unwrap_or(0.0);
+        shear >= 1e3 * SHEAR_GPA[0] || pointers.any(|own| own.starts_with(pointer))
     })
 }
 
@@ -139,7 +134,7 @@ fn of_load(
         .then(|| suspect(pointer, force, "N", "kN"))
 }
 
-/// Units in which a length would make the pressure of a patch usual, which falls with this power of the length.
+/// Returns the units of length in which the pressure of a patch would be usual; it falls with this power of the length.
 fn units_by_pressure(patches: &[Patch], power: f64) -> Option<String> {
     let pressure = patches.first()?.pressure_max;
     let usual = |unit: &LengthUnit| is_within(pressure / unit.mm().powf(power), PRESSURES);
@@ -151,7 +146,7 @@ fn units_by_pressure(patches: &[Patch], power: f64) -> Option<String> {
 fn lengths_of_patch(contact: &Contact, patches: &[Patch]) -> Option<RemarkEntry> {
     match *contact {
         Contact::Radii { rolling_mm, .. } if rolling_mm < RADIUS_LEAST => {
-            // Hertz: p grows with R to the power −2/3.
+            // Hertz: p ∝ R^(−2/3).
             let units = units_by_pressure(patches, 2.0 / 3.0)?;
             Some(suspect("/contact/rolling_mm", rolling_mm, "mm", &units))
         }
@@ -163,7 +158,7 @@ fn lengths_of_patch(contact: &Contact, patches: &[Patch]) -> Option<RemarkEntry>
     }
 }
 
-/// Angles of the place of wheel and rail.
+/// Returns the remarks on the angles of wheel and rail.
 fn of_place(contact: &Contact) -> Vec<RemarkEntry> {
     let angles = match contact {
         Contact::Profiles {
@@ -174,10 +169,10 @@ fn of_place(contact: &Contact) -> Vec<RemarkEntry> {
         } => [*cant_rad, *yaw_rad, *roll_rad],
         Contact::Wheelset {
             cant_rad, yaw_rad, ..
-        } => [*cant_rad, largest(&swept_values_of(yaw_rad)), 0.0],
+        } => [*cant_rad, largest_swept(yaw_rad), 0.0],
         _ => return Vec::new(),
     };
-    // A rail inclined by twice its cant is suspect.
+    // Rails may be inclined by twice the usual angle.
     let names = [
         ("cant_rad", 2.0 * ANGLE_MOST),
         ("yaw_rad", ANGLE_MOST),
@@ -190,35 +185,35 @@ fn of_place(contact: &Contact) -> Vec<RemarkEntry> {
         .collect()
 }
 
-/// The value of the largest size; 0 of none.
+/// Returns the value with the largest magnitude; 0 if there is none.
 fn largest(values: &[f64]) -> f64 {
     let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
     values.iter().fold(0.0, larger)
 }
 
-fn swept_values_of(swept: &Swept) -> Vec<f64> {
+fn largest_swept(swept: &Swept) -> f64 {
     match swept {
-        // The ends have the largest size.
-        Swept::Range(range) => vec![range.from, range.to],
-        swept => swept_values(swept),
+        Swept::Constant(value) => *value,
+        Swept::Range(range) => largest(&[range.from, range.to]),
+        Swept::List(list) => largest(&list.values),
     }
 }
 
-fn course_values(course: &HistoryCourse) -> Vec<f64> {
+fn largest_of_course(course: &HistoryCourse) -> f64 {
     match course {
-        HistoryCourse::Constant(value) => vec![*value],
-        HistoryCourse::Range(range) => vec![range.from, range.to],
-        HistoryCourse::Values(values) => values.clone(),
+        HistoryCourse::Constant(value) => *value,
+        HistoryCourse::Range(range) => largest(&[range.from, range.to]),
+        HistoryCourse::Values(values) => largest(values),
     }
 }
 
-/// Creepages along and across, and the speed, with the pointer to the object that has them.
+/// Longitudinal and lateral creepage and the speed, with the JSON pointer to their object.
 type MotionNumbers = (String, [Option<f64>; 3]);
 
-/// The numbers of all motions; of a sweep and a history those of the largest size.
+/// Returns the numbers of all motions; for a sweep and a history those with the largest magnitude.
 fn numbers_of(motion: &Motions) -> Vec<MotionNumbers> {
-    let swept = |swept: &Option<Swept>| swept.as_ref().map(|s| largest(&swept_values_of(s)));
-    let course = |c: &Option<HistoryCourse>| c.as_ref().map(|c| largest(&course_values(c)));
+    let swept = |swept: &Option<Swept>| swept.as_ref().map(largest_swept);
+    let course = |course: &Option<HistoryCourse>| course.as_ref().map(largest_of_course);
     let asked = |one: &AskedMotion| [one.creepage_x, one.creepage_y, one.speed_mm_per_s];
     let rolling = |one: &Wheelset| [None, None, Some(one.speed_mm_per_s)];
     let alone = |of: &str, numbers| vec![(of.to_owned(), numbers)];
@@ -246,7 +241,7 @@ fn numbers_of(motion: &Motions) -> Vec<MotionNumbers> {
     }
 }
 
-/// Creepages and speeds; of several motions the first that is unusual.
+/// Returns the remarks on creepages and speeds; for several motions those on the first unusual ones.
 fn of_motion(motion: &Motions) -> Vec<RemarkEntry> {
     let all = numbers_of(motion);
     let names = ["creepage_x", "creepage_y", "speed_mm_per_s"];

@@ -1,10 +1,10 @@
-//! From the cross-sections of a case to a wheel in place over its rail, with every fault of both.
+//! From the cross-sections of a case to a wheel placed over its rail, with the faults of both.
 
 use std::sync::Arc;
 
 use crate::case::contact_task;
-use crate::case::solver::{KnownPair, PairWords, Placed};
-use crate::case::words::contact::{Contact, Load};
+use crate::case::solver::{KnownPair, Placed};
+use crate::case::words::contact::{Contact, Load, OnRails};
 use crate::case::words::cross_section::{CrossSection, Smoothing, SmoothingWord};
 use crate::case::words::motion::{Motions, Wheelset};
 use crate::error::Fault;
@@ -13,7 +13,7 @@ use crate::geometry::formats;
 use crate::geometry::formats::{Format, ProfileFile};
 use crate::geometry::orientation::{FormatSenses, Senses, StatedSenses};
 use crate::geometry::profile::{Body, LengthUnit, Profile, Reading};
-use crate::geometry::wheel_rail::{NotPlaced, Placement, RailPlace, WheelRail};
+use crate::geometry::wheel_rail::{NotPlaced, Placement, Side, WheelRail};
 use crate::geometry::wheelset_pose::WheelsetMotion;
 use crate::normal::footprint::NormalTask;
 use crate::normal::wheel::{ProfileTrust, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove};
@@ -22,11 +22,65 @@ use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 use crate::rolling::task::PrescribedForces;
 
-/// The task of a wheel on a rail, whose profiles may be known, with its remarks; `None` without faults where the load or the contact
-/// modulus in MPa is not known.
+/// The members of a case that describe a wheel over its rail.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PairWords<'a> {
+    /// Cross-sections of rail and wheel.
+    pub(crate) sections: [&'a CrossSection; 2],
+    /// JSON pointers to them.
+    pub(crate) pointers: [&'static str; 2],
+    /// JSON pointer to the rolling radius.
+    pub(crate) radius_pointer: &'static str,
+    /// y of the back of the flange in mm, if the case states it.
+    pub(crate) flange_back: Option<f64>,
+    /// Whether rough or exchanged profiles are accepted.
+    pub(crate) accept_rough: bool,
+    /// The placement, in which the position of the back of the flange is still 0.
+    pub(crate) placement: Placement,
+}
+
+impl<'a> PairWords<'a> {
+    /// The pair of one side, with the wheelset at a shift to the left in mm, a yaw and a roll in rad.
+    pub(crate) fn new(
+        rails: &OnRails<'a>,
+        side: Side,
+        [lateral_shift, yaw, roll]: [f64; 3],
+    ) -> PairWords<'a> {
+        PairWords {
+            sections: rails.sections,
+            pointers: ["/contact/rail", "/contact/wheel"],
+            radius_pointer: "/contact/rolling_radius_mm",
+            flange_back: rails.flange_back_position_mm,
+            accept_rough: rails.accept_rough_profiles,
+            placement: Placement {
+                side,
+                rolling_radius: rails.rolling_radius_mm,
+                rail: rails.rail,
+                cant: rails.cant_rad,
+                flange_back_distance: rails.flange_back_distance_mm,
+                flange_back_position: 0.0,
+                lateral_shift,
+                yaw,
+                roll,
+            },
+        }
+    }
+
+    /// Whether the smoothing of the profiles is automatic and rough profiles are accepted.
+    pub(crate) fn trust(&self) -> ProfileTrust {
+        let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
+        ProfileTrust {
+            auto: self.sections.map(auto),
+            accept_rough: self.accept_rough,
+        }
+    }
+}
+
+/// Returns the normal problem of a wheel on a rail with its remarks; `None` without faults if the load or the contact modulus in MPa is
+/// unknown.
 ///
 /// # Errors
-/// Every fault of the two cross-sections; or that they cannot meet.
+/// All faults of the two cross-sections, or the reason why they cannot meet.
 pub(crate) fn task(
     contact: &Contact,
     load: Option<&Load>,
@@ -34,82 +88,56 @@ pub(crate) fn task(
     surface: ReferenceSurface,
     known: &KnownPair,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
-    let Contact::Profiles {
-        rail,
-        wheel,
-        side,
-        rolling_radius_mm,
-        gauge_mm,
-        gauge_height_mm,
-        rail_origin_mm,
-        cant_rad,
-        flange_back_distance_mm,
-        flange_back_position_mm,
-        lateral_shift_mm,
-        yaw_rad,
-        roll_rad,
-        accept_rough_profiles,
-        reference_surface: _,
-        influence: _,
-    } = contact
+    let (
+        Some(rails),
+        Contact::Profiles {
+            side,
+            lateral_shift_mm,
+            yaw_rad,
+            roll_rad,
+            ..
+        },
+    ) = (contact.on_rails(), contact)
     else {
-        return Err(vec![Fault::new(
-            "/contact/type".to_owned(),
-            "no profiles".to_owned(),
-        )]);
+        return Ok(None);
     };
-    let placement = Placement {
-        side: *side,
-        rolling_radius: *rolling_radius_mm,
-        rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
-        cant: *cant_rad,
-        flange_back_distance: *flange_back_distance_mm,
-        flange_back_position: 0.0,
-        lateral_shift: *lateral_shift_mm,
-        yaw: *yaw_rad,
-        roll: *roll_rad,
-    };
-    let words = PairWords {
-        sections: [rail, wheel],
-        flange_back: *flange_back_position_mm,
-        accept_rough: *accept_rough_profiles,
-    };
-    let pointers = ["/contact/rail", "/contact/wheel"];
-    let (geometry, flange_back) = known.placed(&words, &placement, || {
-        let read = (profile(Body::Rail, rail), profile(Body::Wheel, wheel));
-        let profiles = both(read, pointers)?;
-        in_place(
-            profiles,
-            &words,
-            placement,
-            pointers,
-            "/contact/rolling_radius_mm",
-        )
-    })?;
-    meet(&geometry)?;
-    let mut remarks = remarks_of(&geometry, pointers);
-    remarks.extend(flange_back);
+    let pose = [*lateral_shift_mm, *yaw_rad, *roll_rad];
+    let words = PairWords::new(&rails, *side, pose);
+    let (geometry, remarks) = placed(&words, known)?;
     let loading = load.and_then(loading);
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
     };
-    let contact = WheelTask {
+    let wheel = WheelTask {
         geometry,
         loading,
         contact_modulus,
-        trust: trust(&words),
+        trust: words.trust(),
         surface,
     };
-    Ok(Some((NormalTask::Wheel(Arc::new(contact)), remarks)))
+    Ok(Some((NormalTask::Wheel(Arc::new(wheel)), remarks)))
 }
 
-/// The motion of the wheelset, if the case gives it instead of creepages; its angular and its lateral velocity are NaN where they have to be
-/// found.
-pub(crate) fn wheelset(motions: &Motions) -> Option<WheelsetMotion> {
-    moves(motions).first().map(|first| first.motion)
+/// Places a wheel over its rail and returns it with its remarks. Profiles in `known` are not read again.
+///
+/// # Errors
+/// All faults of the two cross-sections, or the reason why they cannot be placed or meet.
+pub(crate) fn placed(
+    words: &PairWords,
+    known: &KnownPair,
+) -> Result<(WheelRail, Vec<RemarkEntry>), Vec<Fault>> {
+    let (geometry, flange_back) = known.placed(words, || place(words))?;
+    if let Err(detail) = ContactLocus::new(&geometry) {
+        let faults = vec![Fault::new("/contact", detail)];
+        return Err(with_reasons(faults, &reasons(geometry.profiles())));
+    }
+    let mut remarks = remarks_of(&geometry, words.pointers);
+    let flange_back = flange_back.map(|remark| remark.at_pointer(words.pointers[1]));
+    remarks.extend(flange_back);
+    Ok((geometry, remarks))
 }
 
-/// The motions of a wheelset, if the case gives them instead of creepages, each with the torque that the rails are to balance.
+/// Returns the motions of a wheelset, each with the torque that the rails balance; none if the case gives creepages.
 pub(crate) fn moves(motions: &Motions) -> Vec<WheelsetMove> {
     let words = match motions {
         Motions::Wheelset { wheelset } => std::slice::from_ref(wheelset),
@@ -123,34 +151,23 @@ pub(crate) fn moves(motions: &Motions) -> Vec<WheelsetMove> {
     words.iter().map(of_words).collect()
 }
 
+/// Returns the motion of a wheelset. Its angular and its lateral velocity are NaN if they must be found.
 fn wheelset_motion(words: &Wheelset) -> WheelsetMotion {
-    let Wheelset {
-        speed_mm_per_s: speed,
-        angular_velocity_rad_per_s,
-        free_rolling_radius_mm,
-        drive_torque_n_mm: _,
-        force_x_n: _,
-        lateral_velocity_mm_per_s,
-        force_y_n: _,
-        yaw_rate_rad_per_s,
-        roll_rate_rad_per_s,
-    } = *words;
-    let free = free_rolling_radius_mm.map(|radius| speed / radius);
+    let speed = words.speed_mm_per_s;
+    let free = words.free_rolling_radius_mm.map(|radius| speed / radius);
     WheelsetMotion {
         speed,
-        angular_velocity: angular_velocity_rad_per_s.or(free).unwrap_or(f64::NAN),
-        lateral_velocity: lateral_velocity_mm_per_s.unwrap_or(f64::NAN),
-        yaw_rate: yaw_rate_rad_per_s,
-        roll_rate: roll_rate_rad_per_s,
+        angular_velocity: words
+            .angular_velocity_rad_per_s
+            .or(free)
+            .unwrap_or(f64::NAN),
+        lateral_velocity: words.lateral_velocity_mm_per_s.unwrap_or(f64::NAN),
+        yaw_rate: words.yaw_rate_rad_per_s,
+        roll_rate: words.roll_rate_rad_per_s,
     }
 }
 
-/// The torque about the axle in N mm that the rails are to balance.
-pub(crate) fn drive_torque(motions: &Motions) -> Option<f64> {
-    moves(motions).first().and_then(|first| first.drive_torque)
-}
-
-/// The forces in N, along and across, that the rail is to carry under a wheelset's wheel.
+/// Returns the longitudinal and the lateral force in N that the rail carries under the wheel of a wheelset.
 pub(crate) fn wheelset_forces(motions: &Motions) -> PrescribedForces {
     match motions {
         Motions::Wheelset { wheelset } => [wheelset.force_x_n, wheelset.force_y_n],
@@ -159,16 +176,14 @@ pub(crate) fn wheelset_forces(motions: &Motions) -> PrescribedForces {
 }
 
 fn loading(load: &Load) -> Option<WheelLoad> {
-    match (load.vertical_force_n, load.normal_force_n, load.approach_mm) {
-        (Some(force), _, _) => Some(WheelLoad::Vertical(force)),
-        (None, Some(force), _) => Some(WheelLoad::Normal(force)),
-        (None, None, Some(lowering)) => Some(WheelLoad::Lowering(lowering)),
-        (None, None, None) => None,
-    }
+    let vertical = load.vertical_force_n.map(WheelLoad::Vertical);
+    let normal = load.normal_force_n.map(WheelLoad::Normal);
+    let lowering = load.approach_mm.map(WheelLoad::Lowering);
+    vertical.or(normal).or(lowering)
 }
 
-/// Why a pair of profiles may not fit, each reason after a semicolon: the size of a profile in another unit, a stated sense that contradicts its
-/// shape. Empty for none.
+/// Returns possible reasons why a pair of profiles does not fit, each after a semicolon: the size of a profile in another unit, and a stated
+/// direction of an axis that contradicts its shape.
 fn reasons(profiles: [&Profile; 2]) -> String {
     let mut reasons = String::new();
     let mut stated = Vec::new();
@@ -176,7 +191,7 @@ fn reasons(profiles: [&Profile; 2]) -> String {
         match remark {
             Remark::ProfileSizeUnusual { .. } => {
                 reasons.push_str("; ");
-                reasons.push_str(&remark.clone().at_pointer("").detail);
+                reasons.push_str(&remark.detail());
             }
             Remark::ProfileSenseContradicted {
                 profile,
@@ -195,7 +210,7 @@ fn reasons(profiles: [&Profile; 2]) -> String {
     reasons
 }
 
-/// Faults of a pair of profiles, each with its [`reasons`].
+/// Appends the [`reasons`] to faults of a pair of profiles.
 fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
     for fault in &mut faults {
         fault.detail.push_str(reasons);
@@ -203,136 +218,93 @@ fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
     faults
 }
 
-/// A wheel over its rail, with the remark on the back of its flange, from whose position the placement follows; the pointers are those of rail and
-/// wheel, and of the rolling radius.
-pub(crate) fn in_place(
-    [rail, wheel]: [Profile; 2],
-    words: &PairWords,
-    placement: Placement,
-    pointers: [&str; 2],
-    radius: &str,
-) -> Result<Placed, Vec<Fault>> {
+/// Reads both profiles and places the wheel over the rail. Returns it with the remark on the back of its flange.
+fn place(words: &PairWords) -> Result<Placed, Vec<Fault>> {
+    let [rail, wheel] = read_both(words)?;
     let reasons = reasons([&rail, &wheel]);
     let explained = |faults| with_reasons(faults, &reasons);
     if !words.accept_rough {
-        exchanged([&rail, &wheel], pointers).map_err(explained)?;
+        exchanged([&rail, &wheel], words.pointers).map_err(explained)?;
     }
-    let (flange_back_position, remark) = contact_task::position(
-        &wheel,
-        pointers[1],
-        words.flange_back,
-        placement.flange_back_distance,
-    )
-    .map_err(|fault| explained(vec![fault]))?;
+    let distance = words.placement.flange_back_distance;
+    let (flange_back_position, remark) =
+        contact_task::position(&wheel, words.flange_back, distance)
+            .map_err(|fault| explained(vec![fault]))?;
     let placement = Placement {
         flange_back_position,
-        ..placement
+        ..words.placement
     };
-    let geometry = WheelRail::new(rail, wheel, placement)
-        .map_err(|reason| explained(vec![unplaced(reason, [pointers[0], radius])]))?;
+    let geometry = WheelRail::new(rail, wheel, placement).map_err(|reason| {
+        let pointer = match reason {
+            NotPlaced::NoGaugeFace { .. } => words.pointers[0],
+            NotPlaced::ReachesAxle { .. } => words.radius_pointer,
+        };
+        explained(vec![Fault::new(pointer, reason.to_string())])
+    })?;
     Ok((geometry, remark))
 }
 
-/// The fault of a wheel that is not above its rail.
-pub(crate) fn meet(geometry: &WheelRail) -> Result<(), Vec<Fault>> {
-    let found = ContactLocus::new(geometry).map(|_| ());
-    found.map_err(|detail| {
-        let faults = vec![Fault::new("/contact", detail)];
-        with_reasons(faults, &reasons(geometry.profiles()))
-    })
-}
-
-/// Both profiles, or the faults of both. If one is not read, the other is named as well where it is that of the other body.
-pub(crate) fn both(
-    read: (Result<Profile, Fault>, Result<Profile, Fault>),
-    pointers: [&str; 2],
-) -> Result<[Profile; 2], Vec<Fault>> {
-    let load_mismatch = |profile: &Profile, body: Body, pointer: &str| {
+/// Reads both profiles. If only one can be read and it looks like the other body, the faults include that.
+fn read_both(words: &PairWords) -> Result<[Profile; 2], Vec<Fault>> {
+    let [rail, wheel] = words.pointers;
+    let read = (
+        profile_at(rail, Body::Rail, words.sections[0]),
+        profile_at(wheel, Body::Wheel, words.sections[1]),
+    );
+    let other_body = |profile: &Profile, body: Body, pointer: &str| {
         let remark = checked_case::load_mismatch(profile, body)?;
-        Some(Fault::new(pointer.to_owned(), remark.detail))
+        Some(Fault::new(pointer, remark.detail))
     };
     let faults = match read {
         (Ok(rail), Ok(wheel)) => return Ok([rail, wheel]),
-        (Err(rail), Err(wheel)) => vec![rail, wheel],
-        (Ok(rail), Err(own)) => {
-            let other = load_mismatch(&rail, Body::Rail, pointers[0]);
-            other.into_iter().chain([own]).collect()
-        }
-        (Err(own), Ok(wheel)) => {
-            let other = load_mismatch(&wheel, Body::Wheel, pointers[1]);
-            [own].into_iter().chain(other).collect()
-        }
+        (Err(of_rail), Err(of_wheel)) => [Some(of_rail), Some(of_wheel)],
+        (Ok(read), Err(of_wheel)) => [other_body(&read, Body::Rail, rail), Some(of_wheel)],
+        (Err(of_rail), Ok(read)) => [Some(of_rail), other_body(&read, Body::Wheel, wheel)],
     };
-    Err(faults)
+    Err(faults.into_iter().flatten().collect())
 }
 
-/// The fault of a pair that cannot be placed, at the pointer of the rail or of the rolling radius.
-fn unplaced(reason: NotPlaced, [rail, radius]: [&str; 2]) -> Fault {
-    let pointer = match reason {
-        NotPlaced::NoGaugeFace { .. } => rail,
-        NotPlaced::ReachesAxle { .. } => radius,
-    };
-    Fault::new(pointer.to_owned(), reason.to_string())
-}
-
-/// Faults of two profiles that both look like the other body's, at the pointers of both; one of them alone may be an unusual shape.
+/// Refuses two profiles that both look like the other body. One of them alone may be an unusual shape.
 fn exchanged([rail, wheel]: [&Profile; 2], pointers: [&str; 2]) -> Result<(), Vec<Fault>> {
     let both = checked_case::load_mismatch(rail, Body::Rail)
         .zip(checked_case::load_mismatch(wheel, Body::Wheel));
     let Some((rail, wheel)) = both else {
         return Ok(());
     };
-    let refused = |remark: RemarkEntry| {
-        format!(
-            "{}; to solve it anyway, give accept_rough_profiles: true",
-            remark.detail
-        )
+    let refused = |(remark, pointer): (RemarkEntry, &str)| {
+        let detail = remark.detail;
+        let detail = format!("{detail}; to solve it anyway, give accept_rough_profiles: true");
+        Fault::new(pointer, detail)
     };
-    Err(vec![
-        Fault::new(pointers[0].to_owned(), refused(rail)),
-        Fault::new(pointers[1].to_owned(), refused(wheel)),
-    ])
+    Err([rail, wheel]
+        .into_iter()
+        .zip(pointers)
+        .map(refused)
+        .collect())
 }
 
-/// How far the points of a pair of cross-sections are trusted.
-pub(crate) fn trust(words: &PairWords) -> ProfileTrust {
-    let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
-    ProfileTrust {
-        auto: words.sections.map(auto),
-        accept_rough: words.accept_rough,
-    }
-}
-
-/// Remarks on two profiles, at their pointers.
-pub(crate) fn remarks_of(geometry: &WheelRail, pointers: [&str; 2]) -> Vec<RemarkEntry> {
+/// Returns the remarks on two profiles at their pointers.
+fn remarks_of(geometry: &WheelRail, pointers: [&str; 2]) -> Vec<RemarkEntry> {
     let bodies = [Body::Rail, Body::Wheel];
     let profiles = geometry.profiles().into_iter().zip(bodies).zip(pointers);
     profiles
         .flat_map(|((profile, body), pointer)| {
             let own = profile.remarks.iter().cloned();
             let own = own.map(|remark| remark.at_pointer(pointer));
-            let load_mismatch = checked_case::load_mismatch(profile, body);
-            let load_mismatch = load_mismatch.map(|remark| RemarkEntry {
+            let other_body = checked_case::load_mismatch(profile, body);
+            let other_body = other_body.map(|remark| RemarkEntry {
                 pointer: Some(pointer.to_owned()),
                 ..remark
             });
-            own.chain(load_mismatch).collect::<Vec<_>>()
+            own.chain(other_body).collect::<Vec<_>>()
         })
         .collect()
 }
 
-/// The profile of a cross-section as that of a body.
+/// Reads a cross-section as the profile of a body. Faults have pointers below `pointer`.
 ///
 /// # Errors
-/// Why it is none.
-pub(crate) fn profile(body: Body, section: &CrossSection) -> Result<Profile, Fault> {
-    profile_at(&format!("/contact/{}", body.name()), body, section)
-}
-
-/// The same at a pointer.
-///
-/// # Errors
-/// Why it is none.
+/// The reason why it is no such profile.
 pub(crate) fn profile_at(
     pointer: &str,
     body: Body,
@@ -354,7 +326,7 @@ pub(crate) fn profile_at(
         .map_err(fault)
 }
 
-/// Reads a section without its guard rail.
+/// Reads a cross-section without its guard rail.
 fn own_profile(pointer: &str, body: Body, section: &CrossSection) -> Result<Profile, Fault> {
     let name = body.name();
     let reading = Reading {
@@ -420,9 +392,9 @@ fn scaled(points: &[[f64; 2]], scale: f64) -> Vec<[f64; 2]> {
     scaled.collect()
 }
 
-/// What the format of a file specifies about the senses of its points.
+/// Returns the directions of y and z that the format of a file specifies.
 fn senses_of(body: Body, format: Format, contents: &ProfileFile) -> FormatSenses {
-    // MiniProf instruments differ in the sense of a wheel's X.
+    // MiniProf instruments differ in the direction of a wheel's X.
     let varies = body == Body::Wheel && format == Format::Miniprof;
     FormatSenses {
         usual: Senses {

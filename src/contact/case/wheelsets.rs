@@ -1,102 +1,72 @@
-//! From the words of a wheelset to both wheels over their rails, with every fault of the cross-sections.
+//! From the members of a case to a wheelset with both wheels placed over their rails, with the faults of all cross-sections.
 
 use std::sync::Arc;
 
-use crate::case::motions::swept_values;
-use crate::case::solver::{Limits, PairWords};
-use crate::case::wheel_task::{both, in_place, meet, moves, profile_at, remarks_of, trust};
-use crate::case::words::contact::{Contact, Load};
-use crate::case::words::cross_section::CrossSection;
+use crate::case::solver::{KnownPair, Limits};
+use crate::case::wheel_task::{PairWords, moves, placed};
+use crate::case::words::contact::{Contact, Load, OnRails, RightSide};
 use crate::case::words::motion::{Combine, Motions, Swept};
 use crate::error::Fault;
-use crate::geometry::profile::Body;
-use crate::geometry::wheel_rail::{Placement, RailPlace, Side};
+use crate::geometry::wheel_rail::Side;
 use crate::normal::footprint::NormalTask;
 use crate::normal::wheel::{
     KinematicsTask, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove, WheelsetTask,
 };
 use crate::remark::entry::{RemarkEntry, merged};
 
-/// The task of a wheelset with its remarks; `None` without faults where the load or the contact modulus in MPa is not known.
+/// Returns the normal problem of a wheelset with its remarks; `None` without faults if the load or the contact modulus in MPa is unknown.
 ///
 /// # Errors
-/// Every fault of the cross-sections; or that wheels and rails cannot meet; or too many positions.
+/// The faults of the cross-sections, too many positions, or the reason why wheels and rails cannot meet.
 pub(crate) fn task(
     contact: &Contact,
     load: Option<&Load>,
     motion: Option<&Motions>,
     contact_modulus: Option<f64>,
     surface: ReferenceSurface,
-    limits: &Limits,
+    (known, limits): (&KnownPair, &Limits),
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
-    let Contact::Wheelset {
-        lateral_shift_mm,
-        yaw_rad,
-        combine,
-        kinematics,
-        right,
-        ..
-    } = contact
+    let (
+        Some(rails),
+        Contact::Wheelset {
+            lateral_shift_mm,
+            yaw_rad,
+            combine,
+            kinematics,
+            right,
+            ..
+        },
+    ) = (contact.on_rails(), contact)
     else {
         return Ok(None);
     };
+    let right = right.as_deref();
     let poses = poses(lateral_shift_mm, yaw_rad, *combine, limits)?;
     let (poses, moves) = moving(poses, motion, *combine, limits)?;
-    let sections = sections(contact);
+    let pairs = sides(&rails, right, poses[0]);
     if kinematics.is_some() {
-        let rails = sections.into_iter().map(|[rail, _]| rail);
-        let mut guarded: Vec<&str> = rails
-            .filter(|(_, rail)| rail.guard_rail_points_mm.is_some())
-            .map(|(pointer, _)| pointer)
-            .collect();
-        guarded.dedup();
-        let detail = "given together with kinematics, which take the running rail alone; leave one of the two out";
-        let faults: Vec<Fault> = guarded
-            .into_iter()
-            .map(|rail| Fault::new(format!("{rail}/guard_rail_points_mm"), detail))
-            .collect();
-        if !faults.is_empty() {
-            return Err(faults);
-        }
+        refuse_guard_rails(&pairs)?;
     }
-    let profiles = sections.map(|[rail, wheel]| {
-        let rail = profile_at(rail.0, Body::Rail, rail.1);
-        (rail, profile_at(wheel.0, Body::Wheel, wheel.1))
-    });
-    let pointers = sections.map(|side| side.map(|(pointer, _)| pointer));
-    let [left, right_profiles] = profiles;
-    let sides = [both(left, pointers[0])?, both(right_profiles, pointers[1])?];
-    let (mut geometries, mut remarks) = (Vec::with_capacity(2), Vec::new());
-    for (k, profiles) in sides.into_iter().enumerate() {
-        let pointers = pointers[k];
-        let (words, placement, radius) = placement(contact, k, poses[0]);
-        let (geometry, flange_back) = in_place(profiles, &words, placement, pointers, radius)?;
-        meet(&geometry)?;
-        remarks.extend(remarks_of(&geometry, pointers));
-        remarks.extend(flange_back);
-        geometries.push(geometry);
-    }
+    let [(left_wheel, mut remarks), (right_wheel, of_right)] =
+        [placed(&pairs[0], known)?, placed(&pairs[1], known)?];
+    remarks.extend(of_right);
     let force = load.and_then(|load| load.vertical_force_n);
     let (Some(force), Some(contact_modulus)) = (force, contact_modulus) else {
         return Ok(None);
     };
-    let left = load.and_then(|load| load.left_share).unwrap_or(0.5);
-    let mut geometries = geometries.into_iter();
-    let mut side = |k: usize, share: f64| {
-        let geometry = geometries.next()?;
-        Some(WheelTask {
-            geometry,
-            loading: WheelLoad::Vertical(share * force),
-            contact_modulus,
-            trust: trust(&placement(contact, k, poses[0]).0),
-            surface,
-        })
-    };
-    let (Some(left), Some(right_side)) = (side(0, left), side(1, 1.0 - left)) else {
-        return Ok(None);
+    let left_share = load.and_then(|load| load.left_share).unwrap_or(0.5);
+    let wheel = |geometry, share: f64, pair: &PairWords| WheelTask {
+        geometry,
+        loading: WheelLoad::Vertical(share * force),
+        contact_modulus,
+        trust: pair.trust(),
+        surface,
     };
     let task = WheelsetTask {
-        sides: [left, right_side],
+        sides: [
+            wheel(left_wheel, left_share, &pairs[0]),
+            wheel(right_wheel, 1.0 - left_share, &pairs[1]),
+        ],
         poses,
         moves,
         kinematics: kinematics.as_ref().map(|asked| KinematicsTask {
@@ -104,7 +74,7 @@ pub(crate) fn task(
             step: asked.step_mm,
             amplitudes: asked.amplitudes_mm.clone(),
         }),
-        own_right: right.as_ref().map_or([false; 2], |right| {
+        own_right: right.map_or([false; 2], |right| {
             [right.rail.is_some(), right.wheel.is_some()]
         }),
     };
@@ -114,7 +84,43 @@ pub(crate) fn task(
     )))
 }
 
-/// Shift and yaw of every position.
+/// Returns the left and the right pair of rail and wheel, with the wheelset at a shift in mm and a yaw in rad without roll.
+fn sides<'a>(
+    rails: &OnRails<'a>,
+    right: Option<&'a RightSide>,
+    [lateral_shift, yaw]: [f64; 2],
+) -> [PairWords<'a>; 2] {
+    let pose = [lateral_shift, yaw, 0.0];
+    let [left, mut other] = [Side::Left, Side::Right].map(|side| PairWords::new(rails, side, pose));
+    if let Some(rail) = right.and_then(|right| right.rail.as_deref()) {
+        (other.sections[0], other.pointers[0]) = (rail, "/contact/right/rail");
+    }
+    if let Some(wheel) = right.and_then(|right| right.wheel.as_deref()) {
+        (other.sections[1], other.pointers[1]) = (wheel, "/contact/right/wheel");
+    }
+    if let Some(radius) = right.and_then(|right| right.rolling_radius_mm) {
+        other.placement.rolling_radius = radius;
+        other.radius_pointer = "/contact/right/rolling_radius_mm";
+    }
+    [left, other]
+}
+
+/// Refuses guard rails together with kinematics.
+fn refuse_guard_rails(pairs: &[PairWords; 2]) -> Result<(), Vec<Fault>> {
+    let guarded = pairs
+        .iter()
+        .filter(|pair| pair.sections[0].guard_rail_points_mm.is_some());
+    let mut guarded: Vec<&str> = guarded.map(|pair| pair.pointers[0]).collect();
+    guarded.dedup();
+    let detail = "given together with kinematics, which take the running rail alone; leave one of the two out";
+    let fault = |rail: &str| Fault::new(format!("{rail}/guard_rail_points_mm"), detail);
+    match guarded.is_empty() {
+        true => Ok(()),
+        false => Err(guarded.into_iter().map(fault).collect()),
+    }
+}
+
+/// Returns shift in mm and yaw in rad of every position.
 fn poses(
     shifts: &Swept,
     yaws: &Swept,
@@ -133,7 +139,7 @@ fn poses(
         );
         return Err(vec![Fault::new("/contact/lateral_shift_mm", detail)]);
     }
-    let (shifts, yaws) = (swept_values(shifts), swept_values(yaws));
+    let (shifts, yaws) = (shifts.values(), yaws.values());
     Ok(match combine {
         Combine::Grid => shifts
             .iter()
@@ -145,10 +151,10 @@ fn poses(
     })
 }
 
-/// Shift and yaw of every position, and how the wheelset moves there.
+/// Shift in mm and yaw in rad of every position, and the motion of the wheelset there.
 type Moving = (Vec<[f64; 2]>, Vec<WheelsetMove>);
 
-/// Every position with its motion; without motions the positions alone.
+/// Combines positions with motions. Without motions it returns the positions alone.
 fn moving(
     poses: Vec<[f64; 2]>,
     motion: Option<&Motions>,
@@ -183,71 +189,4 @@ fn moving(
         false => (poses[k / motions], moves[k % motions]),
     };
     Ok((0..count).map(pair).unzip())
-}
-
-/// Of the left and of the right side, the cross-sections of rail and wheel with their pointers.
-type Sections<'a> = [[(&'static str, &'a CrossSection); 2]; 2];
-
-fn sections(contact: &Contact) -> Sections<'_> {
-    let Contact::Wheelset {
-        rail, wheel, right, ..
-    } = contact
-    else {
-        unreachable!("only wheelsets have two sides")
-    };
-    let left: [(&'static str, &CrossSection); 2] =
-        [("/contact/rail", rail), ("/contact/wheel", wheel)];
-    let own = right.as_ref().map(|right| [&right.rail, &right.wheel]);
-    let pointers = ["/contact/right/rail", "/contact/right/wheel"];
-    let of_right = |k: usize| match own.and_then(|own| own[k].as_deref()) {
-        Some(section) => (pointers[k], section),
-        None => left[k],
-    };
-    [left, [of_right(0), of_right(1)]]
-}
-
-/// The members of a case that describe the pair of a side, its placement at a shift and a yaw without roll, and the pointer to the rolling radius.
-fn placement(
-    contact: &Contact,
-    side: usize,
-    [lateral_shift, yaw]: [f64; 2],
-) -> (PairWords<'_>, Placement, &'static str) {
-    let Contact::Wheelset {
-        right,
-        rolling_radius_mm,
-        gauge_mm,
-        gauge_height_mm,
-        rail_origin_mm,
-        cant_rad,
-        flange_back_distance_mm,
-        flange_back_position_mm,
-        accept_rough_profiles,
-        ..
-    } = contact
-    else {
-        unreachable!("only wheelsets have two sides")
-    };
-    let own = right.as_ref().and_then(|right| right.rolling_radius_mm);
-    let own = own.filter(|_| side == 1);
-    let placement = Placement {
-        side: [Side::Left, Side::Right][side],
-        rolling_radius: own.unwrap_or(*rolling_radius_mm),
-        rail: RailPlace::of(*gauge_mm, *gauge_height_mm, *rail_origin_mm),
-        cant: *cant_rad,
-        flange_back_distance: *flange_back_distance_mm,
-        flange_back_position: 0.0,
-        lateral_shift,
-        yaw,
-        roll: 0.0,
-    };
-    let words = PairWords {
-        sections: sections(contact)[side].map(|(_, section)| section),
-        flange_back: *flange_back_position_mm,
-        accept_rough: *accept_rough_profiles,
-    };
-    let radius = match own {
-        Some(_) => "/contact/right/rolling_radius_mm",
-        None => "/contact/rolling_radius_mm",
-    };
-    (words, placement, radius)
 }

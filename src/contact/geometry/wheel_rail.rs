@@ -55,19 +55,6 @@ pub enum RailPlace {
     Origin(f64),
 }
 
-impl RailPlace {
-    /// The position from the members of a case: the origin if it is given, otherwise gauge and height with the defaults 1435 and 14.
-    pub(crate) fn of(gauge: Option<f64>, height: Option<f64>, origin: Option<f64>) -> RailPlace {
-        origin.map_or(
-            RailPlace::Gauge {
-                gauge: gauge.unwrap_or(1435.0),
-                height: height.unwrap_or(14.0),
-            },
-            RailPlace::Origin,
-        )
-    }
-}
-
 /// The reason why a wheel and a rail cannot be placed; lengths in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NotPlaced {

@@ -4,7 +4,7 @@
 //!
 //! The relative motion of two rolling bodies.
 
-use railhead_macros::Words;
+use railhead_macros::{Finite, Words};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -206,15 +206,18 @@ impl From<MeshSize> for MeshPlan {
     }
 }
 
-/// Velocity of the upper body relative to the lower one, divided by the rolling speed; the rigid slip at `(x, y)` is
-/// `(ξ − φ y, η + φ x)` (Kalker 1990, eq. 1.70).
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
+// The rigid slip at (x, y) is (ξ − φ y, η + φ x) (Kalker 1990, eq. 1.70). The spin is dimensionless where lengths are.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Motion {
-    /// Longitudinal creepage ξ, dimensionless.
+    /// Longitudinal creepage, dimensionless.
+    #[schema(required = false)]
     pub creepage_x: f64,
-    /// Lateral creepage η, dimensionless.
+    /// Lateral creepage, dimensionless.
+    #[schema(required = false)]
     pub creepage_y: f64,
-    /// Spin φ in 1/mm, or dimensionless where lengths are.
+    /// Spin in 1/mm.
+    #[schema(required = false)]
     pub spin_per_mm: f64,
 }
 

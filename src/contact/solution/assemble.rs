@@ -263,7 +263,7 @@ fn point_solution(
         of_motion + on_level.map_or(0.0, of_pressure)
     };
     PointSolution {
-        motion: (*motion).into(),
+        motion: *motion,
         normalised: normalised(&case.problem.elasticity, patch.area, limit, motion),
         force_x_n: found.force_x,
         force_y_n: found.force_y,

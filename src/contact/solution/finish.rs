@@ -1,9 +1,5 @@
-//! The final step for every answer: distributes wall time, sets rounding residues to 0, adds remarks on implausible numbers, and
-//! checks that all numbers are finite.
-//!
-//! Values per cell as the client reads them: with units, and only those requested.
-//!
-//! Moves the coordinates of a patch to another origin.
+//! The final steps of an answer: wall times, rounding residues, remarks on implausible numbers and the check that all numbers are finite. The
+//! values per cell and the change of a patch's origin are here too.
 
 use std::f64::consts::PI;
 use std::time::Duration;
@@ -25,10 +21,10 @@ use crate::solution::words::answer::{
 };
 use crate::solution::words::evolution::SubsurfaceSummary;
 
-/// Values below this fraction of their scale are rounding residues and reported as 0.
-const DUST: f64 = 1e-14;
+/// Values below this fraction of their scale are rounding residues and are reported as 0.
+const ROUNDING_RESIDUE: f64 = 1e-14;
 
-/// Finishes the answer to a whole problem, given the wall time it took.
+/// Finishes the answer to a problem that took a wall time.
 ///
 /// # Errors
 /// [`SolveError::NotFinite`] if a number in the answer is not finite.
@@ -37,23 +33,18 @@ pub fn finish(
     (mut solution, fields): (Solution, Fields),
     took: Duration,
 ) -> Result<(Solution, Fields), SolveError> {
-    require_finite(&solution, &fields)?;
-    clear_dust(case, &mut solution);
+    if let Some(path) = solution.not_finite().or_else(|| fields.not_finite()) {
+        let quantity = path.trim_start_matches('.').to_owned();
+        return Err(SolveError::NotFinite { quantity });
+    }
+    clear_residues(case, &mut solution);
     scale_seconds(&mut solution, took.as_secs_f64());
-    let said = implausible(&solution, case.problem.part.before);
-    solution.remarks = merged(solution.remarks.into_iter().chain(said));
+    let implausible = implausible(&solution, case.problem.part.before);
+    solution.remarks = merged(solution.remarks.into_iter().chain(implausible));
     Ok((solution, fields))
 }
 
-fn require_finite(solution: &Solution, fields: &Fields) -> Result<(), SolveError> {
-    let path = solution.not_finite().or_else(|| fields.not_finite());
-    path.map_or(Ok(()), |path| {
-        let quantity = path.trim_start_matches('.').to_owned();
-        Err(SolveError::NotFinite { quantity })
-    })
-}
-
-/// Divides the wall time of each motion, which stands in each of its patches, among them by their areas.
+/// Divides the wall time of each motion among its patches by their areas. Before, each patch has the whole time.
 pub fn share_seconds(solution: &mut Solution) {
     let area: f64 = solution.patches.iter().map(|patch| patch.area_mm2).sum();
     for patch in &mut solution.patches {
@@ -63,14 +54,11 @@ pub fn share_seconds(solution: &mut Solution) {
     }
 }
 
-/// Scales the times of the motions so that they add up to that of the whole answer: time that belongs to no motion is distributed in
-/// proportion.
+/// Scales the wall times of the motions to the sum `took`. Time that belongs to no motion is distributed in proportion.
 fn scale_seconds(solution: &mut Solution, took: f64) {
-    let points = |patch: &PatchSolution| patch.points.len();
-    let count: usize = solution.patches.iter().map(points).sum();
-    let of_point = |point: &PointSolution| point.solver.seconds;
-    let of_patch = |patch: &PatchSolution| patch.points.iter().map(of_point).sum::<f64>();
-    let sum: f64 = solution.patches.iter().map(of_patch).sum();
+    let points = || solution.patches.iter().flat_map(|patch| &patch.points);
+    let count = points().count();
+    let sum: f64 = points().map(|point| point.solver.seconds).sum();
     for patch in &mut solution.patches {
         for point in &mut patch.points {
             let seconds = &mut point.solver.seconds;
@@ -83,8 +71,8 @@ fn scale_seconds(solution: &mut Solution, took: f64) {
     }
 }
 
-/// Sets values that are rounding residues of larger numbers to 0.
-fn clear_dust(case: &CheckedCase, solution: &mut Solution) {
+/// Sets rounding residues of larger numbers to 0.
+fn clear_residues(case: &CheckedCase, solution: &mut Solution) {
     let (mut limit_all, mut moment_all) = (0.0, 0.0);
     let mut length_all = 0.0_f64;
     for patch in &mut solution.patches {
@@ -130,16 +118,16 @@ fn clear_dust(case: &CheckedCase, solution: &mut Solution) {
 
 /// Replaces a rounding residue relative to `scale`, and −0, by 0.
 fn clear(value: &mut f64, scale: f64) {
-    if value.abs() <= DUST * scale {
+    if value.abs() <= ROUNDING_RESIDUE * scale {
         *value = 0.0;
     }
 }
 
-/// Remarks on numbers that are implausible for wheel and rail; `before` is the number of motions of the case before the first of these.
+/// Returns remarks on numbers that are implausible for wheel and rail. The first motion has the index `before` in the case.
 fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
     let alone = solution.patches.len() == 1;
     let force = solution.patches.iter().map(|patch| patch.normal_force_n);
-    let mut said: Vec<RemarkEntry> = Vec::new();
+    let mut remarks: Vec<RemarkEntry> = Vec::new();
     for (k, patch) in solution.patches.iter().enumerate() {
         let number = (!alone).then_some(k);
         let at = |remark: Remark, point| RemarkEntry {
@@ -148,10 +136,11 @@ fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
             ..remark.into()
         };
         let length = Some((patch.area_mm2 / PI).sqrt());
-        said.extend(checked_case::pressure(patch.pressure_max_mpa).map(|remark| at(remark, None)));
+        let pressure = checked_case::pressure(patch.pressure_max_mpa);
+        remarks.extend(pressure.map(|remark| at(remark, None)));
         for (motion, point) in patch.points.iter().enumerate() {
-            let remark = checked_case::creepage(&point.motion.into(), length);
-            said.extend(remark.map(|remark| at(remark, Some(before + motion))));
+            let remark = checked_case::creepage(&point.motion, length);
+            remarks.extend(remark.map(|remark| at(remark, Some(before + motion))));
         }
     }
     let positions = solution
@@ -159,11 +148,11 @@ fn implausible(solution: &Solution, before: usize) -> Vec<RemarkEntry> {
         .as_ref()
         .map_or(1, |all| all.positions.len());
     let load = force.sum::<f64>() / positions as f64;
-    said.extend(checked_case::load(load).map(RemarkEntry::from));
-    said
+    remarks.extend(checked_case::load(load).map(RemarkEntry::from));
+    remarks
 }
 
-/// The cells of a patch.
+/// Returns the cells of a patch.
 pub(crate) fn patch_cells(case: &CheckedCase, level: &StripMesh, patch: usize) -> PatchCells {
     let cells = level.patch_cells(patch);
     let mesh = &level.mesh;
@@ -186,45 +175,37 @@ pub(crate) fn patch_cells(case: &CheckedCase, level: &StripMesh, patch: usize) -
     fields
 }
 
-/// The values of a patch for one motion that its tractions alone give.
+/// Returns zones and tractions of a patch for one motion, as far as they are requested.
 pub(crate) fn point_fields(
     case: &CheckedCase,
     level: &StripMesh,
     cells: std::ops::Range<usize>,
     answer: &LevelAnswer,
 ) -> PointFields {
-    let scaled = |values: &[f64], factor: f64| {
-        values[cells.clone()]
-            .iter()
-            .map(|v| v * factor)
-            .collect::<Vec<_>>()
-    };
+    let run = &case.run;
     let traction = |k: usize| {
-        case.run
-            .wants(Output::Tractions)
-            .then(|| scaled(&answer.traction[k], level.scale.traction))
+        let values = answer.traction[k][cells.clone()].iter();
+        run.wants(Output::Tractions)
+            .then(|| values.map(|value| value * level.scale.traction).collect())
     };
     let zone = |slips: &bool| if *slips { Zone::Slip } else { Zone::Stick };
+    let zones = answer.slips[cells.clone()].iter().map(zone);
     PointFields {
-        mesh: 0,
-        zone: case
-            .run
-            .wants(Output::Zones)
-            .then(|| answer.slips[cells.clone()].iter().map(zone).collect()),
+        zone: run.wants(Output::Zones).then(|| zones.collect()),
         traction_x_mpa: traction(0),
         traction_y_mpa: traction(1),
         ..PointFields::default()
     }
 }
 
-/// Largest tangential traction in the cells of a patch, in MPa.
+/// Returns the largest tangential traction in the cells of a patch, in MPa.
 pub(crate) fn traction_max(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
     let [x, y] = &fields.tangential.traction;
     let lengths = level.patch_cells(patch).map(|i| length(x[i], y[i]));
     lengths.fold(0.0, f64::max) * level.scale.traction
 }
 
-/// Moves the origin of a patch by `[x, y]` in mm: its extent, its moments and derivatives, and all places in its answer and its fields.
+/// Moves the origin of a patch by `[x, y]` in mm: changes its extent, moments, derivatives and all coordinates in its answer and fields.
 pub(crate) fn move_origin(
     patch: &mut PatchSolution,
     fields: Option<&mut PatchFields>,
@@ -233,10 +214,9 @@ pub(crate) fn move_origin(
     for (end, by) in patch.extent_mm.iter_mut().zip([by[0], by[0], by[1], by[1]]) {
         *end -= by;
     }
-    patch
-        .points
-        .iter_mut()
-        .for_each(|point| move_point(point, by));
+    for point in &mut patch.points {
+        move_point(point, by);
+    }
     let [dx, dy] = by;
     let Some(PatchFields { meshes, points }) = fields else {
         return;
@@ -284,7 +264,7 @@ fn move_point(point: &mut PointSolution, [dx, dy]: [f64; 2]) {
     }
 }
 
-/// A spin about the new origin moves the old one sideways; the moment takes the forces with it.
+/// Moves the origin of derivatives: a spin about the new origin moves the old one sideways, and the moment includes the forces.
 fn move_gradients(gradients: &mut Gradients, [dx, dy]: [f64; 2]) {
     let Gradients {
         force_x_n: x,
@@ -305,7 +285,7 @@ fn move_gradients(gradients: &mut Gradients, [dx, dy]: [f64; 2]) {
     }
 }
 
-/// Adds to the row of the moment, and to the column of the spin, those of the forces and creepages times their arms.
+/// Adds the forces times their arms to the row of the moment, and the creepages times theirs to the column of the spin.
 fn moved([x, y, m]: [&mut [f64; 3]; 3], [along, across]: [f64; 2]) {
     *m = [0, 1, 2].map(|k| m[k] + along * x[k] + across * y[k]);
     for row in [x, y, m] {

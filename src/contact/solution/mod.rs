@@ -1,4 +1,4 @@
-//! The answer, in the words that clients read.
+//! The answer that clients read, and its assembly.
 
 pub mod assemble;
 pub mod finish;

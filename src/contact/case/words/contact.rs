@@ -1,4 +1,4 @@
-//! Where the bodies touch, and how hard they are pressed together.
+//! The members `contact` and `load` of a case.
 
 use railhead_macros::{Finite, Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use crate::case::words::cross_section::CrossSection;
 use crate::case::words::motion::{Combine, Swept, swept};
 use crate::case::words::object::{AllowedRange, Object, shown};
 use crate::case::words::samples;
-use crate::geometry::wheel_rail::Side;
+use crate::geometry::wheel_rail::{RailPlace, Side};
 use crate::half_space::bent_surface::Influence;
 
 /// Where the bodies touch.
@@ -102,7 +102,7 @@ pub enum Contact {
         #[member(closed(-0.5, 0.5, "rad"), default)]
         cant_rad: f64,
         /// Distance between the backs of the two flanges, in mm; default 1360.
-        #[member(closed(0.0, 1e5, "mm"), default = 1360.0)]
+        #[member(closed(0.0, 1e5, "mm"), default = FLANGE_BACKS)]
         flange_back_distance_mm: f64,
         /// y of the back of the flange in the wheel's cross-section, in mm. Default: found from the points, or -70 if they agree with that
         /// or show no flange.
@@ -158,7 +158,7 @@ pub enum Contact {
         #[member(closed(-0.5, 0.5, "rad"), default)]
         cant_rad: f64,
         /// Distance between the backs of the two flanges, in mm; default 1360.
-        #[member(closed(0.0, 1e5, "mm"), default = 1360.0)]
+        #[member(closed(0.0, 1e5, "mm"), default = FLANGE_BACKS)]
         flange_back_distance_mm: f64,
         /// y of the back of the flange in the wheels' cross-section, in mm. Default: found from the points of each wheel, or -70 if they
         /// agree with that or show no flange.
@@ -227,27 +227,84 @@ pub struct KinematicsWords {
 }
 
 impl Contact {
-    /// Are patches found from cross-sections?
+    /// Whether cross-sections describe the contact.
     pub fn has_profiles(&self) -> bool {
         matches!(self, Contact::Profiles { .. } | Contact::Wheelset { .. })
     }
 
-    /// The surface of the contact and how its cells act on each other, as far as they are given.
-    pub(crate) fn surface(&self) -> (Option<SurfaceName>, Option<Influence>) {
-        match self {
-            Contact::Profiles {
-                reference_surface,
-                influence,
-                ..
-            }
-            | Contact::Wheelset {
-                reference_surface,
-                influence,
-                ..
-            } => (*reference_surface, *influence),
-            _ => (None, None),
+    /// The members that `profiles` and `wheelset` share; `None` for other contacts.
+    pub(crate) fn on_rails(&self) -> Option<OnRails<'_>> {
+        let (Contact::Profiles {
+            rail,
+            wheel,
+            rolling_radius_mm,
+            gauge_mm,
+            gauge_height_mm,
+            rail_origin_mm,
+            cant_rad,
+            flange_back_distance_mm,
+            flange_back_position_mm,
+            accept_rough_profiles,
+            reference_surface,
+            influence,
+            ..
         }
+        | Contact::Wheelset {
+            rail,
+            wheel,
+            rolling_radius_mm,
+            gauge_mm,
+            gauge_height_mm,
+            rail_origin_mm,
+            cant_rad,
+            flange_back_distance_mm,
+            flange_back_position_mm,
+            accept_rough_profiles,
+            reference_surface,
+            influence,
+            ..
+        }) = self
+        else {
+            return None;
+        };
+        Some(OnRails {
+            sections: [rail, wheel],
+            rolling_radius_mm: *rolling_radius_mm,
+            gauge_mm: *gauge_mm,
+            rail_origin_mm: *rail_origin_mm,
+            rail: match *rail_origin_mm {
+                Some(origin) => RailPlace::Origin(origin),
+                None => RailPlace::Gauge {
+                    gauge: gauge_mm.unwrap_or(GAUGE),
+                    height: gauge_height_mm.unwrap_or(GAUGE_HEIGHT),
+                },
+            },
+            cant_rad: *cant_rad,
+            flange_back_distance_mm: *flange_back_distance_mm,
+            flange_back_position_mm: *flange_back_position_mm,
+            accept_rough_profiles: *accept_rough_profiles,
+            reference_surface: *reference_surface,
+            influence: *influence,
+        })
     }
+}
+
+/// The members that the contacts `profiles` and `wheelset` share.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OnRails<'a> {
+    /// Cross-sections of rail and wheel; of a wheelset those of the left side.
+    pub(crate) sections: [&'a CrossSection; 2],
+    pub(crate) rolling_radius_mm: f64,
+    pub(crate) gauge_mm: Option<f64>,
+    pub(crate) rail_origin_mm: Option<f64>,
+    /// Position of the rail by gauge or origin.
+    pub(crate) rail: RailPlace,
+    pub(crate) cant_rad: f64,
+    pub(crate) flange_back_distance_mm: f64,
+    pub(crate) flange_back_position_mm: Option<f64>,
+    pub(crate) accept_rough_profiles: bool,
+    pub(crate) reference_surface: Option<SurfaceName>,
+    pub(crate) influence: Option<Influence>,
 }
 
 /// The load that presses the bodies together: exactly one member, and `left_share` with `wheelset`.
@@ -282,15 +339,23 @@ pub enum SurfaceName {
     Curve,
 }
 
+/// Standard gauge in mm, the default.
+pub(crate) const GAUGE: f64 = 1435.0;
+/// Default depth in mm at which the gauge is measured.
+const GAUGE_HEIGHT: f64 = 14.0;
+/// Default distance of the backs of the flanges in mm, that of standard gauge.
+pub(crate) const FLANGE_BACKS: f64 = 1360.0;
+
 const FORCE: AllowedRange = AllowedRange::positive(1e12, "N");
 const APPROACH: AllowedRange = AllowedRange::positive(1e6, "mm");
 const APPROACH_OF_GAP: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const LEFT_SHARE: AllowedRange = AllowedRange::closed(0.01, 0.99, "");
-/// Members of a load; the first is for profiles only.
+/// Members of a load; the first is for cross-sections only.
 const LOADS: [&str; 3] = ["vertical_force_n", "normal_force_n", "approach_mm"];
 
-/// Most shifts to one side, and most amplitudes.
+/// Maximum number of shifts to one side in the kinematics of a wheelset.
 const SHIFTS_MAX: f64 = 1000.0;
+/// Maximum number of amplitudes of the equivalent conicity.
 const AMPLITUDES_MAX: usize = 100;
 
 /// Reads the required member `contact` of a case.
@@ -298,9 +363,8 @@ pub(crate) fn read(case: &mut Object) -> Option<Contact> {
     Contact::members(&mut case.child("contact")?)
 }
 
-/// Reads the member `load` of a case, which is needed or refused according to the type of the contact.
-///
-/// If `type` is faulty, only the members that are present are checked.
+/// Reads the member `load` of a case. The type of the contact decides whether it is required or refused; if the type is faulty, only the
+/// members that are present are checked.
 pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
     let kind = case
         .value("contact")
@@ -321,11 +385,10 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
     block.only_or(names, &LOADS[..1]);
     if !of_profiles && let Some(value) = block.value(LOADS[0]) {
         let value = shown(value);
-        block.fault(
-            LOADS[0],
-            format!("{value} given for another contact than \"type\": \"profiles\"; give normal_force_n instead"),
+        let detail = format!(
+            "{value} given for another contact than \"type\": \"profiles\"; give normal_force_n instead"
         );
-        return None;
+        return block.refuse(LOADS[0], detail);
     }
     let vertical_force_n = block.number("vertical_force_n", FORCE);
     let normal_force_n = block.number("normal_force_n", FORCE);
@@ -335,15 +398,11 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
     );
     let all = names.join(", ");
     match block.given(names)[..] {
-        [] => {
-            block.fault_here(format!("empty; exactly one of {all} is needed"));
-            return None;
-        }
+        [] => return block.refuse_object(format!("empty; exactly one of {all} is needed")),
         [_] => {}
         [first, second, ..] => {
             let detail = format!("given together with {first}; exactly one of {all} is allowed");
-            block.fault(second, detail);
-            return None;
+            return block.refuse(second, detail);
         }
     }
     vertical_force_n.or(normal_force_n).or(approach_mm)?;
@@ -355,18 +414,14 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
     })
 }
 
-/// The load of a pressure that is given.
+/// Refuses the load of a given pressure.
 fn no_load(case: &mut Object) -> Option<Load> {
-    if case.has("load") {
-        case.fault(
-            "load",
-            "given together with a pressure_grid, which carries its own load; leave it out",
-        );
-    }
-    None
+    case.value("load")?;
+    let detail = "given together with a pressure_grid, which carries its own load; leave it out";
+    case.refuse("load", detail)
 }
 
-/// The load of a wheelset: the vertical force of both wheels, and the part of the left one.
+/// Reads the load of a wheelset: the vertical force of both wheels, and the share of the left one.
 fn load_of_wheelset(case: &mut Object) -> Option<Load> {
     let what = "{\"vertical_force_n\": …}, the force of both wheels";
     case.required("load", what)?;
@@ -377,13 +432,12 @@ fn load_of_wheelset(case: &mut Object) -> Option<Load> {
                 "{} given for a wheelset; give vertical_force_n, the force of both wheels",
                 shown(value)
             );
-            block.fault(name, detail);
-            return None;
+            return block.refuse(name, detail);
         }
     }
     block.only(&["vertical_force_n", "left_share"]);
     let vertical_force_n = block.required_number("vertical_force_n", FORCE);
-    let left_share = block.optional_number("left_share", LEFT_SHARE)?;
+    let left_share = block.optional("left_share", |block, name| block.number(name, LEFT_SHARE))?;
     Some(Load {
         vertical_force_n: Some(vertical_force_n?),
         left_share,
@@ -391,40 +445,35 @@ fn load_of_wheelset(case: &mut Object) -> Option<Load> {
     })
 }
 
-/// A surface goes with its influence, and a rail is placed in one way.
+/// Refuses an influence on planes, and a rail that is placed by both its gauge and its origin.
 pub(crate) fn faults_of_pair(block: &mut Object, _: Option<&Contact>) -> Option<()> {
-    let mut sound = true;
+    let mut sound = Some(());
     let plane = block.value("reference_surface") == Some(&Value::from("plane"));
     if plane && block.has("influence") {
-        block.fault(
-            "influence",
-            "given for planes of contact, which are half-spaces; leave it out, or give reference_surface: \"curve\"",
-        );
-        sound = false;
+        let detail = "given for planes of contact, which are half-spaces; leave it out, or give reference_surface: \"curve\"";
+        sound = block.refuse("influence", detail);
     }
     let both = block.given(&["gauge_mm", "gauge_height_mm"]);
     if block.has("rail_origin_mm") && !both.is_empty() {
-        block.fault(
-            "rail_origin_mm",
-            format!(
-                "given together with {}; give rail_origin_mm alone to place the rail by its origin, or gauge_mm and gauge_height_mm to \
-                 place it by its gauge face",
-                both.join(" and ")
-            ),
+        let detail = format!(
+            "given together with {}; give rail_origin_mm alone to place the rail by its origin, or gauge_mm and gauge_height_mm to \
+             place it by its gauge face",
+            both.join(" and ")
         );
-        sound = false;
+        sound = block.refuse("rail_origin_mm", detail);
     }
-    sound.then_some(())
+    sound
 }
 
-/// The gauge, unless the rail is placed by its origin.
+/// Reads the gauge, unless the rail is placed by its origin.
 pub(crate) fn gauge(block: &mut Object, name: &str) -> Option<Option<f64>> {
-    by_gauge(block, name, AllowedRange::positive(1e5, "mm"), 1435.0)
+    by_gauge(block, name, AllowedRange::positive(1e5, "mm"), GAUGE)
 }
 
-/// The depth at which it is measured.
+/// Reads the depth at which the gauge is measured, unless the rail is placed by its origin.
 pub(crate) fn gauge_height(block: &mut Object, name: &str) -> Option<Option<f64>> {
-    by_gauge(block, name, AllowedRange::closed(0.0, 100.0, "mm"), 14.0)
+    let allowed = AllowedRange::closed(0.0, 100.0, "mm");
+    by_gauge(block, name, allowed, GAUGE_HEIGHT)
 }
 
 fn by_gauge(
@@ -433,13 +482,14 @@ fn by_gauge(
     allowed: AllowedRange,
     usual: f64,
 ) -> Option<Option<f64>> {
-    match block.has("rail_origin_mm") {
-        true => Some(None),
-        false => block.number_or(name, allowed, usual).map(Some),
+    if block.has("rail_origin_mm") {
+        return Some(None);
     }
+    let given = block.optional(name, |block, name| block.number(name, allowed))?;
+    Some(Some(given.unwrap_or(usual)))
 }
 
-/// Shifts and yaws that are combined one by one are as many.
+/// Refuses shifts and yaws that are combined one by one and differ in their number.
 pub(crate) fn faults_of_poses(block: &mut Object, read: Option<&Contact>) -> Option<()> {
     let Some(Contact::Wheelset {
         lateral_shift_mm,
@@ -452,30 +502,26 @@ pub(crate) fn faults_of_poses(block: &mut Object, read: Option<&Contact>) -> Opt
     };
     let [a, b] = [lateral_shift_mm, yaw_rad].map(Swept::points);
     if a != b && a > 1 && b > 1 {
-        block.fault(
-            "yaw_rad",
-            format!(
-                "{b} values given with {a} of lateral_shift_mm; values combined \"together\" need the same number, which \"combine\": \
-                 \"grid\" does not"
-            ),
+        let detail = format!(
+            "{b} values given with {a} of lateral_shift_mm; values combined \"together\" need the same number, which \"combine\": \
+             \"grid\" does not"
         );
-        return None;
+        return block.refuse("yaw_rad", detail);
     }
     Some(())
 }
 
-/// Something differs on the right.
+/// Refuses a right side without a member.
 pub(crate) fn faults_of_right(side: &mut Object, _: Option<&RightSide>) -> Option<()> {
     let members = ["rail", "wheel", "rolling_radius_mm"];
     if side.given(&members).is_empty() {
         let names = members.join(", ");
-        side.fault_here(format!("empty; at least one of {names} is needed"));
-        return None;
+        return side.refuse_object(format!("empty; at least one of {names} is needed"));
     }
     Some(())
 }
 
-/// The steps to either side are neither few nor many.
+/// Refuses fewer than 2 or more than [`SHIFTS_MAX`] steps to either side.
 pub(crate) fn faults_of_kinematics(
     asked: &mut Object,
     read: Option<&KinematicsWords>,
@@ -484,18 +530,17 @@ pub(crate) fn faults_of_kinematics(
         reach_mm, step_mm, ..
     } = read?;
     if !(2.0..=SHIFTS_MAX).contains(&(reach_mm / step_mm)) {
-        asked.fault(
-            "step_mm",
-            format!("{step_mm} given for a reach of {reach_mm} mm; 2 to {SHIFTS_MAX} steps to either side are allowed"),
+        let detail = format!(
+            "{step_mm} given for a reach of {reach_mm} mm; 2 to {SHIFTS_MAX} steps to either side are allowed"
         );
-        return None;
+        return asked.refuse("step_mm", detail);
     }
     Some(())
 }
 
-/// Amplitudes of the equivalent conicity.
+/// Reads the amplitudes of the equivalent conicity.
 pub(crate) fn amplitudes(asked: &mut Object, name: &str) -> Option<Vec<f64>> {
     let what = format!("an array of 1 to {AMPLITUDES_MAX} amplitudes in mm");
-    let elements = asked.array(name, 1..=AMPLITUDES_MAX, &what)?;
-    asked.numbers(name, elements, AllowedRange::positive(50.0, "mm"))
+    let allowed = AllowedRange::positive(50.0, "mm");
+    asked.number_array(name, 1..=AMPLITUDES_MAX, &what, allowed)
 }

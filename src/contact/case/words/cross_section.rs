@@ -1,4 +1,4 @@
-//! Cross-sections of rails and wheels.
+//! A cross-section of a rail or a wheel in a case.
 
 use railhead_macros::{Members, none_is_absent};
 use serde::Serialize;
@@ -67,36 +67,32 @@ pub enum SmoothingWord {
 
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
-/// Characters of a file.
+/// Maximum number of characters of a file.
 const TEXT_MAX: usize = 4_000_000;
 
-/// A cross-section is given by points or by the text of a file.
+/// Refuses a cross-section that has neither points nor a text with its format, or both.
 pub(crate) fn faults_of_section(block: &mut Object, _: Option<&CrossSection>) -> Option<()> {
-    match (block.has("points_mm"), block.has("text")) {
-        (true, false) if block.has("format") => block.fault(
-            "format",
-            "given together with points_mm; a format is only for the text of a file",
-        ),
-        (true, false) => return Some(()),
-        (false, true) => {
-            let what = format!("one of {}", names(Format::WORDS));
-            return block.required("format", &what).map(|_| ());
-        }
-        (false, false) => block.fault(
-            "points_mm",
-            "missing; an array of points [y, z] in mm is needed, or text and format of a file instead",
-        ),
-        (true, true) => block.exclude("points_mm", "text"),
+    let given = block.exactly_one(&["points_mm", "text"], |block| {
+        let detail = "missing; an array of points [y, z] in mm is needed, or text and format of a file instead";
+        block.fault("points_mm", detail);
+    })?;
+    if given == "text" {
+        let what = format!("one of {}", names(Format::WORDS));
+        return block.required("format", &what).map(|_| ());
     }
-    None
+    if block.has("format") {
+        let detail = "given together with points_mm; a format is only for the text of a file";
+        return block.refuse("format", detail);
+    }
+    Some(())
 }
 
-/// The content of a file.
+/// Reads the content of a file.
 pub(crate) fn text(block: &mut Object, name: &str) -> Option<String> {
     block.text(name, TEXT_MAX)
 }
 
-/// A length, or the word `auto`.
+/// Reads a length or the keyword `auto`.
 pub(crate) fn smoothing(block: &mut Object, name: &str) -> Option<Smoothing> {
     let value = block.value(name)?;
     if value.as_str() == Some("auto") {
@@ -105,13 +101,12 @@ pub(crate) fn smoothing(block: &mut Object, name: &str) -> Option<Smoothing> {
     if !value.is_number() {
         let given = shown(value);
         let detail = format!("{given} given; {SMOOTHING} is allowed, or \"auto\"");
-        block.fault(name, detail);
-        return None;
+        return block.refuse(name, detail);
     }
     block.number(name, SMOOTHING).map(Smoothing::Length)
 }
 
-/// Points of a cross-section.
+/// Reads the points of a cross-section. The first [`LISTED_MAX`] faulty ones get a fault each; one more fault counts the rest.
 pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 2]>> {
     let what = format!("an array of {POINTS_MIN} to {POINTS_MAX} points [y, z] in mm");
     let elements = block.array(name, POINTS_MIN..=POINTS_MAX, &what)?;

@@ -1,4 +1,4 @@
-//! Request of an evolution: the bodies that wear, the wear model, the extent, events and limits.
+//! The request of an evolution: the bodies that wear, the wear model, the extent, events and limits.
 
 use railhead_macros::{Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::case::words::cross_section::CrossSection;
-use crate::case::words::object::{AllowedRange, Faults, Object, join, number, shown};
+use crate::case::words::object::{AllowedRange, Faults, Object, shown};
 use crate::case::words::subsurface::DamageModel;
 use crate::error::CaseError;
 use crate::numerics::quadrature::PRIMES;
@@ -111,7 +111,7 @@ pub enum WearingBodies {
 }
 
 impl EvolutionWords {
-    /// The extent in the unit that events are given in.
+    /// Returns the extent in the unit in which events are given.
     pub(crate) fn end(&self) -> f64 {
         let extent = &self.extent;
         let rail = extent.mgt.or(extent.axle_passes);
@@ -193,7 +193,7 @@ pub struct WearLosses {
 }
 
 impl WearLosses {
-    /// Names and values, first those of the rail.
+    /// Returns names and values, first those of the rail.
     pub fn named(&self) -> [(&'static str, Option<f64>); 5] {
         [
             ("height_mm", self.height_mm),
@@ -237,18 +237,18 @@ const AMOUNT: AllowedRange = AllowedRange::positive(1e12, "");
 const NOT_NEGATIVE: AllowedRange = AllowedRange::closed(0.0, 1e12, "");
 const ANY: AllowedRange = AllowedRange::closed(-1e12, 1e12, "");
 const LOSS: AllowedRange = AllowedRange::positive(100.0, "mm");
-/// Events of one evolution.
+/// Maximum number of events.
 const EVENTS_MAX: usize = 100;
-/// Rows of a traffic.
+/// Maximum number of rows of a traffic.
 const ROWS_MAX: u32 = 200_000;
-/// Samples of a traffic whose columns are distributions.
+/// Default number of samples of a traffic whose columns are all distributions.
 const SAMPLES_DEFAULT: u32 = 4096;
 
 impl EvolutionWords {
-    /// Reads an evolution whose columns are named by JSON pointers into the template.
+    /// Reads an evolution. The names of its columns are JSON pointers into the template.
     ///
     /// # Errors
-    /// Every fault of the text, with its JSON pointer.
+    /// All faults of the request, with their JSON pointers.
     pub(crate) fn read(value: &Value) -> Result<EvolutionWords, CaseError> {
         let mut faults = Faults::default();
         let words = Object::open(value, String::new(), &mut faults)
@@ -258,22 +258,22 @@ impl EvolutionWords {
     }
 }
 
-/// The case of the states.
+/// Reads the template.
 pub(crate) fn template(all: &mut Object, name: &str) -> Option<Value> {
     all.required(name, "a case of one motion").cloned()
 }
 
-/// A law of wear.
+/// Reads a wear model.
 pub(crate) fn wear_model(all: &mut Object, name: &str) -> Option<DamageModel> {
     all.word(name, &MODELS)
 }
 
-/// A limit of a loss.
+/// Reads a limit of a loss.
 pub(crate) fn loss(limits: &mut Object, name: &str) -> Option<f64> {
     limits.number(name, LOSS)
 }
 
-/// The extent says how far each body that wears goes.
+/// Refuses an extent that does not state how far each wearing body goes, or states the traffic twice.
 pub(crate) fn faults_of_extent(all: &mut Object, _: Option<&EvolutionWords>) -> Option<()> {
     if !all.value("extent")?.is_object() {
         return None;
@@ -296,32 +296,26 @@ pub(crate) fn faults_of_extent(all: &mut Object, _: Option<&EvolutionWords>) -> 
     Some(())
 }
 
-/// Maintenance, in any order.
+/// Reads the events.
 pub(crate) fn events(all: &mut Object, name: &str) -> Option<Vec<EvolutionEvent>> {
     let what = format!("an array of at most {EVENTS_MAX} events");
     let elements = all.array(name, 0..=EVENTS_MAX, &what)?;
-    let pointer = all.pointer_to(name);
-    let event = |(k, element)| {
-        let mut block = Object::open(element, join(&pointer, k), all.faults())?;
-        EvolutionEvent::members(&mut block)
-    };
-    Some(elements.iter().enumerate().filter_map(event).collect())
+    all.each(name, elements, |element, pointer, faults| {
+        EvolutionEvent::members(&mut Object::open(element, pointer, faults)?)
+    })
 }
 
-/// Something happens.
+/// Refuses an event without effect.
 pub(crate) fn faults_of_event(block: &mut Object, _: Option<&EvolutionEvent>) -> Option<()> {
     let kinds = ["grind", "reprofile", "friction_coefficient"];
     if block.given(&kinds).is_empty() {
-        block.fault_here(format!(
-            "the event has no effect; give one of {}",
-            kinds.join(", ")
-        ));
-        return None;
+        let kinds = kinds.join(", ");
+        return block.refuse_object(format!("the event has no effect; give one of {kinds}"));
     }
     Some(())
 }
 
-/// The states, sampled or listed.
+/// Reads the states of the traffic.
 pub(crate) fn traffic(all: &mut Object, name: &str) -> Option<Traffic> {
     let mut block = all.child(name)?;
     block.only(&["columns", "passes", "samples"]);
@@ -333,16 +327,14 @@ pub(crate) fn traffic(all: &mut Object, name: &str) -> Option<Traffic> {
     let Some(members) = members else {
         let given = shown(value);
         let detail = format!("{given} given; an object with at least one column is needed");
-        block.fault("columns", detail);
-        return None;
+        return block.refuse("columns", detail);
     };
     let first = members.values().find_map(Value::as_array);
     let rows = samples.or(first.map(|first| first.len() as u32));
     let samples = rows.unwrap_or(SAMPLES_DEFAULT);
     if !(1..=ROWS_MAX).contains(&samples) {
         let detail = format!("{samples} rows given; 1 to {ROWS_MAX} are allowed");
-        block.fault("columns", detail);
-        return None;
+        return block.refuse("columns", detail);
     }
     let mut block_of_columns = block.child("columns")?;
     let column = |(name, value): (&String, &Value)| {
@@ -355,11 +347,9 @@ pub(crate) fn traffic(all: &mut Object, name: &str) -> Option<Traffic> {
         Some((name.clone(), column?))
     };
     let columns = members.iter().filter_map(column).collect();
-    let (given, most) = (
-        members.values().filter(|of| of.is_object()).count(),
-        PRIMES.len(),
-    );
-    if given > most {
+    let given = members.values().filter(|of| of.is_object()).count();
+    if given > PRIMES.len() {
+        let most = PRIMES.len();
         let detail = format!("{given} distributions given; at most {most} are allowed");
         block.fault("columns", detail);
     }
@@ -395,16 +385,13 @@ fn distribution(mut block: Object) -> Option<TrafficDistribution> {
     })
 }
 
-/// One number for each row.
+/// Reads one number for each row.
 fn numbers(block: &mut Object, name: &str, allowed: AllowedRange, rows: u32) -> Option<Vec<f64>> {
     let value = block.value(name)?;
     let Some(elements) = value.as_array().filter(|all| all.len() == rows as usize) else {
         let given = shown(value);
         let detail = format!("{given} given; one number for each of {rows} rows is needed");
-        block.fault(name, detail);
-        return None;
+        return block.refuse(name, detail);
     };
-    let pointer = block.pointer_to(name);
-    let one = |(k, element)| number(element, &join(&pointer, k), allowed, block.faults());
-    Some(elements.iter().enumerate().filter_map(one).collect())
+    block.numbers(name, elements, allowed)
 }

@@ -1,10 +1,10 @@
-//! Friction between the bodies, and what lies between them.
+//! The member `friction` of a case: coefficients, layers and the reduction factor.
 
 use railhead_macros::{Members, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::case::words::object::{AllowedRange, Object, join};
+use crate::case::words::object::{AllowedRange, Object};
 use crate::case::words::samples::AXIS_POINTS;
 use crate::friction::velocity_weakening::FallForm;
 
@@ -134,17 +134,20 @@ pub struct LayerWords {
 }
 
 impl Friction {
-    /// The largest coefficient.
+    /// Returns the largest coefficient.
     pub fn largest(&self) -> f64 {
-        let falling = |limit: f64| limit + self.terms.iter().map(|t| t.coefficient).sum::<f64>();
-        let across = self.across.iter().flat_map(|across| &across.coefficient);
-        let given = self.coefficient.or_else(|| self.limit.map(falling));
-        let across = across.chain(self.along.iter().flat_map(|along| &along.coefficient));
-        let across = across.chain(self.by_temperature.iter().flat_map(|law| &law.coefficient));
-        across.fold(given.unwrap_or(0.0), |most, value| most.max(*value))
+        let at_rest = |limit: f64| limit + self.terms.iter().map(|t| t.coefficient).sum::<f64>();
+        let single = self.coefficient.or_else(|| self.limit.map(at_rest));
+        let tables = [
+            self.across.as_ref().map(|law| &law.coefficient),
+            self.along.as_ref().map(|law| &law.coefficient),
+            self.by_temperature.as_ref().map(|law| &law.coefficient),
+        ];
+        let listed = tables.into_iter().flatten().flatten();
+        listed.fold(single.unwrap_or(0.0), |most, value| most.max(*value))
     }
 
-    /// What the coefficient falls with, if it falls.
+    /// Returns the quantity with which the coefficient falls: `slip`, `temperature` or none.
     pub fn falls_with(&self) -> Option<&'static str> {
         match (self.law, &self.by_temperature) {
             (Some(_), _) => Some("slip"),
@@ -153,67 +156,60 @@ impl Friction {
         }
     }
 
-    /// The coefficient, if that is all there is.
+    /// Returns the coefficient if it is constant and the case has neither a layer nor a reduction factor.
     pub fn constant(&self) -> Option<f64> {
         let softer = self.layer.is_some() || self.reduction.is_some();
         self.coefficient.filter(|_| !softer)
     }
 }
 
-/// A smaller friction coefficient is refused unless it is 0: dimensionless motions would overflow.
+/// Smallest friction coefficient other than 0. With a smaller one, dimensionless motions would overflow.
 pub(crate) const COEFFICIENT_LEAST: f64 = 1e-12;
-/// The ways to give a coefficient.
-const WAYS: [&str; 5] = ["coefficient", "law", "across", "along", "by_temperature"];
-/// The words of a fault for what `terms` has to be.
+/// The members that give a coefficient.
+const LAWS: [&str; 5] = ["coefficient", "law", "across", "along", "by_temperature"];
+/// The description of `terms` in faults.
 const TERMS: &str = "an array of one or two objects with coefficient and half_speed_mm_per_s";
 
-/// Exactly one way to give a coefficient, with what belongs to it.
+/// Refuses a coefficient that is given in no way or in several ways, and members that do not belong to the way in which it is given.
 pub(crate) fn faults_of_friction(block: &mut Object, read: Option<&Friction>) -> Option<()> {
     let coefficient = AllowedRange::closed(0.0, 100.0, "");
     let falls = block.has("law");
-    let needed = match block.given(&WAYS)[..] {
-        [] => block
-            .required_number("coefficient", coefficient)
-            .map(|_| ()),
-        ["law"] if !block.has("limit") => block.required_number("limit", coefficient).map(|_| ()),
-        ["law"] => block.required("terms", TERMS).map(|_| ()),
-        [_] => Some(()),
-        [first, second, ..] => {
-            block.exclude(first, second);
-            None
+    let law = block.exactly_one(&LAWS, |block| {
+        block.required_number("coefficient", coefficient);
+    });
+    let mut sound = law.and_then(|law| match law {
+        "law" if !block.has("limit") => block.required_number("limit", coefficient).map(|_| ()),
+        "law" => block.required("terms", TERMS).map(|_| ()),
+        _ => Some(()),
+    });
+    if !falls {
+        for name in block.given(&["limit", "terms"]) {
+            sound = block.refuse(name, "given without law, to which it belongs");
         }
-    };
-    let foreign = block.given(&["limit", "terms"]);
-    let foreign = foreign.into_iter().filter(|_| !falls);
-    for name in foreign.clone() {
-        block.fault(name, "given without law, to which it belongs");
     }
-    needed.filter(|()| foreign.count() == 0)?;
+    sound?;
     let read = read?;
     let largest = read.largest();
     match read.coefficient {
         Some(given) if given > 0.0 && given < COEFFICIENT_LEAST => {
             let detail = format!("{given:e} given; 0 or at least {COEFFICIENT_LEAST:e} is needed");
-            block.fault("coefficient", detail);
-            return None;
+            return block.refuse("coefficient", detail);
         }
         None if falls && !(COEFFICIENT_LEAST..=100.0).contains(&largest) => {
-            block.fault_here(format!(
+            return block.refuse_object(format!(
                 "limit and terms add up to {largest}; the coefficient at rest must be a number from {COEFFICIENT_LEAST:e} to 100"
             ));
-            return None;
         }
         _ => {}
     }
     if falls && read.layer.is_some_and(|layer| layer.yield_mpa.is_some()) {
         let detail = "given with a layer that yields; friction that falls with slip goes with a layer that does not";
-        block.fault("law", detail);
-        return None;
+        return block.refuse("law", detail);
     }
     Some(())
 }
 
-/// Reads the terms of a coefficient that falls with slip velocity.
+/// Reads the terms of a coefficient that falls with slip speed.
 pub(crate) fn terms(block: &mut Object, name: &str) -> Option<Vec<FallTermWords>> {
     let elements = block.array(name, 1..=2, TERMS)?;
     block.each(name, elements, |element, pointer, faults| {
@@ -221,33 +217,30 @@ pub(crate) fn terms(block: &mut Object, name: &str) -> Option<Vec<FallTermWords>
     })
 }
 
-/// Places are given in one way, and in order.
+/// Refuses positions that are given in no way, in two ways or out of order.
 pub(crate) fn faults_of_across(block: &mut Object, read: Option<&AcrossWords>) -> Option<()> {
-    let name = match block.given(&["y_mm", "angle_rad"])[..] {
-        [] => {
-            block.required("y_mm", "an array of places in mm")?;
-            return None;
-        }
-        [name] => name,
-        [first, second, ..] => {
-            block.exclude(first, second);
-            return None;
-        }
-    };
+    let name = block.exactly_one(&["y_mm", "angle_rad"], |block| {
+        block.required("y_mm", "an array of places in mm");
+    })?;
     let read = read?;
     let places = read.y_mm.as_ref().or(read.angle_rad.as_ref())?;
-    in_places(block, name, places, &read.coefficient)
+    require_order(block, name, places, &read.coefficient)
 }
 
-/// Places are in order.
+/// Refuses positions that are out of order.
 pub(crate) fn faults_of_along(block: &mut Object, read: Option<&AlongWords>) -> Option<()> {
     let read = read?;
-    in_places(block, "x_mm", &read.x_mm, &read.coefficient)
+    require_order(block, "x_mm", &read.x_mm, &read.coefficient)
 }
 
-/// Places in order, and as many coefficients.
-fn in_places(block: &mut Object, name: &str, places: &[f64], coefficient: &[f64]) -> Option<()> {
-    as_many(block, name, places.len(), coefficient.len())?;
+/// Refuses decreasing positions, three equal positions, and a number of coefficients other than one per position.
+fn require_order(
+    block: &mut Object,
+    name: &str,
+    places: &[f64],
+    coefficient: &[f64],
+) -> Option<()> {
+    require_equal_lengths(block, name, places.len(), coefficient.len())?;
     let falls = |k: usize| places[k] < places[k - 1];
     let is_third = |k: usize| k > 1 && places[k] == places[k - 2];
     let Some(k) = (1..places.len()).find(|k| falls(*k) || is_third(*k)) else {
@@ -262,24 +255,26 @@ fn in_places(block: &mut Object, name: &str, places: &[f64], coefficient: &[f64]
             "{given} given three times; two equal positions form a jump of the coefficient; three are not allowed"
         ),
     };
-    let pointer = join(&block.pointer_to(name), k);
-    block.faults().add(pointer, detail);
-    None
+    block.refuse_element(name, k, detail)
 }
 
-/// There is one coefficient for every place of a table.
-fn as_many(block: &mut Object, name: &str, places: usize, coefficients: usize) -> Option<()> {
+/// Refuses a number of coefficients other than one per value of the member `name`.
+fn require_equal_lengths(
+    block: &mut Object,
+    name: &str,
+    places: usize,
+    coefficients: usize,
+) -> Option<()> {
     if places == coefficients {
         return Some(());
     }
     let detail = format!(
         "{coefficients} values given; one coefficient per {name} is needed, which are {places}"
     );
-    block.fault("coefficient", detail);
-    None
+    block.refuse("coefficient", detail)
 }
 
-/// Temperatures rise, and coefficients do not.
+/// Refuses temperatures that do not rise and coefficients that rise.
 pub(crate) fn faults_of_temperatures(
     block: &mut Object,
     read: Option<&ByTemperatureWords>,
@@ -288,44 +283,34 @@ pub(crate) fn faults_of_temperatures(
         temperature_c: temperature,
         coefficient,
     } = read?;
-    as_many(block, "temperature_c", temperature.len(), coefficient.len())?;
+    require_equal_lengths(block, "temperature_c", temperature.len(), coefficient.len())?;
     if let Some(k) = temperature.windows(2).position(|pair| pair[1] <= pair[0]) {
-        let pointer = join(&block.pointer_to("temperature_c"), k + 1);
         let [before, given] = [temperature[k], temperature[k + 1]];
         let detail = format!("{given} given after {before}; temperatures must rise");
-        block.faults().add(pointer, detail);
-        return None;
+        return block.refuse_element("temperature_c", k + 1, detail);
     }
     if let Some(k) = coefficient.windows(2).position(|pair| pair[1] > pair[0]) {
-        let pointer = join(&block.pointer_to("coefficient"), k + 1);
         let [before, given] = [coefficient[k], coefficient[k + 1]];
         let detail = format!(
             "{given} given after {before}; a coefficient that rises with temperature is not covered, because heat and friction may then drive each other"
         );
-        block.faults().add(pointer, detail);
-        return None;
+        return block.refuse_element("coefficient", k + 1, detail);
     }
     Some(())
 }
 
-/// The numbers of a table.
+/// Reads the numbers of a table.
 pub(crate) fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
-    let what = format!(
-        "an array of {} to {} numbers",
-        AXIS_POINTS.start(),
-        AXIS_POINTS.end()
-    );
-    block.required(name, &what)?;
-    let elements = block.array(name, AXIS_POINTS, &what)?;
-    block.numbers(name, elements, allowed)
+    let (least, most) = (AXIS_POINTS.start(), AXIS_POINTS.end());
+    let what = format!("an array of {least} to {most} numbers");
+    block.number_array(name, AXIS_POINTS, &what, allowed)
 }
 
-/// Hardening belongs to a layer that yields.
+/// Refuses hardening of a layer that does not yield.
 pub(crate) fn faults_of_layer(block: &mut Object, _: Option<&LayerWords>) -> Option<()> {
     if block.has("hardening_mpa_per_mm") && !block.has("yield_mpa") {
         let detail = "given without yield_mpa, to which it belongs";
-        block.fault("hardening_mpa_per_mm", detail);
-        return None;
+        return block.refuse("hardening_mpa_per_mm", detail);
     }
     Some(())
 }

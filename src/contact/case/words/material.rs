@@ -1,4 +1,4 @@
-//! Elastic and thermal constants of the bodies.
+//! The members `material` and `thermal` of a case.
 
 use railhead_macros::{Members, none_is_absent};
 use serde::Serialize;
@@ -22,7 +22,7 @@ pub enum Material {
 }
 
 impl Material {
-    /// The lower and the upper body.
+    /// Returns the constants of the lower and the upper body.
     pub fn bodies(&self) -> [&Elastic; 2] {
         match self {
             Material::Same(both) => [both; 2],
@@ -49,7 +49,7 @@ pub struct Elastic {
 }
 
 impl Elastic {
-    /// The shear modulus in MPa, given or from Young's.
+    /// Returns the shear modulus in MPa, as given or computed from Young's modulus.
     pub fn shear(&self) -> Option<f64> {
         let from_young = || Some(self.young_modulus_mpa? / (2.0 * (1.0 + self.poisson_ratio)));
         self.shear_modulus_mpa.or_else(from_young)
@@ -103,8 +103,8 @@ pub(crate) fn read_material(case: &mut Object) -> Option<Material> {
     })
 }
 
-/// One set of constants for both bodies, or one for each.
-pub(crate) fn one_or_pair<T>(
+/// Reads one set of constants for both bodies, or one for the lower and one for the upper body.
+fn one_or_pair<T>(
     block: &mut Object,
     read: fn(&mut Object) -> Option<T>,
 ) -> Option<[Option<T>; 2]> {
@@ -116,21 +116,19 @@ pub(crate) fn one_or_pair<T>(
     Some([Some(lower?), Some(upper?)])
 }
 
-/// Exactly one of the moduli is given.
+/// Refuses a material without a modulus or with two.
 pub(crate) fn faults_of_elastic(block: &mut Object, _: Option<&Elastic>) -> Option<()> {
-    match block.given(&["shear_modulus_mpa", "young_modulus_mpa"])[..] {
-        [_] => return Some(()),
-        [] => {
-            let modulus = AllowedRange::positive(1e12, "MPa");
-            let detail = format!("missing; {modulus} is needed, or young_modulus_mpa instead");
-            block.fault("shear_modulus_mpa", detail);
-        }
-        [first, second, ..] => block.exclude(first, second),
-    }
-    None
+    let moduli = ["shear_modulus_mpa", "young_modulus_mpa"];
+    let given = block.exactly_one(&moduli, |block| {
+        let modulus = AllowedRange::positive(1e12, "MPa");
+        let detail = format!("missing; {modulus} is needed, or young_modulus_mpa instead");
+        block.fault("shear_modulus_mpa", detail);
+    });
+    given.map(|_| ())
 }
 
 /// Reads the member `thermal` of a case, which belongs to the output `temperature` and to friction that falls with temperature.
+/// `wanted` is `None` if it is not known whether the case needs it.
 ///
 /// Returns `None` if a fault was recorded.
 pub(crate) fn read_thermal(
@@ -147,8 +145,7 @@ pub(crate) fn read_thermal(
     if wanted == Some(false) {
         let detail =
             "given without \"temperature\" among the outputs; add it there or leave this out";
-        case.fault("thermal", detail);
-        return None;
+        return case.refuse("thermal", detail);
     }
     let mut block = case.child("thermal")?;
     Some(Some(

@@ -1,4 +1,4 @@
-//! The words of a case: their names, units and ranges, and how they are read with every fault of the text.
+//! The members of a case: names, units, ranges, and how they are read with all faults of the text.
 
 pub mod contact;
 pub mod cross_section;

@@ -1,29 +1,12 @@
-//! How the bodies roll: one motion, a list, a sweep, a history or a wheelset.
-//!
-//! Rolling that changes, as a client writes it: motions or forces in the distance rolled.
+//! The member `motion` of a case: one motion, a list, a sweep, a history or the motion of a wheelset.
 
-use railhead_macros::{Finite, Members, Words, none_is_absent};
-use serde::{Deserialize, Serialize};
+use railhead_macros::{Members, Words, none_is_absent};
+use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::case::words::object::{AllowedRange, Faults, Member, Object, join, shown};
+use crate::case::words::object::{AllowedRange, Faults, Member, Object, shown};
 use crate::rolling::history::plan::HistoryStart;
-
-/// Rolling motion of the upper body relative to the lower one, divided by the rolling speed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
-#[schema(as = Motion)]
-pub struct MotionWords {
-    /// Longitudinal creepage, dimensionless.
-    #[schema(required = false)]
-    pub creepage_x: f64,
-    /// Lateral creepage, dimensionless.
-    #[schema(required = false)]
-    pub creepage_y: f64,
-    /// Spin in 1/mm.
-    #[schema(required = false)]
-    pub spin_per_mm: f64,
-}
 
 /// A motion of a case: creepages and spin. A tangential force may replace a creepage; the creepage is then computed and reported.
 #[none_is_absent]
@@ -189,12 +172,21 @@ pub struct ValueList {
 }
 
 impl Swept {
-    /// Number of values.
+    /// The number of values.
     pub fn points(&self) -> usize {
         match self {
             Swept::Constant(_) => 1,
             Swept::Range(range) => range.points as usize,
             Swept::List(list) => list.values.len(),
+        }
+    }
+
+    /// Returns the values in order.
+    pub fn values(&self) -> Vec<f64> {
+        match self {
+            Swept::Constant(value) => vec![*value],
+            Swept::Range(range) => range.values(),
+            Swept::List(list) => list.values.clone(),
         }
     }
 }
@@ -242,7 +234,7 @@ pub struct History {
 }
 
 impl History {
-    /// The components by their names, the shifts last.
+    /// Returns the components with their names, the shifts last.
     fn courses(&self) -> [(&'static str, Option<&HistoryCourse>); 8] {
         [
             ("creepage_x", &self.creepage_x),
@@ -272,7 +264,7 @@ pub enum HistoryCourse {
 }
 
 impl HistoryCourse {
-    /// Number of values; 1 of a constant.
+    /// The number of values; 1 for a constant.
     pub fn points(&self) -> usize {
         match self {
             HistoryCourse::Constant(_) => 1,
@@ -281,7 +273,7 @@ impl HistoryCourse {
         }
     }
 
-    /// The values at `points` points.
+    /// Returns the value at each of `points` points.
     pub fn values(&self, points: usize) -> Vec<f64> {
         match self {
             HistoryCourse::Constant(value) => vec![*value; points],
@@ -304,7 +296,7 @@ pub struct Range {
 }
 
 impl Range {
-    /// The values; the ends are exact.
+    /// Returns the values. The first and the last are exactly `from` and `to`.
     pub fn values(&self) -> Vec<f64> {
         let last = self.points.saturating_sub(1);
         (0..self.points)
@@ -322,9 +314,9 @@ impl Range {
     }
 }
 
-/// Most motions of a sweep, points of a history and coordinates of a grid, before the limit of the service.
+/// Maximum number of values in a sweep, a history or a grid axis. The limits of the service apply in addition.
 pub(crate) const POINTS_MAX: u32 = 1_000_000;
-/// The forces stand in the order of the creepages they replace.
+/// The components of a motion. The forces have the order of the creepages that they replace.
 const COMPONENTS: [&str; 5] = [
     "creepage_x",
     "creepage_y",
@@ -332,8 +324,6 @@ const COMPONENTS: [&str; 5] = [
     "force_x_n",
     "force_y_n",
 ];
-/// The lateral velocity of a wheelset, and the force that may stand in its place.
-const ACROSS: [&str; 2] = ["lateral_velocity_mm_per_s", "force_y_n"];
 
 /// Reads the required member `motion` of a case.
 pub(crate) fn read(case: &mut Object) -> Option<Motions> {
@@ -360,11 +350,8 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
             let mut block = Object::open(value, pointer, faults)?;
             block.only(&["wheelset"]);
             if !of_profiles && !of_wheelset {
-                block.fault(
-                    "wheelset",
-                    "given for another contact than \"type\": \"profiles\" or \"wheelset\"; give creepages instead",
-                );
-                return None;
+                let detail = "given for another contact than \"type\": \"profiles\" or \"wheelset\"; give creepages instead";
+                return block.refuse("wheelset", detail);
             }
             match members.get("wheelset") {
                 Some(Value::Array(motions)) if of_wheelset && !motions.is_empty() => {
@@ -382,17 +369,13 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
         _ if of_wheelset => {
             let what = "the motion of the wheelset is needed, such as {\"wheelset\": {\"speed_mm_per_s\": 20000, \"drive_torque_n_mm\": 0}}, from which \
                         every patch gets its own creepages";
-            faults.add(pointer, format!("{} given; {what}", shown(value)));
-            None
+            faults.refuse(pointer, format!("{} given; {what}", shown(value)))
         }
         Value::Object(_) => motion(value, pointer, faults).map(Motions::One),
         Value::Array(elements) if !elements.is_empty() => {
             case.each("motion", elements, motion).map(Motions::Many)
         }
-        _ => {
-            faults.add(pointer, format!("{} given; {what} is needed", shown(value)));
-            None
-        }
+        _ => case.mistaken("motion", what),
     }
 }
 
@@ -406,7 +389,7 @@ fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMo
     })
 }
 
-/// The motion of a wheelset; on both rails a torque can be balanced, on one a longitudinal and a lateral force.
+/// Reads the motion of a wheelset. It may balance a torque on both rails, or longitudinal and lateral forces on one rail.
 fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
     let (balanced, refused) = match on_both_rails {
         true => ("drive_torque_n_mm", &["force_x_n", "force_y_n"][..]),
@@ -420,11 +403,15 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
         );
     }
     let read = Wheelset::members(block);
-    let spins = ["angular_velocity_rad_per_s", "free_rolling_radius_mm"];
-    turning_is_said_once(block, [spins[0], spins[1], balanced])?;
-    if let [velocity, force] = block.given(&ACROSS)[..] {
-        block.exclude(velocity, force);
-        return None;
+    let angular = "angular_velocity_rad_per_s";
+    let radius = "free_rolling_radius_mm";
+    block.exactly_one(&[angular, radius, balanced], |block| {
+        let rate = AllowedRange::closed(-1e6, 1e6, "rad/s");
+        let detail = format!("missing; {rate} is needed, or {radius} or {balanced} instead");
+        block.fault(angular, detail);
+    })?;
+    if let [velocity, force] = block.given(&["lateral_velocity_mm_per_s", "force_y_n"])[..] {
+        return block.exclude(velocity, force);
     }
     let read = read.filter(|_| foreign.is_empty())?;
     let still = read.force_y_n.is_none().then_some(0.0);
@@ -434,77 +421,47 @@ fn wheelset(block: &mut Object, on_both_rails: bool) -> Option<Wheelset> {
     })
 }
 
-/// Faults unless exactly one of the members that say how fast a wheelset turns is given.
-fn turning_is_said_once(block: &mut Object, names: [&str; 3]) -> Option<()> {
-    match block.given(&names)[..] {
-        [_] => Some(()),
-        [] => {
-            let others = names[1..].join(" or ");
-            let rate = AllowedRange::closed(-1e6, 1e6, "rad/s");
-            block.fault(
-                names[0],
-                format!("missing; {rate} is needed, or {others} instead"),
-            );
-            None
-        }
-        [first, second, ..] => {
-            block.exclude(first, second);
-            None
-        }
-    }
-}
-
-/// Components that are combined one by one have the same number of values.
+/// Refuses components that are combined one by one and differ in their number of values.
 pub(crate) fn faults_of_sweep(block: &mut Object, read: Option<&Sweep>) -> Option<()> {
     let sweep = read?;
-    let points: Vec<usize> = components_of(sweep)
-        .into_iter()
-        .flatten()
-        .map(Swept::points)
-        .collect();
-    let mut varying = points.iter().filter(|points| **points > 1);
-    let first = varying.next();
-    if sweep.combine == Combine::Together && varying.any(|points| Some(points) != first) {
-        block.fault_here(format!(
-            "components with {} values given; components combined \"together\" need the same number of values, which \"combine\": \"grid\" does not",
-            points.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
-        ));
-        return None;
-    }
-    Some(())
-}
-
-fn components_of(sweep: &Sweep) -> [Option<&Swept>; COMPONENTS.len()] {
-    [
+    let components = [
         &sweep.creepage_x,
         &sweep.creepage_y,
         &sweep.spin_per_mm,
         &sweep.force_x_n,
         &sweep.force_y_n,
-    ]
-    .map(Option::as_ref)
+    ];
+    let points = components.into_iter().flatten().map(Swept::points);
+    let points: Vec<usize> = points.collect();
+    let mut varying = points.iter().filter(|points| **points > 1);
+    let first = varying.next();
+    if sweep.combine == Combine::Together && varying.any(|points| Some(points) != first) {
+        return block.refuse_object(format!(
+            "components with {} values given; components combined \"together\" need the same number of values, which \"combine\": \"grid\" does not",
+            points.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+        ));
+    }
+    Some(())
 }
 
 /// Refuses a motion that gives both a creepage and its force, or no component at all.
 pub(crate) fn faults_of_components<T>(block: &mut Object, _: Option<&T>) -> Option<()> {
-    let mut sound = true;
+    let mut sound = Some(());
     for (creepage, force) in [("creepage_x", "force_x_n"), ("creepage_y", "force_y_n")] {
         if block.has(creepage) && block.has(force) {
-            block.exclude(creepage, force);
-            sound = false;
+            sound = block.exclude(creepage, force);
         }
     }
     if block.given(&COMPONENTS).is_empty() {
-        block.fault_here(format!(
+        sound = block.refuse_object(format!(
             "no motion given; at least one of {} is needed, with the value 0 if nothing moves",
             COMPONENTS.join(", ")
         ));
-        sound = false;
     }
-    sound.then_some(())
+    sound
 }
 
-/// A number, `{"from": …, "to": …, "points": …}` or `{"values": […]}`.
+/// Reads a number, `{"from": …, "to": …, "points": …}` or `{"values": […]}`.
 pub(crate) fn swept(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Swept> {
     let what = "a number, {\"from\": …, \"to\": …, \"points\": …} or {\"values\": […]}";
     match block.value(name)? {
@@ -513,10 +470,7 @@ pub(crate) fn swept(block: &mut Object, name: &str, allowed: AllowedRange) -> Op
             list(block, name, allowed).map(Swept::List)
         }
         Value::Object(_) => range(block, name, allowed).map(Swept::Range),
-        _ => {
-            block.mistaken(name, what);
-            None
-        }
+        _ => block.mistaken(name, what),
     }
 }
 
@@ -524,8 +478,7 @@ fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<ValueLi
     let mut block = block.child(name)?;
     block.only(&["values"]);
     let what = format!("an array of 1 to {POINTS_MAX} numbers");
-    let elements = block.array("values", 1..=POINTS_MAX as usize, &what)?;
-    let values = block.numbers("values", elements, allowed)?;
+    let values = block.number_array("values", 1..=POINTS_MAX as usize, &what, allowed)?;
     Some(ValueList { values })
 }
 
@@ -533,43 +486,41 @@ fn range(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Range>
     let mut block = block.child(name)?;
     let (from, to, points) = block.range(allowed, 1, POINTS_MAX)?;
     if points == 1 && from.to_bits() != to.to_bits() {
-        block.fault(
-            "points",
-            format!("1 given for a range from {from} to {to}; at least 2 points are needed unless from equals to"),
+        let detail = format!(
+            "1 given for a range from {from} to {to}; at least 2 points are needed unless from equals to"
         );
-        return None;
+        return block.refuse("points", detail);
     }
     Some(Range { from, to, points })
 }
 
-/// Reads the block `{"history": …, "start": …}`.
-pub(crate) fn read_history(block: &mut Object) -> Option<Motions> {
+/// Reads the object `{"history": …, "start": …}`.
+fn read_history(block: &mut Object) -> Option<Motions> {
     block.only(&["history", "start"]);
-    let start = block.optional_word("start", HistoryStart::WORDS);
+    let start = block.optional("start", |block, name| block.word(name, HistoryStart::WORDS));
     let mut block = block.child("history")?;
     let history = History::members(&mut block)?;
     let start = start?.unwrap_or_default();
     let courses = history.courses();
     if start != HistoryStart::Pressed && courses.iter().all(|(_, course)| course.is_none()) {
         let names = courses.map(|(name, _)| name).join(", ");
-        block.fault_here(format!(
+        return block.refuse_object(format!(
             "no motion given; at least one of {names} is needed"
         ));
-        return None;
     }
     let distances = history.distance_mm.values(1);
-    let mut sound = true;
+    let mut sound = Some(());
     for (name, course) in &courses[5..] {
         if let Some(course) = course {
-            sound &= shifted_at_rest(&mut block, name, course, &distances, start);
+            sound = sound.and(shifted_at_rest(&mut block, name, course, &distances, start));
         }
     }
-    sound.then_some(Motions::History { history, start })
+    sound.map(|()| Motions::History { history, start })
 }
 
-/// A force stands in place of a creepage and a shift, every list has one value per distance, and the distance never decreases.
+/// Refuses a force together with its creepage or shift, a number of values other than one per distance, and decreasing distances.
 pub(crate) fn faults_of_history(block: &mut Object, read: Option<&History>) -> Option<()> {
-    let mut sound = true;
+    let mut sound = Some(());
     for (force, others) in [
         ("force_x_n", ["creepage_x", "shift_x_mm"]),
         ("force_y_n", ["creepage_y", "shift_y_mm"]),
@@ -578,8 +529,7 @@ pub(crate) fn faults_of_history(block: &mut Object, read: Option<&History>) -> O
             if block.has(force) && block.has(other) {
                 let detail =
                     format!("given together with {other}; a force is prescribed in its place");
-                block.fault(force, detail);
-                sound = false;
+                sound = block.refuse(force, detail);
             }
         }
     }
@@ -595,57 +545,44 @@ pub(crate) fn faults_of_history(block: &mut Object, read: Option<&History>) -> O
             let detail = format!(
                 "{count} values given for {points} distances; give one value per distance, or one number"
             );
-            block.fault(name, detail);
-            sound = false;
+            sound = block.refuse(name, detail);
         }
     }
-    (increasing(block, &distances) && sound).then_some(())
+    if let Some(k) = (1..points).find(|k| distances[*k] < distances[k - 1]) {
+        let [before, given] = [distances[k - 1], distances[k]];
+        let detail = format!("{given} given after {before}; distances may not decrease");
+        return block.refuse_element("distance_mm", k, detail);
+    }
+    sound
 }
 
-/// Does the distance never decrease?
-fn increasing(block: &mut Object, distances: &[f64]) -> bool {
-    let pointer = block.pointer_to("distance_mm");
-    let Some(k) = (1..distances.len()).find(|k| distances[*k] < distances[k - 1]) else {
-        return true;
-    };
-    let detail = format!(
-        "{} given after {}; distances may not decrease",
-        distances[k],
-        distances[k - 1]
-    );
-    block.faults().add(join(&pointer, k), detail);
-    false
-}
-
-/// Is a shift 0 wherever the bodies roll, or begin in steady rolling?
+/// Refuses a shift other than 0 at a point to which the bodies roll, or at the start of steady rolling.
 fn shifted_at_rest(
     block: &mut Object,
     name: &str,
     course: &HistoryCourse,
     distances: &[f64],
     start: HistoryStart,
-) -> bool {
+) -> Option<()> {
     let values = course.values(distances.len());
     let rolls = |k: usize| match k {
         0 => distances[0] > 0.0 || start == HistoryStart::Steady,
         _ => distances[k] > distances[k - 1],
     };
     let wrong = (0..distances.len()).find(|k| values[*k] != 0.0 && rolls(*k));
-    let Some(k) = wrong else { return true };
-    let pointer = match course {
-        HistoryCourse::Values(_) => join(&block.pointer_to(name), k),
-        _ => block.pointer_to(name),
-    };
+    let Some(k) = wrong else { return Some(()) };
     let detail = format!(
         "{} given for point {k}, to which the bodies roll; a shift belongs to a point with the distance of the point before, or to a first \
          point with the distance 0 that starts from \"rest\" or \"pressed\"",
         values[k]
     );
-    block.faults().add(pointer, detail);
-    false
+    match course {
+        HistoryCourse::Values(_) => block.refuse_element(name, k, detail),
+        _ => block.refuse(name, detail),
+    }
 }
 
-/// A number, an array of one value per point, or `{"from": …, "to": …, "points": …}`.
+/// Reads a number, an array of one value per point, or `{"from": …, "to": …, "points": …}`.
 pub(crate) fn course(
     block: &mut Object,
     name: &str,
@@ -664,8 +601,7 @@ pub(crate) fn course(
             let what = format!(
                 "a number, an array of 1 to {POINTS_MAX} numbers or {{\"from\": …, \"to\": …, \"points\": …}}"
             );
-            block.mistaken(name, &what);
-            None
+            block.mistaken(name, &what)
         }
     }
 }

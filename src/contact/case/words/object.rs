@@ -1,6 +1,4 @@
-//! A JSON object under examination: typed members and their faults.
-//!
-//! The faults found in a case so far, and the numbers that a member may have.
+//! Reads typed members of a JSON object and collects their faults.
 
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -10,13 +8,12 @@ use serde_json::{Map, Number, Value};
 
 use crate::error::{Fault, FaultCode, FaultFigures};
 
-/// Faulty values of one array or grid that are listed one by one.
+/// Maximum number of faulty values of an array or a grid that get a fault of their own.
 pub(crate) const LISTED_MAX: usize = 5;
 
-/// An object, where it stands in the case, and the list its faults go to.
+/// A JSON object, its JSON pointer and the list that collects its faults.
 ///
-/// A reading method returns `None` both for an absent and for a faulty member; the latter leaves a fault behind, so
-/// that the case as a whole is refused.
+/// A reading method returns `None` both for an absent and for a faulty member. A faulty member also adds a fault, so that the case is refused.
 pub(crate) struct Object<'v, 'f> {
     members: &'v Map<String, Value>,
     pointer: String,
@@ -24,7 +21,7 @@ pub(crate) struct Object<'v, 'f> {
 }
 
 impl<'v, 'f> Object<'v, 'f> {
-    /// Opens a value that has to be an object.
+    /// Opens a value that must be an object.
     pub(crate) fn open(value: &'v Value, pointer: String, faults: &'f mut Faults) -> Option<Self> {
         if let Value::Object(members) = value {
             Some(Object {
@@ -42,45 +39,78 @@ impl<'v, 'f> Object<'v, 'f> {
         }
     }
 
-    /// Is the member written at all?
+    /// Whether the object has this member.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.members.contains_key(name)
     }
 
-    /// The names in `names` that the object has.
+    /// Returns those of `names` that the object has.
     pub(crate) fn given<'n>(&self, names: &[&'n str]) -> Vec<&'n str> {
         let names = names.iter().copied();
         names.filter(|name| self.has(name)).collect()
     }
 
     /// Refuses the second of two members that exclude each other.
-    pub(crate) fn exclude(&mut self, first: &str, second: &str) {
+    pub(crate) fn exclude<T>(&mut self, first: &str, second: &str) -> Option<T> {
         let detail = format!("given together with {first}; exactly one of the two is allowed");
-        self.fault(second, detail);
+        self.refuse(second, detail)
     }
 
-    /// The member as it is, if it is written.
+    /// Returns the only one of `names` that the object has. Otherwise adds a fault: that of `missing` if the object has none of them.
+    pub(crate) fn exactly_one<'n>(
+        &mut self,
+        names: &[&'n str],
+        missing: impl FnOnce(&mut Self),
+    ) -> Option<&'n str> {
+        match self.given(names)[..] {
+            [name] => Some(name),
+            [] => {
+                missing(self);
+                None
+            }
+            [first, second, ..] => self.exclude(first, second),
+        }
+    }
+
+    /// Returns the value of a member, if the object has it.
     pub(crate) fn value(&self, name: &str) -> Option<&'v Value> {
         self.members.get(name)
     }
 
-    /// JSON pointer of a member.
+    /// Returns the JSON pointer of a member.
     pub(crate) fn pointer_to(&self, name: &str) -> String {
         join(&self.pointer, name)
     }
 
-    /// The list of faults.
+    /// Returns the list of faults.
     pub(crate) fn faults(&mut self) -> &mut Faults {
         self.faults
     }
 
-    /// Notes a fault of a member.
+    /// Adds a fault of a member.
     pub(crate) fn fault(&mut self, name: &str, detail: impl Into<String>) {
         let figures = figures(FaultCode::Invalid, self.members.get(name));
         self.fault_with(name, detail, figures);
     }
 
-    /// Notes a fault of a member, with its code and values for programs.
+    /// Adds a fault of a member and returns `None`.
+    pub(crate) fn refuse<T>(&mut self, name: &str, detail: impl Into<String>) -> Option<T> {
+        self.fault(name, detail);
+        None
+    }
+
+    /// Adds a fault of the element `index` of an array and returns `None`.
+    pub(crate) fn refuse_element<T>(
+        &mut self,
+        name: &str,
+        index: usize,
+        detail: impl Into<String>,
+    ) -> Option<T> {
+        let pointer = join(&self.pointer_to(name), index);
+        self.faults.refuse(pointer, detail)
+    }
+
+    /// Adds a fault of a member with its code and values for programs.
     pub(crate) fn fault_with(
         &mut self,
         name: &str,
@@ -91,9 +121,9 @@ impl<'v, 'f> Object<'v, 'f> {
         self.faults.add_with(pointer, detail, figures);
     }
 
-    /// Notes a fault of the object as a whole.
-    pub(crate) fn fault_here(&mut self, detail: impl Into<String>) {
-        self.faults.add(self.pointer.clone(), detail);
+    /// Adds a fault of the object as a whole and returns `None`.
+    pub(crate) fn refuse_object<T>(&mut self, detail: impl Into<String>) -> Option<T> {
+        self.faults.refuse(self.pointer.clone(), detail)
     }
 
     /// Refuses every member that is not in `allowed`.
@@ -101,7 +131,7 @@ impl<'v, 'f> Object<'v, 'f> {
         self.only_or(allowed, &[]);
     }
 
-    /// Refuses every member that is neither in `allowed` nor in `reserved`. The fault does not list `reserved`.
+    /// Refuses every member that is neither in `allowed` nor in `reserved`. The fault lists `allowed` only.
     pub(crate) fn only_or(&mut self, allowed: &[&str], reserved: &[&str]) {
         let members = self.members;
         for (name, value) in members {
@@ -120,7 +150,7 @@ impl<'v, 'f> Object<'v, 'f> {
         }
     }
 
-    /// The member, or a fault that says what is missing.
+    /// Returns the value of a required member. If it is absent, adds a fault that states `what` is needed.
     pub(crate) fn required(&mut self, name: &str, what: &str) -> Option<&'v Value> {
         let value = self.members.get(name);
         if value.is_none() {
@@ -130,33 +160,14 @@ impl<'v, 'f> Object<'v, 'f> {
         value
     }
 
-    /// A number that may be left out.
+    /// Reads a number; `None` if it is absent or faulty.
     pub(crate) fn number(&mut self, name: &str, allowed: AllowedRange) -> Option<f64> {
         let value = self.members.get(name)?;
         let pointer = self.pointer_to(name);
         number(value, &pointer, allowed, self.faults)
     }
 
-    /// Reads an optional number. The outer `None` means a fault, the inner one an absent member.
-    pub(crate) fn optional_number(
-        &mut self,
-        name: &str,
-        allowed: AllowedRange,
-    ) -> Option<Option<f64>> {
-        self.optional(name, |block, name| block.number(name, allowed))
-    }
-
-    /// A number, or its default where it is left out.
-    pub(crate) fn number_or(
-        &mut self,
-        name: &str,
-        allowed: AllowedRange,
-        default: f64,
-    ) -> Option<f64> {
-        Some(self.optional_number(name, allowed)?.unwrap_or(default))
-    }
-
-    /// Reads an optional member with `read`.
+    /// Reads an optional member with `read`. The outer `None` means a fault, the inner one an absent member.
     pub(crate) fn optional<T>(
         &mut self,
         name: &str,
@@ -168,25 +179,13 @@ impl<'v, 'f> Object<'v, 'f> {
         }
     }
 
-    /// A word that may be left out.
-    pub(crate) fn optional_word<T: Copy>(
-        &mut self,
-        name: &str,
-        table: &[(&str, T)],
-    ) -> Option<Option<T>> {
-        self.optional(name, |block, name| block.word(name, table))
-    }
-
-    /// `true` or `false`.
+    /// Reads `true` or `false`.
     pub(crate) fn flag(&mut self, name: &str) -> Option<bool> {
         let flag = self.value(name)?.as_bool();
-        if flag.is_none() {
-            self.mistaken(name, "true or false");
-        }
-        flag
+        flag.or_else(|| self.mistaken(name, "true or false"))
     }
 
-    /// The member as an array with an allowed number of elements; `None` if it is absent or faulty.
+    /// Reads an array whose number of elements lies in `lengths`; `None` if it is absent or faulty.
     pub(crate) fn array(
         &mut self,
         name: &str,
@@ -195,13 +194,12 @@ impl<'v, 'f> Object<'v, 'f> {
     ) -> Option<&'v [Value]> {
         let elements = self.value(name)?.as_array();
         let elements = elements.filter(|all| lengths.contains(&all.len()));
-        if elements.is_none() {
-            self.mistaken(name, what);
-        }
-        elements.map(Vec::as_slice)
+        elements
+            .map(Vec::as_slice)
+            .or_else(|| self.mistaken(name, what))
     }
 
-    /// Elements of an array as numbers; of many faulty ones the first are listed, and the rest is counted.
+    /// Reads the elements of an array as numbers. The first [`LISTED_MAX`] faulty ones get a fault each; one more fault counts the rest.
     pub(crate) fn numbers(
         &mut self,
         name: &str,
@@ -214,13 +212,26 @@ impl<'v, 'f> Object<'v, 'f> {
         read
     }
 
-    /// Adds the fault that a member has the wrong value or type.
-    pub(crate) fn mistaken(&mut self, name: &str, what: &str) {
-        let given = self.value(name).map(shown).unwrap_or_default();
-        self.fault(name, format!("{given} given; {what} is needed"));
+    /// Reads a required array of numbers whose length lies in `lengths`.
+    pub(crate) fn number_array(
+        &mut self,
+        name: &str,
+        lengths: RangeInclusive<usize>,
+        what: &str,
+        allowed: AllowedRange,
+    ) -> Option<Vec<f64>> {
+        self.required(name, what)?;
+        let elements = self.array(name, lengths, what)?;
+        self.numbers(name, elements, allowed)
     }
 
-    /// A number that has to be there.
+    /// Adds the fault that a member has the wrong value or type, and returns `None`.
+    pub(crate) fn mistaken<T>(&mut self, name: &str, what: &str) -> Option<T> {
+        let given = self.value(name).map(shown).unwrap_or_default();
+        self.refuse(name, format!("{given} given; {what} is needed"))
+    }
+
+    /// Reads a required number.
     pub(crate) fn required_number(&mut self, name: &str, allowed: AllowedRange) -> Option<f64> {
         if !self.has(name) {
             let detail = format!("missing; {allowed} is needed");
@@ -229,7 +240,7 @@ impl<'v, 'f> Object<'v, 'f> {
         self.number(name, allowed)
     }
 
-    /// A whole number that has to be there; `3.0` counts as whole.
+    /// Reads a required whole number; `3.0` counts as whole.
     pub(crate) fn required_count(&mut self, name: &str, low: u32, high: u32) -> Option<u32> {
         let what = format!("a whole number from {low} to {high}");
         let value = self.required(name, &what)?;
@@ -246,7 +257,7 @@ impl<'v, 'f> Object<'v, 'f> {
         }
     }
 
-    /// Reads every element of the array `name`, given with its pointer; `None` if one of them is faulty.
+    /// Reads the elements of the array `name`; `read` gets each with its JSON pointer. Returns `None` if one of them is faulty.
     pub(crate) fn each<T>(
         &mut self,
         name: &str,
@@ -261,7 +272,7 @@ impl<'v, 'f> Object<'v, 'f> {
         all.into_iter().collect()
     }
 
-    /// The members of `{"from": …, "to": …, "points": …}`.
+    /// Reads the members of `{"from": …, "to": …, "points": …}`, with `low` to `high` points.
     pub(crate) fn range(
         &mut self,
         allowed: AllowedRange,
@@ -275,7 +286,7 @@ impl<'v, 'f> Object<'v, 'f> {
         Some((from?, to?, points?))
     }
 
-    /// A text of at most `length_max` characters that may be left out.
+    /// Reads a text of at most `length_max` characters; `None` if it is absent or faulty.
     pub(crate) fn text(&mut self, name: &str, length_max: usize) -> Option<String> {
         let value = self.members.get(name)?;
         match value.as_str() {
@@ -299,27 +310,24 @@ impl<'v, 'f> Object<'v, 'f> {
         }
     }
 
-    /// The same without line breaks and other control characters.
+    /// Reads a text like [`text`](Object::text), without line breaks and other control characters.
     pub(crate) fn line(&mut self, name: &str, length_max: usize) -> Option<String> {
         let text = self.text(name, length_max)?;
-        if !has_controls(&text) {
-            return Some(text);
+        if has_controls(&text) {
+            let detail = format!("{text:?} given; control characters are not allowed");
+            return self.refuse(name, detail);
         }
-        self.fault(
-            name,
-            format!("{text:?} given; control characters are not allowed"),
-        );
-        None
+        Some(text)
     }
 
-    /// A word from a table; it may be left out.
+    /// Reads a keyword of a table and returns its value; `None` if it is absent or faulty.
     pub(crate) fn word<T: Copy>(&mut self, name: &str, table: &[(&str, T)]) -> Option<T> {
         let value = self.members.get(name)?;
         let pointer = self.pointer_to(name);
         word(value, &pointer, table, self.faults)
     }
 
-    /// A member that has to be an object, opened; an empty one if it is left out.
+    /// Opens a member that must be an object. An absent member is opened as an empty object.
     pub(crate) fn child_or_empty(&mut self, name: &str) -> Option<Object<'v, '_>> {
         static EMPTY: LazyLock<Value> = LazyLock::new(|| Value::Object(Map::new()));
         let value = self.members.get(name).unwrap_or(&EMPTY);
@@ -327,7 +335,7 @@ impl<'v, 'f> Object<'v, 'f> {
         Object::open(value, pointer, self.faults)
     }
 
-    /// A member that has to be an object, opened.
+    /// Opens a required member that must be an object.
     pub(crate) fn child(&mut self, name: &str) -> Option<Object<'v, '_>> {
         let value = self.required(name, "an object")?;
         let pointer = self.pointer_to(name);
@@ -335,9 +343,9 @@ impl<'v, 'f> Object<'v, 'f> {
     }
 }
 
-/// A value that an object has as a member.
+/// A type that can be read from a member of an object.
 pub(crate) trait Member: Sized {
-    /// Reads the member of this name; `None` if it is absent or faulty.
+    /// Reads the member `name`; `None` if it is absent or faulty.
     fn read(block: &mut Object, name: &str) -> Option<Self>;
 }
 
@@ -347,7 +355,7 @@ impl<T: Member> Member for Box<T> {
     }
 }
 
-/// A number within an interval; negative zero becomes zero, so that equal cases have equal digests.
+/// Reads a number within an interval. Negative zero becomes zero, so that equal cases have equal digests.
 pub(crate) fn number(
     value: &Value,
     pointer: &str,
@@ -365,7 +373,7 @@ pub(crate) fn number(
     }
 }
 
-/// A word from a table, see [`Object::word`].
+/// Reads a keyword of a table, see [`Object::word`].
 pub(crate) fn word<T: Copy>(
     value: &Value,
     pointer: &str,
@@ -389,13 +397,13 @@ pub(crate) fn word<T: Copy>(
     None
 }
 
-/// The words of a table, for a sentence.
+/// Returns the keywords of a table, joined for a sentence.
 pub(crate) fn names<T>(table: &[(&str, T)]) -> String {
     let words: Vec<&str> = table.iter().map(|(word, _)| *word).collect();
     words.join(", ")
 }
 
-/// Numbers of an array; faulty ones are counted in `refused`, and listed as long as they are few.
+/// Reads the numbers of an array. Counts faulty ones in `refused`, and adds a fault for each of the first [`LISTED_MAX`].
 pub(crate) fn numbers(
     elements: &[Value],
     pointer: &str,
@@ -418,7 +426,7 @@ pub(crate) fn numbers(
     (read.len() == elements.len()).then_some(read)
 }
 
-/// Says how many faulty numbers were not listed.
+/// Adds a fault with the number of faulty values beyond the first [`LISTED_MAX`], if there are any.
 pub(crate) fn count_rest(
     pointer: &str,
     allowed: AllowedRange,
@@ -436,13 +444,13 @@ pub(crate) fn count_rest(
     }
 }
 
-/// Appends a reference token to a JSON pointer, escaped as RFC 6901, section 3, asks.
+/// Appends a reference token to a JSON pointer, escaped by RFC 6901, section 3.
 pub(crate) fn join(pointer: &str, token: impl fmt::Display) -> String {
     let token = token.to_string().replace('~', "~0").replace('/', "~1");
     format!("{pointer}/{token}")
 }
 
-/// A received value, short enough for a sentence.
+/// Formats a received value, shortened for a sentence.
 pub(crate) fn shown(value: &Value) -> String {
     match value {
         Value::Array(elements) if elements.is_empty() => "an empty array".to_owned(),
@@ -465,17 +473,17 @@ fn cut(text: &str) -> String {
     short
 }
 
-/// Line breaks, tabs and the like: they tear tables and lines of logs apart.
+/// Whether a text has control characters, such as line breaks and tabs, which would break tables and log lines.
 pub(crate) fn has_controls(text: &str) -> bool {
     text.chars().any(char::is_control)
 }
 
-/// Faults listed one by one before the rest is only counted.
+/// Maximum number of faults in a list; further ones are counted only.
 pub(crate) const FAULTS_MAX: usize = 100;
-/// Characters of a received value that a fault repeats.
+/// Maximum number of characters of a received value that a fault repeats.
 pub(crate) const SHOWN_MAX: usize = 60;
 
-/// The faults found so far, in the order of the examination.
+/// The faults found so far, in the order of reading.
 #[derive(Debug, Default)]
 pub(crate) struct Faults {
     listed: Vec<Fault>,
@@ -483,13 +491,23 @@ pub(crate) struct Faults {
 }
 
 impl Faults {
-    /// Notes one fault; beyond the first hundred only their number is kept.
+    /// Adds a fault. Beyond [`FAULTS_MAX`], faults are counted only.
     pub(crate) fn add(&mut self, pointer: impl Into<String>, detail: impl Into<String>) {
         self.add_with(pointer, detail, FaultFigures::default());
     }
 
-    /// Notes one fault, with its code and values for programs.
-    pub(crate) fn add_with(
+    /// Adds a fault and returns `None`.
+    pub(crate) fn refuse<T>(
+        &mut self,
+        pointer: impl Into<String>,
+        detail: impl Into<String>,
+    ) -> Option<T> {
+        self.add(pointer, detail);
+        None
+    }
+
+    /// Adds a fault with its code and values for programs.
+    fn add_with(
         &mut self,
         pointer: impl Into<String>,
         detail: impl Into<String>,
@@ -506,7 +524,7 @@ impl Faults {
         }
     }
 
-    /// The list, with a last entry that counts what did not fit.
+    /// Returns the list. A last entry states the number of faults that are not listed, if there are any.
     pub(crate) fn into_list(self) -> Vec<Fault> {
         let mut listed = self.listed;
         if self.unlisted > 0 {
@@ -517,7 +535,7 @@ impl Faults {
     }
 }
 
-/// The numbers a member may have.
+/// The interval of allowed values of a number, and their unit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AllowedRange {
     low: f64,
@@ -527,7 +545,7 @@ pub(crate) struct AllowedRange {
 }
 
 impl AllowedRange {
-    /// `low <= value <= high`.
+    /// The interval `low <= value <= high`.
     pub(crate) const fn closed(low: f64, high: f64, unit: &'static str) -> Self {
         AllowedRange {
             low,
@@ -537,7 +555,7 @@ impl AllowedRange {
         }
     }
 
-    /// `0 < value <= high`.
+    /// The interval `0 < value <= high`.
     pub(crate) const fn positive(high: f64, unit: &'static str) -> Self {
         AllowedRange {
             low: 0.0,
@@ -547,7 +565,7 @@ impl AllowedRange {
         }
     }
 
-    /// What a fault of a member says of it.
+    /// Describes the interval in a fault of `value`, for programs.
     pub(crate) fn figures(&self, code: FaultCode, value: Option<&Value>) -> FaultFigures {
         FaultFigures {
             minimum: Number::from_f64(self.low),
@@ -558,7 +576,7 @@ impl AllowedRange {
         }
     }
 
-    /// Is the number allowed?
+    /// Whether the interval contains the number.
     pub(crate) fn contains(&self, number: f64) -> bool {
         let above = if self.low_excluded {
             number > self.low
@@ -585,7 +603,7 @@ impl fmt::Display for AllowedRange {
     }
 }
 
-/// The kind of a fault, and the value given if it is short.
+/// Describes a fault of `value` for programs. Arrays, objects and long texts are left out.
 pub(crate) fn figures(code: FaultCode, value: Option<&Value>) -> FaultFigures {
     let short = |value: &&Value| match value {
         Value::Array(_) | Value::Object(_) => false,
@@ -599,15 +617,15 @@ pub(crate) fn figures(code: FaultCode, value: Option<&Value>) -> FaultFigures {
     }
 }
 
-/// The code of a value of the right type that is out of range, or of one of another type.
-pub(crate) fn code_of(value: &Value, right: fn(&Value) -> bool) -> FaultCode {
+/// Returns the code of a refused value: out of range if `right` accepts its type, wrong type otherwise.
+fn code_of(value: &Value, right: fn(&Value) -> bool) -> FaultCode {
     match right(value) {
         true => FaultCode::OutOfRange,
         false => FaultCode::WrongType,
     }
 }
 
-/// A limit as people write it: `1e9` rather than `1000000000`.
+/// Formats a limit, large ones with an exponent: `1e9` rather than `1000000000`.
 fn plain(number: f64) -> String {
     if number.abs() >= 1e5 {
         format!("{number:e}")

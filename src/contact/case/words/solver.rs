@@ -1,11 +1,6 @@
-//! How to solve, how exactly, and what to compute.
+//! A case as a client writes it, and its members `solver` and `outputs`.
 //!
-//! The question as the client writes it: one contact case.
-//!
-//! A [`Case`] is only ever made by [`Case::read`](crate::case::words::solver::Case::read), which collects every fault of the
-//! JSON text at once. Lengths in mm, forces in N, stresses in MPa, creepages dimensionless, spin in 1/mm.
-//!
-//! A case in the form of which its digest is taken.
+//! Lengths are in mm, forces in N, stresses in MPa, spin in 1/mm; creepages are dimensionless.
 
 use std::collections::BTreeMap;
 
@@ -17,13 +12,12 @@ use utoipa::ToSchema;
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, ThermalWords};
-use crate::case::words::motion::{History, MotionWords, Motions, Wheelset};
+use crate::case::words::motion::Motions;
 use crate::case::words::object::{Object, names, shown, word};
 use crate::case::words::subsurface::{DamageWords, SubsurfaceWords};
+use crate::mesh::MeshSize;
 use crate::method::TractionBound;
-use crate::rolling::history::plan::HistoryStart;
-use crate::rolling::task::RelativeTo;
-use crate::rolling::task::{PrescribedForces, TARGET_LEAST, TARGET_USUAL};
+use crate::rolling::task::{RelativeTo, TARGET_LEAST, TARGET_USUAL};
 
 /// Method and accuracy of the solution.
 #[none_is_absent]
@@ -44,7 +38,7 @@ pub struct Solver {
     /// `target_error` of its own tangential force, but not below 1e-4 of μN. Not allowed with `mesh` or for histories.
     pub relative_to: Option<RelativeTo>,
     /// An explicit mesh instead of a target.
-    pub mesh: Option<MeshSizeWords>,
+    pub mesh: Option<MeshSize>,
     /// Traction bound of `fastsim`; default `elliptic`. Not allowed for other methods.
     pub traction_bound: Option<TractionBound>,
     /// Give up after this many seconds of solving.
@@ -82,20 +76,6 @@ pub enum MethodName {
     /// Interpolates resultants of elliptic patches in a table computed by `boundary_element`, in less than a microsecond, with an error
     /// bound. A patch of another shape is replaced by the ellipse with the same load distribution.
     Table,
-}
-
-/// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Members)]
-#[schema(as = MeshSize)]
-pub struct MeshSizeWords {
-    /// Strips across each patch.
-    #[schema(minimum = 1)]
-    #[member(1..=1000)]
-    pub strips: u32,
-    /// Cells along x in each strip.
-    #[schema(minimum = 1)]
-    #[member(1..=1000)]
-    pub cells: u32,
 }
 
 /// A quantity that a case can request. The result contains requested quantities only.
@@ -136,11 +116,19 @@ pub enum Output {
 }
 
 impl Output {
-    /// Is it made from tractions, slips or zones, which only some methods compute?
+    /// Whether it needs tractions, slips or zones, which only some methods compute.
     pub fn needs_fields(self) -> bool {
         !matches!(
             self,
             Output::Resultants | Output::Gradients | Output::Damage
+        )
+    }
+
+    /// Whether it has one value per cell.
+    pub fn is_per_cell(self) -> bool {
+        !matches!(
+            self,
+            Output::Resultants | Output::Gradients | Output::Damage | Output::Subsurface
         )
     }
 }
@@ -179,63 +167,10 @@ pub struct Case {
     pub thermal: Option<ThermalWords>,
 }
 
-/// Everything that determines the answer, in a fixed order; name and labels do not.
-#[none_is_absent(nullable)]
-#[derive(Serialize)]
-pub(crate) struct Canonical<'a> {
-    pub(crate) solver_version: &'static str,
-    pub(crate) solver_revision: u32,
-    pub(crate) elasticity: [f64; 3],
-    /// Revision of the method for bodies that differ, and the lower body's share of the displacement. Absent for equal bodies, whose digests do not depend
-    /// on that method.
-    pub(crate) coupling: Option<(u32, f64)>,
-    pub(crate) friction: FrictionForm<'a>,
-    pub(crate) contact: &'a Contact,
-    #[or_null]
-    pub(crate) load: Option<&'a Load>,
-    pub(crate) motions: Vec<MotionWords>,
-    pub(crate) forces: Option<&'a [PrescribedForces]>,
-    pub(crate) wheelset: Option<&'a Wheelset>,
-    pub(crate) wheelsets: Option<&'a [Wheelset]>,
-    pub(crate) history: Option<(&'a History, HistoryStart)>,
-    pub(crate) method: MethodName,
-    pub(crate) traction_bound: Option<TractionBound>,
-    #[or_null]
-    pub(crate) target_error: Option<f64>,
-    pub(crate) relative_to: Option<RelativeTo>,
-    #[or_null]
-    pub(crate) mesh: Option<MeshSizeWords>,
-    #[or_null]
-    pub(crate) time_limit_s: Option<f64>,
-    pub(crate) outputs: &'a [Output],
-    pub(crate) subsurface: Option<&'a SubsurfaceWords>,
-    pub(crate) bodies: Option<&'a Material>,
-    pub(crate) damage: Option<&'a DamageWords>,
-    pub(crate) thermal: Option<&'a ThermalWords>,
-    pub(crate) speeds: Option<&'a [Option<f64>]>,
-}
-
-/// A constant coefficient alone is its number, however it is written.
-#[derive(Serialize)]
-#[serde(untagged)]
-pub(crate) enum FrictionForm<'a> {
-    Constant(f64),
-    Other(&'a Friction),
-}
-
-impl<'a> From<&'a Friction> for FrictionForm<'a> {
-    fn from(friction: &'a Friction) -> FrictionForm<'a> {
-        match friction.constant() {
-            Some(coefficient) => FrictionForm::Constant(coefficient),
-            None => FrictionForm::Other(friction),
-        }
-    }
-}
-
-/// Reads the member `solver` of a case; left out, it is `auto` with the default target.
+/// Reads the member `solver` of a case. The default is `auto` with the default target.
 pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     let solver = Solver::members(&mut case.child_or_empty("solver")?)?;
-    // The simplified theory has one mesh and a stated error, which no target changes: it has none of its own.
+    // FASTSIM has one mesh and a stated error, which a target does not change.
     let wanted = solver.mesh.is_none() && solver.method != MethodName::Fastsim;
     let usual = wanted.then_some(TARGET_USUAL);
     Some(Solver {
@@ -244,13 +179,13 @@ pub(crate) fn read(case: &mut Object) -> Option<Solver> {
     })
 }
 
-/// Refuses members that do not go together.
+/// Refuses members that exclude each other.
 pub(crate) fn mismatches(block: &mut Object, _: Option<&Solver>) -> Option<()> {
     let method = block.value("method").and_then(Value::as_str);
     let is = |name: &str| method == Some(name);
     let (target, mesh) = (block.has("target_error"), block.has("mesh"));
     let targeted = target || !mesh && !is("fastsim");
-    let mut sound = true;
+    let mut sound = Some(());
     for (wrong, name, detail) in [
         (
             block.has("traction_bound") && !is("fastsim"),
@@ -274,15 +209,14 @@ pub(crate) fn mismatches(block: &mut Object, _: Option<&Solver>) -> Option<()> {
         ),
     ] {
         if wrong {
-            block.fault(name, detail);
-            sound = false;
+            sound = block.refuse(name, detail);
         }
     }
-    sound.then_some(())
+    sound
 }
 
-/// Reads the member `outputs` of a case: sorted, each once; left out, resultants and zones. A method `without_fields` computes
-/// resultants only, and every other output is refused.
+/// Reads the member `outputs` of a case, sorted and without repetition. The default is resultants and zones. A method `without_fields`
+/// computes resultants, gradients and damage only; every other output is refused.
 pub(crate) fn read_outputs(
     case: &mut Object,
     without_fields: Option<MethodName>,
@@ -304,8 +238,7 @@ pub(crate) fn read_outputs(
             ),
             _ => return Some(output),
         };
-        faults.add(pointer, detail);
-        None
+        faults.refuse(pointer, detail)
     })?;
     outputs.sort_unstable();
     outputs.dedup();

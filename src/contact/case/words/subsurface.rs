@@ -1,6 +1,4 @@
-//! Where stresses below the surface are asked for.
-//!
-//! Which damage models a case asks for, and with which figures.
+//! The members `subsurface` and `damage` of a case.
 
 use railhead_macros::{Finite, Members, Words, none_is_absent};
 use serde::{Deserialize, Serialize};
@@ -8,7 +6,9 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::case::words::motion::POINTS_MAX;
-use crate::case::words::object::{AllowedRange, Member, Object, join, names, number, shown, word};
+use crate::case::words::object::{
+    AllowedRange, Faults, Member, Object, join, names, number, shown, word,
+};
 
 /// Points for stresses below the surface, in the axes of the patch: x along rolling, y to the left, depth positive into the body. At most
 /// one of `points_mm`, `along_depth_at_mm` and `plane`; without them only the worst point is found.
@@ -260,13 +260,13 @@ pub struct WlrmFigures {
     pub peak: f64,
 }
 
-/// Evaluated where none is named: those whose figures are confirmed.
-pub(crate) const MODELS_USUAL: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];
+/// The default models: those with confirmed parameters.
+const MODELS_USUAL: [DamageModel; 2] = [DamageModel::TGamma, DamageModel::UsfdWear];
 const FIGURE: AllowedRange = AllowedRange::positive(1e12, "");
 
-/// Reads the member `damage` of a case, which belongs to the output of that name; left out, it has the default models.
+/// Reads the member `damage` of a case, which belongs to the output `damage`. A method without fields does not give wear across the patch.
 ///
-/// Returns `None` if a fault was recorded. A method without fields gives no wear across.
+/// Returns `None` if a fault was recorded.
 pub(crate) fn read_damage(
     case: &mut Object,
     wanted: bool,
@@ -276,14 +276,13 @@ pub(crate) fn read_damage(
         let read = DamageWords::members(block);
         if without_fields && block.value("across") == Some(&Value::Bool(true)) {
             let detail = "true given; the method has no values per cell that wear across the patch is made from";
-            block.fault("across", detail);
-            return None;
+            return block.refuse("across", detail);
         }
         read
     })
 }
 
-/// Models by name, sorted, each once.
+/// Reads damage models, sorted and without repetition.
 pub(crate) fn models(block: &mut Object, name: &str) -> Option<Vec<DamageModel>> {
     let what = format!(
         "an array with at least one of {}",
@@ -298,7 +297,7 @@ pub(crate) fn models(block: &mut Object, name: &str) -> Option<Vec<DamageModel>>
     Some(models)
 }
 
-/// The name of a set of figures, or own ones.
+/// Reads the name of a parameter set, or parameters of the client.
 pub(crate) fn parameters(block: &mut Object, name: &str) -> Option<DamageParameterWords> {
     if matches!(block.value(name)?, Value::Object(_)) {
         let own = OwnDamageFigures::read(block, name)?;
@@ -307,61 +306,68 @@ pub(crate) fn parameters(block: &mut Object, name: &str) -> Option<DamageParamet
     DamageSetName::read(block, name).map(DamageParameterWords::Named)
 }
 
-/// Wear is mild up to a smaller power than it is severe.
+/// Refuses a map whose severe wear ends before it begins.
 pub(crate) fn faults_of_usfd(block: &mut Object, read: Option<&UsfdFigures>) -> Option<()> {
     let read = read?;
     in_order(block, "severe_until", [read.mild_until, read.severe_until])
 }
 
-/// Threshold, peak and end of fatigue are in order.
+/// Refuses a damage function whose threshold, peak and zero are out of order.
 pub(crate) fn faults_of_wlrm(block: &mut Object, read: Option<&WlrmFigures>) -> Option<()> {
     let read = read?;
     in_order(block, "peak_at_n", [read.threshold_n, read.peak_at_n])?;
     in_order(block, "zero_at_n", [read.peak_at_n, read.zero_at_n])
 }
 
-/// `[low, high]`, both more than 0, in order.
+/// Reads `[low, high]`, both more than 0 and in order.
 pub(crate) fn pair(block: &mut Object, name: &str) -> Option<[f64; 2]> {
     let value = block.required(name, "[low, high]")?;
     let pointer = block.pointer_to(name);
-    let Some([low, high]) = value.as_array().map(Vec::as_slice) else {
-        block.mistaken(name, "[low, high]");
-        return None;
+    let Some(both) = value.as_array().filter(|both| both.len() == 2) else {
+        return block.mistaken(name, "[low, high]");
     };
-    let faults = block.faults();
-    let low = number(low, &join(&pointer, 0), FIGURE, faults);
-    let high = number(high, &join(&pointer, 1), FIGURE, faults);
-    let (low, high) = (low?, high?);
+    let [low, high] = tuple(both, &pointer, [FIGURE; 2], block.faults())?;
     if low > high {
-        block.fault(
-            name,
-            format!("[{low}, {high}] given; the first may not be larger"),
-        );
-        return None;
+        let detail = format!("[{low}, {high}] given; the first may not be larger");
+        return block.refuse(name, detail);
     }
     Some([low, high])
+}
+
+/// Reads numbers of an array, each in its own range; there are at least `N` elements.
+fn tuple<const N: usize>(
+    elements: &[Value],
+    pointer: &str,
+    allowed: [AllowedRange; N],
+    faults: &mut Faults,
+) -> Option<[f64; N]> {
+    let mut read = [None; N];
+    for (k, place) in read.iter_mut().enumerate() {
+        *place = number(&elements[k], &join(pointer, k), allowed[k], faults);
+    }
+    let all: Option<Vec<f64>> = read.into_iter().collect();
+    all?.try_into().ok()
 }
 
 fn in_order(block: &mut Object, name: &str, [before, after]: [f64; 2]) -> Option<()> {
     if before < after {
         return Some(());
     }
-    block.fault(name, format!("{after} given; more than {before} is needed"));
-    None
+    block.refuse(name, format!("{after} given; more than {before} is needed"))
 }
 
 const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const DEPTH: AllowedRange = AllowedRange::closed(0.0, 1e6, "mm");
 const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
 
-/// Reads the member `subsurface` of a case, which belongs to the output of that name; left out, it asks for the worst point.
+/// Reads the member `subsurface` of a case, which belongs to the output `subsurface`.
 ///
 /// Returns `None` if a fault was recorded.
 pub(crate) fn read_subsurface(case: &mut Object, wanted: bool) -> Option<Option<SubsurfaceWords>> {
     of_output(case, "subsurface", wanted, SubsurfaceWords::members)
 }
 
-/// Reads the member that belongs to the output of its name; left out, it is read as an empty object.
+/// Reads the member that belongs to the output of its name. An absent one is read as an empty object if the output is wanted.
 fn of_output<T>(
     case: &mut Object,
     name: &str,
@@ -374,8 +380,7 @@ fn of_output<T>(
     if !wanted {
         let detail =
             format!("given without \"{name}\" among the outputs; add it there or leave this out");
-        case.fault(name, detail);
-        return None;
+        return case.refuse(name, detail);
     }
     read(&mut case.child_or_empty(name)?).map(Some)
 }
@@ -384,71 +389,55 @@ fn of_output<T>(
 pub(crate) fn faults_of_places(block: &mut Object, _: Option<&SubsurfaceWords>) -> Option<()> {
     if let [first, second, ..] = block.given(&PLACES)[..] {
         let detail = format!("given together with {first}; at most one of the two is allowed");
-        block.fault(second, detail);
-        return None;
+        return block.refuse(second, detail);
     }
     match (block.has("along_depth_at_mm"), block.has("depths_mm")) {
-        (true, false) => {
-            block.required("depths_mm", "an array of depths in mm")?;
-        }
+        (true, false) => block
+            .required("depths_mm", "an array of depths in mm")
+            .map(|_| ()),
         (false, true) => {
             let detail = "given without along_depth_at_mm; the depths belong to its line";
-            block.fault("depths_mm", detail);
-            return None;
+            block.refuse("depths_mm", detail)
         }
-        _ => {}
+        _ => Some(()),
     }
-    Some(())
 }
 
-/// Points `[x, y, depth]`.
+/// Reads points `[x, y, depth]`.
 pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 3]>> {
     let what = "an array of points [x, y, depth] in mm";
     let elements = block.array(name, 1..=usize::MAX, what)?;
     block.each(name, elements, |element, pointer, faults| {
-        let Some([x, y, depth]) = element.as_array().map(Vec::as_slice) else {
+        let Some(point) = element.as_array().filter(|point| point.len() == 3) else {
             let given = shown(element);
-            faults.add(
-                pointer,
-                format!("{given} given; three numbers [x, y, depth] in mm are needed"),
-            );
-            return None;
+            let detail = format!("{given} given; three numbers [x, y, depth] in mm are needed");
+            return faults.refuse(pointer, detail);
         };
-        let x = number(x, &join(&pointer, 0), COORDINATE, faults);
-        let y = number(y, &join(&pointer, 1), COORDINATE, faults);
-        let depth = number(depth, &join(&pointer, 2), DEPTH, faults);
-        Some([x?, y?, depth?])
+        tuple(point, &pointer, [COORDINATE, COORDINATE, DEPTH], faults)
     })
 }
 
-/// A place on the surface, or the worst one.
+/// Reads a point `[x, y]` of the surface or the keyword `worst`.
 pub(crate) fn line_at(block: &mut Object, name: &str) -> Option<DepthLineAt> {
     let value = block.value(name)?;
     if value.as_str() == Some("worst") {
         return Some(DepthLineAt::Found(FoundPlace::Worst));
     }
     let pointer = block.pointer_to(name);
-    if let Some([x, y]) = value.as_array().map(Vec::as_slice) {
-        let faults = block.faults();
-        let x = number(x, &join(&pointer, 0), COORDINATE, faults);
-        let y = number(y, &join(&pointer, 1), COORDINATE, faults);
-        return Some(DepthLineAt::Place([x?, y?]));
+    if let Some(place) = value.as_array().filter(|place| place.len() == 2) {
+        let place = tuple(place, &pointer, [COORDINATE; 2], block.faults());
+        return place.map(DepthLineAt::Place);
     }
-    block.mistaken(name, "[x, y] in mm or \"worst\"");
-    None
+    block.mistaken(name, "[x, y] in mm or \"worst\"")
 }
 
-/// Numbers in mm.
+/// Reads a list of numbers in mm.
 pub(crate) fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
-    let elements = block.array(name, 1..=usize::MAX, "an array of numbers in mm")?;
-    let pointer = block.pointer_to(name);
-    let faults = block.faults();
-    let one = |(k, value)| number(value, &join(&pointer, k), allowed, faults);
-    let read: Vec<Option<f64>> = elements.iter().enumerate().map(one).collect();
-    read.into_iter().collect()
+    let what = "an array of numbers in mm";
+    block.number_array(name, 1..=usize::MAX, what, allowed)
 }
 
-/// Coordinates of a grid along one axis.
+/// Reads the coordinates of a grid along one axis.
 pub(crate) fn coordinates(
     block: &mut Object,
     name: &str,

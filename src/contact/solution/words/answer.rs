@@ -1,24 +1,16 @@
-//! The answer as the client reads it: everything small. The values per cell are in [`fields`](crate::solution::words::answer).
+//! The answer to a case: [`Solution`] without values per cell, [`Fields`] with them, and [`Understanding`] before a solve.
 //!
-//! Forces and tractions act on the lower body (body 2, the rail). Frame: x along rolling (the leading edge is at the
-//! larger x), y to the left, z up; moments and spin refer to [`Solution::origin`].
-//!
-//! The values per cell: tractions, slips, zones and pressures on the meshes that motions were solved on.
-//!
-//! Frame and signs are those of [`answer`](crate::solution::words::answer).
-//!
-//! The answer for a wheelset as the client reads it: its positions, and what it does as a rigid body over a range of shifts.
-//!
-//! What a case was understood as before anything is solved: what is known of its patches, and where wheel and rail lie.
+//! Forces and tractions act on the lower body (body 2, the rail). Frame: x along rolling (the leading edge is at the larger x), y to the left,
+//! z up; moments and spin refer to [`Solution::origin`].
 
 use railhead_macros::{Finite, Named, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::case::words::contact::Load;
-use crate::case::words::motion::MotionWords;
 use crate::case::words::solver::MethodName;
 use crate::remark::entry::RemarkEntry;
+use crate::rolling::task::Motion;
 use crate::solution::words::damage::{Damage, DamageFiguresUsed, PatchQuality, ProfileUncertainty};
 use crate::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
@@ -104,24 +96,18 @@ pub struct NormalReport {
 }
 
 impl NormalReport {
-    /// One report for two parts of a contact: the finer grid, all the work, the worse residual.
+    /// Combines the reports of two parts of a contact: the finer grid, the sum of the work, the larger residual.
     #[must_use]
     pub fn with(self, other: NormalReport) -> NormalReport {
-        let finer = if self.cells >= other.cells {
-            self
-        } else {
-            other
-        };
-        let changed = self.pressure_change.abs() >= other.pressure_change.abs();
+        let changes = [self.pressure_change, other.pressure_change];
         NormalReport {
-            cells: finer.cells,
+            cells: self.cells.max(other.cells),
             grids: self.grids + other.grids,
             iterations: self.iterations + other.iterations,
             residual: self.residual.max(other.residual),
-            pressure_change: if changed {
-                self.pressure_change
-            } else {
-                other.pressure_change
+            pressure_change: match changes[0].abs() >= changes[1].abs() {
+                true => changes[0],
+                false => changes[1],
             },
             force_residual: self.force_residual.max(other.force_residual),
             seconds: self.seconds + other.seconds,
@@ -165,7 +151,7 @@ pub struct PatchPoint<'a> {
 }
 
 impl Solution {
-    /// The position of the wheelset to which a patch belongs; nothing in other cases.
+    /// Returns the position of the wheelset to which a patch belongs; `None` without a wheelset.
     #[must_use]
     pub fn position_of(&self, patch: usize) -> Option<usize> {
         let positions = self.wheelset.as_deref()?.positions.iter();
@@ -173,7 +159,7 @@ impl Solution {
         wheels.position(|both| both.iter().any(|wheel| wheel.patches.contains(&patch)))
     }
 
-    /// The patches under a motion, or at a position of a wheelset; each position has patches of its own.
+    /// Returns the patches under a motion, or at a position of a wheelset. Each position has its own patches.
     pub fn at(&self, motion: usize) -> impl Iterator<Item = PatchPoint<'_>> + Clone {
         let patches = self.patches.iter().enumerate();
         patches.filter_map(move |(number, patch)| {
@@ -182,15 +168,12 @@ impl Solution {
                 Some(position) => patch.points.first().filter(|_| position == motion),
             };
             let point = point?;
-            let region = match point.region.as_deref() {
-                Some(region) => *region,
-                None => patch.region(),
-            };
+            let region = point.region.as_deref().copied();
             Some(PatchPoint {
                 number,
                 patch,
                 point,
-                region,
+                region: region.unwrap_or_else(|| patch.region()),
             })
         })
     }
@@ -228,7 +211,7 @@ pub struct PatchSolution {
 }
 
 impl PatchSolution {
-    /// Its region and pressure under the first motion.
+    /// Returns its region and pressure under the first motion.
     #[must_use]
     pub fn region(&self) -> MotionRegion {
         MotionRegion {
@@ -267,7 +250,7 @@ pub struct Position {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PointSolution {
     /// The motion of this point.
-    pub motion: MotionWords,
+    pub motion: Motion,
     /// The same motion in the dimensionless form of the literature.
     pub normalised: NormalisedMotion,
     /// Longitudinal force on the lower body in N.
@@ -394,7 +377,7 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
-    /// The estimate of a sum, whose error is at most the sum of the errors.
+    /// Returns the estimate for a sum, whose error is at most the sum of the errors.
     pub(crate) fn plus(self, other: ErrorEstimate) -> ErrorEstimate {
         ErrorEstimate {
             force_x_n: self.force_x_n + other.force_x_n,
@@ -486,31 +469,30 @@ pub struct Total {
     pub profile_uncertainty: Option<ProfileUncertainty>,
 }
 
-/// The values per cell of all patches: what was asked for, nothing else.
+/// The requested values per cell of all patches.
 #[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct Fields {
     /// One entry per patch, in the order of [`Solution::patches`](crate::solution::words::answer::Solution::patches).
     pub patches: Vec<PatchFields>,
 }
 
-/// The values per cell of one patch, motion by motion, each on the mesh that served it.
+/// The values per cell of one patch for each motion, on the mesh of that motion.
 #[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct PatchFields {
-    /// The meshes that the motions were solved on; several motions may share one.
+    /// The meshes on which the motions were solved; several motions may share one.
     pub meshes: Vec<PatchCells>,
     /// One entry per motion.
     pub points: Vec<PointFields>,
 }
 
 impl PatchFields {
-    /// The cells that the values of a motion belong to.
+    /// Returns the cells to which the values of a motion belong.
     pub fn cells(&self, point: usize) -> &PatchCells {
         &self.meshes[self.points[point].mesh]
     }
 }
 
-/// Cells of one patch, strip by strip from smaller to larger y, in each strip from smaller to larger x.
-/// All vectors have one value per cell.
+/// The cells of one patch, in the order of strips with increasing y, in each strip with increasing x. All vectors have one value per cell.
 #[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct PatchCells {
     /// Centre of the cell along x in mm.
@@ -523,14 +505,14 @@ pub struct PatchCells {
     pub dy_mm: Vec<f64>,
     /// Number of the strip, counted from 0; segments of one strip share it.
     pub strip: Vec<u32>,
-    /// Pressure in MPa, if asked for.
+    /// Pressure in MPa, if requested.
     pub pressure_mpa: Option<Vec<f64>>,
 }
 
-/// Values per cell for one motion; absent where not asked for.
+/// The values per cell for one motion; `None` if they are not requested.
 #[derive(Debug, Clone, PartialEq, Default, Finite)]
 pub struct PointFields {
-    /// Which of the patch's meshes they belong to.
+    /// Index of the mesh in [`PatchFields::meshes`].
     pub mesh: usize,
     /// Stick or slip.
     pub zone: Option<Vec<Zone>>,
@@ -538,10 +520,10 @@ pub struct PointFields {
     pub traction_x_mpa: Option<Vec<f64>>,
     /// Traction on the lower body along y in MPa.
     pub traction_y_mpa: Option<Vec<f64>>,
-    /// Mean slip of the cell, upper body relative to the lower, along x, divided by rolling speed: along the traction, and such that the
+    /// Mean slip of the cell along x, upper body relative to the lower, divided by the rolling speed. It is parallel to the traction, and the
     /// power of the cells adds up to that of the patch (see [`local_power`](crate::post::local_power)).
     pub slip_x: Option<Vec<f64>>,
-    /// Slip along y, divided by rolling speed.
+    /// Mean slip along y, divided by the rolling speed.
     pub slip_y: Option<Vec<f64>>,
     /// Temperature of both surfaces at the middle of the cell in °C.
     pub temperature_c: Option<Vec<f64>>,

@@ -1,6 +1,4 @@
-//! What a solved contact does to the surfaces, as the client reads it.
-//!
-//! The quality of the profiles as the client reads it.
+//! Damage of the surfaces and quality of the profiles in an answer.
 
 use railhead_macros::{Finite, none_is_absent};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,4 @@
-//! The answer of an evolution, and the state between two of its steps.
-//!
-//! What follows from a solved contact, as the client reads it: stresses below the surface, damage and temperatures.
+//! The answer of an evolution with the state between two steps, and the summaries of stresses and temperatures in an answer.
 
 use railhead_macros::{Finite, none_is_absent};
 use serde::{Deserialize, Serialize};
@@ -188,28 +186,28 @@ pub struct LimitReached {
     pub latest: Option<Progress>,
 }
 
-/// State of an evolution between two steps; the next step depends on nothing else. JSON keeps every bit of it.
+/// State of an evolution between two steps, on which alone the next step depends. JSON preserves it to the bit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct EvolutionState {
-    /// Share of the extent that is done.
+    /// Completed share of the extent.
     pub share: f64,
-    /// Share of the next step.
+    /// Share of the extent in the next step.
     pub next: f64,
-    /// The present time has a record.
+    /// Whether the current time has a record.
     pub recorded: bool,
     /// Events that have taken place.
     pub events_done: u32,
-    /// Coefficient of friction in place of that of the states.
+    /// Friction coefficient that replaces that of the states.
     pub friction: Option<f64>,
-    /// The states; none before the first step.
+    /// The representative states; none before the first step.
     pub traffic: CondensedTraffic,
-    /// y on the wheel's section where each state touched last.
+    /// y on the wheel's section in mm of the last contact in each state.
     pub wheel_y: Vec<f64>,
     /// Rail and wheel.
     pub bodies: [BodyState; 2],
     /// Number of accepted steps.
     pub steps: u32,
-    /// Repeated steps.
+    /// Number of repeated steps.
     pub rejected: u32,
     /// Number of contacts solved.
     pub solves: u32,
@@ -220,13 +218,13 @@ pub struct EvolutionState {
 pub struct BodyState {
     /// Points at the start, as `points_mm`.
     pub start_mm: Vec<[f64; 2]>,
-    /// The body as the next record shows it.
+    /// The body in the form of a record.
     pub worn: WornBody,
-    /// Worn area by regimes: mild, severe, and seizure or catastrophic.
+    /// Worn area in mm² by regime: mild, severe, and seizure or catastrophic.
     pub regimes_mm2: [f64; 3],
-    /// Sum of the differences in depth between the midpoint rule and Euler's rule, at each point.
+    /// Sum of the differences in depth between the midpoint rule and Euler's rule at each point, in mm.
     pub step_change_mm: Vec<f64>,
-    /// Area that the errors of the contact leave open.
+    /// Uncertainty of the worn area in mm² due to the errors of the contact solutions.
     pub contact_mm2: f64,
 }
 

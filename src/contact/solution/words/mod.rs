@@ -1,4 +1,4 @@
-//! The words of an answer: units in the names, no arithmetic.
+//! The types of an answer, with units in the names of their members.
 
 pub mod answer;
 pub mod damage;
