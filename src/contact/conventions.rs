@@ -1,4 +1,4 @@
-//! Frame, signs, units, order of values and the words of this crate. Other modules refer to this page.
+//! Frame, signs, units, order of values and the glossary of this crate.
 //!
 //! # Units
 //!
@@ -23,34 +23,34 @@
 //! - Grids: the value at `(x[i], y[j])` is `rows[j][i]`, stored at `j * nx + i`.
 //! - Patches: in order of their smallest y.
 //!
-//! # Words
+//! # Glossary
 //!
 //! | word | meaning |
 //! |---|---|
-//! | case | the question in the words of a client; checked, it is a [`CheckedCase`](crate::problem::checked_case::CheckedCase) |
-//! | problem, run, label | what a case asks, how it is to be solved, what it is called |
-//! | contact | what the bodies are: ellipse, radii, gap, pressure grid, profiles |
-//! | normal task | what is known of patches and pressures before they are found ([`NormalTask`](crate::normal::footprint::NormalTask)) |
-//! | footprint | patches and pressures, known ([`Footprint`](crate::normal::footprint::Footprint)) |
-//! | patch | a connected part of the contact |
-//! | approach | how far distant points of the bodies come together |
-//! | lowering | how far a wheel is below its first touch on the rail |
+//! | case | the input of a client; a checked one is a [`CheckedCase`](crate::problem::checked_case::CheckedCase) |
+//! | problem, run, label | the physics of a case, how it is solved, and its name |
+//! | contact | the kind of contact: ellipse, radii, gap, pressure grid, profiles, wheelset |
+//! | normal task | the normal problem ([`NormalTask`](crate::normal::footprint::NormalTask)) |
+//! | footprint | patches and pressures, the solution of the normal problem ([`Footprint`](crate::normal::footprint::Footprint)) |
+//! | patch | a connected part of the contact area |
+//! | approach | displacement of distant points of the bodies toward each other |
+//! | lowering | vertical displacement of a wheel below its first touch on the rail |
 //! | motion | creepages and spin of one state; a sweep has many |
-//! | creepage ξ, η | rigid slip along and across rolling, over the rolling speed |
-//! | spin φ | rigid rotation about the normal, over the rolling speed |
+//! | creepage ξ, η | rigid slip in the rolling and in the lateral direction, divided by the rolling speed |
+//! | spin φ | rigid rotation about the normal, divided by the rolling speed |
 //! | friction limit | μN of a patch; the *bound* is μp of a cell |
 //! | traction | tangential stress on the lower body |
-//! | slip | relative velocity over the rolling speed; a cell *sticks* where it is 0 |
+//! | slip | relative velocity divided by the rolling speed; a cell with slip 0 *sticks* |
 //! | zones | the cells that stick and those that slip |
 //! | resultants | forces and moment of the tractions |
-//! | strip | a part of a patch between two lines along rolling; its mid-line in the patch is a *chord* |
-//! | segment | one chord of a strip; hollow patches have several in a strip |
-//! | rule | how slip is differenced along a segment ([`Rule`](crate::rolling::slip_rules::Rule)) |
+//! | strip | a part of a patch between two lines in the rolling direction; its mid-line in the patch is a *chord* |
+//! | segment | one chord of a strip; strips of hollow patches have several |
+//! | rule | the difference scheme of slip along a segment ([`Rule`](crate::rolling::slip_rules::Rule)) |
 //! | operator | the map from tractions to displacements of a half-space |
-//! | level | one mesh with its areas, pressures and operator ([`StripMesh`](crate::rolling::strip_mesh::StripMesh)) |
-//! | regime | what tractions look like, for which a mesh is made: sticking, or turning about a pole |
-//! | companion | the same level with half the strips or half the cells, which tells the error |
+//! | level | a mesh with its areas, pressures and operator ([`StripMesh`](crate::rolling::strip_mesh::StripMesh)) |
+//! | regime | the type of tractions for which a mesh is made: adhesion, or rotation about a pole |
+//! | companion | the level with half the strips or half the cells, from which the error is estimated |
 //! | target | the error of the resultants that a client allows |
-//! | estimate | the error that is expected, beside every value |
-//! | remark | a sentence with a code about an answer, where it holds and its figures |
-//! | slice | motions of a sweep that are solved without a break |
+//! | estimate | the expected error of a value |
+//! | remark | information about an answer: a code, a sentence, its location and figures |
+//! | slice | motions of a sweep that are solved together |

@@ -1,4 +1,4 @@
-//! The errors of `contact`: a case with faults, and a solve without an answer.
+//! The errors of this crate: a case with faults, and a solve without an answer.
 
 use railhead_macros::Code;
 use serde_json::{Number, Value};
@@ -7,19 +7,19 @@ use thiserror::Error;
 use crate::method::Method;
 use crate::monitor::Stop;
 
-/// One fault of a case: where it is, what was given, what is allowed.
+/// One fault of a case: its location, the given value and the allowed ones.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
     /// JSON pointer (RFC 6901) to the faulty member; empty for the whole case.
     pub pointer: String,
-    /// The value given and what is allowed, as a sentence.
+    /// A sentence with the given value and the allowed ones.
     pub detail: String,
-    /// The same in a form for programs, as far as it can be expressed so.
+    /// The kind of the fault and its values, for programs.
     pub figures: Box<FaultFigures>,
 }
 
 impl Fault {
-    /// A fault described by its sentence alone.
+    /// Creates a fault that is described by its sentence alone.
     pub fn new(pointer: impl Into<String>, detail: impl Into<String>) -> Fault {
         Fault {
             pointer: pointer.into(),
@@ -29,22 +29,22 @@ impl Fault {
     }
 }
 
-/// What a fault is, for programs.
+/// The kind of a fault and its values, for programs.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FaultFigures {
     /// The kind of the fault.
     pub code: FaultCode,
-    /// The value given, unless it is an array, an object or a long text.
+    /// The given value, unless it is an array, an object or a long text.
     pub value: Option<Value>,
-    /// Smallest number allowed.
+    /// Smallest allowed number.
     pub minimum: Option<Number>,
-    /// The smallest number itself is not allowed.
+    /// Whether `minimum` itself is not allowed.
     pub minimum_excluded: bool,
-    /// Largest number, or number of elements or characters, allowed.
+    /// Largest allowed number, or number of characters.
     pub maximum: Option<Number>,
     /// Unit of `minimum` and `maximum`.
     pub unit: Option<&'static str>,
-    /// The values that are allowed.
+    /// The allowed values.
     pub allowed: Vec<String>,
 }
 
@@ -54,21 +54,21 @@ pub enum FaultCode {
     /// Another kind, described by the sentence.
     #[default]
     Invalid,
-    /// A member that is needed is not there.
+    /// A required member is absent.
     Missing,
-    /// A member is not known here.
+    /// A member is unknown.
     UnknownMember,
-    /// A value of another type is needed.
+    /// A value has the wrong type.
     WrongType,
     /// A number is too small or too large.
     OutOfRange,
-    /// A word is none of those allowed.
+    /// A keyword is not among the allowed ones.
     UnknownWord,
     /// A text is too long.
     TooLong,
 }
 
-/// Every fault of a case at once; never empty.
+/// All faults of a case; never empty.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("the case has {} fault(s): {}", .0.len(), .0.iter().map(|f| format!("{}: {}", f.pointer, f.detail)).collect::<Vec<_>>().join("; "))]
 pub struct CaseError(pub Vec<Fault>);
@@ -90,45 +90,45 @@ pub enum SolveError {
     NotConverged {
         /// The method that did not converge.
         method: Method,
-        /// Which motion of the case, counted from 0.
+        /// Index of the motion in the case, from 0.
         point: usize,
-        /// Iterations done.
+        /// Number of iterations.
         iterations: usize,
         /// Residual of the best iterate, relative to the traction scale of the case.
         residual: f64,
-        /// Residual that was needed.
+        /// Tolerance of the residual.
         tolerance: f64,
-        /// What to try instead, as a clause.
+        /// Advice as a clause.
         advice: String,
     },
-    /// No strip of the mesh meets the patch: its edge is too ragged or its samples too few.
+    /// No strip of the mesh meets the patch: its edge is too irregular or it has too few samples.
     #[error(
         "none of the {strips} strips meets patch {patch}; give more strips, or a pressure with more samples"
     )]
     Unmeshable {
-        /// The patch, counted from 0.
+        /// Index of the patch, from 0.
         patch: usize,
-        /// Strips of the mesh.
+        /// Number of strips of the mesh.
         strips: u32,
     },
-    /// There is no region and pressure to go on with.
+    /// The normal problem has no solution.
     #[error("the normal problem has no solution: {reason}")]
     NormalProblem {
-        /// Why, as a clause.
+        /// The reason as a clause.
         reason: String,
     },
-    /// The points of a profile allow no answer that can be relied on.
+    /// The points of a profile do not allow a reliable result.
     #[error("{reason} (at {pointer})")]
     RoughProfile {
         /// JSON pointer to the profile.
         pointer: String,
-        /// What is wrong with it, and what to do.
+        /// The defect, and the advice.
         reason: String,
     },
     /// The method does not cover the contact.
     #[error("{reason}")]
     NotCovered {
-        /// Why, and which method does.
+        /// The reason, and a method that covers it.
         reason: String,
     },
     /// The caller stopped the solve.
@@ -137,17 +137,17 @@ pub enum SolveError {
     /// The time limit of the case was reached.
     #[error("the solve ran out of time{}", reached(*.limit_s, *.motions))]
     OutOfTime {
-        /// The limit in s, where it is the case's own.
+        /// The limit in s, if the case has one.
         limit_s: Option<f64>,
-        /// Motions done and asked for, where that is known.
+        /// The numbers of solved and of all motions, if they are known.
         motions: Option<[usize; 2]>,
     },
-    /// The answer contains a number that is not finite; none of it is usable.
+    /// The answer contains a number that is not finite, so that it is not usable.
     #[error(
         "the result is not finite: {quantity}; check the case for values that are extremely large or small"
     )]
     NotFinite {
-        /// Where it stands in the answer.
+        /// Path of the number in the answer.
         quantity: String,
     },
 }
@@ -164,7 +164,7 @@ impl From<Stop> for SolveError {
     }
 }
 
-/// Which limit was reached, and how far the solve had come.
+/// Formats the time limit and the progress of a solve.
 fn reached(limit_s: Option<f64>, motions: Option<[usize; 2]>) -> String {
     let limit = limit_s.map_or_else(String::new, |limit| {
         format!(": time_limit_s {limit} was reached")

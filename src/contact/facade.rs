@@ -1,6 +1,6 @@
-//! Cases in Rust, without JSON: constructors and setters for the members of a [`Case`], and [`Case::solve`].
+//! Constructors and setters for a [`Case`] in Rust, and [`Case::solve`].
 //!
-//! A case that is built here passes the same checks as one that was read from JSON, and gives the same answer and the same digest.
+//! Such a case passes the same checks as one from JSON, and has the same answer and the same digest.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::case::solver::Limits;
 use crate::case::words::contact::{Contact, FLANGE_BACKS, GAUGE, Load, SurfaceName};
-use crate::case::words::cross_section::{CrossSection, Smoothing};
+use crate::case::words::cross_section::CrossSection;
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Elastic, Material};
 use crate::case::words::motion::{AskedMotion, Motions, Wheelset};
@@ -30,13 +30,13 @@ pub enum Error {
     /// The case has faults.
     #[error(transparent)]
     Case(#[from] CaseError),
-    /// The case was solved without success.
+    /// The solve failed.
     #[error(transparent)]
     Solve(#[from] SolveError),
 }
 
 impl Case {
-    /// A case without load and motion, to be solved by `auto` to the default target for resultants.
+    /// Creates a case without load and motion that requests resultants by `auto` with the default target.
     ///
     /// ```
     /// use railhead_contact::{Case, Contact, Friction, Load, Material, Motion};
@@ -102,7 +102,7 @@ impl Case {
         self
     }
 
-    /// Sets the method; its target or mesh stays.
+    /// Sets the method.
     ///
     /// ```
     /// use railhead_contact::{Case, Contact, Friction, Load, Material, Method, Motion};
@@ -124,7 +124,7 @@ impl Case {
         self
     }
 
-    /// Sets what is computed.
+    /// Sets the outputs.
     ///
     /// ```
     /// use railhead_contact::{Case, Contact, Friction, Limits, Load, Material, Motion, Output, Unmonitored};
@@ -146,7 +146,7 @@ impl Case {
     /// Checks the case against physics and limits.
     ///
     /// # Errors
-    /// Every fault of the case at once.
+    /// All faults of the case.
     ///
     /// ```
     /// use railhead_contact::{Case, Contact, Friction, Limits, Load, Material, Motion};
@@ -167,11 +167,10 @@ impl Case {
         check(&value, limits)
     }
 
-    /// Checks and solves the case within the default limits. [`solve`](crate::solve()) also gives the values per cell, and
-    /// can be followed and stopped.
+    /// Checks and solves the case within the default limits. [`solve`](crate::solve()) also returns the values per cell and takes a monitor.
     ///
     /// # Errors
-    /// The faults of the case, or why the solve gave no answer.
+    /// The faults of the case, or the reason why there is no answer.
     pub fn solve(&self) -> Result<Solution, Error> {
         let (solution, _) = solve(&self.check(&Limits::default())?, &Unmonitored)?;
         Ok(solution)
@@ -186,7 +185,7 @@ impl Material {
 }
 
 impl Elastic {
-    /// From the shear modulus in MPa and Poisson's ratio.
+    /// Creates a material from its shear modulus in MPa and Poisson's ratio.
     pub fn of_shear_modulus(shear_modulus_mpa: f64, poisson_ratio: f64) -> Elastic {
         Elastic {
             shear_modulus_mpa: Some(shear_modulus_mpa),
@@ -195,7 +194,7 @@ impl Elastic {
         }
     }
 
-    /// From Young's modulus in MPa and Poisson's ratio.
+    /// Creates a material from its Young's modulus in MPa and Poisson's ratio.
     ///
     /// ```
     /// use railhead_contact::{Case, Contact, Elastic, Friction, Load, Material, Motion};
@@ -286,8 +285,7 @@ impl Contact {
         }
     }
 
-    /// Requires the curved surface of the rail, which is the default, for a contact of profiles, and chooses the influence on it. Other contacts stay
-    /// unchanged.
+    /// Requires the curved surface of the rail, which is the default, and sets the influence on it. Contacts other than profiles stay unchanged.
     ///
     /// ```
     /// use railhead_contact::{
@@ -309,64 +307,44 @@ impl Contact {
     /// # Ok::<(), railhead_contact::Error>(())
     /// ```
     #[must_use]
-    pub fn on_curve(mut self, asked: Influence) -> Contact {
-        if let Contact::Profiles {
-            reference_surface,
-            influence,
-            ..
-        } = &mut self
-        {
-            *reference_surface = Some(SurfaceName::Curve);
-            *influence = Some(asked);
-        }
-        self
+    pub fn on_curve(self, influence: Influence) -> Contact {
+        self.on_surface(SurfaceName::Curve, Some(influence))
     }
 
-    /// Chooses planes of contact for a contact of profiles. Other contacts stay unchanged.
+    /// Requires planes of contact. Contacts other than profiles stay unchanged.
     #[must_use]
-    pub fn on_planes(mut self) -> Contact {
+    pub fn on_planes(self) -> Contact {
+        self.on_surface(SurfaceName::Plane, None)
+    }
+
+    fn on_surface(mut self, surface: SurfaceName, how: Option<Influence>) -> Contact {
         if let Contact::Profiles {
             reference_surface,
             influence,
             ..
         } = &mut self
         {
-            *reference_surface = Some(SurfaceName::Plane);
-            *influence = None;
+            (*reference_surface, *influence) = (Some(surface), how);
         }
         self
     }
 }
 
 impl CrossSection {
-    /// Points `[y, z]` in mm, in order along the cross-section; y positive to the field side, z positive down.
+    /// Creates a cross-section from points `[y, z]` in mm in order along it; y is positive to the field side, z positive down.
     pub fn points(points_mm: Vec<[f64; 2]>) -> CrossSection {
         CrossSection {
             points_mm: Some(points_mm),
-            ..CrossSection::empty()
+            ..CrossSection::default()
         }
     }
 
-    /// The content of a file.
+    /// Creates a cross-section from the content of a file.
     pub fn text(format: Format, text: impl Into<String>) -> CrossSection {
         CrossSection {
             format: Some(format),
             text: Some(text.into()),
-            ..CrossSection::empty()
-        }
-    }
-
-    fn empty() -> CrossSection {
-        CrossSection {
-            points_mm: None,
-            guard_rail_points_mm: None,
-            profile: None,
-            format: None,
-            text: None,
-            unit: None,
-            mirror_y: None,
-            mirror_z: None,
-            smoothing_mm: Smoothing::Length(0.0),
+            ..CrossSection::default()
         }
     }
 }
@@ -413,7 +391,7 @@ impl Load {
 }
 
 impl AskedMotion {
-    /// Longitudinal and lateral creepage, and spin in 1/mm.
+    /// Creates a motion from longitudinal and lateral creepage, and spin in 1/mm.
     ///
     /// ```
     /// use railhead_contact::{Case, Contact, Friction, Load, Material, Motion};
@@ -438,7 +416,7 @@ impl AskedMotion {
         }
     }
 
-    /// Longitudinal and lateral force on the lower body in N, and spin in 1/mm. The creepages are found.
+    /// Creates a motion with longitudinal and lateral force on the lower body in N, and spin in 1/mm. The creepages are computed.
     ///
     /// ```
     /// use railhead_contact::{Case, Contact, Friction, Load, Material, Motion};
@@ -466,14 +444,8 @@ impl Wheelset {
     pub fn rolling_freely(speed_mm_per_s: f64, radius_mm: f64) -> Wheelset {
         Wheelset {
             speed_mm_per_s,
-            angular_velocity_rad_per_s: None,
             free_rolling_radius_mm: Some(radius_mm),
-            drive_torque_n_mm: None,
-            force_x_n: None,
-            lateral_velocity_mm_per_s: None,
-            force_y_n: None,
-            yaw_rate_rad_per_s: 0.0,
-            roll_rate_rad_per_s: 0.0,
+            ..Wheelset::default()
         }
     }
 }

@@ -1,8 +1,8 @@
-//! The first number of an answer that is not finite.
+//! The search for numbers of an answer that are not finite.
 
-/// A value that may hold numbers.
+/// A type that may contain numbers.
 pub trait Finite {
-    /// The path from the value to its first number that is not finite.
+    /// Returns the path to the first number that is not finite.
     fn not_finite(&self) -> Option<String>;
 }
 

@@ -19,7 +19,7 @@ impl<T> PartialEq for LazyField<T> {
 }
 
 impl<T> LazyField<T> {
-    /// It; made at the first call.
+    /// Returns the value, which the first call computes.
     pub fn get_or_make(&self, make: impl FnOnce() -> T) -> &T {
         self.0.get_or_init(make)
     }

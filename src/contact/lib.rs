@@ -37,7 +37,7 @@
 //!
 //! # Stages
 //!
-//! The code is synchronous and uses no clock, file, environment or output. A case passes these stages in order; none is entered again:
+//! The code is synchronous and uses no clock, file, environment or output. A case passes these stages once, in order:
 //!
 //! | stage | from | to | where |
 //! |---|---|---|---|
@@ -47,23 +47,23 @@
 //! | answer | answers of motions | [`Solution`], [`Fields`] | [`post`], [`solution`] |
 //!
 //! Loops around these stages: [`mod@slices`] of long sweeps, [`unlike_bodies`] (in `unlike_motions`), [`wheel_on_rail`] (in [`profile_assessment`]), [`wheelset`].
-//! Frame, signs, units and words: [`conventions`].
+//! Frame, signs, units and glossary: [`conventions`].
 //!
-//! # The way of a motion
+//! # Steps of a motion
 //!
-//! 1. **Read**: [`case::draft`] turns JSON into the words of a [`Case`] and names every fault of the text.
-//! 2. **Check**: [`case::checks`] turns each part into numbers and names every fault of them; [`case::check`] puts the parts together.
-//!    From here on there is only the [`CheckedCase`].
-//! 3. **Cut**: [`slices()`] divides a long sweep; [`solve_slice`] starts the clock of the recipe for each slice.
-//! 4. **Find region and pressure**: [`normal_stage::solve`]. A gap is solved by [`normal::gap::solve`], a wheel is brought to rest on its
-//!    rail by [`normal::on_curve`].
-//! 5. **Take one motion after the other**: [`rolling_stage`]. [`rolling::force_control`] finds the creepages of a prescribed force; for
-//!    given creepages it passes the motion on. A history goes to [`rolling::history::solve`] instead.
+//! 1. **Read**: [`case::draft`] reads a [`Case`] from JSON and lists the faults of the text.
+//! 2. **Check**: [`case::checks`] converts each part to numbers and lists the faults of the numbers; [`case::check`] combines the parts to a
+//!    [`CheckedCase`], which all later steps use.
+//! 3. **Slice**: [`slices()`] divides a long sweep; [`solve_slice`] solves one slice.
+//! 4. **Find region and pressure**: [`normal_stage::solve`]. A gap is solved by [`normal::gap::solve`], the vertical equilibrium of a wheel by
+//!    [`normal::on_curve`].
+//! 5. **Solve the motions in order**: [`rolling_stage`]. [`rolling::force_control`] finds the creepages for prescribed forces. A history is
+//!    solved by [`rolling::history::solve`] instead.
 //! 6. **Refine**: [`rolling::refinement::adapt`] solves the motion on the meshes of its [family](rolling::refinement::mesh_family), coarse to
 //!    fine, and stops when the [estimate](rolling::refinement::error_estimate) meets the target.
-//! 7. **Solve one mesh**: [`rolling::refinement::on_mesh`] chooses the start and calls the [method](rolling::methods).
-//! 8. **Answer**: [`solution::assemble`] turns the [`MotionAnswer`](rolling::answer::MotionAnswer) into the words of the client, with
-//!    the outputs that were asked for ([`solution::maintain`]: stresses, damage, temperatures).
+//! 7. **Solve one mesh**: [`rolling::refinement::on_mesh`] chooses the start values and calls the [method](rolling::methods).
+//! 8. **Answer**: [`solution::assemble`] converts the [`MotionAnswer`](rolling::answer::MotionAnswer) to a [`Solution`] with the requested
+//!    outputs ([`solution::maintain`]: stresses, damage, temperatures).
 //! 9. **Finish**: [`solution::finish`] distributes the time, adds remarks on implausible numbers, and refuses numbers that are not finite.
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
@@ -150,12 +150,12 @@ pub use crate::solution::words::answer::Solution;
 /// Reads and checks a case.
 ///
 /// # Errors
-/// Every fault of the case at once: those of the text, and those of its sound parts against physics and limits.
+/// All faults of the case: those of the text, and those of its readable members against physics and limits.
 pub fn check(case: &Value, limits: &Limits) -> Result<CheckedCase, CaseError> {
     check_with(&KnownPair::default(), case, limits)
 }
 
-/// Like [`check`], for one of many cases: profiles that were read for a case before are not read again.
+/// Like [`check`], for one of many cases: profiles in `known` are not read again.
 ///
 /// # Errors
 /// See [`check`].
@@ -171,12 +171,12 @@ pub fn check_with(
 /// Solves a checked case, slice by slice.
 ///
 /// # Errors
-/// A named reason why there is no answer.
+/// The reason why there is no answer.
 pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<(Solution, Fields), SolveError> {
     solve_with(&Arc::default(), case, monitor)
 }
 
-/// Like [`solve`], for one of many problems: the store keeps operators for patches of the same shape.
+/// Like [`solve`], for one of many problems: the store keeps operators for patches of equal shape.
 ///
 /// # Errors
 /// See [`solve`].
@@ -185,27 +185,23 @@ pub fn solve_with(
     case: &CheckedCase,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
-    let mut answer: Option<(Solution, Fields)> = None;
-    for range in slices(case) {
-        let (more, more_fields) = solve_slice(operators, case, range, monitor)?;
-        match &mut answer {
-            None => answer = Some((more, more_fields)),
-            Some((solution, fields)) => {
-                solution.append(more);
-                fields.append(more_fields);
-            }
-        }
-    }
-    let Some(answer) = answer else {
+    let mut ranges = slices(case).into_iter();
+    let Some(first) = ranges.next() else {
         unreachable!("a case has at least one slice")
     };
-    Ok(answer)
+    let (mut solution, mut fields) = solve_slice(operators, case, first, monitor)?;
+    for range in ranges {
+        let (more, more_fields) = solve_slice(operators, case, range, monitor)?;
+        solution.append(more);
+        fields.append(more_fields);
+    }
+    Ok((solution, fields))
 }
 
-/// Solves one slice of a case: the motions of a range that [`slices()`] gives. Motions are numbered as in the case.
+/// Solves one slice of a case: a range of motions from [`slices()`]. Motions have their numbers in the case.
 ///
 /// # Errors
-/// A named reason why there is no answer.
+/// The reason why there is no answer.
 pub fn solve_slice(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -224,8 +220,8 @@ pub fn solve_slice(
     solve_motions(operators, &case.slice(range), &share)
 }
 
-/// The recipe: region and pressure, motions, answer. Every patch of a wheel passes the same two stages in a frame of its own, in rounds
-/// that balance its forces.
+/// Runs the stages of a case: region and pressure, motions, answer. For a wheel, the solver iterates over these stages, for each patch in its
+/// own frame, until the forces are in equilibrium.
 fn solve_motions(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,

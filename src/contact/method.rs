@@ -1,10 +1,10 @@
-//! Which method solves a motion.
+//! The methods that solve a motion.
 
 use railhead_macros::{Named, Words};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// A method; each is a file or folder of this name in [`rolling::methods`](crate::rolling::methods).
+/// A method. Each has a file or folder of its name in [`rolling::methods`](crate::rolling::methods).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Named)]
 pub enum Method {
     /// Semismooth Newton iteration with strip-preconditioned GMRES.
@@ -30,11 +30,8 @@ pub enum TractionBound {
 }
 
 impl Method {
-    /// Does it solve for tractions and slips, rather than for resultants only?
+    /// Whether it computes tractions and slips, rather than resultants only.
     pub fn has_fields(self) -> bool {
-        match self {
-            Method::BoundaryElement | Method::LiuHsu | Method::Fastsim => true,
-            Method::Table => false,
-        }
+        self != Method::Table
     }
 }

@@ -1,28 +1,28 @@
-//! How a caller follows and stops a solve. The only clock `contact` has.
+//! The interface by which a caller follows and stops a solve. It is the only clock of this crate.
 
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// Why a solve was stopped from outside.
+/// Why the caller stopped a solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
-    /// The caller no longer wants the answer.
+    /// The caller does not need the answer.
     Cancelled,
-    /// The time allowed for the case is used up.
+    /// The time limit of the case was reached.
     OutOfTime,
 }
 
-/// Watches a solve. Called once per strip of an assembly and once per Krylov step, so it must be cheap.
+/// Follows a solve. It is called once per strip of an assembly and once per Krylov step, so it must be cheap.
 pub trait Monitor {
-    /// Takes note of the progress (0 to 1, rough) and says whether to go on.
+    /// Receives the rough progress, 0 to 1, and decides whether the solve continues.
     fn tick(&self, progress: f64) -> ControlFlow<Stop>;
-    /// Time since the solve began.
+    /// Returns the time since the solve began.
     fn elapsed(&self) -> Duration;
 
     /// Calls [`tick`](Monitor::tick) and returns a stop as an error.
     ///
     /// # Errors
-    /// Why the solve is to end.
+    /// The reason why the solve must end.
     fn go_on(&self, progress: f64) -> Result<(), Stop> {
         match self.tick(progress) {
             ControlFlow::Continue(()) => Ok(()),
@@ -33,11 +33,11 @@ pub trait Monitor {
 
 /// The monitor of a part of the work.
 pub(crate) struct MonitorPart<'a> {
-    /// That of all of it.
+    /// The monitor of the whole work.
     pub(crate) inner: &'a dyn Monitor,
     /// Progress when the part begins.
     pub(crate) before: f64,
-    /// What the part adds to it.
+    /// Progress that the part adds.
     pub(crate) own: f64,
 }
 
@@ -51,7 +51,7 @@ impl Monitor for MonitorPart<'_> {
     }
 }
 
-/// Never stops a solve and measures no time; for tests and for callers that just want the answer.
+/// A monitor that never stops a solve and does not measure time.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Unmonitored;
 

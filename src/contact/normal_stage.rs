@@ -1,4 +1,4 @@
-//! The stage of the normal problem: a contact whose patches have one frame gets its region and pressure.
+//! The stage of the normal problem: computes region and pressure of a contact whose patches share one frame.
 
 use crate::error::SolveError;
 use crate::half_space::grid_operator::GridWorkspace;
@@ -15,21 +15,21 @@ use crate::solution::words::answer::NormalReport;
 pub struct SolvedFootprint {
     /// Patches and pressures.
     pub footprint: Footprint,
-    /// How they were found, where they were not known beforehand.
+    /// How they were computed, unless they were known beforehand.
     pub report: Option<NormalReport>,
-    /// Error of forces relative to μN because the pressures were found without, or with earlier, tractions.
+    /// Error of forces relative to μN because the pressures neglect the tractions or include those of an earlier iteration.
     pub coupling_error: f64,
-    /// Remarks on them.
+    /// Remarks on patches and pressures.
     pub remarks: Vec<RemarkEntry>,
 }
 
-/// Patches and pressures of a checked case: known from the case, or found for a gap.
+/// Returns patches and pressures of a checked case. They are known from the case or computed for a gap.
 ///
 /// # Errors
-/// Why there are none, or why the tangential problem on them needs too much memory; or the monitor stopped the work.
+/// The normal problem has no solution, the tangential problem needs too much memory, or the monitor stopped the work.
 ///
 /// # Panics
-/// On a wheel, whose patches have a frame each: see [`wheel_on_rail`](crate::wheel_on_rail).
+/// For a wheel, whose patches have separate frames: see [`wheel_on_rail`](crate::wheel_on_rail).
 pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprint, SolveError> {
     let first_order_error = case.problem.first_order_error(case.run.method);
     let known = |footprint, coupling_error| SolvedFootprint {
@@ -54,16 +54,15 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
             Ok(found)
         }
         NormalTask::Wheel(_) | NormalTask::Wheelset(_) => {
-            unreachable!("the patches of a wheel have a frame each")
+            unreachable!("the patches of a wheel have separate frames")
         }
     }
 }
 
-/// Patches and pressures of a gap on grids as fine as told, checked against the memory allowed;
-/// coupling error and time are left 0.
+/// Computes patches and pressures of a gap on grids of a given fineness, and checks the memory limit. Coupling error and time are 0.
 ///
 /// # Errors
-/// As [`solve`].
+/// See [`solve`].
 pub(crate) fn solve_gap(
     case: &CheckedCase,
     task: &GapTask,
@@ -92,7 +91,7 @@ impl From<NormalError> for SolveError {
 }
 
 impl NormalWork {
-    /// The report as the client reads it, with the wall time in s.
+    /// Converts the report to that of an answer, with the wall time in s.
     pub fn with_time(self, seconds: f64) -> NormalReport {
         NormalReport {
             cells: self.cells.map(|n| u32::try_from(n).unwrap_or(u32::MAX)),

@@ -1,4 +1,4 @@
-//! The stage of the tangential problem: the motions of a problem on its footprint, one after the other, each to its place in the answer.
+//! The stage of the tangential problem: solves the motions of a problem on its footprint and adds them to the answer.
 
 use std::sync::Arc;
 
@@ -21,10 +21,10 @@ use crate::solution::finish::share_seconds;
 use crate::solution::words::answer::{Fields, Solution};
 use crate::time_limit::TimeLimit;
 
-/// Solves every motion of a problem on a footprint.
+/// Solves all motions of a problem on a footprint.
 ///
 /// # Errors
-/// Why a motion has no answer; or the monitor stopped the work.
+/// The reason why a motion has no answer, or the monitor stopped the work.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -79,8 +79,8 @@ fn solve_motions(
     Ok(assembly.finish())
 }
 
-/// The answer of the creep table to a motion, where `auto` takes its resultants: its bound meets the target. They do not depend on whether a mesh is
-/// solved for values per cell.
+/// Returns the answer of the creep table to a motion, if `auto` takes its resultants because its error bound meets the target. The resultants
+/// then do not depend on whether a mesh is solved for values per cell.
 fn by_table(
     case: &CheckedCase,
     task: &RollingTask,
@@ -95,9 +95,8 @@ fn by_table(
     found.skips.push(Skip::Mesh);
     let limit = task.friction.limit_of_all(task.footprint);
     let allowed = case.run.allowed_error(&found, limit);
-    let is_met = allowed
-        .zip(found.error())
-        .is_some_and(|(allowed, error)| error <= allowed);
+    let both = allowed.zip(found.error());
+    let is_met = both.is_some_and(|(allowed, error)| error <= allowed);
     Ok(is_met.then_some(found))
 }
 
@@ -127,19 +126,19 @@ fn solve_history<'a>(
     Ok(())
 }
 
-/// How often a motion is solved again with a smaller target at most. The force hardly changes between the first and the second answer.
+/// Maximum number of repeated solves of a motion with smaller targets. The force hardly changes after the first solve.
 const ROUNDS_MAX: u32 = 3;
-/// Part of the allowed error that is asked for, since the force may come out smaller.
+/// Requested error relative to the allowed one. The force of the next solve may be smaller.
 const AIMED: f64 = 0.9;
 
-/// A motion on its way into the answer.
+/// A motion that is added to the answer.
 struct StagedMotion<'a> {
     operators: &'a Arc<OperatorStore>,
     case: &'a CheckedCase,
     solved: &'a SolvedFootprint,
     index: usize,
     watch: &'a TimeLimit<'a>,
-    /// The answer that gives the resultants, where it is not that on the mesh.
+    /// The answer of the table, if it gives the resultants.
     by_table: Option<MotionAnswer>,
 }
 
@@ -165,7 +164,7 @@ impl StagedMotion<'_> {
         }
         add_coupling_error(&mut point, self.solved.coupling_error);
         if assembly.is_empty() {
-            // What all motions share is charged to the first.
+            // The time of the normal problem counts for the first motion.
             point.seconds += self.solved.report.map_or(0.0, |report| report.seconds);
         }
         assembly.add(&state.levels, &point, self.watch)?;
@@ -173,8 +172,8 @@ impl StagedMotion<'_> {
         Ok(())
     }
 
-    /// Adds the motion once its error is small enough relative to its force, or no target makes it smaller. Each round asks for the error
-    /// relative to μN that follows from the force of the round before.
+    /// Adds the motion when its error is small enough relative to its force, or no target makes it smaller. The target of each round relative to
+    /// μN follows from the force of the previous round.
     fn add_to_force(
         &self,
         assembly: &mut Assembly,
@@ -198,17 +197,17 @@ impl StagedMotion<'_> {
                     found.work.add_lost(point.work);
                     return self.add_to_force(assembly, &finer, &mut finer_state, found, round + 1);
                 }
-                // The answer of the round before stands, with its error.
+                // The answer of the previous round is used with its error.
                 Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => {}
                 Err(error) => return Err(error),
             }
         }
-        // Levels of other rounds have numbers of their own.
+        // Each round numbers its levels from 0.
         assembly.forget_levels();
         self.add(assembly, task, state, point)
     }
 
-    /// The target relative to μN with which the error may be small enough; none if it is, or if no smaller one helps.
+    /// Returns the target relative to μN with which the error may be small enough; `None` if it is small enough or no smaller target helps.
     fn smaller_target(&self, task: &RollingTask, point: &MotionAnswer) -> Option<f64> {
         let asked = task
             .target()
@@ -223,7 +222,7 @@ impl StagedMotion<'_> {
     }
 }
 
-/// Adds the error of the pressures (see [`SolvedFootprint`]) to the estimates.
+/// Adds the error of the pressures (see [`SolvedFootprint`]) to the error estimates.
 fn add_coupling_error(point: &mut MotionAnswer, coupling: f64) {
     if coupling > 0.0 {
         let errors = point.errors.iter_mut().flatten();

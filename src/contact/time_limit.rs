@@ -1,4 +1,4 @@
-//! The time limit of a case: a monitor that ends the solve, and says how far it came.
+//! The time limit of a case: a monitor that ends the solve and counts the solved motions.
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -8,7 +8,7 @@ use crate::error::SolveError;
 use crate::monitor::{Monitor, MonitorPart, Stop};
 use crate::problem::checked_case::CheckedCase;
 
-/// The monitor of a whole case: adds the case's own time limit and turns motions done into progress, which never falls.
+/// The monitor of a whole case. It adds the time limit of the case and converts solved motions to progress, which never decreases.
 pub(crate) struct TimeLimit<'a> {
     inner: &'a dyn Monitor,
     time_limit: Option<Duration>,
@@ -18,7 +18,7 @@ pub(crate) struct TimeLimit<'a> {
 }
 
 impl<'a> TimeLimit<'a> {
-    /// Watches a case of so many motions.
+    /// Creates the monitor of a case with a number of motions.
     pub(crate) fn new(
         inner: &'a dyn Monitor,
         time_limit: Option<Duration>,
@@ -33,12 +33,12 @@ impl<'a> TimeLimit<'a> {
         }
     }
 
-    /// An error of this case; one of time with the limit and how far the solve came.
+    /// Adds the limit and the progress to an error of the time limit. Other errors stay as they are.
     pub(crate) fn explained(&self, error: SolveError, case: &CheckedCase) -> SolveError {
         let SolveError::OutOfTime { limit_s: None, .. } = error else {
             return error;
         };
-        // Of a wheel on a rail every motion is solved patch by patch.
+        // For a wheel on a rail, each motion is solved once per patch.
         let done = self.done.get() * case.problem.motions.len() / self.motions.max(1);
         SolveError::OutOfTime {
             limit_s: self.time_limit.map(|limit| limit.as_secs_f64()),
@@ -46,7 +46,7 @@ impl<'a> TimeLimit<'a> {
         }
     }
 
-    /// A monitor of the next so many motions, which are solved together.
+    /// Returns the monitor of the next `motions`, which are solved together.
     pub(crate) fn of_next(&self, motions: usize) -> MonitorPart<'_> {
         let left = self.motions.saturating_sub(self.done.get()).max(1);
         MonitorPart {
@@ -56,14 +56,14 @@ impl<'a> TimeLimit<'a> {
         }
     }
 
-    /// One more motion is done.
+    /// Counts a solved motion.
     pub(crate) fn advance(&self) {
         self.done.set(self.done.get() + 1);
     }
 }
 
 impl Monitor for TimeLimit<'_> {
-    /// `progress` is that of the motions not yet done, where they are solved together.
+    /// `progress` is that of the remaining motions.
     fn tick(&self, progress: f64) -> ControlFlow<Stop> {
         if self
             .time_limit

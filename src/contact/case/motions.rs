@@ -5,7 +5,7 @@ use crate::case::solver::Limits;
 use crate::case::words::contact::Contact;
 use crate::case::words::friction::Friction;
 use crate::case::words::motion::{
-    AskedMotion, Combine, History, HistoryCourse, Motions, Sweep, Swept, Wheelset,
+    AskedMotion, History, HistoryCourse, Motions, Sweep, Swept, Wheelset,
 };
 use crate::case::words::object::FAULTS_MAX;
 use crate::case::words::solver::Output;
@@ -139,7 +139,10 @@ fn list(motions: &Motions, limits: &Limits) -> Result<Vec<AskedMotion>, Fault> {
         // Motions of a wheelset are counted with its positions.
         Motions::One(_) | Motions::Wheelset { .. } | Motions::Wheelsets { .. } => 1,
         Motions::Many(list) => list.len() as u128,
-        Motions::Sweep { sweep } => sweep_length(sweep),
+        Motions::Sweep { sweep } => {
+            let lengths = components(sweep).map(|swept| swept.map_or(1, Swept::points));
+            sweep.combine.count(lengths)
+        }
         Motions::History { history, .. } => history.distance_mm.points() as u128,
     };
     let most = limits.motions_max;
@@ -215,6 +218,7 @@ fn history_task(history: &History, start: HistoryStart) -> HistoryTask {
     }
 }
 
+/// Returns the components of a sweep. A force takes the position of its creepage.
 fn components(sweep: &Sweep) -> [Option<&Swept>; 3] {
     [
         sweep.force_x_n.as_ref().or(sweep.creepage_x.as_ref()),
@@ -223,46 +227,24 @@ fn components(sweep: &Sweep) -> [Option<&Swept>; 3] {
     ]
 }
 
-fn sweep_length(sweep: &Sweep) -> u128 {
-    let points = components(sweep)
-        .into_iter()
-        .flatten()
-        .map(|swept| swept.points() as u128);
-    match sweep.combine {
-        Combine::Together => points.max().unwrap_or(0),
-        Combine::Grid => points.product(),
-    }
-}
-
 fn sweep_motions(sweep: &Sweep) -> Vec<AskedMotion> {
     let values = components(sweep).map(|swept| swept.map_or_else(|| vec![0.0], Swept::values));
-    let [x, y, spin] = &values;
+    let lengths = values.each_ref().map(Vec::len);
     let forced = [sweep.force_x_n.is_some(), sweep.force_y_n.is_some()];
-    let motion = |i: usize, j: usize, k: usize| AskedMotion {
-        creepage_x: (!forced[0]).then_some(x[i]),
-        creepage_y: (!forced[1]).then_some(y[j]),
-        spin_per_mm: spin[k],
-        force_x_n: forced[0].then_some(x[i]),
-        force_y_n: forced[1].then_some(y[j]),
-        speed_mm_per_s: sweep.speed_mm_per_s,
+    let motion = |k: usize| {
+        let [i, j, l] = sweep.combine.indices(lengths, k);
+        let [x, y, spin_per_mm] = [values[0][i], values[1][j], values[2][l]];
+        AskedMotion {
+            creepage_x: (!forced[0]).then_some(x),
+            creepage_y: (!forced[1]).then_some(y),
+            spin_per_mm,
+            force_x_n: forced[0].then_some(x),
+            force_y_n: forced[1].then_some(y),
+            speed_mm_per_s: sweep.speed_mm_per_s,
+        }
     };
-    match sweep.combine {
-        Combine::Together => (0..sweep_length(sweep) as usize)
-            // A single value applies to every motion.
-            .map(|n| {
-                motion(
-                    n.min(x.len() - 1),
-                    n.min(y.len() - 1),
-                    n.min(spin.len() - 1),
-                )
-            })
-            .collect(),
-        Combine::Grid => (0..x.len())
-            .flat_map(|i| (0..y.len()).map(move |j| (i, j)))
-            .flat_map(|(i, j)| (0..spin.len()).map(move |k| (i, j, k)))
-            .map(|(i, j, k)| motion(i, j, k))
-            .collect(),
-    }
+    let count = sweep.combine.count(lengths) as usize;
+    (0..count).map(motion).collect()
 }
 
 /// Outputs that are computed for steady rolling only.
@@ -351,8 +333,7 @@ pub(crate) fn history_faults(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::words::motion::Range;
-    use crate::case::words::motion::ValueList;
+    use crate::case::words::motion::{Combine, Range, ValueList};
 
     fn range(from: f64, to: f64, points: u32) -> Option<Swept> {
         Some(Swept::Range(Range { from, to, points }))

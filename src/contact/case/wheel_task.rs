@@ -252,8 +252,8 @@ fn read_both(words: &PairWords) -> Result<[Profile; 2], Vec<Fault>> {
         profile_at(wheel, Body::Wheel, words.sections[1]),
     );
     let other_body = |profile: &Profile, body: Body, pointer: &str| {
-        let remark = checked_case::load_mismatch(profile, body)?;
-        Some(Fault::new(pointer, remark.detail))
+        let remark = checked_case::other_body(profile, body)?;
+        Some(Fault::new(pointer, remark.detail()))
     };
     let faults = match read {
         (Ok(rail), Ok(wheel)) => return Ok([rail, wheel]),
@@ -266,13 +266,13 @@ fn read_both(words: &PairWords) -> Result<[Profile; 2], Vec<Fault>> {
 
 /// Refuses two profiles that both look like the other body. One of them alone may be an unusual shape.
 fn exchanged([rail, wheel]: [&Profile; 2], pointers: [&str; 2]) -> Result<(), Vec<Fault>> {
-    let both = checked_case::load_mismatch(rail, Body::Rail)
-        .zip(checked_case::load_mismatch(wheel, Body::Wheel));
+    let both = checked_case::other_body(rail, Body::Rail)
+        .zip(checked_case::other_body(wheel, Body::Wheel));
     let Some((rail, wheel)) = both else {
         return Ok(());
     };
-    let refused = |(remark, pointer): (RemarkEntry, &str)| {
-        let detail = remark.detail;
+    let refused = |(remark, pointer): (Remark, &str)| {
+        let detail = remark.detail();
         let detail = format!("{detail}; to solve it anyway, give accept_rough_profiles: true");
         Fault::new(pointer, detail)
     };
@@ -287,18 +287,12 @@ fn exchanged([rail, wheel]: [&Profile; 2], pointers: [&str; 2]) -> Result<(), Ve
 fn remarks_of(geometry: &WheelRail, pointers: [&str; 2]) -> Vec<RemarkEntry> {
     let bodies = [Body::Rail, Body::Wheel];
     let profiles = geometry.profiles().into_iter().zip(bodies).zip(pointers);
-    profiles
-        .flat_map(|((profile, body), pointer)| {
-            let own = profile.remarks.iter().cloned();
-            let own = own.map(|remark| remark.at_pointer(pointer));
-            let other_body = checked_case::load_mismatch(profile, body);
-            let other_body = other_body.map(|remark| RemarkEntry {
-                pointer: Some(pointer.to_owned()),
-                ..remark
-            });
-            own.chain(other_body).collect::<Vec<_>>()
-        })
-        .collect()
+    let remarks = profiles.flat_map(|((profile, body), pointer)| {
+        let own = profile.remarks.iter().cloned();
+        let all = own.chain(checked_case::other_body(profile, body));
+        all.map(move |remark| remark.at_pointer(pointer))
+    });
+    remarks.collect()
 }
 
 /// Reads a cross-section as the profile of a body. Faults have pointers below `pointer`.

@@ -127,28 +127,18 @@ fn poses(
     combine: Combine,
     limits: &Limits,
 ) -> Result<Vec<[f64; 2]>, Vec<Fault>> {
-    let [a, b] = [shifts, yaws].map(|swept| swept.points() as u128);
-    let count = match combine {
-        Combine::Together => a.max(b),
-        Combine::Grid => a * b,
-    };
-    if count > limits.motions_max as u128 {
-        let detail = format!(
-            "{count} positions given; at most {} are allowed in one case",
-            limits.motions_max
-        );
+    let lengths = [shifts, yaws].map(Swept::points);
+    let (count, most) = (combine.count(lengths), limits.motions_max);
+    if count > most as u128 {
+        let detail = format!("{count} positions given; at most {most} are allowed in one case");
         return Err(vec![Fault::new("/contact/lateral_shift_mm", detail)]);
     }
     let (shifts, yaws) = (shifts.values(), yaws.values());
-    Ok(match combine {
-        Combine::Grid => shifts
-            .iter()
-            .flat_map(|shift| yaws.iter().map(|yaw| [*shift, *yaw]))
-            .collect(),
-        Combine::Together => (0..count as usize)
-            .map(|k| [shifts[k.min(shifts.len() - 1)], yaws[k.min(yaws.len() - 1)]])
-            .collect(),
-    })
+    let pose = |k: usize| {
+        let [i, j] = combine.indices(lengths, k);
+        [shifts[i], yaws[j]]
+    };
+    Ok((0..count as usize).map(pose).collect())
 }
 
 /// Shift in mm and yaw in rad of every position, and the motion of the wheelset there.
@@ -162,31 +152,26 @@ fn moving(
     limits: &Limits,
 ) -> Result<Moving, Vec<Fault>> {
     let moves = motion.map_or_else(Vec::new, moves);
-    let fault = |detail| Err(vec![Fault::new("/motion/wheelset", detail)]);
     let (places, motions) = (poses.len(), moves.len());
     if motions == 0 {
         return Ok((poses, moves));
     }
-    let together = combine == Combine::Together;
-    if together && motions > 1 && places > 1 && motions != places {
-        return fault(format!(
+    let refused = |detail| Err(vec![Fault::new("/motion/wheelset", detail)]);
+    if combine == Combine::Together && motions > 1 && places > 1 && motions != places {
+        return refused(format!(
             "{motions} motions given for {places} positions; give one motion, one per position, or \"combine\": \"grid\" in the contact"
         ));
     }
-    let count = if together {
-        places.max(motions)
-    } else {
-        places.saturating_mul(motions)
-    };
-    if count > limits.motions_max {
-        return fault(format!(
-            "{count} positions with motions given; at most {} are allowed in one case",
-            limits.motions_max
+    let lengths = [places, motions];
+    let (count, most) = (combine.count(lengths), limits.motions_max);
+    if count > most as u128 {
+        return refused(format!(
+            "{count} positions with motions given; at most {most} are allowed in one case"
         ));
     }
-    let pair = |k: usize| match together {
-        true => (poses[k.min(places - 1)], moves[k.min(motions - 1)]),
-        false => (poses[k / motions], moves[k % motions]),
+    let pair = |k: usize| {
+        let [i, j] = combine.indices(lengths, k);
+        (poses[i], moves[j])
     };
-    Ok((0..count).map(pair).unzip())
+    Ok((0..count as usize).map(pair).unzip())
 }

@@ -1,9 +1,7 @@
-//! Solves many rows: one case with columns of values in place of some of its members.
+//! Solves many rows: one case with columns of values that replace some of its members.
 //!
 //! The answer to a row depends on its own case alone, to the last bit: not on other rows, their order or number, or the load of the machine.
-//! Rows share the operators of patches of one shape and the profiles that were read, so that rows of one shape follow each other.
-//!
-//! What many rows are, and what one of them asks.
+//! Rows share operators of patches of equal shape and the profiles that were read, so rows of equal shape are solved one after the other.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -28,11 +26,11 @@ use crate::problem::checked_case::CheckedCase;
 use crate::rolling::methods::table::solve::RATIO_RANGE;
 use crate::solution::words::answer::Solution;
 
-/// Solves rows: numbers of Hertz contacts by `table` and `fastsim`, or by `auto` where the table's bound meets the target, are evaluated
-/// without meshes; every other row is checked and solved as a case of its own.
+/// Solves rows. Rows of Hertz contacts are evaluated without meshes by `table` and `fastsim`, or by `auto` if the bound of the table meets the
+/// target. Every other row is checked and solved as a separate case.
 ///
 /// # Errors
-/// [`SolveError::Cancelled`]: the monitor stopped the work. What hinders one row is its status.
+/// [`SolveError::Cancelled`]: the monitor stopped the work. The failure of a row is in its status.
 pub fn solve_many(
     task: &ManyTask,
     solve: &RowSolver,
@@ -50,12 +48,11 @@ pub fn solve_many(
         });
         open.retain(|row| !take(&mut answer, *row, method, &evaluated, patches[*row]));
     }
-    open.sort_by(|a, b| near(task.columns, *a, *b));
-    solve_each(task, &open, None, (solve, monitor), &mut answer)?;
+    solve_each(task, open, None, (solve, monitor), &mut answer)?;
     Ok(answer)
 }
 
-/// Solves every row as a case of its own. `checked` is the checked case of the task, and `first` that of its first row, if it is known.
+/// Solves every row as a separate case. `checked` is the checked case of the task, and `first` that of its first row, if it is known.
 fn solve_rows<E>(
     task: &ManyTask,
     checked: &CheckedCase,
@@ -64,35 +61,34 @@ fn solve_rows<E>(
     monitor: &dyn Monitor,
 ) -> Result<RowsAnswer, NotAtOnce<E>> {
     let mut answer = ManyAnswer::new(task.rows(), NumberColumns::of(checked));
-    let mut rows: Vec<usize> = (0..task.rows()).collect();
-    rows.sort_by(|a, b| near(task.columns, *a, *b));
-    let solved = solve_each(task, &rows, first, (solve, monitor), &mut answer);
+    let rows = (0..task.rows()).collect();
+    let solved = solve_each(task, rows, first, (solve, monitor), &mut answer);
     solved.map_err(|_| NotAtOnce::Stopped)?;
     Ok(RowsAnswer::of_solver(answer))
 }
 
-/// Most rows of one evaluation that the solver answers; the table and FASTSIM answer any number.
+/// Maximum number of rows of one evaluation that the solver answers. The table and FASTSIM answer any number.
 pub const SOLVED_ROWS_MAX: usize = 200;
 
-/// Why rows are not answered at once.
+/// Why rows are not evaluated immediately.
 #[derive(Debug)]
 pub enum NotAtOnce<E> {
-    /// That many rows need the solver, more than [`SOLVED_ROWS_MAX`].
+    /// This number of rows needs the solver, more than [`SOLVED_ROWS_MAX`].
     TooManyRows(usize),
     /// The monitor stopped the solver.
     Stopped,
-    /// The error of a step.
+    /// The error that `step` returned.
     Step(E),
 }
 
-/// Answers rows at once, by the table or FASTSIM where they apply, and else by the solver. The case of the task is that of its first row, and
-/// `checked` is its checked form; `step` is called after each row of the former and may end the evaluation.
+/// Evaluates rows immediately, by the table or FASTSIM if they apply, otherwise by the solver. The case of the task is that of its first row,
+/// and `checked` is its checked form. `step` is called after each row of the table or FASTSIM and may end the evaluation.
 ///
-/// With `auto`, rows that the table leaves to the solver are solved too, if there are at most [`SOLVED_ROWS_MAX`]; otherwise their status is
+/// With `auto`, at most [`SOLVED_ROWS_MAX`] rows that the table does not answer are solved. If there are more, their status is
 /// [`RowStatus::NeedsSolver`].
 ///
 /// # Errors
-/// The rows exceed what one evaluation may take, or it was ended.
+/// Too many rows need the solver, or the evaluation was stopped.
 pub fn evaluate_at_once<E>(
     task: &ManyTask,
     checked: &CheckedCase,
@@ -136,7 +132,7 @@ pub fn evaluate_at_once<E>(
     Ok(answer)
 }
 
-/// How long the rows of a task take, in s on one core of the machine the figures were taken on; rough, and the same for the same rows.
+/// Returns the rough time of the rows in s, on one core of the machine on which the constants were measured. Equal rows have equal times.
 pub fn expected_seconds(task: &ManyTask) -> f64 {
     let rows = task.rows() as f64;
     let Ok(checked) = crate::check_with(task.known, task.case, task.limits) else {
@@ -156,13 +152,13 @@ pub fn expected_seconds(task: &ManyTask) -> f64 {
     rows * each + left as f64 * seconds
 }
 
-/// The rows as [`Rows`], if they are of that kind, and the method that was asked for.
+/// Returns the rows as [`Rows`] with the requested method, if they can be evaluated without the solver.
 fn evaluable<'a>(task: &ManyTask<'a>, checked: &CheckedCase) -> Option<(Rows<'a>, MethodName)> {
     let rows = Rows::new(task.case, checked, task.columns)?;
     Some((rows, checked.run.method_asked))
 }
 
-/// Is a row that was evaluated so left to the solver? The solver gives the reason of a row without finite numbers.
+/// Whether a row with this status after its evaluation is left to the solver, which finds the reason of numbers that are not finite.
 fn to_solve(status: RowStatus, method: MethodName) -> bool {
     match status {
         RowStatus::Ok | RowStatus::TargetMissed => false,
@@ -171,7 +167,7 @@ fn to_solve(status: RowStatus, method: MethodName) -> bool {
     }
 }
 
-/// Takes over an evaluated row; `false` if it is to be solved.
+/// Copies an evaluated row with its normal force in N and √(ab) in mm to the answer. Returns `false` if the row must be solved.
 fn take(
     answer: &mut ManyAnswer,
     row: usize,
@@ -218,7 +214,7 @@ fn take(
         f64::NAN,
     ];
     let solved = SolvedRow {
-        target_met: status == RowStatus::Ok,
+        status,
         method: Some(match method {
             MethodName::Auto => MethodName::Table,
             asked => asked,
@@ -229,7 +225,7 @@ fn take(
     true
 }
 
-/// Orders rows so that equal shapes, and then near motions, follow each other.
+/// Orders rows by the columns of their shapes, then by those of their motions.
 fn near(columns: &[VariedColumn], a: usize, b: usize) -> Ordering {
     let of_motion = |column: &VariedColumn| column.pointer.starts_with("/motion");
     let shapes = columns.iter().filter(|column| !of_motion(column));
@@ -241,31 +237,32 @@ fn near(columns: &[VariedColumn], a: usize, b: usize) -> Ordering {
         .unwrap_or_else(|| a.cmp(&b))
 }
 
-/// Solves rows one after the other. The first row of the task is not checked again if its checked case is given.
+/// Solves rows one after the other, in the order of [`near`]. The first row of the task is not checked again if its checked case is given.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`]: the monitor stopped the work.
 fn solve_each(
     task: &ManyTask,
-    rows: &[usize],
+    mut rows: Vec<usize>,
     first: Option<&CheckedCase>,
     (solve, monitor): (&RowSolver, &dyn Monitor),
     answer: &mut ManyAnswer,
 ) -> Result<(), SolveError> {
+    rows.sort_by(|a, b| near(task.columns, *a, *b));
     let own = 1.0 / rows.len() as f64;
-    for (done, row) in rows.iter().enumerate() {
+    for (done, row) in rows.into_iter().enumerate() {
         let before = done as f64 * own;
         if monitor.tick(before.min(1.0)).is_break() {
             return Err(SolveError::Cancelled);
         }
-        let checked = match first.filter(|_| *row == 0) {
+        let checked = match first.filter(|_| row == 0) {
             Some(checked) => Ok(task.as_row(checked.clone())),
-            None => task.checked(*row),
+            None => task.checked(row),
         };
         let checked = match checked {
             Ok(checked) => checked,
             Err(error) => {
-                answer.set(*row, Err(RowFailure::refused(&error)));
+                answer.set(row, Err(RowFailure::refused(&error)));
                 continue;
             }
         };
@@ -275,25 +272,23 @@ fn solve_each(
             before,
             own,
         };
-        match catch_unwind(AssertUnwindSafe(|| solve(&checked, &watch))) {
-            Ok(Ok(solution)) => answer.set_solution(*row, &solution),
-            Ok(Err(error)) => {
-                let failure = RowFailure::of(&error).ok_or(SolveError::Cancelled)?;
-                answer.set(*row, Err(failure));
+        let failure = match catch_unwind(AssertUnwindSafe(|| solve(&checked, &watch))) {
+            Ok(Ok(solution)) => {
+                answer.set_solution(row, &solution);
+                continue;
             }
-            Err(_) => {
-                let failure = RowFailure {
-                    status: RowStatus::SolverFailed,
-                    reason: "the solver stopped on an internal error".to_owned(),
-                };
-                answer.set(*row, Err(failure));
-            }
-        }
+            Ok(Err(error)) => RowFailure::of(&error).ok_or(SolveError::Cancelled)?,
+            Err(_) => RowFailure {
+                status: RowStatus::SolverFailed,
+                reason: "the solver stopped on an internal error".to_owned(),
+            },
+        };
+        answer.set(row, Err(failure));
     }
     Ok(())
 }
 
-/// The monitor of one row.
+/// The monitor of one row: its clock starts with the row, and its progress is that of all rows.
 struct RowMonitor<'a> {
     inner: &'a dyn Monitor,
     begun: Duration,
@@ -318,31 +313,31 @@ pub type RowSolver<'a> = dyn Fn(&CheckedCase, &dyn Monitor) -> Result<Solution, 
 /// Rows to solve.
 #[derive(Debug, Clone, Copy)]
 pub struct ManyTask<'a> {
-    /// A good case of one motion, such as that of the first of all rows.
+    /// A case of one motion without faults, such as that of the first row.
     pub case: &'a Value,
-    /// What differs from it, at least one column; all of the same length.
+    /// The columns that replace members of the case, at least one; all have the same length.
     pub columns: &'a [VariedColumn],
-    /// Cross-sections that rows name, by their names.
+    /// Stored cross-sections by the names that rows give.
     pub profiles: &'a BTreeMap<String, Value>,
-    /// Pairs of cross-sections that were read before.
+    /// Cache of the cross-sections that were read.
     pub known: &'a KnownPair,
-    /// What a row may use.
+    /// Limits of a row.
     pub limits: &'a Limits,
-    /// Longest time for one row; a shorter one of the case counts.
+    /// Time limit of a row, unless the case has a shorter one.
     pub time_limit: Duration,
 }
 
 impl ManyTask<'_> {
-    /// Number of rows.
+    /// The number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.columns.first().map_or(1, |column| column.values.len())
     }
 
-    /// The checked case of a row.
+    /// Returns the checked case of a row.
     ///
     /// # Errors
-    /// Its faults.
-    pub(crate) fn checked(&self, row: usize) -> Result<CheckedCase, CaseError> {
+    /// All faults of the case.
+    fn checked(&self, row: usize) -> Result<CheckedCase, CaseError> {
         let case = case_of_row(self.case, self.columns, self.profiles, row)
             .map_err(|(pointer, reason)| CaseError(vec![Fault::new(pointer, reason)]))?;
         let checked = crate::check_with(self.known, &case, self.limits)?;
@@ -352,9 +347,9 @@ impl ManyTask<'_> {
         }
     }
 
-    /// A checked case with the outputs and the time limit of a row.
-    pub(crate) fn as_row(&self, mut checked: CheckedCase) -> CheckedCase {
-        // Rows are answered with numbers alone.
+    /// Returns a checked case with the outputs and the time limit of a row.
+    fn as_row(&self, mut checked: CheckedCase) -> CheckedCase {
+        // The answer to a row consists of numbers only.
         let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
         let outputs = &mut checked.run.outputs;
         outputs.retain(|output| numbers.contains(output));
@@ -364,7 +359,7 @@ impl ManyTask<'_> {
     }
 }
 
-/// The fault of a case that has several answers, so that no row stands for it.
+/// Returns the fault of a case with several answers, which a row cannot have.
 pub fn several_answers(checked: &CheckedCase) -> Option<Fault> {
     let problem = &checked.problem;
     let (motions, positions) = (problem.motions.len(), problem.task.positions());

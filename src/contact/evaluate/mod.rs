@@ -1,4 +1,4 @@
-//! Rows in, resultants out: one case with columns of values in place of some of its members. [`rows`] answers numbers without meshes, [`many`]
+//! Evaluates rows: one case with columns of values that replace some of its members. [`rows`] answers numbers without meshes, [`many`]
 //! any column with any method.
 
 pub mod answer;

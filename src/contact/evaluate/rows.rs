@@ -1,4 +1,4 @@
-//! Evaluates rows: Hertz's ellipse and the creep forces of each, by the table or by the simplified theory.
+//! Evaluates rows without meshes: the Hertz ellipse of each, and its creep forces by the table or by FASTSIM.
 
 use std::convert::Infallible;
 use std::f64::consts::PI;
@@ -20,17 +20,20 @@ use crate::rolling::methods::table::solve::RATIO_RANGE;
 use crate::rolling::refinement::gradients::{STEP, slope};
 use crate::rolling::task::{RelativeTo, Resolution};
 
-/// Rows that can be evaluated.
+/// Rows that can be evaluated without meshes.
 #[derive(Debug)]
 pub struct Rows<'a> {
     rows: usize,
+    /// The numbers that all rows share.
     fixed: Row,
     varied: Vec<(Variable, &'a [f64])>,
-    /// Shear modulus and Poisson's ratio where the bodies have their own.
+    /// Combined shear modulus in MPa and Poisson's ratio, if the bodies have separate materials.
     pair: Option<[f64; 2]>,
+    /// Whether the case gives Young's modulus.
     young: bool,
-    /// Kalker's reduction factor, 1 of clean surfaces.
+    /// Kalker's reduction factor; 1 for clean surfaces.
     reduction: f64,
+    /// Whether the case gives radii rather than semi-axes.
     radii: bool,
     method: RowMethod,
     target: Option<f64>,
@@ -40,15 +43,14 @@ pub struct Rows<'a> {
 
 #[derive(Debug)]
 enum RowMethod {
-    /// The table; if `auto` chose it, rows above the target are left to the solver.
-    Table {
-        auto: bool,
-    },
+    /// The table. If `auto` chose it, rows above the target are left to the solver.
+    Table { auto: bool },
+    /// FASTSIM with its mesh and its stated error.
     Fastsim(Box<EllipseMesh>, f64),
 }
 
 impl<'a> Rows<'a> {
-    /// The rows of a case: `case` holds the first of them, and `checked` is what it was checked to be. `None` if the solver has to answer them.
+    /// Returns the rows of a case; `None` if they need the solver. `case` is that of the first row, and `checked` its checked form.
     pub fn new(
         case: &Value,
         checked: &CheckedCase,
@@ -98,16 +100,16 @@ impl<'a> Rows<'a> {
         })
     }
 
-    /// The answers.
+    /// Evaluates the rows.
     pub fn evaluate(&self) -> RowsAnswer {
         let Ok(answer) = self.evaluate_to(|_| Ok::<_, Infallible>(()));
         answer
     }
 
-    /// The answers; `note` is called with the normal force in N and √(ab) in mm of each row and may end the evaluation.
+    /// Evaluates the rows. `note` is called with the normal force in N and √(ab) in mm of each row and may end the evaluation.
     ///
     /// # Errors
-    /// Returns the error that `note` returned.
+    /// The error that `note` returned.
     pub fn evaluate_to<E>(
         &self,
         mut note: impl FnMut([f64; 2]) -> Result<(), E>,
@@ -126,11 +128,11 @@ impl<'a> Rows<'a> {
         Ok(answer)
     }
 
-    /// The answer to a row, and its normal force in N and √(ab) in mm.
+    /// Returns the answer to a row, its normal force in N and √(ab) in mm.
     fn answer_row(&self, row: &Row, shapes: &mut Shapes) -> (RowAnswer, [f64; 2]) {
         let at = |variable: Variable| row[variable as usize];
         let [modulus, poisson] = self.material(row);
-        let force = at(Variable::NormalForce);
+        let (force, friction) = (at(Variable::NormalForce), at(Variable::Friction));
         let [a, b] = if self.radii {
             let radii = [at(Variable::Rolling), at(Variable::Lateral)];
             let shape = shapes.hertz(radii);
@@ -139,7 +141,7 @@ impl<'a> Rows<'a> {
             [at(Variable::SemiAxisA), at(Variable::SemiAxisB)]
         };
         let patch = RowPatch {
-            limit: at(Variable::Friction) * force,
+            limit: friction * force,
             c: (a * b).sqrt(),
             ratio: a / b,
             modulus: self.reduction * modulus,
@@ -153,9 +155,8 @@ impl<'a> Rows<'a> {
             approach: 0.0,
             normal_force: force,
         };
-        let friction = at(Variable::Friction);
-        let lost = friction > 0.0 && friction < COEFFICIENT_LEAST;
-        if lost || plausible(&ellipse.patch(), "/load").is_err() {
+        let is_tiny = friction > 0.0 && friction < COEFFICIENT_LEAST;
+        if is_tiny || plausible(&ellipse.patch(), "/load").is_err() {
             return (RowAnswer::without(RowStatus::Refused), place);
         }
         let motion = [
@@ -184,7 +185,7 @@ impl<'a> Rows<'a> {
         (found.of_patch(&patch, motion, self.gradients), place)
     }
 
-    /// Shear modulus and Poisson's ratio of a row.
+    /// Returns shear modulus in MPa and Poisson's ratio of a row.
     fn material(&self, row: &Row) -> [f64; 2] {
         let at = |variable: Variable| row[variable as usize];
         self.pair.unwrap_or_else(|| {
@@ -198,13 +199,13 @@ impl<'a> Rows<'a> {
         })
     }
 
-    /// What the method says of a patch.
+    /// Returns the creep forces of a patch by the method.
     fn creep(&self, patch: &RowPatch, motion: [f64; 3], shapes: &mut Shapes) -> RowCreep {
         if patch.limit == 0.0 {
-            let still = motion == [0.0; 3];
+            let is_still = motion == [0.0; 3];
             return RowCreep::ok(Creep {
                 force: [0.0; 3],
-                stick: if still { 1.0 } else { 0.0 },
+                stick: if is_still { 1.0 } else { 0.0 },
                 bound: 0.0,
             });
         }
@@ -265,18 +266,19 @@ struct RowPatch {
     c: f64,
     /// a/b.
     ratio: f64,
+    /// Shear modulus in MPa, reduced by Kalker's factor.
     modulus: f64,
     poisson: f64,
 }
 
 impl RowPatch {
-    /// The factor that makes creepages dimensionless.
+    /// Returns the factor that makes creepages dimensionless.
     fn unit(&self) -> f64 {
         self.modulus * self.c * self.c / self.limit
     }
 }
 
-/// What a row is answered with, relative to μN.
+/// The creep forces of a row relative to μN, with their derivatives.
 struct RowCreep {
     creep: Creep,
     slopes: [[f64; 3]; 3],
@@ -304,7 +306,7 @@ impl RowCreep {
         }
     }
 
-    /// The numbers in N and mm, with derivatives if they are wanted.
+    /// Converts the numbers to N and mm, with derivatives if requested.
     fn of_patch(&self, patch: &RowPatch, motion: [f64; 3], gradients: bool) -> RowAnswer {
         let (limit, c) = (patch.limit, patch.c);
         let creep = &self.creep;
@@ -343,7 +345,7 @@ impl RowCreep {
     }
 }
 
-/// What neighbouring rows often share.
+/// The last shapes that were computed; neighbouring rows often share them.
 #[derive(Debug, Default)]
 struct Shapes {
     hertz: Option<([f64; 2], HertzShape)>,
@@ -352,33 +354,32 @@ struct Shapes {
 
 impl Shapes {
     fn hertz(&mut self, radii: [f64; 2]) -> HertzShape {
-        match self.hertz {
-            Some((known, shape)) if known == radii => shape,
-            _ => {
-                let shape = HertzShape::of_radii(radii[0], radii[1]);
-                self.hertz = Some((radii, shape));
-                shape
-            }
-        }
+        cached(&mut self.hertz, radii, || {
+            HertzShape::of_radii(radii[0], radii[1])
+        })
     }
 
     fn table(&mut self, ratio: f64, poisson: f64) -> EllipseTable<'static> {
-        match self.table {
-            Some((known, ellipse)) if known == [ratio, poisson] => ellipse,
-            _ => {
-                let ellipse = table().ellipse(ratio, poisson);
-                self.table = Some(([ratio, poisson], ellipse));
-                ellipse
-            }
-        }
+        let key = [ratio, poisson];
+        cached(&mut self.table, key, || table().ellipse(ratio, poisson))
     }
 }
 
-/// Is it a question that table and simplified theory answer row by row: one motion by creepages on a loaded ellipse?
+/// Returns the cached value if it has this key, otherwise computes and caches it.
+fn cached<T: Copy>(
+    cache: &mut Option<([f64; 2], T)>,
+    key: [f64; 2],
+    compute: impl FnOnce() -> T,
+) -> T {
+    let known = cache.filter(|(known, _)| *known == key);
+    cache.insert(known.unwrap_or_else(|| (key, compute()))).1
+}
+
+/// Whether the table or FASTSIM can answer the rows: one motion with creepages on an ellipse under a normal force.
 fn is_plain(case: &Value, checked: &CheckedCase) -> bool {
     let CheckedCase { problem, run, .. } = checked;
     let asked_mesh = matches!(run.resolution, Resolution::Mesh(_));
-    // A list or a sweep of one motion does not have its creepages where rows read them.
+    // The creepages of a list or a sweep of one motion are not at the pointers of the variables.
     let listed = |motion: &Value| motion.is_array() || motion.get("sweep").is_some();
     problem.plain().is_some()
         && problem.motions.len() == 1
@@ -394,7 +395,7 @@ fn is_plain(case: &Value, checked: &CheckedCase) -> bool {
         }
 }
 
-/// None where a mesh of the simplified theory cannot be made.
+/// Returns the method of the rows; `None` if FASTSIM has no mesh of the requested size.
 fn method_of(checked: &CheckedCase) -> Option<RowMethod> {
     Some(match (checked.run.method_asked, checked.run.resolution) {
         (MethodName::Fastsim, resolution) => {

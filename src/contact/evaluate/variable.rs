@@ -1,8 +1,8 @@
-//! The numbers of a case that may differ from row to row.
+//! The numbers of a case that columns of rows can replace without a check of each row.
 
 use crate::case::words::object::AllowedRange;
 
-/// A number of a case that a column can hold.
+/// A number of a case that a column can replace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Variable {
     /// Shear modulus in MPa.
@@ -13,13 +13,13 @@ pub enum Variable {
     PoissonRatio,
     /// Coefficient of friction.
     Friction,
-    /// Relative radius of curvature along rolling in mm.
+    /// Relative radius of curvature in the rolling direction in mm.
     Rolling,
-    /// The same across.
+    /// Relative radius of curvature in the lateral direction in mm.
     Lateral,
-    /// Semi-axis along rolling in mm.
+    /// Semi-axis in the rolling direction in mm.
     SemiAxisA,
-    /// The same across.
+    /// Semi-axis in the lateral direction in mm.
     SemiAxisB,
     /// Normal force in N.
     NormalForce,
@@ -31,7 +31,7 @@ pub enum Variable {
     Spin,
 }
 
-/// Numbers of a row, in the order of [`VARIABLES`].
+/// The numbers of a row, in the order of [`VARIABLES`].
 pub type Row = [f64; VARIABLES.len()];
 
 const MODULUS: AllowedRange = AllowedRange::positive(1e12, "MPa");
@@ -43,43 +43,37 @@ const FORCE: AllowedRange = AllowedRange::positive(1e12, "N");
 const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
 const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
 
-/// Every variable with its place in the case and the numbers that it may have.
-const VARIABLES: [(Variable, &str, AllowedRange); 12] = [
-    (
-        Variable::ShearModulus,
-        "/material/shear_modulus_mpa",
-        MODULUS,
-    ),
-    (
-        Variable::YoungModulus,
-        "/material/young_modulus_mpa",
-        MODULUS,
-    ),
-    (Variable::PoissonRatio, "/material/poisson_ratio", RATIO),
-    (Variable::Friction, "/friction/coefficient", COEFFICIENT),
-    (Variable::Rolling, "/contact/rolling_mm", RADIUS),
-    (Variable::Lateral, "/contact/lateral_mm", RADIUS),
-    (Variable::SemiAxisA, "/contact/a_mm", AXIS),
-    (Variable::SemiAxisB, "/contact/b_mm", AXIS),
-    (Variable::NormalForce, "/load/normal_force_n", FORCE),
-    (Variable::CreepageX, "/motion/creepage_x", CREEPAGE),
-    (Variable::CreepageY, "/motion/creepage_y", CREEPAGE),
-    (Variable::Spin, "/motion/spin_per_mm", SPIN),
-];
+/// Each variable with its JSON pointer in the case and its allowed values.
+const VARIABLES: [(Variable, &str, AllowedRange); 12] = {
+    use Variable as V;
+    [
+        (V::ShearModulus, "/material/shear_modulus_mpa", MODULUS),
+        (V::YoungModulus, "/material/young_modulus_mpa", MODULUS),
+        (V::PoissonRatio, "/material/poisson_ratio", RATIO),
+        (V::Friction, "/friction/coefficient", COEFFICIENT),
+        (V::Rolling, "/contact/rolling_mm", RADIUS),
+        (V::Lateral, "/contact/lateral_mm", RADIUS),
+        (V::SemiAxisA, "/contact/a_mm", AXIS),
+        (V::SemiAxisB, "/contact/b_mm", AXIS),
+        (V::NormalForce, "/load/normal_force_n", FORCE),
+        (V::CreepageX, "/motion/creepage_x", CREEPAGE),
+        (V::CreepageY, "/motion/creepage_y", CREEPAGE),
+        (V::Spin, "/motion/spin_per_mm", SPIN),
+    ]
+};
 
 impl Variable {
-    /// Every variable.
+    /// Returns all variables.
     pub fn all() -> impl Iterator<Item = Variable> {
         VARIABLES.iter().map(|(variable, ..)| *variable)
     }
 
-    /// The variable at a place of the case.
+    /// Returns the variable at a JSON pointer into the case.
     pub fn at(pointer: &str) -> Option<Variable> {
-        let found = VARIABLES.iter().find(|(_, at, _)| *at == pointer);
-        found.map(|(variable, ..)| *variable)
+        Variable::all().find(|variable| variable.pointer() == pointer)
     }
 
-    /// Its number in a case that leaves it out: creepages and spin are 0 then, anything else is not asked for.
+    /// Returns its value in a case that omits it: 0 for creepages and spin, NaN for numbers that such a case does not use.
     pub fn absent(self) -> f64 {
         match self {
             Variable::CreepageX | Variable::CreepageY | Variable::Spin => 0.0,
@@ -87,12 +81,12 @@ impl Variable {
         }
     }
 
-    /// Its place in the case, a JSON pointer.
+    /// Its JSON pointer in the case.
     pub fn pointer(self) -> &'static str {
         VARIABLES[self as usize].1
     }
 
-    /// The numbers that it may have.
+    /// Its allowed values.
     pub(crate) fn allowed(self) -> AllowedRange {
         VARIABLES[self as usize].2
     }

@@ -1,15 +1,12 @@
-//! Columns that may hold any number or text of a case.
-//!
-//! Faults of rows with pointers into the request that brought them: `/template/…` and `/columns/<pointer>/<row>`.
-//!
-//! Puts a value into a case at the place that a JSON pointer leads to.
+//! Columns that replace members of a case, the cases of their rows, and the faults of rows with JSON pointers into their request
+//! (`/template/…`, `/columns/<pointer>/<row>`).
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-use crate::case::words::object::FAULTS_MAX;
+use crate::case::words::object::{FAULTS_MAX, join};
 use crate::error::{CaseError, Fault, FaultCode};
 use crate::evaluate::variable::Variable;
 
@@ -18,11 +15,11 @@ use crate::evaluate::variable::Variable;
 pub enum Values {
     /// Finite numbers.
     Numbers(Vec<f64>),
-    /// Texts, such as digests of profiles; nothing where a row has none.
+    /// Texts, such as digests of profiles; `None` for a row without one.
     Texts(Vec<Option<String>>),
 }
 
-/// A column: where it stands in the case, and a value for each row.
+/// A column with a value for each row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VariedColumn {
     /// JSON pointer into the case.
@@ -32,7 +29,7 @@ pub struct VariedColumn {
 }
 
 impl Values {
-    /// Number of rows.
+    /// The number of rows.
     pub fn len(&self) -> usize {
         match self {
             Values::Numbers(numbers) => numbers.len(),
@@ -40,25 +37,22 @@ impl Values {
         }
     }
 
-    /// There is no row.
+    /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The values of these rows.
+    /// Returns the values of some rows.
     #[must_use]
     pub fn pick(&self, rows: &[usize]) -> Values {
+        let rows = rows.iter();
         match self {
-            Values::Numbers(numbers) => {
-                Values::Numbers(rows.iter().map(|row| numbers[*row]).collect())
-            }
-            Values::Texts(texts) => {
-                Values::Texts(rows.iter().map(|row| texts[*row].clone()).collect())
-            }
+            Values::Numbers(numbers) => Values::Numbers(rows.map(|row| numbers[*row]).collect()),
+            Values::Texts(texts) => Values::Texts(rows.map(|row| texts[*row].clone()).collect()),
         }
     }
 
-    /// The value of a row as a case has it.
+    /// Returns the value of a row in the form of a member of a case.
     pub fn value(&self, row: usize) -> Value {
         match self {
             Values::Numbers(numbers) => Value::from(numbers[row]),
@@ -79,10 +73,10 @@ impl Values {
     }
 }
 
-/// The case of a row: the template with the row's values in their places, and cross-sections in the place of their names.
+/// Returns the case of a row: the template with the values of the row, and with cross-sections instead of their names.
 ///
 /// # Errors
-/// The pointer of the first column that leads nowhere in the template, and why.
+/// The pointer of the first column that leads nowhere in the template, and the reason.
 pub fn case_of_row(
     template: &Value,
     columns: &[VariedColumn],
@@ -106,7 +100,7 @@ pub fn case_of_row(
     Ok(case)
 }
 
-/// Where a case has cross-sections.
+/// JSON pointers to the cross-sections of a case.
 const PLACES: [&str; 4] = [
     "/contact/rail",
     "/contact/wheel",
@@ -115,10 +109,10 @@ const PLACES: [&str; 4] = [
 ];
 /// The member that names a stored cross-section.
 const PROFILE: &str = "profile";
-/// What it stands for.
+/// The members that it replaces.
 const POINTS: [&str; 3] = ["points_mm", "format", "text"];
 
-/// The cross-sections that a case names: where, and by which name.
+/// Returns JSON pointers and names of the cross-sections that a case names.
 pub fn named_sections(case: &Value) -> Vec<(&'static str, String)> {
     let named = |place: &&'static str| {
         let name = case.pointer(place)?.get(PROFILE)?.as_str()?;
@@ -127,7 +121,7 @@ pub fn named_sections(case: &Value) -> Vec<(&'static str, String)> {
     PLACES.iter().filter_map(named).collect()
 }
 
-/// The first cross-section that is both named and given.
+/// Returns the JSON pointer to the first cross-section that is both named and given.
 pub fn named_and_given(case: &Value) -> Option<&'static str> {
     let both = |place: &&&'static str| {
         let section = case.pointer(place);
@@ -138,7 +132,8 @@ pub fn named_and_given(case: &Value) -> Option<&'static str> {
     PLACES.iter().find(both).copied()
 }
 
-/// Puts the stored cross-section in the place of its name. What else the case says of it, such as its smoothing, stays.
+/// Replaces the name of a cross-section by the stored cross-section. Other members of the case's section, such as its smoothing, take
+/// precedence over those of the stored one.
 pub fn put_section(case: &mut Value, place: &str, section: &Value) {
     let Some(Value::Object(own)) = case.pointer_mut(place) else {
         return;
@@ -154,12 +149,12 @@ pub fn put_section(case: &mut Value, place: &str, section: &Value) {
     }
 }
 
-/// The pointer of a column in the request.
+/// Returns the JSON pointer to a column in the request.
 pub fn column_pointer(name: &str) -> String {
-    format!("/columns/{}", name.replace('~', "~0").replace('/', "~1"))
+    join("/columns", name)
 }
 
-/// Faults of the case of the first row, with pointers into the request; of each column the pointer into the case and its name.
+/// Changes the pointers of faults of the first row's case to pointers into the request. A column is its pointer into the case and its name.
 pub fn of_first_row(CaseError(faults): CaseError, columns: &[(&str, &str)]) -> CaseError {
     in_template(CaseError(faults), |pointer| {
         let (_, name) = columns.iter().find(|(known, _)| *known == pointer)?;
@@ -167,8 +162,7 @@ pub fn of_first_row(CaseError(faults): CaseError, columns: &[(&str, &str)]) -> C
     })
 }
 
-/// Faults of the case of a row, with pointers into the request: that of a column where `column` knows the pointer into the case, below the template
-/// elsewhere.
+/// Changes the pointers of faults of a row's case to pointers into the request: that which `column` returns, or else one below `/template`.
 pub fn in_template(
     CaseError(faults): CaseError,
     column: impl Fn(&str) -> Option<String>,
@@ -180,8 +174,8 @@ pub fn in_template(
     CaseError(moved.collect())
 }
 
-/// Faults of some values of a column, the first of which belongs to the row `first`: numbers that are not finite, or that no case may have at
-/// this place, as far as that is known of the place alone.
+/// Returns the faults of some values of a column, the first of which belongs to the row `first`: numbers that are not finite, or outside the
+/// allowed range of the member if it is a [`Variable`].
 pub fn of_values(name: &str, pointer: &str, values: &Values, first: u64) -> Vec<Fault> {
     let Values::Numbers(numbers) = values else {
         return Vec::new();
@@ -190,30 +184,25 @@ pub fn of_values(name: &str, pointer: &str, values: &Values, first: u64) -> Vec<
     let good =
         |number: f64| number.is_finite() && allowed.is_none_or(|range| range.contains(number));
     let wrong = (first..).zip(numbers).filter(|(_, number)| !good(**number));
-    wrong
-        .take(FAULTS_MAX)
-        .map(|(row, number)| {
-            let place = format!("{}/{row}", column_pointer(name));
-            match allowed {
-                Some(allowed) => Fault {
-                    figures: Box::new(
-                        allowed.figures(FaultCode::OutOfRange, Some(&Value::from(*number))),
-                    ),
-                    ..Fault::new(
-                        place,
-                        match number.is_nan() {
-                            true => format!("no number given; {allowed} is needed"),
-                            false => format!("{number} given; {allowed} is needed"),
-                        },
-                    )
-                },
-                None => Fault::new(place, "no number given; a finite number is needed"),
-            }
-        })
-        .collect()
+    let fault = |(row, number): (u64, &f64)| {
+        let pointer = format!("{}/{row}", column_pointer(name));
+        let Some(allowed) = allowed else {
+            return Fault::new(pointer, "no number given; a finite number is needed");
+        };
+        let given = match number.is_nan() {
+            true => "no number".to_owned(),
+            false => number.to_string(),
+        };
+        let figures = allowed.figures(FaultCode::OutOfRange, Some(&Value::from(*number)));
+        Fault {
+            figures: Box::new(figures),
+            ..Fault::new(pointer, format!("{given} given; {allowed} is needed"))
+        }
+    };
+    wrong.take(FAULTS_MAX).map(fault).collect()
 }
 
-/// The members of a JSON pointer (RFC 6901).
+/// Splits a JSON pointer (RFC 6901) into its unescaped members.
 pub fn members(pointer: &str) -> Vec<String> {
     let parts = pointer.split('/').skip(1);
     parts
@@ -221,10 +210,10 @@ pub fn members(pointer: &str) -> Vec<String> {
         .collect()
 }
 
-/// Puts a value where the members lead; objects on the way are made.
+/// Puts a value into a case at a path of members. Missing objects on the path are created.
 ///
 /// # Errors
-/// Returns the reason if a pointer leads nowhere; the case is then unchanged.
+/// The reason, if the path leads nowhere; the case is then unchanged.
 pub fn put(case: &mut Value, path: &[String], value: Value) -> Result<(), String> {
     if path.is_empty() {
         return Ok(());

@@ -1,8 +1,6 @@
-//! A checked case in three parts: what is asked ([`Problem`]), how it is to be solved ([`Run`]) and what it is called ([`Label`]).
+//! A checked case: its physics ([`Problem`]), how it is solved ([`Run`]) and its name ([`Label`]).
 //!
-//! The quality of profiles as far as their points alone show it, before the contact is known.
-//!
-//! Remarks on contacts outside the range for which the theory is intended, for all types of contact; nothing is refused here.
+//! The quality of profiles before their contact is known, and remarks on contacts outside the range of the theory, are here too.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -26,31 +24,31 @@ use crate::solution::words::damage::{PairQuality, SectionQuality};
 /// A case that can be solved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedCase {
-    /// What is asked.
+    /// The physics.
     pub problem: Problem,
-    /// How to solve it.
+    /// How it is solved.
     pub run: Run,
-    /// What it is called.
+    /// Its name and digest.
     pub label: Label,
-    /// Remarks of the checks; they go into the answer.
+    /// Remarks of the checks, which the answer includes.
     pub remarks: Vec<RemarkEntry>,
 }
 
-/// What a case is called; the answer does not depend on it.
+/// Name, labels and digest of a case, on which the numbers of the answer do not depend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {
-    /// Free text given by the client.
+    /// Free text of the client.
     pub name: Option<String>,
     /// Labels of the client.
     pub labels: BTreeMap<String, String>,
-    /// Hexadecimal digest of everything that determines the answer, the solver version included.
+    /// Hexadecimal digest of everything that determines the answer, including the solver version.
     pub digest: String,
-    /// What of the case stands in the answer.
+    /// The parts of the case that the answer includes.
     pub asked: Asked,
 }
 
 impl CheckedCase {
-    /// The same case with some of its motions.
+    /// Returns this case with a range of its motions.
     #[must_use]
     pub fn slice(&self, range: Range<usize>) -> CheckedCase {
         let chosen: Vec<usize> = range.clone().collect();
@@ -68,7 +66,7 @@ impl CheckedCase {
         }
     }
 
-    /// May `auto` take the resultants of a motion from the creep table? Creepages and a target must be given, and the table must cover the contact.
+    /// Whether `auto` may take the resultants of a motion from the creep table. It needs creepages, a target and a contact that the table covers.
     pub(crate) fn may_take_table(&self, index: usize) -> bool {
         let CheckedCase { problem, run, .. } = self;
         run.method_asked == MethodName::Auto
@@ -78,7 +76,7 @@ impl CheckedCase {
             && problem.is_in_table()
     }
 
-    /// What is asked of the tangential problem on a footprint.
+    /// Returns the tangential problem on a footprint.
     pub fn rolling_task<'a>(&'a self, footprint: &'a Footprint) -> RollingTask<'a> {
         let CheckedCase { problem, run, .. } = self;
         RollingTask {
@@ -99,11 +97,11 @@ impl CheckedCase {
     }
 }
 
-/// Pressure in MPa assumed for assessing profiles before their contact is known.
+/// Pressure in MPa with which profiles are assessed before their contact is known.
 pub(crate) const PRESSURE_USUAL: f64 = 1200.0;
 
-/// Noise and spacing of a whole profile.
-pub fn noise_level(profile: &Profile) -> NoiseLevel {
+/// Returns noise and spacing of a whole profile.
+pub(crate) fn noise_level(profile: &Profile) -> NoiseLevel {
     let reading = profile.read();
     let whole = [0, reading.points.at.len()];
     NoiseLevel {
@@ -114,21 +112,21 @@ pub fn noise_level(profile: &Profile) -> NoiseLevel {
 }
 
 /// Whether the points of a profile suffice to determine their noise, or lie on a polygon.
-pub fn tells_noise(profile: &Profile) -> bool {
+pub(crate) fn tells_noise(profile: &Profile) -> bool {
     let reading = profile.read();
     let whole = [0, reading.points.at.len()];
     noise_of(&reading, whole).is_some() || polygon(reading.points, whole, reading.digits).is_some()
 }
 
-/// The quality of both profiles as far as it is known before the solve, with the contact modulus in MPa.
-pub fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {
+/// Returns the quality of both profiles before a solve, with the contact modulus in MPa.
+pub(crate) fn quality(geometry: &WheelRail, modulus: f64) -> PairQuality {
     let profiles = geometry.profiles();
     let advised = advised_smoothing(profiles.map(noise_level), modulus, PRESSURE_USUAL);
     let [rail, wheel] = [0, 1].map(|k| section(profiles[k], advised[k]));
     PairQuality { rail, wheel }
 }
 
-/// The quality of one profile, with the smoothing that suits it in mm.
+/// Returns the quality of one profile, with the suggested smoothing in mm.
 pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
     let (points, groove) = (profile.points(), profile.groove());
     let chords = points.along.windows(2).enumerate();
@@ -137,7 +135,7 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
         .max_by(|(_, a), (_, b)| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
         .map_or(0, |(k, _)| k);
     SectionQuality {
-        // The two points at the bottom of a groove were not given.
+        // The two points at the bottom of a groove are not points of the client.
         points: u32::try_from(points.at.len() - groove.len().min(2)).unwrap_or(u32::MAX),
         spacing_mm: profile.usual_chord(),
         hole_mm: points.along[longest + 1] - points.along[longest],
@@ -149,30 +147,30 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
     }
 }
 
-/// The remark on a profile whose shape can only be that of the other body.
-pub fn load_mismatch(profile: &Profile, body: Body) -> Option<RemarkEntry> {
-    let (looks, like, pointer) = match body {
-        Body::Rail => (SureBody::Wheel, "a wheel with its flange", "/contact/rail"),
-        Body::Wheel => (SureBody::Rail, "the head of a rail", "/contact/wheel"),
+/// Returns the remark on a profile whose shape can only be that of the other body.
+pub(crate) fn other_body(profile: &Profile, body: Body) -> Option<Remark> {
+    let (other, like) = match body {
+        Body::Rail => (SureBody::Wheel, "a wheel with its flange"),
+        Body::Wheel => (SureBody::Rail, "the head of a rail"),
     };
-    let remark = Remark::ProfileOfOtherBody {
+    let is_other = profile.sure_body() == Some(other);
+    is_other.then(|| Remark::ProfileOfOtherBody {
         profile: body.name(),
         like,
-    };
-    (profile.sure_body() == Some(looks)).then(|| remark.at_pointer(pointer))
+    })
 }
 
-/// Beyond this pressure, in MPa, wheel and rail steels yield whatever their hardness (about 3 times a yield stress of 1.6 GPa).
+/// Pressure in MPa above which all wheel and rail steels yield: about 3 times a yield stress of 1.6 GPa.
 const PRESSURE_USUAL_MAX: f64 = 5000.0;
-/// Largest pressure in MPa to which rail steel shakes down in pure rolling: 4.7 times the shear yield stress (Johnson, Contact Mechanics, 1985,
-/// section 9.2), 550 MPa over √3 for R260 (EN 13674-1).
+/// Shakedown limit of the pressure in MPa of rail steel in pure rolling: 4.7 times the shear yield stress (Johnson, Contact Mechanics, 1985,
+/// section 9.2), which is 550 MPa divided by √3 for R260 (EN 13674-1).
 const SHAKEDOWN_LIMIT: f64 = 1500.0;
 /// Load in N above which a mistake of unit is likely: about 60 times that of a heavy wheel.
 const LOAD_USUAL_MAX: f64 = 1e7;
-/// Creepage above which sliding is no longer small compared with the rolling speed.
+/// Creepage above which sliding is not small compared with the rolling speed.
 const CREEPAGE_USUAL_MAX: f64 = 0.2;
 
-/// The remarks on patches that are known from the case alone.
+/// Returns the remarks on patches and motions that are known from the case alone.
 pub(crate) fn of_case(
     contact: &Contact,
     patches: &[Patch],
@@ -208,7 +206,7 @@ pub(crate) fn of_case(
     of_patches.chain(load).chain(of_motions).collect()
 }
 
-/// A remark on a patch; the only one needs no number.
+/// Returns a remark for a patch, without its number if it is the only one.
 fn placed(remark: Remark, patch: usize, alone: bool) -> RemarkEntry {
     if alone {
         remark.into()
@@ -239,7 +237,7 @@ fn strained(overlap_mm: f64, half_widths: [f64; 2]) -> Option<Remark> {
     })
 }
 
-/// The remark on a largest pressure in MPa, if it is unusual.
+/// Returns the remark on an unusual largest pressure in MPa.
 pub(crate) fn pressure(pressure_max_mpa: f64) -> Option<Remark> {
     if pressure_max_mpa > PRESSURE_USUAL_MAX {
         return Some(Remark::PressureImplausible {
@@ -253,7 +251,7 @@ pub(crate) fn pressure(pressure_max_mpa: f64) -> Option<Remark> {
     })
 }
 
-/// The remark on the normal force of all patches in N, if it is unusual.
+/// Returns the remark on an unusual normal force of all patches in N.
 pub(crate) fn load(normal_force_n: f64) -> Option<Remark> {
     (normal_force_n > LOAD_USUAL_MAX).then_some(Remark::LoadImplausible {
         normal_force_n,
@@ -261,7 +259,7 @@ pub(crate) fn load(normal_force_n: f64) -> Option<Remark> {
     })
 }
 
-/// The remark on an unusual motion; `length` is √(area/π) of the patch in mm, if it is known.
+/// Returns the remark on an unusual motion; `length` is √(area/π) of the patch in mm, if it is known.
 pub(crate) fn creepage(motion: &Motion, length: Option<f64>) -> Option<Remark> {
     let Motion {
         creepage_x,
@@ -270,9 +268,7 @@ pub(crate) fn creepage(motion: &Motion, length: Option<f64>) -> Option<Remark> {
     } = *motion;
     let spin_times_length = length.map(|length| spin_per_mm * length);
     let sizes = [creepage_x, creepage_y, spin_times_length.unwrap_or(0.0)];
-    let largest = sizes
-        .iter()
-        .fold(0.0_f64, |most, size| most.max(size.abs()));
+    let largest = sizes.map(f64::abs).into_iter().fold(0.0, f64::max);
     (largest > CREEPAGE_USUAL_MAX).then_some(Remark::CreepageLarge {
         creepage_x,
         creepage_y,

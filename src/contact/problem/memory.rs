@@ -1,4 +1,4 @@
-//! How much memory a case will take, estimated from its finest mesh and from the operators that it leaves in the store of the process.
+//! The estimated memory of a case, from its finest mesh and the operators that it leaves in the operator store of the process.
 
 use crate::error::SolveError;
 use crate::mesh::MeshSize;
@@ -13,27 +13,24 @@ use crate::rolling::refinement::interpolate::LEVELS_KEPT;
 use crate::rolling::refinement::mesh_family::{CELLS_MAX, PATCH_CELLS_MAX_LEAST, fixed_meshes};
 use crate::rolling::task::{Motion, Resolution, precision_of};
 
-/// Cells of the finest mesh for a target of 0.02, on average.
+/// Average number of cells of the finest mesh for a target of 0.02.
 const TARGET_CELLS: f64 = 128.0;
-/// Power by which they grow as the target falls.
+/// Negative exponent of the target in the number of cells.
 const TARGET_GROWTH: f64 = 0.65;
-/// Bytes per cell of the finest mesh that an iteration holds: the Krylov space, iterates and buffers.
+/// Bytes per cell of the finest mesh for an iteration: the Krylov space, iterates and buffers.
 const WORK_BYTES_PER_CELL: f64 = 512.0;
-/// Bytes per cell of a level that is kept: two meshes, pressure, area and bound, and what two motions left on it.
+/// Bytes per cell of a kept level: two meshes, pressure, area, bound, and the values of two motions.
 const LEVEL_BYTES_PER_CELL: f64 = 200.0;
-/// Meshes that one motion is solved on, usually.
+/// Usual number of meshes for one motion.
 const LEVELS_PER_MOTION: f64 = 4.0;
-/// Bytes of a motion in the answer, for each patch, and of its text.
+/// Bytes of a motion in the answer for each patch, with its text.
 const MOTION_BYTES: f64 = 2000.0;
-/// Bytes of a stress in the answer and in its stored form.
-const STRESS_BYTES: f64 = 160.0;
-/// Bytes of the fields of a cell and a motion, in the answer and in their stored form.
-const FIELDS_BYTES_PER_CELL: f64 = 160.0;
-
-/// Bytes per cell and point of a history on a level: tractions, slips, and which slip.
+/// Bytes of a stress, or of the fields of a cell for one motion, in the answer and in their stored form.
+const STORED_BYTES: f64 = 160.0;
+/// Bytes per cell and point of a history on a level: tractions, slips and slip flags.
 const HISTORY_BYTES_PER_CELL: f64 = 33.0;
 
-/// What decides how much memory a solve takes.
+/// The quantities that determine the memory of a solve.
 #[derive(Debug, Clone)]
 pub(crate) struct SizeInput {
     pub(crate) method: Method,
@@ -41,40 +38,40 @@ pub(crate) struct SizeInput {
     /// Segments per strip, for each patch.
     pub(crate) segments: Vec<f64>,
     pub(crate) motions: usize,
-    /// Motions that may each want a mesh of their own: about a pole where they have spin, on a region where bodies differ.
+    /// Number of motions that may each need a separate mesh: about a pole for motions with spin, on a separate region for unlike bodies.
     pub(crate) spinning: usize,
-    /// Values per cell are kept motion by motion.
+    /// Whether values per cell are kept for each motion.
     pub(crate) fields: bool,
-    /// Points of every motion at which stresses below the surface are answered.
+    /// Number of points of stresses below the surface for each motion.
     pub(crate) stress_points: usize,
-    /// Length over width of an ellipse; nothing for other regions.
+    /// Ratio of length to width of an ellipse; `None` for other regions.
     pub(crate) ellipse: Option<f64>,
-    /// Are the motions the points of a history, which is kept whole on two levels?
+    /// Whether the motions are a history, which is kept on two levels.
     pub(crate) history: bool,
-    /// Does it begin with bodies pressed together?
+    /// Whether the history starts with bodies pressed together.
     pub(crate) pressed: bool,
-    /// Bound in bytes of the store of operators.
+    /// Capacity of the operator store in bytes.
     pub(crate) store: u64,
 }
 
-/// Segments per strip of every patch; of a gap, whose patches are not known yet, one for every summit.
+/// Returns the segments per strip of each patch. A gap, whose patches are not known yet, counts one patch per asperity.
 pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
     match task {
         NormalTask::Gap(contact) => vec![1.0; contact.preview().asperities],
         NormalTask::Given(field) => field.segments_per_strip(),
         NormalTask::Hertz(_) | NormalTask::Wheel(_) => vec![1.0],
-        // Both wheels of one position; the answers of all are kept.
+        // Both wheels of one position. The positions are solved one after the other.
         NormalTask::Wheelset(_) => vec![1.0; 2],
     }
 }
 
-/// Motions with spin.
+/// Returns the number of motions with spin.
 pub(crate) fn spinning(motions: &[Motion]) -> usize {
     let spin = |motion: &&Motion| motion.spin_per_mm != 0.0;
     motions.iter().filter(spin).count()
 }
 
-/// Half-length along rolling over half-width of an ellipse.
+/// Returns the ratio of the semi-axes of an ellipse, the longitudinal one divided by the lateral one.
 pub(crate) fn length_over_width(task: &NormalTask) -> Option<f64> {
     match task {
         NormalTask::Hertz(ellipse) => Some(ellipse.a / ellipse.b),
@@ -86,25 +83,24 @@ pub(crate) fn length_over_width(task: &NormalTask) -> Option<f64> {
 }
 
 impl SizeInput {
-    /// Cells of the finest mesh over all patches.
+    /// Returns the number of cells of the finest mesh over all patches.
     pub(crate) fn cells(&self) -> f64 {
         self.finest().0
     }
 
-    /// Peak memory in bytes.
+    /// Returns the peak memory in bytes.
     pub(crate) fn bytes(&self) -> f64 {
         let (cells, segments) = self.finest();
         let motions = self.motions as f64;
         let (all, store) = (self.operators(), self.store as f64);
         let operator = self.operator(cells, segments);
-        let operators = if all > store {
+        let operators = match all > store {
             // The next operator is computed before others leave the store.
-            store + operator
-        } else {
-            all.max(operator)
+            true => store + operator,
+            false => all.max(operator),
         };
         let solve = match self.method {
-            // Own blocks of the strips, and factored blocks of two unknowns per cell (see `StripFactors`).
+            // Diagonal blocks of the strips, and factored blocks of two unknowns per cell (see `StripFactors`).
             Method::BoundaryElement => 48.0 * cells * cells / segments.max(1.0),
             // Four dense square matrices at once.
             Method::LiuHsu => 4.0 * (2.0 * cells).powi(2) * 8.0,
@@ -112,28 +108,27 @@ impl SizeInput {
         };
         let levels = (LEVELS_PER_MOTION * motions).min(LEVELS_KEPT as f64);
         let patches = self.segments.len() as f64;
-        let fields = if self.fields {
-            // Many motions need twice the average at most.
-            motions * cells.min(2.0 * self.usual_cells(cells)) * FIELDS_BYTES_PER_CELL
-        } else {
-            0.0
+        let fields = match self.fields {
+            // On average, motions have at most twice the usual number of cells.
+            true => motions * cells.min(2.0 * self.usual_cells(cells)) * STORED_BYTES,
+            false => 0.0,
         };
         operators
             + solve
             + cells * (WORK_BYTES_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
             + self.kept_of_history(cells)
-            + motions * patches * (MOTION_BYTES + STRESS_BYTES * self.stress_points as f64)
+            + motions * patches * (MOTION_BYTES + STORED_BYTES * self.stress_points as f64)
             + fields
     }
 
-    /// Bytes of the operator of a mesh.
+    /// Returns the memory of the operator of a mesh in bytes.
     fn operator(&self, cells: f64, segments: f64) -> f64 {
         if matches!(self.method, Method::Fastsim | Method::Table) {
             return 0.0;
         }
         let kind = OperatorKind {
             poisson_ratio: 0.0,
-            // Cells that gather about a pole are not.
+            // Cells that are clustered about a pole are not symmetric.
             folded: self.ellipse.is_some()
                 && (self.spinning == 0 || matches!(self.resolution, Resolution::Mesh(_))),
             precision: precision_of(self.resolution),
@@ -141,8 +136,8 @@ impl SizeInput {
         kind.bytes(segments.ceil() as usize, cells.ceil() as usize) as f64
     }
 
-    /// Bytes of all operators of the case that a store keeps, if it has room for them: of the meshes of the method, or of those that lead to a target,
-    /// of which every motion with spin has its own.
+    /// Returns the memory in bytes of all operators that an unlimited store would keep: those of the fixed meshes of the method, or of the meshes
+    /// for a target, of which each motion with spin has its own.
     fn operators(&self) -> f64 {
         let (finest, segments) = self.finest();
         let of = |cells: f64, segments: f64| {
@@ -159,7 +154,7 @@ impl SizeInput {
             };
             return sizes.iter().map(of_size).sum();
         }
-        // Meshes of half, a quarter and so on of the cells precede the finest.
+        // Each mesh of a motion has half the cells of the next finer one.
         let usual = self.usual_cells(finest);
         let halves = std::iter::successors(Some(usual), |cells| Some(0.5 * cells));
         let chain: f64 = halves
@@ -169,12 +164,12 @@ impl SizeInput {
         chain * self.spinning.max(1) as f64
     }
 
-    /// Bytes that the case leaves in the store of operators.
+    /// Returns the memory in bytes that the case takes in the operator store.
     pub(crate) fn stored(&self) -> f64 {
         self.operators().min(self.store as f64)
     }
 
-    /// Bytes of the tractions and slips of a history on two levels, and of what pressing needs.
+    /// Returns the memory in bytes of a history on two levels, with that of pressing the bodies together.
     fn kept_of_history(&self, cells: f64) -> f64 {
         if !self.history {
             return 0.0;
@@ -187,7 +182,7 @@ impl SizeInput {
         pressing + 2.0 * self.motions as f64 * cells * HISTORY_BYTES_PER_CELL
     }
 
-    /// Cells and segments of the finest mesh over all patches.
+    /// Returns the numbers of cells and segments of the finest mesh over all patches.
     pub(crate) fn finest(&self) -> (f64, f64) {
         if self.method == Method::Table {
             return (0.0, 0.0);
@@ -198,7 +193,7 @@ impl SizeInput {
             (_, Some(size)) => *size,
             (Resolution::Mesh(size), None) => size,
             (Resolution::Target(_), None) => {
-                // The cells are shared out among the patches; hollow ones have several segments in a strip.
+                // The patches share the cells. Strips of hollow patches have several segments.
                 let share =
                     (f64::from(CELLS_MAX) / self.segments.len() as f64).max(PATCH_CELLS_MAX_LEAST);
                 return (share * per_strip, share.sqrt() * per_strip);
@@ -208,7 +203,7 @@ impl SizeInput {
         (segments * f64::from(size.cells), segments)
     }
 
-    /// Cells that set the time: those of the mesh, or what the target costs on average.
+    /// Returns the usual number of cells: that of an explicit mesh, or the average for the target.
     fn usual_cells(&self, finest: f64) -> f64 {
         match (self.resolution, self.method) {
             (Resolution::Target(target), Method::BoundaryElement) => {
@@ -220,22 +215,23 @@ impl SizeInput {
 }
 
 impl CheckedCase {
-    /// What decides how much memory this takes.
+    /// Returns the quantities that determine the memory.
     pub(crate) fn size_input(&self) -> SizeInput {
         let places = |task: &SubsurfaceTask| task.places.count();
+        let history = self.problem.history.as_ref();
         SizeInput {
             method: self.run.method,
             resolution: self.run.least_resolution(),
             segments: segments(&self.problem.task),
             motions: self.problem.motions.len() * self.problem.task.positions(),
             spinning: if self.problem.is_coupled(&self.run) {
-                // Each motion has a region, and with it meshes, of its own.
+                // Each motion has a separate region and therefore separate meshes.
                 self.problem.motions.len()
             } else {
                 spinning(&self.problem.motions) * self.problem.task.positions()
             },
-            history: self.problem.history.is_some(),
-            pressed: (self.problem.history.iter()).any(|h| h.start == HistoryStart::Pressed),
+            history: history.is_some(),
+            pressed: history.is_some_and(|history| history.start == HistoryStart::Pressed),
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
             stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),
@@ -243,7 +239,7 @@ impl CheckedCase {
         }
     }
 
-    /// Checks that a solve stays within the memory allowed, once the number of patches and segments is known.
+    /// Checks that a solve stays within its memory limit, once the patches are known.
     ///
     /// # Errors
     /// The solve needs more memory.

@@ -1,4 +1,4 @@
-//! The checked question: physics, run and label, as numbers. Every stage after the check takes its task from here.
+//! A checked case as numbers, from which every later stage takes its input.
 
 pub mod checked_case;
 pub mod memory;

@@ -1,10 +1,6 @@
-//! What is asked, as checked numbers: no results, no options and no names.
+//! The physics of a checked case ([`Problem`]), how it is solved ([`Run`]), and whether pressure and traction of unlike bodies are coupled.
 //!
-//! A [`Problem`] comes from the checks of `case/`, or from a checked one that asked for more: nothing else may put one together.
-//!
-//! How a case is to be solved: method, accuracy, limits and outputs.
-//!
-//! How far pressure and traction of bodies that differ are solved together.
+//! Only the checks in `case/` create a [`Problem`]; others derive from it.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -29,70 +25,69 @@ use crate::rolling::task::{
     Motion, NEGLIGIBLE_OF_TARGET, PrescribedForces, RelativeTo, Resolution, TARGET_LEAST,
 };
 
-/// What is asked: the physics.
+/// The physics of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     /// Combined elastic constants.
     pub elasticity: Elasticity,
-    /// Bound of the tractions.
+    /// The friction law.
     pub friction: FrictionLaw,
-    /// What lies between the bodies.
+    /// The layer between the bodies and the reduction factor.
     pub interface: Interface,
-    /// Where patches and pressures come from.
+    /// The normal problem.
     pub task: NormalTask,
     /// The motions, in the order of the case; never empty.
     pub motions: Vec<Motion>,
-    /// Which motions of the case these are: all of them, unless this is a slice.
+    /// Position of the motions in the case.
     pub part: MotionPart,
-    /// The motion of the wheelset that stands in place of the one motion above, which is then 0: the creepages of the patches
-    /// follow from it.
+    /// The motion of the wheelset, from which the creepages of the patches follow. The only motion in `motions` is then 0.
     pub wheelset: Option<WheelsetMotion>,
-    /// Torque about the axle in N mm that the rails are to balance; the angular velocity of the wheelset is then found.
+    /// Torque about the axle in N mm that the rails balance. The angular velocity of the wheelset is then unknown.
     pub drive_torque: Option<f64>,
-    /// Forces in N that the rail is to carry under the wheel of a wheelset; its angular velocity and its lateral velocity are then found.
+    /// Forces in N that the rail carries under the wheel of a wheelset. Its angular and its lateral velocity are then unknown.
     pub wheelset_forces: PrescribedForces,
-    /// Forces prescribed instead of creepages, motion by motion.
+    /// The forces of each motion that are prescribed instead of creepages.
     pub forces: Vec<PrescribedForces>,
-    /// Rolling speeds in mm/s, motion by motion, where they are given.
+    /// The rolling speed of each motion in mm/s, if it is given.
     pub speeds: Vec<Option<f64>>,
-    /// How the motions follow each other, where they are one history.
+    /// Distances and shifts, if the motions are one history.
     pub history: Option<HistoryTask>,
     /// Proof of the checks.
     pub(crate) checked: Checked,
 }
 
-/// Which motions of a case a problem asks about.
+/// Position of the motions of a slice in their case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MotionPart {
-    /// Motions of the case before the first of these.
+    /// Number of motions of the case before the first of these.
     pub before: usize,
-    /// Motions of the whole case.
+    /// Number of motions of the whole case.
     pub all: usize,
 }
 
-/// A contact whose forces follow from an ellipse, its load, one coefficient of friction, the elastic constants and the motion alone.
+/// An elliptic contact with a constant friction coefficient, whose forces follow from its load, the elastic constants and the motion alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PlainContact {
     pub(crate) ellipse: Ellipse,
     /// Coefficient of friction.
     pub(crate) coefficient: f64,
-    /// Kalker's reduction factor: the part of the shear modulus that tractions meet.
+    /// Kalker's reduction factor of the shear modulus.
     pub(crate) reduction: f64,
 }
 
-/// Proof that a problem went through the checks. Only `case/` and this file make it, and literals of [`Problem`].
+/// Proof that a problem passed the checks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checked(());
 
 impl Checked {
-    /// The checks found no fault.
+    /// Proves that the checks found no fault.
     pub(crate) fn without_faults() -> Checked {
         Checked(())
     }
 }
 
 impl Problem {
-    /// The same question about some of the motions, by their places.
+    /// Returns this problem with some of its motions, by their indices.
     #[must_use]
     pub fn with_motions(&self, chosen: &[usize]) -> Problem {
         Problem {
@@ -103,7 +98,7 @@ impl Problem {
         }
     }
 
-    /// The same question about a wheelset that moves in this way.
+    /// Returns this problem with another motion of the wheelset.
     pub(crate) fn of_move(&self, motion: WheelsetMotion, drive_torque: Option<f64>) -> Problem {
         Problem {
             wheelset: Some(motion),
@@ -113,7 +108,7 @@ impl Problem {
         }
     }
 
-    /// This problem with its wheel replaced.
+    /// Returns this problem with another wheel.
     pub(crate) fn with_wheel(&self, wheel: Arc<WheelTask>) -> Problem {
         Problem {
             task: NormalTask::Wheel(wheel),
@@ -121,18 +116,17 @@ impl Problem {
         }
     }
 
-    /// The same question about one wheel of a wheelset that moves as a whole.
+    /// Returns the problem of one wheel of a wheelset.
     pub(crate) fn of_wheel(&self, wheel: Arc<WheelTask>, wheelset: WheelsetMotion) -> Problem {
         Problem {
-            task: NormalTask::Wheel(wheel),
             wheelset: Some(wheelset),
             drive_torque: None,
-            ..self.clone()
+            ..self.with_wheel(wheel)
         }
     }
 
-    /// The question as a plain contact, if it is one, whatever its motions, forces and history are. The pattern names every member of a question,
-    /// so a new member does not compile before it is judged here.
+    /// Returns the problem as a plain contact, if it is one, for any motions, forces and history. The pattern lists all members, so that a new
+    /// member does not compile before it is considered here.
     pub(crate) fn plain(&self) -> Option<PlainContact> {
         let Problem {
             elasticity: _,
@@ -164,7 +158,7 @@ impl Problem {
         })
     }
 
-    /// Does the table of creep forces cover the patch?
+    /// Whether the table of creep forces covers the patch.
     pub(crate) fn is_in_table(&self) -> bool {
         let inside = |plain: PlainContact| {
             let Ellipse { a, b, .. } = plain.ellipse;
@@ -173,8 +167,8 @@ impl Problem {
         self.plain().is_some_and(inside) && unlike(&self.elasticity).is_none()
     }
 
-    /// The forces in N that the rail is to carry under one wheel, along and across the track, if any is prescribed. That across
-    /// contains the lateral part of the normal forces.
+    /// Returns the longitudinal and the lateral force in N that the rail carries under one wheel, if any is prescribed. The lateral one includes
+    /// normal forces.
     pub(crate) fn pull(&self) -> Option<PrescribedForces> {
         let NormalTask::Wheel(_) = self.task else {
             return None;
@@ -184,7 +178,7 @@ impl Problem {
         (forces != [None; 2]).then_some(forces)
     }
 
-    /// The same question about a wheel that moves as given.
+    /// Returns this problem with one given motion of the wheel and without prescribed forces.
     pub(crate) fn moving(&self, motion: Motion, wheelset: Option<WheelsetMotion>) -> Problem {
         Problem {
             motions: vec![motion],
@@ -195,7 +189,7 @@ impl Problem {
         }
     }
 
-    /// The same question about one gap of a wheel, with friction in its axes and motions about its origin.
+    /// Returns the problem of one gap of a wheel, with friction in the axes of the gap and motions about its origin.
     pub(crate) fn of_gap(&self, friction: FrictionLaw, motions: Vec<Motion>) -> Problem {
         Problem {
             friction,
@@ -206,35 +200,35 @@ impl Problem {
     }
 }
 
-/// How a case is to be solved: nothing of it changes what is asked.
+/// How a case is solved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// The method to solve with.
+    /// The method.
     pub method: Method,
-    /// The word it was asked for with.
+    /// The method as the case names it.
     pub method_asked: MethodName,
     /// Traction bound at which `fastsim` slips.
     pub traction_bound: TractionBound,
     /// Target or mesh.
     pub resolution: Resolution,
-    /// What the target is a share of.
+    /// The quantity to which the target is relative.
     pub relative_to: RelativeTo,
-    /// Time allowed for the whole case.
+    /// Time limit of the whole case.
     pub time_limit: Option<Duration>,
-    /// Memory the solve may use, in bytes.
+    /// Maximum memory of the solve in bytes.
     pub memory_bytes: u64,
-    /// Bound of the store of operators that it shares with others, in bytes.
+    /// Capacity of the operator store that the process shares, in bytes.
     pub operator_store_bytes: u64,
-    /// Steps that a history may take.
+    /// Maximum number of steps of a history.
     pub steps_max: usize,
-    /// What to compute, sorted, without repetition.
+    /// The requested outputs, sorted and without repetition.
     pub outputs: Vec<Output>,
-    /// What is computed from the solved motions.
+    /// The outputs that are computed from the solved motions.
     pub after: AfterTasks,
 }
 
 impl Run {
-    /// The same for resultants alone, with this target or a larger one.
+    /// Returns this run for resultants alone, with at least this target.
     #[must_use]
     pub fn for_resultants(&self, target: f64) -> Run {
         Run {
@@ -242,7 +236,7 @@ impl Run {
                 Resolution::Target(asked) => Resolution::Target(asked.max(target)),
                 mesh @ Resolution::Mesh(_) => mesh,
             },
-            // A coarse look is not refined to a small force.
+            // A coarser solve is not refined for a small force.
             relative_to: match self.resolution {
                 Resolution::Target(asked) if target > asked => RelativeTo::FrictionLimit,
                 _ => self.relative_to,
@@ -253,15 +247,12 @@ impl Run {
         }
     }
 
-    /// Target of the resultants' error relative to μN; infinite where a mesh is given.
+    /// Returns the target of the resultants' error relative to μN; infinite for an explicit mesh.
     pub fn target(&self) -> f64 {
-        match self.resolution {
-            Resolution::Target(target) => target,
-            Resolution::Mesh(_) => f64::INFINITY,
-        }
+        self.resolution.target().unwrap_or(f64::INFINITY)
     }
 
-    /// Allowed error of an answer relative to μN, where an error is asked for; `limit` is μN of all patches in N.
+    /// Returns the allowed error of an answer relative to μN, if there is a target; `limit` is μN of all patches in N.
     pub fn allowed_error(&self, answer: &MotionAnswer, limit: f64) -> Option<f64> {
         let target = self.resolution.target()?;
         Some(match self.relative_to {
@@ -270,7 +261,7 @@ impl Run {
         })
     }
 
-    /// The finest resolution that the case may need: that of a force close to 0 where the target is relative to it.
+    /// Returns the finest resolution that the case may need. For a target relative to the force, it is that of a force close to 0.
     pub fn least_resolution(&self) -> Resolution {
         match (self.resolution, self.relative_to) {
             (Resolution::Target(_), RelativeTo::Force) => Resolution::Target(TARGET_LEAST),
@@ -278,19 +269,19 @@ impl Run {
         }
     }
 
-    /// Is anything asked for that follows from the cells of a mesh?
+    /// Whether an output needs the cells of a mesh.
     pub fn needs_cells(&self) -> bool {
         self.outputs.iter().any(|output| output.needs_fields())
             || self.after.needs_power(&self.outputs)
     }
 
-    /// Is this output asked for?
+    /// Whether this output is requested.
     pub fn wants(&self, output: Output) -> bool {
         self.outputs.contains(&output)
     }
 }
 
-/// What is computed from solved motions; nothing where a case does not ask for it.
+/// The requested outputs that are computed from the solved motions.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AfterTasks {
     /// Stresses below the surface.
@@ -302,34 +293,34 @@ pub struct AfterTasks {
 }
 
 impl AfterTasks {
-    /// Is the power of every cell needed?
+    /// Whether an output needs the power of each cell.
     pub fn needs_power(&self, outputs: &[Output]) -> bool {
         let across = self.damage.as_ref().is_some_and(|task| task.across);
         across || self.thermal.is_some() || outputs.contains(&Output::Slip)
     }
 }
 
-/// Error of forces relative to μN over |K| μ, where tractions feel the pressure but the pressure does not feel them: 0.09 to 0.55 in nine
-/// contacts with |K| from 0.05 to 0.25 and μ of 0.3 and 0.6, on 10 × 20 cells against CONTACT.
+/// Error of forces relative to μN, divided by |K| μ, if the effect of tractions on the pressure is neglected. It was 0.09 to 0.55 in nine
+/// contacts with |K| from 0.05 to 0.25 and μ of 0.3 and 0.6, on 10 × 20 cells compared with CONTACT.
 const FIRST_ORDER: f64 = 0.6;
 
 impl Problem {
-    /// Error of forces, relative to μN, that is left if only tractions feel the other: 0 where the bodies are alike or without friction, and
-    /// where the pressure is given, since it is that of the contact whatever the tractions are.
+    /// Returns the error of forces relative to μN if the effect of tractions on the pressure is neglected. It is 0 for equal bodies, without
+    /// friction, and for a given pressure, which includes that effect.
     pub fn first_order_error(&self, method: Method) -> f64 {
         let coupled = method == Method::BoundaryElement
             && !self.friction.is_frictionless()
             && !matches!(self.task, NormalTask::Given(_));
-        let difference = if coupled {
-            self.elasticity.difference.abs()
-        } else {
-            0.0
+        let difference = match coupled {
+            true => self.elasticity.difference.abs(),
+            false => 0.0,
         };
         FIRST_ORDER * difference * self.friction.largest()
     }
 
-    /// Returns whether the pressures belong to the tractions of bodies that differ. On the curve of a rail they do, in a history to those of its last point.
-    /// Elsewhere they do in motions and in one pressing alone, where the gap is known. Points of a history that goes on share their patches.
+    /// Whether the pressures include the effect of the tractions. On the curve of a rail they always do; in a history they then have the
+    /// tractions of its last point. Otherwise they do for known gaps, in single motions and in a history that only presses the bodies together,
+    /// if the effect is not negligible. The points of other histories share their patches.
     pub fn is_coupled(&self, run: &Run) -> bool {
         let on_curve = |wheel: &WheelTask| matches!(wheel.surface, ReferenceSurface::Curve { .. });
         match &self.task {
@@ -347,13 +338,13 @@ impl Problem {
         solved && self.first_order_error(run.method) > negligible(run)
     }
 
-    /// The remark if the pressure should feel the tractions and does not.
+    /// Returns the remark on a neglected effect of tractions on the pressure that is not negligible.
     pub(crate) fn first_order(&self, run: &Run) -> Option<Remark> {
         let needed = self.first_order_error(run.method) > negligible(run) && !self.is_coupled(run);
         needed.then(|| self.first_order_remark(run.method))
     }
 
-    /// What is said of motions whose pressure does not feel the tractions.
+    /// Returns the remark on motions whose pressure does not include the effect of the tractions.
     pub(crate) fn first_order_remark(&self, method: Method) -> Remark {
         Remark::CouplingFirstOrder {
             difference_parameter: self.elasticity.difference,
@@ -362,7 +353,7 @@ impl Problem {
     }
 }
 
-/// The error of forces below which the pressure need not feel the tractions.
+/// Returns the error of forces below which the effect of tractions on the pressure is negligible.
 pub(crate) fn negligible(run: &Run) -> f64 {
     NEGLIGIBLE_OF_TARGET * run.resolution.target_or_usual()
 }

@@ -1,4 +1,4 @@
-//! A remark as it stands in the answer, with the part it belongs to; and how the remarks of one answer are merged.
+//! A remark in an answer, with the patch, motion or member that it applies to, and the merging of repeated remarks.
 
 use std::collections::BTreeMap;
 
@@ -6,11 +6,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::finite::Finite;
-use crate::remark::kind::Severity;
-use crate::remark::kind::{AsFigure, Figure};
+use crate::remark::kind::{AsFigure, Figure, Severity};
 use crate::remark::list::Remark;
 
-/// Number of motions with the same remark for which the figures are kept; of the others only the index is kept.
+/// Maximum number of motions with the same remark whose figures are kept. For further motions only the index is kept.
 const KEPT_MAX: usize = 4;
 
 /// A remark on a result: its code, its location, a sentence, and the values in it by name.
@@ -88,7 +87,7 @@ impl Finite for RemarkEntry {
 }
 
 impl Remark {
-    /// The remark on one patch.
+    /// Returns the remark for one patch.
     pub fn at_patch(self, patch: usize) -> RemarkEntry {
         RemarkEntry {
             patch: Some(patch),
@@ -96,7 +95,7 @@ impl Remark {
         }
     }
 
-    /// The remark on one motion.
+    /// Returns the remark for one motion.
     pub fn at_point(self, point: usize) -> RemarkEntry {
         RemarkEntry {
             point: Some(point),
@@ -104,7 +103,7 @@ impl Remark {
         }
     }
 
-    /// The remark on a part of the case.
+    /// Returns the remark for a member of the case.
     pub fn at_pointer(self, pointer: &str) -> RemarkEntry {
         RemarkEntry {
             pointer: Some(pointer.to_owned()),
@@ -114,27 +113,28 @@ impl Remark {
 }
 
 impl RemarkEntry {
-    /// Whether it applies to this motion, alone or as one of all.
+    /// Whether it applies to this motion.
     pub fn holds_at(&self, point: usize) -> bool {
         let among = |range: &[usize; 2]| (range[0]..=range[1]).contains(&point);
         self.point.is_none_or(|own| own == point) || self.also_at_points.iter().any(among)
     }
 
-    /// Whether it is the same remark, apart from `also_at_points`.
+    /// Whether it equals another remark, apart from `also_at_points`.
     fn says(&self, other: &RemarkEntry) -> bool {
         self.is_like(other) && self.point == other.point && self.figures == other.figures
     }
 
+    /// Whether it has the kind, patch and pointer of another remark.
     fn is_like(&self, other: &RemarkEntry) -> bool {
         self.code == other.code && self.patch == other.patch && self.pointer == other.pointer
     }
 }
 
-/// The remarks of an answer without repetitions. Of those that differ only in motion and figures the first few are
-/// kept, and the first one lists the motions of those left out.
+/// Returns remarks without repetitions. Of remarks that differ only in motion and figures the first [`KEPT_MAX`] are kept, and the first lists
+/// the motions of the others.
 pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry> {
     let mut kept: Vec<RemarkEntry> = Vec::new();
-    // For each kind and place: the index of the first remark in `kept`, and the number of remarks kept.
+    // For each kind, patch and pointer: the index of the first remark in `kept`, and the number of kept remarks.
     let mut groups: Vec<(usize, usize)> = Vec::new();
     for mut remark in remarks {
         let of_kind = |(first, _): &&mut (usize, usize)| kept[*first].is_like(&remark);
@@ -165,7 +165,7 @@ pub fn merged(remarks: impl IntoIterator<Item = RemarkEntry>) -> Vec<RemarkEntry
     kept
 }
 
-/// Adds motions to ranges unless they are included already; calls come in the order of the motions.
+/// Adds a range of motions to ranges in increasing order, unless they include it.
 fn add(ranges: &mut Vec<[usize; 2]>, [first, end]: [usize; 2]) {
     if ranges.iter().any(|own| own[0] <= first && end <= own[1]) {
         return;

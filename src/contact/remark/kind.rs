@@ -1,6 +1,4 @@
-//! Severity, figures and rounded numbers of remarks, and the entry of a remark in the list of all codes.
-//!
-//! The macro that generates the enum of remarks, with their codes, severities, sentences and explanations, from one list.
+//! Severity, figures and rounded numbers of remarks, and the macro that generates the enum of remarks from their list.
 
 use std::borrow::Borrow;
 use std::fmt::{Display, Formatter, Result};
@@ -14,7 +12,7 @@ use utoipa::ToSchema;
 pub enum Severity {
     /// A fact about the answer; nothing needs to be done.
     Info,
-    /// The numbers are to be used with care; `advice` of the code says how.
+    /// The numbers need care; `advice` of the code explains it.
     Warning,
 }
 
@@ -70,16 +68,21 @@ impl AsFigure for &'static str {
     }
 }
 
-/// A number that is written with this many significant digits.
+/// A number that is displayed with a number of significant digits.
 #[derive(Debug, Clone, Copy)]
 pub struct Rounded(pub f64, pub i32);
 
-/// A number with three significant digits.
+/// Displays a number with three significant digits.
 pub fn short(value: impl Borrow<f64>) -> Rounded {
     Rounded(*value.borrow(), 3)
 }
 
-/// Decimal exponents of the numbers that are written without an exponent.
+/// Displays a ratio in per cent with three significant digits.
+pub(crate) fn percent(ratio: impl Borrow<f64>) -> Rounded {
+    short(100.0 * ratio.borrow())
+}
+
+/// Range of decimal exponents of numbers that are displayed without an exponent.
 const PLAIN: std::ops::Range<i32> = -4..7;
 
 impl Display for Rounded {
@@ -103,19 +106,19 @@ impl Display for Rounded {
     }
 }
 
-/// Declares the enum `Remark`. The documentation of a variant is the explanation that clients read, and its name in kebab case is the code
-/// that they filter by. Every figure has a value for the example. `detail` is an expression that forms the sentence from references to the
-/// figures.
+/// Declares the enum `Remark`. The documentation of a variant is the explanation that clients read, and its name in kebab case is its code.
+/// Every figure has a value for the example. `detail` is an expression that forms the sentence from references to the figures. A figure with
+/// `@short` or `@percent` stands for its rounded value there.
 macro_rules! remarks {
-    (; $(
+    ($(
         $(#[doc = $meaning:literal])+
         $severity:ident $name:ident {
-            $( $(#[doc = $about:literal])+ $figure:ident: $kind:ty = $example:expr, )*
+            $( $(#[doc = $about:literal])+ $figure:ident: $(@ $display:ident)? $kind:ty = $example:expr, )*
         }
         advice: $advice:literal,
         detail: $detail:expr,
     )+) => {
-        /// Something a client should know about an answer.
+        /// A remark on an answer.
         #[derive(Debug, Clone, PartialEq, railhead_macros::Code)]
         pub enum Remark {
             $(
@@ -127,22 +130,27 @@ macro_rules! remarks {
         }
 
         impl Remark {
-            /// How much attention it needs.
+            /// The severity of the remark.
             pub fn severity(&self) -> Severity {
                 match self { $( Remark::$name { .. } => Severity::$severity, )+ }
             }
 
-            /// The sentence with the figures of this occurrence.
+            /// Returns the sentence with the figures.
             #[allow(
                 unused_variables,
                 clippy::useless_format,
                 reason = "not every sentence names all figures, and some name none"
             )]
             pub fn detail(&self) -> String {
-                match self { $( Remark::$name { $($figure),* } => $detail, )+ }
+                match self {
+                    $( Remark::$name { $($figure),* } => {
+                        $( $( let $figure = $display($figure); )? )*
+                        $detail
+                    } )+
+                }
             }
 
-            /// The figures by name; one that is no finite number is left out.
+            /// Returns the figures by name, without those that are not finite.
             pub fn figures(&self) -> BTreeMap<String, Figure> {
                 let all: Vec<(&str, Option<Figure>)> = match self {
                     $( Remark::$name { $($figure),* } => vec![
@@ -154,12 +162,12 @@ macro_rules! remarks {
                     .collect()
             }
 
-            /// One remark of each kind, with invented figures.
+            /// Returns one remark of each kind with the figures of its example.
             pub fn examples() -> Vec<Remark> {
                 vec![ $( Remark::$name { $($figure: $example),* }, )+ ]
             }
 
-            /// Every kind, explained, in the order of the list.
+            /// Returns all kinds with their explanations, in the order of the list.
             pub fn kinds() -> Vec<RemarkKind> {
                 let said: &[(&str, &str, &[&str])] = &[ $(
                     (concat!($($meaning),+), $advice, &[ $(stringify!($figure)),* ]),

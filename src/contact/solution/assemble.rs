@@ -1,4 +1,4 @@
-//! Assembles the answer that a client reads from the results of the stages: with units, and only with the outputs requested.
+//! Assembles the answer from the results of the stages, with the requested outputs only.
 
 use crate::case::words::solver::Output;
 use crate::friction::law::FrictionLaw;
@@ -11,7 +11,7 @@ use crate::problem::checked_case::CheckedCase;
 use crate::remark::entry::{RemarkEntry, merged};
 use crate::remark::list::Remark;
 use crate::rolling::answer::{
-    HistoryAnswer, MotionAnswer, PatchGradients, Resultants, Skip, SolvedFields,
+    HistoryAnswer, MotionAnswer, PatchGradients, Resultants, SolvedFields,
 };
 use crate::rolling::refinement::interpolate::Levels;
 use crate::rolling::strip_mesh::StripMesh;
@@ -25,31 +25,31 @@ use crate::solution::words::answer::{
     SolverReport, Total,
 };
 
-/// Remarks collected before repetitions are merged.
+/// Number of remarks beyond which repetitions are merged.
 const REMARKS_AT_ONCE: usize = 1000;
-/// Axes, origin and signs in one sentence.
+/// The description of axes and signs in an answer.
 const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, z up out of the lower body; forces, moments \
                      and tractions act on the lower body, slip is that of the upper body relative to the lower one";
 
-/// The answer to a problem, built motion by motion; only what the answer contains is kept.
+/// The answer to a problem, built motion by motion. It keeps only what the answer contains.
 #[derive(Debug)]
 pub struct Assembly<'a> {
     case: &'a CheckedCase,
     solved: &'a SolvedFootprint,
     patches: Vec<Patch>,
-    /// Their friction limits in N.
+    /// Friction limits of the patches in N.
     limits: Vec<f64>,
-    /// Motion by motion, for every patch.
+    /// The results of each patch under each motion.
     points: Vec<Vec<PointSolution>>,
     total: Vec<Total>,
     remarks: Vec<RemarkEntry>,
     fields: Fields,
-    /// Numbers of the levels whose cells are in the fields.
+    /// Numbers of the levels whose cells are in `fields`.
     levels: Vec<usize>,
 }
 
 impl<'a> Assembly<'a> {
-    /// No motion yet.
+    /// Creates an answer without motions.
     pub fn new(case: &'a CheckedCase, solved: &'a SolvedFootprint) -> Assembly<'a> {
         let patches = solved.footprint.patches().to_vec();
         let limit = |k| case.problem.friction.limit(&solved.footprint, k);
@@ -67,17 +67,17 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The case and the footprint that it answers.
+    /// Returns the case and the footprint.
     pub fn of(&self) -> (&'a CheckedCase, &'a SolvedFootprint) {
         (self.case, self.solved)
     }
 
-    /// Numbers of levels mean other levels from here on.
+    /// Forgets the numbers of levels, which identify other levels from now on.
     pub fn forget_levels(&mut self) {
         self.levels.fill(usize::MAX);
     }
 
-    /// Is no motion in it yet?
+    /// Whether it has no motion yet.
     pub fn is_empty(&self) -> bool {
         self.total.is_empty()
     }
@@ -85,7 +85,7 @@ impl<'a> Assembly<'a> {
     /// Adds the next motion.
     ///
     /// # Errors
-    /// The monitor may stop the work on what follows from it.
+    /// The monitor stopped the work.
     pub fn add(
         &mut self,
         levels: &Levels,
@@ -101,7 +101,7 @@ impl<'a> Assembly<'a> {
         let allowed = case.run.allowed_error(point, limit);
         let target_met = allowed.map(|allowed| point.error().is_some_and(|error| error <= allowed));
         self.remarks.extend(remarks(case, index, point, limit));
-        // A sweep repeats its remarks motion by motion; merged on the way they never take much memory.
+        // A sweep may repeat remarks for each motion. Merging them here limits the memory.
         if self.remarks.len() > REMARKS_AT_ONCE {
             self.remarks = merged(std::mem::take(&mut self.remarks));
         }
@@ -123,7 +123,6 @@ impl<'a> Assembly<'a> {
                 method: point.method,
                 speed,
             };
-            // Slips are those of the step, not of steady rolling.
             let is_of_history = point.history.is_some();
             let kept = maintain::add_rest(case, solved, is_of_history, &mut points, monitor)?;
             let number = case.problem.part.before + index;
@@ -140,14 +139,12 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    /// Values per cell of the next motion; motions that were solved on one level share its cells.
+    /// Adds the values per cell of the next motion. Motions that were solved on one level share its cells.
     fn add_fields(&mut self, level: &StripMesh, found: &SolvedFields, kept: Vec<PointFields>) {
         let case = self.case;
-        let patches = self.patches.len();
-        self.fields
-            .patches
-            .resize_with(patches, PatchFields::default);
-        // From the end, because a motion mostly shares the mesh of the one before it.
+        let count = self.patches.len();
+        self.fields.patches.resize_with(count, PatchFields::default);
+        // Most motions share the mesh of the previous one.
         let known = self.levels.iter().rposition(|known| *known == found.level);
         let mesh = known.unwrap_or(self.levels.len());
         if known.is_none() {
@@ -171,7 +168,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// The answer.
+    /// Returns the answer.
     pub fn finish(self) -> (Solution, Fields) {
         let case = self.case;
         let patches = self.patches.iter().zip(self.limits).zip(self.points);
@@ -216,7 +213,7 @@ impl<'a> Assembly<'a> {
     }
 }
 
-/// Whether any output is requested that is kept beside the solution.
+/// Whether an output is requested that the [`Fields`] contain.
 pub fn wants_fields(case: &CheckedCase) -> bool {
     let kept = |output: &Output| output.is_per_cell() || *output == Output::Subsurface;
     case.run.outputs.iter().any(kept)
@@ -306,7 +303,11 @@ fn point_solution(
             iterations: point.work.iterations,
             products: point.work.products,
             residual: point.work.residual,
-            skipped: skipped(&point.skips),
+            skipped: point
+                .skips
+                .iter()
+                .map(|skip| skip.text().to_owned())
+                .collect(),
             seconds: point.seconds,
         },
         target_met: None,
@@ -319,8 +320,8 @@ fn point_solution(
     }
 }
 
-/// Derivatives with those by the normal force where similarity gives them: of a Hertz contact F = μN f(ξ, η, ψ) and M = μN c m(ξ, η, ψ), where
-/// c ∝ N^⅓, ξ and η ∝ ν/N^⅓, and ψ does not depend on N.
+/// Returns the derivatives of a patch. Those by the normal force follow from similarity: for a Hertz contact F = μN f(ξ, η, ψ) and
+/// M = μN c m(ξ, η, ψ), where c ∝ N^⅓, ξ and η ∝ ν/N^⅓, and ψ does not depend on N.
 fn gradient_words(
     case: &CheckedCase,
     patch: &Patch,
@@ -350,9 +351,9 @@ fn gradient_words(
     let own = [own.force_x, own.force_y, own.moment_z];
     let [force_x_n, force_y_n, moment_z_n_mm] = found.values;
     let error_estimate = found.errors.map(|errors| {
-        let own = point.errors[index].map_or(ErrorEstimate::default(), |error| {
-            absolute(std::slice::from_ref(patch), limit, error)
-        });
+        let own = point.errors[index]
+            .map(|error| absolute(std::slice::from_ref(patch), limit, error))
+            .unwrap_or_default();
         let own = [own.force_x_n, own.force_y_n, own.moment_z_n_mm];
         let [force_x_n, force_y_n, moment_z_n_mm] = errors;
         GradientErrors {
@@ -373,11 +374,7 @@ fn gradient_words(
     }
 }
 
-/// What was skipped, as the client reads it.
-fn skipped(skips: &[Skip]) -> Vec<String> {
-    skips.iter().map(|skip| skip.text().to_owned()).collect()
-}
-
+/// Cells and areas in mm² of the two zones.
 #[derive(Clone, Copy)]
 struct ZoneAreas {
     stick_cells: u32,
@@ -386,7 +383,7 @@ struct ZoneAreas {
     slip_area: f64,
 }
 
-/// Counts and areas of the zones; areas are the cells' shares of the patch's area, so that they add up to it.
+/// Counts the cells of the zones and computes their areas, scaled so that they add up to the area of the patch.
 fn zone_areas(
     level: &StripMesh,
     patch: &Patch,
@@ -414,7 +411,7 @@ fn zone_areas(
     zones
 }
 
-/// Power of a patch in N that slips beyond those of its motion add to that of its forces; of unlike bodies the moment against rolling gives it.
+/// Returns the power of a patch in N from the slip that the pressure of unlike bodies causes. The moment that resists rolling supplies it.
 fn pressure_power(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64 {
     let Some([x, y]) = &level.surface_slip else {
         return 0.0;
@@ -425,7 +422,7 @@ fn pressure_power(level: &StripMesh, fields: &SolvedFields, patch: usize) -> f64
     sum * level.scale.traction * level.scale.slip()
 }
 
-/// Creepages made dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990).
+/// Makes creepages dimensionless with E = 2G(1+ν) and c = √(A/π) (Kalker 1990).
 pub(crate) fn normalised(
     elasticity: &Elasticity,
     area: f64,
@@ -443,7 +440,8 @@ pub(crate) fn normalised(
     }
 }
 
-/// Converts an error relative to a friction limit to absolute ones. That of the moment grows with the distance of the patches from the origin.
+/// Converts an error relative to a friction limit to absolute errors. The error of the moment grows with the distance of the patches from the
+/// origin.
 fn absolute(patches: &[Patch], limit: f64, relative: f64) -> ErrorEstimate {
     let (mut area, mut reach) = (0.0, 0.0_f64);
     for patch in patches {
@@ -477,7 +475,7 @@ fn total(patches: &[Patch], limits: &[f64], point: &MotionAnswer) -> Total {
     }
 }
 
-/// Remarks on motion `index` of the problem, with its number in the case.
+/// Returns the remarks on motion `index` of the problem, with its number in the case.
 fn remarks(
     case: &CheckedCase,
     index: usize,
@@ -487,7 +485,7 @@ fn remarks(
     let own = point.remarks.iter().cloned();
     let missed = target_missed(case, point, limit);
     let large = error_large(case, point, limit);
-    // Parts of a sweep are numbered through, as the client counts its motions.
+    // The motions of all slices of a sweep are numbered consecutively.
     let number = case.problem.part.before + index;
     own.chain(unreachable(case, index, point))
         .chain(missed)
@@ -523,7 +521,7 @@ fn target_missed(case: &CheckedCase, point: &MotionAnswer, limit: f64) -> Option
         })
 }
 
-/// Estimated error of the sum over the patches relative to its force; none where either is unknown or there is no force.
+/// Returns the estimated error of the sum over the patches relative to its force; `None` if it is unknown or the force is 0.
 fn error_of_force(point: &MotionAnswer, limit: f64) -> Option<f64> {
     let share = point.force_share(limit);
     point
@@ -532,10 +530,10 @@ fn error_of_force(point: &MotionAnswer, limit: f64) -> Option<f64> {
         .filter(|relative| relative.is_finite())
 }
 
-/// Most that an error may be of the force without a remark.
+/// Largest error relative to the force without a remark.
 const LARGE_FOR_FORCE: f64 = 0.1;
 
-/// The remark on an error that meets a target relative to μN but is not small beside the force itself.
+/// Returns the remark on an error that meets a target relative to μN but is large relative to the force.
 fn error_large(case: &CheckedCase, point: &MotionAnswer, limit: f64) -> Option<Remark> {
     let target = case.run.resolution.target()?;
     let met = point.error().is_some_and(|error| error <= target);
@@ -550,7 +548,7 @@ fn error_large(case: &CheckedCase, point: &MotionAnswer, limit: f64) -> Option<R
 }
 
 impl HistoryPoint {
-    /// What a history says of a patch at a point.
+    /// Returns the values of a patch at a point of a history.
     pub(crate) fn of(history: &HistoryAnswer, patch: usize) -> HistoryPoint {
         let [creepage_x_error, creepage_y_error] = history.creepage_errors;
         let [shift_x_error_mm, shift_y_error_mm] = history.shift_errors;

@@ -73,53 +73,45 @@ fn scale_seconds(solution: &mut Solution, took: f64) {
 
 /// Sets rounding residues of larger numbers to 0.
 fn clear_residues(case: &CheckedCase, solution: &mut Solution) {
-    let (mut limit_all, mut moment_all) = (0.0, 0.0);
-    let mut length_all = 0.0_f64;
+    let (mut limit_all, mut moment_all, mut length_all) = (0.0, 0.0, 0.0_f64);
     for patch in &mut solution.patches {
         let length = (patch.area_mm2 / PI).sqrt();
         let limit = case.problem.friction.largest() * patch.normal_force_n;
         for point in &mut patch.points {
-            clear(&mut point.force_x_n, limit);
-            clear(&mut point.force_y_n, limit);
-            clear(&mut point.moment_z_n_mm, limit * length);
             let motion = &point.motion;
             let creepage = motion.creepage_x.hypot(motion.creepage_y);
-            let speed = creepage.hypot(motion.spin_per_mm * length);
-            clear(&mut point.friction_power_n, limit * speed);
-            clear(&mut point.friction_power_without_spin_n, limit * speed);
-            let extent = point
-                .region
-                .iter_mut()
-                .flat_map(|region| &mut region.extent_mm);
-            extent.for_each(|end| clear(end, length));
-        }
-        patch
-            .extent_mm
-            .iter_mut()
-            .for_each(|end| clear(end, length));
-        if let Some(position) = &mut patch.position {
-            let places = [&mut position.track_mm, &mut position.origin_track_mm];
-            for place in places {
-                place.iter_mut().for_each(|part| clear(part, length));
+            let power = limit * creepage.hypot(motion.spin_per_mm * length);
+            clear([&mut point.force_x_n, &mut point.force_y_n], limit);
+            clear([&mut point.moment_z_n_mm], limit * length);
+            clear([&mut point.friction_power_n], power);
+            clear([&mut point.friction_power_without_spin_n], power);
+            if let Some(region) = &mut point.region {
+                clear(&mut region.extent_mm, length);
             }
+        }
+        clear(&mut patch.extent_mm, length);
+        if let Some(position) = &mut patch.position {
+            clear(&mut position.track_mm, length);
+            clear(&mut position.origin_track_mm, length);
         }
         limit_all += limit;
         moment_all += limit * length;
         length_all = length_all.max(length);
     }
     for total in &mut solution.total {
-        clear(&mut total.force_x_n, limit_all);
-        clear(&mut total.force_y_n, limit_all);
-        clear(&mut total.moment_z_n_mm, moment_all);
+        clear([&mut total.force_x_n, &mut total.force_y_n], limit_all);
+        clear([&mut total.moment_z_n_mm], moment_all);
     }
-    clear(&mut solution.origin.x_mm, length_all);
-    clear(&mut solution.origin.y_mm, length_all);
+    let origin = &mut solution.origin;
+    clear([&mut origin.x_mm, &mut origin.y_mm], length_all);
 }
 
-/// Replaces a rounding residue relative to `scale`, and −0, by 0.
-fn clear(value: &mut f64, scale: f64) {
-    if value.abs() <= ROUNDING_RESIDUE * scale {
-        *value = 0.0;
+/// Replaces rounding residues relative to `scale`, and −0, by 0.
+fn clear<'a>(values: impl IntoIterator<Item = &'a mut f64>, scale: f64) {
+    for value in values {
+        if value.abs() <= ROUNDING_RESIDUE * scale {
+            *value = 0.0;
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! What follows from a solved motion for maintenance: stresses below the surface, temperatures, wear across the patch.
+//! Results that follow from a solved motion: stresses below the surface, temperatures, slips and damage.
 
 use crate::case::words::solver::Output;
 use crate::case::words::subsurface::BodyName;
@@ -14,7 +14,7 @@ use crate::post::subsurface::states::{
 };
 use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 use crate::post::subsurface::worst::{GAP, worst_place};
-use crate::post::subsurface::worst_passage::{PassagesOf, passage};
+use crate::post::subsurface::worst_passage::{PassagesOf, passage as passage_of};
 use crate::problem::checked_case::CheckedCase;
 use crate::remark::list::Remark;
 use crate::rolling::answer::LevelAnswer;
@@ -24,25 +24,24 @@ use crate::solution::words::answer::{PointFields, PointSolution};
 use crate::solution::words::damage::WearAcross;
 use crate::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
-/// Stresses are answered from this part of the half-width of the smaller patch on: nearer to the surface the steps of the traction from cell
-/// to cell would show, whose stresses grow without bound. There the largest error in the reference contacts is 0.3 % of the largest pressure
+/// Smallest depth of stresses relative to the half-width of the patch. Closer to the surface, the steps of the traction between cells distort
+/// them. At this depth the largest error in the reference contacts is 0.3 % of the largest pressure
 /// (`cargo test --test physics -- stresses_are --nocapture`).
 const LEAST_DEPTH: f64 = 0.01;
-/// Péclet number from which heat may be taken to flow only into the depth (Jaeger 1942): below it the temperatures are too high.
+/// Smallest Péclet number at which heat flows only into the depth (Jaeger 1942). Below it, the computed temperatures are too high.
 const PECLET_LEAST: f64 = 10.0;
-/// Points between two looks at the monitor.
-const POINTS_UNASKED: usize = 1024;
+/// Number of points between two calls of the monitor.
+const POINTS_PER_TICK: usize = 1024;
 
-/// What follows from the cells of a motion beside the summaries of its points.
+/// Values per cell and remarks that follow from a solved motion.
 #[derive(Default)]
 pub(crate) struct KeptValues {
-    /// The values that are kept of every patch.
+    /// The values of each patch.
     pub(crate) fields: Vec<PointFields>,
-    /// What there is to say of them.
     pub(crate) remarks: Vec<Remark>,
 }
 
-/// A motion solved on a level.
+/// A motion that is solved on a mesh.
 #[derive(Clone, Copy)]
 pub(crate) struct SolvedMotion<'a> {
     pub(crate) footprint: &'a Footprint,
@@ -50,11 +49,11 @@ pub(crate) struct SolvedMotion<'a> {
     pub(crate) answer: &'a LevelAnswer,
     pub(crate) motion: &'a Motion,
     pub(crate) method: Method,
-    /// Rolling speed in mm/s, where it is known.
+    /// Rolling speed in mm/s, if it is known.
     pub(crate) speed: Option<f64>,
 }
 
-/// Damage of every patch, from its resultants and its friction limit in N.
+/// Computes the damage of each patch from its resultants and its friction limit in N.
 pub(crate) fn add_damage(
     case: &CheckedCase,
     patches: &[Patch],
@@ -76,8 +75,8 @@ pub(crate) fn add_damage(
     }
 }
 
-/// Derives the results of a motion from its cells: summaries are written to its points, the rest is returned. The slips of a point of a history are those of
-/// its step.
+/// Computes results from the cells of a motion. Writes summaries to its points and returns the values per cell. In a history, slips are those
+/// of the step to the point.
 pub(crate) fn add_rest(
     case: &CheckedCase,
     solved: SolvedMotion,
@@ -87,19 +86,11 @@ pub(crate) fn add_rest(
 ) -> Result<KeptValues, Stop> {
     let run = &case.run;
     let mut kept = vec![PointFields::default(); points.len()];
-    let keep_slips = |slips: &[Vec<f64>; 2], kept: &mut [PointFields]| {
-        let kept = kept.iter_mut().enumerate();
-        for (k, kept) in kept.filter(|_| run.wants(Output::Slip)) {
-            let cells = solved.level.patch_cells(k);
-            let [x, y] = [0, 1].map(|c| slips[c][cells.clone()].to_vec());
-            (kept.slip_x, kept.slip_y) = (Some(x), Some(y));
-        }
-    };
+    let mut slips: Option<[Vec<f64>; 2]> = None;
     if is_of_history {
         let unit = solved.level.scale.slip();
-        let slips = solved.answer.slip.each_ref();
-        let slips = slips.map(|slips| slips.iter().map(|slip| unit * slip).collect());
-        keep_slips(&slips, &mut kept);
+        let scaled = |slips: &Vec<f64>| slips.iter().map(|slip| unit * slip).collect();
+        slips = Some(solved.answer.slip.each_ref().map(scaled));
     } else if run.after.needs_power(&run.outputs) {
         let totals: Vec<f64> = points.iter().map(|p| p.friction_power_n).collect();
         let task = PowerTask {
@@ -110,7 +101,6 @@ pub(crate) fn add_rest(
             totals: &totals,
         };
         let power = cell_power(&task, monitor)?;
-        keep_slips(&power.slip, &mut kept);
         if let Some(task) = run.after.damage.as_ref().filter(|task| task.across) {
             let found = wear_across(task, solved, &power);
             for (point, found) in points.iter_mut().zip(found) {
@@ -126,11 +116,20 @@ pub(crate) fn add_rest(
                 kept.temperature_c = Some(found.cells);
             }
         }
+        slips = Some(power.slip);
     }
-    let slow = points
-        .iter()
-        .filter_map(|point| point.temperature.map(|found| found.peclet));
-    let slow = slow_remark(slow.fold(f64::INFINITY, f64::min));
+    if let Some([x, y]) = slips.filter(|_| run.wants(Output::Slip)) {
+        for (k, kept) in kept.iter_mut().enumerate() {
+            let cells = solved.level.patch_cells(k);
+            kept.slip_x = Some(x[cells.clone()].to_vec());
+            kept.slip_y = Some(y[cells].to_vec());
+        }
+    }
+    let temperatures = points.iter().filter_map(|point| point.temperature);
+    let peclet = temperatures.map(|found| found.peclet).reduce(f64::min);
+    let least = PECLET_LEAST;
+    let slow = peclet.filter(|peclet| *peclet < least);
+    let slow = slow.map(|peclet| Remark::HeatSpreads { peclet, least });
     let stresses = add_stresses(case, solved, points, &mut kept, monitor)?;
     Ok(KeptValues {
         fields: kept,
@@ -138,7 +137,7 @@ pub(crate) fn add_rest(
     })
 }
 
-/// Stresses below the surface, where they are asked for; what there is to say of them is returned.
+/// Computes stresses below the surface, if they are requested, and returns a remark on them.
 fn add_stresses(
     case: &CheckedCase,
     solved: SolvedMotion,
@@ -158,16 +157,7 @@ fn add_stresses(
     Ok(ball_remark(gap))
 }
 
-/// The remark on a contact that passes too slowly for heat to flow only into the depth, at this smallest Péclet number of its patches; infinite where
-/// no temperatures are asked for.
-fn slow_remark(peclet: f64) -> Option<Remark> {
-    (peclet < PECLET_LEAST).then_some(Remark::HeatSpreads {
-        peclet,
-        least: PECLET_LEAST,
-    })
-}
-
-/// The remark on a passage whose smallest ball about the stresses was not found to its tolerance.
+/// Returns the remark on a passage whose smallest enclosing ball of stresses was not found to its tolerance.
 fn ball_remark(gap: f64) -> Option<Remark> {
     (gap > GAP).then_some(Remark::IterationInexact {
         iteration: "the smallest ball about the stresses of a passage",
@@ -180,9 +170,9 @@ fn ball_remark(gap: f64) -> Option<Remark> {
 /// Stresses below one patch.
 struct PatchStresses {
     summary: SubsurfaceSummary,
-    /// The requested points as they are stored.
+    /// The stresses at the requested points, as [`stored`].
     points: Vec<f64>,
-    /// What is left of the search for smallest balls; 0 where no passage is judged.
+    /// Relative gap of the search for smallest enclosing balls; 0 without a passage.
     gap: f64,
 }
 
@@ -191,7 +181,7 @@ fn least_depth(patch: &Patch) -> f64 {
     LEAST_DEPTH * 0.5 * (x_max - x_min).min(y_max - y_min)
 }
 
-/// The loads on the body that is asked for.
+/// Returns the load on the surface of the requested body.
 fn loaded<'a>(task: &SubsurfaceTask, of: SolvedMotion<'a>) -> SurfaceLoad<'a> {
     // The lower body's normal is up, the upper's down, and tractions on it are the reactions.
     let sign = match task.body {
@@ -201,7 +191,7 @@ fn loaded<'a>(task: &SubsurfaceTask, of: SolvedMotion<'a>) -> SurfaceLoad<'a> {
     SurfaceLoad::new(of.level, of.footprint, of.answer, sign, task.poisson_ratio)
 }
 
-/// Stresses below every patch. Patches of one frame load the same body: each point feels all of them.
+/// Computes the stresses below each patch. All patches of a frame load the same body, so each point has the stresses of all of them.
 fn subsurface(
     task: &SubsurfaceTask,
     of: SolvedMotion,
@@ -214,7 +204,7 @@ fn subsurface(
     let workspace = &mut load.workspace();
     let evaluate = |places: &[[f64; 3]], workspace: &mut LoadWorkspace| {
         let mut values = Vec::with_capacity(places.len() * STORED);
-        for places in places.chunks(POINTS_UNASKED) {
+        for places in places.chunks(POINTS_PER_TICK) {
             monitor.go_on(0.0)?;
             let deep = |[x, y, depth]: &[f64; 3]| [*x, *y, depth.max(least)];
             let places: Vec<[f64; 3]> = places.iter().map(deep).collect();
@@ -225,7 +215,7 @@ fn subsurface(
         }
         Ok(values)
     };
-    let below_worst = matches!(task.places, StressPlaces::BelowWorst(_));
+    let needs_worst = task.worst || matches!(task.places, StressPlaces::BelowWorst(_));
     let mut found = Vec::with_capacity(patches.len());
     let mut shared: Option<([f64; 2], Vec<f64>)> = None;
     for (k, patch) in patches.iter().enumerate() {
@@ -236,9 +226,10 @@ fn subsurface(
             patch: k,
             least: least_depth(patch),
         };
-        let worst = (task.worst || below_worst || task.passage.is_some())
-            .then(|| worst_place(&load, of.footprint, k, place.least, workspace))
-            .flatten();
+        let worst = match needs_worst || task.passage.is_some() {
+            true => worst_place(&load, of.footprint, k, place.least, workspace),
+            false => None,
+        };
         let points = match (&task.places, worst) {
             (StressPlaces::BelowWorst(depths), Some([x, y, _])) => {
                 let line: Vec<[f64; 3]> = depths.iter().map(|depth| [x, y, *depth]).collect();
@@ -261,24 +252,22 @@ fn subsurface(
             }
             (StressPlaces::BelowWorst(_), None) => Vec::new(),
         };
-        let asked = task.passage.zip(worst);
-        let judged = asked.map(|(asked, worst)| passage(asked, place, worst, monitor));
-        let judged = judged.transpose()?;
-        let summary = SubsurfaceSummary {
-            body: task.body,
-            least_depth_mm: least,
-            worst: worst.filter(|_| task.worst || below_worst).map(|at| {
-                point(
-                    at,
-                    in_patch_axes(load.stress(at, LoadResolution::FINE, workspace), task.body),
-                )
-            }),
-            passage: judged.map(|judged| judged.summary),
-        };
+        let passage = task.passage.zip(worst);
+        let passage = passage.map(|(words, worst)| passage_of(words, place, worst, monitor));
+        let passage = passage.transpose()?;
+        let worst = worst.filter(|_| needs_worst).map(|at| {
+            let stress = load.stress(at, LoadResolution::FINE, workspace);
+            point(at, in_patch_axes(stress, task.body))
+        });
         found.push(PatchStresses {
-            summary,
+            summary: SubsurfaceSummary {
+                body: task.body,
+                least_depth_mm: least,
+                worst,
+                passage: passage.map(|passage| passage.summary),
+            },
             points,
-            gap: judged.map_or(0.0, |judged| judged.gap),
+            gap: passage.map_or(0.0, |passage| passage.gap),
         });
     }
     Ok(found)
@@ -287,17 +276,16 @@ fn subsurface(
 /// Temperatures in one patch.
 struct PatchTemperatures {
     summary: TemperatureSummary,
-    /// Of both surfaces at the middle of every cell, in °C.
+    /// Temperature of both surfaces at the middle of each cell, in °C.
     cells: Vec<f64>,
 }
 
-/// Temperatures of every patch; each strip is heated by all its segments in the patch.
+/// Computes the temperatures of each patch. All segments of a strip in the patch heat it.
 fn temperatures(task: &ThermalTask, of: SolvedMotion, power: &CellPower) -> Vec<PatchTemperatures> {
     let speed = of.speed.unwrap_or(0.0);
-    let unit = if speed > 0.0 {
-        task.rise_of(speed)
-    } else {
-        0.0
+    let unit = match speed > 0.0 {
+        true => task.rise_of(speed),
+        false => 0.0,
     };
     let base = task.without_heat();
     let patches = of.footprint.patches().iter().enumerate();
@@ -328,7 +316,7 @@ fn temperatures(task: &ThermalTask, of: SolvedMotion, power: &CellPower) -> Vec<
     patches.map(of_patch).collect()
 }
 
-/// The largest of what the lines have, each at its place: on a parabola through the largest and its neighbours.
+/// Returns the maximum over the lines and its place, on a parabola through the largest value and its neighbours.
 fn peak(lines: &[(f64, [f64; 2])]) -> (f64, [f64; 2]) {
     let top = (0..lines.len()).max_by(|a, b| lines[*a].0.total_cmp(&lines[*b].0));
     let Some(top) = top else {
@@ -339,7 +327,7 @@ fn peak(lines: &[(f64, [f64; 2])]) -> (f64, [f64; 2]) {
     let (Some((before, [_, low])), Some((after, [_, high]))) = (beside, lines.get(top + 1)) else {
         return (value, [x, y]);
     };
-    // Slopes of the two sides; the parabola is v + s d + c d² with d from the middle line.
+    // Slopes on both sides. The parabola is v + s d + c d² with the distance d from the middle line.
     let (down, up) = ((value - before) / (y - low), (after - value) / (high - y));
     let curve = (up - down) / (high - low);
     if curve >= 0.0 {
@@ -350,17 +338,18 @@ fn peak(lines: &[(f64, [f64; 2])]) -> (f64, [f64; 2]) {
     (value + step * (slope + curve * step), [x, y + step])
 }
 
-/// A strip as heat sees it: cells with their heat over the rolling speed, gaps between segments without.
+/// A strip with its heat sources: cells with heat, and gaps between segments without.
 struct HeatedLine {
     y: f64,
     edges: Vec<f64>,
-    /// N/mm².
+    /// Heat per area over the rolling speed between the edges, in N/mm².
     heat: Vec<f64>,
-    /// Where temperatures are looked at: first the middles of the cells, then their edges.
+    /// x where temperatures are computed: first the middles of the cells, then the edges.
     points: Vec<f64>,
     cells: usize,
 }
 
+/// Returns the strips of a patch with their heat sources.
 fn heated_lines(level: &StripMesh, power: &CellPower, patch: usize) -> Vec<HeatedLine> {
     let mesh = &level.mesh;
     let mut lines: Vec<(usize, HeatedLine)> = Vec::new();
@@ -398,11 +387,10 @@ fn heated_lines(level: &StripMesh, power: &CellPower, patch: usize) -> Vec<Heate
     lines
 }
 
-/// Wear strip by strip of every patch.
+/// Computes the wear of each strip of each patch.
 fn wear_across(task: &DamageTask, of: SolvedMotion, power: &CellPower) -> Vec<WearAcross> {
-    let slip: Vec<f64> = (0..power.power.len())
-        .map(|i| power.slip[0][i].hypot(power.slip[1][i]))
-        .collect();
+    let slips = power.slip[0].iter().zip(&power.slip[1]);
+    let slip: Vec<f64> = slips.map(|(x, y)| x.hypot(*y)).collect();
     let cells = CellWear {
         level: of.level,
         power: &power.power,

@@ -5,7 +5,9 @@ use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::case::words::object::{AllowedRange, LISTED_MAX, Object, join, names, number, shown};
+use crate::case::words::object::{
+    AllowedRange, Faults, LISTED_MAX, Object, elements_of, join, names, number, shown,
+};
 use crate::geometry::formats::Format;
 use crate::geometry::profile::LengthUnit;
 use crate::geometry::profile::{POINTS_MAX, POINTS_MIN};
@@ -15,7 +17,7 @@ use crate::geometry::profile::{POINTS_MAX, POINTS_MIN};
 /// y is positive to the field side and z positive down, unless `mirror_y`, `mirror_z`, the shape or the format specify the opposite
 /// direction.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, ToSchema, Members)]
 #[members(faults_of_section)]
 pub struct CrossSection {
     /// Points `[y, z]` in order along the cross-section, in mm or in `unit`.
@@ -43,7 +45,7 @@ pub struct CrossSection {
     pub mirror_z: Option<bool>,
     /// Waves along the cross-section shorter than about this wavelength in mm are smoothed away; default 0 (no smoothing). `auto` chooses
     /// 0, or 2 to 8 mm, from the noise of the points and the pressure; the result states it.
-    #[member(with = smoothing, default = Smoothing::Length(0.0))]
+    #[member(with = smoothing, default)]
     pub smoothing_mm: Smoothing,
 }
 
@@ -55,6 +57,12 @@ pub enum Smoothing {
     Length(f64),
     /// A wavelength that the service chooses.
     ByNoise(SmoothingWord),
+}
+
+impl Default for Smoothing {
+    fn default() -> Smoothing {
+        Smoothing::Length(0.0)
+    }
 }
 
 /// A smoothing that the service chooses.
@@ -110,49 +118,40 @@ pub(crate) fn smoothing(block: &mut Object, name: &str) -> Option<Smoothing> {
 pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 2]>> {
     let what = format!("an array of {POINTS_MIN} to {POINTS_MAX} points [y, z] in mm");
     let elements = block.array(name, POINTS_MIN..=POINTS_MAX, &what)?;
-    let pointer = block.pointer_to(name);
-    let mut read = Vec::with_capacity(elements.len());
-    let mut refused = 0;
-    for (k, element) in elements.iter().enumerate() {
-        if let Some(point) = point(element) {
-            read.push(point);
-            continue;
-        }
-        refused += 1;
-        if refused <= LISTED_MAX {
-            fault_of_point(element, &join(&pointer, k), block);
-        }
-    }
-    if refused > LISTED_MAX {
-        block.faults().add(
-            pointer,
-            format!(
-                "{} more points are refused for the same reason; each must be a pair [y, z], both {COORDINATE}",
-                refused - LISTED_MAX
-            ),
+    let (pointer, mut refused) = (block.pointer_to(name), 0);
+    let faults = block.faults();
+    let read = elements_of(
+        elements,
+        &pointer,
+        &mut refused,
+        faults,
+        point,
+        refuse_point,
+    );
+    let rest = refused.saturating_sub(LISTED_MAX);
+    if rest > 0 {
+        let detail = format!(
+            "{rest} more points are refused for the same reason; each must be a pair [y, z], both {COORDINATE}"
         );
+        faults.add(pointer, detail);
     }
-    (refused == 0).then_some(read)
+    read
 }
 
 fn point(element: &Value) -> Option<[f64; 2]> {
     let [y, z] = element.as_array()?.as_slice() else {
         return None;
     };
-    let part = |value: &Value| value.as_f64().filter(|number| COORDINATE.contains(*number));
-    Some([part(y)? + 0.0, part(z)? + 0.0])
+    Some([COORDINATE.read(y)?, COORDINATE.read(z)?])
 }
 
-fn fault_of_point(element: &Value, pointer: &str, block: &mut Object) {
-    match element.as_array().map(Vec::as_slice) {
-        Some(pair @ [_, _]) => {
-            for (k, value) in pair.iter().enumerate() {
-                number(value, &join(pointer, k), COORDINATE, block.faults());
-            }
-        }
-        _ => block.faults().add(
-            pointer,
-            format!("{} given; a pair [y, z] in mm is needed", shown(element)),
-        ),
+fn refuse_point(element: &Value, pointer: &str, faults: &mut Faults) {
+    let Some(pair) = element.as_array().filter(|pair| pair.len() == 2) else {
+        let given = shown(element);
+        let detail = format!("{given} given; a pair [y, z] in mm is needed");
+        return faults.add(pointer, detail);
+    };
+    for (k, value) in pair.iter().enumerate() {
+        number(value, &join(pointer, k), COORDINATE, faults);
     }
 }

@@ -76,7 +76,7 @@ pub enum Motions {
 /// patch, the wheel's material moves with v = (V, lateral velocity, 0) + ω × r; the creepages of a patch with the tangent t and the
 /// normal n are v_x / V, v · t / V and the spin ω · n / V.
 #[none_is_absent]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, ToSchema, Members)]
 pub struct Wheelset {
     /// Speed V along x in mm/s, more than 0.
     #[member(positive(1e9, "mm/s"))]
@@ -149,6 +149,31 @@ pub enum Combine {
     Together,
     /// Every combination.
     Grid,
+}
+
+impl Combine {
+    /// Returns the number of combinations of components with these numbers of values.
+    pub(crate) fn count<const N: usize>(self, lengths: [usize; N]) -> u128 {
+        let lengths = lengths.into_iter().map(|length| length as u128);
+        match self {
+            Combine::Together => lengths.max().unwrap_or(0),
+            Combine::Grid => lengths.product(),
+        }
+    }
+
+    /// Returns the index of each component's value in combination `k`. A single value is part of every combination.
+    pub(crate) fn indices<const N: usize>(self, lengths: [usize; N], k: usize) -> [usize; N] {
+        let mut rest = k;
+        let mut indices = [0; N];
+        for (index, length) in indices.iter_mut().zip(lengths).rev() {
+            *index = match self {
+                Combine::Together => k.min(length - 1),
+                Combine::Grid => rest % length,
+            };
+            rest /= length;
+        }
+        indices
+    }
 }
 
 /// The values of one component of a sweep.

@@ -355,22 +355,20 @@ impl<T: Member> Member for Box<T> {
     }
 }
 
-/// Reads a number within an interval. Negative zero becomes zero, so that equal cases have equal digests.
+/// Reads a number within an interval and adds a fault if it is not one.
 pub(crate) fn number(
     value: &Value,
     pointer: &str,
     allowed: AllowedRange,
     faults: &mut Faults,
 ) -> Option<f64> {
-    match value.as_f64() {
-        Some(number) if allowed.contains(number) => Some(number + 0.0),
-        _ => {
-            let detail = format!("{} given; {allowed} is needed", shown(value));
-            let code = code_of(value, Value::is_number);
-            faults.add_with(pointer, detail, allowed.figures(code, Some(value)));
-            None
-        }
+    let read = allowed.read(value);
+    if read.is_none() {
+        let detail = format!("{} given; {allowed} is needed", shown(value));
+        let code = code_of(value, Value::is_number);
+        faults.add_with(pointer, detail, allowed.figures(code, Some(value)));
     }
+    read
 }
 
 /// Reads a keyword of a table, see [`Object::word`].
@@ -411,19 +409,35 @@ pub(crate) fn numbers(
     refused: &mut usize,
     faults: &mut Faults,
 ) -> Option<Vec<f64>> {
-    let mut read = Vec::with_capacity(elements.len());
+    let good = |value: &Value| allowed.read(value);
+    let refuse = |value: &Value, pointer: &str, faults: &mut Faults| {
+        number(value, pointer, allowed, faults);
+    };
+    elements_of(elements, pointer, refused, faults, good, refuse)
+}
+
+/// Reads the elements of an array with `read`. Counts those that it refuses in `refused`, and calls `refuse` for each of the first
+/// [`LISTED_MAX`].
+pub(crate) fn elements_of<T>(
+    elements: &[Value],
+    pointer: &str,
+    refused: &mut usize,
+    faults: &mut Faults,
+    read: impl Fn(&Value) -> Option<T>,
+    refuse: impl Fn(&Value, &str, &mut Faults),
+) -> Option<Vec<T>> {
+    let mut all = Vec::with_capacity(elements.len());
     for (i, value) in elements.iter().enumerate() {
-        let good = value.as_f64().filter(|number| allowed.contains(*number));
-        if let Some(good) = good {
-            read.push(good + 0.0);
+        if let Some(one) = read(value) {
+            all.push(one);
             continue;
         }
         *refused += 1;
         if *refused <= LISTED_MAX {
-            number(value, &join(pointer, i), allowed, faults);
+            refuse(value, &join(pointer, i), faults);
         }
     }
-    (read.len() == elements.len()).then_some(read)
+    (all.len() == elements.len()).then_some(all)
 }
 
 /// Adds a fault with the number of faulty values beyond the first [`LISTED_MAX`], if there are any.
@@ -433,14 +447,11 @@ pub(crate) fn count_rest(
     refused: usize,
     faults: &mut Faults,
 ) {
-    if refused > LISTED_MAX {
-        faults.add(
-            pointer,
-            format!(
-                "{} more values are refused for the same reason; {allowed} is needed",
-                refused - LISTED_MAX
-            ),
-        );
+    let rest = refused.saturating_sub(LISTED_MAX);
+    if rest > 0 {
+        let detail =
+            format!("{rest} more values are refused for the same reason; {allowed} is needed");
+        faults.add(pointer, detail);
     }
 }
 
@@ -576,29 +587,29 @@ impl AllowedRange {
         }
     }
 
+    /// Returns the number if the interval contains it. Negative zero becomes zero, so that equal cases have equal digests.
+    pub(crate) fn read(&self, value: &Value) -> Option<f64> {
+        let number = value.as_f64().filter(|number| self.contains(*number))?;
+        Some(number + 0.0)
+    }
+
     /// Whether the interval contains the number.
     pub(crate) fn contains(&self, number: f64) -> bool {
-        let above = if self.low_excluded {
-            number > self.low
-        } else {
-            number >= self.low
-        };
-        above && number <= self.high
+        let is_low = number == self.low && self.low_excluded;
+        (self.low..=self.high).contains(&number) && !is_low
     }
 }
 
 impl fmt::Display for AllowedRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (low, high) = (plain(self.low), plain(self.high));
-        if self.low_excluded {
-            write!(f, "a number more than {low} and at most {high}")?;
-        } else {
-            write!(f, "a number from {low} to {high}")?;
+        match self.low_excluded {
+            true => write!(f, "a number more than {low} and at most {high}")?,
+            false => write!(f, "a number from {low} to {high}")?,
         }
-        if self.unit.is_empty() {
-            Ok(())
-        } else {
-            write!(f, " {}", self.unit)
+        match self.unit {
+            "" => Ok(()),
+            unit => write!(f, " {unit}"),
         }
     }
 }
@@ -627,10 +638,9 @@ fn code_of(value: &Value, right: fn(&Value) -> bool) -> FaultCode {
 
 /// Formats a limit, large ones with an exponent: `1e9` rather than `1000000000`.
 fn plain(number: f64) -> String {
-    if number.abs() >= 1e5 {
-        format!("{number:e}")
-    } else {
-        format!("{number}")
+    match number.abs() >= 1e5 {
+        true => format!("{number:e}"),
+        false => number.to_string(),
     }
 }
 
