@@ -1,11 +1,11 @@
 //! From the members of a case to the outputs that follow from the solved contact: stresses below the surface, damage and temperatures.
 
 use crate::case::solver::Limits;
-use crate::case::words::material::{Material, ThermalWords};
+use crate::case::words::material::{Material, Thermal};
 use crate::case::words::motion::Motions;
 use crate::case::words::solver::{Case, Output};
 use crate::case::words::subsurface::{
-    BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, SubsurfaceWords,
+    BodyName, DepthLineAt, FoundPlace, GridAxis, StressGrid, Subsurface,
 };
 use crate::error::Fault;
 use crate::post::damage::DamageTask;
@@ -28,20 +28,20 @@ impl AfterTasks {
     }
 }
 
-impl From<ThermalWords> for ThermalTask {
-    fn from(words: ThermalWords) -> ThermalTask {
+impl From<Thermal> for ThermalTask {
+    fn from(words: Thermal) -> ThermalTask {
         match words {
-            ThermalWords::Same(both) => ThermalTask {
+            Thermal::Same(both) => ThermalTask {
                 lower: both,
                 upper: both,
             },
-            ThermalWords::Pair { lower, upper } => ThermalTask { lower, upper },
+            Thermal::Pair { lower, upper } => ThermalTask { lower, upper },
         }
     }
 }
 
 /// Returns the number of points at which stresses are computed for each motion.
-pub(crate) fn count(words: &SubsurfaceWords) -> usize {
+pub(crate) fn count(words: &Subsurface) -> usize {
     let grid = |grid: &StressGrid| {
         let sides = [&grid.x_mm, &grid.y_mm, &grid.depths_mm];
         let counts = sides.map(GridAxis::count);
@@ -55,7 +55,7 @@ pub(crate) fn count(words: &SubsurfaceWords) -> usize {
 
 /// Returns the faults of stresses at too many points, or of a passage together with a history.
 pub(crate) fn faults(
-    words: &SubsurfaceWords,
+    words: &Subsurface,
     motion: &Motions,
     motions: usize,
     limits: &Limits,
@@ -76,7 +76,7 @@ pub(crate) fn faults(
 }
 
 /// Returns where and in which body stresses are computed.
-fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTask {
+fn task(words: &Subsurface, material: &Material) -> SubsurfaceTask {
     let [lower, upper] = material.bodies();
     let elastic = match words.body {
         BodyName::Lower => lower,
@@ -91,7 +91,7 @@ fn task(words: &SubsurfaceWords, material: &Material) -> SubsurfaceTask {
     }
 }
 
-fn places(words: &SubsurfaceWords) -> StressPlaces {
+fn places(words: &Subsurface) -> StressPlaces {
     let depths = words.depths_mm.as_deref().unwrap_or_default();
     if let Some(points) = &words.points_mm {
         return StressPlaces::Points(points.clone());

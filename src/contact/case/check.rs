@@ -22,7 +22,7 @@ use crate::geometry::profile_quality::advised_smoothing;
 use crate::normal::footprint::NormalTask;
 use crate::problem::checked_case;
 use crate::problem::checked_case::{CheckedCase, Label};
-use crate::problem::physics::{AfterTasks, Checked, MotionPart, Problem, Run};
+use crate::problem::physics::{AfterTasks, MotionPart, Problem, Run};
 use crate::remark::entry::{RemarkEntry, merged};
 use crate::remark::list::Remark;
 use crate::solution::words::answer::Asked;
@@ -95,7 +95,6 @@ impl CheckedCase {
             wheelset: first_move.map(|first| first.motion),
             drive_torque: first_move.and_then(|first| first.drive_torque),
             wheelset_forces: wheel_task::wheelset_forces(&case.motion),
-            checked: Checked::without_faults(),
         };
         let run = run(&case, limits);
         let first_order = problem.first_order(&run).map(|r| r.at_pointer("/material"));

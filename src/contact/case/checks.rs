@@ -7,7 +7,7 @@ use crate::case::motions::ExpandedMotions;
 use crate::case::solver::{KnownPair, Limits, resolution};
 use crate::case::words::contact::{Contact, OnRails, SurfaceName};
 use crate::case::words::friction::Friction;
-use crate::case::words::material::{Material, ThermalWords};
+use crate::case::words::material::{Material, Thermal};
 use crate::case::words::motion::Motions;
 use crate::case::words::subsurface::DamageModel;
 use crate::case::{after_tasks, contact_task, motions, wheel_task, wheelsets};
@@ -296,7 +296,7 @@ fn table_faults(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> V
 /// Returns the fault of friction that falls too fast on known patches.
 fn too_fast_fault(
     friction: &Friction,
-    thermal: Option<&ThermalWords>,
+    thermal: Option<&Thermal>,
     elasticity: Elasticity,
     patches: &[Patch],
     speeds: &[Option<f64>],

@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use crate::case::words::contact::{Contact, FLANGE_BACKS, GAUGE, Load};
 use crate::error::Fault;
 use crate::geometry::profile::{LengthUnit, Profile};
+use crate::geometry::wheel_rail::RailPlace;
 use crate::normal::footprint::NormalTask;
 use crate::normal::gap::surface::GapSurface;
 use crate::normal::gap::task::{GapTask, PreviewCache};
@@ -253,22 +254,21 @@ pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
         return Vec::new();
     };
     // Usual values are those of standard gauge and of UIC wheels with a diameter of 920 mm.
-    let backs = Some(rails.flange_back_distance_mm);
+    let place = match rails.rail {
+        RailPlace::Gauge { gauge, .. } => ("gauge_mm", gauge, GAUGE),
+        RailPlace::Origin(origin) => ("rail_origin_mm", origin, 752.5),
+    };
+    let backs = rails.flange_back_distance_mm;
     let lengths = [
-        ("/contact/gauge_mm", rails.gauge_mm, GAUGE),
-        ("/contact/rail_origin_mm", rails.rail_origin_mm, 752.5),
-        ("/contact/flange_back_distance_mm", backs, FLANGE_BACKS),
-        (
-            "/contact/rolling_radius_mm",
-            Some(rails.rolling_radius_mm),
-            460.0,
-        ),
+        place,
+        ("flange_back_distance_mm", backs, FLANGE_BACKS),
+        ("rolling_radius_mm", rails.rolling_radius_mm, 460.0),
     ];
-    let remark = |(pointer, length_mm, usual): (&str, Option<f64>, f64)| {
-        let length_mm = length_mm?;
+    let remark = |(name, length_mm, usual): (&str, f64, f64)| {
         let unit = LengthUnit::likely(length_mm, usual).filter(|unit| *unit != LengthUnit::Mm)?;
         let unit = unit.name();
-        Some(Remark::LengthUnusual { length_mm, unit }.at_pointer(pointer))
+        let pointer = format!("/contact/{name}");
+        Some(Remark::LengthUnusual { length_mm, unit }.at_pointer(&pointer))
     };
     lengths.into_iter().filter_map(remark).collect()
 }

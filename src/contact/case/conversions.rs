@@ -1,7 +1,7 @@
 //! Conversions from the members of a case to the types of the numerics.
 
 use crate::case::words::friction::Friction;
-use crate::case::words::material::ThermalWords;
+use crate::case::words::material::Thermal;
 use crate::case::words::solver::MethodName;
 use crate::friction::coefficient_table::CoefficientTable;
 use crate::friction::law::{AcrossLaw, AcrossPlace, FrictionLaw};
@@ -23,7 +23,7 @@ impl From<Method> for MethodName {
 
 impl FrictionLaw {
     /// Returns the friction law of a case. A coefficient that falls with temperature needs `thermal`.
-    pub(crate) fn new(words: &Friction, thermal: Option<&ThermalWords>) -> FrictionLaw {
+    pub(crate) fn new(words: &Friction, thermal: Option<&Thermal>) -> FrictionLaw {
         if let Some(law) = &words.by_temperature {
             let task = thermal.map(|words| ThermalTask::from(*words));
             // Missing thermal constants are a fault of the case. Nothing is heated then.

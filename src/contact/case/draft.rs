@@ -9,11 +9,11 @@ use serde_json::Value;
 
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::friction::Friction;
-use crate::case::words::material::{Material, ThermalWords};
+use crate::case::words::material::{Material, Thermal};
 use crate::case::words::motion::Motions;
 use crate::case::words::object::{Faults, Member, Object, has_controls, join, shown};
 use crate::case::words::solver::{Case, MethodName, Output, Solver};
-use crate::case::words::subsurface::{DamageWords, SubsurfaceWords};
+use crate::case::words::subsurface::{DamageWords, Subsurface};
 use crate::case::words::{contact, material, motion, solver, subsurface};
 use crate::error::{CaseError, Fault};
 use crate::method::Method;
@@ -40,9 +40,9 @@ pub(crate) struct CaseDraft {
     pub(crate) motion: Option<Motions>,
     pub(crate) solver: Option<Solver>,
     pub(crate) outputs: Option<Vec<Output>>,
-    pub(crate) subsurface: Option<SubsurfaceWords>,
+    pub(crate) subsurface: Option<Subsurface>,
     pub(crate) damage: Option<DamageWords>,
-    pub(crate) thermal: Option<ThermalWords>,
+    pub(crate) thermal: Option<Thermal>,
 }
 
 impl Case {

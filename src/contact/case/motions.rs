@@ -4,9 +4,7 @@ use crate::case::draft::CaseDraft;
 use crate::case::solver::Limits;
 use crate::case::words::contact::Contact;
 use crate::case::words::friction::Friction;
-use crate::case::words::motion::{
-    AskedMotion, History, HistoryCourse, Motions, Sweep, Swept, Wheelset,
-};
+use crate::case::words::motion::{AskedMotion, Course, History, Motions, Sweep, Swept, Wheelset};
 use crate::case::words::object::FAULTS_MAX;
 use crate::case::words::solver::Output;
 use crate::error::Fault;
@@ -170,7 +168,7 @@ fn placeholder(wheelset: &Wheelset) -> AskedMotion {
 }
 
 /// Returns the value of a component at each point, if it is given.
-fn course(course: Option<&HistoryCourse>, points: usize) -> Option<Vec<f64>> {
+fn course(course: Option<&Course>, points: usize) -> Option<Vec<f64>> {
     course.map(|course| course.values(points))
 }
 

@@ -5,7 +5,7 @@
 
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::material::{Elastic, Material};
-use crate::case::words::motion::{AskedMotion, HistoryCourse, Motions, Swept, Wheelset};
+use crate::case::words::motion::{AskedMotion, Course, Motions, Swept, Wheelset};
 use crate::case::words::solver::Case;
 use crate::geometry::profile::LengthUnit;
 use crate::normal::hertz::Patch;
@@ -114,21 +114,18 @@ fn of_load(
         Contact::Wheelset { .. } => 2.0,
         _ => 1.0,
     };
-    let of_wheel = match *contact {
+    let radius = match *contact {
         Contact::Radii { rolling_mm, .. } | Contact::GapProfile { rolling_mm, .. } => {
-            rolling_mm >= RADIUS_LEAST
+            Some(rolling_mm)
         }
-        Contact::Profiles {
-            rolling_radius_mm, ..
-        }
-        | Contact::Wheelset {
-            rolling_radius_mm, ..
-        } => rolling_radius_mm >= RADIUS_LEAST,
+        _ => contact.on_rails().map(|rails| rails.rolling_radius_mm),
+    };
+    let of_wheel = match contact {
         // The pressure of a given ellipse grows with its load.
         Contact::Ellipse { .. } => patches
             .iter()
             .any(|patch| is_within(1e3 * patch.pressure_max, PRESSURES)),
-        Contact::GapGrid { .. } | Contact::PressureGrid { .. } => false,
+        _ => radius.is_some_and(|radius| radius >= RADIUS_LEAST),
     };
     (of_wheel && force < wheels * LOAD_LEAST && is_metal(material))
         .then(|| suspect(pointer, force, "N", "kN"))
@@ -160,28 +157,27 @@ fn lengths_of_patch(contact: &Contact, patches: &[Patch]) -> Option<RemarkEntry>
 
 /// Returns the remarks on the angles of wheel and rail.
 fn of_place(contact: &Contact) -> Vec<RemarkEntry> {
-    let angles = match contact {
+    let Some(rails) = contact.on_rails() else {
+        return Vec::new();
+    };
+    let [yaw, roll] = match contact {
         Contact::Profiles {
-            cant_rad,
-            yaw_rad,
-            roll_rad,
-            ..
-        } => [*cant_rad, *yaw_rad, *roll_rad],
-        Contact::Wheelset {
-            cant_rad, yaw_rad, ..
-        } => [*cant_rad, largest_swept(yaw_rad), 0.0],
-        _ => return Vec::new(),
+            yaw_rad, roll_rad, ..
+        } => [*yaw_rad, *roll_rad],
+        Contact::Wheelset { yaw_rad, .. } => [largest_swept(yaw_rad), 0.0],
+        _ => [0.0; 2],
     };
     // Rails may be inclined by twice the usual angle.
-    let names = [
-        ("cant_rad", 2.0 * ANGLE_MOST),
-        ("yaw_rad", ANGLE_MOST),
-        ("roll_rad", ANGLE_MOST),
+    let angles = [
+        ("cant_rad", rails.cant_rad, 2.0 * ANGLE_MOST),
+        ("yaw_rad", yaw, ANGLE_MOST),
+        ("roll_rad", roll, ANGLE_MOST),
     ];
-    let large = names.into_iter().zip(angles);
+    let large = angles
+        .into_iter()
+        .filter(|(_, angle, most)| angle.abs() > *most);
     large
-        .filter(|((_, most), angle)| angle.abs() > *most)
-        .map(|((name, _), angle)| suspect(&format!("/contact/{name}"), angle, "rad", "degrees"))
+        .map(|(name, angle, _)| suspect(&format!("/contact/{name}"), angle, "rad", "degrees"))
         .collect()
 }
 
@@ -199,11 +195,11 @@ fn largest_swept(swept: &Swept) -> f64 {
     }
 }
 
-fn largest_of_course(course: &HistoryCourse) -> f64 {
+fn largest_of_course(course: &Course) -> f64 {
     match course {
-        HistoryCourse::Constant(value) => *value,
-        HistoryCourse::Range(range) => largest(&[range.from, range.to]),
-        HistoryCourse::Values(values) => largest(values),
+        Course::Constant(value) => *value,
+        Course::Range(range) => largest(&[range.from, range.to]),
+        Course::Values(values) => largest(values),
     }
 }
 
@@ -213,7 +209,7 @@ type MotionNumbers = (String, [Option<f64>; 3]);
 /// Returns the numbers of all motions; for a sweep and a history those with the largest magnitude.
 fn numbers_of(motion: &Motions) -> Vec<MotionNumbers> {
     let swept = |swept: &Option<Swept>| swept.as_ref().map(largest_swept);
-    let course = |course: &Option<HistoryCourse>| course.as_ref().map(largest_of_course);
+    let course = |course: &Option<Course>| course.as_ref().map(largest_of_course);
     let asked = |one: &AskedMotion| [one.creepage_x, one.creepage_y, one.speed_mm_per_s];
     let rolling = |one: &Wheelset| [None, None, Some(one.speed_mm_per_s)];
     let alone = |of: &str, numbers| vec![(of.to_owned(), numbers)];

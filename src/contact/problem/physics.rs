@@ -27,6 +27,7 @@ use crate::rolling::task::{
 
 /// The physics of a case.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Problem {
     /// Combined elastic constants.
     pub elasticity: Elasticity,
@@ -52,8 +53,6 @@ pub struct Problem {
     pub speeds: Vec<Option<f64>>,
     /// Distances and shifts, if the motions are one history.
     pub history: Option<HistoryTask>,
-    /// Proof of the checks.
-    pub(crate) checked: Checked,
 }
 
 /// Position of the motions of a slice in their case.
@@ -73,17 +72,6 @@ pub(crate) struct PlainContact {
     pub(crate) coefficient: f64,
     /// Kalker's reduction factor of the shear modulus.
     pub(crate) reduction: f64,
-}
-
-/// Proof that a problem passed the checks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Checked(());
-
-impl Checked {
-    /// Proves that the checks found no fault.
-    pub(crate) fn without_faults() -> Checked {
-        Checked(())
-    }
 }
 
 impl Problem {
@@ -146,7 +134,6 @@ impl Problem {
             forces: _,
             speeds: _,
             history: _,
-            checked: _,
         } = self
         else {
             return None;

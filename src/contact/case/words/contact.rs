@@ -270,8 +270,6 @@ impl Contact {
         Some(OnRails {
             sections: [rail, wheel],
             rolling_radius_mm: *rolling_radius_mm,
-            gauge_mm: *gauge_mm,
-            rail_origin_mm: *rail_origin_mm,
             rail: match *rail_origin_mm {
                 Some(origin) => RailPlace::Origin(origin),
                 None => RailPlace::Gauge {
@@ -295,9 +293,7 @@ pub(crate) struct OnRails<'a> {
     /// Cross-sections of rail and wheel; of a wheelset those of the left side.
     pub(crate) sections: [&'a CrossSection; 2],
     pub(crate) rolling_radius_mm: f64,
-    pub(crate) gauge_mm: Option<f64>,
-    pub(crate) rail_origin_mm: Option<f64>,
-    /// Position of the rail by gauge or origin.
+    /// Position of the rail by its gauge or its origin.
     pub(crate) rail: RailPlace,
     pub(crate) cant_rad: f64,
     pub(crate) flange_back_distance_mm: f64,

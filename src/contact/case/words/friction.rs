@@ -28,15 +28,15 @@ pub struct Friction {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     #[schema(min_items = 1, max_items = 2)]
     #[member(with = terms, default)]
-    pub terms: Vec<FallTermWords>,
+    pub terms: Vec<FallTerm>,
     /// A coefficient that varies across the contact.
-    pub across: Option<AcrossWords>,
+    pub across: Option<FrictionAcross>,
     /// A coefficient that varies along the track; requires a `history` that rolls over it.
-    pub along: Option<AlongWords>,
+    pub along: Option<FrictionAlong>,
     /// A coefficient that falls with the temperature of the contact; requires `thermal`, and `speed_mm_per_s` in every motion.
-    pub by_temperature: Option<ByTemperatureWords>,
+    pub by_temperature: Option<FrictionByTemperature>,
     /// A layer between the bodies, such as wet leaves, sand or oxides.
-    pub layer: Option<LayerWords>,
+    pub layer: Option<Layer>,
     /// Kalker's reduction factor, more than 0 and at most 1: ratio of the initial slope of the creep curves to that of clean bodies.
     #[schema(maximum = 1.0)]
     #[member(positive(1.0, ""))]
@@ -45,8 +45,7 @@ pub struct Friction {
 
 /// A part of the coefficient that falls with slip speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
-#[schema(as = FallTerm)]
-pub struct FallTermWords {
+pub struct FallTerm {
     /// Value at rest, 0 to 100.
     #[schema(minimum = 0.0, maximum = 100.0)]
     #[member(closed(0.0, 100.0, ""))]
@@ -62,8 +61,7 @@ pub struct FallTermWords {
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[members(faults_of_across)]
-#[schema(as = FrictionAcross)]
-pub struct AcrossWords {
+pub struct FrictionAcross {
     /// Positions in mm, in ascending order: y in the axes of the case; with `profiles`, y of the rail's profile.
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(-1e6, 1e6, "mm"))]
@@ -82,8 +80,7 @@ pub struct AcrossWords {
 /// position form a jump.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[members(faults_of_along)]
-#[schema(as = FrictionAlong)]
-pub struct AlongWords {
+pub struct FrictionAlong {
     /// Positions in mm, in ascending order: x in the axes of the case at the start of the history. After a rolled distance q, x = 0 of the
     /// contact is at q.
     #[schema(min_items = 2, max_items = 1000)]
@@ -99,8 +96,7 @@ pub struct AlongWords {
 /// the contact, and each point has the coefficient of the temperature it reaches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[members(faults_of_temperatures)]
-#[schema(as = FrictionByTemperature)]
-pub struct ByTemperatureWords {
+pub struct FrictionByTemperature {
     /// Temperatures in °C, rising.
     #[schema(min_items = 2, max_items = 1000)]
     #[member(with = list, closed(-273.15, 1e5, "°C"))]
@@ -116,8 +112,7 @@ pub struct ByTemperatureWords {
 #[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Members)]
 #[members(faults_of_layer)]
-#[schema(as = Layer)]
-pub struct LayerWords {
+pub struct Layer {
     /// Shear modulus in MPa, more than 0.
     #[member(positive(1e12, "MPa"))]
     pub shear_modulus_mpa: f64,
@@ -210,15 +205,15 @@ pub(crate) fn faults_of_friction(block: &mut Object, read: Option<&Friction>) ->
 }
 
 /// Reads the terms of a coefficient that falls with slip speed.
-pub(crate) fn terms(block: &mut Object, name: &str) -> Option<Vec<FallTermWords>> {
+pub(crate) fn terms(block: &mut Object, name: &str) -> Option<Vec<FallTerm>> {
     let elements = block.array(name, 1..=2, TERMS)?;
     block.each(name, elements, |element, pointer, faults| {
-        FallTermWords::members(&mut Object::open(element, pointer, faults)?)
+        FallTerm::members(&mut Object::open(element, pointer, faults)?)
     })
 }
 
 /// Refuses positions that are given in no way, in two ways or out of order.
-pub(crate) fn faults_of_across(block: &mut Object, read: Option<&AcrossWords>) -> Option<()> {
+pub(crate) fn faults_of_across(block: &mut Object, read: Option<&FrictionAcross>) -> Option<()> {
     let name = block.exactly_one(&["y_mm", "angle_rad"], |block| {
         block.required("y_mm", "an array of places in mm");
     })?;
@@ -228,7 +223,7 @@ pub(crate) fn faults_of_across(block: &mut Object, read: Option<&AcrossWords>) -
 }
 
 /// Refuses positions that are out of order.
-pub(crate) fn faults_of_along(block: &mut Object, read: Option<&AlongWords>) -> Option<()> {
+pub(crate) fn faults_of_along(block: &mut Object, read: Option<&FrictionAlong>) -> Option<()> {
     let read = read?;
     require_order(block, "x_mm", &read.x_mm, &read.coefficient)
 }
@@ -277,9 +272,9 @@ fn require_equal_lengths(
 /// Refuses temperatures that do not rise and coefficients that rise.
 pub(crate) fn faults_of_temperatures(
     block: &mut Object,
-    read: Option<&ByTemperatureWords>,
+    read: Option<&FrictionByTemperature>,
 ) -> Option<()> {
-    let ByTemperatureWords {
+    let FrictionByTemperature {
         temperature_c: temperature,
         coefficient,
     } = read?;
@@ -307,7 +302,7 @@ pub(crate) fn list(block: &mut Object, name: &str, allowed: AllowedRange) -> Opt
 }
 
 /// Refuses hardening of a layer that does not yield.
-pub(crate) fn faults_of_layer(block: &mut Object, _: Option<&LayerWords>) -> Option<()> {
+pub(crate) fn faults_of_layer(block: &mut Object, _: Option<&Layer>) -> Option<()> {
     if block.has("hardening_mpa_per_mm") && !block.has("yield_mpa") {
         let detail = "given without yield_mpa, to which it belongs";
         return block.refuse("hardening_mpa_per_mm", detail);

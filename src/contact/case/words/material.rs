@@ -59,8 +59,7 @@ impl Elastic {
 /// Thermal constants: one set for both bodies, or one for each.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
-#[schema(as = Thermal)]
-pub enum ThermalWords {
+pub enum Thermal {
     /// One set of constants for both bodies.
     Same(ThermalBodyWords),
     /// One set for each body.
@@ -131,10 +130,7 @@ pub(crate) fn faults_of_elastic(block: &mut Object, _: Option<&Elastic>) -> Opti
 /// `wanted` is `None` if it is not known whether the case needs it.
 ///
 /// Returns `None` if a fault was recorded.
-pub(crate) fn read_thermal(
-    case: &mut Object,
-    wanted: Option<bool>,
-) -> Option<Option<ThermalWords>> {
+pub(crate) fn read_thermal(case: &mut Object, wanted: Option<bool>) -> Option<Option<Thermal>> {
     if !case.has("thermal") {
         if wanted == Some(true) {
             let what = "an object with the thermal constants of the bodies";
@@ -150,8 +146,8 @@ pub(crate) fn read_thermal(
     let mut block = case.child("thermal")?;
     Some(Some(
         match one_or_pair(&mut block, ThermalBodyWords::members)? {
-            [Some(lower), Some(upper)] => ThermalWords::Pair { lower, upper },
-            [both, _] => ThermalWords::Same(both?),
+            [Some(lower), Some(upper)] => Thermal::Pair { lower, upper },
+            [both, _] => Thermal::Same(both?),
         },
     ))
 }

@@ -228,39 +228,39 @@ impl Swept {
 pub struct History {
     /// Distance rolled since the start in mm, never decreasing.
     #[member(with = course, closed(0.0, 1e9, "mm"), what = "an array of distances in mm")]
-    pub distance_mm: HistoryCourse,
+    pub distance_mm: Course,
     /// Longitudinal creepage.
     #[member(with = course, closed(-1e6, 1e6, ""))]
-    pub creepage_x: Option<HistoryCourse>,
+    pub creepage_x: Option<Course>,
     /// Lateral creepage.
     #[member(with = course, closed(-1e6, 1e6, ""))]
-    pub creepage_y: Option<HistoryCourse>,
+    pub creepage_y: Option<Course>,
     /// Spin in 1/mm.
     #[member(with = course, closed(-1e6, 1e6, "1/mm"))]
-    pub spin_per_mm: Option<HistoryCourse>,
+    pub spin_per_mm: Option<Course>,
     /// Longitudinal force on the lower body in N, in place of `creepage_x`; the creepages and shifts that produce it are computed.
     #[member(with = course, closed(-1e15, 1e15, "N"))]
-    pub force_x_n: Option<HistoryCourse>,
+    pub force_x_n: Option<Course>,
     /// Lateral force on the lower body in N, in place of `creepage_y`.
     #[member(with = course, closed(-1e15, 1e15, "N"))]
-    pub force_y_n: Option<HistoryCourse>,
+    pub force_y_n: Option<Course>,
     /// Rolling speed in mm/s; required by friction that falls with slip.
     #[member(positive(1e9, "mm/s"))]
     pub speed_mm_per_s: Option<f64>,
     /// Displacement of the upper body relative to the lower one along x in mm, since the previous point; 0 where the bodies roll.
     #[member(with = course, closed(-1e6, 1e6, "mm"))]
-    pub shift_x_mm: Option<HistoryCourse>,
+    pub shift_x_mm: Option<Course>,
     /// Displacement along y, as `shift_x_mm`.
     #[member(with = course, closed(-1e6, 1e6, "mm"))]
-    pub shift_y_mm: Option<HistoryCourse>,
+    pub shift_y_mm: Option<Course>,
     /// Rotation of the upper body relative to the lower one about z in rad, since the previous point; 0 where the bodies roll.
     #[member(with = course, closed(-10.0, 10.0, "rad"))]
-    pub turn_rad: Option<HistoryCourse>,
+    pub turn_rad: Option<Course>,
 }
 
 impl History {
     /// Returns the components with their names, the shifts last.
-    fn courses(&self) -> [(&'static str, Option<&HistoryCourse>); 8] {
+    fn courses(&self) -> [(&'static str, Option<&Course>); 8] {
         [
             ("creepage_x", &self.creepage_x),
             ("creepage_y", &self.creepage_y),
@@ -278,8 +278,7 @@ impl History {
 /// One value for all points of a history, or one value per point.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[serde(untagged)]
-#[schema(as = Course)]
-pub enum HistoryCourse {
+pub enum Course {
     /// One value for all points.
     Constant(f64),
     /// Equally spaced values.
@@ -288,22 +287,22 @@ pub enum HistoryCourse {
     Values(Vec<f64>),
 }
 
-impl HistoryCourse {
+impl Course {
     /// The number of values; 1 for a constant.
     pub fn points(&self) -> usize {
         match self {
-            HistoryCourse::Constant(_) => 1,
-            HistoryCourse::Range(range) => range.points as usize,
-            HistoryCourse::Values(values) => values.len(),
+            Course::Constant(_) => 1,
+            Course::Range(range) => range.points as usize,
+            Course::Values(values) => values.len(),
         }
     }
 
     /// Returns the value at each of `points` points.
     pub fn values(&self, points: usize) -> Vec<f64> {
         match self {
-            HistoryCourse::Constant(value) => vec![*value; points],
-            HistoryCourse::Range(range) => range.values(),
-            HistoryCourse::Values(values) => values.clone(),
+            Course::Constant(value) => vec![*value; points],
+            Course::Range(range) => range.values(),
+            Course::Values(values) => values.clone(),
         }
     }
 }
@@ -563,7 +562,7 @@ pub(crate) fn faults_of_history(block: &mut Object, read: Option<&History>) -> O
     let points = distances.len();
     for (name, course) in read.courses() {
         let count = match course {
-            None | Some(HistoryCourse::Constant(_)) => continue,
+            None | Some(Course::Constant(_)) => continue,
             Some(course) => course.points(),
         };
         if count != points {
@@ -585,7 +584,7 @@ pub(crate) fn faults_of_history(block: &mut Object, read: Option<&History>) -> O
 fn shifted_at_rest(
     block: &mut Object,
     name: &str,
-    course: &HistoryCourse,
+    course: &Course,
     distances: &[f64],
     start: HistoryStart,
 ) -> Option<()> {
@@ -602,25 +601,21 @@ fn shifted_at_rest(
         values[k]
     );
     match course {
-        HistoryCourse::Values(_) => block.refuse_element(name, k, detail),
+        Course::Values(_) => block.refuse_element(name, k, detail),
         _ => block.refuse(name, detail),
     }
 }
 
 /// Reads a number, an array of one value per point, or `{"from": …, "to": …, "points": …}`.
-pub(crate) fn course(
-    block: &mut Object,
-    name: &str,
-    allowed: AllowedRange,
-) -> Option<HistoryCourse> {
+pub(crate) fn course(block: &mut Object, name: &str, allowed: AllowedRange) -> Option<Course> {
     match block.value(name)? {
-        Value::Number(_) => block.number(name, allowed).map(HistoryCourse::Constant),
-        Value::Array(elements) if (1..=POINTS_MAX as usize).contains(&elements.len()) => block
-            .numbers(name, elements, allowed)
-            .map(HistoryCourse::Values),
+        Value::Number(_) => block.number(name, allowed).map(Course::Constant),
+        Value::Array(elements) if (1..=POINTS_MAX as usize).contains(&elements.len()) => {
+            block.numbers(name, elements, allowed).map(Course::Values)
+        }
         Value::Object(_) => {
             let (from, to, points) = block.child(name)?.range(allowed, 2, POINTS_MAX)?;
-            Some(HistoryCourse::Range(Range { from, to, points }))
+            Some(Course::Range(Range { from, to, points }))
         }
         _ => {
             let what = format!(

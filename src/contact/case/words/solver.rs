@@ -11,10 +11,10 @@ use utoipa::ToSchema;
 
 use crate::case::words::contact::{Contact, Load};
 use crate::case::words::friction::Friction;
-use crate::case::words::material::{Material, ThermalWords};
+use crate::case::words::material::{Material, Thermal};
 use crate::case::words::motion::Motions;
 use crate::case::words::object::{Object, names, shown, word};
-use crate::case::words::subsurface::{DamageWords, SubsurfaceWords};
+use crate::case::words::subsurface::{DamageWords, Subsurface};
 use crate::mesh::MeshSize;
 use crate::method::TractionBound;
 use crate::rolling::task::{RelativeTo, TARGET_LEAST, TARGET_USUAL};
@@ -160,11 +160,11 @@ pub struct Case {
     #[schema(required = false)]
     pub outputs: Vec<Output>,
     /// Points for the output `subsurface`, which computes stresses below the surface; default: only the worst point is found.
-    pub subsurface: Option<SubsurfaceWords>,
+    pub subsurface: Option<Subsurface>,
     /// Damage models for the output `damage`. Default: the models with confirmed parameters.
     pub damage: Option<DamageWords>,
     /// Thermal properties of the bodies, for the output `temperature`.
-    pub thermal: Option<ThermalWords>,
+    pub thermal: Option<Thermal>,
 }
 
 /// Reads the member `solver` of a case. The default is `auto` with the default target.

@@ -15,8 +15,7 @@ use crate::case::words::object::{
 #[none_is_absent]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_places)]
-#[schema(as = Subsurface)]
-pub struct SubsurfaceWords {
+pub struct Subsurface {
     /// Points `[x, y, depth]` in mm.
     #[member(with = points)]
     pub points_mm: Option<Vec<[f64; 3]>>,
@@ -363,8 +362,8 @@ const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
 /// Reads the member `subsurface` of a case, which belongs to the output `subsurface`.
 ///
 /// Returns `None` if a fault was recorded.
-pub(crate) fn read_subsurface(case: &mut Object, wanted: bool) -> Option<Option<SubsurfaceWords>> {
-    of_output(case, "subsurface", wanted, SubsurfaceWords::members)
+pub(crate) fn read_subsurface(case: &mut Object, wanted: bool) -> Option<Option<Subsurface>> {
+    of_output(case, "subsurface", wanted, Subsurface::members)
 }
 
 /// Reads the member that belongs to the output of its name. An absent one is read as an empty object if the output is wanted.
@@ -386,7 +385,7 @@ fn of_output<T>(
 }
 
 /// Refuses more than one kind of places, and a line without depths.
-pub(crate) fn faults_of_places(block: &mut Object, _: Option<&SubsurfaceWords>) -> Option<()> {
+pub(crate) fn faults_of_places(block: &mut Object, _: Option<&Subsurface>) -> Option<()> {
     if let [first, second, ..] = block.given(&PLACES)[..] {
         let detail = format!("given together with {first}; at most one of the two is allowed");
         return block.refuse(second, detail);
