@@ -10,9 +10,9 @@ use uuid::Uuid;
 
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, Fault, ProblemBody, Result};
-use railhead_contact::rolling::task::Motion;
 use railhead_contact::case::words::solver::{Case, Output};
 use railhead_contact::remark::entry::RemarkEntry;
+use railhead_contact::rolling::task::Motion;
 use railhead_contact::solution::words::answer::{
     ErrorEstimate, HistoryPoint, Origin, PatchPoint, Solution, Total, Zone,
 };
