@@ -327,7 +327,7 @@ impl NumberColumns {
         let is_optional =
             |name: &str| OPTIONAL_NUMBERS.contains(&name) || GRADIENT_NAMES.contains(&name);
         let is_wrong = |(name, number): &(&str, &f64)| {
-            !number.is_finite() && !(number.is_nan() && is_optional(name))
+            !(number.is_finite() || number.is_nan() && is_optional(name))
         };
         let mut named = self.names().into_iter().zip(numbers);
         named.find(is_wrong).map(|(name, _)| name)

@@ -215,7 +215,7 @@ impl WheelSolve<'_> {
             if let Some(wheelset) = &problem.wheelset {
                 let rigid = RigidMotion::of_wheelset(geometry, contact.centre, wheelset);
                 let motion = creepages(&rigid, centre[0], &place, &over);
-                point.motion = motion.into();
+                point.motion = motion;
                 point.normalised = normalised(&problem.elasticity, patch.area_mm2, limit, &motion);
             }
             let [along, y_share, z_share] = forces.sheared;
