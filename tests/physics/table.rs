@@ -424,3 +424,17 @@ fn a_patch_that_is_nearly_an_ellipse_is_met_within_its_bound_and_two_lobes_are_r
         "{error}"
     );
 }
+
+#[test]
+fn a_reduced_stiffness_has_the_forces_that_auto_takes_from_the_table() {
+    let reduced = json!({ "coefficient": 0.3, "reduction": 0.6 });
+    let forces = |method: &str| {
+        let mut case = good_with("/friction", reduced.clone());
+        case["solver"] = json!({ "method": method });
+        case["outputs"] = json!(["resultants"]);
+        let (solution, _) = solve(&case);
+        let point = solution.patches[0].points[0].clone();
+        [point.force_x_n, point.force_y_n, point.moment_z_n_mm]
+    };
+    assert_eq!(forces("table"), forces("auto"));
+}

@@ -9,6 +9,7 @@ use crate::case::words::contact::{Contact, OnRails, SurfaceName};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, Thermal};
 use crate::case::words::motion::Motions;
+use crate::case::words::solver::MethodName;
 use crate::case::words::subsurface::DamageModel;
 use crate::case::{after_tasks, contact_task, motions, wheel_task, wheelsets};
 use crate::error::Fault;
@@ -317,10 +318,12 @@ fn friction_fault(draft: &CaseDraft) -> Option<Fault> {
         let detail = "given for another contact than \"type\": \"profiles\" or \"wheelset\"; give y_mm instead";
         return Some(Fault::new("/friction/across/angle_rad", detail));
     }
-    if draft.may_use_boundary_elements() || friction.constant().is_some() {
+    let by_table = draft.method() == Some(MethodName::Table);
+    let reduced = by_table && friction.coefficient.is_some() && friction.layer.is_none();
+    if draft.may_use_boundary_elements() || friction.constant().is_some() || reduced {
         return None;
     }
-    let detail = "only a coefficient is covered by this method; boundary_element covers laws, layers and reductions";
+    let detail = "only a coefficient is covered by this method (table also covers a reduction); boundary_element covers laws, layers and reductions";
     Some(Fault::new("/friction", detail))
 }
 

@@ -449,7 +449,7 @@ remarks! {
         /// Error of forces due to the factors, relative to μN; it is part of the error estimates.
         error: @percent f64 = 0.035,
     }
-    advice: "The error is part of the estimates; `target_met` judges the rest of them. Give `reference_surface` \"plane\" to leave the factors out.",
+    advice: "The error is part of the estimates; `target_met` judges the rest of them. Give `influence` \"half_space\" to leave the factors out.",
     detail: format!(
         "the surface turns under the contact, which leaves forces uncertain by {error} % of μN, more than the target of {target} %"
     ),
