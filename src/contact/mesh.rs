@@ -1,7 +1,6 @@
-//! Strips fitted to the patch, cells graded toward both ends. The order of all cell values is defined here.
+//! Meshes of strips fitted to a patch, with cells graded towards both ends. This module defines the order of all values per cell.
 //!
-//! Cells are numbered segment by segment (segments sorted by patch, then y, then x), in each segment from the
-//! trailing end (smaller x) to the leading end (larger x).
+//! Cells are numbered segment by segment (sorted by patch, then y, then x), and in each segment from the trailing end (smaller x) to the leading end (larger x).
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -13,7 +12,7 @@ use utoipa::ToSchema;
 use crate::numerics::roots;
 use crate::numerics::roots::{CloseEnough, Course};
 
-/// How cells and nodes divide a chord that is mapped to `−1 … 1`.
+/// The division of a chord, mapped to `−1 … 1`, into cells with nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grading {
     /// The `n + 1` cell edges, from −1 to 1.
@@ -23,12 +22,12 @@ pub struct Grading {
 }
 
 impl Grading {
-    /// Edges `−cos(kπ/n)`, nodes at the mid-angles: cells are smallest at both ends, where traction varies as the square root of distance.
+    /// Edges `−cos(kπ/n)` with nodes at the mid-angles. Cells are smallest at both ends, where traction varies as the square root of distance.
     pub fn cosine(cells: usize) -> Grading {
         let at = |k: f64| -(k * PI / cells as f64).cos();
         let mut edges: Vec<f64> = (0..=cells).map(|k| at(k as f64)).collect();
         let mut nodes: Vec<f64> = (0..cells).map(|k| at(k as f64 + 0.5)).collect();
-        // Made exactly symmetric, because symmetry is recognised by comparing coordinates.
+        // Exact symmetry is required because it is detected by comparing coordinates.
         symmetrise(&mut edges);
         symmetrise(&mut nodes);
         Grading { edges, nodes }
@@ -73,15 +72,14 @@ impl Grading {
     }
 }
 
-/// Share β of the density of cells that is graded toward the ends when cells are also graded toward a pole. On the first 160 ellipses
-/// of `cargo bench --bench calibrate ellipse`, 0.6 and 0.9 change the median error at the targets 0.005 and 0.001 by 4 % at most; they
-/// take 24 and 5 % more work at the first target, 5 % less at the second.
+/// Share β of the density of cells that is graded towards the ends if cells are also graded towards a pole. On the first 160 ellipses of
+/// `cargo bench --bench calibrate ellipse`, 0.6 and 0.9 change the median error at the targets 0.005 and 0.001 by at most 4 %; they take 24 and 5 % more work at the
+/// first target, and 5 % less at the second.
 const GATHERED_AT_ENDS: f64 = 0.75;
-/// Weight g and half width d of the Lorentz bump `L(t) = 1/(πd(1 + t²/d²))` at the pole. Any weight from 0.08 to 0.25 and
-/// any half width from 0.05 to 0.15 work as well.
+/// Weight g and half width d of the Lorentzian `L(t) = 1/(πd(1 + t²/d²))` at the pole. Weights from 0.08 to 0.25 and half widths from 0.05 to 0.15 are alike.
 const BUMP: (f64, f64) = (0.15, 0.1);
 
-/// A density of cells or strips over −1 … 1 with a bump at the pole.
+/// A density of cells or strips over −1 … 1 with a peak at the pole.
 #[derive(Debug, Clone, Copy)]
 struct PoleGrading {
     pole: f64,
@@ -91,11 +89,7 @@ struct PoleGrading {
 impl PoleGrading {
     fn density(self, t: f64) -> f64 {
         let (weight, width) = BUMP;
-        let ends = if self.at_ends > 0.0 {
-            self.at_ends / (PI * (1.0 - t * t).max(1e-12).sqrt())
-        } else {
-            0.0
-        };
+        let ends = self.at_ends / (PI * (1.0 - t * t).max(1e-12).sqrt());
         let bump = weight / (PI * width * (1.0 + ((t - self.pole) / width).powi(2)));
         0.5 * (1.0 - self.at_ends) + ends + bump
     }
@@ -103,15 +97,11 @@ impl PoleGrading {
     fn cumulated(self, t: f64) -> f64 {
         let (weight, width) = BUMP;
         let bump = |t: f64| weight / PI * ((t - self.pole) / width).atan();
-        let ends = if self.at_ends > 0.0 {
-            self.at_ends * (0.5 + t.asin() / PI)
-        } else {
-            0.0
-        };
+        let ends = self.at_ends * (0.5 + t.asin() / PI);
         0.5 * (1.0 - self.at_ends) * (t + 1.0) + ends + bump(t) - bump(-1.0)
     }
 
-    /// The coordinate to the left of which `share` of the density lies; `from` is a coordinate left of it.
+    /// The coordinate to the left of which `share` of the density lies; `from` is a coordinate further left.
     fn place(self, share: f64, from: f64) -> f64 {
         if share <= 0.0 || share >= 1.0 {
             return 2.0 * share.clamp(0.0, 1.0) - 1.0;
@@ -158,14 +148,14 @@ pub struct Mesh {
     pub left: Vec<f64>,
     /// Leading edge of each cell, in mm.
     pub right: Vec<f64>,
-    /// Node of each cell, in mm: where displacement is evaluated and where its traction acts.
+    /// Node of each cell in mm, at which displacement is evaluated and the traction acts.
     pub node: Vec<f64>,
-    /// y in mm at which each segment's tractions act and its rigid slip is evaluated: the mid-line of the strip unless a more accurate y is known.
+    /// y in mm at which the tractions of each segment act and its rigid slip is evaluated: the mid-line of the strip unless a more accurate y is known.
     pub load_y: Vec<f64>,
 }
 
 impl Mesh {
-    /// Divides every chord in the same way. Chords come sorted by patch, then y, then x.
+    /// Divides every chord in the same way. Chords must be sorted by patch, then y, then x.
     pub fn new(chords: &[Chord], grading: &Grading) -> Mesh {
         let n = grading.cells();
         let mut mesh = Mesh {
@@ -211,7 +201,7 @@ impl Mesh {
         areas
     }
 
-    /// y in mm at which every cell's traction acts.
+    /// y in mm at which the traction of every cell acts.
     pub fn cell_load_y(&self) -> Vec<f64> {
         let mut ys = Vec::with_capacity(self.cells());
         for (segment, y) in self.segments.iter().zip(&self.load_y) {
@@ -220,7 +210,7 @@ impl Mesh {
         ys
     }
 
-    /// The same mesh, moved so that `origin` becomes `(0, 0)`, then with all lengths multiplied by `factor`.
+    /// The mesh moved so that `origin` becomes `(0, 0)`, then with all lengths multiplied by `factor`.
     #[must_use]
     pub fn normalised(&self, origin: [f64; 2], factor: f64) -> Mesh {
         let along = |values: &[f64]| values.iter().map(|x| (x - origin[0]) * factor).collect();
@@ -265,8 +255,7 @@ impl Mesh {
         }
     }
 
-    /// Is every segment its own image under x → −x, to the last bit? The influence of cells on points is then that of their images on the images
-    /// of the points.
+    /// Whether every segment is exactly its own image under x → −x. The influence of cells on points is then that of their images on the images of the points.
     pub fn is_reversible(&self) -> bool {
         let own_image = |segment: &Segment| {
             let cells = segment.cells.clone();
@@ -278,8 +267,8 @@ impl Mesh {
         self.segments.iter().all(own_image)
     }
 
-    /// The y about which segment `j` is the mirror image of segment `m − 1 − j` for every `j`, if there is one and
-    /// no segment is its own image. Lengths are compared to 1e-9 of the extent of the mesh, so that rounding to single precision keeps the line.
+    /// The y about which segment `j` is the mirror image of segment `m − 1 − j` for every `j`, if there is one and no segment is its own image. Lengths are compared to
+    /// 1e-9 of the extent of the mesh, a tolerance that rounding to single precision does not exceed.
     pub fn mirror_line(&self) -> Option<f64> {
         let m = self.segments.len();
         if m == 0 || m % 2 == 1 {
@@ -306,7 +295,7 @@ impl Mesh {
     }
 }
 
-/// `count` equal strips between `low` and `high` as `(y, dy)`, from smaller to larger y.
+/// `count` equal strips between `low` and `high` as `(y, dy)`, by increasing y.
 pub fn equal_strips(low: f64, high: f64, count: usize) -> Vec<(f64, f64)> {
     let dy = (high - low) / count as f64;
     let middle = 0.5 * (low + high);

@@ -1,4 +1,4 @@
-//! The tractions of a wheel on a rail about, by the table of creep forces, so that the height of the wheel is sought with them.
+//! Estimate of the tractions of a wheel on a rail from the table of creep forces, for the search for the height of the wheel.
 
 use crate::normal::footprint::LoadAcross;
 use crate::normal::wheel::WheelPatch;
@@ -7,14 +7,13 @@ use crate::rolling::load_ellipse::LoadEllipse;
 use crate::rolling::methods::table::solve::{forces, tells};
 use crate::rolling::task::Motion;
 
-/// Can the tractions be estimated for this problem? The table must know its physics, and creepages be given.
+/// Whether the tractions of a problem can be estimated: the table must cover its physics, and creepages must be given.
 pub(crate) fn can_estimate(problem: &Problem) -> bool {
     tells(&problem.elasticity, problem.interface, &problem.friction)
         && problem.forces.iter().all(|forces| *forces == [None; 2])
 }
 
-/// Forces of friction on the rail in N along x and across in a motion about the load centre of a patch, which is taken for the ellipse that carries its load
-/// the same way.
+/// Forces of friction on the rail in N along x and across, for a motion about the load centre of a patch. The patch is replaced by its equivalent ellipse.
 pub(crate) fn patch_forces(problem: &Problem, patch: &WheelPatch, motion: &Motion) -> [f64; 2] {
     let ellipse = LoadEllipse::of_samples(&patch.field, patch.number);
     let modulus = problem.interface.reduction * problem.elasticity.shear_modulus;

@@ -1,11 +1,8 @@
-//! Region and pressure of a motion of bodies that differ: pressure and tractions in turn, until each belongs to the other.
+//! Region and pressure of motions of dissimilar bodies: pressure and tractions are iterated until they agree.
 //!
-//! The pressure of unlike bodies makes the surfaces slip, and their tractions open and close the gap. The tractions are solved with the
-//! slips of the present pressure, the gap is changed by what they open, region and pressure are found anew, and so on (Panagiotopoulos
-//! 1975). Each round leaves a hundredth to a fifth of the change before it. The first round begins with the contact of a motion nearby, or with the
-//! one without tractions.
-//!
-//! The motions of bodies that differ: each has a region and a pressure of its own, because its tractions change them.
+//! The pressure of dissimilar bodies causes slip, and their tractions open and close the gap. Each round solves the tractions with the slips of the present pressure,
+//! changes the gap by the opening, and solves for region and pressure again (Panagiotopoulos 1975). It leaves a hundredth to a fifth of the previous change. The first
+//! round starts from the contact of a neighbouring motion, or from the one without tractions. Each motion has its own region and pressure.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -18,7 +15,7 @@ use crate::monitor::Monitor;
 use crate::normal::footprint::NormalTask;
 use crate::normal::gap::grid::GridFineness;
 use crate::normal::gap::surface::GapSurface;
-use crate::normal::gap::task::{GapTask, PreviewCache};
+use crate::normal::gap::task::GapTask;
 use crate::normal::hertz::{Ellipse, NormalLoad};
 use crate::normal_stage::SolvedFootprint;
 use crate::problem::checked_case::CheckedCase;
@@ -40,38 +37,37 @@ const MESH_OF_PRESSING: MeshSize = MeshSize {
     strips: 20,
     cells: 20,
 };
-/// Rounds at most; three suffice up to |K| = 0.25.
+/// Largest number of rounds; three suffice up to |K| = 0.25.
 const ROUNDS_MAX: usize = 6;
-/// Part of the change of a round that later ones would bring: the largest contraction seen is 0.2.
+/// Remaining change after a round over the change of the round. The largest contraction observed is 0.2.
 const LEFT: f64 = 0.25;
-/// Error of forces relative to μN over |K| that region and pressure leave: their edges are found with tractions of a mesh (12 contacts of
-/// `tests/physics/unlike.rs`, at most 0.022 where rolling is free, 0.009 elsewhere).
+/// Error of forces relative to μN over |K| due to region and pressure, whose edges follow from the tractions of a mesh (12 contacts of `tests/physics/unlike.rs`: at most
+/// 0.022 in free rolling, 0.009 elsewhere).
 pub(crate) const LEFT_BY_PRESSURE: f64 = 0.02;
-/// The change that is left has to be below this part of the target. Chosen by judgement; how much it matters was not measured.
+/// Largest remaining change over the target. Chosen by judgement.
 const PART_OF_TARGET: f64 = 0.3;
-/// The opening is sampled on so many points along each axis, over the patches and by a part of their size around them; beyond it
-/// is taken as constant. It is smooth but for the edges of the cells. On the 12 contacts of `tests/physics/unlike.rs` 81 points move forces by at
-/// most 0.0014 of μN; 25 take half the time, and the estimate of one contact no longer covers its error.
+/// Samples of the opening along each axis, over and around the patches; beyond them the opening is constant. It is smooth except at the edges of the cells. On the 12
+/// contacts of `tests/physics/unlike.rs` 81 samples change forces by at most 0.0014 of μN; 25 take half the time, but the estimate of one contact no longer covers its error.
 const SAMPLES: usize = 41;
-/// That part. Chosen by judgement; how much it matters was not measured.
+/// Width of the sampled margin around the patches over their size. Chosen by judgement.
 const AROUND: f64 = 0.25;
-/// Samples of the parabola across that stands for an ellipse, and how far they reach over its semi-axis. Parabolas are reproduced exactly.
+/// Number of samples on either side of the parabola across for an ellipse, and their reach over its semi-axis. Parabolas are reproduced exactly.
 const PARABOLA: (i32, f64) = (8, 6.0);
 
-/// A gap between bodies that differ, and the contact in it that knows nothing of tractions.
+/// A gap between bodies that differ, and its contact without tractions.
 #[derive(Debug)]
 pub(crate) struct UnlikeGap {
-    /// The gap of the undeformed bodies, and how they are pressed together.
+    /// The gap of the undeformed bodies and their load.
     pub(crate) task: GapTask,
     /// Region and pressure without tractions.
     pub(crate) without: SolvedFootprint,
 }
 
 impl UnlikeGap {
-    /// The gap of a case: of radii, an ellipse, or as given.
+    /// The gap of a case with radii, an ellipse or a gap.
     ///
     /// # Errors
-    /// Why there is no contact without tractions; or the monitor stopped the work.
+    /// The reason why there is no contact without tractions; or the monitor stopped the work.
     pub(crate) fn of_case(
         case: &CheckedCase,
         monitor: &dyn Monitor,
@@ -82,10 +78,10 @@ impl UnlikeGap {
         })
     }
 
-    /// Region and pressure of a case of one motion, from those of a `neighbour` on, where there is one.
+    /// Region and pressure of a case of one motion, starting from those of a `neighbour` if there is one.
     ///
     /// # Errors
-    /// A named reason why there is no answer; or the monitor stopped the work.
+    /// The reason why there is no solution; or the monitor stopped the work.
     pub(crate) fn solve(
         &self,
         operators: &Arc<OperatorStore>,
@@ -98,8 +94,7 @@ impl UnlikeGap {
         let target = case.run.resolution.target_or_usual();
         let mut fineness = GridFineness::for_answer(case.run.target());
         if case.problem.history.is_some() {
-            // Peaks that only finer grids see are those of the coarse cells of the tractions; whether the gap itself is rough was found out
-            // without tractions.
+            // Finer grids would only resolve the coarse cells of the tractions. The contact without tractions shows whether the gap is rough.
             fineness = fineness.alone();
         }
         let workspace = &mut GridWorkspace::default();
@@ -113,7 +108,6 @@ impl UnlikeGap {
             before = Some(force);
             let task = GapTask {
                 gap,
-                seen: PreviewCache::default(),
                 ..self.task.clone()
             };
             found = Some(normal_stage::solve_gap(
@@ -149,10 +143,10 @@ impl UnlikeGap {
     }
 }
 
-/// The case as the rounds solve it: for resultants, no more closely than they need.
+/// The case as solved in the rounds, for resultants only and with their accuracy.
 fn rough(case: &CheckedCase) -> CheckedCase {
     let mut rough = CheckedCase {
-        // The opening follows from tractions, whose error counts K times.
+        // An error of the tractions changes the opening by K times as much.
         run: case.run.for_resultants(TARGET_USUAL),
         ..case.clone()
     };
@@ -171,7 +165,7 @@ fn rounds_used_up(residual: f64, tolerance: f64) -> Remark {
     }
 }
 
-/// The gap of a case, and how it is loaded; that of an ellipse is a paraboloid.
+/// The gap of a case with its load; that of an ellipse is a paraboloid.
 fn gap_task(case: &CheckedCase) -> GapTask {
     let modulus = case.problem.elasticity.contact_modulus();
     let ellipse = match &case.problem.task {
@@ -190,11 +184,10 @@ fn gap_task(case: &CheckedCase) -> GapTask {
         gap: paraboloid(&ellipse, modulus),
         loading,
         contact_modulus: modulus,
-        seen: PreviewCache::default(),
     }
 }
 
-/// The gap that an ellipse belongs to.
+/// The gap of a Hertzian ellipse.
 fn paraboloid(ellipse: &Ellipse, modulus: f64) -> GapSurface {
     let [along, across] = ellipse.curvatures(modulus);
     let (count, reach) = PARABOLA;
@@ -204,8 +197,8 @@ fn paraboloid(ellipse: &Ellipse, modulus: f64) -> GapSurface {
     GapSurface::profile(0.5 / along, &y, &gap)
 }
 
-/// The gap with what the tractions under a pressure open, and their force over the friction limit; where bodies are
-/// only pressed together, what stands for it.
+/// The gap with the opening by the tractions under a pressure, and the force of the tractions over the friction limit; where bodies are only pressed together, the result of
+/// [`pressed_out`].
 fn opened(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -214,7 +207,7 @@ fn opened(
     watch: &TimeLimit,
 ) -> Result<(GapSurface, [f64; 2]), SolveError> {
     let rolling = RollingTask {
-        // The tractions of the three-point rule come with the slips.
+        // Smooth slips come with the tractions of the three-point rule.
         wants_slips: true,
         ..case.rolling_task(&solved.footprint)
     };
@@ -241,7 +234,7 @@ fn opened(
     };
     let elasticity = &case.problem.elasticity;
     let unit = level.scale.traction / elasticity.shear_modulus;
-    // Those of the three-point rule are smooth, the others alternate where they stick.
+    // The tractions of the three-point rule are smooth, those of the trapezoid rule alternate where they stick.
     let found = &fields.tangential;
     let traction = found.second.as_ref().unwrap_or(&found.traction);
     let traction = [0, 1].map(|k| traction[k].iter().map(|t| t * unit).collect::<Vec<f64>>());
@@ -270,7 +263,7 @@ fn opened(
     Ok((task.gap.changed(&x, &y, &rows), force))
 }
 
-/// What the tractions of a pressing, whose forces balance, come to along x and across: the sums of their sizes over the friction limit.
+/// Sums of the sizes of the tractions of a pressing along x and across, over the friction limit. Their forces balance.
 fn pressed_out(level: &StripMesh, traction: &[Vec<f64>; 2], limit: f64) -> [f64; 2] {
     let unit = level.scale.traction / limit;
     [0, 1].map(|k| {
@@ -279,7 +272,7 @@ fn pressed_out(level: &StripMesh, traction: &[Vec<f64>; 2], limit: f64) -> [f64;
     })
 }
 
-/// Points over an extent and around it, inside the limits of the data.
+/// Sample points over and around an extent, within the limits of the data.
 fn axis([low, high]: [f64; 2], [least, most]: [f64; 2]) -> Vec<f64> {
     let (count, around) = (SAMPLES, AROUND * (high - low));
     let (low, high) = ((low - around).max(least), (high + around).min(most));
@@ -291,11 +284,11 @@ fn distance([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {
     (a - c).hypot(b - d)
 }
 
-/// Solves every motion of a case in a gap; region and pressure of each are sought from those of the motion before. The patches of the answer
-/// are those of the first motion; where a case has several, their points say what belongs to each.
+/// Solves every motion of a case in a gap; region and pressure of each start from those of the previous motion. The patches of the solution are those of the first motion;
+/// with several motions, each point has its own region.
 ///
 /// # Errors
-/// Why a motion has no answer; or the monitor stopped the work.
+/// The reason why a motion has no solution; or the monitor stopped the work.
 pub(crate) fn solve(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
@@ -334,8 +327,8 @@ pub(crate) fn solve(
     Ok(answer)
 }
 
-/// The contact of a motion, with as many patches as that without tractions: an answer has one list of patches. Where tractions part or join
-/// them, the motion is answered on the patches without tractions, and a remark says so.
+/// The contact of a motion with as many patches as without tractions, because a solution has one list of patches. If tractions divide or join patches, the motion is solved
+/// on the patches without tractions, with a remark.
 fn with_patches_of(
     gap: &UnlikeGap,
     solved: SolvedFootprint,
@@ -360,7 +353,7 @@ fn with_patches_of(
     kept
 }
 
-/// Writes region and pressure of the one motion of a patch into its point.
+/// Writes region and pressure of a patch to the point of its only motion.
 pub(crate) fn tell_region(patch: &mut PatchSolution) {
     let region = patch.region();
     for point in &mut patch.points {

@@ -9,7 +9,7 @@ use crate::geometry::profile::{LengthUnit, Profile};
 use crate::geometry::wheel_rail::RailPlace;
 use crate::normal::footprint::NormalTask;
 use crate::normal::gap::surface::GapSurface;
-use crate::normal::gap::task::{GapTask, PreviewCache};
+use crate::normal::gap::task::GapTask;
 use crate::normal::hertz::{Ellipse, NormalLoad, Patch};
 use crate::normal::pressure_field::field::PressureField;
 use crate::remark::entry::RemarkEntry;
@@ -108,7 +108,6 @@ fn gap(
         gap: surface(),
         loading,
         contact_modulus,
-        seen: PreviewCache::default(),
     };
     contact
         .check()

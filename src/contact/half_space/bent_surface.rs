@@ -1,29 +1,30 @@
 //! Influence between the cells of a contact surface that bends around the rail.
 //!
-//! The surface is unfolded: cells are equal rectangles along x and along the arc length s of the cross-section, whose tangent has the angle α. With
-//! `A` the normal influence of the half-space at the distances `x` and `d = s_j − s_k`, and `Δ = α_j − α_k` the turn from the loaded strip k to
-//! the strip j, both bodies together:
+//! The surface is unfolded: cells are equal rectangles along x and along the arc length s of the cross-section, whose tangent has the angle α. Let `A` be the normal
+//! influence of the half-space at the distances `x` and `d = s_j − s_k`, and `Δ = α_j − α_k` the turn from the loaded strip k to the strip j. For both bodies
+//! together:
 //!
 //! - pressure opens the gap by `cos(1.25 Δ) A`,
 //! - pressure displaces the surfaces along s by `−2κ sin(Δ/2) A`, and tractions along s open the gap by the opposite,
-//! - pressure displaces them along x by `−(Δ/d) x (a + b d²/r²) A` (`−Δ/d` is `−dα/ds` on the strip itself), tractions along x open the gap by the
-//!   opposite,
+//! - pressure displaces them along x by `−(Δ/d) x (a + b d²/r²) A` (`−Δ/d` is `−dα/ds` on the strip itself), and tractions along x open the gap by the opposite,
 //! - tangential displacements by tractions are those of the half-space,
-//! - where the bodies differ, tractions open the gap as on a half-space besides, times the factor of the pressures. What pressures displace there is left to
-//!   the equations of the tractions.
+//! - where the bodies differ, tractions also open the gap as on a half-space, times the factor of the pressures. The equations of the tractions contain the
+//!   corresponding displacements by pressures.
 //!
-//! The factors were fitted to boundary elements of two equal bodies that follow an arc between straight flanks. They leave forces within 1.5 % of μN
-//! for turns up to 1.25 rad.
+//! The factors were fitted to boundary elements of two equal bodies that follow an arc between straight flanks. Forces differ by at most 1.5 % of μN for turns up to
+//! 1.25 rad.
 
 use std::cmp::Ordering;
+use std::sync::Arc;
 
 use pulp::{NullaryFnOnce, Simd, WithSimd};
 use railhead_macros::Words;
 use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::half_space::grid_operator::{FftPlanners, FftPlans, coefficients, lines};
+use crate::half_space::grid_operator::{coefficients, lines, smooth};
 use crate::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
 use crate::lazy_field::LazyField;
 use crate::numerics::simd::{self, LANES};
@@ -40,28 +41,27 @@ pub enum Influence {
     HalfSpace,
 }
 
-/// Turn up to which the factors were compared with boundary elements, in rad.
+/// Largest turn in rad for which the factors were compared with boundary elements.
 pub const TURN_MAX: f64 = 1.25;
-/// The factor of the turn in the influence of pressures on the gap.
+/// Factor of the turn in the influence of pressures on the gap.
 const TURN_OF_PRESSURE: f64 = 1.25;
 
-/// The strips of a surface, equally wide.
+/// The strips of a surface, of equal width.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BentStrips {
     /// The place of each strip, in widths of a strip.
     pub number: Vec<usize>,
     /// The angle of each strip in rad.
     pub angle: Vec<f64>,
-    /// The run of contact that each strip belongs to; runs do not act on each other.
+    /// The run of contact of each strip; runs do not interact.
     pub run: Vec<usize>,
-    /// Do the factors for the turn apply?
+    /// Whether the factors for the turn apply.
     pub corrected: bool,
 }
 
-/// Normal displacements and gaps of cells of a bent surface by pressures and tractions on them.
+/// Normal displacements and gaps of cells of a curved surface by pressures and tractions on them.
 ///
-/// A product transforms the strips along x and sums them wave by wave, with a factor for each pair of strips. Strips may leave out parts of the
-/// surface without contact.
+/// A product transforms the strips along x and sums them wave by wave with a factor for each pair of strips. Parts of the surface without contact may be left out.
 pub struct BentOperator {
     strips: BentStrips,
     /// Cells along x, and size of a cell along x and s in mm.
@@ -69,13 +69,15 @@ pub struct BentOperator {
     step: [f64; 2],
     /// Padded length of a strip.
     width: usize,
-    plans: FftPlans,
-    /// The normal influence of a cell; and that along x at other strips, over the turn, and at its own strip, over its curvature.
+    /// Forward and inverse transform of a padded strip.
+    plans: [Arc<dyn Fft<f32>>; 2],
+    /// Normal influence of a cell.
     normal: Spectrum,
+    /// Influence along x: on other strips over the turn, on its own strip over the curvature.
     along: Option<Spectrum>,
-    /// The displacements along x and along s by a cell's pressure where the bodies differ.
+    /// Displacements along x and along s by the pressure of a cell, if the bodies differ.
     unlike: Option<[Spectrum; 2]>,
-    /// Factors of the influence along x and along s between pressures and tractions.
+    /// Factors of the influence between pressures and tractions along x and along s.
     coupled: LazyField<[StripFactors; 2]>,
     /// 2κ.
     coupling: f64,
@@ -87,12 +89,12 @@ pub struct BentOperator {
 #[derive(Debug, Clone, PartialEq)]
 pub struct StripFactors(Vec<f32>);
 
-/// Transforms of an influence by the distance of two strips: for each group of [`LANES`] waves, and there for each distance from the largest negative to
-/// the largest positive one, real numbers. An odd influence has `i` times these.
+/// Transforms of an influence for each distance of two strips, from the largest negative to the largest positive one, in each group of [`LANES`] waves. They are real;
+/// the transform of an odd influence is `i` times these.
 type Spectrum = Vec<[f32; LANES]>;
 
 impl BentOperator {
-    /// The operator of `nx` cells along x of sizes `step` in mm on some strips.
+    /// The operator of `nx` cells along x of sizes `step` in mm on strips.
     pub fn new(
         nx: usize,
         step: [f64; 2],
@@ -110,7 +112,7 @@ impl BentOperator {
             step[1],
             elasticity.contact_modulus(),
         );
-        let width = smooth(2 * nx - 1);
+        let width = smooth(2 * nx - 1, false);
         let mut used = vec![false; distances];
         for of in &strips.number {
             strips
@@ -122,7 +124,10 @@ impl BentOperator {
             nx,
             step,
             width,
-            plans: workspace.planners.plans(width),
+            plans: [
+                workspace.planner.plan_fft_forward(width),
+                workspace.planner.plan_fft_inverse(width),
+            ],
             normal: Vec::new(),
             along: None,
             unlike: None,
@@ -160,8 +165,8 @@ impl BentOperator {
         operator
     }
 
-    /// The spectrum of an influence by the distances in cells along x and in strips, for those that are used. It is the same at the negative
-    /// distance along x times `parity`.
+    /// The spectrum of an influence, given for distances in cells along x and in strips, for the used distances of strips. At negative distances along x it is multiplied
+    /// by `parity`.
     fn spectrum(
         &self,
         used: &[bool],
@@ -170,7 +175,7 @@ impl BentOperator {
         workspace: &mut BentWorkspace,
     ) -> Spectrum {
         let (nx, width) = (self.nx, self.width);
-        // A product takes twice the spectra of its strips.
+        // A product uses twice the spectra of its strips.
         let scale = 0.5 / width as f64;
         let needed: Vec<usize> = (0..used.len()).filter(|j| used[*j]).collect();
         let lines = &mut workspace.lines;
@@ -189,7 +194,7 @@ impl BentOperator {
                 }
             }
         }
-        self.transform(&*self.plans.forward, lines, &mut workspace.scratch);
+        self.transform(&*self.plans[0], lines, &mut workspace.scratch);
         let last = used.len() - 1;
         let distances = 2 * last + 1;
         let mut spectrum = vec![[0.0; LANES]; distances * self.groups()];
@@ -217,7 +222,7 @@ impl BentOperator {
 
     fn transform(
         &self,
-        plan: &dyn rustfft::Fft<f32>,
+        plan: &dyn Fft<f32>,
         lines: &mut [Complex<f32>],
         scratch: &mut Vec<Complex<f32>>,
     ) {
@@ -238,7 +243,7 @@ impl BentOperator {
         self.coefficients[self.nx - 1]
     }
 
-    /// Factors by the number of the strip acted on and of the one that acts.
+    /// Factors as a function of the strip acted on and the acting strip.
     fn factors(&self, of: impl Fn(usize, usize) -> f64) -> StripFactors {
         let count = self.strips.number.len();
         let mut factors = Vec::with_capacity(count * count);
@@ -248,13 +253,13 @@ impl BentOperator {
         StripFactors(factors)
     }
 
-    /// Sines and cosines of the angles of the strips times a factor: those of turns follow by products.
+    /// Sines and cosines of the angles of the strips times a factor. Those of turns are sums of their products.
     fn sines(&self, of_angle: f64) -> Vec<(f64, f64)> {
         let angles = self.strips.angle.iter();
         angles.map(|angle| (of_angle * angle).sin_cos()).collect()
     }
 
-    /// The factors of the gaps that pressures open.
+    /// The factors of the gaps opened by pressures.
     pub fn pressure_factors(&self) -> StripFactors {
         let run = &self.strips.run;
         if !self.strips.corrected {
@@ -264,7 +269,7 @@ impl BentOperator {
         self.factors(|j, k| sines[j].0 * sines[k].0 + sines[j].1 * sines[k].1)
     }
 
-    /// The same factors over those of a weight of each strip acted on and of each that acts.
+    /// These factors over the weights of the strip acted on and of the acting strip.
     pub fn weighted_pressure_factors(&self, weights: &[f64]) -> StripFactors {
         let StripFactors(mut factors) = self.pressure_factors();
         for (row, of) in factors.chunks_exact_mut(weights.len()).zip(weights) {
@@ -275,13 +280,13 @@ impl BentOperator {
         StripFactors(factors)
     }
 
-    /// 2κ sin(Δ/2) between strips.
+    /// Factors `2κ sin(Δ/2)` between strips.
     fn turn_factors(&self) -> StripFactors {
         let sines = self.sines(0.5);
         self.factors(|j, k| self.coupling * (sines[j].0 * sines[k].1 - sines[j].1 * sines[k].0))
     }
 
-    /// Δ between strips, and `−dα/ds` of one on itself.
+    /// Factors Δ between strips, and `−dα/ds` of a strip on itself.
     fn bend_factors(&self) -> StripFactors {
         let BentStrips { angle, number, .. } = &self.strips;
         let own = curvatures(angle, number, self.step[1]);
@@ -292,7 +297,7 @@ impl BentOperator {
         })
     }
 
-    /// The gap in mm that pressures in MPa open.
+    /// The gap in mm opened by pressures in MPa.
     pub fn opened_by_pressure(
         &self,
         factors: &StripFactors,
@@ -303,7 +308,7 @@ impl BentOperator {
         self.product(&self.normal, factors, pressure, false, gap, workspace);
     }
 
-    /// Adds the gap in mm that changed pressures in MPa open, cell by cell.
+    /// Adds the gap in mm opened by changed pressures in MPa, cell by cell.
     pub fn add_opened(&self, factors: &StripFactors, changes: &[(usize, f64)], gap: &mut [f64]) {
         simd::dispatch(Changes {
             operator: self,
@@ -313,7 +318,7 @@ impl BentOperator {
         });
     }
 
-    /// The gap in mm that tractions on the rail in MPa, along x and s, open; none under like bodies on a surface without factors for the turn.
+    /// The gap in mm opened by tractions on the rail in MPa, along x and s. `None` for like bodies without factors for the turn.
     pub fn opened_by_traction(
         &self,
         [x, s]: &[Vec<f64>; 2],
@@ -360,8 +365,8 @@ impl BentOperator {
         [even, StripFactors(odd)]
     }
 
-    /// The slip that pressures in MPa cause in steady rolling, along x and s: the derivatives along x of the displacements of the rail relative to the
-    /// wheel; none on a surface without factors for the turn.
+    /// The slip by pressures in MPa in steady rolling, along x and s: the derivatives along x of the displacements of the rail relative to the wheel. `None` without factors
+    /// for the turn.
     pub fn slip_of_pressure(
         &self,
         pressure: &[f64],
@@ -372,7 +377,7 @@ impl BentOperator {
         Some([along, across].map(|displacement| self.derivative(&displacement)))
     }
 
-    /// The displacements along x by the first values, and the product of the second ones with `2κ sin(Δ/2) A`.
+    /// The displacements along x by the first values, and the product of the second values with `2κ sin(Δ/2) A`.
     fn coupled(
         &self,
         first: &[f64],
@@ -390,7 +395,7 @@ impl BentOperator {
         Some(out)
     }
 
-    /// The values at all cells by an influence, which may be odd along x, with a factor for each pair of strips.
+    /// The product of an influence, which may be odd along x, with values at all cells, with a factor for each pair of strips.
     fn product(
         &self,
         spectrum: &Spectrum,
@@ -418,7 +423,7 @@ impl BentOperator {
             out.fill(0.0);
             return;
         }
-        // Numbers of about 1 fit single precision, whatever the pressures are.
+        // Single precision needs values of about 1.
         let down = largest.recip();
         lines.clear();
         lines.resize(count.div_ceil(2) * width, Complex::default());
@@ -435,7 +440,7 @@ impl BentOperator {
             }
         }
         let transformed = acting.len().div_ceil(2) * width;
-        self.transform(&*self.plans.forward, &mut lines[..transformed], scratch);
+        self.transform(&*self.plans[0], &mut lines[..transformed], scratch);
         from.resize(
             acting.len().next_multiple_of(2) * self.groups(),
             [[0.0; LANES]; 2],
@@ -452,7 +457,7 @@ impl BentOperator {
             from,
             to,
         });
-        self.transform(&*self.plans.backward, lines, scratch);
+        self.transform(&*self.plans[1], lines, scratch);
         for (rows, line) in out.chunks_mut(2 * nx).zip(lines.chunks_exact(width)) {
             let (one, other) = rows.split_at_mut(nx);
             for (out, value) in one.iter_mut().zip(line) {
@@ -491,22 +496,35 @@ impl std::fmt::Debug for BentOperator {
     }
 }
 
-/// Buffers of products, and plans of transforms.
-#[derive(Default)]
+/// Buffers of products, and plans of transforms. A solve uses few padded sizes, and planning one takes 2 to 14 µs, about a tenth of a product, so plans are kept only
+/// during a solve.
 pub struct BentWorkspace {
-    planners: FftPlanners,
+    planner: FftPlanner<f32>,
     /// Strips, two as the real and the imaginary part of one line.
     lines: Vec<Complex<f32>>,
     scratch: Vec<Complex<f32>>,
     /// Strips with values other than 0.
     acting: Vec<usize>,
-    /// Transforms of acting strips, and of all: for each group of waves, and there for each strip, the real and the imaginary parts.
+    /// Transforms of acting strips: for each group of waves and each strip, the real and the imaginary parts.
     from: Vec<[[f32; LANES]; 2]>,
+    /// Transforms of all strips.
     to: Vec<[[f32; LANES]; 2]>,
 }
 
-/// Takes the transforms of acting strips, two in a line, and leaves those of all strips, two in a line; compiled for the instruction set of this
-/// machine.
+impl Default for BentWorkspace {
+    fn default() -> Self {
+        BentWorkspace {
+            planner: FftPlanner::new(),
+            lines: Vec::new(),
+            scratch: Vec::new(),
+            acting: Vec::new(),
+            from: Vec::new(),
+            to: Vec::new(),
+        }
+    }
+}
+
+/// Sums over the transforms of acting strips, two in a line, for all strips, two in a line; compiled for the instruction set of the machine.
 struct StripSums<'a> {
     spectrum: &'a Spectrum,
     factors: &'a [f32],
@@ -529,8 +547,8 @@ struct GroupSums<'a> {
 }
 
 impl GroupSums<'_> {
-    /// The real and the imaginary parts of `STRIPS` strips that adjoin each other, the first of which is `first`. Each transform that acts is loaded once for
-    /// all of them, and their sums are independent of each other, which hides the latency of the additions.
+    /// The real and the imaginary parts of `STRIPS` adjoining strips from `first` on. Each acting transform is loaded once for all of them, and their sums are independent,
+    /// which hides the latency of the additions.
     #[inline(always)]
     fn of<S: Simd, const STRIPS: usize>(
         &self,
@@ -563,7 +581,7 @@ impl GroupSums<'_> {
         found
     }
 
-    /// Leaves the sums of `STRIPS` strips from `first` on in `to` if they adjoin each other; says how many were summed.
+    /// Writes the sums of `STRIPS` strips from `first` on to `to` if they adjoin each other; returns the number of summed strips.
     #[inline(always)]
     fn leave<S: Simd, const STRIPS: usize>(
         &self,
@@ -614,7 +632,7 @@ impl WithSimd for StripSums<'_> {
                 for (k, here) in line[first..waves].iter().take(LANES).enumerate() {
                     let wave = first + k;
                     let there = line[if wave == 0 { 0 } else { width - wave }];
-                    // The even part belongs to the real line, the odd one to the imaginary line.
+                    // The even part belongs to the real line, the odd part to the imaginary line.
                     (one[0][k], one[1][k]) = (here.re + there.re, here.im - there.im);
                     (other[0][k], other[1][k]) = (here.im + there.im, there.re - here.re);
                 }
@@ -631,7 +649,7 @@ impl WithSimd for StripSums<'_> {
             let to = &mut to[group * to_all..][..count];
             let mut first = 0;
             while first < count {
-                // The sums of eight strips fit into the registers where these hold all waves of a group.
+                // The sums of eight strips fit into the registers if these hold all waves of a group.
                 let mut done = 0;
                 if S::F32_LANES == LANES {
                     done = sums.leave::<S, 8>(simd, first, to);
@@ -667,7 +685,7 @@ impl WithSimd for StripSums<'_> {
     }
 }
 
-/// `−dα/ds` of each strip in 1/mm, by the strips before and after it.
+/// `−dα/ds` of each strip in 1/mm, from the strips before and after it.
 fn curvatures(angle: &[f64], number: &[usize], width: f64) -> Vec<f64> {
     let last = angle.len() - 1;
     let of = |j: usize| {
@@ -680,21 +698,7 @@ fn curvatures(angle: &[f64], number: &[usize], width: f64) -> Vec<f64> {
     (0..=last).map(of).collect()
 }
 
-/// The least number not below `n` without prime factors above 5.
-fn smooth(n: usize) -> usize {
-    let is_smooth = |n: &usize| {
-        let mut n = *n;
-        for factor in [2, 3, 5] {
-            while n.is_multiple_of(factor) {
-                n /= factor;
-            }
-        }
-        n == 1
-    };
-    (n.max(1)..).find(is_smooth).unwrap_or(n)
-}
-
-/// Changed pressures, and the gap that they change.
+/// Changed pressures, and the gap to be updated.
 struct Changes<'a> {
     operator: &'a BentOperator,
     factors: &'a StripFactors,

@@ -1,6 +1,5 @@
-//! Normal influence between equal rectangles on a regular grid, applied as a convolution by transforms along both axes.
-//!
-//! Fourier transforms of the lines of a grid. They have single precision, which takes half the time of double precision.
+//! Normal influence between equal rectangles on a regular grid, applied as a convolution by Fourier transforms along both axes. Single precision takes half the time
+//! of double precision.
 
 use std::sync::Arc;
 
@@ -12,12 +11,11 @@ use rustfft::{Fft, FftPlanner};
 use crate::numerics::simd;
 use crate::numerics::simd::Float;
 
-/// Normal displacement at the centres of `nx` by `ny` equal rectangles caused by uniform pressures on them, both bodies
-/// together.
+/// Normal displacement of both bodies together at the centres of `nx` by `ny` equal rectangles by uniform pressures on them.
 ///
-/// With `E* = G/(1−ν)` the displacement is `1/(πE*) Σ p [[ q asinh(p/|q|) + p asinh(q/|p|) ]]` (Boussinesq; Love 1929),
-/// the coefficient [`rectangle`](crate::half_space::kernels::rectangle) calls `zz`. Values are stored at
-/// `j * nx + i`, i along x. The product equals that of the dense matrix to about 1e-6 of the largest displacement.
+/// With `E* = G/(1−ν)` the displacement is `1/(πE*) Σ p [[ q asinh(p/|q|) + p asinh(q/|p|) ]]` (Boussinesq; Love 1929), the coefficient `zz` of
+/// [`rectangle`](crate::half_space::kernels::rectangle). Values are stored at `j * nx + i`, i along x. The product equals that of the dense matrix to about 1e-6 of the
+/// largest displacement.
 pub struct GridOperator {
     nx: usize,
     ny: usize,
@@ -25,8 +23,7 @@ pub struct GridOperator {
     own: f64,
     /// Coefficients at a distance of i and j cells, i from `1 − nx` to `nx − 1` and j from 0, row by row.
     coefficients: Vec<f64>,
-    /// Transform of the coefficients relative to `own`, divided by the padded sizes, wave by wave along x. It is real because the coefficients
-    /// are even.
+    /// Transform of the coefficients relative to `own`, divided by the padded sizes, wave by wave along x. It is real because the coefficients are even.
     factors: Vec<f32>,
     plans: GridPlans,
 }
@@ -39,14 +36,14 @@ struct GridPlans {
     across: [Arc<dyn Fft<f32>>; 2],
 }
 
-/// Plans and buffers for the products of one solve. It fits grids of any size and carries no state from one product to the next.
+/// Plans and buffers for products with grids of any size. It carries no state from one product to the next.
 pub struct GridWorkspace {
     along: RealFftPlanner<f32>,
     across: FftPlanner<f32>,
     row: Vec<f32>,
     /// Waves of one row.
     waves: Vec<Complex<f32>>,
-    /// Waves of all rows: those of one wave along x after those of another.
+    /// Waves of all rows, grouped by their wave along x.
     columns: Vec<Complex<f32>>,
     scratch: Vec<Complex<f32>>,
 }
@@ -66,7 +63,7 @@ impl Default for GridWorkspace {
 
 impl GridWorkspace {
     fn plans(&mut self, nx: usize, ny: usize) -> GridPlans {
-        let [width, height] = [nx, ny].map(|cells| smooth_even(2 * cells));
+        let [width, height] = [nx, ny].map(|cells| smooth(2 * cells, true));
         GridPlans {
             rows: [width, height],
             forward: self.along.plan_fft_forward(width),
@@ -78,7 +75,7 @@ impl GridWorkspace {
         }
     }
 
-    /// Transforms the rows for which `fill` writes values into a buffer of zeros; the others are 0.
+    /// Transforms the rows that `fill` writes into a buffer of zeros; `fill` returns false for rows of zeros.
     fn forward(&mut self, plans: &GridPlans, mut fill: impl FnMut(usize, &mut [f32]) -> bool) {
         let [width, height] = plans.rows;
         let zero = Complex::default();
@@ -99,7 +96,7 @@ impl GridWorkspace {
             if !fill(j, &mut self.row) {
                 continue;
             }
-            // The buffers have the lengths of the plans, so that no transform can fail.
+            // The buffers have the lengths of the plans, so no transform can fail.
             let done = plans.forward.process_with_scratch(
                 &mut self.row,
                 &mut self.waves,
@@ -113,7 +110,7 @@ impl GridWorkspace {
         plans.across[0].process_with_scratch(&mut self.columns, &mut self.scratch);
     }
 
-    /// Transforms back, and hands over the first rows.
+    /// Transforms back and passes the first rows to `take`.
     fn backward(&mut self, plans: &GridPlans, rows: usize, mut take: impl FnMut(usize, &[f32])) {
         let [_, height] = plans.rows;
         plans.across[1].process_with_scratch(&mut self.columns, &mut self.scratch);
@@ -121,7 +118,7 @@ impl GridWorkspace {
             for (column, wave) in self.columns.chunks_exact(height).zip(&mut self.waves) {
                 *wave = column[j];
             }
-            // Rounding leaves imaginary parts where a real row has none.
+            // A real row has no imaginary parts here; rounding leaves some.
             self.waves[0].im = 0.0;
             let last = self.waves.len() - 1;
             self.waves[last].im = 0.0;
@@ -239,9 +236,11 @@ impl NullaryFnOnce for Addition<'_> {
     }
 }
 
-/// The smallest even number not below `n` with no prime factor above 5, because transforms of such lengths are fast.
-fn smooth_even(n: usize) -> usize {
-    let smooth = |mut n: usize| {
+/// The smallest number not below `n`, even if `even`, with no prime factor above 5, because transforms of such lengths are fast.
+pub(crate) fn smooth(n: usize, even: bool) -> usize {
+    let step = if even { 2 } else { 1 };
+    let is_smooth = |n: &usize| {
+        let mut n = *n;
         for factor in [2, 3, 5] {
             while n.is_multiple_of(factor) {
                 n /= factor;
@@ -249,11 +248,8 @@ fn smooth_even(n: usize) -> usize {
         }
         n == 1
     };
-    let mut n = n.next_multiple_of(2).max(2);
-    while !smooth(n) {
-        n += 2;
-    }
-    n
+    let mut lengths = (n.next_multiple_of(step).max(step)..).step_by(step);
+    lengths.find(is_smooth).unwrap_or(n)
 }
 
 impl std::fmt::Debug for GridOperator {
@@ -274,8 +270,8 @@ pub(crate) fn coefficients(
     contact_modulus: f64,
 ) -> Vec<f64> {
     let factor = 1.0 / (std::f64::consts::PI * contact_modulus);
-    // Corners lie half a cell before and after the centres. Neighbouring cells share them, so each is evaluated once; the
-    // two corners of the first cell differ only in sign.
+    // Corners lie half a cell before and after the centres. Neighbouring cells share them, so each is evaluated once. The two corners of the first cell differ only in
+    // sign.
     let places = |n: usize, d: f64| -> Vec<f64> { (0..n).map(|i| (i as f64 + 0.5) * d).collect() };
     let (x, y) = (places(nx, dx), places(ny, dy));
     let mut corners = vec![0.0; nx * ny];
@@ -330,32 +326,6 @@ pub(crate) fn lines(nx: usize, coefficients: &[f64]) -> Vec<f64> {
         lines.extend_from_slice(row);
     }
     lines
-}
-
-/// Plans for the transforms of a padded line, forward and backward.
-pub struct FftPlans {
-    pub(crate) forward: Arc<dyn Fft<f32>>,
-    pub(crate) backward: Arc<dyn Fft<f32>>,
-}
-
-/// Plans made so far. A solve uses few padded sizes, and planning one takes 2 to 14 µs, about a tenth of a product; plans are therefore kept
-/// only during one solve.
-pub struct FftPlanners(FftPlanner<f32>);
-
-impl Default for FftPlanners {
-    fn default() -> Self {
-        FftPlanners(FftPlanner::new())
-    }
-}
-
-impl FftPlanners {
-    /// Plans for lines of a padded length.
-    pub fn plans(&mut self, width: usize) -> FftPlans {
-        FftPlans {
-            forward: self.0.plan_fft_forward(width),
-            backward: self.0.plan_fft_inverse(width),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -465,7 +435,7 @@ mod tests {
 
     #[test]
     fn padded_sizes_are_even_and_smooth() {
-        let sizes = [1, 2, 14, 62, 97, 101, 128].map(smooth_even);
+        let sizes = [1, 2, 14, 62, 97, 101, 128].map(|n| smooth(n, true));
         assert_eq!(sizes, [2, 2, 16, 64, 100, 108, 128]);
     }
 }

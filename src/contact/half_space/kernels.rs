@@ -1,10 +1,8 @@
-//! Surface displacement caused by a uniformly loaded rectangle: closed forms, one point at a time.
+//! Closed forms of the half-space: displacements by a uniformly loaded rectangle at a point, and stresses by many point loads at a point.
 //!
-//! This is the slow reference implementation; [`strips`](crate::half_space::strip_operator::operator) evaluates the same forms in bulk.
-//!
-//! Stresses of many point loads at a point of a half-space, in the machine's lanes and in single precision.
-//!
-//! Axes: x, y in the surface, z into the body. Tension is positive. Sources: Boussinesq's and Cerruti's point loads (Johnson 1985, §3.2 and 3.6).
+//! The displacements are a slow reference implementation; [`operator`](crate::half_space::strip_operator::operator) evaluates the same forms in bulk. The stresses use
+//! SIMD lanes in single precision. Axes: x, y in the surface, z into the body. Tension is positive. Sources: Boussinesq's and Cerruti's point loads (Johnson 1985, §3.2
+//! and 3.6).
 
 use std::f64::consts::FRAC_1_PI;
 use std::ops::Range;
@@ -27,9 +25,7 @@ pub struct Rectangle {
     pub y1: f64,
 }
 
-/// Relative displacement of the two surfaces (both bodies together) per unit uniform load, times G.
-///
-/// Lengths enter and leave in one unit; with lengths in mm, dividing by G in MPa gives mm per MPa.
+/// Relative displacement of the two surfaces (both bodies together) per unit uniform load, times G, in the unit of length of the rectangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Influence {
     /// u_x from T_x.
@@ -42,18 +38,15 @@ pub struct Influence {
     pub zz: f64,
 }
 
-/// Distance, in units of the rectangle's longer side, beyond which the four corner terms cancel so much that quadrature is
-/// more accurate.
+/// Distance, in units of the longer side of the rectangle, beyond which quadrature is more accurate than the corner terms, which cancel.
 const FAR: f64 = 40.0;
 
 /// Influence of a rectangle at the point `(x, y)` for Poisson's ratio `nu`.
 ///
-/// With `p = x − x_edge`, `q = y − y_edge`, `r = √(p² + q²)` and the alternating sum over the four corners:
-/// `∬X²/r³ = [[q asinh(p/|q|)]]`, `∬Y²/r³ = [[p asinh(q/|p|)]]`, `∬XY/r³ = −[[r]]`; then
-/// `xx = (∬X²/r³ + (1−ν)∬Y²/r³ … )/π` as in Cerruti's and Boussinesq's solutions (Johnson 1985, §3.2 and 3.6; Kalker
-/// 1990), with the factor 2 for two bodies. Terms are 0 where their leading factor is 0, so points on edges and
-/// corners are allowed. The error is about 1e-14 of the largest coefficient near the rectangle; far away a 4×4 Gauss
-/// rule keeps the relative error below 1e-12 where the closed form would lose digits.
+/// With `p = x − x_edge`, `q = y − y_edge`, `r = √(p² + q²)` and the alternating sum over the four corners: `∬X²/r³ = [[q asinh(p/|q|)]]`,
+/// `∬Y²/r³ = [[p asinh(q/|p|)]]`, `∬XY/r³ = −[[r]]`; then `xx = (∬X²/r³ + (1−ν)∬Y²/r³ … )/π` as in Cerruti's and Boussinesq's solutions (Johnson 1985, §3.2 and 3.6;
+/// Kalker 1990), with the factor 2 for two bodies. Terms are 0 where their leading factor is 0, so points on edges and corners are allowed. The error is about 1e-14 of
+/// the largest coefficient near the rectangle; far away a 4×4 Gauss rule keeps the relative error below 1e-12.
 pub fn rectangle(x: f64, y: f64, cell: Rectangle, nu: f64) -> Influence {
     let longer = (cell.x1 - cell.x0).max(cell.y1 - cell.y0);
     let dx = (cell.x0 - x).max(x - cell.x1).max(0.0);
@@ -398,16 +391,16 @@ pub type Stress = [f64; 6];
 /// One number per lane.
 pub type Lanes = [f32; LANES];
 
-/// Forces on the surface, [`LANES`] side by side. Those that are not needed are 0.
+/// Forces on the surface in [`LANES`] lanes; unused lanes are 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LoadPack {
-    /// Where they act: x and y in mm.
+    /// The points of action: x and y in mm.
     pub at: [Lanes; 2],
     /// Their components along x, along y and into the body, in N.
     pub force: [Lanes; 3],
 }
 
-/// The stress in MPa at a point `[x, y, z]` in mm, z more than 0, of these packs of a list, for Poisson's ratio `nu`.
+/// The stress in MPa at a point `[x, y, z]` in mm with z > 0, by ranges of packs, for Poisson's ratio `nu`.
 pub fn stress(packs: &[LoadPack], felt: &[Range<usize>], point: [f32; 3], nu: f64) -> Stress {
     simd::dispatch(FeltStress {
         packs,
@@ -443,9 +436,9 @@ impl NullaryFnOnce for FeltStress<'_> {
 /// 2π times the sums of the stresses.
 #[derive(Default)]
 struct StressSums {
-    /// Without `even`.
+    /// The terms without `even`.
     terms: [Lanes; 6],
-    /// What xx and yy have in common.
+    /// The common part of xx and yy.
     even: Lanes,
 }
 
@@ -477,8 +470,8 @@ impl StressSums {
 
 /// Adds 2π times the stresses of a pack.
 ///
-/// With r from the load to the point, ρ its length and F the force: −3 (F·r) r_i r_j/ρ⁵, and 1 − 2ν times what has only the components
-/// in the surface. Written for few operations that depend on each other: one division, products added where they arise.
+/// With r from the load to the point, its length ρ and the force F: −3 (F·r) r_i r_j/ρ⁵, plus 1 − 2ν times terms that only have components in the surface. The form has few
+/// dependent operations: one division, and fused products.
 #[inline(always)]
 fn add(pack: &LoadPack, [x_point, y_point, z]: [f32; 3], share: f32, sums: &mut StressSums) {
     let [xs, ys] = &pack.at;

@@ -1,16 +1,14 @@
-//! What couples pressure and traction where the bodies differ: tangential displacements from pressure, normal ones from traction.
+//! Coupling of pressure and traction for bodies that differ: tangential displacements by pressure and normal ones by traction; and the elastic constants of a pair.
 //!
-//! With K of the pair, p = x − x′ and q = y − y′ the distances to the corners of a cell and [[·]] their sum with alternating signs, a pressure
-//! P moves the surfaces apart by `u_x = K P/(πG) [[p atan(q/p) + q ln r]]` and `u_y` with p and q exchanged, and tractions open the gap
-//! by minus the same sums (Kalker 1990, section 1.6; Johnson 1985, section 3.6).
-//!
-//! Elastic constants of the pair of bodies.
+//! With K of the pair, the distances p = x − x′ and q = y − y′ to the corners of a cell, and [[·]] their sum with alternating signs, a pressure P moves the surfaces apart
+//! by `u_x = K P/(πG) [[p atan(q/p) + q ln r]]`, and by `u_y` with p and q exchanged. Tractions open the gap by minus the same sums (Kalker 1990, section 1.6; Johnson
+//! 1985, section 3.6).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::mesh::{Mesh, Segment};
 
-/// `p atan(q/p) + q ln r` and the same with p and q exchanged.
+/// `p atan(q/p) + q ln r`, and the same with p and q exchanged.
 fn corner(p: f64, q: f64) -> [f64; 2] {
     let (p_q, q_p) = (p.abs(), q.abs());
     if p_q == 0.0 && q_p == 0.0 {
@@ -46,7 +44,7 @@ fn of_segment(
     }
 }
 
-/// The corner sums of a cell of a size about the origin at a place.
+/// The corner sums at a place for a cell of a size about the origin.
 fn of_cell([x, y]: [f64; 2], size: [f64; 2]) -> [f64; 2] {
     let [dx, dy] = size.map(|size| 0.5 * size);
     let [a, b, c, d] =
@@ -54,12 +52,12 @@ fn of_cell([x, y]: [f64; 2], size: [f64; 2]) -> [f64; 2] {
     [0, 1].map(|k| a[k] - b[k] - (c[k] - d[k]))
 }
 
-/// Displacements along x and across at a place from a unit pressure on a cell of a size about the origin, times G.
+/// Displacements along x and across at a place by unit pressure on a cell of a size about the origin, times G.
 pub fn displacement_by_cell(difference: f64, at: [f64; 2], size: [f64; 2]) -> [f64; 2] {
     of_cell(at, size).map(|sum| difference / PI * sum)
 }
 
-/// Displacements along x and across at a place from pressures on all cells, times G.
+/// Displacements along x and across at a place by pressures on all cells, times G.
 pub fn displacement(mesh: &Mesh, difference: f64, pressure: &[f64], at: [f64; 2]) -> [f64; 2] {
     let mut sum = [0.0; 2];
     for segment in &mesh.segments {
@@ -71,8 +69,7 @@ pub fn displacement(mesh: &Mesh, difference: f64, pressure: &[f64], at: [f64; 2]
     sum.map(|sum| difference / PI * sum)
 }
 
-/// Mean slips of all cells from pressures, along x and across, times G: the differences of the displacements at their two edges over their
-/// lengths.
+/// Mean slips of all cells by pressures, along x and across, times G: the differences of the displacements at their two edges over their lengths.
 pub fn pressure_slips(mesh: &Mesh, difference: f64, pressure: &[f64]) -> [Vec<f64>; 2] {
     let mut slips = [0, 1].map(|_| Vec::with_capacity(mesh.cells()));
     for segment in &mesh.segments {
@@ -91,7 +88,7 @@ pub fn pressure_slips(mesh: &Mesh, difference: f64, pressure: &[f64]) -> [Vec<f6
     slips
 }
 
-/// By how much tractions on all cells open the gap at a place, times G.
+/// The opening of the gap at a place by tractions on all cells, times G.
 pub fn opening(mesh: &Mesh, difference: f64, traction: &[Vec<f64>; 2], at: [f64; 2]) -> f64 {
     let mut sum = 0.0;
     for segment in &mesh.segments {
@@ -102,7 +99,7 @@ pub fn opening(mesh: &Mesh, difference: f64, traction: &[Vec<f64>; 2], at: [f64;
     -difference / PI * sum
 }
 
-/// Elastic constants of the pair of bodies, combined as in quasi-identical contact.
+/// Combined elastic constants of a pair of bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Elasticity {
     /// Combined shear modulus G in MPa.
@@ -111,12 +108,12 @@ pub struct Elasticity {
     pub poisson_ratio: f64,
     /// Difference parameter K (Kalker 1990, eq. 1.44); 0 for like bodies.
     pub difference: f64,
-    /// Part of the normal displacement of both bodies that is the lower one's; ½ for like bodies.
+    /// Part of the normal displacement of both bodies that belongs to the lower one; ½ for like bodies.
     pub lower_share: f64,
 }
 
 impl Elasticity {
-    /// Have the bodies different elastic constants?
+    /// Whether the bodies have different elastic constants.
     pub fn differs(&self) -> bool {
         self.difference != 0.0 || self.lower_share != 0.5
     }

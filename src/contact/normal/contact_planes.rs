@@ -1,15 +1,15 @@
-//! Places of the planes of contact of a wheel on a rail.
+//! Planes of contact of a wheel on a rail.
 
 use crate::geometry::contact_locus::ContactLocus;
 use crate::geometry::reference_curve::{ContactPlane, Nearest, ReferenceCurve};
 use crate::normal::on_curve::CurveContact;
 
-/// Patches nearer to each other than this, in mm, and inclined to each other by less than this, in rad, share a plane of contact. CONTACT separates patches that
-/// are 8 mm or 30° apart.
+/// Largest distance in mm of patches that share a plane of contact. CONTACT separates patches that are 8 mm apart.
 const SHARED_PLANE_DISTANCE: f64 = 12.0;
+/// Largest inclination in rad of patches that share a plane of contact. CONTACT separates patches that are inclined by 30°.
 const SHARED_PLANE_ANGLE: f64 = 0.5;
 
-/// The place of a run of strips.
+/// A run of strips in contact.
 #[derive(Debug, Clone, Copy)]
 struct StripRun {
     /// Arc lengths of its ends in mm.
@@ -19,7 +19,7 @@ struct StripRun {
 }
 
 impl StripRun {
-    /// How far it lies from another one in mm.
+    /// Distance from another run in mm.
     fn apart(&self, other: &StripRun) -> f64 {
         (self.ends[0] - other.ends[1]).max(other.ends[0] - self.ends[1])
     }
@@ -30,8 +30,8 @@ impl StripRun {
 }
 
 impl CurveContact {
-    /// Planes of contact for its patches and for overlaps without pressure: neighbours that are near and hardly inclined to each other share one. Each passes
-    /// through the mean of the overlap, weighted with its square over the area, at the mean angle there.
+    /// Planes of contact for the patches and for overlaps without pressure. Close neighbours with a small inclination share a plane. Each plane passes through the mean
+    /// of the overlap, weighted with its square over the area, at the mean angle there.
     pub(crate) fn planes(&self, curve: &ReferenceCurve, locus: &ContactLocus) -> Vec<ContactPlane> {
         let [first, last] = curve.range();
         let overlaps = curve.overlaps(self.centre);
@@ -49,7 +49,7 @@ impl CurveContact {
         });
         let mut groups: Vec<Vec<StripRun>> = Vec::new();
         for run in pressed.iter().copied().chain(free) {
-            // Of the groups that may have it, the one whose inclination is nearest.
+            // Of the possible groups, the one with the closest inclination.
             let fits = |group: &&mut Vec<StripRun>| {
                 let near = |other: &StripRun| other.apart(&run) <= SHARED_PLANE_DISTANCE;
                 let inclined = group.iter().map(|other| other.inclined(&run));
@@ -94,7 +94,7 @@ impl CurveContact {
         (0..groups.len()).map(plane).collect()
     }
 
-    /// The place of a run of strips.
+    /// The ends and the angle of a run of strips.
     fn strip_run(&self, [first, last]: [usize; 2]) -> StripRun {
         let nx = self.grid.x.len();
         let half = 0.5 * self.grid.step[1];

@@ -2,25 +2,25 @@
 
 use crate::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
 
-/// A strip whose least gap is larger than this, in mm, is no part of the contact.
+/// Least gap of a strip in mm above which it is not part of the contact.
 pub(super) const APART: f64 = 0.3;
-/// The gap of a cell that is no part of the contact, in mm.
+/// The gap in mm that is assigned to a cell outside the contact.
 pub(super) const NO_CONTACT: f64 = 1e3;
-/// Cells around the contact that stay free.
+/// Number of free cells around the contact.
 pub(super) const FREE: usize = 2;
-/// Runs of contact on a half-space that lie nearer than this, in mm, act on each other.
+/// Distance in mm below which runs of contact interact on a half-space.
 pub(super) const APART_ON_HALF_SPACE: f64 = 4.0;
 
-/// Equal cells over parts of the unfolded surface; cell (i, j) is stored at `j * x.len() + i`.
+/// Equal cells over parts of the unfolded surface. Cell (i, j) is stored at `j * x.len() + i`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CurveGrid {
     /// Centres of the cells along x in mm.
     pub(crate) x: Vec<f64>,
-    /// The strips, by increasing arc length; without those between parts of the contact.
+    /// The strips by increasing arc length, without those between parts of the contact.
     pub(crate) places: Vec<CurvePlace>,
-    /// The places of the strips in widths of a strip from that of the first one.
+    /// The places of the strips from the first one, in widths of a strip.
     pub(crate) numbers: Vec<usize>,
-    /// The plane of contact of each strip; none on the curve.
+    /// The plane of contact of each strip; `None` on the curve.
     pub(super) planes: Option<Vec<usize>>,
     /// Size of a cell along x and s in mm.
     pub(crate) step: [f64; 2],
@@ -33,9 +33,9 @@ pub(super) struct WheelOverGrid {
     pub(super) centre: f64,
     /// Distance from the rail along its normal in mm.
     pub(super) gap: Vec<f64>,
-    /// Its change with the height of the wheel's centre.
+    /// Derivative of the gap by the height of the wheel's centre.
     pub(super) lift: Vec<f64>,
-    /// Angle of the wheel over each strip where it is nearest; that of the rail where it is far.
+    /// Angle of the wheel over each strip where it is closest; that of the rail where it is far.
     pub(super) angle: Vec<f64>,
 }
 
@@ -84,7 +84,7 @@ impl CurveGrid {
         self.step[0] * self.step[1]
     }
 
-    /// The wheel over the cells at a height of its centre. Along x the gap is that of a polynomial through some points.
+    /// The wheel over the cells at a height of its centre. Along x the gap is a polynomial through some points.
     pub(super) fn over(&self, curve: &ReferenceCurve, centre: f64) -> WheelOverGrid {
         let [nx, ny] = self.cells();
         let [first, last] = [self.x[0], self.x[nx - 1]];
@@ -129,7 +129,7 @@ impl CurveGrid {
         over
     }
 
-    /// The wheel over a strip above whose ends along x it may end.
+    /// Adds the wheel over a strip at whose ends along x the wheel may end.
     fn one_by_one(&self, curve: &ReferenceCurve, place: &CurvePlace, over: &mut WheelOverGrid) {
         let centre = over.centre;
         let row = over.gap.len();
@@ -155,7 +155,7 @@ impl CurveGrid {
         go(&mut (from..self.x.len()));
     }
 
-    /// Ends of the parts of the grid whose strips adjoin each other, by strips: first and last.
+    /// First and last strip of each part of the grid with adjoining strips.
     pub(super) fn parts(&self) -> Vec<[usize; 2]> {
         let mut parts: Vec<[usize; 2]> = Vec::new();
         for (j, number) in self.numbers.iter().enumerate() {
@@ -182,7 +182,7 @@ impl CurveGrid {
         runs
     }
 
-    /// Runs of contact on a half-space, without those that act on each other as one.
+    /// Merges runs of contact that interact on a half-space.
     pub(super) fn joined(&self, runs: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
         let mut joined: Vec<[usize; 2]> = Vec::new();
         for run in runs {
@@ -198,7 +198,7 @@ impl CurveGrid {
         joined
     }
 
-    /// The number of the run, or of the plane of contact, that each strip belongs to; those between two runs belong to the nearer one.
+    /// The number of the run, or of the plane of contact, of each strip. Strips between two runs belong to the closer one.
     pub(super) fn run_of_strips(&self, runs: &[[usize; 2]]) -> Vec<usize> {
         if let Some(planes) = &self.planes {
             return planes.clone();
@@ -214,7 +214,7 @@ impl CurveGrid {
             .collect()
     }
 
-    /// A larger grid where the contact reaches the border of this one or of a part of it.
+    /// A larger grid if the contact reaches the border of this one or of a part of it.
     pub(super) fn enlarged(&self, curve: &ReferenceCurve, pressure: &[f64]) -> Option<CurveGrid> {
         let nx = self.x.len();
         let is_loaded = |j: usize| pressure[j * nx..(j + 1) * nx].iter().any(|p| *p > 0.0);
@@ -223,7 +223,7 @@ impl CurveGrid {
         let mut window = |[low, high]: [f64; 2], reached: [bool; 2], step: f64| {
             any |= reached[0] || reached[1];
             let growth = 0.15 * (high - low) + 2.0 * step;
-            // Cells are whole, so that half of one is no new one.
+            // Cells are whole, so half a cell adds no new one.
             let [below, above] = reached.map(|reached| if reached { growth } else { 0.0 });
             [low - below - half, high + above + half]
         };
@@ -250,11 +250,12 @@ impl CurveGrid {
         any.then(|| CurveGrid::new(curve, along, &windows, self.step))
     }
 
-    /// Pressures of another grid at the cells: their squares bilinearly, which fall linearly to the edge of the contact and go on beyond it.
+    /// Interpolates pressures of another grid. Squares of pressures, which fall linearly to the edge of the contact and continue beyond it, are interpolated
+    /// bilinearly.
     pub(super) fn pressures(&self, other: &CurveGrid, pressure: &[f64]) -> Vec<f64> {
         let [nx, ny] = other.cells();
         let square = |k: usize| pressure[k] * pressure[k];
-        // The line through the two next cells in a direction, in which `left` cells are.
+        // The continuation of a line through the next two cells in a direction in which there are `left` cells.
         let from = |k: usize, left: usize, stride: isize| {
             let at = |steps: isize| square(k.wrapping_add_signed(steps * stride));
             match left {
@@ -280,7 +281,7 @@ impl CurveGrid {
         found
     }
 
-    /// Gaps of another grid at the cells, bilinearly; beyond its cells those of the nearest ones.
+    /// Interpolates gaps of another grid bilinearly; beyond its cells those of the nearest cells apply.
     pub(super) fn gaps(&self, other: &CurveGrid, gap: &[f64]) -> Vec<f64> {
         self.interpolated(other, gap, true)
     }
@@ -296,7 +297,7 @@ impl CurveGrid {
             let at = (at - first) / step;
             (at.floor() as i64, at - at.floor())
         };
-        // A row has one more value at both ends.
+        // A row has one additional value at both ends.
         let beyond = |i: i64| (i.clamp(-1, width as i64) + 1) as usize;
         let columns: Vec<([usize; 2], f64)> = (self.x.iter())
             .map(|x| place(*x, other.x[0], other.step[0]))
@@ -341,7 +342,7 @@ impl CurveGrid {
     }
 }
 
-/// Weights of values at some nodes for that of a polynomial through them.
+/// Weights of values at nodes for the polynomial through them.
 pub(super) fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
     let weight = |k: usize| {
         let others = (0..nodes.len()).filter(|m| *m != k);
@@ -353,7 +354,7 @@ pub(super) fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
 }
 
 impl WheelOverGrid {
-    /// The largest difference of the change of the gap with the height over the weight of the strip from 1, among cells in contact.
+    /// The largest deviation from 1 of the derivative of the gap by the height over the weight of the strip, among cells in contact.
     pub(super) fn lift_off(&self, pressure: &[f64], weights: &[f64]) -> f64 {
         let nx = pressure.len() / weights.len();
         let rows = pressure.chunks_exact(nx).zip(self.lift.chunks_exact(nx));

@@ -1,10 +1,4 @@
-//! The solved normal problem of one frame: its patches and their pressures.
-//!
-//! How the load of a patch is spread across rolling: its line load by y, a chain of parabolas.
-//!
-//! Slip of a contact surface beyond that of a motion of the plane.
-//!
-//! What is asked of the normal problem: where patches and pressures come from.
+//! The solved normal problem of one frame: patches, pressures, the load across rolling, and the slip of curved surfaces; and the task that it comes from.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -17,8 +11,7 @@ use crate::normal::pressure_field::field::PressureField;
 use crate::normal::wheel::{WheelTask, WheelsetTask};
 use crate::numerics::interpolation;
 
-/// The patches of one frame with their pressures; never empty. It answers where the patches are, how long their chords are,
-/// and what pressure acts on them, and nothing else.
+/// The patches of one frame with their pressures; not empty. It gives the patches, the lengths of their chords, and the pressures on them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Footprint {
     shape: FootprintShape,
@@ -26,12 +19,12 @@ pub struct Footprint {
     uncertainty: Option<NormalUncertainty>,
     slip: Option<Arc<SurfaceSlip>>,
     slip_by_motion: Option<Arc<[SurfaceSlip; 2]>>,
-    /// Of each patch of a curved surface, the origin `[x, y]` in mm of the coordinates that its places are given in.
+    /// Origins `[x, y]` in mm of the coordinates for places of the patches of a curved surface.
     origins: Vec<[f64; 2]>,
     loads: LazyField<Vec<LoadAcross>>,
 }
 
-/// Where the pressure comes from.
+/// The form of the pressure.
 #[derive(Debug, Clone, PartialEq)]
 enum FootprintShape {
     /// Hertz's ellipse, in closed form.
@@ -40,14 +33,14 @@ enum FootprintShape {
     Sampled(PressureField),
 }
 
-/// What computing region and pressure leaves uncertain.
+/// The uncertainty of a computed region and pressure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalUncertainty {
     /// Cells of the normal problem across each patch.
     pub cells_across: Vec<f64>,
-    /// By how much, relatively, the load may differ from the one asked for.
+    /// Relative error of the load.
     pub load: f64,
-    /// How far, relative to the deepest overlap, the surfaces may be apart or overlap where they touch.
+    /// Largest distance or overlap of the surfaces in contact, relative to the deepest overlap.
     pub distance: f64,
 }
 
@@ -59,7 +52,7 @@ pub struct LineAngles<const N: usize> {
 }
 
 impl<const N: usize> LineAngles<N> {
-    /// Those angles.
+    /// Computes the angles.
     pub fn new() -> LineAngles<N> {
         let angles: [f64; N] = std::array::from_fn(|k| (k as f64 + 0.5) * PI / N as f64);
         LineAngles {
@@ -76,11 +69,15 @@ impl<const N: usize> Default for LineAngles<N> {
 }
 
 impl Footprint {
-    /// Hertz's ellipse.
+    /// The footprint of Hertz's ellipse.
     pub fn hertz(ellipse: Ellipse) -> Footprint {
+        Footprint::of(FootprintShape::Hertz(ellipse), vec![ellipse.patch()])
+    }
+
+    fn of(shape: FootprintShape, patches: Vec<Patch>) -> Footprint {
         Footprint {
-            patches: vec![ellipse.patch()],
-            shape: FootprintShape::Hertz(ellipse),
+            shape,
+            patches,
             uncertainty: None,
             slip: None,
             slip_by_motion: None,
@@ -89,21 +86,14 @@ impl Footprint {
         }
     }
 
-    /// A pressure that was given, and is exact as it stands.
+    /// The footprint of a given pressure, which is exact by definition.
     pub fn given(field: PressureField) -> Footprint {
-        Footprint {
-            patches: field.patches(),
-            shape: FootprintShape::Sampled(field),
-            uncertainty: None,
-            slip: None,
-            slip_by_motion: None,
-            origins: Vec::new(),
-            loads: LazyField::default(),
-        }
+        let patches = field.patches();
+        Footprint::of(FootprintShape::Sampled(field), patches)
     }
 
-    /// A pressure that was computed, and whose load may differ from the one asked for by the relative `load_error`. Where the surfaces
-    /// touch, they are apart or overlap by up to `distance`, relative to the deepest overlap.
+    /// The footprint of a computed pressure with a relative `load_error`. `distance` is the largest distance or overlap of the surfaces in contact, relative to the
+    /// deepest overlap.
     pub fn computed(field: PressureField, load_error: f64, distance: f64) -> Footprint {
         let uncertainty = NormalUncertainty {
             cells_across: field.cells_across(),
@@ -116,9 +106,8 @@ impl Footprint {
         }
     }
 
-    /// Returns this footprint on the surface of a rail: on a curve with a rigid slip of its own in every cell, added to that of the motion; with the part of it that
-    /// follows from a motion, for a unit of creepage across and of spin in 1/mm, where motions share the footprint; and for every patch the origin
-    /// `[x, y]` in mm of the coordinates that its places are given in.
+    /// Returns this footprint on the surface of a rail: with a rigid slip of every cell that is added to that of the motion, on a curve; with its part per unit of lateral
+    /// creepage and of spin in 1/mm, where motions share the footprint; and with the origin `[x, y]` in mm of the coordinates for places of every patch.
     pub(crate) fn on_surface(
         self,
         slip: Option<SurfaceSlip>,
@@ -133,12 +122,12 @@ impl Footprint {
         }
     }
 
-    /// The origin `[x, y]` in mm of the coordinates that places below a patch are given in.
+    /// The origin `[x, y]` in mm of the coordinates of places below a patch.
     pub fn origin(&self, patch: usize) -> [f64; 2] {
         self.origins.get(patch).copied().unwrap_or_default()
     }
 
-    /// The slip of the surface beyond the motion of a plane, where it has one.
+    /// The slip of the surface in addition to that of the motion, if it has one.
     pub fn slip(&self) -> Option<&SurfaceSlip> {
         self.slip.as_deref()
     }
@@ -153,7 +142,7 @@ impl Footprint {
         &self.patches
     }
 
-    /// How the load of a patch is spread across; computed when it is first asked for.
+    /// The distribution of the load of a patch across, computed on first use.
     pub fn load_across(&self, patch: usize) -> &LoadAcross {
         let loads = self.loads.get_or_make(|| match &self.shape {
             FootprintShape::Hertz(ellipse) => vec![LoadAcross::of_ellipse([-ellipse.b, ellipse.b])],
@@ -164,17 +153,17 @@ impl Footprint {
         &loads[patch]
     }
 
-    /// The uncertainty of region and pressure, where they were computed.
+    /// The uncertainty of region and pressure; `None` unless they were computed.
     pub fn uncertainty(&self) -> Option<&NormalUncertainty> {
         self.uncertainty.as_ref()
     }
 
-    /// Is it Hertz's ellipse, in closed form?
+    /// Whether the footprint is Hertz's ellipse in closed form.
     pub fn is_closed_form(&self) -> bool {
         matches!(self.shape, FootprintShape::Hertz(_))
     }
 
-    /// Hertz's ellipse, if it is one.
+    /// Hertz's ellipse, if the footprint is one.
     pub fn ellipse(&self) -> Option<&Ellipse> {
         match &self.shape {
             FootprintShape::Hertz(ellipse) => Some(ellipse),
@@ -182,13 +171,12 @@ impl Footprint {
         }
     }
 
-    /// Does the pressure jump from one sample to the next?
+    /// Whether the pressure jumps from one sample to the next.
     pub fn jumps(&self) -> bool {
         matches!(&self.shape, FootprintShape::Sampled(field) if field.jump().is_some())
     }
 
-    /// By how much samples of a given pressure differ from what their neighbours let expect, see [`PressureField::discontinuity`]; nothing for
-    /// pressures that were computed or are known in closed form.
+    /// Discontinuity of a given pressure, see [`PressureField::discontinuity`]; `None` for a pressure that was computed or is known in closed form.
     pub fn discontinuity(&self) -> Option<f64> {
         match &self.shape {
             FootprintShape::Sampled(field) if self.uncertainty.is_none() => {
@@ -198,7 +186,7 @@ impl Footprint {
         }
     }
 
-    /// Segments that a strip has on average, for each patch: more than 1 where patches are hollow or bent.
+    /// Average number of segments of a strip, for each patch: more than 1 for hollow or bent patches.
     pub fn segments_per_strip(&self) -> Vec<f64> {
         match &self.shape {
             FootprintShape::Hertz(_) => vec![1.0],
@@ -206,8 +194,8 @@ impl Footprint {
         }
     }
 
-    /// Chords of one patch along the lines `y`, each standing for a strip of width `dy`; strips that miss the
-    /// patch have no chord, strips that cross it several times have several, from smaller to larger x.
+    /// Chords of one patch along the lines `y`, each for a strip of width `dy`. Strips that miss the patch have no chord, strips that cross it several times have
+    /// several, by increasing x.
     ///
     /// `strips` lists `(y, dy)` of the strips from smaller to larger y; all lengths in mm.
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
@@ -216,7 +204,7 @@ impl Footprint {
         chords
     }
 
-    /// The same in a buffer, instead of what was in it.
+    /// Writes chords to a buffer; see [`Footprint::chords`].
     pub fn chords_into(&self, patch: usize, strips: &[(f64, f64)], chords: &mut Vec<Chord>) {
         chords.clear();
         match &self.shape {
@@ -225,7 +213,7 @@ impl Footprint {
         }
     }
 
-    /// The chord of one patch along a line `y` that stands for a strip of width `dy`, if there is exactly one.
+    /// The chord of one patch along a line `y` for a strip of width `dy`, if there is exactly one.
     #[inline]
     pub fn single_chord(&self, patch: usize, line: (f64, f64)) -> Option<Chord> {
         match &self.shape {
@@ -247,8 +235,8 @@ impl Footprint {
 
     /// Mean pressure in MPa over the line of a chord (not yet scaled to the patch's force).
     ///
-    /// Of a pressure that was computed by the mid-points of N equal angles u, at which `x = −half · cos u` from the middle: exact for Hertz's
-    /// semi-ellipse, and otherwise as exact as N points resolve the pressure.
+    /// A computed pressure is integrated with the mid-points of N equal angles u, at which `x = −half · cos u` from the middle. This is exact for Hertz's semi-ellipse
+    /// and otherwise as accurate as N points resolve the pressure.
     pub fn mean_of_line<const N: usize>(&self, chord: &Chord, angles: &LineAngles<N>) -> f64 {
         match &self.shape {
             FootprintShape::Sampled(field) if self.uncertainty.is_some() => {
@@ -264,8 +252,8 @@ impl Footprint {
         }
     }
 
-    /// Pressures in MPa at points of a chord (not yet scaled to the patch's force), given by the cosines and sines of rising angles u: they lie
-    /// `−half · cos u` from the middle of the chord.
+    /// Pressures in MPa at points of a chord (not yet scaled to the patch's force), given by cosines and sines of increasing angles u, at which `x = −half · cos u` from
+    /// the middle of the chord.
     #[inline]
     pub fn pressures<const N: usize>(
         &self,
@@ -284,25 +272,25 @@ impl Footprint {
     }
 }
 
-/// Parabolas of a pressure that is known by samples, narrower towards both ends, where its line load changes fastest. Chosen by judgement: twice as many
-/// change the limit of Hertz's patch, given as a grid, under a table with a jump by less than 1e-5.
+/// Number of parabolas of a sampled pressure, narrower towards both ends, where its line load changes fastest. Twice as many change the limit of Hertz's patch, given
+/// as a grid, under a table with a jump by less than 1e-5. Chosen by judgement.
 const PARABOLAS: usize = 24;
 
-/// Line load of a patch in N/mm, up to a factor.
+/// Line load of a patch in N/mm across rolling, up to a factor, as a chain of parabolas.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadAcross {
-    /// Place in mm and line load of both ends and the middle of every parabola; neighbours share their ends.
+    /// Place in mm and line load at both ends and in the middle of every parabola; neighbours share their ends.
     points: Vec<(f64, f64)>,
 }
 
 impl LoadAcross {
-    /// That of an elliptic patch between two y: one parabola.
+    /// The line load of an elliptic patch between two y: one parabola.
     pub fn of_ellipse([low, high]: [f64; 2]) -> LoadAcross {
         let points = vec![(low, 0.0), (0.5 * (low + high), 1.0), (high, 0.0)];
         LoadAcross { points }
     }
 
-    /// That of a patch of a pressure known by samples.
+    /// The line load of a sampled pressure.
     pub fn of_samples(field: &PressureField, patch: usize) -> LoadAcross {
         let [.., low, high] = field.patches()[patch].extent;
         let count = 2 * PARABOLAS;
@@ -329,10 +317,10 @@ impl LoadAcross {
         }
     }
 
-    /// Mean over the load of what is linear from one point `(y, value)` to the next, points in order of y and at least one, and constant
-    /// before the first and behind the last. Two points at one place are a jump.
+    /// Load-weighted mean of a function that is linear between at least one points `(y, value)` with increasing y, and constant beyond them. Two points at one place are a
+    /// jump.
     ///
-    /// Exact for a load of parabolas: its products with straight lines are cubic, which Simpson's rule integrates.
+    /// The result is exact for a load of parabolas: its products with straight lines are cubic, which Simpson's rule integrates.
     pub fn mean(&self, table: &[(f64, f64)]) -> f64 {
         let (first, last) = (table[0], table[table.len() - 1]);
         let (low, high) = (self.points[0].0, self.points[self.points.len() - 1].0);
@@ -364,10 +352,10 @@ impl LoadAcross {
     }
 }
 
-/// Slip at the points of a surface beyond that of the motion, divided by the rolling speed, interpolated between samples.
+/// Slip of a surface in addition to that of the motion, divided by the rolling speed, interpolated between samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfaceSlip {
-    /// Samples along x: the first one and their distance in mm, and how many, at least 1.
+    /// Samples along x: place of the first and distance in mm, and their number, at least 1.
     pub x: (f64, f64, usize),
     /// Samples along y in mm, ascending, at least 1.
     pub y: Vec<f64>,
@@ -376,7 +364,7 @@ pub struct SurfaceSlip {
 }
 
 impl SurfaceSlip {
-    /// Slip at a place `[x, y]` in mm; beyond the samples that of the nearest place among them.
+    /// Slip at a place `[x, y]` in mm, which is clamped to the samples.
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let (first, step, samples) = self.x;
         let last = (samples - 1) as f64;
@@ -415,23 +403,23 @@ impl SurfaceSlip {
     }
 }
 
-/// What is known of a contact before it is solved. Solved, it is a [`Footprint`].
+/// The normal problem, whose solution is a [`Footprint`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum NormalTask {
     /// Hertz's ellipse, in closed form.
     Hertz(Ellipse),
-    /// A pressure on a grid, as it was given.
+    /// A given pressure on a grid.
     Given(PressureField),
-    /// A gap: patches and pressures have to be found.
+    /// A gap, of which patches and pressures are unknown.
     Gap(Box<GapTask>),
-    /// A wheel on a rail: the places of its patches have to be found first, each in a frame of its own.
+    /// A wheel on a rail, of which the places of the patches are unknown as well.
     Wheel(Arc<WheelTask>),
     /// A wheelset on both rails, in one or several positions.
     Wheelset(Arc<WheelsetTask>),
 }
 
 impl NormalTask {
-    /// Number of positions of the bodies: several of a wheelset only.
+    /// Number of positions of the bodies; only wheelsets have several.
     pub fn positions(&self) -> usize {
         match self {
             NormalTask::Wheelset(task) => task.poses.len(),
@@ -442,7 +430,7 @@ impl NormalTask {
         }
     }
 
-    /// The contact where it is known; nothing where it has to be found.
+    /// The footprint; `None` if it must be computed.
     pub fn known_footprint(&self) -> Option<Footprint> {
         match self {
             NormalTask::Hertz(ellipse) => Some(Footprint::hertz(*ellipse)),
@@ -451,7 +439,7 @@ impl NormalTask {
         }
     }
 
-    /// The patches, in order of their smallest y and at least one; nothing where they have to be found.
+    /// The patches by increasing smallest y; `None` if they must be computed.
     pub fn known_patches(&self) -> Option<Vec<Patch>> {
         match self {
             NormalTask::Hertz(ellipse) => Some(vec![ellipse.patch()]),

@@ -1,12 +1,9 @@
 //! Hertz's elliptic contact in closed form.
-//!
-//! One connected contact area, before anything is meshed.
-//!
-//! The ratio of the semi-axes of Hertz's ellipse from that of the curvatures, and the elliptic integrals that it needs.
 
 use std::f64::consts::PI;
 
 use crate::mesh::Chord;
+use crate::numerics::ITERATIONS_MAX;
 
 /// An elliptic patch with Hertz's pressure `p0 √(1 − x²/a² − y²/b²)`, centred at the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,11 +16,11 @@ pub struct Ellipse {
     pub pressure_max: f64,
     /// Approach in mm.
     pub approach: f64,
-    /// Normal force in N: as given where it was, so that no digit of it is lost.
+    /// Normal force in N, exactly as given.
     pub normal_force: f64,
 }
 
-/// How two bodies are pressed together.
+/// The load on two bodies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NormalLoad {
     /// Normal force in N.
@@ -33,13 +30,11 @@ pub enum NormalLoad {
 }
 
 impl Ellipse {
-    /// The contact of bodies with relative radii of curvature `rolling` and `lateral` in mm, and contact modulus
-    /// `E* = G/(1−ν)` in MPa.
+    /// The contact of bodies with relative radii of curvature `rolling` and `lateral` in mm, and contact modulus `E* = G/(1−ν)` in MPa.
     ///
-    /// With `h = A x² + B y²`, L and l the larger and smaller semi-axis and k = l/L, the smaller of A and B is
-    /// `p0 l D(k)/(E* L²)`, the larger `p0 l (K(k) − D(k))/(E* L² k²)`, the approach `p0 l K(k)/E*` and the force
-    /// `⅔π L l p0`; K and D are complete elliptic integrals of parameter 1 − k². All inputs are positive and
-    /// finite; radii may differ by any ratio. Relative accuracy about 1e-14. Source: Johnson 1985, chapter 4.
+    /// With `h = A x² + B y²`, the larger and smaller semi-axis L and l, and k = l/L, the smaller of A and B is `p0 l D(k)/(E* L²)`, the larger
+    /// `p0 l (K(k) − D(k))/(E* L² k²)`, the approach `p0 l K(k)/E*` and the force `⅔π L l p0`, where K and D are complete elliptic integrals of parameter 1 − k². All
+    /// inputs are positive and finite; the ratio of the radii is arbitrary. The relative accuracy is about 1e-14. Source: Johnson 1985, chapter 4.
     pub fn of_radii(
         rolling: f64,
         lateral: f64,
@@ -59,8 +54,8 @@ impl Ellipse {
         Ellipse::of_semi_axes(a, b, loading, contact_modulus)
     }
 
-    /// The contact with semi-axes `a` along and `b` across rolling in mm, and contact modulus `E*` in MPa:
-    /// `p0 = 3N/(2πab)`, approach `p0 l K(k)/E*` with l the smaller semi-axis and k the ratio of smaller to larger.
+    /// The contact with semi-axes `a` along and `b` across rolling in mm, and contact modulus `E*` in MPa: `p0 = 3N/(2πab)` and approach `p0 l K(k)/E*`, where l is the
+    /// smaller semi-axis and k the ratio of the smaller to the larger.
     pub fn of_semi_axes(a: f64, b: f64, loading: NormalLoad, contact_modulus: f64) -> Ellipse {
         let (small, large) = (a.min(b), a.max(b));
         let (k_integral, _) = complete_integrals(small / large);
@@ -84,7 +79,7 @@ impl Ellipse {
         }
     }
 
-    /// The coefficients of x² and y² of its gap in 1/mm, with the contact modulus `E*` in MPa; see [`Ellipse::of_radii`].
+    /// The coefficients of x² and y² of the gap in 1/mm, with the contact modulus `E*` in MPa; see [`Ellipse::of_radii`].
     pub fn curvatures(&self, contact_modulus: f64) -> [f64; 2] {
         let (small, large) = (self.a.min(self.b), self.a.max(self.b));
         let ratio = small / large;
@@ -113,20 +108,20 @@ impl Ellipse {
         }
     }
 
-    /// Chords on the given strips, each `(y, dy)` with its mid-line at y; strips that miss the patch have none.
+    /// Chords on the given strips, each `(y, dy)` with its mid-line at y. Strips that miss the patch have none.
     pub fn chords(&self, strips: &[(f64, f64)]) -> Vec<Chord> {
         let mut chords = Vec::new();
         self.add_chords(strips, &mut chords);
         chords
     }
 
-    /// The same behind those in a buffer.
+    /// Appends chords on the given strips to a buffer.
     pub fn add_chords(&self, strips: &[(f64, f64)], chords: &mut Vec<Chord>) {
         let chord = |(strip, &line): (usize, &(f64, f64))| self.chord(strip, line);
         chords.extend(strips.iter().enumerate().filter_map(chord));
     }
 
-    /// The chord on one strip `(y, dy)`; nothing if it misses the patch.
+    /// The chord on one strip `(y, dy)`; `None` if it misses the patch.
     #[inline]
     pub fn chord(&self, strip: usize, (y, dy): (f64, f64)) -> Option<Chord> {
         let half = self.half_chord(y);
@@ -140,8 +135,7 @@ impl Ellipse {
         })
     }
 
-    /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord, in closed form; 0 outside the ellipse.
-    /// For `x0 = x1` the pressure there.
+    /// Mean pressure in MPa over `x0 < x < x1` on the line of a chord, in closed form; 0 outside the ellipse. For `x0 = x1` the pressure there.
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         let half = self.half_chord(chord.y);
         if half <= 0.0 {
@@ -164,8 +158,7 @@ impl Ellipse {
         self.pressure_max * 0.5 * (chord.right - chord.left) / self.a * sine
     }
 
-    /// Mean pressures over the largest one of a line, between neighbouring places on it that run from −1 to 1: they are the same on
-    /// every line.
+    /// Mean pressures between neighbouring places, from −1 to 1, over the largest pressure of a line. They are equal on all lines.
     pub fn profile(places: &[f64]) -> Vec<f64> {
         places
             .windows(2)
@@ -183,8 +176,8 @@ impl Ellipse {
 
 /// Mean of `√(1 − x²/half²)` over `x0 < x < x1`.
 ///
-/// With x = half cos θ the integrand is sin θ and its integral over x that of sin² θ; written with the width and middle of the interval of θ it
-/// has no cancellation near the ends.
+/// With x = half cos θ the integrand is sin θ, and its integral over x that of sin² θ. Written with the width and the middle of the interval of θ, it does not
+/// suffer from cancellation near the ends.
 fn mean_height(half: f64, x0: f64, x1: f64) -> f64 {
     let angle = |x: f64| {
         let x = x.clamp(-half, half);
@@ -196,20 +189,20 @@ fn mean_height(half: f64, x0: f64, x1: f64) -> f64 {
     half * integral / (x1 - x0)
 }
 
-/// The shape of the ellipse of two radii, for many loads: of [`Ellipse::of_radii`] what does not depend on the load.
+/// The part of [`Ellipse::of_radii`] that does not depend on the load.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HertzShape {
     /// Ratio of the semi-axes, smaller to larger.
     ratio: f64,
     d_integral: f64,
     curvature: f64,
-    /// The larger semi-axis lies along rolling.
+    /// Whether the larger semi-axis lies along rolling.
     long: bool,
 }
 
 impl HertzShape {
-    /// The shape of bodies with relative radii of curvature `rolling` and `lateral` in mm. The larger semi-axis lies along the larger radius, where
-    /// the gap opens more slowly.
+    /// The shape of bodies with relative radii of curvature `rolling` and `lateral` in mm. The larger semi-axis lies along the larger radius, where the gap opens more
+    /// slowly.
     pub fn of_radii(rolling: f64, lateral: f64) -> HertzShape {
         let (large, small) = (rolling.max(lateral), rolling.min(lateral));
         let (ratio, d_integral) = axis_ratio(small / large);
@@ -227,7 +220,7 @@ impl HertzShape {
         self.of_larger(cube.cbrt())
     }
 
-    /// Both semi-axes with the larger one.
+    /// Both semi-axes, for the larger one.
     fn of_larger(&self, large: f64) -> [f64; 2] {
         let small = self.ratio * large;
         if self.long {
@@ -238,30 +231,28 @@ impl HertzShape {
     }
 }
 
-/// What the normal problem says of one patch.
+/// A connected contact area as the normal problem describes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch {
     /// Normal force in N.
     pub normal_force: f64,
-    /// Approach in mm, where it is known.
+    /// Approach in mm; `None` if unknown.
     pub approach: Option<f64>,
     /// Area in mm².
     pub area: f64,
     /// Largest pressure in MPa.
     pub pressure_max: f64,
-    /// Semi-axes along and across rolling in mm, for ellipses.
+    /// Semi-axes along and across rolling in mm; `None` unless it is an ellipse.
     pub semi_axes: Option<[f64; 2]>,
     /// `[x_min, x_max, y_min, y_max]` in mm.
     pub extent: [f64; 4],
 }
 
-/// Of the ratio A/B of the curvatures, both from 0 to 1: the ratio k of the semi-axes, smaller to larger, and the integral D there.
+/// The ratio k of the semi-axes, smaller to larger, and the integral D there, for the ratio A/B of the curvatures from 0 to 1.
 ///
-/// Solves `k² D(k)/(K(k) − D(k)) = A/B` by Newton's method for ln k from a rational function that is right to 1e-6 unless the ellipse is very slender. The
-/// derivatives follow from the integrals themselves: `dK/dk = −(K − D)/k` and `dD/dk = −k (r⁻¹ − 1) D/m` with the `r = k² D/(K − D)` of that k and
-/// `m = 1 − k²`.
+/// Solves `k² D(k)/(K(k) − D(k)) = A/B` by Newton's method for ln k. The start is a rational function, accurate to 1e-6 unless the ellipse is very slender. The
+/// derivatives follow from the integrals: `dK/dk = −(K − D)/k` and `dD/dk = −k (r⁻¹ − 1) D/m` with `r = k² D/(K − D)` and `m = 1 − k²`.
 pub(crate) fn axis_ratio(curvature_ratio: f64) -> (f64, f64) {
-    const STEPS_MAX: usize = 40;
     let ln_curvatures = curvature_ratio.ln();
     let square = ln_curvatures * ln_curvatures;
     let sum = |c: [f64; 4]| c[0] + square * (c[1] + square * (c[2] + square * c[3]));
@@ -269,7 +260,7 @@ pub(crate) fn axis_ratio(curvature_ratio: f64) -> (f64, f64) {
         .exp()
         .min(1.0);
     let mut d = 0.0;
-    for _ in 0..STEPS_MAX {
+    for _ in 0..ITERATIONS_MAX {
         let (k_integral, found) = complete_integrals(k);
         let rest = k_integral - found;
         let m = (1.0 - k) * (1.0 + k);
@@ -281,7 +272,7 @@ pub(crate) fn axis_ratio(curvature_ratio: f64) -> (f64, f64) {
         let step = ln_off / (3.0 - share * (1.0 + rest / found));
         k = (k * (1.0 + step + 0.5 * step * step)).min(1.0);
         d = found - rest * share * step;
-        // What is left is of the second order.
+        // The remaining error is of second order.
         if step.abs() < 1e-8 {
             break;
         }
@@ -289,15 +280,15 @@ pub(crate) fn axis_ratio(curvature_ratio: f64) -> (f64, f64) {
     (k, d)
 }
 
-/// For A/B from exp(−10) to 1, `ln k/ln(A/B)` is 2/3 at the circle and falls slowly: a quotient of two polynomials of `ln²(A/B)`, fitted
-/// to our own inverse of A/B so that the largest error of ln k (1.0e-6) is least. The numerator.
+/// Numerator of `ln k/ln(A/B)` for A/B from exp(−10) to 1, which is 2/3 at the circle and falls slowly: a quotient of two polynomials of `ln²(A/B)`, fitted to the
+/// inverse of A/B with the least largest error of ln k, 1.0e-6.
 const POWER_ABOVE: [f64; 4] = [
     2.0 / 3.0,
     0.052_821_991_585_557_69,
     9.364_049_705_523_599e-4,
     2.630_387_036_952_323e-6,
 ];
-/// The denominator that belongs to [`POWER_ABOVE`].
+/// Denominator of the quotient with [`POWER_ABOVE`].
 const POWER_BELOW: [f64; 4] = [
     1.0,
     0.083_860_695_138_854_51,
@@ -307,9 +298,8 @@ const POWER_BELOW: [f64; 4] = [
 
 /// Complete elliptic integrals K and `D = (K − E)/m` of parameter m = 1 − k², for 0 < k ≤ 1.
 ///
-/// Arithmetic–geometric mean: `K = π/(2 agm(1, k))` and `D = K Σ 2^{n−1} c_n²/m`. The quotients `c_n²/m` are carried
-/// along as such, so nothing is 0/0 at the circle. Relative accuracy a few units in the last place. Source: Gauss;
-/// Abramowitz and Stegun 1964, 17.6.
+/// Arithmetic–geometric mean: `K = π/(2 agm(1, k))` and `D = K Σ 2^{n−1} c_n²/m`. The recurrence is written for the quotients `c_n²/m`, so there is no 0/0 at the circle. The
+/// relative accuracy is a few units in the last place. Source: Gauss; Abramowitz and Stegun 1964, 17.6.
 pub(crate) fn complete_integrals(k: f64) -> (f64, f64) {
     let (mut a, mut g) = (0.5 * (1.0 + k), k.sqrt());
     let mut c = 0.5 * (1.0 - k);

@@ -1,8 +1,7 @@
-//! The normal problem of a wheel on the reference curve: one grid over the arc length of the rail, and one unknown height of the wheel.
+//! The normal problem of a wheel on the reference curve: one grid over the arc length of the rail, and the height of the wheel as an unknown.
 //!
-//! Where the bodies overlap at an expected height, a coarse grid finds the contact; a finer one, as fine as the narrowest patch that counts needs,
-//! has the answer. Its strips lie at multiples of their width from the origin of the arc length, whatever the height is, and leave out what lies
-//! between the patches.
+//! A coarse grid over the overlaps at an expected height finds the contact. The solution is on a finer grid, whose cells resolve the narrowest patch that
+//! counts. Its strips lie at multiples of their width from the origin of the arc length, independent of the height, and omit what lies between the patches.
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -15,52 +14,54 @@ use crate::half_space::unlike_bodies::Elasticity;
 use crate::lazy_field::LazyField;
 use crate::monitor::Monitor;
 use crate::normal::curve_grid::{CurveGrid, FREE, WheelOverGrid, extent_of};
-use crate::normal::gap::cell_sums::LANES;
+
 use crate::normal::gap::conjugate_gradients::{PressureInfluence, PressureTask, solve_pressure};
-use crate::normal::gap::grid::{GridFineness, NormalError, NormalWork, no_touch, squares};
+use crate::normal::gap::grid::{
+    GRIDS_MAX, GridFineness, NEAR, NormalError, NormalWork, SHARE_MIN, no_touch, squares,
+};
 use crate::normal::hertz::NormalLoad;
 use crate::normal::pressure_field::field::PressureField;
 use crate::normal::pressure_field::grid_pressure::GridPressure;
 use crate::normal::wheel::WheelLoad;
+use crate::numerics::ITERATIONS_MAX;
 use crate::numerics::flood_fill::groups;
+use crate::numerics::simd::LANES;
 
-/// Cells across the largest overlap on the grid that finds the contact.
+/// Cells across the largest overlap on the coarse grid.
 const FIRST: f64 = 24.0;
-/// Largest number of cells along x and s.
+/// Largest number of cells along x or s.
 const CELLS_MAX: usize = 600;
-/// A finer grid is not needed where the present one has this part of the wanted cells.
+/// A grid is fine enough if its cells have at most the wanted size over this part.
 const FINE_ENOUGH: f64 = 0.9;
-/// An intermediate grid is solved where the wanted cells are smaller by more than this factor; chosen on contacts at gauge corners and flanges.
+/// An intermediate grid is solved if the wanted cells are smaller by more than this factor. Chosen on contacts at gauge corners and flanges.
 const FINER_MAX: f64 = 4.0;
-/// Strips whose deformed surfaces come nearer than this part of the deepest overlap are part of the next grid.
-const NEAR: f64 = 0.03;
-/// Normal problems that are solved on one grid at most, and grids.
-const HEIGHTS_MAX: usize = 40;
-const GRIDS_MAX: usize = 12;
-/// Tolerance of the contact conditions on the grid that finds the contact, relative to the deepest overlap.
+
+/// Tolerance of the contact conditions on the coarse grid, relative to the deepest overlap.
 const FIRST_TOLERANCE: f64 = 5e-3;
-/// A light patch has at least this part of the cells across that the smallest patch has on planes.
+/// Least number of cells across a light patch, over that of the smallest patch that counts.
 const OF_LIGHT: f64 = 0.5;
-/// Tolerance of the force.
+/// Relative tolerance of the force.
 const FORCE: f64 = 2e-5;
-/// A force that is missed by more than this is no answer.
+/// Relative error of the force above which there is no solution.
 const FORCE_POOR: f64 = 5e-3;
-/// Least lowering of the wheel in mm that is tried.
+/// Least lowering of the wheel in mm.
 const LOWERING_LEAST: f64 = 1e-4;
-/// A wheel that rests where it touches first is lowered by no more than this, in mm.
+/// Usual upper limit of the lowering in mm of a wheel that rests where it touches first.
 const LOWERING_USUAL: f64 = 1.0;
-/// The gap is computed again where the height has changed by more than this part of the deepest overlap; up to there it is linear in the height.
+/// Change of height over the deepest overlap up to which the gap is linear in the height. Beyond it, the gap is computed again.
 const LINEAR: f64 = 0.05;
-/// Faces are steep where the cosine of their angle is less than this.
+/// Cosine of the angle of a face below which the face is steep.
 pub(crate) const STEEP: f64 = 0.26;
-/// The search below steep faces: its steps in mm, their number at most, and the tolerance in mm of the lowering.
+/// Step in mm of the search for a lowering below steep faces.
 const SLIDE_STEP: f64 = 0.5;
+/// Largest number of these steps.
 const SLIDE_STEPS: u32 = 120;
+/// Tolerance of this lowering in mm.
 const SLIDE_EXACT: f64 = 2e-3;
-/// Steeper strips count in the search for the height as if their angle had this cosine.
+/// Least cosine of the angle of a strip in the search for the height.
 const COSINE_LEAST: f64 = 0.1;
 
-/// What presses a wheel on a rail.
+/// A wheel pressed on the reference curve of a rail.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CurveTask<'a> {
     pub(crate) curve: &'a ReferenceCurve<'a>,
@@ -69,7 +70,7 @@ pub(crate) struct CurveTask<'a> {
     pub(crate) loading: WheelLoad,
     /// Height of the wheel's centre in mm at which the bodies just touch.
     pub(crate) touch: f64,
-    /// Lowering in mm to begin with.
+    /// Expected lowering in mm.
     pub(crate) expected: f64,
     pub(crate) fineness: GridFineness,
 }
@@ -81,41 +82,41 @@ pub(crate) struct CurveContact {
     pub(crate) operator: BentOperator,
     /// Height of the wheel's centre in mm.
     pub(crate) centre: f64,
-    /// Distance in mm of the undeformed wheel from the rail along its normal at each cell; more than 8 where none was found.
+    /// Distance in mm of the undeformed wheel from the rail along its normal at each cell; more than 8 if none was found.
     pub(crate) gap: Vec<f64>,
     /// Pressures in MPa.
     pub(crate) pressure: Vec<f64>,
-    /// The runs of contact that act on each other, by strips: first and last.
+    /// First and last strip of the runs of contact within which pressures interact.
     pub(crate) runs: Vec<[usize; 2]>,
     pub(crate) work: NormalWork,
-    /// Was the height found before the heights were used up?
+    /// Whether the height was found within the largest number of heights.
     settled: bool,
-    /// By which part the force is missed.
+    /// Relative error of the force.
     pub(crate) missed: f64,
-    /// The gap in mm that tractions open at each cell, where any do.
+    /// The gap in mm opened by tractions at each cell, if there is any.
     pub(crate) opened: Option<Vec<f64>>,
     over: WheelOverGrid,
-    /// A height of the wheel's centre in mm, and the intervals of arc length in mm in which the bodies overlap at that height. Set on the coarse grid only.
+    /// A height of the wheel's centre in mm, and the intervals of arc length in mm in which the bodies overlap at that height. Only set on the coarse grid.
     overlaps: (f64, Vec<[f64; 2]>),
-    /// Strips whose deformed surfaces nearly touch.
+    /// Whether the deformed surfaces of each strip nearly touch.
     near: Vec<bool>,
     /// The pressures of the patches with their first strips.
     patches: LazyField<Vec<(usize, GridPressure)>>,
 }
 
-/// What friction does to a contact.
+/// The effect of friction on a contact.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Friction {
-    /// Vertical force on the rail in N, upward, of the tractions.
+    /// Upward vertical force of the tractions on the rail in N.
     pub(crate) lift: f64,
-    /// The gap in mm that tractions open, on the cells of a grid.
+    /// The gap in mm opened by tractions on the cells of a grid.
     pub(crate) opened: Option<Vec<f64>>,
 }
 
 /// Buffers that successive solves reuse.
 pub(crate) type Workspace = BentWorkspace;
 
-/// Pressures of strips times weights: a uniform approach of these lowers the wheel.
+/// The influence of pressures multiplied by weights of their strips. A uniform approach of these lowers the wheel.
 struct WeightedStrips<'a> {
     operator: &'a BentOperator,
     factors: StripFactors,
@@ -151,7 +152,7 @@ impl PressureInfluence for WeightedStrips<'_> {
 }
 
 impl CurveTask<'_> {
-    /// The mean of two angles of rail and wheel, with the parts that they have of the displacements.
+    /// The mean of angles of rail and wheel, weighted with their parts of the displacements.
     fn of_both(&self, rail: f64, wheel: f64) -> f64 {
         if self.curve.is_flat() {
             return rail;
@@ -160,7 +161,7 @@ impl CurveTask<'_> {
         share * rail + (1.0 - share) * wheel
     }
 
-    /// Returns this task with the looser tolerance of grids that only find the contact or estimate friction.
+    /// Returns this task with the looser tolerance of grids that only locate the contact or estimate friction.
     pub(crate) fn roughly(mut self) -> Self {
         self.fineness.tolerance = FIRST_TOLERANCE;
         self
@@ -169,7 +170,7 @@ impl CurveTask<'_> {
     /// Finds the contact on a coarse grid, without friction.
     ///
     /// # Errors
-    /// Why the wheel does not come to rest; or the monitor stopped the work.
+    /// The reason why the wheel does not come to rest; or the monitor stopped the work.
     pub(crate) fn coarse(
         &self,
         workspace: &mut Workspace,
@@ -179,7 +180,7 @@ impl CurveTask<'_> {
             WheelLoad::Lowering(lowering) => lowering,
             _ => self.expected.max(LOWERING_LEAST),
         };
-        // Grids reach a little deeper than the lowering.
+        // Grids reach slightly deeper than the lowering.
         let deepest = |lowering: f64| self.touch - lowering - 0.1 * lowering.min(LOWERING_USUAL);
         let mut overlaps = self.curve.overlaps(deepest(lowering));
         if let Some(lower) = self.below_steep_faces(lowering, &overlaps)? {
@@ -193,7 +194,7 @@ impl CurveTask<'_> {
             let over = grid.over(self.curve, centre);
             let runs = match self.influence {
                 Influence::AngleCorrected => vec![[0, grid.places.len() - 1]],
-                // Overlaps are wider than contacts, so that runs of strips that touch may only be found with what acts alone.
+                // Overlaps are wider than contacts, so runs of strips that touch can only be determined from a solution.
                 Influence::HalfSpace => {
                     let deep: Vec<f64> = over.gap.iter().map(|gap| (-gap).max(0.0)).collect();
                     grid.joined(grid.runs(&deep))
@@ -227,8 +228,8 @@ impl CurveTask<'_> {
         last.ok_or_else(|| NormalError::NoAnswer("no grid of the contact was found".to_owned()))
     }
 
-    /// Returns the lowering in mm at which places outside steep faces carry the load. Returns `None` if the bodies overlap at such places at the expected
-    /// lowering already, or if no lowering was found.
+    /// The lowering in mm at which places outside steep faces carry the load. `None` if the bodies overlap at such places at the expected lowering already, or if no
+    /// lowering was found.
     fn below_steep_faces(
         &self,
         expected: f64,
@@ -252,7 +253,7 @@ impl CurveTask<'_> {
         Ok(Some(low + width))
     }
 
-    /// Estimates the force in N that the overlaps carry outside steep faces. Each counts as a circle with half of its area, pressed by a sphere.
+    /// Estimates the force in N of the overlaps outside steep faces. Each counts as a circle with half of its area, pressed by a sphere.
     fn carried_apart_from_steep(&self, overlaps: &[Vec<Nearest>]) -> f64 {
         let of_overlap = |overlap: &Vec<Nearest>| {
             let flat = || overlap.iter().filter(|at| !is_steep(at));
@@ -264,10 +265,10 @@ impl CurveTask<'_> {
         overlaps.iter().map(of_overlap).sum()
     }
 
-    /// Brings the wheel to rest on a grid as fine as the answer needs.
+    /// Brings the wheel to rest on a grid that meets the wanted resolution.
     ///
     /// # Errors
-    /// As [`coarse`](Self::coarse).
+    /// See [`coarse`](Self::coarse).
     pub(crate) fn fine(
         &self,
         coarse: &CurveContact,
@@ -278,11 +279,11 @@ impl CurveTask<'_> {
         self.finer(coarse, self.wanted(coarse), friction, workspace, monitor)
     }
 
-    /// Finds the contact without friction on cells of an intermediate size, where the answer needs much smaller cells than the coarse grid has, as for a narrow
-    /// patch beside a wide one. Returns `None` elsewhere and on planes.
+    /// Finds the contact without friction on cells of an intermediate size if the wanted cells are much smaller than those of the coarse grid, for example for a
+    /// narrow patch beside a wide one. `None` otherwise, and on planes.
     ///
     /// # Errors
-    /// As [`coarse`](Self::coarse).
+    /// See [`coarse`](Self::coarse).
     pub(crate) fn between(
         &self,
         coarse: &CurveContact,
@@ -302,7 +303,7 @@ impl CurveTask<'_> {
         Ok(Some(found))
     }
 
-    /// Brings the wheel to rest on a grid with cells of a given size in mm, around the contact found on another grid.
+    /// Brings the wheel to rest on a grid with cells of a given size in mm around the contact on another grid.
     fn finer(
         &self,
         coarse: &CurveContact,
@@ -319,7 +320,7 @@ impl CurveTask<'_> {
             .filter(|(_, near)| **near)
             .map(|(place, _)| [place.s - beside, place.s + beside])
             .collect();
-        // Overlaps narrower than a cell of the coarse grid. A higher wheel overlaps in no other places than a lower one.
+        // Overlaps narrower than a cell of the coarse grid. A higher wheel has no other overlaps than a lower one.
         let missed = |windows: &[[f64; 2]], [low, high]: [f64; 2]| {
             windows.iter().all(|[from, to]| *to < low || *from > high)
         };
@@ -351,10 +352,10 @@ impl CurveTask<'_> {
         self.settled(start, &friction, workspace, monitor)
     }
 
-    /// Brings the wheel to rest with friction on the grid of a rest with other friction.
+    /// Brings the wheel to rest with friction on the grid of a solution with other friction.
     ///
     /// # Errors
-    /// As [`coarse`](Self::coarse).
+    /// See [`coarse`](Self::coarse).
     pub(crate) fn again(
         &self,
         before: CurveContact,
@@ -376,7 +377,7 @@ impl CurveTask<'_> {
         Ok(found)
     }
 
-    /// A coarse grid for a lowering in mm over all places where the bodies overlap.
+    /// A coarse grid over all overlaps at a lowering in mm.
     fn over_overlaps(
         &self,
         lowering: f64,
@@ -420,10 +421,10 @@ impl CurveTask<'_> {
         let total: f64 = pressure.iter().sum();
         for patch in groups(grid.cells(), |k| pressure[k] > 0.0) {
             let share = patch.iter().map(|k| pressure[*k]).sum::<f64>() / total;
-            if share < self.fineness.share_min {
+            if share < SHARE_MIN {
                 continue;
             }
-            // The error of a patch falls with the power 3/2 of its cells, and counts as much as its load.
+            // The error of a patch falls with the power 3/2 of its cells and counts in proportion to its load.
             let cells = self.fineness.contact * share.powf(2.0 / 3.0);
             let cells = cells.max(OF_LIGHT * self.fineness.patch);
             for axis in [0, 1] {
@@ -440,7 +441,7 @@ impl CurveTask<'_> {
         })
     }
 
-    /// The wheel at rest on a grid, which grows where the contact reaches its border.
+    /// Brings the wheel to rest on a grid, which is enlarged where the contact reaches its border.
     fn settled(
         &self,
         mut start: Start,
@@ -456,7 +457,7 @@ impl CurveTask<'_> {
                 found.opened = opened;
                 return Ok(found);
             };
-            // On a face that is nearly vertical, the contact outgrows every grid.
+            // Next to a nearly vertical face the contact outgrows every grid.
             if !found.settled {
                 return Err(NormalError::NoAnswer(
                     "the contact extends beyond the surfaces that were searched, and no height of the wheel carries its load \
@@ -480,7 +481,7 @@ impl CurveTask<'_> {
         ))
     }
 
-    /// The force in N that the pressures carry as [`carried`] counts it; none where the height is given.
+    /// The required value of [`carried`] in N; `None` if the height is given.
     fn wanted_force(&self, friction: &Friction) -> Result<Option<f64>, NormalError> {
         let wanted = match self.loading {
             WheelLoad::Vertical(force) => force + friction.lift,
@@ -515,11 +516,10 @@ impl CurveTask<'_> {
         BentOperator::new(grid.x.len(), grid.step, self.elasticity, strips, workspace)
     }
 
-    /// The wheel at rest on one grid.
+    /// Brings the wheel to rest on one grid.
     ///
-    /// Pressures are multiplied with a weight of their strip, the cosine of its angle. Then their sum is the vertical force, and lowering the wheel is
-    /// a uniform approach: conjugate gradients find the pressures and the height together. What the gap depends on the height otherwise is
-    /// added in the next solve.
+    /// Pressures are multiplied by a weight of their strip, the cosine of its angle. Their sum is then the vertical force, and lowering the wheel is a uniform
+    /// approach, so conjugate gradients find pressures and height together. Other effects of the height on the gap enter the next solve.
     fn on_grid(
         &self,
         start: Start,
@@ -555,7 +555,7 @@ impl CurveTask<'_> {
             WheelLoad::Normal(_) => wanted * mean_weight(nx, &pressure, &over.gap, &weights),
             _ => wanted,
         });
-        for height in 0..HEIGHTS_MAX {
+        for height in 0..ITERATIONS_MAX {
             let gap = over.at(centre);
             let mut weighted: Vec<f64> = match &friction.opened {
                 Some(opened) => gap.iter().zip(opened).map(|(a, b)| a + b).collect(),
@@ -587,7 +587,7 @@ impl CurveTask<'_> {
             let missed = wanted.map_or(0.0, |wanted| carried / wanted - 1.0);
             let off = over.lift_off(&pressure, &weights) * found.approach.abs();
             let is_linear = (over.centre - centre).abs() <= LINEAR * depth;
-            let ends = height + 1 == HEIGHTS_MAX;
+            let ends = height + 1 == ITERATIONS_MAX;
             let settled = is_linear && off <= tolerance * depth && missed.abs() <= FORCE;
             if ends || settled {
                 if missed.abs() > FORCE_POOR {
@@ -640,7 +640,7 @@ fn ends(overlap: &[Nearest]) -> [f64; 2] {
     [0, overlap.len() - 1].map(|k| overlap[k].place.s)
 }
 
-/// Why there is no answer where the force is missed by a part of it.
+/// The error for a force with a relative error `part`.
 fn load_missed(part: f64) -> NormalError {
     NormalError::NoAnswer(format!(
         "no height of the wheel was found on the curve of the rail at which it carries its load, which is missed by {:.1} %",
@@ -648,7 +648,7 @@ fn load_missed(part: f64) -> NormalError {
     ))
 }
 
-/// Changes the values of cells with a weight of their strip.
+/// Combines the values of the cells with the weight of their strip.
 fn each_row(values: &mut [f64], weights: &[f64], of: fn(f64, f64) -> f64) {
     let nx = values.len() / weights.len();
     for (row, weight) in values.chunks_exact_mut(nx).zip(weights) {
@@ -657,7 +657,7 @@ fn each_row(values: &mut [f64], weights: &[f64], of: fn(f64, f64) -> f64) {
     }
 }
 
-/// The weight of the strips in contact, or, where none is, of the one with the least gap.
+/// The load-weighted mean weight of the strips in contact, or the weight at the least gap if none is in contact.
 fn mean_weight(nx: usize, pressure: &[f64], gap: &[f64], weights: &[f64]) -> f64 {
     let loads = || pressure.chunks_exact(nx).map(|row| row.iter().sum::<f64>());
     let total: f64 = loads().sum();
@@ -669,19 +669,19 @@ fn mean_weight(nx: usize, pressure: &[f64], gap: &[f64], weights: &[f64]) -> f64
     weights[deepest.unwrap_or(0) / nx]
 }
 
-/// Where a grid is solved from.
+/// The start of a solve on a grid.
 struct Start {
     grid: CurveGrid,
     runs: Vec<[usize; 2]>,
     pressure: Vec<f64>,
     centre: f64,
-    /// Solution found earlier on the same grid.
+    /// The operator, if the grid has been solved before.
     operator: Option<BentOperator>,
     over: Option<WheelOverGrid>,
     iterations: u32,
 }
 
-/// A pressure to start from: Hertz's law over the part that overlaps by more than half of the deepest overlap, which is given.
+/// A first pressure: Hertz's law over the part that overlaps by more than half of the given deepest overlap.
 fn first_pressure(gap: &[f64], depth: f64, cell: f64, elasticity: &Elasticity) -> Vec<f64> {
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
     let part = |gap: &f64| (1.0 - 2.0 * (gap - least) / depth).max(0.0);
@@ -691,7 +691,7 @@ fn first_pressure(gap: &[f64], depth: f64, cell: f64, elasticity: &Elasticity) -
     gap.iter().map(|gap| largest * part(gap).sqrt()).collect()
 }
 
-/// The force that is prescribed, as pressures give it: the vertical one, or the sum of the normal ones.
+/// The force of pressures that corresponds to the load: the vertical one, or the sum of the normal ones.
 fn carried(loading: WheelLoad, grid: &CurveGrid, pressure: &[f64]) -> f64 {
     let rows = pressure.chunks_exact(grid.x.len()).zip(&grid.places);
     let of_row = |(row, place): (&[f64], &CurvePlace)| {
@@ -712,11 +712,11 @@ fn extent(contact: &CurveContact, axis: usize) -> [f64; 2] {
 }
 
 impl CurveContact {
-    /// The pressures of the patches in some strips, each as a field of its own, by increasing arc length; coordinates are x and s. Without `edges`, they
-    /// are samples only, as [`GridPressure::of_samples`] has them.
+    /// The pressures of the patches in some strips, each as a separate field, by increasing arc length; coordinates are x and s. Without `edges` they are samples
+    /// (see [`GridPressure::of_samples`]).
     ///
     /// # Errors
-    /// As [`GridPressure::of_samples`].
+    /// See [`GridPressure::of_samples`].
     pub(crate) fn patches(
         &self,
         [first, last]: [usize; 2],
@@ -768,7 +768,7 @@ impl CurveContact {
                 &pressure,
                 depth,
             );
-            // A patch of a cell or two has no edges.
+            // A patch of one or two cells has no edges.
             Some((strip, found.ok()?))
         };
         let inside = |k: usize| self.pressure[k] > 0.0;
@@ -776,8 +776,8 @@ impl CurveContact {
         patches.filter_map(field).collect()
     }
 
-    /// The strips of the parts of the contact that are solved together: all on the curve, those of a plane, and with the influence of a half-space the
-    /// runs that act on each other.
+    /// The strips of the parts of the contact that are solved together: everything on the curve, the strips of a plane, or with the influence of a half-space the runs
+    /// that interact.
     pub(crate) fn parts(&self, influence: Influence) -> Vec<[usize; 2]> {
         let of_strips = match influence {
             Influence::AngleCorrected => vec![0; self.grid.places.len()],
@@ -821,8 +821,8 @@ impl CurveContact {
         [mean, (second / load - mean * mean).max(0.0).sqrt()]
     }
 
-    /// About what changes with the friction: the vertical force on the rail, relative to it; and, by the gap that tractions open, the lateral force relative
-    /// to all normal forces. That changes by the turn of the surface, and by `shared`, the part of a change of the pressures that the tractions take.
+    /// Estimated changes with the friction: of the vertical force on the rail, relative to it, and of the lateral force through the gap opened by tractions, relative to all
+    /// normal forces. The lateral force changes with the turn of the surface and with `shared`, the part of a change of pressures that tractions follow.
     pub(crate) fn change_by(&self, from: &Friction, to: &Friction, shared: f64) -> [f64; 2] {
         let (mut depth, mut opened) = (0.0, 0.0);
         for (k, p) in self.pressure.iter().enumerate().filter(|(_, p)| **p > 0.0) {

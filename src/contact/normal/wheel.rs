@@ -1,8 +1,4 @@
-//! A wheel over its rail, with what presses them together.
-//!
-//! A wheel at rest on its rail.
-//!
-//! A wheelset over both rails, with what presses it down and what is asked of it.
+//! A wheel over its rail, a wheel at rest, and a wheelset over both rails.
 
 use crate::geometry::contact_locus::ContactLocus;
 use crate::geometry::reference_curve::{CurvePlace, WheelOver};
@@ -13,18 +9,18 @@ use crate::normal::hertz::Patch;
 use crate::normal::pressure_field::field::PressureField;
 use crate::remark::entry::RemarkEntry;
 
-/// What presses the wheel on the rail.
+/// The load of a wheel on its rail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WheelLoad {
     /// Vertical force in N.
     Vertical(f64),
     /// Sum of the normal forces of all patches in N.
     Normal(f64),
-    /// The wheel is lowered by so many mm below first touch.
+    /// Lowering of the wheel below first touch in mm.
     Lowering(f64),
 }
 
-/// A wheel over its rail, and what presses them together.
+/// A wheel over its rail with its load.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WheelTask {
     /// Wheel and rail in place.
@@ -33,7 +29,7 @@ pub struct WheelTask {
     pub loading: WheelLoad,
     /// Contact modulus `E* = G/(1−ν)` in MPa.
     pub contact_modulus: f64,
-    /// What the case says about the trust in the profiles.
+    /// Treatment of the profiles.
     pub trust: ProfileTrust,
     /// The surface on which the contact is solved.
     pub surface: ReferenceSurface,
@@ -64,10 +60,10 @@ impl WheelTask {
         }
     }
 
-    /// The height in mm of the wheel's centre at which the bodies just touch, and about how far below it the wheel comes to rest.
+    /// The height in mm of the wheel's centre at which the bodies just touch, and the estimated lowering below it.
     ///
     /// # Errors
-    /// As [`ContactLocus::new`].
+    /// See [`ContactLocus::new`].
     pub(crate) fn first_touch(&self) -> Result<[f64; 2], String> {
         let locus = ContactLocus::new(&self.geometry)?;
         let lowering = match self.loading {
@@ -79,7 +75,7 @@ impl WheelTask {
         Ok([locus.touch, lowering])
     }
 
-    /// This task with planes of contact in place of the curve.
+    /// Returns this task with planes of contact instead of the curve.
     pub(crate) fn on_planes(&self) -> WheelTask {
         WheelTask {
             surface: ReferenceSurface::Planes,
@@ -87,7 +83,7 @@ impl WheelTask {
         }
     }
 
-    /// Whether planes may answer in place of the curve.
+    /// Whether planes may replace the curve.
     pub(crate) fn may_fall_back(&self) -> bool {
         matches!(
             self.surface,
@@ -99,16 +95,16 @@ impl WheelTask {
     }
 }
 
-/// What a case says about the trust in its profiles.
+/// Treatment of the profiles as requested by the case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ProfileTrust {
-    /// The smoothing of rail and wheel follows from their noise.
+    /// Whether the smoothing of rail and wheel follows from their noise.
     pub auto: [bool; 2],
-    /// Profiles are solved that are too rough or too coarse for an answer that can be relied on.
+    /// Whether profiles are accepted that are too rough or too coarse for a reliable result.
     pub accept_rough: bool,
 }
 
-/// The wheel at rest on its rail.
+/// A wheel at rest on its rail.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WheelContact {
     /// How far the wheel is below first touch, in mm.
@@ -130,16 +126,16 @@ pub struct WheelPatch {
     pub place: CurvePlace,
     /// The undeformed wheel over the load centre.
     pub wheel: WheelOver,
-    /// Parameters of rail and wheel at the ends across.
+    /// Parameters of rail and wheel at the lateral ends.
     pub ends: [[f64; 2]; 2],
-    /// Region and pressure from the load centre, of this patch and of those that are solved together with it.
+    /// Region and pressure, with coordinates from the load centre, of this patch and of those solved together with it.
     pub field: PressureField,
     /// Number of the patch in the field.
     pub number: usize,
 }
 
 impl WheelPatch {
-    /// Its region and forces.
+    /// Region and forces of the patch.
     pub fn patch(&self) -> Patch {
         self.field.patches()[self.number]
     }
@@ -157,23 +153,23 @@ impl WheelContact {
     }
 }
 
-/// A wheelset over both rails, in all positions that are asked for.
+/// A wheelset over both rails, in all requested positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WheelsetTask {
-    /// The left and the right wheel over their rails, each with the vertical force it carries, in the first position without roll.
+    /// The left and the right wheel over their rails, each with its vertical force in the first position without roll.
     pub sides: [WheelTask; 2],
-    /// Shift to the left in mm and yaw in rad of every position; never empty.
+    /// Shift to the left in mm and yaw in rad of every position; not empty.
     pub poses: Vec<[f64; 2]>,
-    /// How the wheelset moves in every position.
+    /// The motion of the wheelset in every position.
     pub moves: Vec<WheelsetMove>,
-    /// What is asked of the rigid wheelset.
+    /// The requested kinematics of the rigid wheelset.
     pub kinematics: Option<KinematicsTask>,
-    /// Whether the right rail and wheel have cross-sections of their own, to which remarks are to point.
+    /// Whether the right rail and wheel have their own cross-sections, to which remarks point.
     pub own_right: [bool; 2],
 }
 
 impl WheelsetTask {
-    /// The pointer to a cross-section of the right side, from what it would be for a single wheel.
+    /// The pointer to a cross-section of the right side for that of a single wheel.
     pub fn pointer_on_right(&self, pointer: &str) -> String {
         for (own, name) in self.own_right.into_iter().zip(["rail", "wheel"]) {
             if own && let Some(rest) = pointer.strip_prefix(&format!("/contact/{name}")) {
@@ -184,21 +180,21 @@ impl WheelsetTask {
     }
 }
 
-/// How a wheelset moves in a position.
+/// The motion of a wheelset in a position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelsetMove {
-    /// Its motion; the angular velocity is NaN where it has to be found.
+    /// The motion; the angular velocity is NaN where it has to be found.
     pub motion: WheelsetMotion,
-    /// Torque about the axle in N mm that the rails are to balance.
+    /// Torque about the axle in N mm that the rails balance, if it is prescribed.
     pub drive_torque: Option<f64>,
 }
 
-/// Shifts and amplitudes, in mm.
+/// The shifts and amplitudes, in mm, of the kinematics of a wheelset.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KinematicsTask {
     /// Largest shift to either side.
     pub reach: f64,
-    /// Distance of the shifts.
+    /// Distance between shifts.
     pub step: f64,
     /// Amplitudes of the conicity.
     pub amplitudes: Vec<f64>,

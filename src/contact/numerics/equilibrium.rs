@@ -1,19 +1,17 @@
-//! Equilibrium: the unknowns at which residuals vanish, by Broyden's iteration (Broyden 1965) with limited steps.
+//! The unknowns at which residuals vanish, by Broyden's iteration (Broyden 1965) with limited steps.
 //!
-//! Each residual must grow with its own unknown, as a force does with its creepage. A step was then too long if the residuals after it point back along
-//! it. Unless it has shortened the residuals it is rejected, and the next one, from the same place, is shorter.
+//! Each residual must be an increasing function of its own unknown, as a force is of its creepage. A step was then too long if the following residuals point back along
+//! it. Unless it reduced the residuals, it is rejected, and a shorter step follows from the same place.
 
+use crate::numerics::ITERATIONS_MAX;
 use crate::numerics::roots::ROUNDING;
 use crate::remark::list::Remark;
 
-/// Most trials of one search.
-const TRIALS_MAX: u32 = 40;
-/// Bound of the first step: the length of the residuals that it is expected to remove. It doubles after every accepted step that reached it. Chosen by
-/// judgement.
+/// Bound of the first step: the length of the residuals that it should remove. It doubles after every accepted step that reached it. Chosen by judgement.
 const STRIDE: f64 = 0.5;
-/// An update multiplies the inverse of the derivatives along a step by at most the reciprocal of this, however little the residuals change there.
+/// The inverse derivative along a step grows at most by the reciprocal of this per update, however little the residuals change.
 const FLAT: f64 = 0.1;
-/// The residuals jump where steps shorter than this part of the tolerance no longer bring them within it.
+/// Step length over the tolerance below which residuals outside their tolerance mean a jump.
 const JUMP: f64 = 0.01;
 
 /// Residuals at a place.
@@ -83,10 +81,10 @@ impl<const N: usize, T> Equilibrium<N, T> {
     }
 }
 
-/// A search. It keeps the derivatives that it has found for the next one.
+/// A search, which keeps its derivatives for the next one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Search<const N: usize> {
-    /// For each unknown the change that changes its residual by about 1; `None` where the unknown is given.
+    /// The change of each unknown that changes its residual by about 1; `None` where the unknown is given.
     scale: [Option<f64>; N],
     /// Largest size of each unknown.
     limit: [f64; N],
@@ -95,7 +93,7 @@ pub(crate) struct Search<const N: usize> {
 }
 
 impl<const N: usize> Search<N> {
-    /// A search that starts from the scale as its derivatives.
+    /// A search whose first derivatives follow from the scale.
     pub(crate) fn new(scale: [Option<f64>; N], limit: [f64; N]) -> Search<N> {
         Search {
             scale,
@@ -124,7 +122,7 @@ impl<const N: usize> Search<N> {
             end: Termination::TrialsUsedUp,
         };
         let (mut stride, mut rejected) = (STRIDE, 0);
-        for _ in 1..TRIALS_MAX {
+        for _ in 1..ITERATIONS_MAX {
             if best.residual <= best.tolerance {
                 break;
             }
@@ -135,12 +133,12 @@ impl<const N: usize> Search<N> {
             let wanted = times(&self.inverse, residual);
             let mut factor = (stride / length(wanted)).min(1.0);
             let wanted: [f64; N] = each(|k| -self.scale[k].map_or(0.0, |scale| scale * wanted[k]));
-            // As far as all unknowns stay within their limits.
+            // Scales the step so that all unknowns stay within their limits.
             let room = |k: usize| (self.limit[k] - place[k] * wanted[k].signum()) / wanted[k].abs();
             factor = (0..N).fold(factor, |factor, k| factor.min(room(k)));
-            // An unknown is at its limit if the limit leaves almost none of its step.
+            // An unknown is at its limit if the limit leaves almost nothing of its step.
             if factor <= ROUNDING {
-                // An unknown at its limit, whose own residual asks for more.
+                // The residual of an unknown at its limit may point beyond it.
                 let beyond =
                     |k: usize| -self.scale[k].unwrap_or(0.0) * residual[k] * place[k] > 0.0;
                 if (0..N).any(|k| room(k) <= ROUNDING && beyond(k)) {
@@ -186,7 +184,7 @@ impl<const N: usize> Search<N> {
         Ok(best)
     }
 
-    /// Broyden's update, for a change of the residuals with a step over the scale.
+    /// Broyden's update, for the change of the residuals with a step over the scale.
     fn update(&mut self, step: [f64; N], change: [f64; N]) {
         let mut moved = times(&self.inverse, change);
         let least = FLAT * product(step, step);

@@ -1,6 +1,6 @@
 //! Connected groups of grid cells.
 
-/// Cells of one row, from the first to the one after the last, and a run of the same group before it (its own number where there is none).
+/// Adjoining cells of a row, from the first to one after the last, and a run of the same group before it (its own number if there is none).
 #[derive(Clone, Copy)]
 struct RowRun {
     from: usize,
@@ -15,7 +15,7 @@ pub(crate) fn groups(
     inside: impl Fn(usize) -> bool,
 ) -> Vec<Vec<usize>> {
     let mut runs: Vec<RowRun> = Vec::new();
-    // The runs of the row before.
+    // The runs of the previous row.
     let mut above = 0..0;
     for j in 0..height {
         let (first, row) = (runs.len(), j * width);
@@ -35,7 +35,7 @@ pub(crate) fn groups(
                 to: row + i,
                 parent,
             });
-            // Those that it meets at an edge or a corner.
+            // Runs of the previous row that touch it at an edge or a corner.
             for k in above.clone() {
                 let (low, high) = (runs[k].from + width, runs[k].to + width);
                 if low <= row + i && high >= row + from {

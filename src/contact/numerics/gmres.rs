@@ -1,12 +1,12 @@
-//! GMRES with right preconditioning (Saad & Schultz 1986): linear systems known only through products.
+//! GMRES with right preconditioning (Saad & Schultz 1986) for linear systems given by their products.
 
 use crate::monitor::Stop;
 
-/// Basis vectors kept before a restart. A Newton step takes 4 products on average; 30 gives the same work on the 160 ellipses that
-/// `newton.rs` of the boundary element method names.
+/// Number of basis vectors before a restart. A Newton step takes 4 products on average; 30 gives the same work on the 160 ellipses named in `newton.rs` of the boundary
+/// element method.
 const BASIS_MAX: usize = 60;
 
-/// Buffers that live as long as a solve.
+/// Buffers of successive solves.
 #[derive(Debug, Default)]
 pub struct Gmres {
     basis: Vec<Vec<f64>>,
@@ -14,21 +14,21 @@ pub struct Gmres {
     columns: Vec<f64>,
     rotations: Vec<(f64, f64)>,
     rhs: Vec<f64>,
-    /// `P⁻¹ V`, so that the solution needs no application of its own.
+    /// `P⁻¹ V`, so that the solution needs no application of the preconditioner.
     directions: Vec<Vec<f64>>,
     product: Vec<f64>,
     residual: Vec<f64>,
     weights: Vec<f64>,
 }
 
-/// Result of a linear solve.
+/// Report of a linear solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearReport {
     /// Products with the matrix.
     pub products: u32,
-    /// Norm of the residual divided by that of the right-hand side.
+    /// Norm of the residual over that of the right-hand side.
     pub residual: f64,
-    /// Did the residual fall by the tolerance, before the restarts were used up?
+    /// Whether the residual reached the tolerance.
     pub converged: bool,
 }
 
@@ -41,13 +41,12 @@ pub trait LinearSystem {
     /// Called once per product.
     ///
     /// # Errors
-    /// Why the work is to end.
+    /// Why the work must end.
     fn tick(&mut self) -> Result<(), Stop>;
 }
 
 impl Gmres {
-    /// Improves `x` (which starts at zero) until the residual of `A x = b` has fallen by `tolerance`, or the limits
-    /// on basis size and restarts are reached.
+    /// Improves `x`, which starts at zero, until the norm of the residual of `A x = b` is at most `tolerance` times that of `b`, or the restarts are used up.
     ///
     /// # Errors
     /// Only if the system's `tick` stops the work.
@@ -75,8 +74,7 @@ impl Gmres {
         let mut beta = norm_b;
         for restart in 0..=3 {
             if restart > 0 {
-                // The norm that a cycle ends with was carried along by rotations and collects rounding errors: each restart
-                // begins with the residual itself.
+                // The norm from the rotations accumulates rounding errors, so each restart computes the residual.
                 system.product(x, &mut self.product);
                 report.products += 1;
                 for i in 0..b.len() {
@@ -122,14 +120,13 @@ impl Gmres {
             let direction = &mut self.directions[k];
             direction.clear();
             direction.extend_from_slice(&self.basis[k]);
-            // Preconditioned from the right: the residual that is minimised is that of the system itself, so that the
-            // tolerance means the same with any preconditioner.
+            // With right preconditioning the residual is that of the system itself, so the tolerance does not depend on the preconditioner.
             system.precondition(direction);
             system.product(direction, &mut self.product);
             report.products += 1;
             let breakdown = self.orthogonalise(k);
             k += 1;
-            // The last rotated entry is the norm of the residual; the solution need not be formed to know it.
+            // The last rotated entry is the norm of the residual, so the solution need not be formed.
             if breakdown || self.rhs[k].abs() <= goal {
                 break;
             }
@@ -149,8 +146,8 @@ impl Gmres {
         }
     }
 
-    /// Makes the newest product orthogonal to the basis (modified Gram–Schmidt), appends it, and applies the Givens
-    /// rotations. Returns true if the product lies in the span of the basis, so that the cycle has to end.
+    /// Orthogonalises the last product against the basis (modified Gram–Schmidt), appends it, and applies the Givens rotations. Returns true if the product lies in the
+    /// span of the basis, which ends the cycle.
     fn orthogonalise(&mut self, k: usize) -> bool {
         let before = norm(&self.product);
         self.columns.resize(column_start(k + 1), 0.0);
@@ -179,7 +176,7 @@ impl Gmres {
         let last = self.rhs[k];
         self.rhs[k] = c * last;
         self.rhs.push(-s * last);
-        // What is left is rounding; scaled up to a basis vector it would be noise.
+        // The remainder is rounding noise.
         if rest <= 1e-14 * before {
             return true;
         }
@@ -198,11 +195,11 @@ impl Gmres {
             for j in i + 1..k {
                 y[i] -= self.columns[column_start(j) + i] * y[j];
             }
-            // A pivot of 0 belongs to a singular system: that direction is left out.
+            // A pivot of 0 belongs to a singular system; its direction is skipped.
             let pivot = self.columns[column_start(i) + i];
             y[i] = if pivot == 0.0 { 0.0 } else { y[i] / pivot };
         }
-        // There may still be directions of a longer cycle; the weights end the sum.
+        // Directions of a longer cycle may follow; the weights end the sum.
         for (weight, direction) in self.weights.iter().zip(&self.directions) {
             for (to, d) in x.iter_mut().zip(direction) {
                 *to += weight * d;
@@ -211,12 +208,12 @@ impl Gmres {
     }
 }
 
-/// Where column k of the triangular matrix, which has k + 1 entries, starts.
+/// The start of column k, which has k + 1 entries, in the triangular matrix.
 fn column_start(k: usize) -> usize {
     k * (k + 1) / 2
 }
 
-/// Inner product in eight running sums, so that it can be vectorised and rounds alike everywhere.
+/// Inner product in eight running sums, which can be vectorised and round alike on every machine.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (chunks_a, chunks_b) = (a.chunks_exact(8), b.chunks_exact(8));

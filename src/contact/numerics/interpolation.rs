@@ -1,28 +1,24 @@
-//! Curves through samples: a cubic in every interval, with slopes at the nodes that the functions here choose by different rules.
+//! Curves through samples: cubics with slopes at the nodes chosen by different rules, polynomials through points (Lagrange), and natural cubic splines, smoothed on
+//! request.
 //!
-//! Polynomials through given points, after Lagrange.
-//!
-//! Natural cubic splines through samples, smoothed on request.
-//!
-//! The spline f of the samples `(s_i, d_i)` minimises `Σ w_i (d_i − f(s_i))² + λ ∫ (f'')² ds`, with
-//! `w_i` half the distance between the neighbours of `s_i`, so that `λ = (L/2π)⁴` halves waves of length L whatever the
-//! spacing. Source: Reinsch, "Smoothing by spline functions", Numerische Mathematik 10 (1967).
+//! The spline f of the samples `(s_i, d_i)` minimises `Σ w_i (d_i − f(s_i))² + λ ∫ (f'')² ds`, where `w_i` is half the distance between the neighbours of `s_i`, so that
+//! `λ = (L/2π)⁴` halves waves of length L for any spacing. Source: Reinsch, "Smoothing by spline functions", Numerische Mathematik 10 (1967).
 
 use crate::numerics::roots::interval;
 
-/// A place on an axis, found once for the curves of many rows.
+/// A place on an axis, for the curves of many rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Place {
     /// The node at the start of its interval.
     pub(crate) node: usize,
-    /// Weights of the values at both ends of the interval in the curve's value.
+    /// Weights of the values at both ends of the interval.
     pub(crate) values: [f64; 2],
-    /// Weights of the slopes there.
+    /// Weights of the slopes at both ends of the interval.
     pub(crate) slopes: [f64; 2],
 }
 
 impl Place {
-    /// A place on an ascending axis of at least 2 nodes; beyond the ends it is counted from the outermost intervals.
+    /// A place on an ascending axis of at least 2 nodes; beyond the ends, relative to the outermost intervals.
     pub(crate) fn new(axis: &[f64], at: f64) -> Place {
         let node = interval(axis, at);
         let length = axis[node + 1] - axis[node];
@@ -36,7 +32,7 @@ impl Place {
         }
     }
 
-    /// Value of the curve with these values and slopes at the nodes.
+    /// Value of the curve with given values and slopes at the nodes.
     pub(crate) fn value(&self, values: &[f64], slopes: &[f64]) -> f64 {
         let [start, end] = self.values;
         let [leaving, arriving] = self.slopes;
@@ -47,39 +43,38 @@ impl Place {
     }
 }
 
-/// How many nodes away the last value lies that a slope of [`limited_slopes`] depends on.
+/// Distance in nodes of the last value on which a slope of [`limited_slopes`] depends.
 pub(crate) const SLOPE_REACH: usize = 2;
 
 /// Slopes at the nodes of a curve through at least 2 values, limited where the values jump or have a kink.
 ///
-/// A slope is that of the parabola through the node and its two neighbours, unless this parabola is curved more than a fixed
-/// number of times as strongly as those of both neighbouring nodes. There the slope is blended with the harmonic mean of the
-/// adjoining chords' slopes, 0 where these differ in sign (the limiter of van Leer 1974), which keeps the curve from overshooting
-/// the values. At the ends the parabola of the adjacent node is used. A slope inside depends on [`SLOPE_REACH`] values on either side.
+/// A slope is that of the parabola through the node and its two neighbours, unless this parabola is curved more than a fixed number of times as strongly as those of both
+/// neighbours. Then the slope is blended with the harmonic mean of the slopes of the adjoining chords, 0 if these differ in sign (the limiter of van Leer 1974), which
+/// prevents the curve from overshooting the values. At the ends the parabola of the adjacent node is used. An inner slope depends on [`SLOPE_REACH`] values on either side.
 pub(crate) fn limited_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     let mut slopes = LimitedSlopes::new(axis);
     slopes.find(values);
     slopes.slopes
 }
 
-/// [`limited_slopes`] of one curve after the other over the same axis.
+/// [`limited_slopes`] of successive curves over the same axis.
 #[derive(Debug)]
 pub(crate) struct LimitedSlopes {
-    /// One over the distance from every node to the next.
+    /// Inverse distance from every node to the next.
     per_width: Vec<f64>,
-    /// Of every node but the outermost, two over the distance from the one before it to the one after it.
+    /// Two over the distance between both neighbours, for every inner node.
     bend: Vec<f64>,
-    /// The weights of the chords before and after such a node in the slope of its parabola.
+    /// Weights of the chords before and after every inner node in the slope of its parabola.
     weights: Vec<[f64; 2]>,
     rises: Vec<f64>,
-    /// Second derivatives of the parabolas; the outermost two have those of their neighbours.
+    /// Second derivatives of the parabolas; those of the outermost nodes equal those of their neighbours.
     bends: Vec<f64>,
-    /// Those of the last curve.
+    /// Slopes of the last curve.
     pub(crate) slopes: Vec<f64>,
 }
 
 impl LimitedSlopes {
-    /// For curves over an ascending axis of at least 2 nodes.
+    /// Buffers for curves over an ascending axis of at least 2 nodes.
     pub(crate) fn new(axis: &[f64]) -> LimitedSlopes {
         let around = || {
             axis.windows(3)
@@ -97,7 +92,7 @@ impl LimitedSlopes {
         }
     }
 
-    /// Finds the slopes of a curve.
+    /// Computes the slopes of a curve.
     pub(crate) fn find(&mut self, values: &[f64]) {
         let n = values.len();
         self.rises.clear();
@@ -138,9 +133,9 @@ impl LimitedSlopes {
         self.slopes.push(self.rises[n - 2] + last);
     }
 
-    /// Share of the parabola in the slope at a node that is not the first or last.
+    /// Share of the parabola in the slope at an inner node.
     fn trust(&self, k: usize) -> f64 {
-        /// How many times as strongly a parabola may be curved as its neighbours. Chosen by judgement; how much it matters was not measured.
+        /// Largest ratio of the curvature of a parabola to those of its neighbours. Chosen by judgement.
         const SLOPE_LIMIT: f64 = 8.0;
         let bend = self.bends[k].abs();
         let allowed = SLOPE_LIMIT * self.bends[k - 1].abs().min(self.bends[k + 1].abs());
@@ -148,11 +143,11 @@ impl LimitedSlopes {
     }
 }
 
-/// Slopes that favour the straighter side, so that the curve stays close to the chords where a spline overshoots (H. Akima, Journal of
-/// the ACM 17, 1970). At least 2 nodes, ascending.
+/// Slopes that favour the straighter side, so that the curve stays close to the chords where a spline overshoots (H. Akima, Journal of the ACM 17, 1970). The axis has at
+/// least 2 nodes and increases.
 pub(crate) fn akima_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
     let count = axis.len();
-    // Slopes of the chords, with two more beyond either end that go on in a straight line.
+    // Slopes of the chords, with two more at either end by linear continuation.
     let mut chords = vec![0.0; count + 3];
     for k in 0..count - 1 {
         chords[k + 2] = (values[k + 1] - values[k]) / (axis[k + 1] - axis[k]);
@@ -186,7 +181,7 @@ pub(crate) fn polynomial_weights<const N: usize>(nodes: &[f64; N], at: f64) -> [
     })
 }
 
-/// Value at `at` of the polynomial of least degree through points `(place, value)`, of which there is at least one.
+/// Value at `at` of the polynomial of least degree through at least one point `(place, value)`.
 pub fn polynomial_value(points: &[(f64, f64)], at: f64) -> f64 {
     let mut sum = 0.0;
     for (i, (node, value)) in points.iter().enumerate() {
@@ -218,9 +213,8 @@ pub struct SplineValue {
 }
 
 impl Spline {
-    /// The splines through two series of `values` at strictly increasing `knots`, at least 2; waves shorter than about `cut_wavelength`
-    /// (same unit as the knots) are smoothed away, 0 for interpolation. Smoothed splines pass exactly through the first and the last value
-    /// where `ends` says so.
+    /// The splines through two series of `values` at at least 2 strictly increasing `knots`. Waves shorter than about `cut_wavelength` (same unit as the knots) are smoothed
+    /// away; 0 means interpolation. Smoothed splines pass exactly through the first and the last value where `ends` is set.
     pub fn pair(
         knots: &[f64],
         values: [Vec<f64>; 2],
@@ -297,12 +291,12 @@ impl Spline {
         &self.knots
     }
 
-    /// Value and derivatives; beyond the ends the tangent there.
+    /// Value and derivatives; beyond the ends, those of the tangent.
     pub fn at(&self, s: f64) -> SplineValue {
         self.at_in(self.interval(s), s)
     }
 
-    /// Coefficients of the cubic between the knots i and i + 1, by powers of the distance from knot i.
+    /// Coefficients of the cubic between the knots i and i + 1 in powers of the distance from knot i.
     pub fn cubic(&self, i: usize) -> [f64; 4] {
         let step = self.knots[i + 1] - self.knots[i];
         let [first, last] = [self.bends[i], self.bends[i + 1]];
@@ -316,10 +310,9 @@ impl Spline {
         ]
     }
 
-    /// The interval of knots that a place lies in, or the nearest one.
+    /// The interval of knots that contains a place, or the nearest one.
     pub fn interval(&self, s: f64) -> usize {
-        let after = self.knots.partition_point(|knot| *knot <= s);
-        after.clamp(1, self.knots.len() - 1) - 1
+        interval(&self.knots, s)
     }
 
     /// [`Spline::at`] for a place whose [`Spline::interval`] is known.

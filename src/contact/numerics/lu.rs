@@ -1,11 +1,7 @@
-//! Dense LU factorisation with row exchanges.
+//! Dense LU factorisation with row exchanges, and least-squares fits of few functions by their normal equations.
 //!
-//! LU factorisation of the blocks of a preconditioner in place.
-//!
-//! Column by column, each elimination one update of contiguous values: no blocks, no recursion, no buffers. Up to 32 unknowns this takes less time
-//! than faer, which eliminates many columns at once.
-//!
-//! Least-squares fits of a few functions, by their normal equations on the stack.
+//! The factorisation of the blocks of a preconditioner proceeds column by column in place, with contiguous updates. Up to 32 unknowns it takes less time than faer, which
+//! eliminates many columns at once.
 
 use faer::linalg::solvers::{PartialPivLu, Solve};
 use faer::{Mat, MatMut};
@@ -14,10 +10,10 @@ use pulp::NullaryFnOnce;
 use crate::monitor::{Monitor, Stop};
 use crate::numerics::simd;
 
-/// Solves `X ← A⁻¹ X` for a square matrix. With a singular matrix, solutions are not finite.
+/// Solves `X ← A⁻¹ X` for a square matrix. The solutions for a singular matrix are not finite.
 ///
 /// # Errors
-/// Only if the monitor stops the work; it is called before and after the factorisation.
+/// Only if the monitor, which is called before and after the factorisation, stops the work.
 pub fn solve(matrix: &Mat<f64>, rhs: MatMut<'_, f64>, monitor: &dyn Monitor) -> Result<(), Stop> {
     monitor.go_on(0.0)?;
     let factors = PartialPivLu::new(matrix.as_ref());
@@ -26,7 +22,7 @@ pub fn solve(matrix: &Mat<f64>, rhs: MatMut<'_, f64>, monitor: &dyn Monitor) -> 
     Ok(())
 }
 
-/// The inverse of a small square matrix, both row by row; of a singular one it is not finite.
+/// The inverse of a small square matrix, both row by row. It is not finite if the matrix is singular.
 pub(crate) fn inverse(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let n = rows.len();
     let matrix = Mat::from_fn(n, n, |i, j| rows[i][j]);
@@ -36,11 +32,11 @@ pub(crate) fn inverse(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Factors a square matrix, stored column by column, into `P A = L U`: below the diagonal is L, whose own diagonal is 1, and U elsewhere.
-/// `order[i]` becomes the row of A that is row i of `P A`; its length is that of the sides. Factors of a singular matrix are not finite.
+/// Factors a square matrix, stored column by column, into `P A = L U`. The part below the diagonal is L, whose diagonal is 1, the rest is U. `order[i]` becomes the row of
+/// A that is row i of `P A`; its length is that of the sides. The factors of a singular matrix are not finite.
 pub(crate) fn factor(matrix: &mut [f64], order: &mut [usize]) {
     debug_assert_eq!(matrix.len(), order.len() * order.len());
-    // The loops inside are compiled for the instruction set of this machine.
+    // The loops are compiled for the instruction set of the machine.
     simd::dispatch(Factorisation { matrix, order });
 }
 
@@ -83,7 +79,7 @@ impl NullaryFnOnce for Factorisation<'_> {
     }
 }
 
-/// Place of the largest magnitude, the first of several.
+/// Place of the first entry of largest magnitude.
 #[inline(always)]
 fn largest(values: &[f64]) -> usize {
     let (mut place, mut most) = (0, 0.0);
@@ -95,11 +91,11 @@ fn largest(values: &[f64]) -> usize {
     place
 }
 
-/// Pivots below this are rounding: the functions are linearly dependent. Keeps the numbers safe; not tuned.
+/// Smallest pivot of linearly independent functions; smaller ones are rounding errors.
 const DEPENDENT: f64 = 1e-12;
 
-/// First of the `N` coefficients of the sum of functions that is nearest to the samples, each of which is the functions' values at a place and
-/// the value there; none if the functions, which are of order 1, are linearly dependent on these places.
+/// First of the `N` coefficients of the least-squares fit of functions to samples. Each sample consists of the functions' values and the value to be fitted. `None` if the
+/// functions, which are of order 1, are linearly dependent on the samples.
 pub(crate) fn first_coefficient<const N: usize>(samples: &[([f64; N], f64)]) -> Option<f64> {
     let mut normal = [[0.0; N]; N];
     let mut right = [0.0; N];
@@ -111,7 +107,7 @@ pub(crate) fn first_coefficient<const N: usize>(samples: &[([f64; N], f64)]) -> 
             }
         }
     }
-    // Eliminated from the last coefficient to the first, because only the first is needed.
+    // Elimination proceeds from the last coefficient, because only the first is needed.
     for k in (1..N).rev() {
         let (pivot, own) = (normal[k], right[k]);
         if pivot[k].abs() < DEPENDENT {

@@ -1,6 +1,4 @@
-//! Gauss–Legendre quadrature (Abramowitz and Stegun 1964, table 25.4): exact for polynomials of degree `2 n − 1` with n points.
-//!
-//! Points that fill a range evenly, and the normal distribution at them.
+//! Gauss–Legendre quadrature (Abramowitz and Stegun 1964, table 25.4), exact for polynomials of degree `2 n − 1` with n points; and evenly distributed samples.
 
 use crate::numerics::roots::bisect;
 
@@ -31,7 +29,7 @@ pub(crate) const RULES: [&[(f64, f64)]; 3] = [
     ],
 ];
 
-/// How many points are used for an integral over one interval.
+/// Number of points for an integral over one interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum GaussPoints {
     /// Exact for polynomials of degree 5.
@@ -57,7 +55,7 @@ impl GaussPoints {
     }
 }
 
-/// Integral of f from the first to the second bound; exchanged bounds change its sign.
+/// Integral of f between two bounds; exchanged bounds reverse its sign.
 pub(crate) fn integral([from, to]: [f64; 2], points: GaussPoints, f: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let points = points.right_half();
@@ -80,8 +78,8 @@ pub(crate) fn halton(mut k: u32, base: u32) -> f64 {
     sum
 }
 
-/// Samples of a distribution between two values at the points of one dimension of Halton's sequence: of a uniform one, or of a truncated normal
-/// one with a mean and a standard deviation.
+/// Samples of a distribution between two values at the points of one dimension of Halton's sequence: of a uniform one, or of a truncated normal one with a mean and a
+/// standard deviation.
 pub(crate) fn samples(
     [low, high]: [f64; 2],
     normal: Option<(f64, f64)>,

@@ -1,13 +1,12 @@
-//! The boundary of a condition, the largest value in an interval, and the range of some values.
+//! The boundary of a condition, the maximum in an interval, and the root of a monotone function in a bracket by Newton's method with bisection; and cubics through
+//! samples with unequal spacing, with their roots; and the range of some values.
 //!
-//! The root of a monotone function in a bracket: Newton's method, with bisection where a step fails, so that it always converges.
-//!
-//! Smooth interpolation on an axis with unequal spacing: one cubic per interval, its roots and extremes.
-//!
-//! Tangents at the nodes are those of the parabola through the node and its two neighbours, so the curve has a
-//! continuous derivative and reproduces parabolas exactly (Catmull and Rom 1974, for unequal spacing).
+//! The tangents of a cubic at its nodes are those of the parabola through the node and its two neighbours, so the curve has a continuous derivative and reproduces
+//! parabolas exactly (Catmull and Rom 1974, for unequal spacing).
 
-/// Relative differences below this are rounding, of values that took many operations.
+use crate::numerics::ITERATIONS_MAX;
+
+/// Relative differences below this are rounding errors of values after many operations.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
 /// The least and the largest of some values; `[∞, −∞]` if there are none.
@@ -17,8 +16,8 @@ pub(crate) fn bounds(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     values.into_iter().fold(none, widened)
 }
 
-/// Bisects the interval between `low` and `high` (in either order) and returns the bracket after the given number of halvings, `2^-halvings` times as
-/// long. `is_low` is true on the side of `low` and false on that of `high`.
+/// Bisects the interval between `low` and `high` (in either order) and returns the bracket after the given number of halvings. `is_low` is true on the side of `low` and
+/// false on that of `high`.
 pub(crate) fn bisect(
     [mut low, mut high]: [f64; 2],
     halvings: u32,
@@ -35,9 +34,8 @@ pub(crate) fn bisect(
     [low, high]
 }
 
-/// Maximum of a unimodal function in an interval, by parabolic interpolation and golden sections (Brent 1973). The argument is
-/// found to 1e-4 of the interval, so that the relative error of a smooth maximum is about the square of this. A function with several
-/// maxima gives one of them. At most forty evaluations.
+/// Maximum of a unimodal function in an interval, by parabolic interpolation and golden sections (Brent 1973). The argument is accurate to 1e-4 of the interval, so the
+/// relative error of a smooth maximum is about the square of this. For a function with several maxima, the result is one of them. Takes at most forty evaluations.
 pub(crate) fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     const SHORT: f64 = 0.381_966_011_250_105_1;
     let close = 1e-4 * (high - low);
@@ -45,7 +43,7 @@ pub(crate) fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> 
     // The best argument, the second best and the previous second best, each with its value.
     let mut places = [(best, f(best)); 3];
     let (mut step, mut before) = (0.0_f64, 0.0_f64);
-    for _ in 0..40 {
+    for _ in 0..ITERATIONS_MAX {
         let [(x, fx), (w, fw), (v, fv)] = places;
         let middle = 0.5 * (low + high);
         if (x - middle).abs() <= 2.0 * close - 0.5 * (high - low) {
@@ -77,10 +75,10 @@ pub(crate) fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> 
     places[0].1
 }
 
-/// Evaluations after which Newton steps are no longer tried and the bracket is halved every time.
+/// Number of evaluations after which the bracket is halved instead of taking Newton steps.
 const NEWTON_STEPS: usize = 60;
 
-/// When a search ends: as soon as the value, the last step or the bracket is smaller than given here; 0 disables a criterion.
+/// Criteria for the end of a search: it ends when the value, the last step or the bracket is smaller; 0 disables a criterion.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CloseEnough {
     /// Magnitude of the value.
@@ -96,9 +94,8 @@ pub(crate) enum Course {
     Falling,
 }
 
-/// The root of a function that rises or falls from `low` to `high`. `f` returns value and slope. `start` is tried first, or the middle
-/// of the bracket if `start` lies outside. If Newton steps do not converge, as at a triple root, sixty halvings reduce the bracket to
-/// rounding error.
+/// The root of a function that rises or falls from `low` to `high`. `f` returns value and slope. The search starts at `start`, or in the middle of the bracket if `start`
+/// lies outside. If Newton steps do not converge, as at a triple root, sixty halvings reduce the bracket to rounding error.
 pub(crate) fn find(
     [mut low, mut high]: [f64; 2],
     start: f64,
@@ -149,8 +146,7 @@ pub(crate) struct Cubic {
 }
 
 impl Cubic {
-    /// The curve between nodes `i` and `i + 1` of the axis; `values` belong to the nodes `i − 1` to `i + 2`, which all
-    /// have to exist.
+    /// The curve between nodes `i` and `i + 1` of the axis; `values` belong to the nodes `i − 1` to `i + 2`, which must exist.
     pub(crate) fn between(axis: &[f64], i: usize, values: [f64; 4]) -> Cubic {
         let [before, length, after] = [
             axis[i] - axis[i - 1],
@@ -198,17 +194,15 @@ impl Cubic {
         self.value((x - self.start) / self.length)
     }
 
-    /// Is it surely positive nowhere? Its values are means, with weights that are not negative, of those at both ends and of two that their
-    /// tangents tell.
+    /// Whether the curve is certainly positive nowhere. Its values are means, with non-negative weights, of those at both ends and of two given by the tangents there.
     pub(crate) fn is_never_positive(&self) -> bool {
         let [c0, c1, c2, c3] = self.coefficients;
         let before_end = self.end - (c1 + 2.0 * c2 + 3.0 * c3) / 3.0;
         c0 <= 0.0 && self.end <= 0.0 && c0 + c1 / 3.0 <= 0.0 && before_end <= 0.0
     }
 
-    /// Points where the sign changes from or to positive, from smaller to larger x, each with the sign after it
-    /// (`true` is positive). Accurate to a few units in the last place of x; where
-    /// two of them nearly meet, to 1e-8 of the interval.
+    /// The points where the sign changes from or to positive, by increasing x, each with the sign after it (`true` is positive). They are accurate to a few units in the
+    /// last place, or to 1e-8 of the interval where two of them nearly meet.
     pub(crate) fn sign_changes(&self) -> impl Iterator<Item = (f64, bool)> + use<> {
         let cubic = *self;
         let [first, second] = self.turning_points();
@@ -229,10 +223,10 @@ impl Cubic {
         c0 + s * (c1 + s * (c2 + s * c3))
     }
 
-    /// The turning points that divide 0..=1 into monotone pieces, in order; one outside is replaced by the nearer end.
+    /// The turning points that divide 0..=1 into monotone pieces, in order; those outside are replaced by the closer end.
     fn turning_points(&self) -> [f64; 2] {
         let [_, c1, c2, c3] = self.coefficients;
-        // The slope is a mean of these with weights that are not negative.
+        // The slope is a mean of these with non-negative weights.
         let slopes = [c1, c1 + c2, c1 + 2.0 * c2 + 3.0 * c3];
         if slopes.iter().all(|slope| *slope >= 0.0) || slopes.iter().all(|slope| *slope <= 0.0) {
             return [0.0, 1.0];
@@ -253,9 +247,9 @@ impl Cubic {
         }
     }
 
-    /// The root in a monotone piece over which the sign changes.
+    /// The root in a monotone piece with a change of sign.
     fn root(&self, low: f64, high: f64) -> f64 {
-        /// A step of Newton's method by less leaves an error of its square.
+        /// Length of a Newton step that leaves an error of about its square.
         const CLOSE: f64 = 1e-8;
         let [_, c1, c2, c3] = self.coefficients;
         let [at_low, at_high] = [low, high].map(|s| self.value(s));
@@ -284,7 +278,7 @@ pub(crate) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
         axis[i + 2] - axis[i + 1],
     ];
     let s = (x - axis[i]) / length;
-    // Hermite's functions of the rise and of the two tangents, which are means of the slopes beside their nodes.
+    // Hermite's functions of the rise and of the two tangents, which are means of the adjacent slopes.
     let rise = s * s * (3.0 - 2.0 * s);
     let start = s * (1.0 - s) * (1.0 - s) / (before + length);
     let end = s * s * (s - 1.0) / (length + after);
@@ -298,15 +292,14 @@ pub(crate) fn weights(axis: &[f64], i: usize, x: f64) -> [f64; 4] {
     ]
 }
 
-/// Index i of the interval from node `i` to `i + 1` that holds x; the first or last one for points outside.
+/// The interval from node `i` to `i + 1` that contains x; the first or last one for points outside.
 pub(crate) fn interval(axis: &[f64], x: f64) -> usize {
     axis.partition_point(|node| *node <= x)
         .clamp(1, axis.len() - 1)
         - 1
 }
 
-/// Slope at a node of the parabola through it and its neighbours at distances `before` and `after`, over which the
-/// value rises by `rise_before` and `rise_after`.
+/// Slope at a node of the parabola through it and its neighbours at distances `before` and `after`, over which the value rises by `rise_before` and `rise_after`.
 pub(crate) fn tangent(before: f64, after: f64, rise_before: f64, rise_after: f64) -> f64 {
     (rise_before * after * after + rise_after * before * before)
         / (before * after * (before + after))

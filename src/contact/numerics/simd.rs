@@ -1,8 +1,4 @@
-//! SIMD level of the kernels: the best that the processor has, or a lower one for a comparison.
-//!
-//! Single and double precision for the influence coefficients, with a natural logarithm that the compiler can vectorise.
-//!
-//! The length of a vector in the plane.
+//! SIMD level of the kernels, numbers in single and double precision with a vectorisable logarithm, and the length of a plane vector.
 
 use std::cell::Cell;
 use std::fmt::{self, Display, Formatter};
@@ -10,22 +6,22 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use pulp::{Arch, WithSimd};
 
-/// Numbers that are taken side by side; lists of values per cell are padded to a multiple of it, so that products need no remainder loop.
+/// Number of lanes of packed values. Lists of values per cell are padded to a multiple of it, so that products need no remainder loop.
 pub const LANES: usize = 16;
 
 thread_local! {
-    /// Level that [`SimdLevel::during`] has set on this thread.
+    /// The level set by [`SimdLevel::during`] on this thread.
     static CHOSEN: Cell<Option<Arch>> = const { Cell::new(None) };
 }
 
-/// An instruction set that the processor has.
+/// An instruction set of the processor.
 ///
-/// Levels differ in the width of their sums, and therefore in the last digits of an answer.
+/// Levels differ in the width of their sums, and therefore in the last digits of results.
 #[derive(Debug, Clone, Copy)]
 pub struct SimdLevel(Arch);
 
 impl SimdLevel {
-    /// All levels of the processor, the lowest first.
+    /// All levels of the processor, lowest first.
     pub fn available() -> Vec<SimdLevel> {
         let mut levels = vec![Arch::Scalar];
         #[cfg(target_arch = "x86_64")]
@@ -40,14 +36,14 @@ impl SimdLevel {
         levels.into_iter().map(SimdLevel).collect()
     }
 
-    /// The level that kernels use on this thread.
+    /// The level of the kernels on this thread.
     pub fn current() -> SimdLevel {
         SimdLevel(CHOSEN.get().unwrap_or_default())
     }
 
     /// Runs `work` with the kernels of this level on this thread.
     ///
-    /// Factorisations and Fourier transforms come from libraries that choose their own instructions.
+    /// Factorisations and Fourier transforms of libraries choose their own instructions.
     pub fn during<R>(self, work: impl FnOnce() -> R) -> R {
         /// Restores the level, also after a panic.
         struct Restore(Option<Arch>);
@@ -86,7 +82,7 @@ pub trait Float:
 {
     /// 0.
     const ZERO: Self;
-    /// Far below every length, far above the smallest normal number.
+    /// A number far below every length and far above the smallest normal number.
     const TINY: Self;
     /// The nearest number of this precision.
     fn of(value: f64) -> Self;
@@ -101,9 +97,8 @@ pub trait Float:
     fn ln(self) -> Self;
 }
 
-/// `ln x` with `x = 2^e m`, `m` in `√½ … √2` and `ln m = 2 artanh s`, `s = (m − 1)/(m + 1)`, by its series in `s²`.
-/// Zero, subnormal, negative and non-finite arguments give meaningless finite or non-finite values, never a panic:
-/// callers exclude them. Products and sums are fused: they round once, identically on every machine.
+/// `ln x` with `x = 2^e m`, `m` in `√½ … √2` and `ln m = 2 artanh s`, `s = (m − 1)/(m + 1)`, by its series in `s²`. The result for zero, subnormal, negative and
+/// non-finite arguments is meaningless, but never a panic. Products and sums are fused, so they round once and alike on every machine.
 macro_rules! number {
     (
         $float:ty, $bits:ty, tiny $tiny:expr, sqrt_half $sqrt_half:expr, mantissa $mantissa:expr, bias $bias:expr,
@@ -174,8 +169,7 @@ number!(
     "Error at most 2 units in the last place of `max(|ln x|, |ln m|)`."
 );
 
-/// `√(x² + y²)` of numbers whose squares are numbers too, as those of everything dimensionless are. `f64::hypot` takes any numbers, and a creep
-/// map of 1000 motions took 6 % longer with it.
+/// `√(x² + y²)` for numbers whose squares do not overflow, such as dimensionless ones. With `f64::hypot` a creep map of 1000 motions takes 6 % longer.
 pub fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }

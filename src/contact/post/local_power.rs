@@ -21,7 +21,7 @@ use crate::method::Method;
 use crate::monitor::{Monitor, Stop};
 use crate::numerics::simd;
 use crate::numerics::simd::Float;
-use crate::rolling::answer::{LevelAnswer, LevelOutcome};
+use crate::rolling::answer::{LevelAnswer, Skip};
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
@@ -68,10 +68,7 @@ pub fn cell_power(task: &PowerTask, monitor: &dyn Monitor) -> Result<CellPower, 
     let (level, answer) = (task.level, task.answer);
     let unit = level.scale.slip();
     let mut slip = [0, 1].map(|k| answer.slip[k].iter().map(|s| s * unit).collect::<Vec<_>>());
-    if matches!(
-        answer.exit,
-        LevelOutcome::NoMotion | LevelOutcome::NoFriction
-    ) {
+    if let Some(Skip::NoMotion | Skip::NoFriction) = answer.skip {
         let power = vec![0.0; level.area.len()];
         return Ok(CellPower { power, slip });
     }
@@ -129,7 +126,7 @@ fn own_powers(level: &StripMesh, answer: &LevelAnswer) -> Vec<f64> {
 /// Traction times mean slip on a mesh, up to a common factor.
 fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
     let (level, traction) = (task.level, &task.answer.traction);
-    let (mesh, nu) = (&level.normalised, level.poisson_ratio());
+    let (mesh, nu) = (&level.normalised, level.poisson_ratio);
     let mut power = rigid_powers(mesh, &level.scale.motion(task.motion), traction);
     if let Some([x, y]) = &level.surface_slip {
         let areas = mesh.areas();
@@ -137,8 +134,8 @@ fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>,
             *power += areas[i] * (traction[0][i] * x[i] + traction[1][i] * y[i]);
         }
     }
-    if task.answer.exit != LevelOutcome::RigidSlip {
-        let differences = match level.precision() {
+    if task.answer.skip != Some(Skip::RigidSlip) {
+        let differences = match level.precision {
             Precision::Single => Differences::of::<f32>(mesh, nu, traction, monitor)?,
             Precision::Double => Differences::of::<f64>(mesh, nu, traction, monitor)?,
         };

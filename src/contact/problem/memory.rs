@@ -11,7 +11,7 @@ use crate::rolling::history::solve::{pressed_bytes, pressed_cells_max};
 use crate::rolling::operator_store::{OperatorKind, kept_bytes};
 use crate::rolling::refinement::interpolate::LEVELS_KEPT;
 use crate::rolling::refinement::mesh_family::{CELLS_MAX, PATCH_CELLS_MAX_LEAST, fixed_meshes};
-use crate::rolling::task::{Motion, Resolution, precision_of};
+use crate::rolling::task::{Motion, Resolution};
 
 /// Average number of cells of the finest mesh for a target of 0.02.
 const TARGET_CELLS: f64 = 128.0;
@@ -57,7 +57,7 @@ pub(crate) struct SizeInput {
 /// Returns the segments per strip of each patch. A gap, whose patches are not known yet, counts one patch per asperity.
 pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
     match task {
-        NormalTask::Gap(contact) => vec![1.0; contact.preview().asperities],
+        NormalTask::Gap(contact) => vec![1.0; contact.asperities()],
         NormalTask::Given(field) => field.segments_per_strip(),
         NormalTask::Hertz(_) | NormalTask::Wheel(_) => vec![1.0],
         // Both wheels of one position. The positions are solved one after the other.
@@ -131,7 +131,7 @@ impl SizeInput {
             // Cells that are clustered about a pole are not symmetric.
             folded: self.ellipse.is_some()
                 && (self.spinning == 0 || matches!(self.resolution, Resolution::Mesh(_))),
-            precision: precision_of(self.resolution),
+            precision: self.resolution.precision(),
         };
         kind.bytes(segments.ceil() as usize, cells.ceil() as usize) as f64
     }

@@ -1,8 +1,4 @@
-//! The tangential answer on one level: tractions, slips and zones, how they came about, and the work done for them.
-//!
-//! The tangential answer for one motion: resultants, and the fields they come from where the method has any.
-//!
-//! Forces and moment of tractions over a patch.
+//! Solutions of the tangential problem: tractions, slips and zones on one mesh, resultants of a motion, and the work done for them.
 
 use crate::method::Method;
 use crate::monitor::Stop;
@@ -11,39 +7,33 @@ use crate::remark::list::Remark;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
-/// The tangential answer on one level for one motion, dimensionless, one value per cell.
+/// The solution for one motion on one mesh, dimensionless, with one value per cell.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LevelAnswer {
-    /// Tractions along x and across, for forces.
+    /// Tractions along x and across, from which forces follow.
     pub traction: [Vec<f64>; 2],
-    /// The tractions by the three-point rule, where smooth slips were asked for or bounds depend on the slip.
+    /// The tractions of the three-point rule, if it was solved for smooth slips or for bounds that depend on the slip.
     pub second: Option<[Vec<f64>; 2]>,
     /// Slips along x and across.
     pub slip: [Vec<f64>; 2],
-    /// Does the cell slip?
+    /// Whether each cell slips.
     pub slips: Vec<bool>,
-    /// How the tractions came about.
-    pub exit: LevelOutcome,
     /// Work done.
     pub work: Work,
     /// Work that was not needed.
-    pub skips: Vec<Skip>,
+    pub skip: Option<Skip>,
     /// Remarks for the client.
     pub remarks: Vec<Remark>,
 }
 
-/// How the tractions of a level came about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum LevelOutcome {
-    /// Nothing moves: they are 0.
-    NoMotion,
-    /// There is no friction: they are 0.
-    NoFriction,
-    /// The rigid slip is so large that they follow it, to one part in a million.
-    RigidSlip,
-    /// The method solved for them.
-    #[default]
-    Solved,
+impl LevelAnswer {
+    /// Whether the tractions were found without an iteration.
+    pub fn is_closed_form(&self) -> bool {
+        matches!(
+            self.skip,
+            Some(Skip::NoMotion | Skip::NoFriction | Skip::RigidSlip)
+        )
+    }
 }
 
 /// Counted work of a solve.
@@ -55,12 +45,12 @@ pub struct Work {
     pub products: u32,
     /// Entries of the operator that these products touched.
     pub entries: u64,
-    /// Last residual of the friction law relative to the traction scale.
+    /// Residual of the friction law after the last iteration, relative to the traction scale.
     pub residual: f64,
 }
 
 impl Work {
-    /// Adds the counts of another solve; the residual is the later one's.
+    /// Adds the counts of a later solve and takes over its residual.
     pub fn add(&mut self, later: Work) {
         self.iterations += later.iterations;
         self.products += later.products;
@@ -68,7 +58,7 @@ impl Work {
         self.residual = later.residual;
     }
 
-    /// Adds the counts of work that did not change the answer.
+    /// Adds the counts of work that did not change the solution, and keeps the residual.
     pub fn add_lost(&mut self, lost: Work) {
         let residual = self.residual;
         self.add(lost);
@@ -87,18 +77,18 @@ impl Work {
     }
 }
 
-/// Why there is no tangential answer.
+/// The reason why there is no solution of the tangential problem.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LevelFailure {
-    /// The caller stopped the work.
+    /// The monitor stopped the work.
     Stopped(Stop),
     /// The iteration did not converge.
     NotConverged {
         /// Work done, with the residual of the best iterate.
         work: Work,
-        /// Residual needed.
+        /// Residual to reach.
         tolerance: f64,
-        /// What to try instead.
+        /// Advice for the client.
         advice: String,
     },
 }
@@ -109,8 +99,8 @@ impl From<Stop> for LevelFailure {
     }
 }
 
-/// Brings every traction into its disc, which it may exceed by the tolerance of the solver, and returns the slips: 0 in cells that
-/// stick, the component of the given slip along the traction in cells that slip.
+/// Projects the tractions onto their friction circles, which they may exceed by the tolerance of the solver. Returns the slips: 0 in cells that stick, and
+/// the component of the given slip along the traction in cells that slip.
 pub(crate) fn project_on_bound(
     bound: &[f64],
     slips: &[bool],
@@ -121,7 +111,7 @@ pub(crate) fn project_on_bound(
     for i in 0..bound.len() {
         let length = length(traction[0][i], traction[1][i]);
         if length == 0.0 {
-            // Without traction (no pressure) the slip is free.
+            // Without traction, hence without pressure, the slip is free.
             if slips[i] {
                 slip[0][i] = given[0][i];
                 slip[1][i] = given[1][i];
@@ -142,16 +132,16 @@ pub(crate) fn project_on_bound(
     slip
 }
 
-/// A part of the usual work that was recognised as unnecessary.
+/// A part of the usual work that is not needed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Skip {
-    /// The bound of the creep table meets the target, so that resultants need no mesh.
+    /// The error bound of the creep table meets the target, so that resultants need no mesh.
     Mesh,
     /// The tractions of a motion without creepage and spin are 0.
     NoMotion,
     /// Without friction there are no tractions.
     NoFriction,
-    /// The rigid slip is so large that elastic slip cannot turn the tractions.
+    /// The rigid slip is so large that tractions follow it to one part in a million.
     RigidSlip,
     /// Patch and motion are mirror-symmetric, so that half the cells are unknowns.
     HalfTheCells,
@@ -177,77 +167,77 @@ impl Skip {
     }
 }
 
-/// Relative errors of every patch, then of the sum over them; nothing where there is nothing to compare with.
+/// Relative errors of every patch, then of the sum over the patches; `None` where unknown.
 pub type RelativeErrors = Vec<Option<f64>>;
 
-/// The answer for one motion.
+/// The solution for one motion.
 #[derive(Debug, Clone, Default)]
 pub struct MotionAnswer {
-    /// The motion it was solved for.
+    /// The motion.
     pub motion: Motion,
     /// Whether a prescribed force could not be reached.
     pub saturated: bool,
-    /// Resultants of every patch about the origin of the case: the best known.
+    /// Resultants of every patch about the origin of the case, extrapolated where the mesh is the solver's.
     pub resultants: Vec<Resultants>,
-    /// Their estimated errors relative to μN: one per patch, then that of the sum.
+    /// Estimated errors of the resultants relative to μN: one per patch, then that of the sum.
     pub errors: RelativeErrors,
-    /// Tractions, slips and zones; none from a method that knows resultants only ([`Method::has_fields`]).
+    /// Tractions, slips and zones; `None` from a method that gives resultants only ([`Method::has_fields`]).
     pub fields: Option<SolvedFields>,
-    /// Share of every patch that sticks, from methods without fields that know it.
+    /// Share of the area of every patch that sticks, from methods without fields that give it.
     pub stick: Option<Vec<f64>>,
-    /// Derivatives of the resultants of every patch, where they were asked for or come with the method.
+    /// Derivatives of the resultants of every patch, if they were requested or come with the method.
     pub gradients: Option<Vec<PatchGradients>>,
-    /// What a history adds to a motion; nothing of steady rolling.
+    /// Results of a transient motion; `None` in steady rolling.
     pub history: Option<HistoryAnswer>,
     /// Work that was not needed.
     pub skips: Vec<Skip>,
     /// Remarks for the client.
     pub remarks: Vec<Remark>,
-    /// Work over all levels.
+    /// Work over all meshes.
     pub work: Work,
-    /// The method that gave the resultants.
+    /// The method that the resultants are from.
     pub method: Method,
     /// Wall time in s.
     pub seconds: f64,
 }
 
-/// What is known of a point of a history beside its forces.
+/// Results at a point of a transient motion besides its forces.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HistoryAnswer {
     /// Distance rolled since the start in mm.
     pub distance: f64,
-    /// Displacement of the upper body against the lower one from the point before in mm and rad, where the bodies did not roll.
+    /// Displacement in mm and rad of the upper body relative to the lower one since the point before, if the bodies did not roll.
     pub shift: Option<Motion>,
-    /// Power of friction over the rolling speed of every patch, in N; 0 of a shift.
+    /// Power of friction over the rolling speed in N, for every patch; 0 in a shift.
     pub power: Vec<f64>,
-    /// What friction has dissipated since the start in every patch, in N·mm.
+    /// Energy dissipated by friction since the start in N·mm, for every patch.
     pub dissipated: Vec<f64>,
-    /// Estimated errors of the creepages that were found.
+    /// Estimated errors of the creepages found for prescribed forces.
     pub creepage_errors: [Option<f64>; 2],
-    /// The same of shifts, in mm.
+    /// Estimated errors in mm of the shifts found for prescribed forces.
     pub shift_errors: [Option<f64>; 2],
 }
 
-/// Derivatives of F_x, F_y and M_z about the origin of the case by ν_x, ν_y and φ (per mm): `[resultant][creepage]` in N and mm.
+/// Derivatives of F_x, F_y and M_z about the origin of the case by ν_x, ν_y and φ (per mm), as `[resultant][creepage]` in N and mm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PatchGradients {
     /// The derivatives.
     pub values: [[f64; 3]; 3],
-    /// Their estimated absolute errors, where they are known.
+    /// Estimated absolute errors; `None` where unknown.
     pub errors: Option<[[f64; 3]; 3]>,
 }
 
-/// The fields of a motion on the finest level it needed.
+/// The fields of a motion on its finest mesh.
 #[derive(Debug, Clone)]
 pub struct SolvedFields {
-    /// The number of that level in the levels.
+    /// Number of the mesh.
     pub level: usize,
-    /// Tractions, slips and zones on it.
+    /// Tractions, slips and zones.
     pub tangential: LevelAnswer,
 }
 
 impl MotionAnswer {
-    /// Replaces the resultants, and what belongs to them, by those of another method; the values per cell stay.
+    /// Replaces the resultants and their errors by those of another method, and keeps the values per cell.
     pub(crate) fn take_resultants(&mut self, of: &MotionAnswer) {
         self.resultants.clone_from(&of.resultants);
         self.errors.clone_from(&of.errors);
@@ -256,7 +246,7 @@ impl MotionAnswer {
         self.method = of.method;
     }
 
-    /// Tangential force of all patches over their friction limit in N; 0 without friction.
+    /// Total tangential force over the friction limit, a given `limit` in N; 0 without friction.
     pub fn force_share(&self, limit: f64) -> f64 {
         let sum: Resultants = self.resultants.iter().sum();
         let force = sum.force_x.hypot(sum.force_y);
@@ -276,7 +266,7 @@ pub struct Resultants {
     pub force_x: f64,
     /// Lateral force.
     pub force_y: f64,
-    /// Moment about the point it was asked for.
+    /// Moment about a point that the context defines.
     pub moment_z: f64,
 }
 
@@ -287,12 +277,11 @@ impl<'a> std::iter::Sum<&'a Resultants> for Resultants {
 }
 
 impl Resultants {
-    /// `F_x = Σ T_x A`, `F_y = Σ T_y A`, `M_z = Σ (x T_y − y T_x) A` over the cells of one patch. `traction` is dimensionless as on the
-    /// level; the moment is about the origin of the case.
+    /// `F_x = Σ T_x A`, `F_y = Σ T_y A`, `M_z = Σ (x T_y − y T_x) A` over the cells of one patch, about the origin of the case. `traction` is dimensionless.
     ///
-    /// x is taken in the middle of the cell, where the moment of its constant traction is exact; at the node the error of M_z is about
-    /// twice as large. y is taken halfway between the mid-line and the centre of the load: at the mid-line the moment of a vortex comes
-    /// out too large, at the centre too small, because the mean of `y²` over a strip exceeds the square of the mean.
+    /// x is taken in the middle of the cell, where the moment of a constant traction is exact; with the node the error of M_z is about twice as large. y is the
+    /// mean of the mid-line and the load centre of the strip: the mid-line gives a moment of a vortex that is too large, and the load centre one that is too
+    /// small, because the mean of `y²` over a strip exceeds the square of the mean.
     pub fn of_patch(level: &StripMesh, traction: &[Vec<f64>; 2], patch: usize) -> Resultants {
         let mut sum = Resultants::default();
         let mesh = &level.mesh;
@@ -311,7 +300,7 @@ impl Resultants {
         sum
     }
 
-    /// Sum of two resultants about the same point.
+    /// The sum with other resultants about the same point.
     #[must_use]
     pub fn plus(self, other: Resultants) -> Resultants {
         Resultants {
@@ -331,8 +320,7 @@ impl Resultants {
         }
     }
 
-    /// Richardson's extrapolation of errors that fall as 1/N: these resultants plus `share` of their change from a coarser
-    /// mesh, with a force no larger than `bound`.
+    /// Richardson extrapolation of an error that falls as 1/N: these resultants plus `share` of their change from a coarser mesh, with a force of at most `bound`.
     #[must_use]
     pub fn beyond(self, coarser: Resultants, share: f64, bound: f64) -> Resultants {
         let past = |here: f64, before: f64| here + share * (here - before);
@@ -349,7 +337,7 @@ impl Resultants {
         }
     }
 
-    /// The same resultants with the moment about `point` instead of the origin.
+    /// These resultants with the moment about `point` instead of the origin.
     #[must_use]
     pub fn about(self, point: [f64; 2]) -> Resultants {
         Resultants {

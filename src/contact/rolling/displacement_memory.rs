@@ -1,21 +1,21 @@
-//! What the surfaces remember: their tangential displacement, whose change in time is a part of the slip where rolling changes.
+//! Displacements in transient rolling, whose change in time is a part of the slip.
 //!
-//! Slip in a frame that moves with the contact is `s = w + ∂u/∂x − ∂u/∂q`, q the distance rolled (Kalker 1990, eq. 1.44; Johnson 1985, eq. 8.2 in
-//! time). The operator between strips knows differences of u along a strip; with u at the leading edge of every strip u is known at all nodes.
+//! In a frame that moves with the contact, slip is `s = w + ∂u/∂x − ∂u/∂q` with the distance rolled q (Kalker 1990, eq. 1.44; Johnson 1985, eq. 8.2 in time).
+//! The strip operator gives differences of u along a strip; together with u at the leading edge of every strip they give u at all nodes.
 
 use crate::half_space::kernels::{Rectangle, rectangle};
 use crate::half_space::strip_operator::kind::Parity;
 use crate::mesh::Mesh;
 
-/// Displacement at the leading edge of every strip per unit traction on every cell, for the unknowns of a parity.
+/// Displacements at the leading edge of every strip per unit traction on every cell, for the unknowns of a parity.
 #[derive(Debug, Clone)]
 pub struct LeadingEdges {
-    /// For every strip the rows `[xx, u_x from T_y, u_y from T_x, yy]` over the cells.
+    /// The rows `[xx, u_x from T_y, u_y from T_x, yy]` over the cells, for every strip.
     rows: Vec<[Vec<f64>; 4]>,
 }
 
 impl LeadingEdges {
-    /// Edges of a dimensionless mesh; with a parity of the first half of its strips, which feel their mirror images.
+    /// The edges of a dimensionless mesh. With a parity, those of the first half of its strips, including the effect of their mirror images.
     pub fn new(mesh: &Mesh, nu: f64, parity: Option<Parity>) -> LeadingEdges {
         let strips = match parity {
             None => mesh.segments.len(),
@@ -63,26 +63,25 @@ impl LeadingEdges {
         [sum(xx, xy), sum(yx, yy)]
     }
 
-    /// What a unit traction on a cell gives there along x from x, and across from across.
+    /// The displacements along x and across at the edge of strip `j` per unit traction of a cell in the same direction.
     fn own(&self, j: usize, cell: usize) -> [f64; 2] {
         [self.rows[j][0][cell], self.rows[j][3][cell]]
     }
 }
 
-/// How the slip of a step depends on the displacements at its end.
+/// The dependence of the slip of a step on the displacements at its end.
 #[derive(Debug, Clone, Copy)]
 pub struct DisplacementMemory<'a> {
     /// Displacements at the leading edges.
     pub edges: &'a LeadingEdges,
-    /// What multiplies the displacement at the end of the step, per dimensionless distance rolled; of a shift 1.
+    /// Factor of the displacement at the end of the step, per dimensionless distance rolled; 1 for a shift.
     pub factor: f64,
-    /// Do the bodies roll in the step? In a shift they only slide.
+    /// Whether the bodies roll in the step. In a shift they only slide.
     pub rolls: bool,
 }
 
 impl DisplacementMemory<'_> {
-    /// Writes the displacements at the nodes of strip `j`: those at its edge less the differences up to there, and the shear of a layer
-    /// of a flexibility.
+    /// Writes the displacements at the nodes of strip `j`: those at its edge minus the differences up to the node, plus the shear of a layer of a flexibility.
     pub(crate) fn at_nodes(
         &self,
         j: usize,
@@ -103,7 +102,7 @@ impl DisplacementMemory<'_> {
         }
     }
 
-    /// The same for a unit traction on a cell of the strip itself, subtracted from the columns of its own block; `place` is its number in
+    /// Subtracts the displacements by a unit traction on a cell of the strip from the columns of its self-influence block; `place` is the number of the cell in
     /// the strip.
     pub(crate) fn add_column(
         &self,

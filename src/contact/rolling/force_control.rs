@@ -1,12 +1,11 @@
 //! The creepages that give prescribed tangential forces.
 //!
-//! The friction law is monotone: while the other components are kept, a force grows with its creepage. The unknown is not the creepage but its
-//! *place*: by Vermeulen and Johnson's cubic law with Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3) the creepage at place r
-//! gives the force r μN, so that the change of a force with its place is about μN. A search starts where the table of creep
-//! forces has the forces, or that law without spin.
+//! Each force is a monotone function of its own creepage. The unknown is not the creepage but its *place*: the creepage at place r gives the force r μN by
+//! Vermeulen and Johnson's cubic law with Kalker's coefficients (Vermeulen & Johnson 1964; Kalker 1990, §2.2.3), so the derivative of the force by the place
+//! is about μN. A search starts from the creepages of the table of creep forces, or of that law without spin.
 //!
-//! A rough search on the coarsest mesh finds where to begin. The adaptive solve of that motion fixes the meshes, on which value and estimate
-//! are one smooth function of the creepage.
+//! A rough search on the coarsest mesh gives the start. The adaptive solve of that motion determines the meshes, on which value and estimate are smooth
+//! functions of the creepage.
 
 use std::convert::Infallible;
 
@@ -27,30 +26,28 @@ use crate::rolling::task::{
     MeshPlan, Motion, PrescribedForces, Resolution, RollingTask, TOLERANCE_LEAST,
 };
 
-/// Largest place: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement; how much it matters was not
-/// measured.
+/// Largest place: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement.
 pub(crate) const PLACE_MAX: f64 = 65.0;
-/// The start is good enough when the table misses the forces by no more than this, relative to μN: about what the table is off. With the cubic law
-/// in place of the table, a single force takes 47 % more products, and those of sweeps 13 %.
+/// Tolerance of the table search for a start, relative to μN: about the error of the table. With the cubic law in place of the table, a single force takes
+/// 47 % more products, and those of sweeps 13 %.
 const TABLE_MISSED: f64 = 1e-3;
-/// A prescribed force may be missed by this part of the target error. Chosen by judgement; how much it matters was not measured.
+/// Tolerance of a prescribed force over the target error. Chosen by judgement.
 const SHARE_OF_TARGET: f64 = 0.02;
-/// Tolerance of a force, relative to μN, of the first search, on the coarsest mesh. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of `cargo bench --bench
-/// stress -- --only times`, and no such search five times as much, most of it in a few slender ellipses.
+/// Tolerance of a force, relative to μN, of the first search, on the coarsest mesh. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of
+/// `cargo bench --bench stress -- --only times`. Without such a search the work is five times as large, mostly because of a few slender ellipses.
 const MISSED_ON_COARSEST: f64 = 0.01;
-/// Near μN the creepage depends on the small remainder `1 − force/μN`; the tolerance is at most this multiple of the remainder. Chosen by
-/// judgement; how much it matters was not measured.
+/// Near μN the creepage depends on the small remainder `1 − force/μN`; the tolerance is at most this multiple of it. Chosen by judgement.
 const NEAR_LIMIT: f64 = 10.0;
-/// No force is sought more closely than this, relative to μN or, if they are smaller, to the forces of the first motion tried: where
-/// everything slips, elastic slip still turns the tractions by this much. Chosen by judgement; how much it matters was not measured.
+/// Least tolerance of a force, relative to μN or, if they are smaller, to the forces of the first motion tried. Where everything slips, elastic slip still turns
+/// the tractions by this much. Chosen by judgement.
 const MISSED_LEAST: f64 = 2e-7;
-/// How often the meshes are chosen anew because the motion that was found does not meet its target on them. Keeps the numbers safe; not tuned.
+/// Largest number of choices of meshes. Further choices follow if the motion found does not meet its target on the meshes chosen before.
 const MESH_CHOICES_MAX: u32 = 3;
 
-/// Solves motion `index` of a problem; where forces are prescribed, finds the creepages that give them.
+/// Solves motion `index` of a problem. Where forces are prescribed, finds the creepages that give them.
 ///
 /// # Errors
-/// Why there is no answer.
+/// The reason why there is no solution.
 pub fn solve(
     task: &RollingTask,
     state: &mut RefinementState,
@@ -79,7 +76,7 @@ pub fn solve(
     Ok(point)
 }
 
-/// Places with the answer at them.
+/// Places with the solution at them.
 type FoundPlaces = Equilibrium<2, MotionAnswer>;
 
 /// The search for the creepages of one motion.
@@ -93,9 +90,9 @@ struct ForceSearch<'a, 's, 'p> {
     limit: f64,
     law: CubicLaw,
     search: Search<2>,
-    /// The meshes of a trial, coarse to fine; those of the method if empty.
+    /// The meshes of a trial, coarse to fine; empty for the meshes of the method.
     meshes: Vec<MeshPlan>,
-    /// Largest force of the first trial, relative to μN.
+    /// Length of the forces of the first trial, relative to μN.
     first: Option<f64>,
     work: Work,
 }
@@ -124,7 +121,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         }
     }
 
-    /// Finds the places on meshes on which the motion that is found meets its target.
+    /// Finds the places on meshes on which the motion found meets its target.
     fn find_on_chosen_meshes(&mut self, start: [f64; 2]) -> Result<FoundPlaces, SolveError> {
         let mut place = self.start_on_coarsest(start)?;
         let target = self.task.target().unwrap_or(f64::INFINITY);
@@ -134,7 +131,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
             let found = self.find(place, false)?;
             choices += 1;
             let met = found.value.error().is_some_and(|error| error <= target);
-            // Where the force jumps, other meshes do not help either.
+            // Where the force jumps, other meshes do not help.
             let ends = matches!(found.end, Termination::AtLimit | Termination::Jump);
             if met || ends || choices == MESH_CHOICES_MAX {
                 return Ok(found);
@@ -143,13 +140,13 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         }
     }
 
-    /// Finds the places on the coarsest mesh, roughly; the start if they are not found there.
+    /// Finds the places roughly on the coarsest mesh; the start if that fails.
     fn start_on_coarsest(&mut self, start: [f64; 2]) -> Result<[f64; 2], SolveError> {
         let family = MeshFamily::of(self.task, &self.motion(start));
         self.meshes = vec![family.mesh(family.cells_first())];
         match self.find(start, true) {
             Ok(found) if found.converged() => Ok(found.place),
-            // What the coarsest mesh cannot answer may have an answer all the same.
+            // Finer meshes may have a solution all the same.
             Ok(_) | Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => {
                 self.search = new_search(self.forces);
                 Ok(start)
@@ -158,7 +155,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         }
     }
 
-    /// Chooses the meshes that the adaptive solve of the motion at two places compares.
+    /// Takes the meshes that the adaptive solve at two places compares.
     fn choose_meshes(&mut self, place: [f64; 2]) -> Result<(), SolveError> {
         let asked = self.asked(place);
         let (point, meshes) = adapt::solve_forces(self.task, self.state, asked, self.monitor)?;
@@ -168,7 +165,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         Ok(())
     }
 
-    /// Finds the places at which the forces are as prescribed, or as near to that as can be; `roughly` to find where to begin.
+    /// Finds the places at which the forces are as prescribed, or as close as possible; `roughly` for a start.
     fn find(&mut self, start: [f64; 2], roughly: bool) -> Result<FoundPlaces, SolveError> {
         let mut search = self.search;
         let found = search.find(start, |place| self.trial(place, roughly));
@@ -176,7 +173,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         found
     }
 
-    /// Solves the motion of two places; how far its forces are from those prescribed, relative to μN.
+    /// Solves the motion at two places and compares its forces with the prescribed ones, relative to μN.
     fn trial(
         &mut self,
         place: [f64; 2],
@@ -204,18 +201,18 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         }
     }
 
-    /// The forces of an answer, relative to μN.
+    /// The forces of a solution, relative to μN.
     fn relative(&self, point: &MotionAnswer) -> [f64; 2] {
         let sum: Resultants = point.resultants.iter().sum();
         [sum.force_x / self.limit, sum.force_y / self.limit]
     }
 
-    /// The forces that are prescribed, relative to μN.
+    /// The prescribed forces, relative to μN.
     fn wanted(&self) -> [f64; 2] {
         self.forces.map(|force| force.unwrap_or(0.0) / self.limit)
     }
 
-    /// By how much forces may be missed, relative to μN.
+    /// Tolerance of the forces, relative to μN.
     fn tolerance(&self, roughly: bool) -> f64 {
         let most = match self.task.resolution {
             Resolution::Target(target) if self.task.method != Method::Fastsim => {
@@ -224,7 +221,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
             _ => TOLERANCE_LEAST,
         };
         let wanted = length(self.wanted());
-        // Where pressure alone pulls, the forces of the first motion tried say nothing of the size of those to be sought.
+        // Where pressure causes slip, the forces of the first trial are no measure of the forces.
         let first = self.first.filter(|_| !self.task.is_coupled());
         let scale = first.unwrap_or(1.0).max(wanted).min(1.0);
         let left = (NEAR_LIMIT * (1.0 - wanted)).max(0.0);
@@ -236,7 +233,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         (most * scale.min(left)).max(MISSED_LEAST * scale)
     }
 
-    /// Places to start from: those of the table with the rest of the motion, or of the cubic law.
+    /// The start: the places at which the table has the forces, or those of the cubic law.
     fn start(&self) -> [f64; 2] {
         let RollingTask {
             elasticity,
@@ -284,7 +281,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
     }
 }
 
-/// A search for the places of prescribed forces: a force over μN is close to its place.
+/// A search for places. A force over μN changes about as much as its place.
 fn new_search(forces: PrescribedForces) -> Search<2> {
     Search::new(forces.map(|force| force.map(|_| 1.0)), [PLACE_MAX; 2])
 }
@@ -294,13 +291,13 @@ fn length([x, y]: [f64; 2]) -> f64 {
     x.hypot(y)
 }
 
-/// From this place on the cubic law is continued by its tangent. Chosen by judgement; how much it matters was not measured.
+/// Place from which the cubic law is continued by its tangent. Chosen by judgement.
 const CUBIC_UNTIL: f64 = 0.9;
 
-/// The cubic law of a problem.
+/// The cubic law for a footprint.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CubicLaw {
-    /// Force of linear theory over μN and creepage, along x and across.
+    /// Force of linear theory over μN per creepage, along x and across.
     pub(crate) stiffness: [f64; 2],
 }
 
@@ -315,7 +312,7 @@ impl CubicLaw {
         CubicLaw::of_patches(task.elasticity, task.interface, shapes, limit)
     }
 
-    /// The law of patches with these ratios of length to width and areas in mm²; `limit` is μN of all in N.
+    /// The law for patches given by their ratio of length to width and area in mm²; `limit` is the total μN in N.
     pub(crate) fn of_patches(
         elasticity: &Elasticity,
         interface: Interface,
@@ -354,7 +351,7 @@ impl CubicLaw {
         (inside + beyond).min(PLACE_MAX).copysign(creepage)
     }
 
-    /// Places of the creepages that give forces relative to μN by the cubic law without spin, where both share the friction.
+    /// Places of the creepages that give forces relative to μN by the cubic law without spin, with a common friction limit.
     pub(crate) fn places_of_forces(&self, force: [f64; 2]) -> [f64; 2] {
         let length = force[0].hypot(force[1]);
         let linear = if length > 0.0 {

@@ -1,9 +1,8 @@
-//! Kalker's coefficients of linear theory: how much force a creepage makes before anything slips.
+//! Kalker's coefficients of linear theory, the forces per creepage before anything slips.
 //!
-//! `F_x = G c² C11 ν_x`, `F_y = G c² C22 ν_y + G c³ C23 φ` and `M_z = −G c³ C23 ν_y + G c⁴ C33 φ` with `c = √(ab)` (Kalker 1990,
-//! §2.2.3). The values are this
-//! program's own: its fast solver at vanishing creepage on two meshes, extrapolated; `tests/physics/kalker_table.rs` computes
-//! them anew and compares. They agree with Kalker's printed table to its rounding, about 1 % where the ellipse is slender.
+//! `F_x = G c² C11 ν_x`, `F_y = G c² C22 ν_y + G c³ C23 φ` and `M_z = −G c³ C23 ν_y + G c⁴ C33 φ` with `c = √(ab)` (Kalker 1990, §2.2.3). The values were
+//! computed with the boundary element method at vanishing creepage on two meshes and extrapolated; `tests/physics/kalker_table.rs` computes them again and
+//! compares. They agree with Kalker's printed table to its rounding, about 1 % for slender ellipses.
 
 use std::f64::consts::PI;
 
@@ -21,8 +20,8 @@ pub fn ratio(row: usize) -> f64 {
 
 /// `[C11, C22, C23]` for semi-axes a along rolling and b across, and Poisson's ratio 0 to 0.5.
 ///
-/// Between the entries `ln C` is a cubic in `ln a/b` and a quartic in ν (to one part in a thousand); beyond 1/32 and 32 the
-/// last entry is continued in proportion to the limits of slender ellipses.
+/// Between the entries `ln C` is a cubic in `ln a/b` and a quartic in ν, accurate to one part in a thousand. Beyond 1/32 and 32 the last entry is continued in
+/// proportion to the asymptotes of slender ellipses.
 pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     let inside = a_over_b.clamp(ratio(0), ratio(RATIOS - 1));
     let (first, along, across) = places(inside, poisson_ratio);
@@ -45,7 +44,7 @@ pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     found
 }
 
-/// C33 for a/b from 1/32 to 32, the nearer of these beyond, and Poisson's ratio 0 to 0.5; interpolated like [`coefficients`].
+/// C33 for a/b from 1/32 to 32, clamped, and Poisson's ratio 0 to 0.5; interpolated like [`coefficients`].
 pub fn spin_coefficient(a_over_b: f64, poisson_ratio: f64) -> f64 {
     let (first, along, across) = places(a_over_b.clamp(ratio(0), ratio(RATIOS - 1)), poisson_ratio);
     let row = |r: usize| -> f64 {
@@ -55,7 +54,7 @@ pub fn spin_coefficient(a_over_b: f64, poisson_ratio: f64) -> f64 {
     (0..4).map(|r| along[r] * row(r)).sum::<f64>().exp()
 }
 
-/// The first of four rows, their weights, and those of the columns.
+/// The first of four rows, the weights of these rows, and the weights of the columns.
 fn places(inside: f64, poisson_ratio: f64) -> (usize, [f64; 4], [f64; 5]) {
     let place = 2.0 * inside.log2() + 0.5 * (RATIOS - 1) as f64;
     let first = (place.floor() as usize).clamp(1, RATIOS - 3) - 1;
@@ -92,7 +91,7 @@ fn slender(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     ]
 }
 
-/// `[[C11], [C22], [C23]]` at [`POISSON_RATIOS`], one entry for each a/b.
+/// `[[C11], [C22], [C23]]` at [`POISSON_RATIOS`] for each a/b.
 const TABLE: [[[f64; 5]; 3]; RATIOS] = [
     [
         [2.47442, 2.82584, 3.29305, 3.94455, 4.91616],
@@ -201,7 +200,7 @@ const TABLE: [[[f64; 5]; 3]; RATIOS] = [
     ],
 ];
 
-/// `[C33]` at [`POISSON_RATIOS`], one entry for each a/b; from two meshes, as the others.
+/// `[C33]` at [`POISSON_RATIOS`] for each a/b.
 const SPIN: [[f64; 5]; RATIOS] = [
     [19.89006, 22.67151, 26.35056, 31.44515, 38.96354],
     [14.14085, 16.08910, 18.65496, 22.18722, 27.35622],

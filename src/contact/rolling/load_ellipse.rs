@@ -1,10 +1,8 @@
-//! The ellipse that stands for a patch of any shape: the one that carries its load the same way, and how much of the load is elsewhere.
+//! Equivalent ellipses of patches of any shape, and chords that represent a whole strip.
 //!
-//! Matched are the load, its centre and its second moments: `a² = 5⟨(x − x_c)²⟩`, `b² = 5⟨(y − y_c)²⟩` with means weighted by the
-//! pressure, which is exact for Hertz's pressure. On 17 patches of arcs and quartics the resultants of this ellipse are off by 0.004 μN in
-//! the median and 0.015 at most; those of the ellipse of the same area and second moments of area by 0.009 and 0.051.
-//!
-//! Chords that stand for their whole strip, not only for its mid-line.
+//! The equivalent ellipse has the load centre and the second moments of the load of the patch: `a² = 5⟨(x − x_c)²⟩`, `b² = 5⟨(y − y_c)²⟩` with means weighted
+//! by the pressure, which is exact for Hertz's pressure. On 17 patches of arcs and quartics the resultants of this ellipse differ by 0.004 μN in the median and
+//! at most 0.015; those of the ellipse with the area and the second moments of area by 0.009 and 0.051.
 
 use crate::mesh::Chord;
 use crate::normal::footprint::{Footprint, LineAngles};
@@ -12,21 +10,21 @@ use crate::normal::hertz::{Ellipse, NormalLoad};
 use crate::normal::pressure_field::field::PressureField;
 use crate::numerics::quadrature::FOUR_POINTS;
 
-/// Strips over a patch, and parts of each chord: moments and load_mismatch load change by less than 0.002 with twice as many.
+/// Number of strips over a patch, and of parts of each chord. Moments and mismatch change by less than 0.002 with twice as many.
 const PARTS: usize = 48;
 
-/// The ellipse that stands for a patch.
+/// The equivalent ellipse of a patch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadEllipse {
     /// Load centre in mm.
     pub centre: [f64; 2],
     /// Semi-axes along and across rolling in mm.
     pub semi_axes: [f64; 2],
-    /// Share of the load that Hertz's pressure on the ellipse has in another place, `½ ∫ |p − p_ellipse| / N`; 0 for an ellipse.
+    /// Share of the load that is placed differently by Hertz's pressure on the ellipse, `½ ∫ |p − p_ellipse| / N`; 0 for an ellipse.
     pub load_mismatch: f64,
 }
 
-/// A part of a patch.
+/// A part of a chord with its load.
 struct EllipsePart {
     x: [f64; 2],
     y: f64,
@@ -69,7 +67,7 @@ impl LoadEllipse {
         }
     }
 
-    /// The ellipse of one patch of a pressure from its samples alone, for a forecast: load_mismatch load is not counted.
+    /// The equivalent ellipse of a patch from the samples of its pressure, without the mismatch, for an estimate.
     pub(crate) fn of_samples(field: &PressureField, patch: usize) -> LoadEllipse {
         LoadEllipse {
             centre: field.load_centre(Some(patch)),
@@ -89,7 +87,7 @@ impl LoadEllipse {
     }
 }
 
-/// The parts of a patch with their loads, in any unit.
+/// The parts of a patch with their loads, in an arbitrary unit.
 fn parts(footprint: &Footprint, patch: usize) -> Vec<EllipsePart> {
     let [_, _, low, high] = footprint.patches()[patch].extent;
     let dy = (high - low) / PARTS as f64;
@@ -112,7 +110,7 @@ fn parts(footprint: &Footprint, patch: usize) -> Vec<EllipsePart> {
     parts
 }
 
-/// The share of the load that is elsewhere than on the ellipse.
+/// The share of the load that is placed differently by the ellipse.
 fn load_mismatch(parts: &[EllipsePart], load: f64, centre: [f64; 2], [a, b]: [f64; 2]) -> f64 {
     let ellipse = Ellipse::of_semi_axes(a, b, NormalLoad::Force(load), 1.0);
     let (mut apart, mut inside) = (0.0, 0.0);
@@ -130,26 +128,26 @@ fn load_mismatch(parts: &[EllipsePart], load: f64, centre: [f64; 2], [a, b]: [f6
         apart += (part.load - own).abs();
         inside += own;
     }
-    // Where the patch is not, all of the ellipse's load is load_mismatch.
+    // Where the patch does not reach, all of the load of the ellipse is misplaced.
     0.5 * (apart + (load - inside).max(0.0)) / load
 }
 
-/// A strip's chord and the line of the region it was made from.
+/// The chord of a strip and the line of the region that it is derived from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StripChord {
-    /// The chord that is meshed: centred on the line, its length between that of the line and the mean over the strip (see [`chords`]).
+    /// The meshed chord: centred on the line, with a length between that of the line and the mean over the strip (see [`chords`]).
     pub chord: Chord,
-    /// The region's own chord on the mid-line of the strip.
+    /// The chord of the region on the mid-line of the strip.
     pub line: Chord,
-    /// y of the centre of the strip's load; the mid-line where a strip has several chords.
+    /// y of the load centre of the strip; the mid-line where a strip has several chords.
     pub load_y: f64,
-    /// Load of the strip over its width in N/mm; nothing where a strip has several chords.
+    /// Load of the strip over its width in N/mm; `None` where a strip has several chords.
     pub load: Option<f64>,
 }
 
 impl StripChord {
-    /// Mean pressure in MPa over `x0 < x < x1` of the chord: the pressure of the line, stretched and scaled with the
-    /// length so that its profile keeps its form (exact for Hertz's semi-ellipse).
+    /// Mean pressure in MPa over `x0 < x < x1` of the chord. The pressure of the line is stretched and scaled with the length, so its profile keeps its form
+    /// (exact for Hertz's semi-ellipse).
     pub fn mean_pressure(&self, footprint: &Footprint, x0: f64, x1: f64) -> f64 {
         let ratio = self.stretch();
         let middle = 0.5 * (self.line.left + self.line.right);
@@ -162,7 +160,7 @@ impl StripChord {
         (self.chord.right - self.chord.left) / (self.line.right - self.line.left)
     }
 
-    /// Loads over width at equally spaced places y of the strip.
+    /// Loads over width at equally spaced `(y, load)` of the strip.
     pub fn loads(&self, footprint: &Footprint, patch: usize, samples: usize) -> Vec<(f64, f64)> {
         let step = self.line.dy / samples as f64;
         let places =
@@ -180,11 +178,10 @@ impl StripChord {
 
 /// Chords of one patch on the strips `(y, dy)`.
 ///
-/// The mid-line's chord is too long where the patch ends inside a strip, the mean chord (exact area) too short for the
-/// forces. `(1 − θ)` of the one and θ of the other, `θ = ½ / (1 + ½ (a/b)²)` with the longest half chord a and the half
-/// width b of the patch, lowers the errors of the resultants on 62 Hertz cases by a third and Kalker's C33 with it.
-/// Where a strip has several chords the mid-line's are kept. With `like_circle` θ is that of a circle, so that the meshes of all ellipses are images of
-/// each other.
+/// The chord of the mid-line is too long where the patch ends inside a strip, and the mean chord, which has the exact area, too short for the forces. With
+/// the weights `1 − θ` and θ, `θ = ½ / (1 + ½ (a/b)²)`, where a is the longest half chord and b the half width of the patch, the errors of the resultants of
+/// 62 Hertz cases fall by a third, and that of Kalker's C33 as well. Where a strip has several chords, those of the mid-line are kept. With `like_circle` θ is
+/// that of a circle, so the meshes of all ellipses are images of each other.
 pub fn chords(
     footprint: &Footprint,
     patch: usize,
@@ -227,13 +224,13 @@ pub fn chords(
     lines.iter().map(fit).collect()
 }
 
-/// Points along a chord from which its mean pressure is found. With 16 as many estimates hold in the tables `gap` and `profiles` of
-/// `cargo bench --bench calibrate`, and a row of `cargo bench --bench wheels -- rows` takes 1 % more instructions.
+/// Points along a chord for its mean pressure. With 16 as many estimates hold in the tables `gap` and `profiles` of `cargo bench --bench calibrate`, and a row
+/// of `cargo bench --bench wheels -- rows` takes 1 % more instructions.
 const POINTS: usize = 8;
 
-/// What the lines of all strips share.
+/// Buffers and angles that all strips share.
 struct StripBuffer {
-    /// Room for the chords of one line.
+    /// The chords of one line.
     across: Vec<Chord>,
     angles: LineAngles<POINTS>,
 }
@@ -247,10 +244,10 @@ impl StripBuffer {
     }
 }
 
-/// Mean length, load and load centre of a strip between its two sides.
+/// Mean length, load and load centre of a strip.
 #[derive(Debug, Clone, Copy)]
 struct StripLoad {
-    /// Mean length of the chords; nothing if there is more than one on any of its lines.
+    /// Mean length of the chords; `None` if a line of the strip has more than one.
     length: Option<f64>,
     /// y of the centre of the load.
     load_y: f64,
@@ -259,7 +256,7 @@ struct StripLoad {
 }
 
 impl StripLoad {
-    /// The strip about a line.
+    /// Integrates over the strip about a line.
     fn of(
         footprint: &Footprint,
         line: &Chord,

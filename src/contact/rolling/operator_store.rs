@@ -1,7 +1,7 @@
-//! The operators of a process: bounded in bytes, shared by all cases and threads.
+//! The operators of a process, bounded in bytes and shared by all cases and threads.
 //!
-//! Meshes are dimensionless, so that patches of one shape share their operator whatever their size and load. The store decides how
-//! long an operator is kept, never what an answer is: an operator that is computed again is the same to the last bit.
+//! Meshes are dimensionless, so patches of one shape share their operator whatever their size and load. The store affects only the time of a solve: an operator
+//! that is computed again is identical.
 
 use std::collections::HashMap;
 use std::collections::hash_map::DefaultHasher;
@@ -14,25 +14,25 @@ use crate::half_space::strip_operator::operator::StripOperator;
 use crate::mesh::{Mesh, Segment};
 use crate::monitor::{Monitor, Stop};
 
-/// Default size of a store in bytes: room for two of the largest operators that targets from 0.0005 on lead to (52 MB each without
-/// mirror symmetry), or for some hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and
-/// 256 MiB (`cargo bench --bench stress -- --only creep-map`); what is kept pays for batches of one shape (`cargo bench --bench report`).
+/// Default size of a store in bytes: room for two of the largest operators of targets from 0.0005 on (52 MB each without mirror symmetry), or for some
+/// hundred usual ones. A creep map of 900 motions at fixed spin takes the same time with 0, 64, 128 and 256 MiB (`cargo bench --bench stress -- --only
+/// creep-map`); batches of one shape benefit (`cargo bench --bench report`).
 pub const BYTES_DEFAULT: u64 = 128 << 20;
 
-/// Bytes that a store of `bytes_max` keeps of an operator of so many: all or nothing.
+/// Bytes of an operator that a store of `bytes_max` keeps: all or 0.
 pub(crate) fn kept_bytes(bytes: u64, bytes_max: u64) -> u64 {
-    // One larger than half of the bound would push out all others.
+    // One larger than half of the bound would displace all others.
     if bytes <= bytes_max / 2 { bytes } else { 0 }
 }
 
-/// What an operator depends on beside its mesh.
+/// The properties of an operator besides its mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorKind {
     /// Poisson's ratio.
     pub poisson_ratio: f64,
-    /// Only one half of a mirror-symmetric mesh is stored.
+    /// Whether only one half of a mirror-symmetric mesh is stored.
     pub folded: bool,
-    /// Width of its numbers.
+    /// Precision of its numbers.
     pub precision: Precision,
 }
 
@@ -43,14 +43,14 @@ impl OperatorKind {
     }
 }
 
-/// Operators within a bound of bytes; the least recently used leave first.
+/// Operators within a bound of bytes; the least recently used are dropped first.
 #[derive(Debug)]
 pub struct OperatorStore {
     bytes_max: u64,
     kept: Mutex<Shelf>,
 }
 
-/// The operators that are kept, by digest.
+/// The stored operators, by digest.
 #[derive(Debug, Default)]
 struct Shelf {
     operators: HashMap<u64, Kept>,
@@ -58,17 +58,30 @@ struct Shelf {
     bytes: u64,
 }
 
+/// An operator with the mesh that it belongs to.
 #[derive(Debug, Clone)]
 struct Kept {
     kind: OperatorKind,
     mesh: Arc<Mesh>,
-    bytes: u64,
-    /// When it was used last, counted in uses of the store.
-    used: u64,
     operator: Arc<StripOperator>,
+    /// Number of the last use, counted over all uses of the store.
+    used: u64,
 }
 
 impl Kept {
+    fn new(kind: OperatorKind, mesh: &Arc<Mesh>, operator: &Arc<StripOperator>) -> Kept {
+        Kept {
+            kind,
+            mesh: Arc::clone(mesh),
+            operator: Arc::clone(operator),
+            used: 0,
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        self.operator.bytes() as u64
+    }
+
     fn is_of(&self, mesh: &Mesh, kind: OperatorKind) -> bool {
         self.kind == kind && alike(&self.mesh, mesh)
     }
@@ -81,7 +94,7 @@ impl Default for OperatorStore {
 }
 
 impl OperatorStore {
-    /// A store of at most so many bytes; 0 keeps nothing, which changes no answer.
+    /// A store of at most `bytes_max` bytes; 0 keeps nothing.
     pub fn new(bytes_max: u64) -> OperatorStore {
         OperatorStore {
             bytes_max,
@@ -89,8 +102,8 @@ impl OperatorStore {
         }
     }
 
-    /// The operator of a mesh: kept from an equal mesh, else computed outside the lock. Two threads that miss the same operator at once
-    /// both compute it, and one result is dropped: a solve that is stopped cannot hold up another.
+    /// The operator of a mesh: a stored one of an equal mesh, or else computed outside the lock. Two threads that need the same missing operator both compute
+    /// it, and one result is dropped, so that a stopped solve cannot block another.
     ///
     /// # Errors
     /// The monitor may stop the work.
@@ -111,21 +124,14 @@ impl OperatorStore {
         } = kind;
         let operator = StripOperator::new(mesh, poisson_ratio, folded, precision, monitor)?;
         let operator = Arc::new(operator);
-        let bytes = operator.bytes() as u64;
-        if kept_bytes(bytes, self.bytes_max) > 0 {
-            let kept = Kept {
-                kind,
-                mesh: Arc::clone(mesh),
-                bytes,
-                used: 0,
-                operator: Arc::clone(&operator),
-            };
+        if kept_bytes(operator.bytes() as u64, self.bytes_max) > 0 {
+            let kept = Kept::new(kind, mesh, &operator);
             self.shelf().keep(digest, kept, self.bytes_max);
         }
         Ok(operator)
     }
 
-    /// Bytes of the operators that are kept.
+    /// Bytes of the stored operators.
     pub fn bytes(&self) -> u64 {
         self.shelf().bytes
     }
@@ -148,7 +154,7 @@ impl Shelf {
 
     fn keep(&mut self, digest: u64, mut new: Kept, bytes_max: u64) {
         self.drop_one(digest);
-        while self.bytes + new.bytes > bytes_max {
+        while self.bytes + new.bytes() > bytes_max {
             let oldest = self.operators.iter().min_by_key(|(_, kept)| kept.used);
             let Some((&oldest, _)) = oldest else {
                 break;
@@ -157,34 +163,26 @@ impl Shelf {
         }
         self.uses += 1;
         new.used = self.uses;
-        self.bytes += new.bytes;
+        self.bytes += new.bytes();
         self.operators.insert(digest, new);
     }
 
     fn drop_one(&mut self, digest: u64) {
         if let Some(gone) = self.operators.remove(&digest) {
-            self.bytes -= gone.bytes;
+            self.bytes -= gone.bytes();
         }
     }
 }
 
-/// Where the levels of one case get their operators from: the store, and the operator used last. An operator too large for the store
-/// is thereby computed once, not for every motion.
+/// The operators of one case: those of the store, and the last one used. An operator too large for the store is thus not computed again for every motion.
 #[derive(Debug)]
 pub struct CaseOperators {
     store: Arc<OperatorStore>,
-    last: Mutex<Option<Held>>,
-}
-
-#[derive(Debug)]
-struct Held {
-    kind: OperatorKind,
-    mesh: Arc<Mesh>,
-    operator: Arc<StripOperator>,
+    last: Mutex<Option<Kept>>,
 }
 
 impl CaseOperators {
-    /// Those of a case whose store is this.
+    /// The operators of a case with a store.
     pub fn new(store: &Arc<OperatorStore>) -> Arc<CaseOperators> {
         Arc::new(CaseOperators {
             store: Arc::clone(store),
@@ -192,7 +190,7 @@ impl CaseOperators {
         })
     }
 
-    /// As [`OperatorStore::get`].
+    /// See [`OperatorStore::get`].
     ///
     /// # Errors
     /// The monitor may stop the work.
@@ -203,23 +201,18 @@ impl CaseOperators {
         monitor: &dyn Monitor,
     ) -> Result<Arc<StripOperator>, Stop> {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = |held: &&Held| held.kind == kind && alike(&held.mesh, mesh);
-        if let Some(held) = last.as_ref().filter(same) {
-            return Ok(Arc::clone(&held.operator));
+        if let Some(kept) = last.as_ref().filter(|kept| kept.is_of(mesh, kind)) {
+            return Ok(Arc::clone(&kept.operator));
         }
-        // A case needs one operator at a time: the last one is dropped before the next is computed.
+        // A case needs one operator at a time, so the last one is dropped before the next is computed.
         *last = None;
         let operator = self.store.get(mesh, kind, monitor)?;
-        *last = Some(Held {
-            kind,
-            mesh: Arc::clone(mesh),
-            operator: Arc::clone(&operator),
-        });
+        *last = Some(Kept::new(kind, mesh, &operator));
         Ok(operator)
     }
 }
 
-/// The numbers of a segment that the influence depends on, beside its cells.
+/// The place and width of a segment, on which the operator depends besides its cells.
 fn across(segment: &Segment) -> [f64; 2] {
     [segment.chord.y, segment.chord.dy]
 }
@@ -239,7 +232,7 @@ fn digest(mesh: &Mesh, kind: OperatorKind) -> u64 {
     hasher.finish()
 }
 
-/// Do two meshes have the same operator, to the last digit?
+/// Whether two meshes have identical operators.
 fn alike(a: &Mesh, b: &Mesh) -> bool {
     let segments = a.segments.iter().zip(&b.segments);
     (a.segments.len(), a.cells()) == (b.segments.len(), b.cells())

@@ -1,4 +1,4 @@
-//! The discrete equations that every tangential method solves: `s = q + M T` with `|T| ≤ g` on every cell.
+//! The discrete equations of all tangential methods: `s = q + M T` with `|T| ≤ g` on every cell.
 //!
 //! Everything is dimensionless: lengths by the scale of the patch, tractions by a reference traction P, slips by P/G.
 //! Vectors hold all x components, then all y components, each padded with zeros to the operator's length.
@@ -21,23 +21,23 @@ pub struct SlipEquations<'a> {
     differences: &'a StripOperator,
     parity: Option<Parity>,
     stencils: Stencils,
-    /// What an elastic layer between the bodies adds.
+    /// The slip of an elastic layer between the bodies, if there is one.
     layer: Option<LayerSlip>,
     flexibility: f64,
-    /// What the change of the displacements in time adds, where rolling is not steady.
+    /// The slip from the change of displacements in time, if rolling is not steady.
     memory: Option<DisplacementMemory<'a>>,
     /// Cells and rows of every segment that has unknowns.
     cells: Vec<Range<usize>>,
     rows: Vec<Range<usize>>,
     padded: usize,
     row_count: usize,
-    /// y of every segment, for the rigid slip.
+    /// y of the rigid slip of every segment.
     y: Vec<f64>,
 }
 
-/// Mean slip of every cell that neither the motion nor the tractions cause, in the units of the motion. Steady rolling of like bodies has
-/// none; the pressure of unlike bodies is such a source. Every rule adds it to the slip of the cell as it is: sampled like the rigid slip,
-/// the trapezoid rule would carry what its samples miss at the leading edge along the whole strip.
+/// Mean slip of every cell that neither the motion nor the tractions cause, in the units of the motion, for example by the pressure of dissimilar bodies.
+/// Every rule adds it to the slip of the cell itself: sampling it like rigid slip would propagate the error at the leading edge along the strip under the
+/// trapezoid rule.
 #[derive(Debug, Clone, Copy)]
 pub struct SlipSource<'a> {
     /// Along x.
@@ -46,8 +46,7 @@ pub struct SlipSource<'a> {
     pub y: &'a [f64],
 }
 
-/// Buffers of one product. The caller keeps them from product to product, so that a product allocates nothing and the equations
-/// can be shared by threads; they fit equations of any size.
+/// Buffers of products with equations of any size. The caller keeps them, so that a product allocates nothing and threads can share the equations.
 #[derive(Debug, Clone, Default)]
 pub struct SlipScratch {
     /// Displacement differences along x, then across.
@@ -58,8 +57,8 @@ pub struct SlipScratch {
 }
 
 impl<'a> SlipEquations<'a> {
-    /// Sets up a rule for a mesh and its operator. With a parity only the first half of the segments has unknowns; it is ignored if the
-    /// operator is not folded.
+    /// Sets up a rule for a mesh and its operator. With a parity only the first half of the segments has unknowns. The parity is ignored if the operator is not
+    /// folded.
     pub fn new(
         rule: Rule,
         mesh: &Mesh,
@@ -103,7 +102,7 @@ impl<'a> SlipEquations<'a> {
         equations
     }
 
-    /// The same with an elastic layer of this flexibility between the bodies; with 0 there is none.
+    /// Returns the equations with an elastic layer of a flexibility between the bodies; 0 means no layer.
     #[must_use]
     pub fn with_layer(mut self, mesh: &Mesh, flexibility: f64) -> SlipEquations<'a> {
         let segments = &mesh.segments[..self.cells.len()];
@@ -113,7 +112,7 @@ impl<'a> SlipEquations<'a> {
         self
     }
 
-    /// The same for a step in which the displacements change.
+    /// Returns the equations of a step in which the displacements change.
     #[must_use]
     pub fn with_memory(mut self, memory: DisplacementMemory<'a>) -> SlipEquations<'a> {
         self.memory = Some(memory);
@@ -140,7 +139,7 @@ impl<'a> SlipEquations<'a> {
         self.cells[j].clone()
     }
 
-    /// Elastic slip `M T` of tractions `t`. The padding of `slip` is left as it is.
+    /// Elastic slip `M T` of tractions `t`. The padding of `slip` is not changed.
     pub fn elastic(&self, t: &[f64], slip: &mut [f64], scratch: &mut SlipScratch) {
         let (tx, ty) = t.split_at(self.padded);
         let (sx, sy) = slip.split_at_mut(self.padded);
@@ -183,7 +182,7 @@ impl<'a> SlipEquations<'a> {
         }
     }
 
-    /// Displacements at the nodes from tractions and the differences that they cause.
+    /// Displacements at the nodes from tractions and their displacement differences.
     fn at_nodes(
         &self,
         memory: DisplacementMemory,
@@ -200,12 +199,12 @@ impl<'a> SlipEquations<'a> {
         }
     }
 
-    /// What multiplies the displacements in the slip of a step; 0 without a memory.
+    /// Factor of the displacements in the slip of a step; 0 without memory.
     pub fn memory_factor(&self) -> f64 {
         self.memory.map_or(0.0, |memory| memory.factor)
     }
 
-    /// Displacements at the nodes under tractions, those of a layer included, x then y; only of equations with a memory.
+    /// Displacements at the nodes under tractions, including those of a layer, x then y. Does nothing for equations without memory.
     pub fn displacement(&self, t: &[f64], out: &mut [f64], scratch: &mut SlipScratch) {
         let Some(memory) = self.memory else {
             return;
@@ -224,12 +223,12 @@ impl<'a> SlipEquations<'a> {
         self.at_nodes(memory, [tx, ty], [dx, dy], [ux, uy]);
     }
 
-    /// Rigid slip `q` of a motion, in the units of the motion: `(ν_x − φ y, ν_y + φ x)` as the rule samples it.
+    /// Rigid slip `q = (ν_x − φ y, ν_y + φ x)` of a motion, in the units of the motion, as sampled by the rule.
     pub fn rigid(&self, motion: &Motion) -> Vec<f64> {
         self.given(motion, None)
     }
 
-    /// Rigid slip of a motion with the slip of a source added.
+    /// Rigid slip of a motion plus that of a source.
     pub fn given(&self, motion: &Motion, source: Option<SlipSource>) -> Vec<f64> {
         let mut slip = vec![0.0; 2 * self.padded];
         let (sx, sy) = slip.split_at_mut(self.padded);
@@ -250,8 +249,8 @@ impl<'a> SlipEquations<'a> {
         slip
     }
 
-    /// Fills `blocks` with the own block of segment `j`: `M_xx` and `M_yy` between its cells, column by column. (`M_xy` is 0
-    /// there.) `differences` are buffers.
+    /// Writes the self-influence block of segment `j` to `blocks`: `M_xx` and `M_yy` between its cells, column by column. `M_xy` is 0 there. `differences` are
+    /// buffers.
     pub(crate) fn own_block(
         &self,
         j: usize,
@@ -260,7 +259,7 @@ impl<'a> SlipEquations<'a> {
     ) {
         let own = self.cells[j].clone();
         let n = own.len();
-        // A mirrored segment has the same own block as its image.
+        // A mirrored segment has the block of its image.
         let stored = if j < self.differences.segments() {
             j
         } else {
@@ -301,11 +300,11 @@ impl<'a> SlipEquations<'a> {
         }
     }
 
-    /// The whole map `M` as a matrix over the cells without padding, column by column: the x components of all cells
-    /// come before the y components, in rows and in columns. For small meshes: it has `(2 × cells)²` values.
+    /// The whole map `M` as a matrix over the cells without padding, column by column. In rows and in columns, the x components of all cells precede the y
+    /// components. It has `(2 × cells)²` values, so it is meant for small meshes.
     ///
     /// # Errors
-    /// The monitor is asked every few columns and may stop the work.
+    /// The monitor may stop the work.
     pub fn dense(&self, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
         let n = self.cells();
         let mut matrix = vec![0.0; 4 * n * n];
@@ -339,16 +338,16 @@ impl<'a> SlipEquations<'a> {
         Ok(matrix)
     }
 
-    /// Entries of the operator that one product touches.
+    /// Entries of the operator that one product reads.
     pub fn entries(&self) -> usize {
         self.differences.entries(self.parity)
     }
 }
 
-/// The layer on the segments of a mesh under one rule.
+/// An elastic layer on the segments of a mesh under one rule.
 #[derive(Debug)]
 pub(crate) struct LayerSlip {
-    /// Dimensionless: displacement over traction.
+    /// Displacement over traction, dimensionless.
     flexibility: f64,
     stencils: Stencils,
 }
@@ -366,7 +365,7 @@ impl LayerSlip {
         }
     }
 
-    /// Adds the slip of the tractions of a segment to those of the whole mesh.
+    /// Adds the slip from the tractions of a segment to the slips of the whole mesh.
     pub(crate) fn add(
         &self,
         cells: Range<usize>,
@@ -390,7 +389,7 @@ impl LayerSlip {
         }
     }
 
-    /// Adds the slips of a unit traction on one cell of a segment, along x and across.
+    /// Adds the slips by a unit traction on one cell of a segment, along x and across.
     pub(crate) fn add_column(&self, cells: Range<usize>, cell: usize, slips: [&mut [f64]; 2]) {
         let n = cells.len();
         let mut unit = vec![0.0; n];

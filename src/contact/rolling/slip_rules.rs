@@ -1,8 +1,7 @@
-//! Discretisation rules: how slip on a cell follows from displacement differences along its segment.
+//! Discretisation rules, which give the slip on a cell from displacement differences along its segment.
 //!
-//! Steady rolling asks for `s = w + ∂u/∂x` (Johnson 1985, §8.1; Liu & Hsu, eq. 2). All rules difference toward the
-//! leading edge: that is what selects the solution that vanishes there and keeps the problem well posed. Slip is in
-//! units of G⁻¹ × traction, lengths in the unit of the mesh.
+//! Steady rolling requires `s = w + ∂u/∂x` (Johnson 1985, §8.1; Liu & Hsu, eq. 2). All rules take differences towards the leading edge, which selects the
+//! solution that vanishes there and makes the problem well posed. Slip is in units of G⁻¹ × traction, lengths in the unit of the mesh.
 
 use std::ops::Range;
 
@@ -10,7 +9,7 @@ use railhead_macros::Named;
 
 use crate::mesh::{Mesh, Segment, observe};
 
-/// The rules offered.
+/// The available rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Named)]
 pub enum Rule {
     /// Mean slip between a node and the next (the leading edge for the last node). First order, monotone.
@@ -19,26 +18,25 @@ pub enum Rule {
     /// smooth slips.
     #[serde(rename = "mirror")]
     ThreePoint,
-    /// The seed's eq. 6 with `x_U` at the leading edge and half weight for the own cell, differenced along the strip:
-    /// slips of neighbouring cells average to the mean slip between their nodes. Second order, best forces, but its
-    /// slips oscillate next to the stick zone.
+    /// Eq. 6 of Liu & Hsu with `x_U` at the leading edge and half weight for the own cell, differenced along the strip: the mean of the slips of neighbouring
+    /// cells is the mean slip between their nodes. Second order, with the best forces; its slips oscillate next to the stick zone.
     Trapezoid,
 }
 
-/// A rule made ready for the segments of a mesh, cell by cell: `t_i = Σ_k band_i[k] (d_{i+k} + W_{i+k})`, then, from the
-/// leading cell of a segment backwards, `s_i = t_i − carry_i s_{i+1}`.
+/// A rule prepared for the segments of a mesh, cell by cell: `t_i = Σ_k band_i[k] (d_{i+k} + W_{i+k})` and, backwards from the leading cell of a segment,
+/// `s_i = t_i − carry_i s_{i+1}`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stencils {
     band: Vec<[f64; 3]>,
     carry: Vec<f64>,
-    /// Where the rigid slip of each cell is taken, along x; a carried rule adds the neighbour's as for `s`.
+    /// x at which the rigid slip of each cell is sampled. A rule with `carry` adds that of the next cell as for `s`.
     rigid_at: Vec<f64>,
-    /// Sum that multiplies the rigid slip at `rigid_at`.
+    /// Factor of the rigid slip at `rigid_at`.
     rigid_weight: Vec<f64>,
 }
 
 impl Stencils {
-    /// Prepares a rule for the segments of a mesh, or for the first of them.
+    /// Prepares a rule for all segments of a mesh, or for the first of them.
     pub fn new(rule: Rule, mesh: &Mesh, segments: &[Segment]) -> Stencils {
         let cells = segments.last().map_or(0, |segment| segment.cells.end);
         let mut stencils = Stencils {
@@ -55,7 +53,7 @@ impl Stencils {
         stencils
     }
 
-    /// The same for a quantity that is nothing beyond the leading edge, instead of going on there as in a mirror.
+    /// Prepares a rule for a quantity that is 0 beyond the leading edge instead of being mirrored there.
     pub fn ending_at_the_edge(rule: Rule, mesh: &Mesh, segments: &[Segment]) -> Stencils {
         let mut stencils = Stencils::new(rule, mesh, segments);
         let mut points = Vec::new();
@@ -116,8 +114,7 @@ impl Stencils {
         }
     }
 
-    /// Given slip of every cell of a segment: `w(i, x)` is what is given for cell i at x, where the rule samples it. For rigid slip
-    /// w is linear in x.
+    /// Given slip of every cell of a segment, where `w(i, x)` is the slip of cell i at x. Rigid slip is linear in x.
     pub fn given(&self, cells: Range<usize>, w: impl Fn(usize, f64) -> f64, slip: &mut [f64]) {
         let mut ahead = 0.0;
         for (i, slip) in cells.zip(slip).rev() {
@@ -129,8 +126,8 @@ impl Stencils {
 
 /// Weights of the three-point derivative at node `i` on the differences `d_i`, `d_{i+1}`, `d_{i+2}`.
 ///
-/// The observation points are the `n` nodes, the leading edge and the images of the last two nodes; the derivative
-/// skips the edge, so that the difference across it is the sum of two stored ones.
+/// The observation points are the `n` nodes, the leading edge and the images of the last two nodes. The derivative skips the edge, so the difference across
+/// it is the sum of two stored differences.
 fn three_point(points: &[f64], i: usize, n: usize) -> [f64; 3] {
     if n == 1 {
         return [1.0 / (points[1] - points[0]), 0.0, 0.0];

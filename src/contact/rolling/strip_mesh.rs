@@ -1,4 +1,4 @@
-//! One mesh level of a contact: cells, pressures and bounds, shared by all motions and methods, and access to its operator.
+//! A mesh of strips over the patches of a footprint, with pressures and friction bounds. All motions and methods share it.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -18,25 +18,25 @@ use crate::rolling::load_ellipse::StripChord;
 use crate::rolling::operator_store::{CaseOperators, OperatorKind, OperatorStore};
 use crate::rolling::task::{MeshPlan, Motion, RollingTask};
 
-/// With an operator in single precision, dimensionless coordinates are rounded to multiples of this, so that patches of one shape get
-/// the same mesh to the last digit whatever their size. 2⁻³⁴ is a thousandth of the last digit of single precision.
+/// With a single-precision operator, dimensionless coordinates are rounded to multiples of this, so that patches of one shape and different sizes have
+/// identical meshes. 2⁻³⁴ is a thousandth of the last digit of single precision.
 const COORDINATE_STEP: f64 = 1.0 / (1_u64 << 34) as f64;
 
-/// The contact made dimensionless: lengths by `length`, tractions by `traction`, slips by `traction / G`.
+/// The units of the dimensionless problem: lengths by `length`, tractions by `traction`, slips by `traction / G`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
     /// Unit of length in mm: √(A/π) with A the area of all patches.
     pub length: f64,
     /// Unit of traction in MPa: μ times the largest pressure.
     pub traction: f64,
-    /// Combined shear modulus in MPa; of an interface that reduces it, what it is for tractions.
+    /// Combined shear modulus in MPa, reduced by the interface where it reduces that of tractions.
     pub shear_modulus: f64,
-    /// Where the dimensionless coordinates are 0, in mm: on the mirror line if there is one.
+    /// The origin of the dimensionless coordinates in mm; on the mirror line if there is one.
     pub origin: [f64; 2],
 }
 
 impl Scale {
-    /// Unit of slip: traction / G, or 1 without friction, where slips are the rigid ones.
+    /// Unit of slip: `traction / G`, or 1 without friction.
     pub fn slip(&self) -> f64 {
         if self.traction > 0.0 {
             self.traction / self.shear_modulus
@@ -45,12 +45,12 @@ impl Scale {
         }
     }
 
-    /// What changes bounds on the way through the contact, in these units.
+    /// The path-dependent friction in these units.
     pub fn passage<'a>(&self, laws: &PathDependentLaws<'a>) -> PathDependentFriction<'a> {
         laws.on_level(self.slip(), self.length, self.traction)
     }
 
-    /// A motion about the origin of the case becomes one about [`Scale::origin`], in units of rigid slip.
+    /// Converts a motion about the origin of the case to a dimensionless one about [`Scale::origin`].
     pub fn motion(&self, motion: &Motion) -> Motion {
         let unit = self.shear_modulus / self.traction;
         Motion {
@@ -60,7 +60,7 @@ impl Scale {
         }
     }
 
-    /// The motion about the origin of the case of a dimensionless one.
+    /// Converts a dimensionless motion to one about the origin of the case.
     pub fn creepages(&self, motion: &Motion) -> Motion {
         let unit = self.traction / self.shear_modulus;
         let spin = motion.spin_per_mm * unit / self.length;
@@ -71,17 +71,17 @@ impl Scale {
         }
     }
 
-    /// The displacement of the upper body in mm and rad of a dimensionless one.
+    /// Converts a dimensionless displacement of the upper body to mm and rad.
     pub fn shift(&self, motion: &Motion) -> Motion {
         let creepages = self.creepages(motion).components();
         Motion::of(creepages.map(|part| part * self.length))
     }
 }
 
-/// A mesh with its pressures and bounds. It is not changed once it is made; its operator is kept by the store of the process.
+/// A mesh with its pressures and bounds. It is immutable; its operator belongs to the store of the process.
 #[derive(Debug)]
 pub struct StripMesh {
-    /// What it was made from.
+    /// Size and grading.
     pub plan: MeshPlan,
     /// The mesh in mm.
     pub mesh: Mesh,
@@ -97,20 +97,22 @@ pub struct StripMesh {
     pub bound: Vec<f64>,
     /// Flexibility of an elastic layer between the bodies, dimensionless.
     pub layer: f64,
-    /// Mean slip of every cell beyond that of the motion, dimensionless, along x and across: from the pressure of unlike bodies, or on a
-    /// surface that bends.
+    /// Mean slip of every cell besides that of the motion, dimensionless, along x and across. It comes from the pressure of dissimilar bodies or from the
+    /// curvature of the surface.
     pub surface_slip: Option<[Vec<f64>; 2]>,
-    /// What a unit of creepage across, and of spin in 1/mm, about the origin of the case adds to it, where motions share a surface that bends.
+    /// Additional slip per unit of lateral creepage, and per unit of spin in 1/mm, about the origin of the case, where motions share a curved surface.
     pub slip_by_motion: Option<[[Vec<f64>; 2]; 2]>,
-    poisson_ratio: f64,
-    precision: Precision,
-    mirrored: bool,
+    /// Poisson's ratio of the pair.
+    pub poisson_ratio: f64,
+    /// Precision of the operator.
+    pub precision: Precision,
+    /// Whether patches and bounds are mirror-symmetric, so that half of the operator is enough.
+    pub mirrored: bool,
     operators: Arc<CaseOperators>,
 }
 
 impl StripMesh {
-    /// Meshes every patch of the footprint: with equal strips and cosine-graded cells, or with both gathered about the pole of the plan.
-    /// Its operator is not kept.
+    /// Meshes every patch of the footprint with the size and grading of `plan`. The operator is not kept for later meshes.
     ///
     /// # Errors
     /// [`SolveError::Unmeshable`] if no strip meets a patch.
@@ -119,17 +121,17 @@ impl StripMesh {
         StripMesh::with_operators(task, plan, CaseOperators::new(&store))
     }
 
-    /// The same; its operator comes from those of the case.
+    /// Meshes every patch of the footprint; the operator comes from those of the case.
     ///
     /// # Errors
-    /// The same.
+    /// [`SolveError::Unmeshable`] if no strip meets a patch.
     pub fn with_operators(
         task: &RollingTask,
         plan: impl Into<MeshPlan>,
         operators: Arc<CaseOperators>,
     ) -> Result<StripMesh, SolveError> {
         let plan: MeshPlan = plan.into();
-        // Rows by the simplified theory share one mesh.
+        // By the simplified theory all ellipses share one mesh.
         let like_circle = task.method == Method::Fastsim;
         let fitted = fitted_chords(task.footprint, &plan, like_circle)?;
         let Elasticity {
@@ -145,15 +147,14 @@ impl StripMesh {
         };
         let mut mesh = Mesh::new(&chords, &grading);
         if plan.pole.is_some() {
-            // Where everything slips, the traction of a strip follows the slip at the centre of its load; sticking strips
-            // follow their mid-lines.
+            // In full slip the traction of a strip follows the slip at its load centre; sticking strips follow their mid-lines.
             mesh.load_y = fitted.iter().map(|f| f.load_y).collect();
         }
         let area = mesh.areas();
         let pressure = cell_pressures(footprint, &fitted, &mesh, &grading, &area);
         let largest = patches.iter().map(|p| p.pressure_max).fold(0.0, f64::max);
         let bound = bounds(task, &fitted, &mesh, &pressure, largest);
-        // Pressures enter the equations through their bounds only, so that bounds decide the symmetry.
+        // Pressures enter the equations only through the bounds, so the symmetry is that of the bounds.
         let mirror = mesh
             .mirror_line()
             .filter(|_| footprint.slip().is_none() && bounds_mirror(&mesh, &bound));
@@ -164,7 +165,7 @@ impl StripMesh {
             shear_modulus: task.interface.reduction * shear_modulus,
             origin: [x, mirror.unwrap_or(y)],
         };
-        let precision = task.precision();
+        let precision = task.resolution.precision();
         let mut normalised = mesh.normalised(scale.origin, 1.0 / scale.length);
         if precision == Precision::Single {
             normalised.round(COORDINATE_STEP);
@@ -175,7 +176,7 @@ impl StripMesh {
         let slip_by_motion = of_motion.map(|slips| slips.each_ref().map(of_surface));
         let own_slip = own_slip.map(of_surface);
         let of_pressure = (task.is_coupled() && scale.traction > 0.0).then(|| {
-            // A reduced shear modulus is one for tractions alone.
+            // A reduced shear modulus applies to tractions only.
             let unit = task.interface.reduction / scale.traction;
             let relative: Vec<f64> = pressure.iter().map(|p| p * unit).collect();
             pressure_slips(&normalised, task.elasticity.difference, &relative)
@@ -212,13 +213,12 @@ impl StripMesh {
         self.operators.get(&self.normalised, kind, monitor)
     }
 
-    /// The parity of the tractions under a dimensionless motion, if the level has a mirror line and the motion is symmetric or
-    /// antisymmetric about it.
+    /// The parity of the tractions under a dimensionless motion. `None` unless the mesh has a mirror line and the motion is symmetric or antisymmetric about it.
     pub fn parity(&self, motion: &Motion) -> Option<Parity> {
         if !self.mirrored {
             return None;
         }
-        // The slips from the pressure of unlike bodies are symmetric as those of a longitudinal creepage are.
+        // Slips from the pressure of dissimilar bodies have the symmetry of a longitudinal creepage.
         let along = motion.creepage_x != 0.0 || self.surface_slip.is_some();
         let lateral = motion.creepage_y != 0.0 || motion.spin_per_mm != 0.0;
         match (along, lateral) {
@@ -226,21 +226,6 @@ impl StripMesh {
             (false, true) => Some(Parity::Lateral),
             (true, true) => None,
         }
-    }
-
-    /// Poisson's ratio of the pair.
-    pub fn poisson_ratio(&self) -> f64 {
-        self.poisson_ratio
-    }
-
-    /// Width of the numbers of its operator.
-    pub fn precision(&self) -> Precision {
-        self.precision
-    }
-
-    /// Are patch and bounds mirror-symmetric, so that half of the operator is enough?
-    pub fn is_mirrored(&self) -> bool {
-        self.mirrored
     }
 
     /// Cells of one patch.
@@ -257,7 +242,7 @@ impl StripMesh {
         first.start..cells.next_back().map_or(first.end, |c| c.end)
     }
 
-    /// Values of the unknowns of a parity, along x then across, over the whole mesh.
+    /// Expands the unknowns of a parity, x then y, to the whole mesh.
     pub(crate) fn expand(&self, parity: Option<Parity>, values: &[f64]) -> [Vec<f64>; 2] {
         let (x, y) = values.split_at(values.len() / 2);
         match parity {
@@ -267,7 +252,7 @@ impl StripMesh {
         }
     }
 
-    /// Values over the whole mesh that are equal in both halves, from those of the unknowns of a parity.
+    /// Expands the unknowns of a parity to the whole mesh for a quantity that is equal in both halves.
     pub(crate) fn whole(&self, parity: Option<Parity>, values: &[f64]) -> Vec<f64> {
         match parity {
             Some(_) => self.unfold(values, 1.0),
@@ -275,7 +260,7 @@ impl StripMesh {
         }
     }
 
-    /// Values of the first half of the segments continued to the mirrored half: `sign` is that of the image.
+    /// Continues values of the first half of the segments to the mirrored half, multiplied by `sign`.
     pub fn unfold(&self, half: &[f64], sign: f64) -> Vec<f64> {
         let cells = self.mesh.cells();
         let mut values = vec![0.0; cells];
@@ -290,7 +275,7 @@ impl StripMesh {
     }
 }
 
-/// Mean slips of the cells in a unit, along x and across.
+/// Mean slips of the cells in units of `unit`, along x and across.
 fn surface_slips(mesh: &Mesh, slip: &SurfaceSlip, unit: f64) -> [Vec<f64>; 2] {
     let y = mesh.cell_load_y();
     let of = |i: usize| slip.mean([mesh.left[i], mesh.right[i]], y[i]);
@@ -298,7 +283,7 @@ fn surface_slips(mesh: &Mesh, slip: &SurfaceSlip, unit: f64) -> [Vec<f64>; 2] {
     [0, 1].map(|k| slips.iter().map(|slip| slip[k] / unit).collect())
 }
 
-/// The sum of slips, where there are any.
+/// The sum of two slips, either of which may be absent.
 fn sum(one: Option<[Vec<f64>; 2]>, other: Option<[Vec<f64>; 2]>) -> Option<[Vec<f64>; 2]> {
     match (one, other) {
         (Some(one), Some(other)) => Some([0, 1].map(|axis| {
@@ -309,10 +294,10 @@ fn sum(one: Option<[Vec<f64>; 2]>, other: Option<[Vec<f64>; 2]>) -> Option<[Vec<
     }
 }
 
-/// Samples across a strip where friction varies.
+/// Number of samples across a strip if the coefficient of friction varies across.
 const FRICTION_SAMPLES: usize = 16;
 
-/// Friction bounds of the cells, dimensionless: the load-weighted mean coefficient of the strip times the pressure.
+/// Dimensionless friction bounds of the cells: the load-weighted mean coefficient of the strip times the pressure.
 fn bounds(
     task: &RollingTask,
     fitted: &[StripChord],
@@ -333,7 +318,7 @@ fn bounds(
     bound
 }
 
-/// The strips of all patches, fitted to the region; they depend on the number of strips and on where these gather.
+/// The fitted chords of all patches.
 ///
 /// # Errors
 /// [`SolveError::Unmeshable`] if no strip meets a patch.
@@ -359,8 +344,8 @@ fn fitted_chords(
     Ok(fitted)
 }
 
-/// Mean pressures of the cells, scaled so that the cells carry the load of their strip where the region is not Hertz's
-/// ellipse (its line loads are smooth enough), then the patch's normal force.
+/// Mean pressures of the cells. They are scaled to the load of their strip unless the patch is Hertz's ellipse, whose line loads are smooth enough, and
+/// finally to the normal force of the patch.
 fn cell_pressures(
     footprint: &Footprint,
     fitted: &[StripChord],
@@ -368,7 +353,7 @@ fn cell_pressures(
     grading: &Grading,
     area: &[f64],
 ) -> Vec<f64> {
-    // Cells divide every line in the same way, so that their shares of a semi-ellipse are found once.
+    // All lines are divided alike, so the shares of a semi-ellipse are computed once.
     let known = footprint.ellipse();
     let known = known.map(|ellipse| (ellipse, Ellipse::profile(&grading.edges)));
     let patches = footprint.patches();
@@ -409,7 +394,7 @@ fn scale(values: &mut [f64], factor: f64) {
     values.iter_mut().for_each(|value| *value *= factor);
 }
 
-/// Are the bounds of the cells mirror images to 1e-9 of the largest?
+/// Whether the bounds of mirrored cells agree within 1e-9 of the largest bound.
 fn bounds_mirror(mesh: &Mesh, bound: &[f64]) -> bool {
     let tolerance = 1e-9 * bound.iter().copied().fold(0.0, f64::max);
     let m = mesh.segments.len();

@@ -1,8 +1,4 @@
-//! What the tangential problem of one footprint asks: physics, method and accuracy.
-//!
-//! How fine a solution is to be, and the size and grading of a mesh.
-//!
-//! The relative motion of two rolling bodies.
+//! The tangential problem of one footprint: physics, motions, method and accuracy.
 
 use railhead_macros::{Finite, Words};
 use serde::{Deserialize, Serialize};
@@ -17,58 +13,58 @@ use crate::mesh::MeshSize;
 use crate::method::{Method, TractionBound};
 use crate::normal::footprint::Footprint;
 
-/// Targets from here on are met with an operator in single precision. Chosen by judgement; how much it matters was not measured.
+/// Least target at which operators have single precision. Chosen by judgement.
 const SINGLE_PRECISION_FROM: f64 = 5e-4;
 
-/// Residual to reach over the target error. Chosen by judgement; how much it matters was not measured.
+/// Residual to reach over the target error. Chosen by judgement.
 const RESIDUAL_OF_TARGET: f64 = 0.04;
-/// The same where forces are prescribed or differences are taken. The search finds the root of a force as a function of its creepage, and the residual is the noise of
-/// that function: less than a tenth of what a force may be missed by (`SHARE_OF_TARGET`). Chosen by judgement.
+/// Residual to reach over the target error where forces are prescribed or differences are taken. A search for a force sees the residual as noise, which must be
+/// less than a tenth of its tolerance (`SHARE_OF_TARGET`). Chosen by judgement.
 const RESIDUAL_FOR_FORCES: f64 = 0.0015;
-/// Largest residual that any target allows, relative to the traction scale. Chosen by judgement; how much it matters was not measured.
+/// Largest residual that a target allows, relative to the traction scale. Chosen by judgement.
 const TOLERANCE_LARGEST: f64 = 4e-4;
 
-/// Residual of the friction law to which every method solves on a mesh of the client's, relative to the traction scale.
+/// Residual of the friction law, relative to the traction scale, on a mesh given by the client.
 pub const TOLERANCE_LEAST: f64 = 1e-6;
 
-/// The motions to be solved on one footprint, and how.
+/// The motions to solve on one footprint, with the physics and the method.
 #[derive(Debug, Clone, Copy)]
 pub struct RollingTask<'a> {
     /// Patches and pressures.
     pub footprint: &'a Footprint,
     /// Elastic constants of the pair.
     pub elasticity: &'a Elasticity,
-    /// Bound of the tractions.
+    /// Friction law, which bounds the tractions.
     pub friction: &'a FrictionLaw,
-    /// What lies between the bodies.
+    /// Interface between the bodies.
     pub interface: Interface,
     /// The motions, in order; a creepage is 0 where a force is prescribed instead.
     pub motions: &'a [Motion],
     /// Forces prescribed instead of creepages, motion by motion.
     pub forces: &'a [PrescribedForces],
-    /// Rolling speeds in mm/s, motion by motion, where they are known.
+    /// Rolling speeds in mm/s, motion by motion; `None` where unknown.
     pub speeds: &'a [Option<f64>],
-    /// The number of the first of these motions in its case.
+    /// Number of the first of these motions in its case.
     pub first_motion: usize,
     /// The method.
     pub method: Method,
     /// Traction bound at which `fastsim` slips.
     pub traction_bound: TractionBound,
-    /// Target or mesh.
+    /// Target error or mesh.
     pub resolution: Resolution,
-    /// Are slips asked for, or what follows from them? Forces do not depend on it.
+    /// Whether smooth slips are needed. Forces do not depend on it.
     pub wants_slips: bool,
-    /// Are differences of the resultants of near motions taken? They are solved to smaller residuals.
+    /// Whether resultants of neighbouring motions are subtracted from each other, which requires smaller residuals.
     pub is_differenced: bool,
 }
 
 impl RollingTask<'_> {
-    /// The allowed error of the resultants, where an error is asked for rather than a mesh.
+    /// The target error of the resultants; `None` for an explicit mesh.
     pub fn target(&self) -> Option<f64> {
         self.resolution.target()
     }
 
-    /// Residual to reach for motion `index`: far below the target, but no further, because iterating further does not improve the answer.
+    /// The residual to reach for motion `index`. It is far below the target; a smaller one would not improve the answer.
     pub fn tolerance(&self, index: usize) -> f64 {
         let is_prescribed =
             self.is_differenced || self.forces.get(index).is_some_and(|f| *f != [None; 2]);
@@ -85,13 +81,13 @@ impl RollingTask<'_> {
         }
     }
 
-    /// How the bounds of the cells fall with their slip in motion `index`, where they do; slips are counted in `slip_unit`.
+    /// The weakening of the friction bounds with slip in motion `index`, if there is any. Slips are in units of `slip_unit`.
     pub fn bound_fall(&self, index: usize, slip_unit: f64) -> Option<Softening> {
         let speed = self.speeds.get(index).copied().flatten();
         self.friction.bound_fall(speed, slip_unit)
     }
 
-    /// What changes the bounds of motion `index` on the way through the contact, if anything does.
+    /// The laws that change the friction bounds along the path through the contact in motion `index`, if there are any.
     pub fn passage(&self, index: usize) -> Option<PathDependentLaws<'_>> {
         let speed = self.speeds.get(index).copied().flatten();
         let laws = PathDependentLaws {
@@ -101,46 +97,32 @@ impl RollingTask<'_> {
         (laws.heated.is_some() || laws.yielding.is_some()).then_some(laws)
     }
 
-    /// Why friction falls too fast with slip or temperature for an answer, if it does.
+    /// The reason why friction falls too fast with slip or temperature for a solution, if it does.
     pub fn falls_too_fast(&self) -> Option<String> {
         let modulus = self.interface.reduction * self.elasticity.shear_modulus;
         let patches = self.footprint.patches();
         self.friction.too_fast(patches, modulus, self.speeds)
     }
 
-    /// Does the pressure make the surfaces slip, because the bodies differ and the method takes account of it?
+    /// Whether the pressure causes slip because the bodies differ, and the method models it.
     pub fn is_coupled(&self) -> bool {
         self.elasticity.difference != 0.0 && self.method == Method::BoundaryElement
     }
 
-    /// Is a force prescribed for any motion?
+    /// Whether a force is prescribed for any motion.
     pub fn has_prescribed_forces(&self) -> bool {
         self.forces.iter().any(|forces| *forces != [None; 2])
     }
-
-    /// Single precision serves any target that the residuals of single precision can meet.
-    pub fn precision(&self) -> Precision {
-        precision_of(self.resolution)
-    }
 }
 
-/// See [`RollingTask::precision`].
-pub fn precision_of(resolution: Resolution) -> Precision {
-    match resolution {
-        Resolution::Target(target) if target >= SINGLE_PRECISION_FROM => Precision::Single,
-        _ => Precision::Double,
-    }
-}
-
-/// Error of the resultants relative to μN that is allowed when nothing else is asked for, and that stands for an explicit mesh where a search needs a
-/// target.
+/// Default target error of the resultants relative to μN. It also replaces the target of an explicit mesh where a search needs one.
 pub const TARGET_USUAL: f64 = 0.005;
-/// An error below this part of the target is not worth another iteration.
+/// Errors below this part of the target are negligible.
 pub(crate) const NEGLIGIBLE_OF_TARGET: f64 = 0.1;
-/// Part of a target that another error may take up while the rest of it is still sought.
+/// Largest part of a target that a known error may take up; beyond it the target is not reduced by that error.
 const ERROR_MAX: f64 = 0.95;
 
-/// Least target of an error relative to μN: no mesh resolves less.
+/// Least target error relative to μN; no mesh resolves less.
 pub const TARGET_LEAST: f64 = 1e-4;
 
 /// Reference quantity of a relative error.
@@ -154,7 +136,7 @@ pub enum RelativeTo {
     Force,
 }
 
-/// Mesh chosen by the solver for a target, or given by the client.
+/// A mesh chosen by the solver for a target, or given by the client.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Resolution {
     /// Allowed error of the resultants relative to μN.
@@ -172,13 +154,21 @@ impl Resolution {
         }
     }
 
-    /// The target, or what stands for it with an explicit mesh.
+    /// The precision of the operators: single where its rounding errors are far below the target.
+    pub fn precision(self) -> Precision {
+        match self {
+            Resolution::Target(target) if target >= SINGLE_PRECISION_FROM => Precision::Single,
+            _ => Precision::Double,
+        }
+    }
+
+    /// The target, or [`TARGET_USUAL`] for an explicit mesh.
     pub fn target_or_usual(self) -> f64 {
         self.target().unwrap_or(TARGET_USUAL)
     }
 
-    /// The target reduced so that its root sum of squares with another error equals the original; unchanged if that error is 0, or takes up
-    /// the target so that the finest meshes would hardly meet the rest.
+    /// The target reduced so that its root sum of squares with another error equals the original. It is unchanged if that error is 0, or larger than the part
+    /// `ERROR_MAX` of the target.
     #[must_use]
     pub fn beside(self, error: f64) -> Resolution {
         match self {
@@ -190,13 +180,13 @@ impl Resolution {
     }
 }
 
-/// The size of a mesh and where it is graded.
+/// The size of a mesh and the place at which it is refined.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshPlan {
     /// Strips and cells.
     pub size: MeshSize,
-    /// The point about which strips and cells gather, along the chords and across the patch, each from −1 to 1. Without one, strips are equal
-    /// and cells are cosine-graded.
+    /// The point about which strips and cells gather, along the chords and across the patch, each from −1 to 1. `None` means equal strips and cosine-graded
+    /// cells.
     pub pole: Option<[f64; 2]>,
 }
 
@@ -222,7 +212,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// The motion of ξ, η and φ.
+    /// The motion with the components ξ, η and φ.
     #[must_use]
     pub fn of([creepage_x, creepage_y, spin_per_mm]: [f64; 3]) -> Motion {
         Motion {
@@ -232,7 +222,7 @@ impl Motion {
         }
     }
 
-    /// ξ, η and φ.
+    /// The components ξ, η and φ.
     pub fn components(&self) -> [f64; 3] {
         [self.creepage_x, self.creepage_y, self.spin_per_mm]
     }
@@ -243,5 +233,5 @@ impl Motion {
     }
 }
 
-/// The forces prescribed along x and across instead of creepages, in N, where they are.
+/// Prescribed forces along x and across in N; `None` where the creepage is given instead.
 pub type PrescribedForces = [Option<f64>; 2];

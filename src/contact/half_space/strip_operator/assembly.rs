@@ -1,27 +1,29 @@
-//! Rows of the operator between strips: corner sums of the closed forms over all cell edges, differenced.
+//! Rows of the strip operator: corner sums of the closed forms over all cell edges, and their differences.
 
 use std::ops::{ControlFlow, Range};
 
 use pulp::NullaryFnOnce;
 
+use crate::half_space::strip_operator::operator::blocks;
 use crate::mesh::{Mesh, observe};
 use crate::monitor::{Monitor, Stop};
 use crate::numerics::simd;
 use crate::numerics::simd::Float;
 
-/// All cell edges of a mesh, as seen from the mid-line of one strip.
+/// All cell edges of a mesh relative to the mid-line of one strip.
 pub(crate) struct CellEdges<T> {
     /// x of every edge, segment by segment.
     x: Vec<T>,
-    /// Distance in y from the strip's smaller-y side, and its logarithm (0 for distance 0).
+    /// Distances in y from the sides of the cells' strips with smaller and larger y.
     q1: Vec<T>,
     q2: Vec<T>,
+    /// Logarithms of these distances; 0 for distance 0.
     ln_q1: Vec<T>,
     ln_q2: Vec<T>,
-    /// Per edge, at the point in work and at the one before: the three corner sums over the two y.
+    /// The three corner sums over the two y, per edge, at the present point and at the one before.
     now: [Vec<T>; 3],
     before: [Vec<T>; 3],
-    /// One row: xx, xy, yy of every edge and the next one. Those from one strip to the next mean nothing.
+    /// One row: xx, xy, yy between every edge and the next. Entries between different strips are meaningless.
     row: [Vec<T>; 3],
 }
 
@@ -63,8 +65,8 @@ impl<T: Float> CellEdges<T> {
         }
     }
 
-    /// Corner sums over the two y at every edge: `[q asinh(p/|q|)]`, `[p asinh(q/|p|)]`, `[r]`, each the value at `q1`
-    /// less that at `q2`. The differences of `asinh` are logarithms of one ratio, so nothing cancels for small strips.
+    /// Corner sums over the two y at every edge: `[q asinh(p/|q|)]`, `[p asinh(q/|p|)]`, `[r]`, each the value at `q1` minus that at `q2`. Differences of `asinh` are logarithms
+    /// of one ratio, so nothing cancels for narrow strips.
     #[inline(always)]
     fn corner_sums(&mut self, x: f64) {
         let x = T::of(x);
@@ -79,7 +81,7 @@ impl<T: Float> CellEdges<T> {
             let distance = p.abs();
             let pp = p * p;
             let (r1, r2) = ((pp + q1 * q1).sqrt(), (pp + q2 * q2).sqrt());
-            // `TINY` keeps the logarithm finite at the corner itself, where its factor is 0.
+            // `TINY` keeps the logarithm finite at the corner, where its factor is 0.
             let along1 = q1 * ((distance + r1 + T::TINY).ln() - ln_q1s[e]);
             let along2 = q2 * ((distance + r2 + T::TINY).ln() - ln_q2s[e]);
             out_a[e] = if p < T::ZERO {
@@ -88,7 +90,7 @@ impl<T: Float> CellEdges<T> {
                 along1 - along2
             };
             let (g1, g2) = (q1.abs() + r1, q2.abs() + r2);
-            // `|q| + r` is a sum of like signs, while `r − |q|` would cancel: the ratio is written without it.
+            // `|q| + r` is a sum of like signs, while `r − |q|` would cancel, so the ratio avoids it.
             let (above, below) = if q2 >= T::ZERO {
                 (g1, g2)
             } else if q1 <= T::ZERO {
@@ -101,8 +103,7 @@ impl<T: Float> CellEdges<T> {
         }
     }
 
-    /// Turns the change of the corner sums since the point before into a row. All edges at once: the cells of a strip are too few for the
-    /// machine's lanes.
+    /// Computes a row from the change of the corner sums between two points. All edges are processed together, because the cells of one strip are too few for the SIMD lanes.
     #[inline(always)]
     fn row(&mut self, nu: f64) {
         use std::f64::consts::FRAC_1_PI;
@@ -126,23 +127,23 @@ impl<T: Float> CellEdges<T> {
     }
 }
 
-/// A matrix to compute.
+/// A matrix to be computed.
 pub(crate) struct OperatorAssembly<'a> {
     pub(crate) mesh: &'a Mesh,
     pub(crate) nu: f64,
     pub(crate) folded: bool,
     /// Length of a block of a row.
     pub(crate) stride: usize,
-    pub(crate) row_length: usize,
-    /// First row of each stored segment, and one more.
+    /// First row of each stored segment, and the end of the last.
     pub(crate) first_row: &'a [usize],
 }
 
 impl OperatorAssembly<'_> {
-    /// All rows, one after the other.
+    /// Computes all rows in order.
     pub(crate) fn matrix<T: Float>(&self, monitor: &dyn Monitor) -> Result<Vec<T>, Stop> {
         let rows = self.first_row[self.first_row.len() - 1];
-        let mut matrix = vec![T::ZERO; rows * self.row_length];
+        let row_length = blocks(self.folded) * self.stride;
+        let mut matrix = vec![T::ZERO; rows * row_length];
         let mut edges = CellEdges::new(self.mesh);
         let mut points = Vec::new();
         let reversible = self.mesh.is_reversible();
@@ -161,7 +162,7 @@ impl OperatorAssembly<'_> {
                 folded: self.folded,
                 reversible,
                 stride: self.stride,
-                target: &mut matrix[place[0] * self.row_length..place[1] * self.row_length],
+                target: &mut matrix[place[0] * row_length..place[1] * row_length],
             });
         }
         Ok(matrix)
@@ -196,7 +197,7 @@ impl<T: Float> NullaryFnOnce for SegmentRows<'_, T> {
             stride,
             target,
         } = self;
-        let row_length = if folded { 6 * stride } else { 3 * stride };
+        let row_length = blocks(folded) * stride;
         // The rows between nodes of the trailing half are images of those of the leading half.
         let first = if reversible {
             (points.len() - 4) / 2
@@ -232,8 +233,8 @@ impl<T: Float> NullaryFnOnce for SegmentRows<'_, T> {
     }
 }
 
-/// Writes the row whose points are the images of those of another row on a reversible mesh. From one point to the next `u_x` of `T_x` and `u_y`
-/// of `T_y` change the other way about, the cross terms alike.
+/// Writes the row whose points are the images of those of another row of a reversible mesh. Changes of `u_x` by `T_x` and of `u_y` by `T_y` reverse their sign, cross terms do
+/// not.
 #[inline(always)]
 fn reverse<T: Float>(mesh: &Mesh, folded: bool, stride: usize, image: &[T], row: &mut [T]) {
     let (each, stored) = if folded {
@@ -251,7 +252,7 @@ fn reverse<T: Float>(mesh: &Mesh, folded: bool, stride: usize, image: &[T], row:
     }
 }
 
-/// Values in reverse order, with their signs changed where asked for.
+/// Copies values in reverse order, with their signs changed on request.
 #[inline(always)]
 fn reverse_cells<T: Float>(from: &[T], to: &mut [T], negate: bool) {
     for (target, value) in to.iter_mut().zip(from.iter().rev()) {
@@ -259,7 +260,7 @@ fn reverse_cells<T: Float>(from: &[T], to: &mut [T], negate: bool) {
     }
 }
 
-/// The first edges of the cells of a strip among all edges.
+/// The first edges of the cells of a strip in the list of all edges.
 #[inline(always)]
 fn edges_of(cells: Range<usize>, strip: usize) -> Range<usize> {
     cells.start + strip..cells.end + strip

@@ -1,6 +1,6 @@
-//! Which half of the unknowns an operator serves, and how wide its numbers are.
+//! Parity of the unknowns, and precision of an operator.
 
-/// Which part of a mirror-symmetric problem the unknowns belong to.
+/// The symmetry of the unknowns of a mirror-symmetric problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parity {
     /// T_x is the same and T_y the opposite at the mirrored cell: longitudinal creepage.
@@ -9,7 +9,7 @@ pub enum Parity {
     Lateral,
 }
 
-/// Width of the numbers of the matrix, in its computation and its products.
+/// Precision of the numbers of the matrix, in its computation and its products.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Precision {
     /// Four bytes: half the memory and twice the speed; forces move by less than 1e-5 of μN.

@@ -1,11 +1,8 @@
-//! The operator between strips: how much the surface displacement changes from one observation point of a segment
-//! to the next, per unit traction on every cell.
+//! The strip operator: the change of the surface displacement from one observation point of a segment to the next, per unit traction on every cell.
 //!
-//! Every segment with `n` cells has `n + 3` observation points in the order of x: its `n` nodes, its leading edge, and
-//! the images of its last two nodes behind that edge. Their `n + 2` consecutive differences are all that the
-//! discretisation rules need, and differences, unlike displacements, do not lose digits when they are combined.
-//! The matrix depends on the mesh and Poisson's ratio only. Tractions are in any unit, displacement differences come
-//! out in (that unit / G) × (length unit of the mesh).
+//! A segment with `n` cells has `n + 3` observation points by increasing x: its `n` nodes, its leading edge, and the images of its last two nodes behind that edge. The
+//! discretisation rules need only their `n + 2` consecutive differences. Differences, unlike displacements, do not lose digits when they are combined. The matrix
+//! depends only on the mesh and Poisson's ratio. Tractions are in an arbitrary unit; displacement differences are in (that unit / G) × (length unit of the mesh).
 
 use pulp::WithSimd;
 
@@ -17,38 +14,30 @@ use crate::monitor::{Monitor, Stop};
 use crate::numerics::simd;
 use crate::numerics::simd::LANES;
 
-/// How the matrix is laid out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum OperatorLayout {
-    /// Row `[xx | xy | yy]` over all cells.
-    Full,
-    /// Rows of the first half of the segments only, `[xx+ | xx− | xy+ | xy− | yy+ | yy−]` over the cells of that half,
-    /// where `±` adds or subtracts the influence of the mirrored cell.
-    Folded,
-}
-
-/// Displacement differences of all segments, see the module's text.
+/// Displacement differences of all segments, see the [module](self).
 #[derive(Debug, Clone)]
 pub struct StripOperator {
-    layout: OperatorLayout,
+    /// Whether only one half of a mirror-symmetric mesh is stored. The rows of a full matrix are `[xx | xy | yy]` over all cells. A folded matrix has the rows
+    /// of the first half of the segments, `[xx+ | xx− | xy+ | xy− | yy+ | yy−]` over the cells of that half, where `±` adds or subtracts the influence of the
+    /// mirrored cell.
+    folded: bool,
     /// Cells of the whole mesh.
     cells: usize,
     /// Length of a block of a row.
     stride: usize,
-    /// First row of each stored segment, and one more.
+    /// First row of each stored segment, and the end of the last.
     first_row: Vec<usize>,
-    /// First cell of each stored segment, and one more.
+    /// First cell of each stored segment, and the end of the last.
     first_cell: Vec<usize>,
     matrix: Matrix,
 }
 
-/// What a product needs beside its arguments; the caller keeps it, so that a product allocates nothing and the matrix can be
-/// shared by threads.
+/// Buffers of a product. The caller keeps them, so that a product allocates nothing and threads can share the matrix.
 #[derive(Debug, Clone, Default)]
 pub struct OperatorScratch {
     /// Tractions in single precision.
     narrow: [Vec<f32>; 2],
-    /// Tractions, then displacement differences of the two parities.
+    /// Tractions and displacement differences of the two parities.
     halves: [Vec<f64>; 2],
 }
 
@@ -101,23 +90,19 @@ impl StripOperator {
             first_row.push(first_row[first_row.len() - 1] + rows_of(segment.cells.len()));
             first_cell.push(segment.cells.end);
         }
-        let blocks = if folded { 6 } else { 3 };
         let assembly = OperatorAssembly {
             mesh,
             nu,
             folded,
             stride,
-            row_length: blocks * stride,
             first_row: &first_row,
         };
-        let matrix = Matrix::of_rows(&assembly, precision, monitor)?;
-        let layout = if folded {
-            OperatorLayout::Folded
-        } else {
-            OperatorLayout::Full
+        let matrix = match precision {
+            Precision::Single => Matrix::Single(assembly.matrix(monitor)?),
+            Precision::Double => Matrix::Double(assembly.matrix(monitor)?),
         };
         Ok(StripOperator {
-            layout,
+            folded,
             cells: mesh.cells(),
             stride,
             first_row,
@@ -136,9 +121,9 @@ impl StripOperator {
         self.first_row.len() - 1
     }
 
-    /// Is only one half of a mirror-symmetric mesh stored?
+    /// Whether only one half of a mirror-symmetric mesh is stored.
     pub fn is_folded(&self) -> bool {
-        self.layout == OperatorLayout::Folded
+        self.folded
     }
 
     /// Rows of segment `j`.
@@ -156,48 +141,47 @@ impl StripOperator {
         self.first_cell[j]..self.first_cell[j + 1]
     }
 
-    /// Number of entries that one product with the given parity touches.
+    /// Number of entries that a product with the given parity reads.
     pub fn entries(&self, parity: Option<Parity>) -> usize {
-        let blocks = match (self.layout, parity) {
-            (OperatorLayout::Full, _) => 3,
-            (OperatorLayout::Folded, None) => 6,
-            (OperatorLayout::Folded, Some(_)) => 4,
+        let blocks = match (self.folded, parity) {
+            (false, _) => 3,
+            (true, None) => 6,
+            (true, Some(_)) => 4,
         };
         blocks * self.row_count() * self.stride
     }
 
     /// Length of a vector of values per cell: the cells of the unknowns, padded with zeros.
     pub fn padded(&self, parity: Option<Parity>) -> usize {
-        match (self.layout, parity) {
-            (OperatorLayout::Folded, None) => self.cells.next_multiple_of(LANES),
+        match (self.folded, parity) {
+            (true, None) => self.cells.next_multiple_of(LANES),
             _ => self.stride,
         }
     }
 
-    /// Where a block of a row begins in the matrix.
+    /// The start of a block of a row in the matrix.
     fn place(&self, row: usize, block: usize) -> usize {
-        let blocks = if self.is_folded() { 6 } else { 3 };
-        (row * blocks + block) * self.stride
+        (row * blocks(self.folded) + block) * self.stride
     }
 
     fn stored(&self, row: usize, block: usize, cell: usize) -> f64 {
         self.matrix.at(self.place(row, block) + cell)
     }
 
-    /// The blocks that act as (xx, u_x from T_y, u_y from T_x, yy).
+    /// The blocks for (xx, u_x from T_y, u_y from T_x, yy).
     fn roles(&self, parity: Option<Parity>) -> [usize; 4] {
-        match (self.layout, parity) {
-            (OperatorLayout::Full, _) => [0, 1, 1, 2],
-            (OperatorLayout::Folded, Some(Parity::Lateral)) => [1, 2, 3, 4],
-            (OperatorLayout::Folded, _) => [0, 3, 2, 5],
+        match (self.folded, parity) {
+            (false, _) => [0, 1, 1, 2],
+            (true, Some(Parity::Lateral)) => [1, 2, 3, 4],
+            (true, _) => [0, 3, 2, 5],
         }
     }
 
-    /// Entry of the segment's own block: the change of u_x per T_x (or u_y per T_y) in row `row` of the matrix from
-    /// cell `cell`. Own blocks have no cross terms in a full matrix; in a folded one they are left out.
+    /// Entries of the self-influence block: the change of u_x per T_x and of u_y per T_y in a row of the matrix by a cell of its segment. These blocks have no cross terms in a
+    /// full matrix; in a folded one they are neglected.
     pub fn own(&self, row: usize, cell: usize, parity: Option<Parity>) -> (f64, f64) {
         if self.is_folded() && parity.is_none() {
-            // In half the sum of both parities the mirrored cell cancels: what is left is the cell's own influence.
+            // Half the sum of both parities is the influence of the cell without its mirror image.
             let half = |k: usize| 0.5 * (self.stored(row, k, cell) + self.stored(row, k + 1, cell));
             return (half(0), half(4));
         }
@@ -205,8 +189,8 @@ impl StripOperator {
         (self.stored(row, xx, cell), self.stored(row, yy, cell))
     }
 
-    /// Any entry of the matrix that [`apply`](Self::apply) stands for, as `[xx, xy, yx, yy]`: the change of u_x per T_x
-    /// and per T_y, then of u_y. Without parity, rows and cells are counted over the whole mesh.
+    /// An entry of the matrix applied by [`apply`](Self::apply), as `[xx, xy, yx, yy]`: the change of u_x per T_x and per T_y, then that of u_y. Without parity, rows and cells
+    /// are counted over the whole mesh.
     pub fn entry(&self, parity: Option<Parity>, row: usize, cell: usize) -> [f64; 4] {
         if self.is_folded() && parity.is_none() {
             return self.unfolded_entry(row, cell);
@@ -215,7 +199,7 @@ impl StripOperator {
             .map(|block| self.stored(row, block, cell))
     }
 
-    /// An entry of the whole mesh from the stored half: a mirrored row sees the mirrored cell with `T_y` turned round.
+    /// An entry of the whole mesh from the stored half. For a mirrored row, the cell is mirrored and `T_y` reversed.
     fn unfolded_entry(&self, row: usize, cell: usize) -> [f64; 4] {
         let (row, cell, side) = if row < self.row_count() {
             (row, cell, 1.0)
@@ -223,7 +207,7 @@ impl StripOperator {
             let row = mirror_image(&self.first_row, row);
             (row, mirror_image(&self.first_cell, cell), -1.0)
         };
-        // Half the sum of the two stored values belongs to the cell itself, half their difference to its mirror image.
+        // Half the sum of the two stored values belongs to the cell, half their difference to its mirror image.
         let (cell, sign) = if cell < self.first_cell[self.segments()] {
             (cell, 0.5)
         } else {
@@ -237,7 +221,7 @@ impl StripOperator {
 
     /// Displacement differences `out_x`, `out_y` (one value per row) caused by tractions `tx`, `ty`.
     ///
-    /// Without parity, vectors cover the whole mesh: rows of the mirrored half follow in the order of their segments.
+    /// Without parity, vectors cover the whole mesh; rows of the mirrored half follow in the order of their segments.
     pub fn apply(
         &self,
         parity: Option<Parity>,
@@ -255,7 +239,7 @@ impl StripOperator {
         }
     }
 
-    /// `out_x = xx tx + a ty`, `out_y = b tx + yy ty` row by row, for the blocks with these roles.
+    /// `out_x = xx tx + a ty` and `out_y = b tx + yy ty` row by row, for the blocks with these roles.
     fn product(
         &self,
         roles: [usize; 4],
@@ -266,7 +250,7 @@ impl StripOperator {
         narrow: &mut [Vec<f32>; 2],
     ) {
         let layout = RowLayout {
-            blocks: if self.is_folded() { 6 } else { 3 },
+            blocks: blocks(self.folded),
             stride: self.stride,
             roles,
         };
@@ -275,7 +259,7 @@ impl StripOperator {
             .multiply(layout, tractions, [out_x, out_y], narrow);
     }
 
-    /// Splits the tractions into their two parities, applies each part, and puts the halves together again.
+    /// Applies the operator to both parities of the tractions separately and combines the results.
     fn apply_both(
         &self,
         tx: &[f64],
@@ -286,8 +270,7 @@ impl StripOperator {
     ) {
         let (stride, rows) = (self.stride, self.row_count());
         let OperatorScratch { narrow, halves } = scratch;
-        // The parities do not mix, so that each product keeps to the stored half of the rows and cells, and no matrix
-        // of the whole mesh is needed.
+        // The parities do not mix, so each product uses only the stored half of the rows and cells.
         let [parts, sums] = halves;
         parts.resize(4 * stride, 0.0);
         sums.resize(4 * rows, 0.0);
@@ -322,7 +305,7 @@ impl StripOperator {
         self.join(uy_same, uy_opposite, out_y);
     }
 
-    /// Halves of the sum and of the difference of a cell's value and its mirror image's.
+    /// Writes half the sum and half the difference of the values of each cell and its mirror image.
     fn split(&self, values: &[f64], parts: &mut [f64]) {
         let (same, opposite) = parts.split_at_mut(self.stride);
         for j in 0..self.segments() {
@@ -342,7 +325,7 @@ impl StripOperator {
             let rows = self.segment_rows(j);
             let image = total - rows.end;
             for (k, i) in rows.enumerate() {
-                // The part of opposite parity changes its sign in the mirrored half.
+                // The part of opposite parity changes sign in the mirrored half.
                 out[i] = same[i] + opposite[i];
                 out[image + k] = same[i] - opposite[i];
             }
@@ -350,7 +333,12 @@ impl StripOperator {
     }
 }
 
-/// The place of `i` in the mirrored segment; `first` has the starts of the first half of the segments, and its end.
+/// Number of blocks of a row.
+pub(crate) fn blocks(folded: bool) -> usize {
+    if folded { 6 } else { 3 }
+}
+
+/// The place of `i` in the mirrored segment; `first` contains the starts of the first half of the segments, and the end of the last.
 fn mirror_image(first: &[usize], i: usize) -> usize {
     let half = first[first.len() - 1];
     if i < half {
@@ -370,21 +358,6 @@ pub(crate) enum Matrix {
 }
 
 impl Matrix {
-    /// Computes the rows of an operator.
-    ///
-    /// # Errors
-    /// The monitor stopped the work.
-    pub(crate) fn of_rows(
-        assembly: &OperatorAssembly,
-        precision: Precision,
-        monitor: &dyn Monitor,
-    ) -> Result<Matrix, Stop> {
-        match precision {
-            Precision::Single => assembly.matrix(monitor).map(Matrix::Single),
-            Precision::Double => assembly.matrix(monitor).map(Matrix::Double),
-        }
-    }
-
     pub(crate) fn bytes(&self) -> usize {
         match self {
             Matrix::Single(matrix) => size_of_val(&matrix[..]),
@@ -399,7 +372,7 @@ impl Matrix {
         }
     }
 
-    /// The [`Product`] of all rows with tractions along x and across, which are narrowed first where the numbers are.
+    /// The [`Product`] of all rows with tractions along x and across, which are converted to the precision of the matrix.
     pub(crate) fn multiply(
         &self,
         layout: RowLayout,
@@ -421,7 +394,7 @@ impl Matrix {
     }
 }
 
-/// The product with numbers of one width.
+/// The product with numbers of one precision.
 fn multiply<'a, T>(
     matrix: &'a [T],
     layout: RowLayout,

@@ -1,15 +1,15 @@
-//! Products of the operator between strips with tractions, in single or double precision, in the machine's lanes.
+//! Products of the strip operator with tractions, in single or double precision, in SIMD lanes.
 
 use pulp::{Simd, WithSimd};
 
-/// How the rows of a matrix are divided, and which part of a row acts as what.
+/// The division of the rows of a matrix into blocks, and the roles of the blocks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowLayout {
-    /// Blocks of a row.
+    /// Number of blocks of a row.
     pub(crate) blocks: usize,
     /// Length of a block.
     pub(crate) stride: usize,
-    /// The blocks that act as `xx, a, b, yy`.
+    /// The blocks for `xx, a, b, yy`.
     pub(crate) roles: [usize; 4],
 }
 
@@ -23,11 +23,11 @@ pub(crate) struct Product<'a, T> {
     pub(crate) out_y: &'a mut [f64],
 }
 
-/// The product for one width of numbers: four running sums per row, and two rows at once, whose sums do not wait for each other.
+/// The product for one precision, with four running sums per row and two rows at once, so that sums do not wait for each other.
 macro_rules! product {
     ($number:ty, $lanes:ident, $zero:ident, $multiply_add:ident, $add:ident, $sum:ident) => {
         impl Product<'_, $number> {
-            /// The products with as many rows of the matrix as there are results.
+            /// The products with `ROWS` rows of the matrix.
             #[inline(always)]
             fn rows<S: Simd, const ROWS: usize>(
                 &self,

@@ -1,13 +1,10 @@
-//! The loops over all cells of the conjugate gradients, in the machine's lanes.
+//! Loops over all cells of the conjugate gradients in SIMD lanes.
 
 use pulp::{Simd, WithSimd};
 
 use crate::numerics::simd;
 
-/// Arrays over cells go on to a multiple of this: no machine has more lanes.
-pub(crate) const LANES: usize = 8;
-
-/// Puts `displacement + gap` into the distances; the answer is their weighted sum over the contact, and that of the weights.
+/// Computes `g = u + h`; returns the weighted sum of g over the contact, and the sum of the weights.
 pub(crate) struct Distances<'a> {
     pub(crate) distance: &'a mut [f64],
     pub(crate) displacement: &'a [f64],
@@ -17,8 +14,8 @@ pub(crate) struct Distances<'a> {
     pub(crate) weights: &'a [f64],
 }
 
-/// Subtracts the approach from the distances; the answer is their largest violation, and in the contact the weighted sums of their squares and of
-/// their products with what the last direction displaced.
+/// Subtracts the approach from the distances; returns their largest violation, and in the contact the weighted sums of their squares and of their products with the
+/// displacement of the last direction.
 pub(crate) struct Parting<'a> {
     pub(crate) distance: &'a mut [f64],
     pub(crate) displacement: &'a [f64],
@@ -28,7 +25,7 @@ pub(crate) struct Parting<'a> {
     pub(crate) approach: f64,
 }
 
-/// The next direction: steepest descent, and a part of the direction before; 0 outside the contact.
+/// Computes the next direction: steepest descent plus a multiple of the last direction, 0 outside the contact.
 pub(crate) struct Direction<'a> {
     pub(crate) direction: &'a mut [f64],
     pub(crate) distance: &'a [f64],
@@ -38,8 +35,7 @@ pub(crate) struct Direction<'a> {
     pub(crate) factor: f64,
 }
 
-/// Sums over the contact that give the length of a step along a direction: distance times direction, displacement times direction, direction
-/// alone, weighted displacement, weights.
+/// Sums over the contact for the step length: distance times direction, displacement times direction, direction, weighted displacement, weights.
 pub(crate) struct StepSums<'a> {
     pub(crate) distance: &'a [f64],
     pub(crate) direction: &'a [f64],
@@ -49,8 +45,8 @@ pub(crate) struct StepSums<'a> {
     pub(crate) weights: &'a [f64],
 }
 
-/// Takes a step along a direction in all pressures. Those that are not in contact, or leave it, become 0, or what their overlap gives; `off` is
-/// the difference from the full step.
+/// Takes a step along a direction in all pressures. Outside the contact, and where a cell leaves it, the pressure becomes 0 or follows from the overlap; `off` is the
+/// difference from the full step.
 pub(crate) struct Advance<'a> {
     pub(crate) pressure: &'a mut [f64],
     pub(crate) off: &'a mut [f64],
@@ -61,10 +57,10 @@ pub(crate) struct Advance<'a> {
     pub(crate) step: f64,
 }
 
-/// Sum of the numbers of all cells.
+/// Sum over all cells.
 pub(crate) struct CellSum<'a>(pub(crate) &'a [f64]);
 
-/// Runs a loop in the lanes of this machine.
+/// Runs a loop in the SIMD lanes of the machine.
 pub(crate) fn run<W: WithSimd>(work: W) -> W::Output {
     simd::dispatch(work)
 }

@@ -1,30 +1,29 @@
-//! Pressure on a regular grid by conjugate gradients that never leave the contact conditions.
+//! Pressure on a regular grid by conjugate gradients whose iterates satisfy the sign conditions.
 //!
-//! The unknowns satisfy `p ≥ 0`, `g = u(p) + h − δ ≥ 0` and `p g = 0` at every cell; either the sum of p or the approach δ is
-//! prescribed (Polonsky and Keer 1999). Distances may be scaled by what a cell's own pressure displaces.
+//! The solution satisfies `p ≥ 0`, `g = u(p) + h − δ ≥ 0` and `p g = 0` at every cell; either the sum of p or the approach δ is prescribed (Polonsky and Keer 1999).
+//! Distances may be scaled by the displacement of a cell by its own pressure.
 
 use crate::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::monitor::{Monitor, Stop};
 use crate::normal::gap::cell_sums;
-use crate::normal::gap::cell_sums::{
-    Advance, CellSum, Direction, Distances, LANES, Parting, StepSums,
-};
+use crate::normal::gap::cell_sums::{Advance, CellSum, Direction, Distances, Parting, StepSums};
 use crate::normal::hertz::NormalLoad;
+use crate::numerics::simd::LANES;
 
-/// Displacements that pressures on equal cells cause.
+/// Displacements of equal cells by their pressures.
 pub(crate) trait PressureInfluence {
-    /// Up to so many changed pressures are added to the displacement one by one, which costs less than a whole product.
+    /// Largest number of changed pressures whose displacements are added one by one, which costs less than a product.
     const CHANGES_MAX: usize;
     /// Buffers of a product.
     type Workspace;
     /// Displacement in mm at every centre for pressures in MPa.
     fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut Self::Workspace);
-    /// Adds the displacement in mm for changed pressures in MPa, cell by cell; never more than `CHANGES_MAX`.
+    /// Adds the displacement in mm of at most `CHANGES_MAX` changed pressures in MPa.
     fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]);
     /// Displacement in mm/MPa of the first cell by its own pressure.
     fn own(&self) -> f64;
-    /// Displacement of the first cell by its own pressure relative to that of each, for a multiple of [`LANES`] cells: distances times this are
-    /// the direction of steepest descent.
+    /// The displacement of the first cell by its own pressure over that of each cell, for a multiple of [`LANES`] cells. Distances times these weights are the direction
+    /// of steepest descent.
     fn weights(&self, cells: usize) -> Vec<f64>;
 }
 
@@ -49,10 +48,10 @@ impl PressureInfluence for GridOperator {
     }
 }
 
-/// Iterations after which something is wrong: smooth gaps take 10 to 30, rough ones up to about 100.
+/// Largest number of iterations. Smooth gaps take 10 to 30, rough ones up to about 100.
 const ITERATIONS_MAX: u32 = 500;
 
-/// Pressures, distances and approach of two bodies pressed together, and how well they meet the contact conditions.
+/// The solution for two bodies pressed together, and its residual.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PressureAnswer {
     /// Pressure of every cell in MPa.
@@ -63,8 +62,7 @@ pub(crate) struct PressureAnswer {
     pub(crate) approach: f64,
     /// Iterations done.
     pub(crate) iterations: u32,
-    /// Largest violation of the contact conditions: |g| in contact, −g outside, relative to the deepest overlap of the
-    /// undeformed surfaces.
+    /// Largest violation of the contact conditions (|g| in contact, −g outside), relative to the deepest overlap of the undeformed surfaces.
     pub(crate) residual: f64,
 }
 
@@ -75,16 +73,16 @@ impl PressureAnswer {
     }
 }
 
-/// Why there is no pressure.
+/// The reason why there is no pressure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum PressureFailure {
-    /// The iteration ended, with this least residual.
+    /// The iteration did not converge; the least residual.
     NotConverged(f64),
-    /// The caller stopped the work.
+    /// The monitor stopped the work.
     Stopped(Stop),
 }
 
-/// What is asked of the pressure on a grid.
+/// The problem on a grid.
 pub(crate) struct PressureTask<'a> {
     /// Gap of the undeformed surfaces at every cell in mm.
     pub(crate) gap: &'a [f64],
@@ -97,7 +95,7 @@ pub(crate) struct PressureTask<'a> {
 
 /// Solves for the pressure under which the surfaces touch.
 ///
-/// `start` is any pressure that is not 0 everywhere; it decides the number of iterations only.
+/// `start` is any pressure that is not 0 everywhere. It only affects the number of iterations.
 pub(crate) fn solve_pressure<I: PressureInfluence>(
     task: &PressureTask,
     influence: &I,
@@ -140,7 +138,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
                 residual,
             });
         }
-        // Conjugate to the last direction, whichever cells came into contact or left it since; 0 before the first step.
+        // Conjugate to the last direction, although cells may have come into contact or left it; 0 in the first step.
         let factor = (-along / below).max(0.0);
         let step;
         [step, below] = work.step_after(factor, n, influence, loading, workspace);
@@ -162,7 +160,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
     Err(PressureFailure::NotConverged(least_residual))
 }
 
-/// What changes from iteration to iteration; all cells, and a few more without pressure up to a multiple of [`LANES`].
+/// The vectors of the iteration over all cells, padded without pressure to a multiple of [`LANES`].
 struct PressureIterate {
     /// Gap of the undeformed surfaces.
     h: Vec<f64>,
@@ -185,7 +183,7 @@ impl PressureIterate {
     fn new(gap: &[f64], mut start: Vec<f64>, weights: Vec<f64>) -> PressureIterate {
         let padded = gap.len().next_multiple_of(LANES);
         let mut h = gap.to_vec();
-        // The surfaces never meet there.
+        // Padding never touches.
         h.resize(padded, f64::INFINITY);
         start.resize(padded, 0.0);
         let zeros = || vec![0.0; padded];
@@ -212,7 +210,7 @@ impl PressureIterate {
         scale
     }
 
-    /// Puts `u + h` into the distances and returns the approach δ; with a force it makes the mean over the contact 0.
+    /// Computes `g = u + h` and returns the approach δ; with a force it is the weighted mean of g over the contact.
     fn distances(&mut self, loading: NormalLoad) -> f64 {
         let [sum, count] = cell_sums::run(Distances {
             distance: &mut self.g,
@@ -227,8 +225,8 @@ impl PressureIterate {
         }
     }
 
-    /// Subtracts the approach from the distances; returns their largest violation and the sums of their squares and of their products with the
-    /// displacement of the last direction, in the contact.
+    /// Subtracts the approach from the distances. Returns their largest violation, and in the contact the weighted sums of their squares and of their products with the
+    /// displacement of the last direction.
     fn part_from(&mut self, approach: f64) -> [f64; 3] {
         cell_sums::run(Parting {
             distance: &mut self.g,
@@ -249,9 +247,9 @@ impl PressureIterate {
         });
     }
 
-    /// Chooses the direction and what it displaces; returns the length of the step along it, and what the direction displaces times itself.
+    /// Chooses the direction and computes its displacement. Returns the step length and the curvature `tᵀAt` along the direction.
     ///
-    /// Cells that left the contact turn the conjugate direction. If it no longer lowers the energy, steepest descent takes its place.
+    /// Cells that left the contact change the conjugate direction. If it no longer lowers the energy, steepest descent replaces it.
     fn step_after<I: PressureInfluence>(
         &mut self,
         factor: f64,
@@ -270,11 +268,11 @@ impl PressureIterate {
                 break;
             }
         }
-        // A single cell under a force leaves nothing to minimise; a step by its own stiffness lets other cells in.
+        // A single cell under a force has nothing to minimise. A step with its own stiffness brings other cells into contact.
         [1.0 / influence.own(), f64::INFINITY]
     }
 
-    /// Length of the step that leaves no distance along the direction, and the product of the direction with what it displaces, if the direction lowers the energy.
+    /// The step length and the curvature along the direction, if the direction lowers the energy.
     fn step(&self, loading: NormalLoad) -> Option<[f64; 2]> {
         let [above, product, along, sum, count] = cell_sums::run(StepSums {
             distance: &self.g,
@@ -290,7 +288,7 @@ impl PressureIterate {
         (below > 0.0 && above > 0.0).then(|| [above / below, below])
     }
 
-    /// Takes the step, and records the cells whose pressure had to be changed otherwise.
+    /// Takes the step and records the cells whose pressure differs from the full step.
     fn advance(&mut self, step: f64) {
         cell_sums::run(Advance {
             pressure: &mut self.p,
@@ -302,7 +300,7 @@ impl PressureIterate {
         });
         self.changes.clear();
         for (block, off) in self.off.chunks(LANES).enumerate() {
-            // Nearly all blocks have none.
+            // Nearly all blocks are 0.
             if off.iter().fold(0, |bits, off| bits | off.to_bits()) == 0 {
                 continue;
             }

@@ -1,19 +1,10 @@
-//! Grids of equal rectangles over a box of the contact plane: where they are in contact, and which grid should follow.
+//! Grids of equal rectangles over the contact plane, their refinement criteria, and the types of a solution of a gap.
 //!
-//! Tuned numbers of the gap solver: how fine its grids are, and when they are fine enough.
-//!
-//! Errors at these numbers are those of `tests/physics/gap_hertz.rs` and `gap_reference.rs`; `cargo bench --bench gaps` prints times and
-//! errors of the reference gaps. Where no sensitivity is given it was not measured.
-//!
-//! The contact of a gap, or the reason why there is none.
-//!
-//! A grid of the normal problem with its pressure.
-//!
-//! Pressures near the edge of the contact, corrected for the steps of the grid.
+//! Errors with the constants below are those of `tests/physics/gap_hertz.rs` and `gap_reference.rs`; `cargo bench --bench gaps` prints times and errors of the
+//! reference gaps.
 
 use std::f64::consts::PI;
 
-use crate::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::monitor::Stop;
 use crate::normal::gap::conjugate_gradients;
 use crate::normal::gap::conjugate_gradients::PressureAnswer;
@@ -23,13 +14,13 @@ use crate::normal::pressure_field::field::PressureField;
 use crate::numerics::flood_fill::groups;
 use crate::remark::entry::RemarkEntry;
 
-/// Most cells along either axis.
+/// Largest number of cells along an axis.
 const CELLS_MAX: usize = 200;
-/// A box that turned out too small grows by this fraction of its length. 0.12 and 0.5 give the same
-/// results with as many iterations on the 100 gaps of `cargo bench --bench calibrate gap`, whose boxes are large enough.
+/// Part of its length by which a box grows that is too small. 0.12 and 0.5 give the same results with as many iterations on the 100 gaps of
+/// `cargo bench --bench calibrate gap`, whose boxes are large enough.
 const GROWTH: f64 = 0.25;
 
-/// Cells of a box; cell (i, j) is stored at `j * cells[0] + i`.
+/// The cells of a box. Cell (i, j) is stored at `j * cells[0] + i`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PressureGrid {
     /// Middle of the box in mm.
@@ -38,7 +29,7 @@ pub(crate) struct PressureGrid {
     pub(crate) step: [f64; 2],
     /// Number of cells along x and y.
     pub(crate) cells: [usize; 2],
-    /// The gap is its own mirror image about x = 0 or y = 0, and so is the grid.
+    /// Whether the gap, and the grid with it, is mirror-symmetric about x = 0 and about y = 0.
     pub(crate) mirrored: [bool; 2],
 }
 
@@ -46,40 +37,39 @@ pub(crate) struct PressureGrid {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct GridSide {
     axis: usize,
-    /// The end of larger coordinates.
+    /// Whether the side is that of the larger coordinate.
     upper: bool,
 }
 
-/// How fine the next grid should be, and where.
+/// Place and resolution of the next grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct NextGrid {
     pub(crate) window: Window,
     pub(crate) cells: [usize; 2],
-    /// So many cells along each axis would resolve it.
+    /// Numbers of cells along each axis that would resolve the contact.
     pub(crate) needed: [usize; 2],
-    /// More cells were wanted than a grid may have: some patch will be too coarse.
+    /// Whether more cells are needed than a grid may have, so that a patch will be too coarse.
     pub(crate) capped: bool,
 }
 
-/// Numbers of cells that are wanted across the contact and its patches.
+/// Required numbers of cells across the contact and its patches.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GridFineness {
-    /// Cells of the first grid along either axis, which finds the box of the contact.
+    /// Cells of the first grid along either axis; it locates the contact.
     pub(crate) first: usize,
-    /// Across everything in contact.
+    /// Cells across the whole contact.
     pub(crate) contact: f64,
-    /// Across the smallest patch that counts.
+    /// Cells across the smallest patch that counts.
     pub(crate) patch: f64,
-    /// Patches that carry a smaller fraction of the load do not count.
-    pub(crate) share_min: f64,
-    /// The result is compared with that of the grid before.
+
+    /// Whether the result is compared with that of the previous grid.
     pub(crate) settles: bool,
-    /// Violation of the contact conditions relative to the deepest overlap that ends the iteration on all grids but the first.
+    /// Violation of the contact conditions, relative to the deepest overlap, that ends the iteration on all grids but the first.
     pub(crate) tolerance: f64,
 }
 
 impl GridSide {
-    /// The side in words, with its coordinate in the limits of the data.
+    /// The name of the side, with its coordinate in the limits of the data.
     pub(crate) fn place(self, limits: Window) -> String {
         let name = ["x", "y"][self.axis];
         format!("{name} = {} mm", limits[self.axis][usize::from(self.upper)])
@@ -87,8 +77,7 @@ impl GridSide {
 }
 
 impl PressureGrid {
-    /// The grid of so many cells (at most 200 along either axis) over a window; made symmetric about
-    /// x = 0 and y = 0 where `mirrored`.
+    /// A grid over a window, with 4 to 200 cells along either axis, which is symmetric about x = 0 and y = 0 where `mirrored`.
     pub(crate) fn new(window: Window, cells: [usize; 2], mirrored: [bool; 2]) -> PressureGrid {
         let cells = cells.map(|n| n.clamp(4, CELLS_MAX));
         let mut middle = window.map(|[low, high]| 0.5 * (low + high));
@@ -108,7 +97,7 @@ impl PressureGrid {
     /// Coordinates of the centres along an axis.
     pub(crate) fn centres(&self, axis: usize) -> Vec<f64> {
         let n = self.cells[axis] as f64;
-        // Written so that a middle of 0 gives exact mirror images.
+        // This form gives exact mirror images for a middle of 0.
         (0..self.cells[axis])
             .map(|i| self.middle[axis] + (i as f64 + 0.5 - 0.5 * n) * self.step[axis])
             .collect()
@@ -128,15 +117,6 @@ impl PressureGrid {
         })
     }
 
-    /// The influence of the cells on each other, in single precision, which is enough for the tolerances of the contact conditions.
-    pub(crate) fn influence(
-        &self,
-        contact_modulus: f64,
-        workspace: &mut GridWorkspace,
-    ) -> GridOperator {
-        GridOperator::new(self.cells, self.step, contact_modulus, workspace)
-    }
-
     /// The gap at the centres.
     pub(crate) fn gap(&self, gap: &GapSurface) -> Vec<f64> {
         let mut values = gap.on(&self.centres(0), &self.centres(1));
@@ -154,7 +134,7 @@ impl PressureGrid {
         }
     }
 
-    /// Cells with their mirror images: first those about x = 0, then those about y = 0.
+    /// Pairs of cells and their mirror images, first about x = 0, then about y = 0.
     fn images(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
         let ([width, rows], [along, across]) = (self.cells, self.mirrored);
         let half = if along { width / 2 } else { 0 };
@@ -167,7 +147,7 @@ impl PressureGrid {
         about_x.chain(about_y)
     }
 
-    /// A pressure to start from: Hertz's law over the region that overlaps by more than half of the approach.
+    /// A first pressure: Hertz's law over the region that overlaps by more than half of the approach.
     pub(crate) fn first_pressure(&self, gap: &[f64], reach: &SearchBox, modulus: f64) -> Vec<f64> {
         let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
         let depth = (reach.level - least).max(1e-3 * (reach.level - reach.least));
@@ -178,8 +158,8 @@ impl PressureGrid {
         gap.iter().map(|h| largest * part(h).sqrt()).collect()
     }
 
-    /// Pressures of another grid at the centres of this one: the root of their squares, which fall linearly to 0 at the
-    /// edge and are continued beyond it, interpolated bilinearly. If they are 0 everywhere, the largest one at the deepest cell.
+    /// Interpolates pressures of another grid. Their squares, which fall linearly to 0 at the edge and are continued beyond it, are interpolated bilinearly. If all
+    /// results are 0, the deepest cell gets the largest pressure.
     pub(crate) fn interpolate(
         &self,
         other: &PressureGrid,
@@ -237,13 +217,13 @@ impl PressureGrid {
         sides.into_iter().filter(touches).collect()
     }
 
-    /// Does this side lie at the limit of the data?
+    /// Whether a side lies at the limit of the data.
     pub(crate) fn ends_at(&self, side: GridSide, limits: Window) -> bool {
         let end = usize::from(side.upper);
         (self.range(side.axis)[end] - limits[side.axis][end]).abs() < 0.5 * self.step[side.axis]
     }
 
-    /// A grid that reaches farther out on some sides, with cells of about the same size.
+    /// A grid that reaches farther on some sides, with cells of about the same size.
     pub(crate) fn enlarged(&self, sides: &[GridSide], limits: Window) -> PressureGrid {
         let mut window = [self.range(0), self.range(1)];
         for side in sides {
@@ -259,7 +239,7 @@ impl PressureGrid {
         PressureGrid::new(window, cells, self.mirrored)
     }
 
-    /// The box around all cells that touch or nearly do (closer than `near`), and the cells that resolve what is in it.
+    /// The box around all cells that touch or are closer than `near`, and the cells that resolve its contents.
     pub(crate) fn wanted(
         &self,
         pressed: &PressureAnswer,
@@ -282,7 +262,7 @@ impl PressureGrid {
             let extent = self.extent(&patch);
             contact.join(extent);
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
-            if load >= resolution.share_min * total {
+            if load >= SHARE_MIN * total {
                 for (k, step) in steps.iter_mut().enumerate() {
                     *step = step.min(extent.length(k) * self.step[k] / resolution.patch);
                 }
@@ -309,7 +289,7 @@ impl PressureGrid {
         }
     }
 
-    /// Cells along either axis from the first to the last of some.
+    /// Numbers of cells along both axes from the first to the last of some cells.
     pub(crate) fn extent_of(&self, cells: &[usize]) -> [f64; 2] {
         let extent = self.extent(cells);
         [0, 1].map(|k| extent.length(k))
@@ -324,7 +304,7 @@ impl PressureGrid {
         })
     }
 
-    /// The range of some cells, which ascend.
+    /// The range of some cells in ascending order.
     fn extent(&self, cells: &[usize]) -> Extent {
         let width = self.cells[0];
         let mut extent = Extent::default();
@@ -338,7 +318,7 @@ impl PressureGrid {
         extent
     }
 
-    /// Cells in contact, patch by patch; cells hang together over edges and corners.
+    /// Cells in contact, patch by patch. Cells are connected over edges and corners.
     pub(crate) fn patches(&self, pressure: &[f64]) -> Vec<Vec<usize>> {
         groups(self.cells, |cell| pressure[cell] > 0.0)
     }
@@ -367,7 +347,7 @@ impl Extent {
         }
     }
 
-    /// Cells from the first to the last.
+    /// Number of cells from the first to the last.
     fn length(&self, axis: usize) -> f64 {
         let [first, last] = self.0[axis];
         (last + 1).saturating_sub(first) as f64
@@ -384,57 +364,56 @@ pub(crate) fn within(window: Window, limits: Window) -> Window {
     })
 }
 
-/// Fewest cells across the contact, and across every patch with the given share of the load, on the last grid: with 44 cells the error of
-/// the resultants is below 0.0007 in nine of ten gaps (see `REGION` of the rolling constants).
+/// Part of the load below which a patch need not be resolved.
+pub(crate) const SHARE_MIN: f64 = 0.02;
+
+/// Resolution of the last grid. With 44 cells across the contact the error of the resultants is below 0.0007 for nine of ten gaps (see `REGION` of
+/// `error_estimate.rs`).
 pub(crate) const RESOLUTION: GridFineness = GridFineness {
     first: 32,
     contact: 44.0,
     patch: 24.0,
-    share_min: 0.02,
+
     settles: true,
     tolerance: 2e-4,
 };
 
-/// Below this target of the resultants' error (relative to μN) grids are finer: the error of a normal problem falls with the
-/// power 3/2 of its cells' size.
+/// Target of the error of the resultants, relative to μN, below which grids are finer.
 pub(crate) const TARGET_USUAL: f64 = 0.002;
 
-/// Power of the target over [`TARGET_USUAL`] by which the cells grow: the inverse of that 3/2.
+/// Power of the target over [`TARGET_USUAL`] with which cells grow: the error falls with the power 3/2 of their size.
 pub(crate) const TARGET_POWER: f64 = -2.0 / 3.0;
 
-/// Between these targets patches have fewer cells, the looser the target: that of a case that gives none still has all.
+/// Targets between which patches have fewer cells, the looser the target. The default target has all cells.
 pub(crate) const TARGETS_LOOSE: [f64; 2] = [0.005, 0.02];
 
-/// Power of the target by which they fall: 25 cells at 0.02. At that target gaps take two thirds of the time that they
-/// take with all cells; .97 and .95 of them are covered, .985 and .99 with all cells
-/// (`cargo bench --bench calibrate gap profiles`).
+/// Power of the target with which the number of cells then falls, to 25 cells at 0.02. At that target gaps take two thirds of the time; .97 and .95 of them are
+/// covered, instead of .985 and .99 with all cells (`cargo bench --bench calibrate gap profiles`).
 pub(crate) const LOOSE_POWER: f64 = -0.4;
 
-/// A grid is fine enough if the cells that are wanted are no smaller than this times its own.
+/// Ratio of the wanted to the present size of cells from which a grid is fine enough.
 pub(crate) const COARSER_MAX: f64 = 0.8;
 
-/// A gap is solved on finer grids until the approach changes by no more than this, relative to the depth of overlap and times the ratio
-/// of the cells' sizes.
+/// Change of the approach between grids at which a gap is resolved, relative to the depth of overlap and to the ratio of the sizes of cells.
 pub(crate) const APPROACH_CHANGE: f64 = 0.002;
 
-/// The same for the largest pressure.
+/// Relative change of the largest pressure between grids at which a gap is resolved, relative to the ratio of the sizes of cells.
 pub(crate) const PRESSURE_CHANGE: f64 = 0.015;
 
-/// Ratio of the cells along an axis from one such grid to the next.
+/// Ratio of the numbers of cells along an axis of successive grids while the gap is not resolved.
 pub(crate) const REFINEMENT: f64 = 1.6;
 
-/// Violation of the contact conditions relative to the deepest overlap that ends the iteration on the first grid, which only finds the
-/// box.
+/// Violation of the contact conditions, relative to the deepest overlap, that ends the iteration on the first grid.
 pub(crate) const TOLERANCE_FIRST: f64 = 2e-3;
 
-/// Most grids that are tried; each is larger, shifted or finer than the one before. Numeric safety.
+/// Largest number of grids.
 pub(crate) const GRIDS_MAX: usize = 12;
 
-/// Where the approach found is beyond the level that a box was made for, the next box is made for the approach and this part of the depth of
-/// overlap more. Chosen by judgement; the box grows again where it is not enough.
+/// If the approach exceeds the level of a box, the next box is made for the approach plus this part of the depth of overlap. Chosen by judgement; the box grows again
+/// if it is not enough.
 pub(crate) const LEVEL_BEYOND: f64 = 0.2;
 
-/// Cells outside the contact that nearly touch, relative to the deepest overlap, belong to the next grid.
+/// Gap of a deformed surface over the deepest overlap below which a cell is part of the next grid.
 pub(crate) const NEAR: f64 = 0.03;
 
 /// The contact of a gap.
@@ -442,29 +421,29 @@ pub(crate) const NEAR: f64 = 0.03;
 pub struct NormalAnswer {
     /// Region and pressure.
     pub field: PressureField,
-    /// How it was found.
+    /// How it was solved.
     pub report: NormalWork,
     /// Remarks for the answer.
     pub remarks: Vec<RemarkEntry>,
 }
 
-/// How a normal problem was solved.
+/// Report of a normal problem.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NormalWork {
-    /// Cells of the last grid along x and y, of the one that carries most if there are several.
+    /// Cells of the last grid along x and y; of the one with the largest load if there are several.
     pub cells: [usize; 2],
-    /// Grids: 1, or one per patch where patches differ much in size.
+    /// Number of final grids: 1, or one per patch if patches differ much in size.
     pub grids: usize,
     /// Iterations over all grids.
     pub iterations: u32,
-    /// Largest violation of the contact conditions on the last grid, relative to the deepest overlap of the undeformed
-    /// surfaces: distance in the contact, overlap outside.
+    /// Largest violation of the contact conditions on the last grid (distance in the contact, overlap outside), relative to the deepest overlap of the undeformed
+    /// surfaces.
     pub residual: f64,
-    /// Largest pressure on the last grid but one, relative to that on the last, less 1; 0 if there was only one grid.
+    /// Ratio of the largest pressure on the last grid but one to that on the last, minus 1; 0 with one grid.
     pub pressure_change: f64,
 }
 
-/// Why a normal problem has no answer.
+/// The reason why a normal problem has no solution.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NormalError {
     /// A reason, as a sentence.
@@ -499,7 +478,7 @@ pub(crate) fn edge_reached(side: GridSide, limits: Window) -> NormalError {
     ))
 }
 
-/// A grid with its part of the solution: distances and pressures are its own, the rest is common to all grids.
+/// A grid with its distances and pressures, under the approach of all grids.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PatchGrid {
     pub(crate) grid: PressureGrid,
@@ -520,7 +499,7 @@ impl PatchGrid {
         PatchGrid { grid, pressed }
     }
 
-    /// Load over the area of a cell of 1 mm².
+    /// The load in N.
     pub(crate) fn load(&self) -> f64 {
         self.pressed.pressure.iter().sum::<f64>() * self.grid.step[0] * self.grid.step[1]
     }
@@ -530,31 +509,31 @@ impl PatchGrid {
     }
 }
 
-/// How the refinement of the grids of a gap ended.
+/// The end of the refinement of the grids of a gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum GridsExit {
     /// Finer grids no longer change the result.
     Settled,
-    /// The result still changes on the finest grid allowed.
+    /// The result still changes on the finest grid.
     Rough,
-    /// The number of grids that may be tried was used up.
+    /// The largest number of grids was reached.
     GridsUsedUp,
 }
 
 impl GridsExit {
-    /// Is the result that of the gap, rather than of the grid?
+    /// Whether the result is independent of the grid.
     pub(crate) fn settled(self) -> bool {
         self == GridsExit::Settled
     }
 }
 
-/// Pressures on the last grids.
+/// The solution on the last grids.
 pub(crate) struct GapOutcome {
     /// The grids with their pressures: one, or one per patch.
     pub(crate) patch_grids: Vec<PatchGrid>,
     /// Iterations over all grids.
     pub(crate) iterations: u32,
-    /// How the refinement of the grids ended.
+    /// The end of the refinement.
     pub(crate) exit: GridsExit,
     /// See [`NormalWork`].
     pub(crate) pressure_change: f64,
@@ -562,12 +541,10 @@ pub(crate) struct GapOutcome {
     pub(crate) least: f64,
 }
 
-/// How far outward a piecewise constant pressure places the edge of the contact: `(distance, displacement)`, where the distance is that
-/// from the edge as pressure and gradient give it. Both are in cells along the normal.
+/// Outward displacement of the edge of the contact by a piecewise constant pressure: `(distance, displacement)` in cells along the normal.
 ///
-/// Near an edge the square of the pressure falls linearly, so that a pressure and its gradient tell the distance of the
-/// edge. Measured on Hertz's contact (a/b 0.25 to 1.4, 20 to 42 cells across, all positions and directions of the edge);
-/// the scatter is 0.02 up to a distance of 1.2, then 0.005 and less.
+/// Near an edge the square of the pressure falls linearly, so the distance from the edge follows from pressure and gradient. Measured on Hertz's contact (a/b 0.25 to 1.4,
+/// 20 to 42 cells across, all positions and directions of the edge); the scatter is 0.02 up to a distance of 1.2, and 0.005 or less beyond.
 const DISPLACEMENT: [(f64, f64); 18] = [
     (0.00, 0.090),
     (0.05, 0.020),
@@ -589,8 +566,8 @@ const DISPLACEMENT: [(f64, f64); 18] = [
     (4.00, 0.007),
 ];
 
-/// The squared pressures as they would be without the grid: moved back by [`DISPLACEMENT`], so that they vanish at the edge. Cells
-/// without pressure keep 0; others become negative where the edge excludes their centre.
+/// The squared pressures corrected for the grid: moved back by [`DISPLACEMENT`], so that they vanish at the edge. Cells without pressure keep 0; others become negative if
+/// the edge excludes their centre.
 ///
 /// `pressure` belongs to a grid with `nx` cells along x.
 pub(crate) fn squares(nx: usize, pressure: &[f64]) -> Vec<f64> {
@@ -615,8 +592,8 @@ pub(crate) fn squares(nx: usize, pressure: &[f64]) -> Vec<f64> {
     moved
 }
 
-/// Change per cell at cell `i` of a line of `n`, from cells in contact only; a cell at the edge takes that between its
-/// two inner neighbours, as its own value is not sound.
+/// Change per cell at cell `i` of a line of `n`, from cells in contact only. At the edge, where the value of a cell is inaccurate, it is that between the two inner
+/// neighbours.
 #[inline]
 fn slope(i: usize, n: usize, square: impl Fn(usize) -> f64) -> f64 {
     let before = if i > 0 { square(i - 1) } else { 0.0 };
@@ -643,8 +620,8 @@ fn displacement(distance: f64) -> f64 {
     y0 + (y1 - y0) * (distance - x0) / (x1 - x0)
 }
 
-/// The squares, continued below 0 in the cells next to the contact: the mean over all eight directions of the extrapolation from two
-/// cells inside in a row, or of the negative of one cell where there is only one.
+/// Continues the squares below 0 in the cells next to the contact: the mean over all eight directions of the extrapolation from two cells inside in a row, or the negative
+/// of one cell if there is only one.
 pub(crate) fn continued(nx: usize, squares: Vec<f64>) -> Vec<f64> {
     let ny = squares.len() / nx;
     let value = |i: isize, j: isize| {
@@ -669,7 +646,7 @@ pub(crate) fn continued(nx: usize, squares: Vec<f64>) -> Vec<f64> {
     };
     let mut out = squares.clone();
     let row_of = |j: usize| squares[j * nx..(j + 1) * nx].iter();
-    // Cells of a row of the contact, the first and the last one, and those of the rows around it.
+    // The first and the last cell in contact of every row.
     let ends: Vec<Option<[usize; 2]>> = (0..ny)
         .map(|j| {
             let first = row_of(j).position(|square| *square > 0.0)?;

@@ -1,7 +1,7 @@
-//! The answer of a gap: pressures of the last grids as a field, and remarks on them.
+//! The solution of a gap: a pressure field from the last grids, and remarks.
 
 use crate::normal::gap::grid::{
-    GapOutcome, NormalAnswer, NormalError, NormalWork, PatchGrid, squares,
+    GapOutcome, NormalAnswer, NormalError, NormalWork, PatchGrid, SHARE_MIN, squares,
 };
 use crate::normal::gap::task::GapTask;
 use crate::normal::pressure_field::field::PressureField;
@@ -9,28 +9,26 @@ use crate::normal::pressure_field::grid_pressure::GridPressure;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 
-/// Half of a side of a patch over the radius in its direction from which on half-spaces are a poor likeness of the bodies. A judgement, not a
-/// measurement.
+/// Ratio of a half-width of a patch to the radius in its direction above which half-spaces are poor approximations of the bodies. Chosen by judgement.
 pub(crate) const HALF_WIDTH_USUAL_MAX: f64 = 0.3;
-/// Approach over the smaller half width from which on strains are too large for linear elasticity. A judgement, not a measurement.
+/// Ratio of the approach to the smaller half-width above which strains are too large for linear elasticity. Chosen by judgement.
 pub(crate) const APPROACH_USUAL_MAX: f64 = 0.15;
-/// A patch with less than this fraction of the load need not be resolved.
-const SHARE_MIN: f64 = 0.02;
-/// Fewest cells across a patch that is resolved: Hertz's width and pressure then come out within 1 %.
+
+/// Least number of cells across a resolved patch. The width and pressure of Hertz's contact are then accurate to 1 %.
 const CELLS_ACROSS_MIN: f64 = 11.0;
 
-/// A patch with too few cells.
+/// An unresolved patch.
 struct Coarse {
-    /// Position of the highest temperature, `[x, y]` in mm.
+    /// Middle `[x, y]` of the patch in mm.
     middle: [f64; 2],
-    /// Cells across its narrower side.
+    /// Number of cells across its narrower side.
     cells: f64,
     /// Its part of the load.
     share: f64,
 }
 
 impl GapTask {
-    /// Field, report and remarks.
+    /// The field, report and remarks of a solution.
     pub(crate) fn found(&self, outcome: GapOutcome) -> Result<NormalAnswer, NormalError> {
         let loads = outcome.patch_grids.iter().map(PatchGrid::load);
         let heaviest = loads
@@ -76,7 +74,7 @@ impl GapTask {
         })
     }
 
-    /// Remarks on contacts for which a half-space is a poor likeness of the bodies; the patch that carries most decides.
+    /// Remarks on contacts for which half-spaces are poor approximations, from the patch with the largest load.
     fn remarks(&self, field: &PressureField, depth: f64) -> Vec<RemarkEntry> {
         let patches = field.patches();
         let heaviest = patches
@@ -109,7 +107,7 @@ impl GapTask {
     }
 }
 
-/// Patches that should be resolved and are not, the heaviest first.
+/// Unresolved patches that should be resolved, by descending load.
 fn coarse(patch_grids: &[PatchGrid]) -> Vec<Coarse> {
     let total: f64 = patch_grids.iter().map(PatchGrid::load).sum();
     let mut found = Vec::new();

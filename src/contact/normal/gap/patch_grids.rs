@@ -1,8 +1,7 @@
-//! One grid per patch, where one grid for all patches would be too coarse for some of them.
+//! One grid per patch, if one grid for all patches is too coarse for some of them.
 //!
-//! Patches are taken from a solution on one grid. Each gets a grid of its own, sized by its own width, and patches whose boxes
-//! overlap share one. Every patch is solved at the approach of all in the gap that the loads of the others open; loads and approach
-//! follow in rounds.
+//! The patches come from a solution on one grid. Each gets a grid adapted to its own width; patches whose boxes overlap share one. Every patch is solved at the
+//! common approach, in the gap opened by the loads of the others. Loads and approach are iterated.
 
 use crate::half_space::grid_operator::GridWorkspace;
 use crate::monitor::Monitor;
@@ -11,23 +10,23 @@ use crate::normal::gap::grid::{
     within,
 };
 use crate::normal::gap::surface::{GapSurface, Window};
-use crate::normal::gap::task::{GapTask, PreviewCache, SearchBox};
+use crate::normal::gap::task::{GapTask, SearchBox};
 use crate::normal::hertz::NormalLoad;
 
-/// More patches than this are not solved one by one: such a gap is rough.
+/// Largest number of patches with their own grids; a gap with more patches is rough.
 const PATCHES_MAX: usize = 6;
-/// Change of the load of a patch from round to round, relative to the load of all, that ends the rounds.
+/// Change of the load of a patch per round, relative to the total load, that ends the iteration.
 const LOAD_CHANGE: f64 = 1e-4;
-/// Samples along either axis of the gap that the loads of other patches open over a grid.
+/// Number of samples along either axis of the gap opened by the loads of other patches.
 const SAMPLES: usize = 12;
-/// Cells along either axis of a grid around a patch that was not seen before.
+/// Number of cells along either axis of a grid around a patch that was not found before.
 const CELLS_UNSEEN: usize = 24;
 
 /// A force `[x, y, N]`.
 type PointLoad = [f64; 3];
 
 impl GapTask {
-    /// Goes on from a solution on one grid with one grid per patch; none if there is only one patch, or too many.
+    /// Solves with one grid per patch, starting from a solution on one grid. `None` if there is only one patch, or too many.
     pub(crate) fn patch_by_patch(
         &self,
         whole: &PatchGrid,
@@ -60,7 +59,6 @@ impl GapTask {
                     gap: self.opened(&grid, &others),
                     loading: NormalLoad::Approach(approach),
                     contact_modulus: self.contact_modulus,
-                    seen: PreviewCache::default(),
                 };
                 let gap = grid.gap(&task.gap);
                 let deepest = gap.iter().copied().fold(f64::INFINITY, f64::min);
@@ -88,12 +86,12 @@ impl GapTask {
                 let load = patch_grids[patch_grids.len() - 1].load();
                 let before: f64 = own.iter().map(|[.., force]| force).sum();
                 change = change.max((load - before).abs());
-                // That of Hertz's contact.
+                // The stiffness of Hertz's contact.
                 stiffness += 1.5 * load / (approach - deepest);
             }
             found.patch_grids = patch_grids;
             grids = found.patch_grids.iter().map(|at| at.grid.clone()).collect();
-            // Later rounds change loads by little.
+            // Later rounds change the loads only slightly.
             fineness = fineness.alone();
             let total: f64 = found.patch_grids.iter().map(PatchGrid::load).sum();
             let mut missed = 0.0;
@@ -122,7 +120,7 @@ impl GapTask {
         Ok(Some(found))
     }
 
-    /// The gap over a grid and around it with what point loads elsewhere open.
+    /// The gap over and around a grid, including the gap opened by point loads elsewhere.
     fn opened(&self, grid: &PressureGrid, loads: &[&PointLoad]) -> GapSurface {
         let limits = self.gap.window();
         let axis = |k: usize| -> Vec<f64> {
@@ -144,14 +142,13 @@ impl GapTask {
         self.gap.changed(&x, &y, &rows)
     }
 
-    /// Displacement of a place by point loads in mm.
+    /// Displacement in mm of a place by point loads.
     fn displaced<'a>(&self, [x, y]: [f64; 2], loads: impl Iterator<Item = &'a PointLoad>) -> f64 {
         let of_load = |[u, v, force]: &PointLoad| force / (x - u).hypot(y - v);
         loads.map(of_load).sum::<f64>() / (std::f64::consts::PI * self.contact_modulus)
     }
 
-    /// Grids around samples of the gap outside all grids at which the deformed surfaces overlap: patches that were too small to
-    /// be seen before.
+    /// Grids around samples of the gap, outside all grids, at which the deformed surfaces overlap: patches that were too small to be found before.
     fn unseen(&self, patch_grids: &[PatchGrid], depth: f64) -> Vec<PressureGrid> {
         let approach = patch_grids[0].pressed.approach;
         let limits = self.gap.window();
@@ -191,7 +188,7 @@ impl GapTask {
     }
 }
 
-/// The pressed cells of a patch grid as point loads.
+/// The cells of a patch grid with pressure as point loads.
 fn point_loads(patch_grid: &PatchGrid) -> Vec<PointLoad> {
     let grid = &patch_grid.grid;
     let [x, y] = [grid.centres(0), grid.centres(1)];
@@ -203,7 +200,7 @@ fn point_loads(patch_grid: &PatchGrid) -> Vec<PointLoad> {
         .collect()
 }
 
-/// A box around every patch of a grid, those that overlap in one.
+/// A box around every patch of a grid; boxes that overlap are merged.
 fn boxes(whole: &PatchGrid, limits: Window) -> Vec<PressureGrid> {
     let grid = &whole.grid;
     let boxes = grid.patches(&whole.pressed.pressure).into_iter();
@@ -224,7 +221,7 @@ fn boxes(whole: &PatchGrid, limits: Window) -> Vec<PressureGrid> {
     merged(boxes.collect())
 }
 
-/// The grids, those that overlap replaced by one over both with the finer cells.
+/// Merges grids that overlap, with the finer cells of the two.
 fn merged(mut grids: Vec<PressureGrid>) -> Vec<PressureGrid> {
     let overlap = |a: &PressureGrid, b: &PressureGrid| {
         (0..2).all(|k| a.range(k)[0] < b.range(k)[1] && b.range(k)[0] < a.range(k)[1])

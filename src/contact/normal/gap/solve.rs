@@ -1,10 +1,10 @@
-//! Any gap: contact region and pressure under a load or an approach.
+//! Contact region and pressure of a gap under a load or an approach.
 //!
-//! A box that holds the contact is found by evaluating the gap, then the pressure by conjugate gradients on ever finer grids of that
-//! box. Each grid starts from the solution on the one before and is shrunk to the contact. Where one grid cannot resolve all
-//! patches, each gets a grid of its own (see `patch_grids.rs`). At the end the edges are placed between the cells.
+//! The search box of the contact comes from the gap, the pressure from conjugate gradients on successively finer grids of that box. Each grid starts from the
+//! solution on the previous one and is reduced to the contact. If one grid cannot resolve all patches, each patch gets its own grid (see `patch_grids.rs`).
+//! Finally the edges are placed between the cells.
 
-use crate::half_space::grid_operator::GridWorkspace;
+use crate::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::monitor::Monitor;
 use crate::normal::gap::conjugate_gradients::{PressureAnswer, PressureTask, solve_pressure};
 use crate::normal::gap::grid::{
@@ -17,11 +17,10 @@ use crate::normal::gap::task::{GapTask, SearchBox, reach_of_level};
 use crate::normal::hertz::NormalLoad;
 
 impl GapTask {
-    /// What is wrong with the gap, as far as its samples tell without solving.
+    /// Checks the gap by its samples, without solving.
     ///
     /// # Errors
-    /// A JSON pointer into the case and a sentence, if the gap has no least value inside or the approach does not
-    /// reach it.
+    /// A JSON pointer into the case and a sentence, if the gap has no minimum inside or the approach does not reach it.
     pub fn check(&self) -> Result<(), (&'static str, String)> {
         let [least, largest] = self.gap.extremes();
         let gap = |reason: String| Err(("/contact/gap_mm", reason));
@@ -43,13 +42,13 @@ impl GapTask {
         }
     }
 
-    /// Finds region and pressure on grids of a fineness.
+    /// Finds region and pressure on grids of a given resolution.
     ///
-    /// Measured on Hertz's contact and on crowns of arcs, at targets of 0.002 to 0.005: approach within 0.02 %, area within 0.3 %, largest
-    /// pressure within 0.3 %. At 0.02 lengths and pressures are within 1 %.
+    /// Measured on Hertz's contact and on crowns of arcs at targets of 0.002 to 0.005: the approach is within 0.02 %, the area and the largest pressure within 0.3 %. At
+    /// 0.02 lengths and pressures are within 1 %.
     ///
     /// # Errors
-    /// A reason why there is no answer; or the monitor stopped the work.
+    /// The reason why there is no solution; or the monitor stopped the work.
     pub(crate) fn solve_as(
         &self,
         resolution: GridFineness,
@@ -81,8 +80,8 @@ impl GapTask {
         PressureGrid::new(reach.window, cells, self.gap.is_mirrored())
     }
 
-    /// Goes from grid to grid until one is fine enough, from a solution on another grid where there is one; and whether a patch would want more
-    /// cells than the last grid may have.
+    /// Refines the grid until it is fine enough, starting from a solution on another grid if there is one. Also returns whether a patch needs more cells than the last
+    /// grid may have.
     pub(crate) fn refined(
         &self,
         mut grid: PressureGrid,
@@ -108,7 +107,7 @@ impl GapTask {
                 pressure_change = before.largest() / pressed.largest() - 1.0;
             }
             let next = if pressed.approach > reach.level {
-                // The estimate was too small: parts of the gap beyond the box may touch as well.
+                // The estimate was too small, so parts of the gap beyond the box may touch as well.
                 let depth = pressed.approach - reach.least;
                 reach = reach_of_level(&self.gap, pressed.approach + LEVEL_BEYOND * depth);
                 NextStep::PressureGrid(self.first_grid(&reach, resolution))
@@ -138,7 +137,7 @@ impl GapTask {
         Ok((outcome, capped))
     }
 
-    /// The box of the contact, if the bodies touch.
+    /// The search box of the contact, if the bodies touch.
     fn touching_reach(&self) -> Result<SearchBox, NormalError> {
         let reach = self.reach();
         match self.loading {
@@ -170,7 +169,7 @@ impl GapTask {
                 TOLERANCE_FIRST,
             ),
         };
-        let influence = grid.influence(self.contact_modulus, workspace);
+        let influence = GridOperator::new(grid.cells, grid.step, self.contact_modulus, workspace);
         let task = PressureTask {
             gap: &gap,
             cell: grid.step[0] * grid.step[1],
@@ -182,7 +181,7 @@ impl GapTask {
         Ok(pressed)
     }
 
-    /// Whether a grid is to be enlarged, to be refined, or is the last one.
+    /// Decides whether a grid must be enlarged or refined, or is the last one.
     fn next_grid(
         &self,
         grid: &PressureGrid,
@@ -212,7 +211,7 @@ impl GapTask {
             return Ok(NextStep::End(GridsExit::Settled, capped));
         }
         let Some((coarse, before)) = before else {
-            // The first grid is solved roughly, and there is nothing to compare it with.
+            // The first grid is solved roughly and has nothing to compare with.
             return Ok(NextStep::PressureGrid(finer));
         };
         let ratio = (coarse.step[0] / grid.step[0]).max(coarse.step[1] / grid.step[1]);
@@ -230,26 +229,26 @@ impl GapTask {
     }
 }
 
-/// What a grid is solved from, and how exactly.
+/// The start of a solve on a grid.
 #[derive(Clone, Copy)]
 struct GridStart<'a> {
-    /// An earlier grid; none before the first one.
+    /// The solution on an earlier grid, if there is one.
     before: Option<&'a (PressureGrid, PressureAnswer)>,
-    /// The box of the contact.
+    /// The search box of the contact.
     reach: &'a SearchBox,
     /// See [`GridFineness::tolerance`].
     tolerance: f64,
 }
 
-/// What follows a grid.
+/// The step after a grid.
 enum NextStep {
     PressureGrid(PressureGrid),
-    /// It is the last one, and whether a patch would want more cells than a grid may have.
+    /// The grid is the last one; the flag says whether a patch needs more cells than a grid may have.
     End(GridsExit, bool),
 }
 
 impl GridFineness {
-    /// The same without a comparison with another grid.
+    /// Returns this resolution without the comparison with another grid.
     pub(crate) fn alone(self) -> GridFineness {
         GridFineness {
             settles: false,
@@ -257,7 +256,7 @@ impl GridFineness {
         }
     }
 
-    /// That for a target of the resultants' error, relative to μN: finer below 0.002, and coarser above 0.005.
+    /// The resolution for a target of the error of the resultants relative to μN: finer below 0.002 and coarser above 0.005.
     pub(crate) fn for_answer(target: f64) -> GridFineness {
         let mut cells = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
         let mut looser = 1.0;

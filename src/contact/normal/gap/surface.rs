@@ -1,4 +1,4 @@
-//! The gap between the undeformed bodies: samples, and a smooth surface through them.
+//! The gap between the undeformed bodies: a smooth surface through samples.
 
 use crate::numerics::interpolation::{LimitedSlopes, Place, SLOPE_REACH, limited_slopes};
 
@@ -14,18 +14,16 @@ pub enum GapSurface {
     },
     /// Any surface, given on a rectangular grid.
     Grid(SampledSurface),
-    /// Another gap with a small change, which is constant beyond its grid.
+    /// Another gap plus a small change, which is constant beyond its grid.
     Changed {
         /// The other gap.
         gap: Box<GapSurface>,
-        /// What is added to it.
+        /// The change.
         change: SampledSurface,
     },
 }
 
-/// A curve with a continuous derivative through samples; parabolas are reproduced exactly.
-///
-/// Beyond the first and the last sample there is nothing.
+/// A curve with a continuous derivative through samples, which reproduces parabolas exactly. It ends at the first and the last sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GapCurve {
     axis: Vec<f64>,
@@ -61,7 +59,7 @@ impl GapSurface {
         GapSurface::Grid(SampledSurface::new(x, y, gap))
     }
 
-    /// The same gap with `change[j][i]` added at `(x[i], y[j])`; axes as of [`GapSurface::grid`].
+    /// The gap plus `change[j][i]` at `(x[i], y[j])`; axes as in [`GapSurface::grid`].
     #[must_use]
     pub fn changed(&self, x: &[f64], y: &[f64], change: &[Vec<f64>]) -> GapSurface {
         GapSurface::Changed {
@@ -90,7 +88,7 @@ impl GapSurface {
         }
     }
 
-    /// Coordinates of the samples along x and y; none where a formula holds.
+    /// Coordinates of the samples along x and y; empty where a formula holds.
     pub fn samples(&self) -> [&[f64]; 2] {
         match self {
             GapSurface::Changed { gap, .. } => gap.samples(),
@@ -99,7 +97,7 @@ impl GapSurface {
         }
     }
 
-    /// Values at all `(x[i], y[j])`, stored at `j * x.len() + i`. All points lie in the window.
+    /// Values at all `(x[i], y[j])` in the window, stored at `j * x.len() + i`.
     pub fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         match self {
             GapSurface::Profile { rolling, across } => {
@@ -127,7 +125,7 @@ impl GapSurface {
         }
     }
 
-    /// The least and the largest sample; along x = 0 for a profile, without a change that was added.
+    /// The smallest and the largest sample, without an added change; of a profile, those at x = 0.
     pub fn extremes(&self) -> [f64; 2] {
         let values = match self {
             GapSurface::Profile { across, .. } => &across.values,
@@ -140,7 +138,7 @@ impl GapSurface {
         })
     }
 
-    /// Where the least sample lies, if none inside the data is as small.
+    /// The place of the smallest sample, if it lies at the edge of the data and no inner sample is as small.
     pub fn least_at_edge(&self) -> Option<String> {
         let place = |name: &str, at: f64| format!("{name} = {at} mm");
         let least = self.extremes()[0];
@@ -171,7 +169,7 @@ impl GapSurface {
         }
     }
 
-    /// Is the gap its own mirror image about x = 0 and about y = 0, sample by sample?
+    /// Whether the gap is mirror-symmetric about x = 0 and about y = 0, sample by sample.
     pub fn is_mirrored(&self) -> [bool; 2] {
         let mirrored = |axis: &[f64]| axis.iter().zip(axis.iter().rev()).all(|(a, b)| *a == -b);
         let alike = |values: &[f64]| values.iter().zip(values.iter().rev()).all(|(a, b)| a == b);
@@ -229,7 +227,7 @@ impl SampledSurface {
     fn on(&self, x: &[f64], y: &[f64]) -> Vec<f64> {
         let width = self.x.len();
         let mut places: Vec<Place> = x.iter().map(|x| Place::new(&self.x, *x)).collect();
-        // Only these columns decide on the values.
+        // Only these columns affect the values.
         let first = places.iter().map(|place| place.node).min();
         let last = places.iter().map(|place| place.node + 1).max();
         let from = first.unwrap_or(0).saturating_sub(SLOPE_REACH);

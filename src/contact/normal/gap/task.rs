@@ -1,16 +1,10 @@
-//! What is asked of a gap: the surfaces, and how hard they are pressed together.
-//!
-//! Preview of a contact from the samples of its gap, cached because check and solution use it several times.
-//!
-//! What will the contact of a gap be like? A look at the samples, before anything is solved.
-//!
-//! The box in which a contact can be: it holds every point at which the bodies could touch, and is found before anything is solved.
+//! The gap problem: the surfaces and their load; and estimates of a contact from the samples of its gap, before it is solved.
 
-use crate::lazy_field::LazyField;
 use crate::normal::gap::surface::{GapSurface, Window};
 use crate::normal::hertz::NormalLoad;
+use crate::numerics::ITERATIONS_MAX;
 
-/// Two bodies with a gap between them, pressed together.
+/// Two bodies pressed together, with the gap between them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GapTask {
     /// The gap of the undeformed bodies.
@@ -19,78 +13,42 @@ pub struct GapTask {
     pub loading: NormalLoad,
     /// Contact modulus `E* = G/(1−ν)` in MPa.
     pub contact_modulus: f64,
-    /// First looks at the contact, kept once they were taken; starts empty.
-    pub seen: PreviewCache,
 }
 
-/// Estimates of a contact before it is solved.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GapPreview {
-    /// Half-length along rolling and half-width of everything that touches, in mm.
-    pub half: [f64; 2],
-    /// Approach beyond the least gap, in mm.
-    pub depth: f64,
-    /// Asperities of the bodies that are likely to touch, at least 1.
-    pub asperities: usize,
-}
-
-/// The cached parts of a preview.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PreviewCache {
-    /// The box in which contact can be.
-    pub(super) reach: LazyField<SearchBox>,
-    /// Size and roughness of the contact.
-    pub(super) preview: LazyField<GapPreview>,
-}
-
-/// Valleys less deep than this part of the approach are pressed flat.
+/// Part of the approach up to which valleys between asperities are pressed flat.
 const DEPTH: f64 = 0.05;
-/// More patches than this are not told apart by any grid.
-const SUMMITS_MAX: usize = 48;
-/// Half-length of the contact over that of the box it is looked for in, which is made for 1.3 times the approach: Hertz's edge
-/// lies where the gap is half the approach.
-const CONTACT_OVER_BOX: f64 = 0.62;
+/// Largest number of asperities that a grid can distinguish.
+const ASPERITIES_MAX: usize = 48;
 
 impl GapTask {
-    /// What the contact will be like: its size, and how many asperities touch, with valleys between them that are not pressed flat.
-    pub fn preview(&self) -> GapPreview {
-        *self.seen.preview.get_or_make(|| self.look())
-    }
-
-    /// The box in which contact can be.
+    /// The search box of the contact.
     pub(crate) fn reach(&self) -> SearchBox {
-        let found = || reach(&self.gap, self.loading, self.contact_modulus);
-        *self.seen.reach.get_or_make(found)
+        reach(&self.gap, self.loading, self.contact_modulus)
     }
 
-    fn look(&self) -> GapPreview {
-        let reach = self.reach();
-        let depth = reach.level - reach.least;
+    /// Estimated number of asperities that touch, at least 1: those with valleys between them that are not pressed flat.
+    pub fn asperities(&self) -> usize {
+        let SearchBox {
+            window,
+            level,
+            least,
+        } = self.reach();
         let samples = self.gap.samples();
         let within = |k: usize| -> Vec<f64> {
-            let [low, high] = reach.window[k];
+            let [low, high] = window[k];
             let inside = samples[k].iter().filter(|at| (low..=high).contains(*at));
             inside.copied().collect()
         };
-        let middle = |k: usize| [0.5 * (reach.window[k][0] + reach.window[k][1])];
-        // Along the middle line of either axis.
+        let middle = |k: usize| [0.5 * (window[k][0] + window[k][1])];
+        // Samples on the middle lines of both axes.
         let (x, y) = (within(0), within(1));
         let lines = [self.gap.on(&x, &middle(1)), self.gap.on(&middle(0), &y)];
-        let asperities = lines
-            .iter()
-            .map(|line| valleys(line, reach.level, DEPTH * depth))
-            .max();
-        GapPreview {
-            half: reach
-                .window
-                .map(|[low, high]| 0.5 * CONTACT_OVER_BOX * (high - low)),
-            depth,
-            asperities: asperities.unwrap_or(1).clamp(1, SUMMITS_MAX),
-        }
+        let minima = lines.map(|line| valleys(&line, level, DEPTH * (level - least)));
+        minima[0].max(minima[1]).clamp(1, ASPERITIES_MAX)
     }
 }
 
-/// Valleys of a line whose bottom is below a level, with ridges between them that are higher than both by a depth.
+/// Number of minima of a line that lie below a level and are separated by ridges higher than a depth.
 fn valleys(line: &[f64], level: f64, depth: f64) -> usize {
     let (mut bottom, mut ridge) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut rising = false;
@@ -112,45 +70,45 @@ fn valleys(line: &[f64], level: f64, depth: f64) -> usize {
     count + usize::from(!rising && bottom < level)
 }
 
-/// Points of a box along each axis when it is looked through. With 24 a gap of a few bumps has a force that is 8 % off.
+/// Number of points of a box along each axis. With 24 a gap of a few bumps has a force that is 8 % off.
 const POINTS: usize = 48;
-/// Most samples along one axis that are evaluated one by one; of more samples, only every second or third is.
+/// Largest number of samples along an axis that are all evaluated; of more samples, only every second or third is.
 const SAMPLES_MAX: usize = 400;
-/// Most boxes that are tried until one is filled; each try shrinks a box that is too large at least by half.
-const BOXES_TRIED_MAX: usize = 40;
-/// A box is filled if the region found takes this fraction of it along both axes. Chosen by judgement; how much it matters was not measured.
+
+/// Part of a box along both axes that the region must fill. Chosen by judgement.
 const FILLED: f64 = 0.5;
-/// Factor on the estimated approach: on smooth gaps it was never too small by more. If it is, the solution shows it and the box grows.
+/// Safety factor on the estimated approach. On smooth gaps it was never too small; otherwise the solution shows it and the box grows.
 const MARGIN: f64 = 1.3;
 
-/// A box of the contact plane and the depth of overlap it was made for.
+/// A box of the contact plane with the level it was made for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SearchBox {
     pub(crate) window: Window,
-    /// No point outside the window has a gap of less than this, in mm (as far as the data go).
+    /// A lower bound in mm of the gap outside the window, within the data.
     pub(crate) level: f64,
     /// The least gap found, in mm.
     pub(crate) least: f64,
 }
 
-/// The points at which a gap is evaluated, and its values there.
+/// The gap at points of a box.
 struct GapSamples {
     axes: [Vec<f64>; 2],
     values: Vec<f64>,
     least: f64,
 }
 
-/// The box in which contact can be under this load, found by evaluating the gap.
+/// The box in which contact is possible under a load.
 ///
-/// Contact lies where the gap is smaller than the approach, whatever the pressure. The approach belonging to a force is
-/// estimated as if the region overlapping by half of it were a circle of the same area pressed by a sphere, which is
-/// exact for a paraboloid: `N = 4/3 E* √(A/π) δ` with A the area where the gap is less than `δ/2` above its least value.
+/// Contact lies where the gap is smaller than the approach, for any pressure. The approach of a force is estimated as if the region that overlaps by half of it
+/// were a circle of the same area pressed by a sphere, which is exact for a paraboloid: `N = 4/3 E* √(A/π) δ`, where A is the area in which the gap is less than
+/// `δ/2` above its minimum.
 pub(crate) fn reach(gap: &GapSurface, loading: NormalLoad, contact_modulus: f64) -> SearchBox {
     let limits = gap.window();
     let mut window = first_box(gap);
     let mut level = f64::INFINITY;
     let mut least = f64::INFINITY;
-    for _ in 0..BOXES_TRIED_MAX {
+    // Each iteration shrinks a box that is too large by at least half.
+    for _ in 0..ITERATIONS_MAX {
         let samples = GapSamples::new(gap, window);
         least = samples.least;
         level = match loading {
@@ -188,7 +146,7 @@ fn length(range: [f64; 2]) -> f64 {
     range[1] - range[0]
 }
 
-/// The whole window; where a formula holds, as far as the gap exceeds all that the samples tell.
+/// The whole window. Where a formula holds, the length at which the gap exceeds all samples.
 fn first_box(gap: &GapSurface) -> Window {
     let mut window = gap.window();
     if let Some(rolling) = gap.rolling_radius() {
@@ -212,7 +170,7 @@ impl GapSamples {
         }
     }
 
-    /// Estimated approach above the least gap, for the force divided by the contact modulus.
+    /// Estimated approach beyond the least gap, for the force divided by the contact modulus.
     fn depth(&self, force: f64) -> f64 {
         let shares = [0, 1].map(|k| shares(&self.axes[k]));
         let width = self.axes[0].len();
@@ -229,8 +187,7 @@ impl GapSamples {
             .collect();
         let carried =
             |area: f64, depth: f64| 4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * depth;
-        // The least height at which the force is carried, by halves: lower ones to the front, as a sort would, but only
-        // in the half that holds the answer.
+        // Finds the least height at which the force is carried, by bisection: lower heights are moved to the front, but only in the half that contains the result.
         let (mut area, mut rest) = (0.0, &mut cells[..]);
         while rest.len() > 1 {
             let middle = rest.len() / 2;
@@ -253,8 +210,7 @@ impl GapSamples {
         }
     }
 
-    /// The box around all points with a gap below a level, one point wider on every side; around the deepest point if
-    /// there is none.
+    /// The box around all points with a gap below a level, wider by one point on every side; around the deepest point if there is none.
     fn below(&self, level: f64, limits: Window) -> Window {
         let width = self.axes[0].len();
         let level = level.max(self.least);
@@ -274,7 +230,7 @@ impl GapSamples {
     }
 }
 
-/// Points of a range with both ends: the samples in it, or equally many everywhere if there are too few.
+/// Points of a range including both ends: the samples in it, or equally spaced points if there are too few samples.
 fn points(range: [f64; 2], samples: &[f64]) -> Vec<f64> {
     let [low, high] = range;
     let inside: Vec<f64> = samples
@@ -295,7 +251,7 @@ fn points(range: [f64; 2], samples: &[f64]) -> Vec<f64> {
     points
 }
 
-/// Length of the axis that each of its points stands for.
+/// The length of the axis that each point represents.
 fn shares(axis: &[f64]) -> Vec<f64> {
     let n = axis.len();
     (0..n)

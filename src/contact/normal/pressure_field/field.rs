@@ -1,6 +1,4 @@
-//! The pressure of a whole contact: on one grid, or on a grid per patch where patches differ much in size.
-//!
-//! Fields from pressures computed on equal cells, and their mirror symmetry about y = 0.
+//! The pressure of a whole contact, on one grid or on a grid per patch; and fields of computed pressures with their mirror symmetry.
 
 use crate::mesh::Chord;
 use crate::normal::hertz::Patch;
@@ -13,15 +11,14 @@ use crate::remark::entry::RemarkEntry;
 #[derive(Debug, Clone, PartialEq)]
 pub struct PressureField {
     grids: Vec<GridPressure>,
-    /// For every patch, in order of smallest y: the index of its grid, and its number on that grid.
+    /// The grid of every patch, by increasing smallest y, and its number on that grid.
     places: Vec<[usize; 2]>,
 }
 
 impl PressureField {
     /// Finds the patches of a pressure; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
     ///
-    /// Axes increase strictly and have at least 2 points; pressures are finite and not negative. Returns the field and
-    /// remarks for the answer.
+    /// Axes increase strictly and have at least 2 points; pressures are finite and not negative. Returns the field and remarks.
     ///
     /// # Errors
     /// A sentence, if no pressure is positive or there are more than 64 patches.
@@ -55,7 +52,7 @@ impl PressureField {
         Ok(PressureField { grids, places })
     }
 
-    /// The patches, in order of their smallest y: force, extent, area and largest pressure.
+    /// The patches by increasing smallest y.
     pub fn patches(&self) -> Vec<Patch> {
         let patches: Vec<Vec<Patch>> = self.grids.iter().map(GridPressure::patches).collect();
         self.places.iter().map(|[g, k]| patches[*g][*k]).collect()
@@ -80,7 +77,7 @@ impl PressureField {
         self.grids.iter().find_map(GridPressure::jump)
     }
 
-    /// How far a given pressure is from smooth, see [`GridPressure::discontinuity`].
+    /// The discontinuity of a given pressure, see [`GridPressure::discontinuity`].
     pub fn discontinuity(&self) -> f64 {
         let each = self.grids.iter().map(GridPressure::discontinuity);
         each.fold(0.0, f64::max)
@@ -96,15 +93,15 @@ impl PressureField {
         self.places.iter().map(|[g, k]| segments[*g][*k]).collect()
     }
 
-    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y. A strip that misses the patch has none; one
-    /// that crosses a hollow or curved patch may have several, in order of x.
+    /// Chords of one patch on the given strips, each `(y, dy)` with its mid-line at y. A strip that misses the patch has none; one that crosses a hollow or curved patch may
+    /// have several, by increasing x.
     pub fn chords(&self, patch: usize, strips: &[(f64, f64)]) -> Vec<Chord> {
         let mut chords = Vec::new();
         self.add_chords(patch, strips, &mut chords);
         chords
     }
 
-    /// Adds them to others.
+    /// Appends chords to a buffer; see [`PressureField::chords`].
     pub fn add_chords(&self, patch: usize, strips: &[(f64, f64)], chords: &mut Vec<Chord>) {
         let [grid, label] = self.places[patch];
         self.grids[grid].add_chords(label, strips, patch, chords);
@@ -117,13 +114,13 @@ impl PressureField {
         self.grids[grid].mean_pressure(chord, x0, x1)
     }
 
-    /// The pressures in MPa at points of the line of a chord, given by x in rising order; 0 outside the chord.
+    /// Pressures in MPa at points of the line of a chord, given by increasing x; 0 outside the chord.
     pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
         let [grid, _] = self.places[chord.patch];
         self.grids[grid].pressures(chord, places)
     }
 
-    /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
+    /// Load centre `[x, y]` in mm of one patch, or of all patches: the mean position weighted with the pressure.
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
         if let Some(patch) = patch {
             let [grid, label] = self.places[patch];
@@ -147,7 +144,7 @@ impl PressureField {
         self.grids[grid].load_spread(label)
     }
 
-    /// The same pressure with coordinates relative to another origin, in mm.
+    /// The pressure with coordinates relative to another origin, in mm.
     #[must_use]
     pub fn from_origin(mut self, origin: [f64; 2]) -> PressureField {
         let grids = self.grids.into_iter();
@@ -160,8 +157,8 @@ impl GridPressure {
     /// The field of a pressure computed on equal cells with the centres `(x[i], y[j])` in mm, stored at
     /// `j * x.len() + i`.
     ///
-    /// `squares` are the squared pressures in MPa², continued so that the edge is where they vanish (not positive at centres
-    /// outside the edge). `pressure` are the computed pressures in MPa, from which the forces of the patches are taken.
+    /// `squares` are the squared pressures in MPa², continued such that the edge is where they vanish; they are not positive at centres outside the edge. `pressure` are
+    /// the computed pressures in MPa, which give the forces of the patches.
     ///
     /// # Errors
     /// A sentence, if there are more than 64 patches, or none.
@@ -177,11 +174,11 @@ impl GridPressure {
         Ok(field)
     }
 
-    /// The same field before its edges are found: it has forces, load centres and spreads, its patches end at their outermost samples, and it gives no
-    /// pressures between samples.
+    /// The field before its edges are found. It has forces, load centres and spreads, its patches end at their outermost samples, and it gives no pressures between
+    /// samples.
     ///
     /// # Errors
-    /// As [`of_solution`](Self::of_solution).
+    /// See [`of_solution`](Self::of_solution).
     pub(crate) fn of_samples(
         x: &[f64],
         y: &[f64],

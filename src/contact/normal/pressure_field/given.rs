@@ -1,16 +1,13 @@
 //! A pressure given on a grid, transferred to strips with its load preserved.
 //!
-//! The contact is where the interpolated square of the pressure is positive. Squared pressure falls linearly at the
-//! edge, so that the edge is located to a small fraction of a grid spacing (see `level_set.rs`), and Hertz's pressure is
-//! reproduced exactly. The force of a patch is the sum of its samples times the areas they represent; the mesh scales the
-//! pressures on its strips to carry that force.
-
-use std::ops::RangeInclusive;
+//! The contact is where the interpolated square of the pressure is positive. Squared pressure falls linearly at the edge, so the edge is located to a small fraction of a
+//! grid spacing (see `level_set.rs`), and Hertz's pressure is reproduced exactly. The force of a patch is the sum of its samples times the areas they represent; the
+//! mesh scales the pressures on its strips to that force.
 
 use crate::mesh::Chord;
 use crate::normal::hertz::Patch;
 use crate::normal::pressure_field::grid_pressure::{
-    GridPressure, NOWHERE, PADDING, PATCHES_MAX, PatchShape, SampleGrid, padded,
+    GridPressure, PADDING, PATCHES_MAX, SampleGrid, padded,
 };
 use crate::normal::pressure_field::level_set::{GridLine, State};
 use crate::normal::pressure_field::{grid_pressure, level_set};
@@ -19,23 +16,22 @@ use crate::numerics::roots::{interval, weights};
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 
-/// With at least this many intervals per chord, three Gauss points per interval are enough: the error stays below 1e-9 of the mean
-/// pressure for Hertz's pressure.
+/// Number of intervals per chord from which three Gauss points per interval suffice: for Hertz's pressure the error stays below 1e-9 of the mean pressure.
 const INTERVALS_MANY: f64 = 24.0;
-/// Shortest chord over the length of its patch. A line that only touches an edge has shorter ones. They carry a millionth of the load of a line, and their
-/// cells are too small for an operator in single precision.
+/// Shortest chord over the length of its patch. A line that only touches an edge has shorter ones, which carry a millionth of the load of a line and whose cells are too
+/// small for an operator in single precision.
 const CHORD_LEAST: f64 = 1e-3;
 
 /// The samples of the four rows about a line along x.
 struct RowsAbout<'a> {
     weights: [f64; 4],
     q: [&'a [f64]; 4],
-    /// Of the two beside the line.
+    /// Smoothness of the two rows beside the line.
     smooth: [&'a [bool]; 2],
 }
 
 impl RowsAbout<'_> {
-    /// Value on a column.
+    /// Value at a column.
     fn value(&self, column: usize) -> f64 {
         let q = self.q.map(|row| row[column]);
         let [a, b, c, d] = self.weights;
@@ -49,8 +45,7 @@ impl RowsAbout<'_> {
 impl GridPressure {
     /// Finds the patches of a pressure; `pressure[j][i]` in MPa belongs to `(x[i], y[j])` in mm.
     ///
-    /// Axes increase strictly and have at least 2 points; pressures are finite and not negative. Returns the field and
-    /// remarks for the answer.
+    /// Axes increase strictly and have at least 2 points; pressures are finite and not negative. Returns the pressure and remarks.
     ///
     /// # Errors
     /// A sentence, if no pressure is positive or there are more than 64 patches.
@@ -90,8 +85,7 @@ impl GridPressure {
         Ok((field, remarks))
     }
 
-    /// The field before the regions of its patches are found, and the patch of every sample. `q` is as in [`GridPressure::q`],
-    /// with 0 outside the contact.
+    /// The pressure before the regions of its patches are found, and the patch of every sample. `q` is as in [`GridPressure::q`], with 0 outside the contact.
     pub(crate) fn from_squares(
         grid: SampleGrid,
         q: Vec<f64>,
@@ -105,8 +99,7 @@ impl GridPressure {
             grid,
             q,
             smooth: Vec::new(),
-            runs: Vec::new(),
-            spans: Vec::new(),
+
             cells,
             pressure_max,
             shapes: Vec::new(),
@@ -127,22 +120,7 @@ impl GridPressure {
             .into_iter()
             .map(|state| state == State::Smooth)
             .collect();
-        let run = |row: &[f64]| {
-            let first = row.iter().position(|q| *q > 0.0)?;
-            let last = row.iter().rposition(|q| *q > 0.0)?;
-            let single = row[first..=last].iter().all(|q| *q > 0.0);
-            single.then_some([first, last])
-        };
-        self.runs = self.q.chunks_exact(self.grid.x.len()).map(run).collect();
-        let span = |row: &[u8]| {
-            let first = row.iter().position(|label| *label != NOWHERE)?;
-            Some([first, row.iter().rposition(|label| *label != NOWHERE)?])
-        };
-        self.spans = self
-            .cells
-            .chunks_exact(self.grid.x.len())
-            .map(span)
-            .collect();
+
         for label in 0..self.shapes.len() {
             let (extent, area) = self.measure(label, &self.shapes[label]);
             let patch = &mut self.shapes[label].patch;
@@ -151,10 +129,10 @@ impl GridPressure {
         self.make_images_alike();
     }
 
-    /// The patches found, in order of the smallest y of their samples.
+    /// The patches by increasing smallest y of their samples.
     ///
-    /// `normal_force` is the sum of the samples' pressures times the areas they represent, which extend half-way to the
-    /// neighbouring samples; `area` is that of the interpolated region, `pressure_max` the largest sample.
+    /// `normal_force` is the sum of the pressures of the samples times the areas they represent, which extend half-way to the neighbouring samples; `area` is that of the
+    /// interpolated region, `pressure_max` the largest sample.
     pub fn patches(&self) -> Vec<Patch> {
         self.shapes.iter().map(|shape| shape.patch).collect()
     }
@@ -167,8 +145,8 @@ impl GridPressure {
             .collect()
     }
 
-    /// Adds the chords of one patch on the given strips, each `(y, dy)` with its mid-line at y; they get the number `patch`. A strip that misses
-    /// the patch, or only touches its edge, has none; one that crosses a hollow or curved patch may have several, in order of x.
+    /// Appends the chords of one patch on the given strips, each `(y, dy)` with its mid-line at y, with the number `patch`. A strip that misses the patch, or only touches its
+    /// edge, has none; one that crosses a hollow or curved patch may have several, by increasing x.
     pub fn add_chords(
         &self,
         label: usize,
@@ -179,7 +157,7 @@ impl GridPressure {
         let [x_min, x_max, ..] = self.shapes[label].patch.extent;
         for (strip, &(y, dy)) in strips.iter().enumerate() {
             self.each_segment(label, y, |left, right| {
-                // Rough data may extend slightly farther between the lines from which the extent was measured.
+                // Rough data may extend slightly farther between the lines that determined the extent.
                 let (left, right) = (left.max(x_min), right.min(x_max));
                 if right - left > CHORD_LEAST * (x_max - x_min) {
                     chords.push(Chord {
@@ -217,12 +195,10 @@ impl GridPressure {
         }
     }
 
-    /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For
-    /// `x0 = x1` the pressure there.
+    /// Mean of the interpolated pressure in MPa over `x0 < x < x1` on the line of a chord; 0 outside the chord. For `x0 = x1` the pressure there.
     ///
-    /// Gauss–Legendre quadrature of order 10 per grid interval (6 where there are many intervals), with the square root of the
-    /// distance from the nearer end of the chord as variable, in which the pressure is smooth; accurate to about 1e-9 for Hertz's
-    /// pressure.
+    /// Gauss–Legendre quadrature of order 10 per grid interval, or 6 with many intervals, in the square root of the distance from the nearer end of the chord, as a function of
+    /// which the pressure is smooth; accurate to about 1e-9 for Hertz's pressure.
     pub fn mean_pressure(&self, chord: &Chord, x0: f64, x1: f64) -> f64 {
         let (low, high) = (x0.max(chord.left), x1.min(chord.right));
         if low > high {
@@ -269,7 +245,7 @@ impl GridPressure {
         self.pressure_max * sum / (x1 - x0)
     }
 
-    /// Pressures at points of the line of a chord, given by x in rising order; 0 outside the chord.
+    /// Pressures at points of the line of a chord, given by increasing x; 0 outside the chord.
     pub fn pressures<const N: usize>(&self, chord: &Chord, places: [f64; N]) -> [f64; N] {
         let x = &self.grid.x;
         let rows = self.rows_about(chord);
@@ -294,7 +270,7 @@ impl GridPressure {
         })
     }
 
-    /// Tells the segments of the line at y that lie in a patch, from smaller to larger x.
+    /// Passes the segments of the line at y that lie in a patch to `tell`, by increasing x.
     pub(crate) fn each_segment(&self, label: usize, y: f64, tell: impl FnMut(f64, f64)) {
         let (label, y) = match self.images.get(label) {
             Some(image) if y < 0.0 => (*image, -y),
@@ -306,15 +282,11 @@ impl GridPressure {
         if rows[j] > y || rows[j + 1] < y || !shape.rows.contains(&j) {
             return;
         }
-        let Some(columns) = self.near_row(shape, j) else {
-            return;
-        };
         let t = (y - rows[j]) / (rows[j + 1] - rows[j]);
         let about = self.rows_at(j, weights(rows, j, y));
         let line = GridLine {
             axis: x,
-            intervals: columns,
-            whole: self.whole(label, j),
+            intervals: shape.columns.clone(),
             value: |i| about.value(i),
             inside: |i| about.q[1][i] > 0.0 && about.q[2][i] > 0.0,
             smooth: |i| self.is_smooth(i, j),
@@ -323,32 +295,10 @@ impl GridPressure {
         line.each_segment(tell);
     }
 
-    /// The columns of row j that may hold a part of a patch: those of its cells, and one beside them ([`GridPressure::allowed`]).
-    fn near_row(&self, shape: &PatchShape, j: usize) -> Option<RangeInclusive<usize>> {
-        let Some(near) = self.spans.get(j - 1..=j + 1) else {
-            return Some(shape.columns.clone());
-        };
-        let widened = |a: [usize; 2], b: [usize; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        let [first, last] = near.iter().flatten().copied().reduce(widened)?;
-        let [from, to] = [*shape.columns.start(), *shape.columns.end()];
-        Some(from.max(first - 1)..=to.min(last + 1))
-    }
-
-    /// The columns between which a patch has all samples of row j and the next one, where each of the two has one run of positive samples.
-    fn whole(&self, label: usize, j: usize) -> Option<[usize; 2]> {
-        let [one, other] = [*self.runs.get(j)?, *self.runs.get(j + 1)?];
-        let [first, last] = [one?, other?]
-            .into_iter()
-            .reduce(|a, b| [a[0].max(b[0]), a[1].min(b[1])])?;
-        let own = usize::from(self.cells[j * self.grid.x.len() + first]) == label;
-        (own && first < last).then_some([first, last])
-    }
-
     /// The part of cell (i, j) along x that may belong to a patch, on the line at the fraction t of its width.
     ///
-    /// A cell with a sample of the patch as a corner belongs to it as a whole. Where the edge is smooth and nearly parallel to the
-    /// grid it may extend slightly beyond those cells (by an eighth of the squared spacing over the radius); farther out the
-    /// interpolation is not reliable.
+    /// A cell with a sample of the patch as a corner belongs to it entirely. Where the edge is smooth and nearly parallel to the grid, the patch may extend slightly beyond
+    /// those cells, by an eighth of the squared spacing over the radius; farther outside the interpolation is not reliable.
     fn allowed(&self, label: usize, i: usize, j: usize, t: f64) -> [f64; 2] {
         const BULGE: f64 = 0.125;
         let nx = self.grid.x.len();

@@ -1,18 +1,4 @@
-//! A pressure on one grid of samples, with its patches.
-//!
-//! The grid of the samples, padded so that pressures can be continued beyond the contact.
-//!
-//! A discontinuity of a sampled pressure.
-//!
-//! How well samples resolve a pressure: spacings across a patch, and discontinuities between samples.
-//!
-//! The patches of a grid: groups of connected positive samples.
-//!
-//! The load centre of a pressure, and the same pressure moved or corrected.
-//!
-//! One patch of a grid, with the range of its cells.
-//!
-//! Force, extent, area and remarks of each patch of a grid.
+//! A pressure on one grid of samples: its patches with force, extent, area and load centre, its resolution and discontinuities, and remarks.
 
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
@@ -26,32 +12,29 @@ use crate::remark::list::Remark;
 /// Pressure samples on one rectangular grid and the patches they form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridPressure {
-    /// The given grid with [`PADDING`] more lines on each side.
+    /// The given grid, padded with [`PADDING`] lines on each side.
     pub(crate) grid: SampleGrid,
-    /// Squared pressure relative to its largest value, continued below 0 outside the contact.
+    /// Squared pressure over its largest value, continued below 0 outside the contact.
     pub(crate) q: Vec<f64>,
-    /// Samples that are positive or continued by a parabola.
+    /// Whether each sample is positive or continued by a parabola.
     pub(crate) smooth: Vec<bool>,
-    /// The first and the last positive sample of every row that has one run of them; empty before edges are found.
-    pub(crate) runs: Vec<Option<[usize; 2]>>,
-    /// The first and the last cell of every row that belongs to a patch; empty before edges are found.
-    pub(crate) spans: Vec<Option<[usize; 2]>>,
-    /// The patch of every cell that has one of its samples as a corner.
+
+    /// The patch of every cell with one of its samples as a corner.
     pub(crate) cells: Vec<u8>,
     /// Largest pressure in MPa.
     pub(crate) pressure_max: f64,
     pub(crate) shapes: Vec<PatchShape>,
-    /// For each patch, its mirror image about y = 0; empty if the pressure has no such symmetry.
+    /// The mirror image about y = 0 of each patch; empty without such a symmetry.
     pub(crate) images: Vec<usize>,
-    /// The largest jump from one given sample to the next.
+    /// The largest jump between given samples.
     pub(crate) jump: Option<Jump>,
     pub(crate) discontinuity: f64,
 }
 
-/// Most patches of one grid.
+/// Largest number of patches of a contact.
 pub(crate) const PATCHES_MAX: usize = 64;
 
-/// Grid lines added on each side: the contact may extend half a spacing beyond the grid, and interpolation needs nodes beyond that.
+/// Number of lines added on each side. The contact may extend half a spacing beyond the grid, and interpolation needs more nodes.
 pub(crate) const PADDING: usize = 4;
 
 /// Coordinates of a rectangular grid in mm; the value at `(x[i], y[j])` is stored at `j * x.len() + i`.
@@ -61,7 +44,7 @@ pub(crate) struct SampleGrid {
     pub(crate) y: Vec<f64>,
 }
 
-/// An axis with [`PADDING`] more points on each side, spaced like the outermost ones.
+/// An axis with [`PADDING`] more points on each side, with the outermost spacings.
 pub(crate) fn padded(axis: &[f64]) -> Vec<f64> {
     let n = axis.len();
     let (first, last) = (axis[1] - axis[0], axis[n - 1] - axis[n - 2]);
@@ -70,7 +53,7 @@ pub(crate) fn padded(axis: &[f64]) -> Vec<f64> {
     before.chain(axis.iter().copied()).chain(after).collect()
 }
 
-/// A discontinuity: the pressure falls from one sample to the next more steeply than at the edge of any smooth contact.
+/// A discontinuity, where the pressure falls between two samples more steeply than at the edge of a smooth contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jump {
     /// Coordinates in mm, halfway between the two samples.
@@ -79,9 +62,8 @@ pub struct Jump {
     pub fall: f64,
 }
 
-/// A jump is a fall of the squared pressure over one interval that exceeds the extrapolation from the interval before by this, relative
-/// to the largest squared pressure. At an edge of Hertz's kind the excess is 0; powers of a lens from 0.5 to 1.5 reach 0.21 on 12
-/// samples a side, a hole 0.9.
+/// Excess of the fall of the squared pressure over one interval, relative to the largest squared pressure, from which it is a jump. The excess is over the extrapolation
+/// from the interval before. It is 0 at an edge of Hertz's kind; powers of a lens from 0.5 to 1.5 reach 0.21 on 12 samples a side, a hole 0.9.
 const JUMP: f64 = 0.35;
 
 impl GridPressure {
@@ -99,8 +81,8 @@ impl GridPressure {
             .collect()
     }
 
-    /// The largest excess fall between neighbouring samples (see [`JUMP`]), and the jump there if it is one. To be called before
-    /// edges are found, while squared pressures are 0 outside the contact.
+    /// The largest excess fall between neighbouring samples (see [`JUMP`]), and the jump there if it is one. Must be called before edges are found, while squared pressures
+    /// are 0 outside the contact.
     pub(crate) fn find_jump(&self) -> (f64, Option<Jump>) {
         let (nx, ny) = (self.grid.x.len(), self.grid.y.len());
         let mut largest: (f64, Option<Jump>) = (0.0, None);
@@ -113,7 +95,7 @@ impl GridPressure {
                         (row as usize) * nx + column as usize
                     };
                     let [before, here, next] = [-1, 0, 1].map(|steps| self.q[index(steps)]);
-                    // The value extrapolated from the two samples before, less the sample itself.
+                    // The extrapolation from the two samples before minus the sample.
                     let discontinuity = 2.0 * here - before.max(here) - next;
                     if here > 0.0 && discontinuity > largest.0 {
                         let middle = |axis: &[f64], k: usize, d: isize| {
@@ -135,8 +117,7 @@ impl GridPressure {
         self.jump
     }
 
-    /// The largest fall of the squared pressure over one interval beyond that extrapolated from the interval before, relative to the
-    /// largest squared pressure: up to 0.2 for smooth pressures.
+    /// The largest excess of the fall of the squared pressure over one interval, relative to the largest squared pressure (see [`JUMP`]): up to 0.2 for smooth pressures.
     pub fn discontinuity(&self) -> f64 {
         self.discontinuity
     }
@@ -145,16 +126,16 @@ impl GridPressure {
 /// Label of samples and cells that belong to no patch.
 pub(crate) const NOWHERE: u8 = u8::MAX;
 
-/// The patch of every sample, numbered from 0 in order of smallest y (then x), and the number of patches.
+/// The patch of every sample, numbered by increasing smallest y (then x), and the number of patches.
 ///
-/// Samples that are neighbours along an axis or a diagonal are connected: otherwise a slender patch oblique to the grid would
-/// be split, although the interpolated region between two diagonal samples belongs to both.
+/// Samples that are neighbours along an axis or a diagonal are connected. Otherwise a slender patch oblique to the grid would be split, although the interpolated region
+/// between two diagonal samples belongs to both.
 ///
 /// # Errors
 /// The number of patches, if there are more than [`PATCHES_MAX`].
 pub(crate) fn label_samples(grid: &SampleGrid, q: &[f64]) -> Result<(Vec<u8>, usize), usize> {
     let size = [grid.x.len(), grid.y.len()];
-    // Samples are stored in order of y, so patches are found in the order required.
+    // Samples are stored by increasing y, so patches are found in the required order.
     let patches = groups(size, |sample| q[sample] > 0.0);
     if patches.len() > PATCHES_MAX {
         return Err(patches.len());
@@ -168,8 +149,7 @@ pub(crate) fn label_samples(grid: &SampleGrid, q: &[f64]) -> Result<(Vec<u8>, us
     Ok((labels, patches.len()))
 }
 
-/// The patch of every cell between four samples, stored at the index of its corner of smallest x and y. It is the patch of its
-/// corners; no two of them belong to different patches.
+/// The patch of every cell between four samples, stored at the index of its corner of smallest x and y: the patch of its corners, which never belong to two patches.
 pub(crate) fn label_cells(grid: &SampleGrid, samples: &[u8]) -> Vec<u8> {
     let (nx, ny) = (grid.x.len(), grid.y.len());
     let mut labels = vec![NOWHERE; nx * ny];
@@ -188,7 +168,7 @@ pub(crate) fn label_cells(grid: &SampleGrid, samples: &[u8]) -> Vec<u8> {
 }
 
 impl GridPressure {
-    /// Load centre `[x, y]` in mm of one patch, or of all of them: the mean position weighted with the pressure.
+    /// Load centre `[x, y]` in mm of one patch, or of all patches: the mean position weighted with the pressure.
     pub fn load_centre(&self, patch: Option<usize>) -> [f64; 2] {
         if let Some(patch) = patch {
             return self.shapes[patch].load.centre;
@@ -208,7 +188,7 @@ impl GridPressure {
         sum.map(|sum| sum / weight)
     }
 
-    /// Finds the loads of all patches, before their edges are placed.
+    /// Computes the loads of all patches; called before their edges are found.
     pub(crate) fn find_loads(&mut self) {
         let mut loads = vec![SampledLoad::default(); self.shapes.len()];
         self.each_load(|patch, [x, y], own| {
@@ -240,7 +220,7 @@ impl GridPressure {
         sum.map(|sum| sum / weight)
     }
 
-    /// Tells patch, place and load of every sample; loads are relative to the largest pressure in MPa, times mm².
+    /// Passes patch, place and load of every sample to `tell`. Loads are relative to the largest pressure in MPa, times mm².
     fn each_load(&self, mut tell: impl FnMut(usize, [f64; 2], f64)) {
         let share = |axis: &[f64], k: usize| 0.5 * (axis[k + 1] - axis[k - 1]);
         let (x, y) = (&self.grid.x, &self.grid.y);
@@ -250,7 +230,7 @@ impl GridPressure {
             .zip(self.cells.chunks_exact(x.len()));
         for (j, (row, cells)) in rows.enumerate() {
             for (i, (q, cell)) in row.iter().zip(cells).enumerate() {
-                // Values continued outside the contact are not positive, so a positive one is a sample and not in the padding.
+                // Continued values are not positive, so a positive one is a sample outside the padding.
                 if *q > 0.0 {
                     let load = q.sqrt() * share(x, i) * share(y, j);
                     tell(usize::from(*cell), [x[i], y[j]], load);
@@ -259,7 +239,7 @@ impl GridPressure {
         }
     }
 
-    /// The same pressure with coordinates relative to another origin, in mm.
+    /// The pressure with coordinates relative to another origin, in mm.
     #[must_use]
     pub fn from_origin(mut self, origin: [f64; 2]) -> GridPressure {
         self.grid.x.iter_mut().for_each(|x| *x -= origin[0]);
@@ -282,7 +262,7 @@ impl GridPressure {
     }
 }
 
-/// One patch and the cells it may occupy.
+/// A patch and the cells it may occupy.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PatchShape {
     pub(crate) patch: Patch,
@@ -292,22 +272,21 @@ pub(crate) struct PatchShape {
     pub(crate) load: SampledLoad,
 }
 
-/// The load of some samples: the sum of their pressures relative to the largest one, times the areas they represent in mm², and their mean position
-/// `[x, y]` in mm, weighted so.
+/// The load of samples: the sum of their pressures, relative to the largest one, times the areas they represent in mm², and their mean position `[x, y]` in mm with
+/// these weights.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct SampledLoad {
     pub(crate) weight: f64,
     pub(crate) centre: [f64; 2],
 }
 
-/// With fewer samples along or across, the edge of a patch is uncertain and its force wrong by more than about 2 %: for
-/// Hertz's pressure, the sum of the samples is wrong by up to 2 % with 9 samples, 0.5 % with 18.
+/// Least number of samples along and across a resolved patch. With fewer, its edge is uncertain and its force is wrong by more than about 2 %: for Hertz's pressure, the
+/// sum of the samples is wrong by up to 2 % with 9 samples, and 0.5 % with 18.
 const SAMPLES_ACROSS_MIN: usize = 8;
-/// Halvings of the line between two samples on which a patch ends. They leave 1e-11 of it: mirror images stay alike to 1e-9, for which 1e-9 was not
-/// enough.
+/// Number of halvings of the line between two samples on which a patch ends. They leave 1e-11 of it, which makes mirror images equal to 1e-9; 1e-9 was not enough.
 const HALVINGS: u32 = 37;
 
-/// The ends of a patch along x, each with the line that reaches it.
+/// The ends of a patch along x, each with its line.
 struct FarthestLines {
     left: (f64, f64),
     right: (f64, f64),
@@ -330,7 +309,7 @@ impl FarthestLines {
 }
 
 impl GridPressure {
-    /// Patches before their regions are found: force, rows and columns, from the samples.
+    /// Patches before their regions are found, with force, rows and columns of the samples.
     pub(crate) fn shapes_from_samples(&self, samples: &[u8], count: usize) -> Vec<PatchShape> {
         let nx = self.grid.x.len();
         let mut boxes = vec![[usize::MAX, 0, usize::MAX, 0]; count];
@@ -368,7 +347,7 @@ impl GridPressure {
                             self.grid.y[j1],
                         ],
                     },
-                    // Cells with these samples as corners, and one more cell on every side.
+                    // Cells with these samples as corners, plus one cell on every side.
                     columns: i0 - 2..=i1 + 1,
                     rows: j0 - 2..=j1 + 1,
                     segments_per_strip: f64::from(runs[label]) / (j1 - j0 + 1) as f64,
@@ -381,7 +360,7 @@ impl GridPressure {
     /// Extent `[x_min, x_max, y_min, y_max]` in mm and area in mm² of a patch, from its chords on lines along x.
     pub(crate) fn measure(&self, label: usize, shape: &PatchShape) -> ([f64; 4], f64) {
         let [y_min, y_max] = self.extent_across(shape, label);
-        // The length of chords varies as a square root at both ends of the patch, so lines are closer there.
+        // The length of chords varies as a square root at both ends of the patch, where lines are closer.
         let lines = (16 + shape.rows.clone().count()).max(48);
         let (middle, half) = (0.5 * (y_min + y_max), 0.5 * (y_max - y_min));
         let step = PI / lines as f64;
@@ -396,11 +375,9 @@ impl GridPressure {
             reach.widen(n, left, right);
         }
         // The longest chord of a rough patch may lie on a row of samples.
-        for (j, y) in self.grid.y.iter().enumerate() {
-            if y_min < *y && *y < y_max && self.may_reach(j, &reach) {
-                let (left, right, _) = ends(*y);
-                reach.widen(((middle - y) / half).acos() / step, left, right);
-            }
+        for y in self.grid.y.iter().filter(|y| y_min < **y && **y < y_max) {
+            let (left, right, _) = ends(*y);
+            reach.widen(((middle - y) / half).acos() / step, left, right);
         }
         let FarthestLines { left, right } = reach;
         let (first, last) = (|n: f64| -ends(at(n)).0, |n: f64| ends(at(n)).1);
@@ -414,15 +391,7 @@ impl GridPressure {
         (extent, area)
     }
 
-    /// May the line of row j reach farther than all lines so far? An edge lies at most two samples beyond the positive ones.
-    fn may_reach(&self, j: usize, reach: &FarthestLines) -> bool {
-        self.runs[j].is_none_or(|[first, last]| {
-            let x = &self.grid.x;
-            x[first - 2] < reach.left.0 || x[last + 2] > reach.right.0
-        })
-    }
-
-    /// Left and right end of a patch on the line at y, and the length of its segments there; infinite ends and 0 if it has none.
+    /// Left and right end of a patch on the line at y, and the length of its segments there; infinite ends and 0 without a segment.
     fn ends(&self, label: usize, y: f64) -> (f64, f64, f64) {
         let mut found = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
         self.each_segment(label, y, |left, right| {
@@ -431,16 +400,16 @@ impl GridPressure {
         found
     }
 
-    /// First and last y of lines that meet the patch.
+    /// Smallest and largest y of lines that meet the patch.
     fn extent_across(&self, shape: &PatchShape, label: usize) -> [f64; 2] {
         let y = &self.grid.y;
-        // The outermost samples are two lines inside the range of cells (see `shapes_from_samples`).
+        // The outermost samples lie two lines inside the range of cells (see `shapes_from_samples`).
         let [first, last] = [*shape.rows.start(), *shape.rows.end() + 1];
         [(first, first + 2), (last, last - 2)]
             .map(|(outside, inside)| self.end_across(label, [y[outside], y[inside]]))
     }
 
-    /// The last place that meets the patch on the way from `inside` to `outside`.
+    /// The last place from `inside` to `outside` at which the line meets the patch.
     fn end_across(&self, label: usize, [outside, inside]: [f64; 2]) -> f64 {
         let meets = |y: f64| {
             let (left, right, _) = self.ends(label, y);

@@ -1,25 +1,22 @@
-//! Continues squared pressure beyond the edge of the contact, so that its zero locates the edge.
+//! Squared pressure, continued beyond the edge of the contact so that its zero locates the edge, and its positive parts along lines of a grid.
 //!
-//! At the edge of a smooth contact the pressure is proportional to the square root of the distance, its square q to the
-//! distance. Samples outside the contact, where only `p = 0` is known, therefore get negative values extrapolated from
-//! inside. For Hertz's pressure q is a quadratic function and the continuation is exact.
-//!
-//! Squared pressure along a straight grid-parallel line: where it is positive.
+//! At the edge of a smooth contact the pressure is proportional to the square root of the distance, and its square q to the distance. Samples outside the contact,
+//! where only `p = 0` is known, get negative values extrapolated from inside. For Hertz's pressure q is quadratic and the continuation is exact.
 
 use crate::normal::pressure_field::grid_pressure::SampleGrid;
 use crate::numerics::interpolation;
 use crate::numerics::roots::Cubic;
 
-/// Number of samples outside that get an extrapolated value, counted from the nearest one inside along either axis.
+/// Number of samples outside with an extrapolated value, counted from the nearest one inside along either axis.
 const RINGS: usize = 3;
-/// Value of samples farther out; the largest inside is 1.
+/// Value of samples farther outside; the largest value inside is 1.
 const FAR: f64 = -1.0;
-/// How a sample's value was found, from least to most reliable.
+/// The origin of the value of a sample, from least to most reliable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum State {
     /// No value yet.
     Unknown,
-    /// Continued beyond a jump of pressure with a constant value, because a curve extrapolated through the jump would diverge.
+    /// Continued beyond a jump of pressure with a constant value, because an extrapolated curve would diverge.
     Step,
     /// Continued from fewer than three samples, or limited.
     Rough,
@@ -27,8 +24,8 @@ pub(crate) enum State {
     Smooth,
 }
 
-/// Replaces the zeros of `q` near positive samples by extrapolated values, none of them positive; `q` is scaled to at
-/// most 1 and stored as [`SampleGrid`] says. Returns how each sample is known.
+/// Replaces the zeros of `q` near positive samples by extrapolated values, which are not positive. `q` is scaled to at most 1 and stored as in [`SampleGrid`]. Returns
+/// the state of each sample.
 pub(crate) fn extend(grid: &SampleGrid, q: &mut [f64]) -> Vec<State> {
     let state_of = |q: &f64| {
         if *q > 0.0 {
@@ -81,7 +78,7 @@ fn near_positive(grid: &SampleGrid, q: &[f64]) -> Vec<bool> {
     widened(&widened(&positive, 1), grid.x.len())
 }
 
-/// Marks what is marked, and what lies at most [`RINGS`] strides away from it.
+/// Extends marks by up to [`RINGS`] strides.
 fn widened(marked: &[bool], stride: usize) -> Vec<bool> {
     let mut out = marked.to_vec();
     for ring in 1..=RINGS {
@@ -96,10 +93,10 @@ fn widened(marked: &[bool], stride: usize) -> Vec<bool> {
     out
 }
 
-/// Weights of the three samples before and after a place of an axis in the value of their parabola there.
+/// Weights of the three samples before and after a place of an axis for the value of their parabola there.
 type ParabolaWeights = [[f64; 3]; 2];
 
-/// Those of every place of an axis that has as many samples on that side; elsewhere 0.
+/// The weights of every place of an axis; 0 without three samples on that side.
 fn parabola_weights(axis: &[f64]) -> Vec<ParabolaWeights> {
     let of = |at: usize, nodes: [Option<usize>; 3]| {
         let nodes = nodes.map(|node| axis.get(node?).copied());
@@ -117,8 +114,8 @@ fn parabola_weights(axis: &[f64]) -> Vec<ParabolaWeights> {
     (0..axis.len()).map(both).collect()
 }
 
-/// Value of the unknown sample `k` from the most reliable extrapolations along the axes, if there are any. Their harmonic mean
-/// is used, so that the steep edge of a heavily loaded patch does not shift that of a lightly loaded one beside it.
+/// Value of the unknown sample `k` from the most reliable extrapolations along the axes, if there are any. Their harmonic mean prevents the steep edge of a heavily loaded
+/// patch from shifting that of a lightly loaded one beside it.
 fn continued(
     grid: &SampleGrid,
     weights: &[Vec<ParabolaWeights>; 2],
@@ -181,11 +178,10 @@ fn continued(
     (best > 0).then_some((count / inverse_sum, state))
 }
 
-/// Value of the first sample outside, from one to three samples inside and the value of the curve through them there, and how it is known.
+/// Value of the first sample outside, with its state, from one to three samples inside and the value there of the curve through them.
 ///
-/// The value is never positive, so the edge lies between the last sample inside and the first outside. Where the
-/// pressure jumps (the extrapolation is well above 0) the edge is put half-way; between the two cases the rule changes
-/// smoothly.
+/// The value is not positive, so the edge lies between the last sample inside and the first outside. Where the pressure jumps (the extrapolation is well above 0) the
+/// edge is half-way; between the two cases the rule changes smoothly.
 fn edge_value(at: f64, inside: &[(f64, f64)], value: f64) -> (f64, State) {
     const EDGE_AT_SAMPLE: f64 = 0.25;
     const JUMP: f64 = 0.75;
@@ -211,7 +207,7 @@ fn edge_value(at: f64, inside: &[(f64, f64)], value: f64) -> (f64, State) {
     (-last * jump.min(1.0), State::Step)
 }
 
-/// Value of a sample farther out, from one to three known ones and the value of the curve through them there; values never increase outward.
+/// Value of a sample farther outside, from one to three known ones and the value there of the curve through them. Values do not increase outward.
 fn outward_value(known: &[(f64, f64)], value: f64) -> (f64, State) {
     let smooth = known.len() == 3 && value <= known[0].1;
     (
@@ -220,25 +216,24 @@ fn outward_value(known: &[(f64, f64)], value: f64) -> (f64, State) {
     )
 }
 
-/// Values at the nodes of an axis, and the intervals that may belong to a patch. Everything is asked for when it is needed: most
-/// intervals of a line lie inside the contact, where no values are.
+/// A line of a grid: values at its nodes, and the intervals that may belong to a patch. Closures compute values on demand, because most intervals lie inside the contact
+/// and need none.
 pub(crate) struct GridLine<'f, V, I, S, A> {
     pub(crate) axis: &'f [f64],
-    /// The intervals, each named by the node at its start. Values are asked for one node before and one after them as well.
+    /// The intervals, each numbered by the node at its start. Values of one more node on either side are used as well.
     pub(crate) intervals: std::ops::RangeInclusive<usize>,
-    /// Nodes between which all are surely positive and every interval belongs to the patch, if that is known.
-    pub(crate) whole: Option<[usize; 2]>,
+
     /// The value at a node.
     pub(crate) value: V,
-    /// Is the value at a node surely positive?
+    /// Whether the value at a node is known to be positive.
     pub(crate) inside: I,
-    /// Are the samples around an interval smooth?
+    /// Whether the samples around an interval are smooth.
     pub(crate) smooth: S,
-    /// Which part of an interval may belong to the patch, from 0 at its start to 1 at its end; nothing if the part is empty.
+    /// The part of an interval that may belong to the patch, from 0 at its start to 1 at its end; it may be empty.
     pub(crate) allowed: A,
 }
 
-/// A cubic kept within the bounds that its ends suggest.
+/// A cubic limited to the bounds given by its ends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoundedCubic {
     cubic: Cubic,
@@ -252,23 +247,16 @@ where
     S: Fn(usize) -> bool,
     A: Fn(usize) -> [f64; 2],
 {
-    /// Tells the segments where the curve is positive, from smaller to larger coordinate.
+    /// Passes the segments on which the curve is positive to `tell`, by increasing coordinate.
     pub(crate) fn each_segment(&self, tell: impl FnMut(f64, f64)) {
         let mut segments = JoinedSegments { last: None, tell };
-        let mut known: Option<(usize, [f64; 4])> = None;
-        let mut nodes = self.intervals.clone();
-        while let Some(node) = nodes.next() {
-            if let Some([first, last]) = self.whole.filter(|[first, _]| *first == node) {
-                segments.add(self.axis[first], self.axis[last]);
-                nodes = last..=*self.intervals.end();
-                continue;
-            }
+        for node in self.intervals.clone() {
             let [from, to] = (self.allowed)(node);
             if to <= from {
                 continue;
             }
             let (low, high) = (self.axis[node], self.axis[node + 1]);
-            // The ends of a whole interval are its nodes to the last digit, so that segments join there.
+            // A whole interval must end exactly at its nodes, where segments join.
             let part = |s: f64, end: f64| {
                 if s == 0.0 || s == 1.0 {
                     end
@@ -278,20 +266,14 @@ where
             };
             let (from, to) = (part(from, low), part(to, high));
             let mut tell = |left: f64, right: f64| segments.add(left.max(from), right.min(to));
-            // Between two positive nodes the contact is whole: a gap there is not in the data.
+            // Between two positive nodes the contact has no gap.
             if (self.inside)(node) && (self.inside)(node + 1) {
                 tell(low, high);
                 continue;
             }
-            let values = match known {
-                Some((before, [_, a, b, c])) if before + 1 == node => {
-                    [a, b, c, (self.value)(node + 2)]
-                }
-                _ => [0, 1, 2, 3].map(|k| (self.value)(node + k - 1)),
-            };
-            known = Some((node, values));
+            let values = [0, 1, 2, 3].map(|k| (self.value)(node + k - 1));
             let [_, here, next, _] = values;
-            // Between two nodes that are not positive, a positive part counts only where it continues a smooth edge.
+            // Between two nodes that are not positive, a positive part counts only as the continuation of a smooth edge.
             if here > 0.0 || next > 0.0 || (self.smooth)(node) {
                 self.positive_parts(node, values, tell);
             }
@@ -299,7 +281,7 @@ where
         segments.end();
     }
 
-    /// Tells where the curve is positive between a node and the next one, part by part; `values` are those of the nodes around.
+    /// Passes the parts between a node and the next on which the curve is positive to `tell`; `values` are those of the nodes around.
     fn positive_parts(&self, node: usize, values: [f64; 4], mut tell: impl FnMut(f64, f64)) {
         let (low, high) = (self.axis[node], self.axis[node + 1]);
         let [_, here, next, _] = values;
@@ -325,7 +307,7 @@ where
     }
 }
 
-/// Segments told one after the other, those that meet as one.
+/// Joins successive segments that meet.
 struct JoinedSegments<T> {
     last: Option<(f64, f64)>,
     tell: T,
@@ -361,11 +343,11 @@ pub(crate) fn cubic(axis: &[f64], i: usize, values: [f64; 4]) -> BoundedCubic {
     }
 }
 
-/// Least and largest value of the curve between two nodes.
+/// Bounds of the curve between two nodes.
 ///
-/// If both are positive it stays above a quarter of the lower one; if none is and they are not smooth, below a quarter
-/// of the higher one, so not positive. It never exceeds twice the largest sample, which is 1: between samples the pressure
-/// may be a few per cent larger than on them; a larger excess results from very unequal spacing.
+/// Between positive nodes it stays above a quarter of the lower one. Between nodes that are neither positive nor smooth, it stays below a quarter of the higher one,
+/// hence not positive. It does not exceed twice the largest sample, which is 1: between samples the pressure may be a few per cent larger, and a larger excess
+/// results from very unequal spacing.
 pub(crate) fn bounds(left: f64, right: f64, smooth: bool) -> [f64; 2] {
     const LARGEST: f64 = 2.0;
     let (lower, higher) = (left.min(right), left.max(right));

@@ -1,4 +1,4 @@
-//! What a step has done: friction work, elastic energy, and the record of a point.
+//! Results of a step: friction work, elastic energy, and the record of a point.
 
 use crate::rolling::answer::{Resultants, project_on_bound};
 use crate::rolling::history::level_run::LevelRun;
@@ -7,10 +7,10 @@ use crate::rolling::slip_equations::SlipSource;
 use crate::rolling::task::Motion;
 
 impl LevelRun<'_> {
-    /// Adds what friction has dissipated in a step that began with the tractions `from`: what the motion has given less what is stored.
+    /// Adds the energy that friction has dissipated in a step that began with the tractions `from`: the work of the motion minus the stored energy.
     ///
-    /// Power summed over the cells, `∬T·s`, would miss several per cent: in steady rolling its error is that of the slip at the trailing edge,
-    /// where ν·F is as exact as the forces. In a shift there is no such slip, and the sum is taken.
+    /// The power summed over the cells, `∬T·s`, would be several per cent too small: in steady rolling its error is that of the slip at the trailing edge, while ν·F
+    /// is as accurate as the forces. A shift has no such slip, and the sum is used.
     pub(super) fn dissipate(&mut self, of: &StepEquations, from: &[f64]) {
         let rigid = self.rigid(of, &self.state.motion);
         let slip = self.workspace.slip().to_vec();
@@ -35,7 +35,7 @@ impl LevelRun<'_> {
                     (now[patch] - growing, given - (stored - last))
                 }
             };
-            // What the error of the mesh leaves below 0 where next to nothing slips.
+            // The error of the mesh may be negative where almost nothing slips.
             state.power[patch] = power.max(0.0);
             state.dissipated[patch] += dissipated.max(0.0);
             state.stored[patch] = match of.kind {
@@ -45,7 +45,7 @@ impl LevelRun<'_> {
         }
     }
 
-    /// Rigid slip of a dimensionless motion on the surface, with that of the pressure of unlike bodies or on a surface that bends where they roll.
+    /// Rigid slip of a dimensionless motion, with the slip of the surface if the bodies roll.
     pub(super) fn rigid(&self, of: &StepEquations, motion: &Motion) -> Vec<f64> {
         let rolls = matches!(of.kind, StepKind::Steady | StepKind::Roll { .. });
         let source = self.level.surface_slip.as_ref().filter(|_| rolls);
@@ -64,7 +64,7 @@ impl LevelRun<'_> {
         rigid
     }
 
-    /// Adds values of the cells, along x and across, to those of the unknowns.
+    /// Adds values of the cells, along x and across, to the unknowns.
     pub(super) fn add_to_cells(&self, unknowns: &mut [f64], values: [&Vec<f64>; 2]) {
         let half = unknowns.len() / 2;
         for (unknowns, values) in unknowns.chunks_exact_mut(half).zip(values) {
@@ -73,7 +73,7 @@ impl LevelRun<'_> {
         }
     }
 
-    /// `∬a·b` over each patch in N where `a` is a traction and `b` a slip, both of the unknowns and dimensionless.
+    /// `∬a·b` over each patch in N for a traction `a` and a slip `b`, both dimensionless values of the unknowns.
     pub(super) fn per_patch(&self, a: &[f64], b: &[f64]) -> Vec<f64> {
         let [a, b] = [a, b].map(|values| self.expand(values));
         let level = self.level;
@@ -85,7 +85,7 @@ impl LevelRun<'_> {
             .collect()
     }
 
-    /// What is kept of the state that the last step has led to.
+    /// The record of the state after the last step.
     pub(super) fn record(&mut self, of: &StepEquations) -> PointRecord {
         let level = self.level;
         let slip = self.workspace.slip();
@@ -99,7 +99,7 @@ impl LevelRun<'_> {
         let motion = self.state.motion;
         let (shifted, motion) = match of.kind {
             StepKind::Shift | StepKind::Press => {
-                // Displacements are no slips.
+                // Displacements are not slips.
                 slip.iter_mut().for_each(|slip| slip.fill(0.0));
                 (scale.shift(&motion), Motion::default())
             }
@@ -124,7 +124,7 @@ impl LevelRun<'_> {
         }
     }
 
-    /// Values of the unknowns over the whole mesh.
+    /// Expands values of the unknowns to the whole mesh.
     pub(super) fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
         self.level.expand(self.parity, values)
     }

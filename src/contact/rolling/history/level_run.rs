@@ -1,4 +1,4 @@
-//! A history on one level: step by step, with the displacements that each step remembers.
+//! A history on one mesh, step by step.
 
 use std::sync::Arc;
 
@@ -22,11 +22,11 @@ use crate::rolling::slip_rules::Rule;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Motion, PrescribedForces, RollingTask};
 
-/// Tangential stiffness of a circular patch over shear modulus and radius, for the first trial of a force: 4/(2 − ν) of both bodies together
-/// (Mindlin 1949). Later trials take what was found.
+/// Tangential stiffness of a circular patch over shear modulus and radius, for the first trial of a force: 4/(2 − ν) of both bodies together (Mindlin 1949).
+/// Later trials use the stiffness found.
 const STIFFNESS: f64 = 2.5;
 
-/// What is solved on one level.
+/// The solve of a history on one mesh.
 pub struct LevelRun<'a> {
     pub(super) task: &'a RollingTask<'a>,
     pub(super) history: &'a HistoryTask,
@@ -34,43 +34,44 @@ pub struct LevelRun<'a> {
     pub(super) operator: Arc<StripOperator>,
     pub(super) parity: Option<Parity>,
     pub(super) edges: LeadingEdges,
-    /// Cells with unknowns.
+    /// Number of cells with unknowns.
     pub(super) cells: usize,
-    /// Of the last step.
+    /// Bounds of the last step.
     pub(super) bound: Vec<f64>,
     pub(super) track: Option<TrackFriction>,
     pub(super) slip_friction: Option<SlipFriction>,
     /// Friction limit of the unknowns with the largest coefficient, dimensionless.
     pub(super) limit: f64,
     pub(super) area: Vec<f64>,
-    /// Residual of the tractions, and by how much forces may be missed, both relative.
+    /// Tolerances of the residual of the tractions and of the forces, both relative.
     pub(super) tolerance: [f64; 2],
     pub(super) workspace: &'a mut NewtonWorkspace,
     pub(super) monitor: &'a dyn Monitor,
     pub(super) state: RunState,
 }
 
-/// What the next step begins with.
+/// The state before a step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RunState {
     pub(super) tractions: Vec<f64>,
-    /// Where the next solve starts.
+    /// The start of the next solve.
     pub(super) guess: Vec<f64>,
-    /// Displacements at the nodes, and a step earlier.
+    /// Displacements at the nodes.
     pub(super) displacement: Vec<f64>,
+    /// Displacements one step before.
     pub(super) earlier: Vec<f64>,
     /// Dimensionless creepages or shift of the last step.
     pub(super) motion: Motion,
     pub(super) power: Vec<f64>,
     pub(super) dissipated: Vec<f64>,
-    /// Elastic energy of every patch in N·mm, now and a step earlier.
+    /// Elastic energy of every patch in N·mm, now and one step before.
     pub(super) stored: Vec<[f64; 2]>,
     pub(super) work: Work,
     pub(super) saturated: bool,
 }
 
 impl<'a> LevelRun<'a> {
-    /// A run that begins without tractions.
+    /// A history that begins without tractions.
     ///
     /// # Errors
     /// The monitor may stop the work.
@@ -105,7 +106,7 @@ impl<'a> LevelRun<'a> {
             track: law.map(|law| TrackFriction::new(law, &level.mesh, cells, &bound)),
             slip_friction: (task.bound_fall(0, level.scale.slip()))
                 .map(|fall| SlipFriction::new(fall, &bound)),
-            edges: LeadingEdges::new(&level.normalised, level.poisson_ratio(), parity),
+            edges: LeadingEdges::new(&level.normalised, level.poisson_ratio, parity),
             bound,
             area,
             state: RunState {
@@ -171,7 +172,7 @@ impl<'a> LevelRun<'a> {
         Ok(points)
     }
 
-    /// By how much the displacements of a step make the slip of each cell fall if all tractions grow by one.
+    /// The decrease of the slip of each cell through the displacements of a step if all tractions grow by one.
     fn gain(&self, equations: &SlipEquations) -> Vec<f64> {
         let mut even = vec![0.0; self.state.tractions.len()];
         even[..self.cells].fill(1.0);
@@ -193,14 +194,14 @@ impl<'a> LevelRun<'a> {
             StepKind::Roll { distance, growth } => {
                 distance / (self.level.scale.length * weights(growth)[0])
             }
-            // Creepage has about brought its force after half of the length.
+            // Creepage produces most of its force within half of the length.
             StepKind::Steady => 0.5 * (patch[1] - patch[0]) / self.level.scale.length,
         };
         let scale = self.task.forces[0].map(|force| force.map(|_| 1.0 / (stiffness * reach)));
         Search::new(scale, [f64::INFINITY; 2])
     }
 
-    /// One step: its motion, or the one that gives its forces.
+    /// Solves one step with its motion, or with the motion that gives its forces.
     fn step(
         &mut self,
         of: &StepEquations,
@@ -208,10 +209,10 @@ impl<'a> LevelRun<'a> {
         search: &mut Search<2>,
     ) -> Result<(), LevelFailure> {
         if let Some(track) = &self.track {
-            track.lay(step.travelled(self.history), &mut self.bound);
+            track.set_bounds(step.travelled(self.history), &mut self.bound);
         }
         if let Some(friction) = &self.slip_friction {
-            friction.lay(of.kind, &mut self.bound);
+            friction.set_bounds(of.kind, &mut self.bound);
         }
         if of.kind == StepKind::Press {
             return self.press(of);
@@ -264,7 +265,7 @@ impl<'a> LevelRun<'a> {
         let forces = [0, 1].map(|k| to[k].map(|to| between(from[k].unwrap_or(to), to)));
         if step.kind == StepKind::Shift {
             let shift = self.history.shifts[point];
-            // A force that is there before the bodies roll.
+            // A force that is applied before the bodies roll has no given shift.
             let shift = if step.last { shift } else { Motion::default() };
             let shift = scale.motion(&shift);
             let length = scale.length;
@@ -276,7 +277,7 @@ impl<'a> LevelRun<'a> {
         (scale.motion(&motion), forces)
     }
 
-    /// The slip that the displacements before the step add to it.
+    /// The slip from the displacements before the step.
     fn memory(&self, of: &StepEquations) -> [Vec<f64>; 2] {
         let RunState {
             displacement,
@@ -323,7 +324,7 @@ impl<'a> LevelRun<'a> {
             .solve(&law, &mut tractions, self.workspace, self.monitor)?;
         let mut work = of.newton.work(&report);
         if !report.converged {
-            // Try again without a start, which may be why the iteration did not converge.
+            // The start may prevent convergence.
             tractions.fill(0.0);
             report = of
                 .newton
@@ -354,7 +355,7 @@ impl<'a> LevelRun<'a> {
         [sum(x) / limit, sum(y) / limit]
     }
 
-    /// Takes over the tractions of a step.
+    /// Makes the tractions of a step the present state.
     fn advance(&mut self, of: &StepEquations, motion: Motion, tractions: Vec<f64>) {
         let mut displacement = vec![0.0; tractions.len()];
         let mut scratch = SlipScratch::default();
@@ -362,7 +363,7 @@ impl<'a> LevelRun<'a> {
             .displacement(&tractions, &mut displacement, &mut scratch);
         let state = &mut self.state;
         state.earlier = match of.kind {
-            // Nothing changed before.
+            // Before steady rolling, displacements do not change.
             StepKind::Steady => displacement.clone(),
             _ => std::mem::take(&mut state.displacement),
         };
@@ -372,9 +373,34 @@ impl<'a> LevelRun<'a> {
         self.dissipate(of, &from);
         self.follow_slips(of);
     }
+
+    /// The weakening of the bounds within a step, which only steady rolling has.
+    fn fall(&self, kind: StepKind) -> Option<Softening> {
+        let friction = self.slip_friction.as_ref()?;
+        (kind == StepKind::Steady).then_some(friction.fall)
+    }
+
+    /// Updates bounds that weaken with slip by the slips of a step.
+    fn follow_slips(&mut self, of: &StepEquations) {
+        let Some(friction) = &mut self.slip_friction else {
+            return;
+        };
+        let slip = self.workspace.slip();
+        let half = slip.len() / 2;
+        let slides = |i: usize| of.newton.slips(&self.bound, &self.state.tractions, slip, i);
+        let size = |i: usize| match slides(i) {
+            true => slip[i].hypot(slip[half + i]),
+            false => 0.0,
+        };
+        let sizes: Vec<f64> = (0..self.cells).map(size).collect();
+        friction.follow(of.kind, &sizes);
+        if of.kind == StepKind::Steady {
+            self.bound.copy_from_slice(&friction.next);
+        }
+    }
 }
 
-/// A motion that has every component that any motion or shift of a history has.
+/// A motion with every component that occurs in a motion or shift of a history.
 fn every_motion(task: &RollingTask, history: &HistoryTask) -> Motion {
     let mut every = [0.0; 3];
     for motion in task.motions.iter().chain(&history.shifts) {
@@ -388,87 +414,75 @@ fn every_motion(task: &RollingTask, history: &HistoryTask) -> Motion {
     Motion::of(every)
 }
 
-/// Distance in which bounds follow slips, over that above which disturbances die away; the weight of a step's own displacements, 1.5, counts
-/// against it. With 2 a mesh of 16 × 32 is off by up to 0.029 of the friction limit, with 4 by 0.016, in the three histories of
+/// Ratio of the distance over which bounds follow slips to the distance above which disturbances decay. The weight 1.5 of the displacements at the end of a step
+/// counts against it. With 2 a mesh of 16 × 32 is off by up to 0.029 of the friction limit, with 4 by 0.016, in the three histories of
 /// `cargo test --test physics -- history_falling::finer --nocapture`.
 const DAMPING: f64 = 4.0;
 
-/// Bounds of the cells with unknowns.
+/// Bounds of the cells with unknowns that weaken with slip. In rolling they follow the slip of earlier steps with a lag.
 pub(super) struct SlipFriction {
     fall: Softening,
-    /// Without slip.
+    /// Bounds without slip.
     rest: Vec<f64>,
-    /// Of the next step of rolling.
+    /// Bounds of the next step of rolling.
     next: Vec<f64>,
-    /// The distance D in mm.
-    reach: f64,
+    /// The distance in mm by which bounds lag behind slips.
+    lag: f64,
 }
 
 impl SlipFriction {
-    /// Bodies that have not slipped yet, with these bounds at rest.
+    /// The state before any slip, with the bounds without slip.
     pub(super) fn new(fall: Softening, rest: &[f64]) -> SlipFriction {
         SlipFriction {
             fall,
             rest: rest.to_vec(),
             next: rest.to_vec(),
-            reach: 0.0,
+            lag: 0.0,
         }
     }
 
-    /// The fall that a step follows at once, which only steady rolling does.
-    pub(super) fn at_once(&self, kind: StepKind) -> Option<Softening> {
-        (kind == StepKind::Steady).then_some(self.fall)
-    }
-
-    /// Finds the distance D. `gain` is by how much the slip of each cell falls in a step if all tractions grow by one, and `per_mm` the
-    /// part of it that a displacement of one mm would have.
+    /// Sets the lag. `gain` is the decrease of the slip of each cell in a step if all tractions grow by one, and `per_mm` its part per mm of displacement.
     pub(super) fn damp(&mut self, gain: &[f64], per_mm: f64) {
         let steepest = self.fall.steepest();
         let of_cell = |(gain, rest): (&f64, &f64)| steepest * rest * gain.abs();
         let most = gain.iter().zip(&self.rest).map(of_cell);
-        self.reach = DAMPING * most.fold(0.0, f64::max) / per_mm;
+        self.lag = DAMPING * most.fold(0.0, f64::max) / per_mm;
     }
 
-    /// Sets the bounds of a step. Bodies that shift do so slowly.
-    pub(super) fn lay(&self, kind: StepKind, bounds: &mut [f64]) {
+    /// Sets the bounds of a step; those without slip in a shift, which is slow.
+    pub(super) fn set_bounds(&self, kind: StepKind, bounds: &mut [f64]) {
         bounds.copy_from_slice(match kind {
             StepKind::Roll { .. } => &self.next,
             StepKind::Steady | StepKind::Press | StepKind::Shift => &self.rest,
         });
     }
 
-    /// Takes over the sizes of the slips that a step has led to, 0 where cells stick.
+    /// Updates the bounds by the sizes of the slips after a step, 0 where cells stick.
     pub(super) fn follow(&mut self, kind: StepKind, slips: &[f64]) {
         let share = match kind {
             StepKind::Shift | StepKind::Press => return self.next.clone_from(&self.rest),
             StepKind::Steady => 1.0,
-            // Bounds of the next step follow slips of this one; with this share they lag by D in the mean, whatever the length of the steps.
-            StepKind::Roll { distance, .. } => (distance / self.reach).min(1.0),
+            // With this share the bounds lag behind the slips by `lag` on average, for steps of any length.
+            StepKind::Roll { distance, .. } => (distance / self.lag).min(1.0),
         };
         let cells = self.next.iter_mut().zip(&self.rest).zip(slips);
         for ((next, rest), slip) in cells {
             *next += share * (rest * self.fall.at(*slip).0 - *next);
         }
     }
-
-    /// Bounds that belong to the slips of steady rolling, which has been taken over last.
-    pub(super) fn settled(&self) -> &[f64] {
-        &self.next
-    }
 }
 
-/// What the bounds of the cells are taken from.
+/// Friction coefficients along the track under the cells.
 pub(super) struct TrackFriction {
     law: CoefficientTable,
-    /// Trailing and leading edge of each cell with unknowns in mm, when nothing has been rolled over.
+    /// Trailing and leading edge of each cell with unknowns in mm, before any rolling.
     cells: Vec<[f64; 2]>,
     /// Bounds with the largest coefficient.
     largest: Vec<f64>,
 }
 
 impl TrackFriction {
-    /// The friction of a track under the first cells of a mesh in mm, as many as have unknowns, which would have these bounds with the
-    /// largest coefficient everywhere.
+    /// The friction of a track under the first `cells` cells of a mesh in mm. `largest` are the bounds with the largest coefficient everywhere.
     pub(super) fn new(
         law: &CoefficientTable,
         mesh: &Mesh,
@@ -483,8 +497,8 @@ impl TrackFriction {
         }
     }
 
-    /// Sets the bounds to those of the coefficients under the cells after so many mm; rolling goes towards larger x.
-    pub(super) fn lay(&self, travelled: f64, bounds: &mut [f64]) {
+    /// Sets the bounds after rolling `travelled` mm towards larger x.
+    pub(super) fn set_bounds(&self, travelled: f64, bounds: &mut [f64]) {
         let most = self.law.largest();
         let cells = self.cells.iter().zip(&self.largest);
         for (bound, ([left, right], largest)) in bounds.iter_mut().zip(cells) {

@@ -1,13 +1,7 @@
-//! In which steps a history is solved: equal ones from point to point, short ones where it begins anew.
+//! The steps of a history, the data of a history, and the record of a point.
 //!
-//! Each step is a backward difference of second order in the displacements (BDF2) with the weights for unequal steps (Hairer, Nørsett &
-//! Wanner 1993, §III.5), or of first order where no step was before it.
-//!
-//! The slip equations of the steps of one kind.
-//!
-//! What a history asks beside its motions and forces.
-//!
-//! What is kept of a point of a history.
+//! Steps are equal from point to point and shorter where a sequence begins. Each is a backward difference of second order in the displacements (BDF2) with the
+//! weights for unequal steps (Hairer, Nørsett & Wanner 1993, §III.5), or of first order if no step precedes it.
 
 use railhead_macros::Words;
 use serde::{Deserialize, Serialize};
@@ -23,26 +17,26 @@ use crate::rolling::slip_rules::Rule;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
-/// A step may be longer than the one before by this factor at most; BDF2 is stable up to 1 + √2.
+/// Largest ratio of a step to the one before; BDF2 is stable up to 1 + √2.
 const GROWTH_MAX: f64 = 2.0;
 
-/// Weights in the slip of a step of pressing: of the displacements at its end, and with the sign turned of those one and two steps smaller.
+/// Weights in the slip of a step of pressing: of the displacements at its end and, with negative sign, of those one and two steps before.
 pub(super) const PRESS_WEIGHTS: [f64; 3] = [1.5, 2.0, -0.5];
 
-/// What the bodies do in a step.
+/// The motion of the bodies in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepKind {
-    /// They roll in the state that belongs to the motion.
+    /// Steady rolling.
     Steady,
-    /// They are pressed together.
+    /// Pressing together.
     Press,
-    /// They are shifted without rolling.
+    /// A shift without rolling.
     Shift,
-    /// They roll a distance in mm; the step before was longer by 1/growth, which is 0 if there was none.
+    /// Rolling over a distance.
     Roll {
-        /// The distance.
+        /// Distance in mm.
         distance: f64,
-        /// Length over that of the step before.
+        /// Length of the step over that of the previous one; 0 if there is none.
         growth: f64,
     },
 }
@@ -50,18 +44,18 @@ pub enum StepKind {
 /// One step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HistoryStep {
-    /// What it is.
+    /// The motion of the bodies.
     pub kind: StepKind,
-    /// The point that it leads to.
+    /// The point to which it leads.
     pub point: usize,
-    /// Which part of the way from the point before is done after it.
+    /// Part of the way from the previous point that is completed after the step.
     pub share: f64,
-    /// Does it end at the point?
+    /// Whether it ends at the point.
     pub last: bool,
 }
 
 impl HistoryStep {
-    /// Distance in mm rolled since the start of a history when this step of it ends.
+    /// Distance in mm rolled since the start of the history at the end of the step.
     pub(super) fn travelled(&self, history: &HistoryTask) -> f64 {
         let before = (self.point.checked_sub(1)).map_or(0.0, |k| history.distances[k]);
         match self.kind {
@@ -71,7 +65,7 @@ impl HistoryStep {
     }
 }
 
-/// Weights of a backward difference, over the length of the step: of the displacement at its end, at its beginning, and a step earlier.
+/// Weights of a backward difference over the length of the step: of the displacement at its end, at its beginning, and one step earlier.
 pub fn weights(growth: f64) -> [f64; 3] {
     [
         (1.0 + 2.0 * growth) / (1.0 + growth),
@@ -80,13 +74,13 @@ pub fn weights(growth: f64) -> [f64; 3] {
     ]
 }
 
-/// Steps of a point that is rolled to.
+/// Lengths of the steps that roll to a point.
 fn rolled(distance: f64, longest: f64, before: Option<f64>) -> Vec<f64> {
     let count = (distance / longest).ceil().max(1.0);
     let even = distance / count;
     let count = count as usize;
     match before {
-        // The first of a sequence is divided, since it is of first order.
+        // The first step of a sequence is divided, because it is of first order.
         None => {
             let mut steps = vec![0.25 * even, 0.25 * even, 0.5 * even];
             steps.extend(std::iter::repeat_n(even, count - 1));
@@ -111,14 +105,14 @@ fn rolled(distance: f64, longest: f64, before: Option<f64>) -> Vec<f64> {
     }
 }
 
-/// Steps in a history of these distances, none longer than `longest` mm.
+/// Number of steps of a history, none longer than `longest` mm.
 pub fn count(history: &HistoryTask, longest: f64) -> f64 {
     let points = 0..history.distances.len();
     let steps = points.map(|k| (history.rolled(k) / longest).ceil().max(1.0));
     3.0 + steps.sum::<f64>()
 }
 
-/// Do the bodies shift at a first point to which they do not roll?
+/// Whether the bodies shift at a first point without rolling to it.
 fn begins_with_shift(history: &HistoryTask, forced: bool) -> bool {
     match history.start {
         HistoryStart::Steady => false,
@@ -127,8 +121,7 @@ fn begins_with_shift(history: &HistoryTask, forced: bool) -> bool {
     }
 }
 
-/// The steps of a history, none longer than `longest` mm. With `forced`, where a force is prescribed, one that is there at once is
-/// brought up by a shift before the bodies roll.
+/// The steps of a history, none longer than `longest` mm. With `forced`, a force that is prescribed at the start is applied by a shift before the bodies roll.
 pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistoryStep> {
     let mut steps = Vec::new();
     let whole = |kind, point| HistoryStep {
@@ -154,7 +147,7 @@ pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistorySt
             for length in lengths {
                 done += length;
                 let growth = before.map_or(0.0, |before| length / before);
-                // Rounding would make every step one of its own kind.
+                // Rounding would prevent steps from sharing their equations.
                 let growth = if (growth - 1.0).abs() < 1e-9 {
                     1.0
                 } else {
@@ -182,14 +175,14 @@ pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistorySt
     steps
 }
 
-/// Equations of steps of one kind.
+/// The equations of steps of one kind.
 pub(super) struct StepEquations<'e> {
     pub(super) kind: StepKind,
     pub(super) equations: &'e SlipEquations<'e>,
     pub(super) newton: &'e Newton<'e>,
 }
 
-/// How the displacements enter the slip of a step of this kind, for a unit of length in mm.
+/// The memory of displacements in steps of this kind, for a unit of length in mm.
 pub(super) fn memory(kind: StepKind, edges: &LeadingEdges, unit: f64) -> DisplacementMemory<'_> {
     let (factor, rolls) = match kind {
         StepKind::Steady => (0.0, true),
@@ -204,7 +197,7 @@ pub(super) fn memory(kind: StepKind, edges: &LeadingEdges, unit: f64) -> Displac
     }
 }
 
-/// Equations of steady rolling by a rule.
+/// The equations of steady rolling by a rule.
 pub(super) fn steady<'e>(
     rule: Rule,
     (level, operator, parity): (&StripMesh, &'e StripOperator, Option<Parity>),
@@ -227,60 +220,59 @@ pub enum HistoryStart {
     Pressed,
 }
 
-/// A sequence of motions in the distance rolled; creepages, spin and forces change linearly between them.
+/// A sequence of motions over the distance rolled; creepages, spin and forces change linearly between them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct HistoryTask {
-    /// Where it begins.
+    /// The initial state.
     pub start: HistoryStart,
-    /// Distance rolled since the start in mm, motion by motion, never less than the one before. Where it is the same as before, or 0 at
-    /// first, the bodies do not roll: they are shifted.
+    /// Distance rolled since the start in mm, motion by motion, not decreasing. Where it does not increase, or is 0 at first, the bodies do not roll but are
+    /// shifted.
     pub distances: Vec<f64>,
-    /// Displacements of the upper body against the lower one at these points, in mm and rad; a component is found where its force is
-    /// prescribed.
+    /// Displacements of the upper body relative to the lower one at these points, in mm and rad. A component with a prescribed force is found.
     pub shifts: Vec<Motion>,
 }
 
 impl HistoryTask {
-    /// Is pressing all that is asked for?
+    /// Whether pressing is all that is requested.
     pub fn only_presses(&self) -> bool {
         self.start == HistoryStart::Pressed
             && self.distances == [0.0]
             && self.shifts == [Motion::default()]
     }
 
-    /// Distance rolled from the point before to point `index`; 0 of a shift.
+    /// Distance rolled from the previous point to point `index`; 0 for a shift.
     pub fn rolled(&self, index: usize) -> f64 {
         let before = index.checked_sub(1).map_or(0.0, |k| self.distances[k]);
         self.distances[index] - before
     }
 }
 
-/// A solved point of a history on one level.
+/// A solved point of a history on one mesh.
 #[derive(Debug, Clone, Default)]
 pub struct PointRecord {
-    /// Creepages and spin, in the units of the case; found where forces are prescribed.
+    /// Creepages and spin, in the units of the case; those found where forces are prescribed.
     pub motion: Motion,
-    /// The shift that led here without rolling, in mm and rad.
+    /// The shift without rolling that leads to the point, in mm and rad.
     pub shift: Motion,
     /// Resultants of every patch about the origin of the case.
     pub resultants: Vec<Resultants>,
-    /// Power of friction of every patch over the rolling speed, in N; 0 of a shift.
+    /// Power of friction over the rolling speed in N, for every patch; 0 in a shift.
     pub power: Vec<f64>,
-    /// What friction has dissipated since the start, of every patch, in N·mm.
+    /// Energy dissipated by friction since the start in N·mm, for every patch.
     pub dissipated: Vec<f64>,
     /// Sum of the lengths of all tractions over the friction limit.
     pub carried: f64,
     /// Elastic energy of all tangential displacements in N·mm.
     pub elastic: f64,
-    /// Tractions, slips, and which cells slip, dimensionless on the level.
+    /// Tractions, dimensionless.
     pub traction: [Vec<f64>; 2],
-    /// See [`PointRecord::traction`].
+    /// Slips, dimensionless.
     pub slip: [Vec<f64>; 2],
-    /// See [`PointRecord::traction`].
+    /// Slip flags of the cells.
     pub slips: Vec<bool>,
     /// Whether a prescribed force could not be reached.
     pub saturated: bool,
-    /// Work since the point before.
+    /// Work since the previous point.
     pub work: Work,
 }
 

@@ -1,29 +1,25 @@
-//! Displacements of the smaller patch that a pressed one has grown from, where every state of the growth is a scaled copy of the last.
+//! Displacements of an earlier, smaller state of a self-similar loading.
 //!
-//! Under a gap of second degree a patch pressed together along one load path stays similar to itself: at half the size it has half the
-//! tractions and a quarter of the displacements (Spence 1968). With U(x) the displacements of the present state, those at the time when the patch
-//! was smaller by ρ are ρ⁻² U(ρx).
+//! Under a gap of second degree, a patch that is pressed together along one load path stays similar to itself: at half the size it has half the tractions and
+//! a quarter of the displacements (Spence 1968). With the displacements U(x) of the present state, those of the state smaller by ρ are ρ⁻² U(ρx).
 //!
-//! The state in which pressing leaves bodies that differ, step by step of a growing patch (Spence 1968, 1975).
+//! The state after pressing bodies that differ, computed step by step for a growing patch (Spence 1968, 1975).
 //!
-//! A step lets the patch grow by the factor ρ. Slip over it is minus the change of the displacements U at a fixed place, of which the
-//! backward difference of second order in the logarithm of the size is `3/2 U(x) − 2 ρ⁻² U(ρx) + 1/2 ρ⁻⁴ U(ρ²x)`. Steps are taken until the tractions are the scaled
-//! copy of those before; what the first of them began with is then forgotten.
-//!
-//! How the steps of a run take part in friction that falls with slip.
+//! In a step the patch grows by the factor ρ. The slip is minus the change of the displacements U at a fixed place, whose backward difference of second order in
+//! the logarithm of the size is `3/2 U(x) − 2 ρ⁻² U(ρx) + 1/2 ρ⁻⁴ U(ρ²x)`. Steps follow until the tractions are the scaled copy of those before, so that the
+//! initial state is forgotten.
 
-use crate::friction::velocity_weakening::Softening;
 use crate::half_space::kernels::{Rectangle, rectangle};
 use crate::half_space::unlike_bodies::displacement;
 use crate::mesh::Mesh;
 use crate::numerics::interpolation;
 use crate::rolling::answer::LevelFailure;
 use crate::rolling::history::level_run::LevelRun;
-use crate::rolling::history::plan::{PRESS_WEIGHTS, StepEquations, StepKind};
+use crate::rolling::history::plan::{PRESS_WEIGHTS, StepEquations};
 use crate::rolling::slip_equations::SlipScratch;
 use crate::rolling::task::Motion;
 
-/// What the displacements of a state depend on, over all cells of a dimensionless mesh.
+/// The state that determines the displacements, over all cells of a dimensionless mesh.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PressedState {
     /// Displacements at the nodes, along x and across.
@@ -33,7 +29,7 @@ pub(crate) struct PressedState {
 }
 
 impl PressedState {
-    /// The state in the middle between two.
+    /// The mean of two states.
     pub(crate) fn mean(&self, other: &PressedState) -> PressedState {
         let between = |a: &[Vec<f64>; 2], b: &[Vec<f64>; 2]| {
             [0, 1].map(|k| a[k].iter().zip(&b[k]).map(|(a, b)| 0.5 * (a + b)).collect())
@@ -45,12 +41,12 @@ impl PressedState {
     }
 }
 
-/// How the displacement at a scaled place follows from a state.
+/// The displacement at a scaled place as a function of the state.
 #[derive(Debug, Clone)]
 enum ScaledPlace {
-    /// Inside the patch, from those at nodes around it.
+    /// Inside the patch: weights of the displacements at nodes around.
     Inside(Vec<(usize, f64)>),
-    /// Outside, from the tractions of all cells (along x, either from the other, across) and the pressures.
+    /// Outside: influence of the tractions of all cells (along x from x, mixed, across from y) and displacement by the pressures.
     Outside {
         along: Vec<f64>,
         mixed: Vec<f64>,
@@ -59,14 +55,14 @@ enum ScaledPlace {
     },
 }
 
-/// The displacements of a state that was smaller by a factor, at the nodes of the present one.
+/// The displacements, at the nodes of the present state, of the state that was smaller by a factor.
 #[derive(Debug, Clone)]
 pub(crate) struct SelfSimilarState {
     factor: f64,
     places: Vec<ScaledPlace>,
 }
 
-/// The pair, and pressures over the unit of traction.
+/// Elastic constants of the pair, and pressures over the unit of traction.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PressedPair<'a> {
     /// Poisson's ratio of the pair.
@@ -78,7 +74,7 @@ pub(crate) struct PressedPair<'a> {
 }
 
 impl SelfSimilarState {
-    /// The state that was smaller by `factor`, more than 1, about `centre`, at the first `cells` nodes of a mesh.
+    /// The state smaller by `factor`, more than 1, about `centre`, at the first `cells` nodes of a mesh.
     pub(crate) fn new(
         mesh: &Mesh,
         pair: &PressedPair,
@@ -130,14 +126,14 @@ impl SelfSimilarState {
         [0, 1].map(|k| found.iter().map(|u| scale * u[k]).collect())
     }
 
-    /// Bytes of those that a mesh of so many cells needs.
+    /// Memory in bytes on a mesh.
     pub(crate) fn bytes(cells: f64) -> f64 {
-        // Two factors, unknowns in half of the cells, three numbers for each of the third of the scaled nodes that lies outside.
+        // Two factors, unknowns in half of the cells, and three numbers for the third of the scaled nodes that lies outside.
         3.0 * 8.0 * cells * cells / 3.0
     }
 }
 
-/// Nodes around a place of the mesh with their weights, along x at the same angle and across by cubics; none outside.
+/// Nodes around a place of the mesh with their weights, by cubics along x at the same angle and across; `None` outside.
 fn around(mesh: &Mesh, [x, y]: [f64; 2]) -> Option<Vec<(usize, f64)>> {
     let middles: Vec<f64> = mesh.segments.iter().map(|s| s.chord.y).collect();
     let (first, last) = (*middles.first()?, *middles.last()?);
@@ -155,7 +151,7 @@ fn around(mesh: &Mesh, [x, y]: [f64; 2]) -> Option<Vec<(usize, f64)>> {
     let strips: [usize; 4] = std::array::from_fn(|k| from + k);
     let mut places = strips.map(relative);
     if places.iter().any(|place| place.abs() >= 1.0) {
-        // Near the edge strips are followed at the same part of their half-length, which is that at the place.
+        // Near the edge strips are followed at the relative position of the place.
         let half = |j: usize| 0.5 * (mesh.segments[j].chord.right - mesh.segments[j].chord.left);
         let squares = strips.map(|j| half(j) * half(j));
         let weights = interpolation::polynomial_weights(&nodes, y);
@@ -184,7 +180,7 @@ fn around(mesh: &Mesh, [x, y]: [f64; 2]) -> Option<Vec<(usize, f64)>> {
     Some(weights)
 }
 
-/// Nodes of strip `j` and their weights at a place between −1 and 1 of its half-length: a cubic in the angle, in which nodes have equal distances.
+/// Nodes of strip `j` and their weights at a relative position between −1 and 1: a cubic in the angle, in which nodes have equal distances.
 fn along(mesh: &Mesh, j: usize, place: f64) -> Option<[(usize, f64); 4]> {
     let segment = &mesh.segments[j];
     let chord = segment.chord;
@@ -205,7 +201,7 @@ fn along(mesh: &Mesh, j: usize, place: f64) -> Option<[(usize, f64); 4]> {
     Some(std::array::from_fn(|k| (from + k, weights[k])))
 }
 
-/// What every cell displaces at a place.
+/// The influence of every cell on a place outside.
 fn outside(mesh: &Mesh, pair: &PressedPair, [x, y]: [f64; 2]) -> ScaledPlace {
     let [mut along, mut mixed, mut across] =
         [0; 3].map(|_| Vec::<f64>::with_capacity(mesh.cells()));
@@ -232,20 +228,19 @@ fn outside(mesh: &Mesh, pair: &PressedPair, [x, y]: [f64; 2]) -> ScaledPlace {
     }
 }
 
-// The numbers below were chosen on the three contacts of `tests/physics/pressing.rs`; what others give was not measured.
+// The constants below were chosen on the three contacts of `tests/physics/pressing.rs`.
 
 /// Growth of the patch in a step.
 const GROWTH: f64 = 1.05;
-/// Steps at most; 100 shrink what a step began with by 130.
+/// Largest number of steps; 100 steps reduce the influence of the initial state by 130.
 const STEPS_MAX: usize = 300;
-/// From this step on the mean of two states is taken for the past, since single cells at the edge of what sticks may come and go for ever
-/// where nearly all sticks.
+/// Step from which the mean of two states is used as the past: single cells at the edge of the stick zone may alternate for ever where nearly all sticks.
 const STEPS_FREE: usize = 60;
-/// Mean change of the tractions in a step, relative to the friction limit, from which on they count as copies. 1e-6 gives the same forces and areas.
+/// Mean change of the tractions in a step, relative to the friction limit, at which they count as self-similar. 1e-6 gives the same forces and areas.
 const CHANGE: f64 = 2e-5;
 
 impl LevelRun<'_> {
-    /// Tractions of bodies that were pressed together.
+    /// Finds the tractions after pressing the bodies together.
     ///
     /// # Errors
     /// A step did not converge, or the monitor stopped the work.
@@ -256,7 +251,7 @@ impl LevelRun<'_> {
         let unit = self.task.interface.reduction / level.scale.traction;
         let pressure: Vec<f64> = level.pressure.iter().map(|p| p * unit).collect();
         let pair = PressedPair {
-            poisson_ratio: level.poisson_ratio(),
+            poisson_ratio: level.poisson_ratio,
             difference,
             pressure: &pressure,
         };
@@ -270,7 +265,7 @@ impl LevelRun<'_> {
         let given: Vec<[f64; 2]> = rows
             .map(|at| displacement(mesh, difference, &pressure, at))
             .collect();
-        // From nothing at once to begin with.
+        // The patch starts without a past.
         let mut past: Option<[PressedState; 2]> = None;
         let mut change = f64::INFINITY;
         for step in 0..STEPS_MAX {
@@ -289,7 +284,7 @@ impl LevelRun<'_> {
             past = Some(match past {
                 None => [state.clone(), state],
                 Some([last, _]) if step < STEPS_FREE => [state, last],
-                // What comes and goes from step to step is taken out.
+                // The mean removes cells that alternate from step to step.
                 Some([last, _]) => {
                     let mean = state.mean(&last);
                     [mean.clone(), mean]
@@ -310,7 +305,7 @@ impl LevelRun<'_> {
         })
     }
 
-    /// Mean of what tractions have more than those of the state, over the friction limit.
+    /// Mean change of tractions from those of the state, over the friction limit.
     fn mean_change(&self, tractions: &[f64]) -> f64 {
         let before = &self.state.tractions;
         let change: Vec<f64> = tractions.iter().zip(before).map(|(t, b)| t - b).collect();
@@ -324,7 +319,7 @@ impl LevelRun<'_> {
         (0..self.cells).map(of_cell).sum::<f64>() / self.limit
     }
 
-    /// The state of tractions and of displacements that pressures give.
+    /// The state for given tractions and the displacements by pressures.
     fn pressed(&self, of: &StepEquations, tractions: &[f64], given: &[[f64; 2]]) -> PressedState {
         let mut own = vec![0.0; tractions.len()];
         of.equations
@@ -340,7 +335,7 @@ impl LevelRun<'_> {
         }
     }
 
-    /// What the state remembers once it is found: friction took a fifth of the power that it takes per growth.
+    /// Sets the displacements and energies of the state found. Friction has dissipated a fifth of its power per growth.
     fn settle(&mut self, of: &StepEquations) {
         let mut displacement = vec![0.0; self.state.tractions.len()];
         let mut scratch = SlipScratch::default();
@@ -369,32 +364,6 @@ fn add(sum: &mut [Vec<f64>; 2], values: &[Vec<f64>; 2], weight: f64) {
         sum.iter_mut()
             .zip(values)
             .for_each(|(sum, value)| *sum += weight * value);
-    }
-}
-
-impl LevelRun<'_> {
-    /// The fall that a step follows at once.
-    pub(super) fn fall(&self, kind: StepKind) -> Option<Softening> {
-        self.slip_friction.as_ref()?.at_once(kind)
-    }
-
-    /// Lets bounds that fall with slip follow the slips of a step.
-    pub(super) fn follow_slips(&mut self, of: &StepEquations) {
-        let Some(friction) = &mut self.slip_friction else {
-            return;
-        };
-        let slip = self.workspace.slip();
-        let half = slip.len() / 2;
-        let slides = |i: usize| of.newton.slips(&self.bound, &self.state.tractions, slip, i);
-        let size = |i: usize| match slides(i) {
-            true => slip[i].hypot(slip[half + i]),
-            false => 0.0,
-        };
-        let sizes: Vec<f64> = (0..self.cells).map(size).collect();
-        friction.follow(of.kind, &sizes);
-        if of.kind == StepKind::Steady {
-            self.bound.copy_from_slice(friction.settled());
-        }
     }
 }
 

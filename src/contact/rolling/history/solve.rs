@@ -1,4 +1,4 @@
-//! A history on finer and finer levels until two in a row agree.
+//! Transient rolling on successively finer meshes until two in a row agree.
 
 use crate::error::SolveError;
 use crate::mesh::MeshSize;
@@ -15,44 +15,43 @@ use crate::rolling::refinement::interpolate::RefinementState;
 use crate::rolling::refinement::on_mesh::named;
 use crate::rolling::task::{Motion, Resolution, RollingTask, TOLERANCE_LEAST};
 
-// The numbers below are from the four histories of CONTACT in `tests/data/transient.json`, on meshes from 6 × 12 to 24 × 48 with steps of
-// a/5 to a/32, a half the length (`cargo test --test physics -- histories_agree --nocapture` prints what comes of them).
+// The constants below come from the four histories of CONTACT in `tests/data/transient.json`, on meshes from 6 × 12 to 24 × 48 with steps of a/5 to a/32, where
+// a is half the length (`cargo test --test physics -- histories_agree --nocapture` prints the results).
 
-/// Cells along x of the first level. 12 give a change to the second level that misses the usual target.
+/// Cells along x of the first mesh. With 12 the change to the second mesh misses the default target.
 const CELLS_FIRST: f64 = 16.0;
-/// From level to level there are so many times more cells along x, strips and steps.
+/// Ratio of the numbers of cells along x, strips and steps from mesh to mesh.
 const FINER: f64 = 1.5;
-/// Levels at most.
+/// Largest number of meshes.
 const LEVELS_MAX: i32 = 4;
-/// Cells along x per strip on a patch as long as wide. What travels through the contact is rounded over two cells, so that cells count for
-/// more than strips: with 3 creepages are as exact, moments under spin half as.
-/// The second where pressing is all that is asked for, whose tractions change as much across as along.
+/// Cells along x per strip on a patch as long as wide: in rolling, and where pressing is all that is requested. In rolling, what travels through the contact is
+/// smoothed over two cells, so cells count for more than strips; with 3 creepages are as accurate, moments under spin half as accurate. In pressing,
+/// tractions change as much across as along.
 const SHAPES: [f64; 2] = [2.0, 1.0];
-/// Steps in which a pressing usually settles.
+/// Usual number of steps of a pressing.
 const STEPS_PRESSED: f64 = 100.0;
-/// Steps per half-length of the patch and cell along x. With twice as many the creepages are off by up to twice as much, since shorter
-/// steps round less in time; forces change by 0.002 of the limit at most.
+/// Steps per half-length of the patch and cell along x. With twice as many the errors of creepages are up to twice as large, because shorter steps smooth less in
+/// time; forces change by at most 0.002 of the limit.
 const STEPS_PER_CELL: f64 = 1.0 / 3.0;
-/// Resultants are extrapolated by this share of their change from the level before; their error falls a little faster than the width
-/// of the cells. 0.25 and 0.75 leave 1.5 times the error.
+/// Share of the change from the previous mesh by which resultants are extrapolated. Their error falls slightly faster than the width of the cells. 0.25 and 0.75
+/// leave 1.5 times the error.
 const EXTRAPOLATED: f64 = 0.5;
-/// Error of resultants, and of creepages and shifts that are found, over the change from the level before. Chosen so that the estimates
-/// cover the points of CONTACT's four histories (`cargo test --test physics histories`), which therefore are no check of them.
+/// Ratio of the error of resultants to the change from the previous mesh. Chosen so that the estimates cover the points of CONTACT's four histories
+/// (`cargo test --test physics histories`), which are therefore no independent check.
 const ERROR_OVER_CHANGE: f64 = 0.8;
-/// See [`ERROR_OVER_CHANGE`].
+/// The same ratio for creepages and shifts that are found.
 const CREEPAGE_ERROR_OVER_CHANGE: f64 = 1.4;
-/// Least change of a shift that is found, in cells along x and relative to the shift: the changes of single shifts from level to level cross zero by
-/// chance. Chosen so that the errors cover 57 shifts, alone and within histories, of which 31 were covered by the changes alone; the closed form of
-/// Cattaneo (1938) is among them.
+/// Least change of a shift that is found, in cells along x and relative to the shift, because the changes of single shifts cross zero by chance. Chosen so that
+/// the errors cover 57 shifts, alone and within histories, of which the changes alone covered 31. The closed form of Cattaneo (1938) is among them.
 const SHIFT_CHANGE_LEAST: f64 = 0.18;
-/// The error at a point is at least this part of the largest of the history, since what was wrong before is remembered.
+/// The error at a point is at least this part of the largest error of the history, because earlier errors persist.
 const REMEMBERED: f64 = 0.7;
-/// By how much prescribed forces may be missed, relative to the friction limit, with some room.
+/// Tolerance of prescribed forces relative to the friction limit, with a margin.
 const MISSED: f64 = 2e-5;
-/// The error of creepages and shifts that are found is to be below this many times the target, relative to the largest creepage.
+/// Target of the creepages and shifts that are found, relative to their largest value, over the target of the resultants.
 const CREEPAGE_SHARE: f64 = 10.0;
 
-/// One level of a history.
+/// One mesh of a history.
 #[derive(Debug, Clone, Copy)]
 struct HistoryLevel {
     size: MeshSize,
@@ -60,31 +59,31 @@ struct HistoryLevel {
     longest: f64,
 }
 
-/// A history on one level.
+/// A history solved on one mesh.
 struct SolvedHistory {
-    /// The number of the level in the levels.
+    /// Number of the mesh.
     level: usize,
     points: Vec<PointRecord>,
     /// Wall time in s.
     seconds: f64,
 }
 
-/// How far two levels are apart at a point.
+/// The changes between two meshes at a point.
 #[derive(Debug, Clone, Default)]
 struct Change {
-    /// Of the resultants relative to μN, patch by patch, then of their sum.
+    /// Changes of the resultants relative to μN, patch by patch, then of their sum.
     resultants: Vec<f64>,
-    /// Of the creepages found.
+    /// Changes of the creepages found.
     creepage: [f64; 2],
-    /// Of the shifts found, in mm.
+    /// Changes of the shifts found, in mm.
     shift: [f64; 2],
-    /// Resultants and shift of the coarser level.
+    /// Resultants on the coarser mesh.
     coarser: Vec<Resultants>,
-    /// See [`Change::coarser`].
+    /// Shift on the coarser mesh.
     coarser_shift: Motion,
 }
 
-/// Why a history takes more steps than are allowed, if it does; `extents` are those of the patches.
+/// The reason why a history takes more steps than are allowed, if it does; `extents` are those of the patches.
 pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -> Option<String> {
     let half = half_length(extents)?;
     let longest = half / (STEPS_PER_CELL * CELLS_FIRST);
@@ -98,7 +97,7 @@ pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -
     })
 }
 
-/// Number of steps of a history on a mesh with `along` cells along x, and number of cells of a patch. Without `along`, those of the usual finest level.
+/// The number of steps on a mesh with `along` cells along x, and the number of cells of a patch. Without `along`, those of the usual finest mesh.
 pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64>) -> (f64, f64) {
     let Some(half) = half_length(extents) else {
         return (history.distances.len() as f64, CELLS_FIRST * CELLS_FIRST);
@@ -112,12 +111,12 @@ pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64
     (steps + pressing, cells * cells / SHAPES[0])
 }
 
-/// Most cells that a target leads to where pressing is all that is asked for.
+/// Largest number of cells of a target where pressing is all that is requested.
 pub fn pressed_cells_max() -> f64 {
     (CELLS_FIRST * FINER.powi(LEVELS_MAX - 1)).powi(2) / SHAPES[1]
 }
 
-/// Bytes that a pressing keeps on a mesh of so many cells.
+/// Memory in bytes of a pressing on a mesh.
 pub fn pressed_bytes(cells: f64) -> f64 {
     SelfSimilarState::bytes(cells)
 }
@@ -128,7 +127,7 @@ fn half_length(extents: &[[f64; 4]]) -> Option<f64> {
     lengths.reduce(f64::min).filter(|half| *half > 0.0)
 }
 
-/// Progress before a level, and what it adds: two levels usually suffice, of which the second takes most of the time.
+/// Progress before a mesh, and its share. Two meshes usually suffice, of which the second takes most of the time.
 fn progress(level: usize) -> [f64; 2] {
     match level {
         0 => [0.0, 0.15],
@@ -140,10 +139,10 @@ fn progress(level: usize) -> [f64; 2] {
     }
 }
 
-/// Solves a history: an answer per point.
+/// Solves a history and returns a solution per point.
 ///
 /// # Errors
-/// Why there is no answer.
+/// The reason why there is no solution.
 pub fn solve(
     task: &RollingTask,
     history: &HistoryTask,
@@ -175,7 +174,7 @@ pub fn solve(
         }
         let mut changes = changes(task, &coarser.points, &found.points);
         if presses {
-            // Forces balance; what pressing has brought about shows in the sum of the tractions.
+            // Forces balance in a pressing, so its error shows in the sum of the lengths of the tractions.
             let grown = (found.points[0].carried - coarser.points[0].carried).abs();
             let of_all = changes[0].resultants.iter_mut();
             of_all.for_each(|change| *change = change.max(grown));
@@ -195,8 +194,7 @@ pub fn solve(
     unreachable!("there are two levels at least")
 }
 
-/// The levels that a history may be solved on, coarse to fine: those of a target, with so many cells along x per strip on a round patch, or a
-/// mesh of the client's behind a coarser one.
+/// The meshes of a history, coarse to fine: those of a target, with `shape` cells along x per strip on a round patch, or a client mesh after a coarser one.
 fn level_plans(task: &RollingTask, shape: f64) -> Vec<HistoryLevel> {
     let patches = task.footprint.patches();
     let extents: Vec<[f64; 4]> = patches.iter().map(|patch| patch.extent).collect();
@@ -214,7 +212,7 @@ fn level_plans(task: &RollingTask, shape: f64) -> Vec<HistoryLevel> {
         let coarse = plan(even.max(4.0), (cells / FINER).round().max(6.0));
         return vec![coarse, plan(strips, cells)];
     }
-    // All patches have the mesh of the one that carries most, whatever their order.
+    // All patches have the mesh of the one with the largest load, in any order.
     let heaviest = patches
         .iter()
         .max_by(|a, b| a.normal_force.total_cmp(&b.normal_force));
@@ -239,9 +237,8 @@ fn on_level(
     let began = monitor.elapsed();
     let number = state.levels.level(plan.size.into())?;
     let level = state.levels.get(number);
-    // What the iteration leaves of a force is a change of the creepage in one step.
-    // A step of rolling changes little, so that the tractions before it leave a small residual by themselves: at 1e-4 they were kept, and under small
-    // creepages forces stayed up to 0.012 of the limit from steady rolling, with estimates of 0.002.
+    // A step of rolling changes little, so the tractions before it leave a small residual. With a tolerance of 1e-4 they were kept, and under small creepages
+    // forces stayed up to 0.012 of the limit from steady rolling, with estimates of 0.002. The residual of a force causes an error of the creepage in one step.
     let tolerance = [TOLERANCE_LEAST, 1e-5];
     let workspace = &mut state.workspace;
     let run = LevelRun::new(task, history, &level, tolerance, workspace, monitor)?;
@@ -255,8 +252,8 @@ fn on_level(
     })
 }
 
-/// The changes from one level to the next; at every point at least those of its neighbours, since what travels through the contact comes
-/// to a point a little earlier or later on another level, and a part of the largest.
+/// The changes from one mesh to the next. At every point they are at least those of its neighbours, because the same event may occur slightly earlier or later on
+/// another mesh, and at least a part of the largest change.
 fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> Vec<Change> {
     let patches = task.footprint.patches();
     let area: f64 = patches.iter().map(|patch| patch.area).sum();
@@ -311,7 +308,7 @@ fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> 
         .collect()
 }
 
-/// Are resultants and creepages as exact as is asked?
+/// Whether resultants and creepages meet the target.
 fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> bool {
     let Some(target) = task.target() else {
         return true;
@@ -336,13 +333,13 @@ fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> boo
         && small(of, |point| &point.shift, |change| change.shift)
 }
 
-/// A shift extrapolated as resultants are; what was given is the same on both levels.
+/// Extrapolates a shift like the resultants; a given shift is equal on both meshes.
 fn beyond(fine: &Motion, coarse: &Motion) -> Motion {
     let [fine, coarse] = [fine, coarse].map(Motion::components);
     Motion::of([0, 1, 2].map(|k| fine[k] + EXTRAPOLATED * (fine[k] - coarse[k])))
 }
 
-/// The answers of the points.
+/// The solutions at the points.
 fn answers(
     task: &RollingTask,
     history: &HistoryTask,

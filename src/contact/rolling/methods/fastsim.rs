@@ -1,8 +1,8 @@
-//! Kalker's simplified theory: the displacement of a cell depends on its own traction only, so that a strip is solved in one pass.
+//! Kalker's simplified theory (*A fast algorithm for the simplified theory of rolling contact*, 1982). The displacement of a cell depends only on its own
+//! traction, so a strip is solved in one pass.
 //!
-//! With `u = L T` steady rolling becomes `s = w + L ∂T/∂x` on each strip by itself (Kalker, *A fast algorithm for the simplified
-//! theory of rolling contact*, 1982). Tractions grow from 0 at the leading edge and are scaled back to the bound where they exceed
-//! it; there the cell slips. The flexibilities `L1 = 8a/(3 G C11)`, `L2 = 8a/(3 G C22)` for the creepages and
+//! With `u = L T` steady rolling becomes `s = w + L ∂T/∂x` on each strip separately. Tractions grow from 0 at the leading edge. Where they exceed the bound,
+//! they are scaled back to it and the cell slips. The flexibilities `L1 = 8a/(3 G C11)`, `L2 = 8a/(3 G C22)` for the creepages and
 //! `L3 = π a √(a/b)/(4 G C23)` for the spin give the forces of linear theory where nothing slips.
 
 use std::f64::consts::PI;
@@ -19,17 +19,15 @@ use crate::numerics::simd::length;
 use crate::rolling::answer::{LevelAnswer, Work};
 use crate::rolling::linear_theory;
 use crate::rolling::methods::full_slip;
+use crate::rolling::refinement::mesh_family::SIDE_GOOD;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Motion, Resolution, RollingTask};
 
-/// The mesh if none is given: finer ones change the resultants by a small fraction of the error of the theory.
+/// The default mesh. Finer ones change the resultants by a small fraction of the error of the theory.
 pub const MESH: MeshSize = MeshSize {
     strips: 10,
     cells: 16,
 };
-
-/// Meshes with at least so many strips, and cells in one, add little to the error of the theory.
-const SIDE_GOOD: u32 = 8;
 
 /// Error of the resultants relative to μN (moment: μN√(A/π)) on meshes whose sides are [`SIDE_GOOD`] or more, with either bound. It covers
 /// 95 % of random motions of ellipses with a/b from 0.1 to 10 and any ν. The errors of most are far smaller; the largest, about 0.25, belong to
@@ -42,12 +40,11 @@ pub fn stated_error(mesh: MeshSize) -> f64 {
     ERROR * (f64::from(SIDE_GOOD) / f64::from(side)).powi(2)
 }
 
-/// Tractions, slips and zones of one dimensionless motion on a level.
+/// Tractions, slips and zones of one dimensionless motion on a mesh.
 ///
-/// Each patch is taken by itself, with the flexibilities of the ellipse that carries its load the same way (see
-/// [`LoadEllipse`](crate::rolling::load_ellipse::LoadEllipse)), and creepages about its load centre; for an ellipse that is the
-/// ellipse. Slips are those of the single flexibility
-/// `(L1|ν_x| + L2|ν_y| + L3|φ|c)/√(ν_x² + ν_y² + φ²c²)`. Tractions with the parabolic bound exceed μp in the middle of a patch.
+/// Each patch is solved separately, with the flexibilities of its equivalent ellipse (see [`LoadEllipse`](crate::rolling::load_ellipse::LoadEllipse)) and
+/// the creepages at its load centre. Slips are those of the single flexibility `(L1|ν_x| + L2|ν_y| + L3|φ|c)/√(ν_x² + ν_y² + φ²c²)`. Tractions with the
+/// parabolic bound exceed μp in the middle of a patch.
 pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAnswer {
     let parabolic = task.traction_bound == TractionBound::Parabolic;
     if !parabolic && let Some(answer) = full_slip::rigid_answer(level, motion) {
@@ -82,7 +79,7 @@ pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAns
     answer
 }
 
-/// The tractions of [`solve`] alone, with the elliptic bound.
+/// The tractions of [`solve`] with the elliptic bound.
 pub fn tractions(task: &RollingTask, level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
     let cells = level.mesh.cells();
     let mut found = [vec![0.0; cells], vec![0.0; cells]];
@@ -95,7 +92,7 @@ pub fn tractions(task: &RollingTask, level: &StripMesh, motion: &Motion) -> [Vec
     found
 }
 
-/// The theory of every patch.
+/// The coefficients of every patch.
 fn brushes<'a>(
     task: &'a RollingTask,
     level: &'a StripMesh,
@@ -108,21 +105,21 @@ fn brushes<'a>(
     })
 }
 
-/// The mesh of an ellipse for many ellipses and motions: that of the circle, since all ellipses are its images.
+/// A mesh for many ellipses and motions: that of the circle, of which all ellipses are images.
 #[derive(Debug)]
 pub struct EllipseMesh {
     level: StripMesh,
     bound: Vec<f64>,
 }
 
-/// Dimensionless creepages and forces of a level per those relative to μN: the largest pressure of an ellipse is 3N/(2πab).
+/// Ratio of the dimensionless creepages and forces of a mesh to those relative to μN. The largest pressure of an ellipse is 3N/(2πab).
 const PER_LIMIT: f64 = 2.0 * PI / 3.0;
 
 impl EllipseMesh {
-    /// A mesh of so many strips and cells.
+    /// A mesh of a given size.
     ///
     /// # Errors
-    /// It has no strip.
+    /// The size is 0.
     pub fn new(size: MeshSize, bound: TractionBound) -> Result<EllipseMesh, SolveError> {
         let circle = Ellipse::of_semi_axes(1.0, 1.0, NormalLoad::Force(1.0), 1.0);
         let footprint = Footprint::hertz(circle);
@@ -157,7 +154,7 @@ impl EllipseMesh {
         })
     }
 
-    /// `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` and the share that sticks, of the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)`.
+    /// `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` and the share of the area that sticks, for the dimensionless creepages `G c²/(μN) (ν_x, ν_y, c φ)`.
     pub fn creep(&self, a_over_b: f64, poisson_ratio: f64, creepage: [f64; 3]) -> ([f64; 3], f64) {
         if creepage == [0.0; 3] {
             return ([0.0; 3], 1.0);
@@ -205,7 +202,7 @@ impl EllipseMesh {
     }
 }
 
-/// Replaces the bound of a patch by its square, scaled to the same load: a paraboloid instead of Hertz's ellipsoid.
+/// Replaces the bound of a patch by its square, scaled to the same load, which makes a paraboloid of Hertz's ellipsoid.
 fn make_parabolic(level: &StripMesh, patch: usize, bound: &mut [f64]) {
     let (mut load, mut square) = (0.0, 0.0);
     for i in level.patch_cells(patch) {
@@ -219,7 +216,7 @@ fn make_parabolic(level: &StripMesh, patch: usize, bound: &mut [f64]) {
     }
 }
 
-/// The ellipse that stands for a patch, dimensionless.
+/// The equivalent ellipse of a patch, dimensionless.
 #[derive(Debug, Clone, Copy)]
 struct EquivalentEllipse {
     centre: [f64; 2],
@@ -255,13 +252,13 @@ impl EquivalentEllipse {
     }
 }
 
-/// Rigid slip over flexibility, `(ν_x/L1 − φy/L3, ν_y/L2 + φx/L3)`: how fast sticking tractions grow.
+/// Rigid slip over flexibility, `(ν_x/L1 − φy/L3, ν_y/L2 + φx/L3)`, which is the growth of sticking tractions along a strip.
 #[derive(Debug, Clone, Copy)]
 struct SimplifiedTheory {
     growth: [f64; 2],
     turning: f64,
     centre: [f64; 2],
-    /// The single flexibility that slips are counted with.
+    /// The single flexibility for slips.
     flexibility: f64,
 }
 
@@ -288,7 +285,7 @@ impl SimplifiedTheory {
         }
     }
 
-    /// One pass along each segment of a patch, from its leading edge to its trailing one; `take` is given cell, traction, and slip where it slips.
+    /// Sweeps each segment of a patch from its leading to its trailing edge. `take` receives each cell, its traction, and its slip if it slips.
     fn sweep_patch(
         &self,
         level: &StripMesh,

@@ -1,25 +1,23 @@
-//! States that need no Newton iteration: nothing slips because nothing moves, or everything slips.
+//! States without an iteration: nothing moves, everything slips, or there is no friction.
 
+use crate::mesh::Mesh;
 use crate::numerics::simd::length;
-use crate::rolling::answer::{LevelAnswer, LevelOutcome, Skip};
+use crate::rolling::answer::{LevelAnswer, Skip};
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
-/// Upper bound of the elastic slip in full slip, in units of (μ p_max)/G: three times the largest that was seen for a/b from 1/50 to 50
-/// and any ν.
+/// Upper bound of the elastic slip in full slip, in units of (μ p_max)/G: three times the largest value found for a/b from 1/50 to 50 and any ν.
 const ELASTIC_SLIP_MAX: f64 = 10.0;
-/// Rigid slip must be this many times larger for the elastic slip to be left out: the direction of the traction then
-/// changes by less than the inverse.
+/// Ratio of rigid to elastic slip from which elastic slip is neglected. The direction of the traction then changes by less than the inverse.
 pub(crate) const NEGLIGIBLE: f64 = 1e6;
 
-fn rigid_slip(level: &StripMesh, motion: &Motion) -> [Vec<f64>; 2] {
-    let normalised = &level.normalised;
-    let load_y = normalised.cell_load_y();
+/// Rigid slips of a motion at the cells of a mesh.
+fn rigid_slip(mesh: &Mesh, motion: &Motion) -> [Vec<f64>; 2] {
+    let (load_y, node) = (mesh.cell_load_y(), mesh.node.iter());
     let x = load_y
         .iter()
         .map(|y| motion.creepage_x - motion.spin_per_mm * y);
-    let y = normalised.node.iter();
-    let y = y.map(|x| motion.creepage_y + motion.spin_per_mm * x);
+    let y = node.map(|x| motion.creepage_y + motion.spin_per_mm * x);
     [x.collect(), y.collect()]
 }
 
@@ -44,18 +42,17 @@ fn along(level: &StripMesh, slip: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
     })
 }
 
-/// The answer where the rigid slip alone decides: no motion, or a rigid slip so large that elastic slip cannot turn the tractions
-/// (relative change below 1e-6).
+/// The solution where the rigid slip alone determines it: no motion, or a rigid slip so large that elastic slip turns the tractions by less than 1e-6.
 pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
     let cells = level.mesh.cells();
-    let slip = rigid_slip(level, motion);
+    let slip = rigid_slip(&level.normalised, motion);
     let sizes = slip[0].iter().zip(&slip[1]).map(|(x, y)| length(*x, *y));
     let smallest = sizes.fold(f64::INFINITY, f64::min);
     let still = motion.is_still();
-    let (exit, skip) = if still {
-        (LevelOutcome::NoMotion, Skip::NoMotion)
+    let skip = if still {
+        Skip::NoMotion
     } else if smallest > ELASTIC_SLIP_MAX * NEGLIGIBLE && !pole_inside(level, motion) {
-        (LevelOutcome::RigidSlip, Skip::RigidSlip)
+        Skip::RigidSlip
     } else {
         return None;
     };
@@ -64,39 +61,24 @@ pub fn rigid_answer(level: &StripMesh, motion: &Motion) -> Option<LevelAnswer> {
         traction,
         slips: vec![!still; cells],
         slip,
-        exit,
-        skips: vec![skip],
+        skip: Some(skip),
         ..LevelAnswer::default()
     })
 }
 
-/// Without friction there are no tractions, and the slip is the rigid one.
+/// The solution without friction: no tractions, and the rigid slip.
 pub fn frictionless_answer(level: &StripMesh, motion: &Motion) -> LevelAnswer {
     let cells = level.mesh.cells();
-    let load_y = level.mesh.cell_load_y();
-    let still = motion.is_still();
     LevelAnswer {
         traction: [vec![0.0; cells], vec![0.0; cells]],
-        slip: [
-            load_y
-                .iter()
-                .map(|y| motion.creepage_x - motion.spin_per_mm * y)
-                .collect(),
-            level
-                .mesh
-                .node
-                .iter()
-                .map(|x| motion.creepage_y + motion.spin_per_mm * x)
-                .collect(),
-        ],
-        slips: vec![!still; cells],
-        exit: LevelOutcome::NoFriction,
-        skips: vec![Skip::NoFriction],
+        slip: rigid_slip(&level.mesh, motion),
+        slips: vec![!motion.is_still(); cells],
+        skip: Some(Skip::NoFriction),
         ..LevelAnswer::default()
     }
 }
 
-/// Does the rigid slip vanish somewhere in the box around the patches?
+/// Whether the rigid slip vanishes in a segment of the patches.
 fn pole_inside(level: &StripMesh, motion: &Motion) -> bool {
     if motion.spin_per_mm == 0.0 {
         return false;

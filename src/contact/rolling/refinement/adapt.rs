@@ -1,4 +1,4 @@
-//! The adaptive solve: one motion on the meshes of its family until the estimate of the error meets the target.
+//! The adaptive solve of one motion on its family of meshes.
 
 use crate::error::SolveError;
 use crate::method::Method;
@@ -14,14 +14,14 @@ use crate::rolling::refinement::on_mesh::{
 };
 use crate::rolling::task::{MeshPlan, RollingTask};
 
-/// Where the estimate of a mesh exceeds the target by no more than this part of it, half a doubling follows, and the answer is a mean of both meshes,
-/// so that answers of near motions do not jump where the number of meshes changes.
+/// If the estimate exceeds the target by at most this part of it, the next mesh has √2 times as many cells, and the solution is a mean of both meshes. So
+/// the solutions of neighbouring motions do not jump where the number of meshes changes.
 const BLENDED: f64 = 0.5;
 
 /// Solves a motion by the method of the task.
 ///
 /// # Errors
-/// Why there is no answer.
+/// The reason why there is no solution.
 pub fn solve(
     task: &RollingTask,
     state: &mut RefinementState,
@@ -33,7 +33,7 @@ pub fn solve(
     Ok(found)
 }
 
-/// Solves a motion without slips for output. Also returns the meshes that its value and its estimate compare.
+/// Solves a motion without smooth slips. Also returns the meshes that the estimate compares.
 pub(crate) fn solve_forces(
     task: &RollingTask,
     state: &mut RefinementState,
@@ -57,10 +57,10 @@ pub(crate) fn solve_forces(
     Ok((run.finish(estimate), plans))
 }
 
-/// Solves a motion on given meshes, coarse to fine. Value and estimate are a smooth function of the motion.
+/// Solves a motion on given meshes, coarse to fine. Value and estimate are smooth functions of the motion.
 ///
 /// # Errors
-/// Why there is no answer.
+/// The reason why there is no solution.
 pub(crate) fn solve_on_meshes(
     task: &RollingTask,
     state: &mut RefinementState,
@@ -73,7 +73,7 @@ pub(crate) fn solve_on_meshes(
     Ok(run.finish(estimate))
 }
 
-/// Adds smooth slips to an answer if they are asked for. Forces do not depend on it.
+/// Adds smooth slips to a solution if they are requested. Forces do not depend on it.
 ///
 /// # Errors
 /// The monitor may stop the work.
@@ -96,16 +96,16 @@ pub(crate) fn add_slips(
     Ok(())
 }
 
-/// The meshes of a motion that are solved.
+/// The state of the solve of one motion.
 struct AdaptiveRun<'a, 's, 't> {
     task: &'a RollingTask<'a>,
     state: &'s mut RefinementState<'t>,
     asked: MotionTask,
     monitor: &'a dyn Monitor,
     began: f64,
-    /// Coarse to fine.
+    /// The solved meshes, coarse to fine.
     solved: Vec<DiscreteSolution>,
-    /// The mesh before has no answer.
+    /// Whether the previous mesh has no solution.
     failed: bool,
     work: Work,
 }
@@ -129,7 +129,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
         }
     }
 
-    /// Solves the meshes of the family until the estimate meets the target, or to the finest.
+    /// Solves the meshes of the family until the estimate meets the target or the finest mesh is reached.
     fn meet_target(&mut self, target: f64) -> Result<Estimate, SolveError> {
         let family = MeshFamily::of(self.task, &self.asked.motion);
         let most = family.cells_max();
@@ -147,7 +147,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
                 if error <= target || is_finest {
                     if let Some(before) = &before {
                         found.blend(before, target);
-                        // Tractions that a client sums are no farther from the resultants than the estimate.
+                        // The estimate also covers the distance from the sums of the tractions, which a client may compute.
                         let finest = self.solved.last();
                         found.cover(self.task, finest.map_or(&[], |mesh| &mesh.resultants));
                     }
@@ -162,7 +162,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
         }
     }
 
-    /// Solves given meshes; those before the finest only as far as they have an answer.
+    /// Solves given meshes, of which only the finest needs a solution.
     fn on_meshes(
         &mut self,
         plans: &[MeshPlan],
@@ -178,7 +178,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
         Ok(found)
     }
 
-    /// Solves a mesh unless it is the last one. One that is not needed may have no answer, but not two in a row.
+    /// Solves a mesh unless it was the last one. A mesh that is not needed may have no solution, but not two in a row.
     fn add(&mut self, plan: MeshPlan, is_needed: bool) -> Result<(), SolveError> {
         let last = self.solved.last();
         if last.is_some_and(|last| last.mesh.plan == plan) {
@@ -201,7 +201,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
         Ok(())
     }
 
-    /// The meshes that the estimate compares: the finest, and up to two coarser ones, coarse to fine.
+    /// The meshes that the estimate compares, coarse to fine: the finest and up to two coarser ones.
     fn compared(&self) -> Vec<MeshPlan> {
         let last = self.solved.len().checked_sub(1);
         let next = |k: &usize| coarser(&self.solved, *k);
@@ -224,7 +224,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
             motion: self.asked.motion,
             resultants: estimate.resultants,
             errors: estimate.errors,
-            skips: std::mem::take(&mut tangential.skips),
+            skips: tangential.skip.into_iter().collect(),
             remarks: std::mem::take(&mut tangential.remarks),
             fields: Some(SolvedFields {
                 level: number,
@@ -239,7 +239,7 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
 }
 
 impl Estimate {
-    /// Moves value and errors towards those of the mesh before, the more the closer its estimate was to the target.
+    /// Moves value and errors towards those of the previous mesh; the closer its estimate was to the target, the farther.
     fn blend(&mut self, before: &Estimate, target: f64) {
         let excess = before
             .whole()
@@ -255,7 +255,7 @@ impl Estimate {
             if let (Some(error), Some(other)) = (error, other) {
                 let mixed = weight * *error + (1.0 - weight) * other;
                 let met = *error <= target;
-                // A mean of two meshes of which the finer meets the target meets it, with room for rounding.
+                // If the finer mesh meets the target, so does the mean, with room for rounding.
                 let most = if met {
                     (1.0 - ROUNDING) * target
                 } else {

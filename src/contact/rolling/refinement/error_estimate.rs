@@ -1,54 +1,55 @@
-//! The error of the resultants, estimated from the last two changes between nested meshes, and the extrapolated value.
+//! The error of the resultants, estimated from the last two changes between nested meshes, and their extrapolation.
 
 use std::f64::consts::PI;
 
 use crate::method::Method;
 use crate::normal::hertz::Patch;
-use crate::rolling::answer::{LevelOutcome, RelativeErrors, Resultants};
+use crate::rolling::answer::{RelativeErrors, Resultants, Skip};
 use crate::rolling::methods::fastsim;
 use crate::rolling::methods::full_slip::NEGLIGIBLE;
+use crate::rolling::refinement::mesh_family::SIDE_GOOD;
 use crate::rolling::refinement::on_mesh::DiscreteSolution;
 use crate::rolling::task::{Resolution, RollingTask};
 
-/// Factor on the root of the squares of both changes. Chosen on 230 of the 920 ellipses, smooth grids and gaps of `benches/calibrate`: 0.9 covers .89
-/// to 1.0 of the classes, 1.3 covers .95 to 1.0 for up to 1.4 times the work.
+/// Safety factor on the root of the sum of squares of both changes. Chosen on 230 of the 920 ellipses, smooth grids and gaps of `benches/calibrate`: 0.9
+/// covers .89 to 1.0 of the classes, 1.3 covers .95 to 1.0 for up to 1.4 times the work.
 const SAFETY: f64 = 1.1;
-/// The factor where the pressure jumps (80 grids of the same bench).
+/// Safety factor where the pressure jumps (80 grids of the same bench).
 const SAFETY_JUMPING: f64 = 1.5;
-/// Surprises (see `GridPressure::discontinuity`) up to which a pressure counts as smooth and from which it jumps; the factor is linear between.
+/// Discontinuities (see `GridPressure::discontinuity`) up to which a pressure counts as smooth, and from which it counts as jumping. The factor is linear
+/// between them.
 const SURPRISES: [f64; 2] = [0.06, 0.31];
-/// Share of the error of the finest mesh that extrapolation takes off. 0 leaves errors 1.3 times as large, ½ is alike.
+/// Share of the error of the finest mesh that extrapolation removes. 0 leaves 1.3 times the error, ½ is alike.
 const EXTRAPOLATED: f64 = 1.0 / 3.0;
-/// Part of the cells of a mesh that a coarser one may have to be compared with it.
+/// Largest ratio of the numbers of cells of two meshes that are compared.
 const COARSER: f64 = 0.6;
-/// Meshes with fewer strips, or fewer cells in one, that a client gives may agree by chance.
-const SIDE_GOOD: u32 = 8;
-/// Least relative error on them, over the sum of the inverse squares of both numbers: errors of an ellipse 6 mm × 5 mm on 3 × 3 to 8 × 8 cells, 10 creepages
-/// each. On other ellipses it also covers 3 to 5 strips of 40 cells, 24 strips of 3 and 40 strips of 4.
+
+/// Least relative error on client meshes below [`SIDE_GOOD`], which may agree by chance, over the sum of the inverse squares of both numbers. From an ellipse of 6 mm × 5 mm on 3 × 3 to 8 × 8 cells with 10
+/// creepages each; on other ellipses it also covers 3 to 5 strips of 40 cells, 24 strips of 3 and 40 strips of 4.
 const ERROR_FEW: f64 = 0.3;
-/// Meshes with fewer have no coarser one along that axis to be compared with. Their least relative error is 1 over the square of that number.
+/// Meshes with fewer strips or cells cannot be compared with a coarser one. Their least relative error is the inverse square of that number.
 const SIDE_FEW: u32 = 3;
-/// Error of the resultants from region and pressure of a gap with [`REGION_CELLS`] cells of the normal problem across a patch (100 gaps and 96 patches
-/// of wheels on rails).
+/// Error of the resultants due to region and pressure of a gap with [`REGION_CELLS`] cells of the normal problem across a patch (100 gaps and 96 patches of
+/// wheels on rails).
 const REGION: f64 = 6e-4;
-/// Cells of the normal problem across a patch that [`REGION`] belongs to.
+/// Number of cells of the normal problem across a patch to which [`REGION`] belongs.
 const REGION_CELLS: f64 = 44.0;
-/// Power of these cells that the error falls with.
+/// Power of the number of cells with which that error falls.
 const REGION_POWER: f64 = 1.75;
-/// On so few cells the error is twice what the power says. Chosen on one patch with a few ten-thousandths of the load.
+/// Number of cells at which the error is twice that of the power law. Chosen on one patch with a few ten-thousandths of the load.
 const REGION_CELLS_FEW: f64 = 3.0;
 
-/// Value and relative error of the resultants.
+/// Resultants with their relative errors.
 #[derive(Debug, Clone)]
 pub(crate) struct Estimate {
-    /// Resultants of every patch: the best known.
+    /// Resultants of every patch, extrapolated on request.
     pub(crate) resultants: Vec<Resultants>,
-    /// Their errors, patch by patch, then of the sum; none without a coarser mesh.
+    /// Relative errors, patch by patch, then of the sum; `None` without a coarser mesh.
     pub(crate) errors: RelativeErrors,
 }
 
 impl Estimate {
-    /// Raises the errors to the distances from other resultants.
+    /// Raises the errors to at least the distances from other resultants.
     pub(crate) fn cover(&mut self, task: &RollingTask, other: &[Resultants]) {
         let patches = task.footprint.patches();
         let apart = distances(task, patches, &self.resultants, other);
@@ -62,7 +63,7 @@ impl Estimate {
         self.errors.last().copied().flatten()
     }
 
-    /// The estimate of meshes of one motion, coarse to fine; nothing without a mesh. Values are those of the finest mesh, extrapolated if so asked.
+    /// The estimate from meshes of one motion, coarse to fine; `None` without a mesh. Values are those of the finest mesh, extrapolated on request.
     pub(crate) fn of(
         task: &RollingTask,
         index: usize,
@@ -75,12 +76,8 @@ impl Estimate {
             resultants: finest.resultants.clone(),
             errors: vec![None; patches.len() + 1],
         };
-        let tangential = &finest.tangential;
-        let still = matches!(
-            tangential.exit,
-            LevelOutcome::NoMotion | LevelOutcome::NoFriction
-        );
-        if still {
+        let skip = finest.tangential.skip;
+        if let Some(Skip::NoMotion | Skip::NoFriction) = skip {
             found.errors.fill(Some(0.0));
             return Some(found);
         }
@@ -99,10 +96,9 @@ impl Estimate {
             }
             return Some(found);
         };
-        // The power of the number of cells that the error falls with. A layer between the bodies lowers the order at the leading edge (60 ellipses with
-        // a layer).
+        // The power of the number of cells with which the error falls. A layer between the bodies lowers the order at the leading edge (60 ellipses with a layer).
         let order = if task.interface.layer > 0.0 { 0.5 } else { 1.0 };
-        // What the coarser of two meshes is off over what the finer one is.
+        // The ratio of the errors of the coarser and the finer of two meshes.
         let ratio = |fine: usize, coarse: usize| {
             (solved[fine].cells() / solved[coarse].cells()).powf(order)
         };
@@ -127,8 +123,8 @@ impl Estimate {
         let safety = safety(task);
         let given = matches!(task.resolution, Resolution::Mesh(_));
         let inverse_squares = || [size.strips, size.cells].map(|n| f64::from(n).powi(-2));
-        let least = match tangential.exit {
-            LevelOutcome::RigidSlip => 1.0 / NEGLIGIBLE,
+        let least = match skip {
+            Some(Skip::RigidSlip) => 1.0 / NEGLIGIBLE,
             _ if given && side < SIDE_FEW => alone,
             _ if given && side < SIDE_GOOD => ERROR_FEW * inverse_squares().iter().sum::<f64>(),
             _ => task.tolerance(index),
@@ -142,7 +138,7 @@ impl Estimate {
             let share = EXTRAPOLATED / (ratio(last, middle) - 1.0);
             let coarse = &solved[middle].resultants;
             for (k, value) in found.resultants.iter_mut().enumerate() {
-                // The loads of strips are not quite those of the limit where friction varies across.
+                // Where friction varies across, the sum of the loads of the strips differs slightly from the limit.
                 let limit = task.friction.limit(task.footprint, k);
                 let bound = limit.max(value.force_x.hypot(value.force_y));
                 *value = value.beyond(coarse[k], share, bound);
@@ -152,7 +148,7 @@ impl Estimate {
     }
 }
 
-/// The finest of the meshes before number `fine` that is coarse enough to compare with.
+/// The finest of the meshes before `fine` that is coarse enough to be compared with it.
 pub(crate) fn coarser(solved: &[DiscreteSolution], fine: usize) -> Option<usize> {
     let most = COARSER * solved[fine].cells();
     solved[..fine].iter().rposition(|mesh| mesh.cells() <= most)
@@ -167,8 +163,7 @@ fn safety(task: &RollingTask) -> f64 {
     SAFETY + share * (SAFETY_JUMPING - SAFETY)
 }
 
-/// Distances of two sets of resultants by their largest components: every patch relative to its own μN with moments about its middle, then
-/// the sums.
+/// Distances of two sets of resultants in their largest component: for every patch relative to its own μN, with moments about its middle, then for the sums.
 fn distances(
     task: &RollingTask,
     patches: &[Patch],
@@ -201,7 +196,7 @@ fn distances(
     distances
 }
 
-/// Errors of region and pressure that were found from a gap, and of the load they carry, patch by patch, then of the sum.
+/// Relative errors due to region, pressure and load of a computed normal problem, patch by patch, then for the sum.
 fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
     let Some(uncertainty) = task.footprint.uncertainty() else {
         return vec![0.0; patches.len() + 1];
@@ -212,7 +207,7 @@ fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
         region * (1.0 + (REGION_CELLS_FEW / cells).powi(2))
     };
     let mut errors: Vec<f64> = uncertainty.cells_across.iter().map(of).collect();
-    // An error of the deepest patch, or a distance between surfaces that should touch, moves the surface at the other patches by a part of the largest depth.
+    // An error of the deepest patch, or a distance between surfaces that should touch, shifts the surface at the other patches by a part of the largest depth.
     // The load of a patch grows with the power 3/2 of its own depth.
     let depth = |patch: &Patch| patch.normal_force / patch.area.sqrt();
     let deepest =

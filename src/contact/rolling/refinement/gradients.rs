@@ -1,7 +1,7 @@
-//! Derivatives of the resultants by creepages and spin, by differences on the meshes of the answer.
+//! Derivatives of the resultants by creepages and spin, by finite differences.
 //!
-//! Region and pressure stay as they are, and so do the meshes, on which the resultants are smooth functions of the motion. Central differences
-//! of two steps are extrapolated to the step 0 (Richardson).
+//! Region, pressure and meshes are fixed, so the resultants are smooth functions of the motion. Central differences of two steps are extrapolated to step 0
+//! (Richardson).
 
 use crate::error::SolveError;
 use crate::monitor::Monitor;
@@ -11,14 +11,14 @@ use crate::rolling::refinement::interpolate::RefinementState;
 use crate::rolling::refinement::on_mesh::MotionTask;
 use crate::rolling::task::{Motion, RollingTask};
 
-/// The smaller step as a part of μN/(G c²), with c² = A/π. A creepage of that unit makes nearly everything slip, so that the force changes by about
-/// 0.02 μN, and the noise of a solve, 1e-5 μN, is far below the errors of the mesh.
+/// The smaller step over μN/(G c²), with c² = A/π. A creepage of that unit makes nearly everything slip, so the force changes by about 0.02 μN, and the noise
+/// of a solve, 1e-5 μN, is far below the error of the mesh.
 pub(crate) const STEP: f64 = 0.005;
 
 /// Adds the gradients to an answer.
 ///
 /// # Errors
-/// Why a motion beside that of the answer has no answer; or the monitor stopped the work.
+/// The reason why a neighbouring motion has no solution; or the monitor stopped the work.
 pub(crate) fn add_gradients(
     task: &RollingTask,
     state: &mut RefinementState,
@@ -45,7 +45,7 @@ pub(crate) fn add_gradients(
     let modulus = task.interface.reduction * task.elasticity.shear_modulus;
     let creepage = STEP * limit / (modulus * length * length);
     let steps = [creepage, creepage, creepage / length];
-    // Where the mesh is the client's, resultants are not extrapolated.
+    // On a client mesh, resultants are not extrapolated.
     let kind = usize::from(task.target().is_none());
     let mut all = vec![PatchGradients::default(); patches.len()];
     for (component, step) in steps.into_iter().enumerate() {
@@ -95,8 +95,8 @@ pub(crate) fn add_gradients(
     Ok(())
 }
 
-/// The slope of a function at 0 and its error, from its values at -2, -1, 1 and 2 steps. Forces have a kink of higher order where slip begins,
-/// where the extrapolated slope is off by up to as much as the change; the error is twice the change.
+/// The slope of a function at 0 and its error, from its values at −2, −1, 1 and 2 steps. Where slip begins, forces have a kink of higher order, at which the
+/// extrapolated slope is off by up to the change between both steps; the error is twice that change.
 pub(crate) fn slope(values: [f64; 4], step: f64) -> (f64, f64) {
     let small = (values[2] - values[1]) / (2.0 * step);
     let large = (values[3] - values[0]) / (4.0 * step);

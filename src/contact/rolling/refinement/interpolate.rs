@@ -1,8 +1,4 @@
-//! Prolongation: the tractions on a coarse mesh as the first iterate on a finer one.
-//!
-//! The meshes of a footprint that exist: made once, shared by all motions, the least recently used dropped.
-//!
-//! Meshes, tractions for predictions, and buffers, kept from one motion of a footprint to the next.
+//! State kept from one motion of a footprint to the next: meshes, predictor and buffers; and the prolongation of tractions to a finer mesh.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -16,7 +12,7 @@ use crate::rolling::refinement::predictor::Predictor;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{MeshPlan, RollingTask};
 
-/// Tractions on one mesh interpolated to another. Interpolated are their ratios to the friction bound, which vary less.
+/// Prolongs tractions from one mesh to another. Their ratios to the friction bound are interpolated, because these vary less.
 pub(crate) fn prolonged(
     from: &StripMesh,
     traction: &[Vec<f64>; 2],
@@ -33,10 +29,8 @@ pub(crate) fn prolonged(
     })
 }
 
-/// Interpolates `values` (one per coarse cell) to the cells of the fine mesh: linearly along the normalised chord,
-/// linearly in y between the coarse strips of the same patch. Cells beyond the outermost strip take its value.
-///
-/// The result is only a first iterate: a segment without counterpart takes the values of the nearest segment of the patch.
+/// Interpolates `values` (one per coarse cell) to the cells of the fine mesh: linearly along the normalised chord and linearly in y between the coarse strips
+/// of the same patch. Cells beyond the outermost strip take its value.
 pub fn interpolate(coarse: &Mesh, values: &[f64], fine: &Mesh) -> Vec<f64> {
     let mut out = vec![0.0; fine.cells()];
     for segment in &fine.segments {
@@ -63,7 +57,7 @@ pub fn interpolate(coarse: &Mesh, values: &[f64], fine: &Mesh) -> Vec<f64> {
     out
 }
 
-/// The segment of the same patch on the wanted side that is nearest in y, then in x.
+/// The segment of the same patch on the given side that is nearest in y, then in x.
 fn nearest<'a>(
     mesh: &'a Mesh,
     segment: &Segment,
@@ -102,23 +96,22 @@ fn along(mesh: &Mesh, segment: &Segment, values: &[f64], place: f64) -> f64 {
     (1.0 - weight) * values[next - 1] + weight * values[next]
 }
 
-/// Levels that are kept from one motion to the next: a few paths of about four levels. Sweeps return to the levels of the last few
-/// motions only; in a creep map of 900 motions at fixed spin, half as many make no difference (`cargo bench --bench stress -- --only
-/// creep-map`).
+/// Number of meshes kept from one motion to the next, enough for a few families. Sweeps return only to the meshes of the last few motions; in a creep map of
+/// 900 motions at fixed spin, half as many make no difference (`cargo bench --bench stress -- --only creep-map`).
 pub const LEVELS_KEPT: usize = 32;
 
-/// The levels of a case that exist; the least recently used are dropped between motions.
+/// The meshes of a case; the least recently used are dropped between motions.
 #[derive(Debug)]
 pub struct Levels<'a> {
     task: &'a RollingTask<'a>,
     operators: Arc<CaseOperators>,
-    /// With their numbers, which are never given twice, in the order of their last use.
+    /// Meshes with their unique numbers, in the order of their last use.
     kept: Vec<(usize, Arc<StripMesh>)>,
     made: usize,
 }
 
 impl<'a> Levels<'a> {
-    /// No levels yet; their operators come from a store.
+    /// Starts without meshes; their operators come from a store.
     pub fn new(task: &'a RollingTask<'a>, store: &Arc<OperatorStore>) -> Levels<'a> {
         Levels {
             task,
@@ -128,13 +121,13 @@ impl<'a> Levels<'a> {
         }
     }
 
-    /// The number of the level of this plan; it is made if it is not there.
+    /// The number of the mesh of this plan, which is made if it is missing.
     ///
     /// # Errors
     /// If no strip meets a patch.
     pub fn level(&mut self, plan: MeshPlan) -> Result<usize, SolveError> {
         if let Some(place) = self.kept.iter().position(|(_, level)| level.plan == plan) {
-            // The most recently used stand last.
+            // The most recently used mesh is the last one.
             self.kept[place..].rotate_left(1);
             return Ok(self.kept[self.kept.len() - 1].0);
         }
@@ -145,7 +138,7 @@ impl<'a> Levels<'a> {
         Ok(self.made - 1)
     }
 
-    /// A level by its number; it must have been used since the last [`Levels::trim`].
+    /// The mesh with a number; it must have been used since the last [`Levels::trim`].
     pub fn get(&self, level: usize) -> Arc<StripMesh> {
         let found = self.kept.iter().rev().find(|(number, _)| *number == level);
         let Some((_, level)) = found else {
@@ -154,8 +147,8 @@ impl<'a> Levels<'a> {
         Arc::clone(level)
     }
 
-    /// Drops the least recently used levels beyond [`LEVELS_KEPT`] and gives their numbers. Called between motions: no answer may refer to
-    /// a level by its number after that.
+    /// Drops the least recently used meshes beyond [`LEVELS_KEPT`] and returns their numbers. Called between motions, when no solution refers to a mesh by its
+    /// number.
     pub fn trim(&mut self) -> Vec<usize> {
         let surplus = self.kept.len().saturating_sub(LEVELS_KEPT);
         let dropped = self.kept.drain(..surplus);
@@ -163,13 +156,13 @@ impl<'a> Levels<'a> {
     }
 }
 
-/// The state of the refinement of one footprint. It saves time and never changes a mesh or an estimate.
+/// The state of the refinement of one footprint. It saves time and changes no mesh and no estimate.
 #[derive(Debug)]
 pub struct RefinementState<'a> {
     task: &'a RollingTask<'a>,
-    /// The meshes that exist.
+    /// The meshes.
     pub levels: Levels<'a>,
-    /// Tractions of the last motions.
+    /// Tractions of recent motions.
     pub predictor: Predictor,
     /// Buffers of the iterations on all meshes.
     pub workspace: NewtonWorkspace,
@@ -197,8 +190,7 @@ impl<'a> RefinementState<'a> {
             .get_or_init(|| all.map(|patch| LoadEllipse::of(footprint, patch)).collect())
     }
 
-    /// Drops the least recently used meshes and the tractions on them. Called between motions: no answer may refer to a mesh by its number
-    /// after that.
+    /// Drops the least recently used meshes and the tractions on them. Called between motions, when no solution refers to a mesh by its number.
     pub fn trim(&mut self) {
         for number in self.levels.trim() {
             self.predictor.forget(number);

@@ -1,4 +1,4 @@
-//! The nested meshes of a motion: a function of the patches, their pressures and the rigid slip, never of an iterate or of other motions.
+//! The nested meshes of a motion. They depend on patches, pressures and rigid slip, never on an iterate or on other motions.
 
 use std::f64::consts::PI;
 
@@ -7,39 +7,41 @@ use crate::method::Method;
 use crate::rolling::methods::fastsim;
 use crate::rolling::task::{MeshPlan, Motion, Resolution, RollingTask};
 
-/// Cells per patch of the coarsest mesh. 16 and 23 halve the work at a target of 0.02, but cover 90 to 93 % of ellipses: meshes of 4 × 4 cells
-/// agree by accident.
+/// Cells per patch of the coarsest mesh. 16 and 23 halve the work at a target of 0.02, but cover 90 to 93 % of ellipses, because meshes of 4 × 4 cells agree
+/// by chance.
 const CELLS_FIRST: f64 = 32.0;
-/// Cells of the finest mesh over all patches.
+/// Total number of cells of the finest mesh.
 pub const CELLS_MAX: u32 = 2048;
-/// Fewest cells per patch that the finest mesh may have, however many patches there are.
+/// Least number of cells per patch of the finest mesh, for any number of patches.
 pub const PATCH_CELLS_MAX_LEAST: f64 = 64.0;
-/// Fewest strips, and fewest cells in a strip, of an adaptive mesh; the meshes below an explicit one may have half as many.
+/// Least number of strips, and of cells in a strip, of an adaptive mesh. The meshes below an explicit one may have half as many.
 const SIDE_MIN: f64 = 4.0;
 /// Least cells of the finest mesh over those of the coarsest: an estimate needs two doublings.
 const LAST_OVER_FIRST: f64 = 4.0;
 /// Strips, and cells in a strip, of the coarsest mesh before they are rounded. Each doubling of the cells then adds to both. With fewer, the
 /// meshes of a slender patch have 4 strips one after another, and agree although their strips are too wide.
 const SIDE_FIRST: f64 = 3.6;
-/// Dimensionless spin `φ c G/(μ p_max)` from which meshes gather about the pole of the rigid slip. 1 to 4 change the work by 20 %.
+/// Number of strips, and of cells in a strip, from which a mesh given by the client counts as fine.
+pub(crate) const SIDE_GOOD: u32 = 8;
+/// Dimensionless spin `φ c G/(μ p_max)` from which meshes are refined about the pole of the rigid slip. Values from 1 to 4 change the work by 20 %.
 const SPIN_GRADED: f64 = 2.0;
-/// Distance from the middle of the patch, in half axes, beyond which a pole counts as outside.
+/// Distance from the middle of the patch, in semi-axes, beyond which a pole counts as outside.
 const POLE_INSIDE: f64 = 0.9;
-/// Length over width of a patch beyond which the cells of a motion with spin and no pole inside become longer. With 4 in place of 8 and a power of
-/// 0.75, 1.5 % of the errors of random ellipses exceed twice their estimate; with 8 it is 0.5 %.
+/// Ratio of length to width of a patch beyond which cells become longer for a motion with spin and no pole inside. With 4 and a power of 0.75 in place of 8
+/// and 1.5, 1.5 % of the errors of random ellipses exceed twice their estimate instead of 0.5 %.
 const SLENDER_SPINNING: f64 = 8.0;
-/// Power with which their number along a strip over the number of strips then grows. With 0.75 the patch of a flange takes twice as many products as
-/// with 1.5; with 2, 5 % of the errors of wheels on the curve exceed twice their estimate.
+/// Power with which the number of cells along a strip over the number of strips then grows. With 0.75 the patch of a flange takes twice as many products;
+/// with 2, 5 % of the errors of wheels on the curve exceed twice their estimate.
 const SLENDER_POWER: f64 = 1.5;
-/// Poles are rounded to multiples of this, in half axes, so that near motions share meshes. 0.02 and 0.1 change the work by 1 to 6 %.
+/// Poles are rounded to multiples of this, in semi-axes, so that neighbouring motions share meshes. 0.02 and 0.1 change the work by 1 to 6 %.
 const POLE_GRID: f64 = 0.05;
 
 /// The meshes of one motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshFamily {
-    /// Cells along a strip over the number of strips.
+    /// Number of cells along a strip over the number of strips.
     shape: f64,
-    /// Where all meshes are graded.
+    /// The point about which all meshes are refined.
     pole: Option<[f64; 2]>,
     patches: f64,
 }
@@ -47,8 +49,7 @@ pub struct MeshFamily {
 impl MeshFamily {
     /// The family of a motion about the origin of the case.
     ///
-    /// Factors and exponents of the shape lie on flat optima over 62 Hertz contacts with a/b from 0.2 to 5 and 14 random ellipses with
-    /// a/b > 5.
+    /// Factors and exponents of the shape lie on flat optima over 62 Hertz contacts with a/b from 0.2 to 5 and 14 random ellipses with a/b > 5.
     pub fn of(task: &RollingTask, motion: &Motion) -> MeshFamily {
         let patches = task.footprint.patches();
         let heaviest = patches
@@ -106,8 +107,8 @@ fn cells_max(patches: f64) -> f64 {
 
 /// The point of the only patch about which the tractions of a motion turn, in half axes, if there is one.
 ///
-/// Elastic slip moves the pole of the rigid slip towards the trailing edge, by about `1/(1 + ψ)` half axes under the dimensionless spin ψ
-/// (290 vortex centres on random ellipses).
+/// Elastic slip moves the pole of the rigid slip towards the trailing edge by about `1/(1 + ψ)` semi-axes, with the dimensionless spin ψ (290 vortex centres
+/// on random ellipses).
 fn pole(task: &RollingTask, motion: &Motion) -> Option<[f64; 2]> {
     let [patch] = task.footprint.patches() else {
         return None;

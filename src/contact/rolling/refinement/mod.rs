@@ -1,12 +1,12 @@
-//! A motion on nested meshes, coarse to fine, until the estimate of the error meets the target.
+//! Adaptive refinement: a motion is solved on nested meshes, coarse to fine, until the estimated error meets the target.
 //!
 //! | question | where |
 //! |---|---|
 //! | which meshes, when to stop | [`adapt`] |
 //! | sizes and grading of the meshes of a motion | [`mesh_family`] |
-//! | one mesh: start, method, resultants | [`on_mesh`] |
+//! | one mesh: first iterate, method, resultants | [`on_mesh`] |
 //! | error and extrapolated value | [`error_estimate`] |
-//! | starts from motions before and from coarser meshes; meshes kept from one motion to the next | [`predictor`], [`interpolate`] |
+//! | first iterates from earlier motions and from coarser meshes; meshes kept from motion to motion | [`predictor`], [`interpolate`] |
 //! | derivatives by creepages and spin | [`gradients`] |
 
 pub mod adapt;

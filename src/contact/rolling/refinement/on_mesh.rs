@@ -8,7 +8,7 @@ use crate::method::Method;
 use crate::monitor::Monitor;
 use crate::normal::hertz::Patch;
 use crate::remark::kind::short;
-use crate::rolling::answer::{LevelAnswer, LevelFailure, LevelOutcome, Resultants, Work};
+use crate::rolling::answer::{LevelAnswer, LevelFailure, Resultants, Work};
 use crate::rolling::methods::boundary_element::solve as boundary_element;
 use crate::rolling::methods::boundary_element::task::LevelTask;
 use crate::rolling::methods::liu_hsu::on_level;
@@ -17,16 +17,15 @@ use crate::rolling::refinement::interpolate::{RefinementState, prolonged};
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{MeshPlan, Motion, RollingTask};
 
-/// The coarse mesh on which the method of Liu and Hsu finds its spin pole; they recommend fewer than 30 cells (see `liu_hsu`).
+/// The coarse mesh on which the method of Liu and Hsu finds its spin pole. They recommend fewer than 30 cells (see `liu_hsu`).
 const POLE_MESH: MeshSize = MeshSize {
     strips: 5,
     cells: 5,
 };
-/// If a solve does not converge, a patch longer along rolling than this many times its width is named as the likely reason; nearly all
-/// such patches are solved.
+/// If a solve does not converge, a patch with a larger ratio of length along rolling to width is named as the likely reason. Most such patches converge.
 const SLENDER: f64 = 20.0;
 
-/// A motion of a problem, and the creepages it is solved with.
+/// A motion of a problem with its creepages.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionTask {
     /// The number of the motion.
@@ -35,16 +34,16 @@ pub struct MotionTask {
     pub motion: Motion,
 }
 
-/// The answer for one motion on one mesh.
+/// The solution for one motion on one mesh.
 #[derive(Debug, Clone)]
 pub struct DiscreteSolution {
-    /// The number of the mesh in the levels.
+    /// Number of the mesh.
     pub number: usize,
     /// The mesh.
     pub mesh: Arc<StripMesh>,
     /// Tractions, slips and zones.
     pub tangential: LevelAnswer,
-    /// Resultants of every patch about the origin of the case, as the tractions give them.
+    /// Resultants of the tractions of every patch about the origin of the case.
     pub resultants: Vec<Resultants>,
 }
 
@@ -55,11 +54,11 @@ impl DiscreteSolution {
     }
 }
 
-/// Solves a motion on one mesh. The start is predicted from motions before, else prolonged from a coarser mesh, else that of the
-/// simplified theory.
+/// Solves a motion on one mesh. The first iterate is predicted from earlier motions, or else prolonged from a coarser mesh, or else that of the simplified
+/// theory.
 ///
 /// # Errors
-/// Why there is no answer.
+/// The reason why there is no solution.
 pub fn solve_on_mesh(
     task: &RollingTask,
     state: &mut RefinementState,
@@ -71,7 +70,7 @@ pub fn solve_on_mesh(
     let number = state.levels.level(plan)?;
     let mesh = state.levels.get(number);
     let tangential = match task.method {
-        // Tractions are 0, whatever the method.
+        // Without friction, tractions are 0 for every method.
         _ if task.friction.is_frictionless() => {
             Ok(full_slip::frictionless_answer(&mesh, &asked.motion))
         }
@@ -113,7 +112,7 @@ fn boundary_elements(
     let motion = mesh.scale.motion(&asked.motion);
     let of_mesh = level_task(task, &mesh, &motion, asked.index);
     let is_unique = of_mesh.fall.is_none() && of_mesh.passage.is_none();
-    // Which of several solutions is found depends on the start, which therefore has to be a function of the motion.
+    // The start may decide which of several solutions is found, so it must be a function of the motion alone.
     let predicted = match is_unique {
         true => state.predictor.start(number, &motion, &mesh.bound),
         false => None,
@@ -128,13 +127,13 @@ fn boundary_elements(
     };
     let found = boundary_element::solve(of_mesh, start.as_ref(), &mut state.workspace, monitor)?;
     let is_predicting = task.motions.len() > 1 || task.forces[asked.index] != [None; 2];
-    if is_unique && is_predicting && found.exit == LevelOutcome::Solved {
+    if is_unique && is_predicting && !found.is_closed_form() {
         state.predictor.remember(number, motion, &found.traction);
     }
     Ok(found)
 }
 
-/// Replaces the slips on a mesh by smooth ones where they are those of the trapezoid rule; where that has no answer, they stay. Returns the work.
+/// Replaces the slips of the trapezoid rule on a mesh by smooth ones, if the three-point rule converges. Returns the work.
 ///
 /// # Errors
 /// The monitor may stop the work.
@@ -146,7 +145,7 @@ pub(crate) fn add_smooth_slips(
     answer: &mut LevelAnswer,
     monitor: &dyn Monitor,
 ) -> Result<Work, SolveError> {
-    let is_smooth = answer.second.is_some() || answer.exit != LevelOutcome::Solved;
+    let is_smooth = answer.second.is_some() || answer.is_closed_form();
     if task.method != Method::BoundaryElement || is_smooth {
         return Ok(Work::default());
     }
@@ -160,7 +159,7 @@ pub(crate) fn add_smooth_slips(
     }
 }
 
-/// The task of a motion on a mesh.
+/// The equations of a motion on a mesh.
 fn level_task<'a>(
     task: &'a RollingTask,
     level: &'a StripMesh,
@@ -176,7 +175,7 @@ fn level_task<'a>(
     }
 }
 
-/// The error that a client reads about a failure at a point of the case.
+/// The client error for a failure at a point of the case.
 pub(crate) fn named(failure: LevelFailure, task: &RollingTask, point: usize) -> SolveError {
     match failure {
         LevelFailure::Stopped(stop) => stop.into(),
@@ -198,7 +197,7 @@ pub(crate) fn named(failure: LevelFailure, task: &RollingTask, point: usize) -> 
     }
 }
 
-/// A clause that names the patch of the largest ratio of length along rolling to width, if this may be why there is no answer.
+/// A clause that names the most slender patch, if its length along rolling may be why there is no solution.
 fn slender(task: &RollingTask) -> Option<String> {
     let ratio = |patch: &Patch| {
         let [x_min, x_max, y_min, y_max] = patch.extent;

@@ -1,36 +1,36 @@
-//! Starts of a motion from the tractions of the last motions on the same mesh. They change the time of a solve, never its mesh or estimate.
+//! First iterates from the tractions of earlier motions on the same mesh. They change the time of a solve, but no mesh and no estimate.
 
 use crate::numerics::simd::length;
 use crate::rolling::task::Motion;
 
-/// Longest step that is extrapolated, in steps between the last two motions. 1.1 and 2.5 are alike on sweeps of equal steps.
+/// Longest step that is extrapolated, relative to the step between the last two motions. 1.1 and 2.5 are alike on sweeps of equal steps.
 const STEP_MAX: f64 = 1.5;
-/// Longest step, relative to the motion, over which the last tractions serve unchanged. On 12 sweeps of 9 motions on random ellipses 0.12 takes
-/// 6 % more products and 0.5 takes 6 % fewer.
+/// Longest step, relative to the motion, for which the last tractions are used unchanged. On 12 sweeps of 9 motions on random ellipses 0.12 takes 6 % more
+/// products and 0.5 takes 6 % fewer.
 const NEAR: f64 = 0.25;
 
-/// Tractions of the last motions on every mesh.
+/// Tractions of the last two motions on every mesh.
 #[derive(Debug, Default)]
 pub struct Predictor {
-    /// The newest of a mesh last.
+    /// The newest step of a mesh is last.
     steps: Vec<Step>,
 }
 
 #[derive(Debug)]
 struct Step {
-    /// The number of the mesh.
+    /// Number of the mesh.
     mesh: usize,
-    /// Dimensionless, about the origin of the mesh.
+    /// The motion, dimensionless, about the origin of the mesh.
     motion: Motion,
     traction: [Vec<f64>; 2],
 }
 
 impl Predictor {
-    /// Remembers the tractions of a motion in place of the oldest on the mesh, or of the same motion.
+    /// Stores the tractions of a motion; those of the same motion, or the oldest on the mesh, are dropped.
     pub fn remember(&mut self, mesh: usize, motion: Motion, traction: &[Vec<f64>; 2]) {
         self.steps
             .retain(|step| step.mesh != mesh || step.motion != motion);
-        // Starts from three motions, by a parabola, take 8 to 15 % more products on creep curves and maps.
+        // Extrapolation by a parabola through three motions takes 8 to 15 % more products on creep curves and maps.
         if self.steps.iter().filter(|step| step.mesh == mesh).count() == 2
             && let Some(oldest) = self.steps.iter().position(|step| step.mesh == mesh)
         {
@@ -43,13 +43,13 @@ impl Predictor {
         });
     }
 
-    /// Forgets a mesh.
+    /// Forgets the tractions on a mesh.
     pub fn forget(&mut self, mesh: usize) {
         self.steps.retain(|step| step.mesh != mesh);
     }
 
-    /// The tractions that are expected for a motion, within their bounds: on the line through the last two motions, on that through the
-    /// last one and rest, or those of the last one if it is near.
+    /// The predicted tractions of a motion, within their bounds: extrapolated on the line through the last two motions, or on that through the last one and rest,
+    /// or those of the last motion if it is near.
     pub fn start(&self, mesh: usize, motion: &Motion, bound: &[f64]) -> Option<[Vec<f64>; 2]> {
         let mut steps = self.steps.iter().rev().filter(|step| step.mesh == mesh);
         let last = steps.next()?;
@@ -83,7 +83,7 @@ fn on_line(to: [f64; 3], step: [f64; 3]) -> Option<f64> {
     (dot(aside, aside).sqrt() <= 1e-6 * dot(to, to).sqrt()).then_some(along)
 }
 
-/// The ratio of a motion to the last one, if they are parallel and of similar size: tractions that stick grow in proportion.
+/// The ratio of a motion to the last one, if they are parallel and of similar size. Sticking tractions grow in proportion.
 fn from_rest(motion: &Motion, last: &Motion) -> Option<f64> {
     let along = on_line(motion.components(), last.components())?;
     (1.0 / (1.0 + STEP_MAX)..=1.0 + STEP_MAX)
@@ -91,13 +91,13 @@ fn from_rest(motion: &Motion, last: &Motion) -> Option<f64> {
         .then_some(along)
 }
 
-/// Whether the tractions of the last motion serve as they are.
+/// Whether the tractions of the last motion can be used unchanged.
 fn is_near(motion: &Motion, last: &Motion) -> bool {
     let (whole, to_go) = (motion.components(), difference(motion, last));
     dot(to_go, to_go) <= NEAR * NEAR * dot(whole, whole)
 }
 
-/// Brings tractions into their discs.
+/// Scales tractions back to their friction circles.
 fn shrink(traction: &mut [Vec<f64>; 2], bound: &[f64]) {
     let [x, y] = traction;
     for ((x, y), bound) in x.iter_mut().zip(y.iter_mut()).zip(bound) {

@@ -4,38 +4,38 @@ use std::ops::Range;
 
 use crate::friction::velocity_weakening::Slipping;
 
-/// The state of one Newton step: which cells slip, and in which direction.
+/// The state of one Newton step: which cells slip, and along which tangent.
 #[derive(Debug, Default)]
 pub struct Linearisation {
     /// `(1, 0)` where a cell sticks, the unit tangent where it slips.
     pub(crate) direction: Vec<(f64, f64)>,
     /// D where a cell slips, −1 where it sticks.
     pub(crate) stiffness: Vec<f64>,
-    /// Cells that slip under a bound that falls with the slip, in order. They have two unknowns, like those that stick.
+    /// The cells that slip under a bound that weakens with slip, in order. They have two unknowns, like sticking cells.
     pub(crate) falling: Vec<FallingRow>,
 }
 
 impl Linearisation {
-    /// Begins another linearisation.
+    /// Empties the lists for a new linearisation.
     pub(crate) fn clear(&mut self) {
         self.direction.clear();
         self.stiffness.clear();
         self.falling.clear();
     }
 
-    /// The next cell has two unknowns.
+    /// Appends a cell with two unknowns.
     pub(crate) fn two_unknowns(&mut self) {
         self.direction.push((1.0, 0.0));
         self.stiffness.push(-1.0);
     }
 
-    /// The rows among these cells whose bound falls with the slip.
+    /// The rows among these cells whose bound weakens with slip.
     pub(crate) fn falling_in(&self, cells: Range<usize>) -> &[FallingRow] {
         let place = |cell| self.falling.partition_point(|row| row.cell < cell);
         &self.falling[place(cells.start)..place(cells.end)]
     }
 
-    /// Does the cell slip with one unknown?
+    /// Whether the cell slips with one unknown.
     pub fn slips(&self, cell: usize) -> bool {
         self.stiffness[cell] >= 0.0
     }
@@ -51,9 +51,9 @@ impl Linearisation {
     }
 }
 
-/// The law of such a cell linearised at `z = T + r s`, `d = z/|z|` and `t ⟂ d`: `t·δs − D t·δT = D t·T − t·s` turns the traction with
-/// the slip, and `d·(T + δT) = g + g′ (d·(s + δs) − σ)` keeps its size on the bound, σ being the slip of the resolvent. The second is
-/// divided by −r, so that both have the size and the sign of the rows of sticking cells.
+/// The law of a cell whose bound weakens with slip, linearised at `z = T + r s` with `d = z/|z|` and `t ⟂ d`. The equation `t·δs − D t·δT = D t·T − t·s` turns
+/// the traction with the slip. The equation `d·(T + δT) = g + g′ (d·(s + δs) − σ)` keeps its length at the bound, where σ is the slip of the resolvent; it is
+/// divided by −r, so that both rows have the size and sign of those of sticking cells.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FallingRow {
     /// The cell.
@@ -71,7 +71,7 @@ pub(crate) struct FallingRow {
 }
 
 impl FallingRow {
-    /// The row of a cell that slips at `z` of this length.
+    /// The row of a cell that slips at `z` of the given length.
     pub(crate) fn new(
         cell: usize,
         z: [f64; 2],
@@ -89,7 +89,7 @@ impl FallingRow {
         }
     }
 
-    /// Both rows applied to a slip and a traction.
+    /// Applies both rows to a slip and a traction.
     pub(crate) fn apply(&self, slip: [f64; 2], traction: [f64; 2]) -> [f64; 2] {
         let [dx, dy] = self.along;
         let turned = |v: [f64; 2]| dx * v[1] - dy * v[0];
@@ -107,9 +107,9 @@ impl FallingRow {
     }
 }
 
-/// Turns the rows of cells in a block of the preconditioner, which so far are the slips themselves.
+/// Transforms the rows of such cells in a block of the preconditioner, which contain the slips at first.
 ///
-/// `block` is a square matrix of `size`, column by column. `places` are the rows, and the columns, of the two components of each cell.
+/// `block` is a square matrix of `size`, column by column. Each row comes with the places of both components of its cell.
 pub(crate) fn turn_rows(
     block: &mut [f64],
     size: usize,

@@ -1,4 +1,4 @@
-//! Semismooth Newton iteration on strips.
+//! The boundary element method: semismooth Newton iteration on strips.
 
 pub mod linearisation;
 pub mod newton;

@@ -1,10 +1,9 @@
-//! Semismooth Newton on the projected friction law `T = Π(T + r s(T))`, Π the projection on the disc of radius g.
+//! Semismooth Newton iteration on the projected friction law `T = Π(T + r s(T))`, where Π projects onto the disc of radius g.
 //!
-//! With `z = T + r s`: a cell sticks where `|z| ≤ g` (both components unknown, `s = 0`), and slips where `|z| > g`
-//! (`T = g d + τ t`, `d = z/|z|`, `t ⟂ d`, one unknown τ, one equation `t·s = D τ`, `D = (|z| − g)/(g r)`). Each step
-//! solves that linear system by GMRES with the segments' own blocks as preconditioner (Alart & Curnier 1991 for the
-//! projection form; `r = 0.3/M_ii` because larger values can cycle on fine meshes). Where the bound falls with the slip, Π is the resolvent
-//! of that law: see [`FallingRow`].
+//! With `z = T + r s`, a cell sticks where `|z| ≤ g`: both components are unknown and `s = 0`. It slips where `|z| > g`: `T = g d + τ t` with `d = z/|z|` and
+//! `t ⟂ d`, one unknown τ and one equation `t·s = D τ`, `D = (|z| − g)/(g r)`. Each step solves this linear system by GMRES with the self-influence blocks of
+//! the segments as preconditioner. The projection form is that of Alart & Curnier (1991), with `r = 0.3/M_ii`, because larger values can cycle on fine
+//! meshes. Where the bound weakens with slip, Π is the resolvent of that law: see [`FallingRow`].
 
 use crate::friction::velocity_weakening::Softening;
 use crate::monitor::{Monitor, Stop};
@@ -19,30 +18,27 @@ use crate::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::rolling::slip_rules::Rule;
 use crate::rolling::strip_mesh::StripMesh;
 
-// Sensitivities of the numbers below: each changed alone, on the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the
-// targets 0.005 and 0.001, and on 12 sweeps of 9 motions. No change made a solve fail or moved an error beyond its scatter.
+// The sensitivities below: each constant was changed alone, on the first 160 ellipses of `cargo bench --bench calibrate ellipse` at the targets 0.005 and
+// 0.001, and on 12 sweeps of 9 motions. No change made a solve fail or moved an error beyond its scatter.
 
-/// Projection parameter r times `M_ii`. 0.2 takes 2 to 8 % more Newton steps, 0.45 takes 1 to 4 % fewer but is nearer to values that
-/// cycle.
+/// Projection parameter r times `M_ii`. 0.2 takes 2 to 8 % more Newton steps; 0.45 takes 1 to 4 % fewer but is closer to values that cycle.
 const PROJECTION: f64 = 0.3;
-/// The first so many steps are never halved: far from the solution the residual may grow for a step or two. With 4 or 16 the steps
-/// change by 0.6 % at most.
+/// Number of first steps that are never halved: far from the solution the residual may grow for a step or two. With 4 or 16 the steps change by at most 0.6 %.
 const FREE_STEPS: u32 = 8;
-/// A step is halved at most so many times. 3 and 8 give the same steps.
+/// Largest number of halvings of a step. 3 and 8 give the same steps.
 const HALVINGS_MAX: u32 = 5;
-/// If the tractions of slipping cells are this close to the tangents of their discs, relative to the residual, they are not moved there,
+/// Distance of the tractions of slipping cells from the tangents of their friction circles, relative to the residual, up to which they are not moved there,
 /// which saves a product. 0.03 takes 1 % more products, 0.3 takes 1 % fewer and 1 % more steps.
 const LIFT_NEGLIGIBLE: f64 = 0.1;
-/// Smallest and largest tolerance of a linear system. 3e-5 and 3e-4 in place of the first change nothing; 0.05 and 0.2 in place of the
-/// second take 3 to 5 % more products in 5 % fewer steps, and the reverse.
+/// Smallest and largest tolerance of a linear system. 3e-5 and 3e-4 in place of the first change nothing; 0.05 in place of the second takes 3 to 5 % more
+/// products in 5 % fewer steps, and 0.2 the reverse.
 const INNER_TOLERANCE: (f64, f64) = (1e-4, 1e-1);
-/// A linear system is solved no closer than to this part of the residual at which the iteration ends. Chosen by judgement; how much it
-/// matters was not measured.
+/// Least tolerance of a linear system over the ratio of the final to the present residual. Chosen by judgement.
 const INNER_OF_GOAL: f64 = 0.3;
-/// A step is halved if the residual exceeds the largest of the last three by this factor. 1.2 is alike, 2 takes up to 2 % more steps.
+/// Factor by which the residual may exceed the largest of the last three before a step is halved. 1.2 is alike, 2 takes up to 2 % more steps.
 const GROWTH_ALLOWED: f64 = 1.5;
 
-/// Solver for one rule on one mesh. It is not changed by a solve, and threads may share it.
+/// Solver for one rule on one mesh. It is immutable, so threads may share it.
 #[derive(Debug)]
 pub struct Newton<'a> {
     equations: &'a SlipEquations<'a>,
@@ -56,7 +52,7 @@ pub struct Newton<'a> {
 }
 
 impl<'a> Newton<'a> {
-    /// Collects the own blocks.
+    /// Collects the self-influence blocks.
     pub fn new(equations: &'a SlipEquations<'a>) -> Newton<'a> {
         let own = OwnBlocks::new(equations);
         let diagonal = own.diagonal(equations);
@@ -71,8 +67,8 @@ impl<'a> Newton<'a> {
         }
     }
 
-    /// The same for bounds that fall with the slip from those at rest: r is at least twice the steepest fall of each cell, so that its
-    /// resolvent is unique.
+    /// Returns this solver for bounds that weaken with slip from `bound`. r is at least twice the steepest weakening of each cell, which makes its resolvent
+    /// unique.
     #[must_use]
     pub fn falling(mut self, bound: &[f64], fall: Option<Softening>) -> Newton<'a> {
         let Some(fall) = fall else {
@@ -86,8 +82,8 @@ impl<'a> Newton<'a> {
         self
     }
 
-    /// The same with r no larger than slips allow that grow by `gain` on each cell when all tractions grow by one: displacements reach
-    /// far, so that together the tractions of a step move a cell much more than its own does.
+    /// Returns this solver with a smaller r, for a slip of each cell that grows by `gain` when all tractions grow by one. Displacements reach far, so the
+    /// tractions of a step together move a cell much more than its own traction does.
     #[must_use]
     pub fn far_reaching(mut self, gain: &[f64]) -> Newton<'a> {
         for (r, gain) in self.parameter.iter_mut().zip(gain) {
@@ -96,8 +92,8 @@ impl<'a> Newton<'a> {
         self
     }
 
-    /// How fast bounds fall with the slip over how fast slips fall as tractions grow: the largest `|g′| |M_ii|` of a cell. Below 1 every
-    /// cell alone has one solution. 0 for bounds that do not fall.
+    /// The largest `|g′| |M_ii|` of a cell: the weakening of the bound with slip over the decrease of slip with traction. Below 1 every cell alone has one
+    /// solution. 0 for bounds that do not weaken.
     pub fn stability(&self) -> f64 {
         self.stability
     }
@@ -112,7 +108,7 @@ impl<'a> Newton<'a> {
         self.compliance
     }
 
-    /// Entries of the influence that one product touches.
+    /// Entries of the operator that one product reads.
     pub fn entries(&self) -> usize {
         self.equations.entries()
     }
@@ -157,7 +153,7 @@ impl<'a> Newton<'a> {
                 report.converged = true;
                 break;
             }
-            // No step leads back from an iterate that is no number.
+            // An iterate that is not a number cannot be improved.
             if report.iterations == law.steps_max || report.residual.is_nan() {
                 break;
             }
@@ -165,7 +161,7 @@ impl<'a> Newton<'a> {
             before.copy_from_slice(t);
             self.linearise(law, t, rhs, workspace, &mut report);
             let NewtonWorkspace { blocks, linear, .. } = &mut *workspace;
-            // Where a start is near. Iterations from far, which may cycle, get blocks that leave nothing out.
+            // Iterations from a distant start may cycle, so they use complete blocks.
             let near = law.steps_max < STEPS_MAX;
             blocks.factor(&self.own, self.equations, linear, near);
             let inner = inner_tolerance(report.residual, last, law.tolerance);
@@ -190,7 +186,7 @@ impl<'a> Newton<'a> {
         Ok(report)
     }
 
-    /// Halves the step between two iterates until the residual is no more than is allowed, but not too often.
+    /// Halves the step between two iterates until the residual is allowed or the limit of halvings is reached.
     fn halve(
         &self,
         law: &NewtonTask,
@@ -211,7 +207,7 @@ impl<'a> Newton<'a> {
         }
     }
 
-    /// The bounds of all cells at the slips of an iterate that solves the law: those at rest where they stick.
+    /// The bounds of all cells at the slips of a solution; those without slip where cells stick.
     pub fn bounds(&self, rest: &[f64], fall: &Softening, t: &[f64], slip: &[f64]) -> Vec<f64> {
         let mut bounds = rest.to_vec();
         for (i, bound) in bounds.iter_mut().enumerate().take(self.equations.cells()) {
@@ -223,19 +219,19 @@ impl<'a> Newton<'a> {
         bounds
     }
 
-    /// `z = T + r s` of a cell, and its length.
+    /// `z = T + r s` of a cell and its length.
     fn projected(&self, t: &[f64], slip: &[f64], cell: usize) -> ([f64; 2], f64) {
         let (padded, r) = (self.equations.padded(), self.parameter[cell]);
         let z = [cell, padded + cell].map(|i| t[i] + r * slip[i]);
         (z, (z[0] * z[0] + z[1] * z[1]).sqrt())
     }
 
-    /// Does a cell slip under tractions `t` with the slips that they cause?
+    /// Whether a cell slips under tractions `t` with their slips.
     pub fn slips(&self, bound: &[f64], t: &[f64], slip: &[f64], cell: usize) -> bool {
         self.projected(t, slip, cell).1 > bound[cell]
     }
 
-    /// Which cells of the whole mesh slip at tractions and slips that belong to each other.
+    /// Slip flags of all cells of the whole mesh, for tractions with their slips.
     pub fn zones(&self, bound: &[f64], t: &[f64], slip: &[f64], level: &StripMesh) -> Vec<bool> {
         let mut zones = Vec::with_capacity(level.mesh.cells());
         zones.extend((0..self.cells()).map(|i| self.slips(bound, t, slip, i)));
@@ -258,7 +254,7 @@ impl<'a> Newton<'a> {
         }
     }
 
-    /// Computes the slips of `t` and the residual of the projected law; the slips are left in the workspace.
+    /// Computes the slips of `t`, which stay in the workspace, and returns the residual of the projected law.
     pub fn evaluate(
         &self,
         law: &NewtonTask,
@@ -302,8 +298,8 @@ impl<'a> Newton<'a> {
         }
     }
 
-    /// Sorts the cells into stick and slip by the last slips, moves `t` of slipping cells to the tangent of the disc,
-    /// and sets up the right-hand side there.
+    /// Divides the cells into stick and slip by the last slips, moves `t` of slipping cells to the tangent of the friction circle, and computes the right-hand
+    /// side there.
     fn linearise(
         &self,
         law: &NewtonTask,
@@ -341,8 +337,7 @@ impl<'a> Newton<'a> {
             }
             let (dx, dy) = (zx / length, zy / length);
             linear.direction.push((-dy, dx));
-            // A cell without pressure carries no traction, which is an infinite stiffness. A large finite one keeps the
-            // factorisation sound.
+            // A cell without pressure carries no traction, which means infinite stiffness. A large finite one keeps the factorisation accurate.
             let stiffness = if bound > 0.0 {
                 (length - bound) / (bound * r)
             } else {
@@ -353,7 +348,7 @@ impl<'a> Newton<'a> {
             to_tangent.push((lift * dx, lift * dy));
             lifted += law.area[i] * lift * lift;
         }
-        // Near the solution the distance to the tangent is less than the residual that the step leaves.
+        // Near the solution the distance to the tangent is smaller than the residual after the step.
         if (lifted / weight).sqrt() > LIFT_NEGLIGIBLE * residual * law.scale {
             for (i, (x, y)) in to_tangent.iter().enumerate() {
                 t[i] += x;
@@ -364,7 +359,7 @@ impl<'a> Newton<'a> {
         self.right_hand_side(t, rhs, workspace);
     }
 
-    /// Sets up the right-hand side of a linearisation at an iterate.
+    /// Computes the right-hand side of a linearisation at an iterate.
     fn right_hand_side(&self, t: &[f64], rhs: &mut [f64], workspace: &NewtonWorkspace) {
         let (padded, cells) = (self.equations.padded(), self.equations.cells());
         let NewtonWorkspace { linear, slip, .. } = workspace;
@@ -421,7 +416,7 @@ impl<'a> Newton<'a> {
         Ok(())
     }
 
-    /// `next` is `t` plus the step, slipping cells brought back to the circle.
+    /// Writes `t` plus the step to `next`, with slipping cells projected onto the friction circle.
     fn candidate(
         &self,
         law: &NewtonTask,
@@ -448,8 +443,8 @@ impl<'a> Newton<'a> {
     }
 }
 
-/// Tolerance of a linear system: loose while the zones still move, then the square of the progress of the residual (Eisenstat & Walker
-/// 1996, choice 2), but no tighter than the last step needs.
+/// Tolerance of a linear system: the square of the progress of the residual (Eisenstat & Walker 1996, choice 2), which is loose while the zones still move,
+/// but no tighter than the last step needs.
 fn inner_tolerance(residual: f64, last: f64, goal: f64) -> f64 {
     let progress = if last.is_finite() {
         0.5 * (residual / last).powi(2)
@@ -461,7 +456,7 @@ fn inner_tolerance(residual: f64, last: f64, goal: f64) -> f64 {
         .clamp(INNER_TOLERANCE.0, INNER_TOLERANCE.1)
 }
 
-/// The linearised equations as GMRES sees them.
+/// The linearised equations as a system for GMRES.
 pub(crate) struct NewtonSystem<'a> {
     pub(crate) equations: &'a SlipEquations<'a>,
     pub(crate) linear: &'a Linearisation,

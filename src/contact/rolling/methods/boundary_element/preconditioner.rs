@@ -1,6 +1,4 @@
-//! The preconditioner: every segment's own block of the Newton matrix, factored on its own.
-//!
-//! Own blocks of the strips: the effect of a strip on itself.
+//! The preconditioner: the self-influence block of every segment in the Newton matrix, factored on its own.
 
 use std::ops::Range;
 
@@ -11,21 +9,21 @@ use crate::rolling::methods::boundary_element::linearisation::{
 use crate::rolling::methods::boundary_element::strip_blocks::StripBlocks;
 use crate::rolling::slip_equations::SlipEquations;
 
-/// A segment in which something slips may have a block for each axis, like one where all sticks, if the tangents of its cells are no farther
-/// from the axes than this (sine of the angle); what such blocks leave out is left to GMRES. With such blocks in all iterations, the 62 Hertz
-/// references at 0.005 take 1.4 % more instructions with .25 (callgrind), with 1 (always) 0.8 % and 9 % more products, and with one block each
-/// 2.9 %; a creep curve takes 12 % more with one block each. In iterations from far they are not used: on an ellipse 30 times as long as wide
-/// under spin, five of eleven targets then found no solution, one block each misses one.
+/// A segment with slipping cells gets a block per axis, like one that sticks, if the tangents of its cells are no farther from the axes than this (sine of
+/// the angle). GMRES corrects what such blocks neglect. With such blocks in all iterations, the 62 Hertz references at 0.005 take 1.4 % more instructions with
+/// .25 (callgrind), 0.8 % and 9 % more products with 1 (always), and 2.9 % with one block each; a creep curve takes 12 % more with one block each. Iterations
+/// from a distant start use one block each: otherwise five of eleven targets have no solution on an ellipse 30 times as long as wide under spin, instead of
+/// one.
 const SKEW_MAX: f64 = 0.5;
 
-/// Own blocks of the operator, fixed for a rule and mesh.
+/// Self-influence blocks of the operator, for one rule and mesh.
 #[derive(Debug)]
 pub struct OwnBlocks {
-    /// `M_xx` of every segment, column by column, one segment after the other.
+    /// `M_xx` of every segment, column by column, segment after segment.
     xx: Vec<f64>,
     /// `M_yy`, likewise.
     yy: Vec<f64>,
-    /// Start of each segment's block, and one more.
+    /// Start of the block of each segment, and the end of the last.
     starts: Vec<usize>,
 }
 
@@ -71,7 +69,7 @@ impl OwnBlocks {
 pub struct StripFactors {
     blocks: StripBlocks,
     gathered: Vec<f64>,
-    /// Cells of the newest block that have two unknowns.
+    /// Cells of the last block that have two unknowns.
     stick: Vec<usize>,
     gathered_axis: Gathered,
     pivots: Vec<usize>,
@@ -80,17 +78,17 @@ pub struct StripFactors {
 /// Unknowns of one axis in a segment.
 #[derive(Debug, Default)]
 struct Gathered {
-    /// The cells that have one.
+    /// The cells with an unknown of this axis.
     rows: Vec<usize>,
-    /// Directions of all cells.
+    /// Directions of the unknowns of all cells.
     units: [Vec<f64>; 2],
-    /// One column of the block, of all cells.
+    /// One column of the block over all cells.
     line: Vec<f64>,
 }
 
 impl StripFactors {
-    /// Builds and factors the blocks of a linearisation: one block per segment, or one for each axis where nothing slips (sticking x and y do
-    /// not touch each other inside a segment) and, `near` a start, where all cells slip nearly along an axis.
+    /// Builds and factors the blocks of a linearisation. There is one block per segment, or one per axis where nothing slips (sticking x and y do not interact
+    /// inside a segment) and, `near` a start, where all cells slip nearly along an axis.
     pub fn factor(
         &mut self,
         own: &OwnBlocks,
@@ -142,7 +140,7 @@ impl StripFactors {
             }
             self.close_block(start);
         } else {
-            // Two factorisations of half the size take a quarter of the work of one.
+            // Two factorisations of half the size take a quarter of the work.
             for (matrix, shift) in [(xx, 0), (yy, padded)] {
                 let start = self.open_block();
                 self.blocks.places.extend(cells.clone().map(|i| shift + i));
@@ -152,8 +150,8 @@ impl StripFactors {
         }
     }
 
-    /// Gathers the unknowns of a segment that belong to an axis: those of its sticking cells along it, and those of slipping cells that are
-    /// nearer to it than to the other.
+    /// Gathers the unknowns of a segment that belong to an axis: those of sticking cells along it, and those of slipping cells that are closer to it than to the
+    /// other.
     fn gather(&mut self, linear: &Linearisation, cells: Range<usize>, axis: usize, padded: usize) {
         let Gathered { rows, units, .. } = &mut self.gathered_axis;
         rows.clear();
@@ -176,7 +174,7 @@ impl StripFactors {
         }
     }
 
-    /// Fills a block of the unknowns gathered last.
+    /// Fills a block with the unknowns gathered last.
     fn fill_gathered(
         &mut self,
         xx: &[f64],
@@ -214,13 +212,13 @@ impl StripFactors {
         start
     }
 
-    /// Factors the newest block, whose matrix is complete.
+    /// Factors the last block, whose matrix is complete.
     fn close_block(&mut self, start: usize) {
         let size = self.blocks.places.len() - start;
         let offset = self.blocks.offsets[self.blocks.offsets.len() - 1];
         self.pivots.resize(size, 0);
         lu::factor(&mut self.blocks.factors[offset..], &mut self.pivots);
-        // The rows are exchanged while values are gathered, so that an application needs no permutation of its own.
+        // Rows are exchanged while values are gathered, so applying the block needs no permutation.
         self.blocks.pivot_places.extend(
             self.pivots
                 .iter()
@@ -229,8 +227,7 @@ impl StripFactors {
         self.gathered.resize(self.gathered.len().max(size), 0.0);
     }
 
-    /// Fills one block: first one unknown per cell (T_x where it sticks, the tangential change where it slips), then
-    /// T_y of the cells that stick.
+    /// Fills one block. The first unknown of each cell is T_x where it sticks and the tangential change where it slips; then follows T_y of the cells that stick.
     fn fill_block(
         &mut self,
         xx: &[f64],
@@ -276,7 +273,7 @@ impl StripFactors {
         }
     }
 
-    /// Turns the rows of falling cells in the newest block.
+    /// Transforms the rows of cells with weakening bounds in the last block.
     fn turn(&mut self, falling: &[FallingRow], cells: Range<usize>, size: usize) {
         let stick = &self.stick;
         let rows = falling.iter().filter_map(|row| {
@@ -294,7 +291,7 @@ impl StripFactors {
     }
 }
 
-/// How far a tangent of a segment's slipping cells is from the nearest axis, at most (its sine); nothing if no cell slips.
+/// The largest angle (its sine) between a tangent of a slipping cell of a segment and the nearest axis; `None` if no cell slips.
 fn skew(linear: &Linearisation, cells: Range<usize>) -> Option<f64> {
     let slipping = cells.filter(|i| linear.slips(*i));
     let skews = slipping.map(|i| {

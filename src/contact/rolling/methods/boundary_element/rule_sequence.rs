@@ -1,4 +1,4 @@
-//! The two rules of one motion on one level, each from the starts that it has.
+//! Both discretisation rules on one mesh, each from its starts.
 
 use std::borrow::Cow;
 
@@ -19,46 +19,38 @@ use crate::rolling::slip_rules::Rule;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
-/// Forces of two solutions that differ by no more than this part of the friction limit are the same: ten times what the iteration leaves.
+/// Largest difference of the forces of equal solutions, relative to the friction limit: ten times the largest residual.
 const SAME_SOLUTION: f64 = 4e-3;
-/// From this stability number on (see [`Newton::stability`]) a second solution is looked for. None was seen below 1.5 in 360 random
-/// motions of the prototype.
+/// Stability number (see [`Newton::stability`]) above which a second solution is sought. None was found below 1.5 in 360 random motions of a prototype.
 const SECOND_START_FROM: f64 = 0.5;
-/// A round that leaves more than this part of the change before it halves the steps of the next ones. Chosen by judgement; how much it matters was
-/// not measured.
+/// If the change of the bounds in a round exceeds this part of the change before, the following steps are halved. Chosen by judgement.
 const PASSAGE_FALL: f64 = 0.7;
 
-/// What the three-point rule gives besides tractions.
+/// The results of the three-point rule besides its tractions.
 pub(super) struct ThreePointAnswer {
     pub(super) slip: [Vec<f64>; 2],
     pub(super) slips: Vec<bool>,
-    /// By how much a second solution differs, see [`RuleSequence::other_solution`].
+    /// See [`RuleSequence::other_solution`].
     pub(super) other: Option<f64>,
 }
 
-/// With which buffers to solve, and who may stop it.
-pub(super) struct Control<'a> {
-    pub(super) workspace: &'a mut NewtonWorkspace,
-    pub(super) monitor: &'a dyn Monitor,
-}
-
-/// One motion on one level.
+/// The solve of one motion on one mesh.
 pub(super) struct RuleSequence<'a> {
     level: &'a StripMesh,
     motion: &'a Motion,
     fall: Option<Softening>,
     passage: Option<PathDependentFriction<'a>>,
     tolerance: f64,
-    /// Newton steps of a rule at most.
-    steps_max: u32,
+
     operator: &'a StripOperator,
     pub(super) parity: Option<Parity>,
-    /// Bounds of the cells, at rest where they fall with the slip.
+    /// Bounds of the cells; without slip if they weaken with slip.
     bound: Vec<f64>,
-    /// The same at the slips of the three-point rule, once it is solved; nothing where they do not fall.
+    /// Bounds at the slips of the three-point rule, once it is solved; `None` if they do not depend on slip.
     slipping: Option<Vec<f64>>,
     area: Vec<f64>,
-    control: Control<'a>,
+    workspace: &'a mut NewtonWorkspace,
+    monitor: &'a dyn Monitor,
     pub(super) work: Work,
 }
 
@@ -66,7 +58,8 @@ impl<'a> RuleSequence<'a> {
     pub(super) fn new(
         task: LevelTask<'a>,
         operator: &'a StripOperator,
-        control: Control<'a>,
+        workspace: &'a mut NewtonWorkspace,
+        monitor: &'a dyn Monitor,
     ) -> RuleSequence<'a> {
         let LevelTask {
             level,
@@ -90,13 +83,13 @@ impl<'a> RuleSequence<'a> {
             fall,
             passage,
             tolerance,
-            steps_max: STEPS_MAX,
             operator,
             parity,
             bound: padded_with_zeros(&level.bound),
             slipping: None,
             area: padded_with_zeros(&level.normalised.areas()),
-            control,
+            workspace,
+            monitor,
             work: Work::default(),
         }
     }
@@ -106,20 +99,19 @@ impl<'a> RuleSequence<'a> {
             .with_layer(&self.level.normalised, self.level.layer)
     }
 
-    /// Slips of the motion and of the pressure.
+    /// Slips of the motion and of the surface.
     fn rigid(&self, equations: &SlipEquations) -> Vec<f64> {
         let source = self.level.surface_slip.as_ref();
         equations.given(self.motion, source.map(|[x, y]| SlipSource { x, y }))
     }
 
     fn newton<'e>(&self, equations: &'e SlipEquations<'e>) -> Newton<'e> {
-        // The trapezoid rule keeps the bounds that the three-point rule has found: its own slips alternate from cell
-        // to cell, and bounds that follow them would do so too.
+        // The trapezoid rule uses the bounds of the three-point rule, because its own slips alternate from cell to cell.
         let fall = self.fall.filter(|_| equations.rule != Rule::Trapezoid);
         Newton::new(equations).falling(&self.bound, fall)
     }
 
-    /// The bounds of all cells of the mesh at the slips found.
+    /// The bounds of all cells of the mesh at the slips of the solution.
     pub(super) fn bounds(&self) -> Cow<'a, [f64]> {
         match &self.slipping {
             None => Cow::Borrowed(&self.level.bound),
@@ -127,7 +119,7 @@ impl<'a> RuleSequence<'a> {
         }
     }
 
-    /// The start brought onto the unknowns, or zero tractions.
+    /// The unknowns of a start, or zeros.
     pub(super) fn start(&self, start: Option<&[Vec<f64>; 2]>) -> Vec<f64> {
         let padded = self.operator.padded(self.parity);
         let mut t = vec![0.0; 2 * padded];
@@ -144,8 +136,14 @@ impl<'a> RuleSequence<'a> {
         t
     }
 
-    /// Solves one rule from `t`.
-    fn rule(&mut self, newton: &Newton, rigid: &[f64], t: &mut [f64]) -> Result<Convergence, Stop> {
+    /// Solves one rule from `t` in at most `steps_max` Newton steps.
+    fn rule(
+        &mut self,
+        newton: &Newton,
+        rigid: &[f64],
+        t: &mut [f64],
+        steps_max: u32,
+    ) -> Result<Convergence, Stop> {
         let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
         let falls = newton.rule() != Rule::Trapezoid;
         let law = NewtonTask {
@@ -156,31 +154,30 @@ impl<'a> RuleSequence<'a> {
             },
             fall: self.fall.filter(|_| falls),
             area: &self.area,
-            // Small motions cause small tractions: relative to the bounds their residual would look small at once.
+            // Small motions cause small tractions, whose residual must not be relative to the bounds.
             scale: (largest * newton.compliance()).min(1.0),
             tolerance: self.tolerance,
-            steps_max: self.steps_max,
-            // Starts of the trapezoid rule come from other meshes or motions; one step makes the answer independent of them.
+            steps_max,
+            // Starts of the trapezoid rule come from other meshes or motions; one step makes the solution independent of them.
             accepts_start: falls,
         };
-        let Control { workspace, monitor } = &mut self.control;
-        let report = newton.solve(&law, t, workspace, *monitor)?;
+        let report = newton.solve(&law, t, self.workspace, self.monitor)?;
         self.work.add(newton.work(&report));
         Ok(report)
     }
 
-    /// The three-point rule: from the start, else from the upwind solution.
+    /// Solves the three-point rule from the start, or else from the upwind solution.
     pub(super) fn three_point(&mut self, t: &mut [f64]) -> Result<ThreePointAnswer, LevelFailure> {
         let equations = self.equations(Rule::ThreePoint);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        let mut report = self.rule(&newton, &rigid, t)?;
-        // The start may be what hinders the iteration.
+        let mut report = self.rule(&newton, &rigid, t, STEPS_MAX)?;
+        // The start may prevent convergence.
         if !report.converged {
             t.fill(0.0);
-            // The upwind rule is of first order, but monotone; its solution serves as a start only.
+            // The upwind rule is of first order but monotone. Its solution is only a start.
             self.upwind(t)?;
-            report = self.rule(&newton, &rigid, t)?;
+            report = self.rule(&newton, &rigid, t, STEPS_MAX)?;
         }
         if !report.converged {
             return Err(LevelFailure::NotConverged {
@@ -194,14 +191,14 @@ impl<'a> RuleSequence<'a> {
         }
         let found = ThreePointAnswer {
             slip: self.own_slip(),
-            slips: newton.zones(&self.bound, t, self.control.workspace.slip(), self.level),
+            slips: newton.zones(&self.bound, t, self.workspace.slip(), self.level),
             other: None,
         };
         let Some(fall) = self.fall else {
             return Ok(found);
         };
-        // Now, because a second start overwrites the slips in the workspace.
-        self.slipping = Some(newton.bounds(&self.bound, &fall, t, self.control.workspace.slip()));
+        // A second start would overwrite the slips in the workspace.
+        self.slipping = Some(newton.bounds(&self.bound, &fall, t, self.workspace.slip()));
         let other = match newton.stability() > SECOND_START_FROM {
             true => self.other_solution(&newton, &rigid, t)?,
             false => None,
@@ -209,7 +206,7 @@ impl<'a> RuleSequence<'a> {
         Ok(ThreePointAnswer { other, ..found })
     }
 
-    /// Solves on with the bounds that belong to the slips found, until both agree. These bounds are kept for the trapezoid rule too.
+    /// Solves repeatedly with the bounds of the last slips until both agree. The trapezoid rule uses the same bounds.
     fn follow_passage(
         &mut self,
         newton: &Newton,
@@ -219,9 +216,9 @@ impl<'a> RuleSequence<'a> {
     ) -> Result<(), LevelFailure> {
         let (cells, rest) = (newton.cells(), self.bound.clone());
         let (mut change, mut weight) = (f64::INFINITY, 1.0);
-        // On 200 random motions with friction that falls with temperature none took as many.
+        // None of 200 random motions with temperature-dependent friction took as many.
         for _ in 0..STEPS_MAX {
-            let slips = self.control.workspace.slip();
+            let slips = self.workspace.slip();
             let padded = slips.len() / 2;
             let sizes = (0..cells).map(|i| match newton.slips(&self.bound, t, slips, i) {
                 true => length(slips[i], slips[padded + i]),
@@ -239,14 +236,14 @@ impl<'a> RuleSequence<'a> {
                 self.slipping = Some(found);
                 return Ok(());
             }
-            // Layers that harden fast answer every change of slip by a larger one of their bounds.
+            // The bounds of layers that harden fast change by more than the slip.
             if change > PASSAGE_FALL * before {
                 weight *= 0.5;
             }
             for (bound, found) in self.bound.iter_mut().zip(found) {
                 *bound += weight * (found - *bound);
             }
-            if !self.rule(newton, rigid, t)?.converged {
+            if !self.rule(newton, rigid, t, STEPS_MAX)?.converged {
                 break;
             }
         }
@@ -259,8 +256,8 @@ impl<'a> RuleSequence<'a> {
         })
     }
 
-    /// By how much the force differs, relative to the friction limit, if every cell slips along the rigid slip at first; nothing if
-    /// that leads to no solution or to the same.
+    /// The difference of the force, relative to the friction limit, of the solution from a start in which every cell slips along the rigid slip. `None` if
+    /// that start leads to no solution or to the same one.
     fn other_solution(
         &mut self,
         newton: &Newton,
@@ -275,7 +272,7 @@ impl<'a> RuleSequence<'a> {
         let mut other = vec![0.0; t.len()];
         slide_along(rigid, bound, Some(&fall), &mut other);
         let limit: f64 = area.iter().zip(bound).map(|(a, g)| a * g).sum();
-        let report = self.rule(newton, rigid, &mut other)?;
+        let report = self.rule(newton, rigid, &mut other, STEPS_MAX)?;
         if !report.converged {
             return Ok(None);
         }
@@ -287,11 +284,11 @@ impl<'a> RuleSequence<'a> {
         let equations = self.equations(Rule::Upwind);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        Ok(self.rule(&newton, &rigid, t)?.converged)
+        Ok(self.rule(&newton, &rigid, t, STEPS_MAX)?.converged)
     }
 
-    /// Which cells slip by the trapezoid rule, solved from `t` in at most `steps_max` Newton steps; `t` and its residual stay as they were if they do not
-    /// suffice.
+    /// Solves the trapezoid rule from `t` in at most `steps_max` Newton steps and returns the slip flags. Without convergence, `t` and its residual do not
+    /// change.
     pub(super) fn trapezoid(
         &mut self,
         t: &mut [f64],
@@ -301,21 +298,19 @@ impl<'a> RuleSequence<'a> {
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
         let (mut found, residual) = (t.to_vec(), self.work.residual);
-        self.steps_max = steps_max;
-        let report = self.rule(&newton, &rigid, &mut found)?;
-        self.steps_max = STEPS_MAX;
+        let report = self.rule(&newton, &rigid, &mut found, steps_max)?;
         if !report.converged {
             self.work.residual = residual;
             return Ok(None);
         }
         t.copy_from_slice(&found);
-        let slip = self.control.workspace.slip();
+        let slip = self.workspace.slip();
         Ok(Some(newton.zones(&self.bound, t, slip, self.level)))
     }
 
-    /// The slips of the rule that was solved last, over the whole mesh.
+    /// The slips of the last rule that was solved, over the whole mesh.
     pub(super) fn own_slip(&self) -> [Vec<f64>; 2] {
-        self.expand(self.control.workspace.slip())
+        self.expand(self.workspace.slip())
     }
 
     /// Values of the unknowns (x then y) as two vectors over the whole mesh.
@@ -324,7 +319,7 @@ impl<'a> RuleSequence<'a> {
     }
 }
 
-/// Tractions of these cells at their bounds, along slips, both components one after the other.
+/// Sets the tractions to their bounds in the directions of the slips.
 fn slide_along(slip: &[f64], bound: &[f64], fall: Option<&Softening>, t: &mut [f64]) {
     let padded = t.len() / 2;
     for (i, rest) in bound.iter().enumerate() {
@@ -336,7 +331,7 @@ fn slide_along(slip: &[f64], bound: &[f64], fall: Option<&Softening>, t: &mut [f
     }
 }
 
-/// Length of the difference of the forces of two sets of tractions on cells with these areas.
+/// Length of the difference of the forces of two sets of tractions on cells with given areas.
 fn force_change(area: &[f64], t: &[f64], other: &[f64]) -> f64 {
     let padded = t.len() / 2;
     let [x, y] = [0, padded].map(|from| {

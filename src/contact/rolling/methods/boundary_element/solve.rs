@@ -1,27 +1,26 @@
-//! The fast solver: projection form, semismooth Newton, strip-preconditioned GMRES.
+//! The solve of one motion on one mesh.
 //!
-//! Tractions, zones and forces are those of the trapezoid rule. Its own slips alternate from cell to cell, so that slips for output come
-//! from the three-point rule ([`smooth_slips`]); their directions are those of the tractions, as Coulomb's law demands. The three-point
-//! rule is also the start where the given one fails, and it determines bounds that depend on the slip.
+//! Tractions, zones and forces are those of the trapezoid rule. Its slips alternate from cell to cell, so slips for output come from the three-point rule
+//! ([`smooth_slips`]), with the directions of the tractions as Coulomb's law demands. The three-point rule also gives a start where the given one fails, and
+//! bounds that depend on the slip.
 
 use crate::half_space::strip_operator::kind::Parity;
 use crate::monitor::Monitor;
 use crate::remark::list::Remark;
 use crate::rolling::answer::Skip;
-use crate::rolling::answer::{LevelAnswer, LevelFailure, LevelOutcome, project_on_bound};
-use crate::rolling::methods::boundary_element::rule_sequence::{Control, RuleSequence};
+use crate::rolling::answer::{LevelAnswer, LevelFailure, project_on_bound};
+use crate::rolling::methods::boundary_element::rule_sequence::RuleSequence;
 use crate::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask, STEPS_MAX};
 use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::rolling::strip_mesh::StripMesh;
 
-/// Solves one motion on one level, from a start or from zero tractions.
+/// Solves one motion on one mesh, from a start or from zero tractions.
 ///
-/// Bounds that depend on the slip are found with the three-point rule and kept for the trapezoid rule: its own slips alternate and would
-/// carry that into the bounds.
+/// Bounds that depend on the slip are those of the three-point rule, because the slips of the trapezoid rule alternate.
 ///
 /// # Errors
-/// [`LevelFailure::NotConverged`] if no start leads to a solution; [`LevelFailure::Stopped`] if the monitor stops the work. If only the
-/// trapezoid rule fails, the three-point tractions serve and a remark says so.
+/// [`LevelFailure::NotConverged`] if no start leads to a solution; [`LevelFailure::Stopped`] if the monitor stops the work. If only the trapezoid rule fails,
+/// the solution has the three-point tractions and a remark.
 pub fn solve(
     task: LevelTask,
     start: Option<&[Vec<f64>; 2]>,
@@ -32,8 +31,8 @@ pub fn solve(
         return Ok(answer);
     }
     let operator = task.level.operator(monitor)?;
-    let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
-    let skips = symmetry(task.level, solve.parity);
+    let mut solve = RuleSequence::new(task, &operator, workspace, monitor);
+    let skip = symmetry(task.level, solve.parity);
     let mut remarks = Vec::new();
     let mut t = solve.start(start);
     let bounds_are_given = task.fall.is_none() && task.passage.is_none();
@@ -67,25 +66,21 @@ pub fn solve(
         second,
         slip,
         slips,
-        exit: LevelOutcome::Solved,
         work: solve.work,
-        skips,
+        skip,
         remarks,
     })
 }
 
-/// What the symmetry of a level and a motion saves.
-fn symmetry(level: &StripMesh, parity: Option<Parity>) -> Vec<Skip> {
-    if parity.is_some() {
-        vec![Skip::HalfTheCells]
-    } else if level.is_mirrored() {
-        vec![Skip::HalfTheOperator]
-    } else {
-        Vec::new()
+/// The work that the symmetry of a mesh and a motion saves.
+fn symmetry(level: &StripMesh, parity: Option<Parity>) -> Option<Skip> {
+    match parity {
+        Some(_) => Some(Skip::HalfTheCells),
+        None => level.mirrored.then_some(Skip::HalfTheOperator),
     }
 }
 
-/// Replaces the slips of an answer by those of the three-point rule, which are smooth, and adds its tractions. Forces and zones stay.
+/// Replaces the slips of a solution by the smooth ones of the three-point rule and adds its tractions. Forces and zones do not change.
 ///
 /// # Errors
 /// See [`solve`].
@@ -96,11 +91,11 @@ pub fn smooth_slips(
     monitor: &dyn Monitor,
 ) -> Result<(), LevelFailure> {
     let operator = task.level.operator(monitor)?;
-    let mut solve = RuleSequence::new(task, &operator, Control { workspace, monitor });
+    let mut solve = RuleSequence::new(task, &operator, workspace, monitor);
     let mut t = solve.start(Some(&answer.traction));
     let three_point = solve.three_point(&mut t)?;
     answer.second = Some(solve.expand(&t));
-    // The tractions are within their bounds already, and stay as they are to the last bit.
+    // The tractions are within their bounds already and must not change by rounding.
     let mut same = answer.traction.clone();
     let bound = solve.bounds();
     answer.slip = project_on_bound(&bound, &answer.slips, &mut same, &three_point.slip);

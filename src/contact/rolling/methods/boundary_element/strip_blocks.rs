@@ -1,4 +1,4 @@
-//! Factored blocks, one segment after the other, and their inverse.
+//! Factored blocks of the segments, and their application.
 
 use pulp::NullaryFnOnce;
 
@@ -10,16 +10,16 @@ pub(super) struct StripBlocks {
     pub(super) factors: Vec<f64>,
     /// Position in a full vector of every unknown of every block, in the order of the block's pivot rows.
     pub(super) pivot_places: Vec<usize>,
-    /// Position of every unknown in its own order.
+    /// Position of every unknown in the order of the unknowns.
     pub(super) places: Vec<usize>,
-    /// Start of each block in `places`, and one more.
+    /// Start of each block in `places`, and the end of the last.
     pub(super) starts: Vec<usize>,
     /// Start of each block's matrix in `factors`.
     pub(super) offsets: Vec<usize>,
 }
 
 impl StripBlocks {
-    /// Empties it.
+    /// Empties the lists.
     pub(super) fn clear(&mut self) {
         let StripBlocks {
             factors,
@@ -34,9 +34,9 @@ impl StripBlocks {
         }
     }
 
-    /// `x ← P⁻¹ x`, block by block. `gathered` has room for the unknowns of each.
+    /// `x ← P⁻¹ x`, block by block. `gathered` is a buffer for the unknowns of a block.
     pub(super) fn apply(&self, gathered: &mut [f64], x: &mut [f64]) {
-        // One dispatch for all blocks: the loops inside are compiled for the instruction set of this machine.
+        // One dispatch for all blocks: the loops are compiled for the instruction set of the machine.
         simd::dispatch(Elimination {
             blocks: self,
             gathered,

@@ -7,38 +7,38 @@ use crate::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::rolling::methods::boundary_element::preconditioner::StripFactors;
 use crate::rolling::slip_equations::SlipScratch;
 
-/// What the iteration writes to. It fits equations of any size and grows to the largest; a second solve of the same size
-/// allocates nothing. Nothing in it but [`slip`](Self::slip) means anything between two calls.
+/// Buffers of the iteration for equations of any size. They grow to the largest, so a second solve of the same size allocates nothing. Between two calls only
+/// [`slip`](Self::slip) is meaningful.
 #[derive(Debug, Default)]
 pub struct NewtonWorkspace {
     pub(crate) blocks: StripFactors,
     pub(crate) gmres: Gmres,
     pub(crate) linear: Linearisation,
-    /// What brings each slipping cell from its traction to the tangent of its disc.
+    /// The vector from the traction of each slipping cell to the tangent of its friction circle.
     pub(crate) to_tangent: Vec<(f64, f64)>,
     pub(crate) slip: Vec<f64>,
     pub(crate) product: SlipScratch,
-    /// Unknowns of the linear system as tractions.
+    /// The unknowns of the linear system, expanded to tractions.
     pub(crate) expanded: Vec<f64>,
     pub(crate) vectors: StepVectors,
 }
 
-/// Largest workspace that is kept, in numbers of a vector: two for each of 640 cells, with which all buffers take about a megabyte. Chosen by
-/// judgement: most meshes of targets down to 0.001 are smaller.
+/// Largest workspace that is kept, in numbers of a vector: two for each of 640 cells, with which all buffers take about a megabyte. Most meshes of targets down to 0.001 are
+/// smaller. Chosen by judgement.
 const KEPT_LENGTH: usize = 1280;
 
 thread_local! {
-    /// The workspace of the last solve of this thread. No answer depends on it.
+    /// The workspace of the last solve of this thread. No solution depends on it.
     static LAST: Cell<Option<NewtonWorkspace>> = const { Cell::new(None) };
 }
 
 impl NewtonWorkspace {
-    /// The workspace that the last solve of this thread gave back, or a new one.
+    /// The workspace that the last solve of this thread returned, or a new one.
     pub fn of_thread() -> NewtonWorkspace {
         LAST.take().unwrap_or_default()
     }
 
-    /// Leaves the workspace to the next solve of this thread, unless it is large.
+    /// Returns the workspace for the next solve of this thread, unless it is large.
     pub fn give_back(self) {
         if self.slip.capacity() <= KEPT_LENGTH {
             LAST.set(Some(self));
@@ -57,14 +57,14 @@ pub(crate) struct StepVectors {
 }
 
 impl NewtonWorkspace {
-    /// The slips `q + M T` of the iterate that was evaluated last, x then y.
+    /// The slips `q + M T` of the last iterate that was evaluated, x then y.
     pub fn slip(&self) -> &[f64] {
         &self.slip
     }
 }
 
 impl StepVectors {
-    /// Makes all of them copies of an iterate.
+    /// Copies an iterate to all vectors.
     pub(crate) fn copy(&mut self, t: &[f64]) {
         let StepVectors {
             step,
@@ -80,7 +80,7 @@ impl StepVectors {
     }
 }
 
-/// Makes a buffer a vector of zeros.
+/// Resizes a buffer and fills it with zeros.
 pub(crate) fn zeroed(buffer: &mut Vec<f64>, length: usize) {
     buffer.clear();
     buffer.resize(length, 0.0);

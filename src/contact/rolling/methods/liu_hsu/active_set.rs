@@ -1,37 +1,35 @@
-//! The outer iteration: which cells stick and which slip.
-//!
-//! Newton–Raphson for the tractions of the slip cells (eq. 8, 9 and 13).
+//! The outer iteration over stick and slip zones, and Newton–Raphson for the tractions of the slip cells (eq. 8, 9 and 13).
 
 use faer::{Mat, MatMut};
 
 use crate::monitor::{Monitor, Stop};
-use crate::numerics::lu;
 use crate::numerics::roots::ROUNDING;
+use crate::numerics::{ITERATIONS_MAX, lu};
 use crate::rolling::methods::boundary_element::task::STEPS_MAX;
 use crate::rolling::methods::liu_hsu::stick_block::{DenseProblem, SlipSystem, both_components};
 use crate::rolling::slip_rules::Rule;
 use crate::rolling::task::Motion;
 
-/// In given tractions, a cell counts as slipping if its traction is less than its bound by at most this share.
+/// A cell of given tractions counts as slipping if its traction is below its bound by at most this share.
 const START_MARGIN: f64 = 1e-6;
 
-/// How the outer iteration ended.
+/// The end of the outer iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ZonesTermination {
-    /// The division into zones agrees with the tractions and slips that follow from it.
+    /// The zones agree with the resulting tractions and slips.
     Converged,
-    /// Newton–Raphson found no tractions for a division.
+    /// Newton–Raphson did not converge for a division into zones.
     NewtonDiverged,
-    /// A division occurred for the second time, so that the iteration would cycle.
+    /// A division occurred again, so the iteration would cycle.
     ZonesRepeat,
-    /// The limit of divisions was reached.
+    /// The largest number of divisions was reached.
     IterationLimit,
     /// The zones are consistent, but rounding keeps the residual above the tolerance.
     Inexact,
 }
 
 impl ZonesTermination {
-    /// Did the residual reach the tolerance?
+    /// Whether the residual reached the tolerance.
     pub fn converged(self) -> bool {
         self == ZonesTermination::Converged
     }
@@ -48,18 +46,18 @@ impl ZonesTermination {
     }
 }
 
-/// One run of the outer iteration.
+/// A run of the outer iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZonesRun {
     /// The discretisation rule.
     pub rule: Rule,
-    /// The initial guess used.
+    /// The initial guess.
     pub guess: InitialGuess,
-    /// How it ended.
+    /// The end of the run.
     pub exit: ZonesTermination,
-    /// Divisions into stick and slip that were solved.
+    /// Number of divisions that were solved.
     pub outer_iterations: u32,
-    /// Newton–Raphson steps over all divisions.
+    /// Number of Newton–Raphson steps over all divisions.
     pub newton_iterations: u32,
 }
 
@@ -72,10 +70,9 @@ pub struct Zoning {
     pub slips: Vec<bool>,
 }
 
-/// Runs the outer iteration from all cells sticking, or from the zones of given tractions.
+/// Runs the outer iteration, with all cells sticking at first, or with the zones of given tractions.
 ///
-/// A stick cell whose traction reaches its bound and a slip cell whose traction opposes its slip (eq. 10) change their
-/// zones in the same pass.
+/// In each pass, stick cells whose traction reaches the bound and slip cells whose traction opposes the slip (eq. 10) change their zones.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -97,22 +94,22 @@ pub fn run(
     while attempt.outer_iterations < STEPS_MAX {
         attempt.outer_iterations += 1;
         seen.push(division.slips.clone());
-        // Stick tractions are eliminated, and which these are depends on the division: each has a system of its own.
+        // Each division has its own system, because its stick tractions are eliminated.
         let system = SlipSystem::new(task, &division.slips, monitor)?;
         if !solve_division(task, &system, &mut attempt, &mut division, monitor)? {
             attempt.exit = ZonesTermination::NewtonDiverged;
             break;
         }
-        let load_mismatch = load_mismatch(task, &system, &division.tractions);
-        if load_mismatch.is_empty() {
+        let contradicting = contradicting_cells(task, &system, &division.tractions);
+        if contradicting.is_empty() {
             attempt.exit = ZonesTermination::Converged;
             break;
         }
         let mut next = division.slips.clone();
-        for cell in load_mismatch {
+        for cell in contradicting {
             next[cell] = !next[cell];
         }
-        // A division that comes back means that the iteration cycles.
+        // A repeated division means a cycle.
         if seen.contains(&next) {
             attempt.exit = ZonesTermination::ZonesRepeat;
             break;
@@ -122,8 +119,7 @@ pub fn run(
     Ok((attempt, division))
 }
 
-/// The division to start from: all cells stick, or with `start` the cells whose traction there reaches the bound slip. A cell without
-/// pressure never sticks.
+/// The first division: all cells stick, or those of `start` whose traction reaches the bound slip. A cell without pressure never sticks.
 fn first_division(task: &DenseProblem, start: Option<&[f64]>) -> Zoning {
     let n = task.cells;
     let tractions = start.map_or_else(|| vec![0.0; 2 * n], <[f64]>::to_vec);
@@ -133,7 +129,7 @@ fn first_division(task: &DenseProblem, start: Option<&[f64]>) -> Zoning {
     Zoning { tractions, slips }
 }
 
-/// Solves for the tractions of one division into zones; returns `false` if Newton–Raphson does not converge.
+/// Solves for the tractions of a division; returns whether Newton–Raphson converged.
 fn solve_division(
     task: &DenseProblem,
     system: &SlipSystem,
@@ -154,7 +150,7 @@ fn solve_division(
             start(InitialGuess::Continued),
             start(InitialGuess::RigidSlip),
         )?,
-        // The guesses of the paper take its full steps, and whatever root these lead to.
+        // The guesses of the paper use its full steps and accept any root.
         guess => roots.find(start(guess), StepRule::Full)?,
     };
     attempt.newton_iterations += roots.iterations;
@@ -173,7 +169,7 @@ fn solve_division(
     Ok(true)
 }
 
-/// The search for a root of eq. 8 and 9 for one division.
+/// The search for a root of eq. 8 and 9 for a division.
 struct RootChoice<'a> {
     system: &'a SlipSystem,
     bound: Vec<f64>,
@@ -182,22 +178,22 @@ struct RootChoice<'a> {
 }
 
 impl RootChoice<'_> {
-    /// The root that Newton–Raphson finds from a start, if any.
+    /// The root that Newton–Raphson reaches from a start, if it converges.
     fn find(&mut self, mut t: Vec<f64>, steps: StepRule) -> Result<Option<Vec<f64>>, Stop> {
         let (converged, steps) = solve(self.system, &self.bound, steps, &mut t, self.monitor)?;
         self.iterations += steps;
         Ok(converged.then_some(t))
     }
 
-    /// A root with as few tractions as possible that oppose their slip. Eq. 9 has a root for every choice of such
-    /// cells. The search starts from `first`, then from the root found with those tractions reversed, then from `second`.
+    /// A root with as few tractions as possible that oppose their slip; eq. 9 has a root for every choice of such cells. The starts are `first`, the root found
+    /// with the opposing tractions reversed, and `second`.
     fn along_slip(&mut self, first: Vec<f64>, second: Vec<f64>) -> Result<Option<Vec<f64>>, Stop> {
         let mut best = self.find(first, StepRule::OnCircles)?;
         let turned = best.as_ref().map(|t| turned(self.system, t));
         for start in turned.into_iter().chain([second]) {
             let count = |t: &Vec<f64>| opposed(self.system, t).len();
             let least = best.as_ref().map_or(usize::MAX, count);
-            // No traction opposes its slip: there is no better root.
+            // Without opposing tractions there is no better root.
             if least == 0 {
                 break;
             }
@@ -211,7 +207,7 @@ impl RootChoice<'_> {
     }
 }
 
-/// The slip cells, as indices into the list of slip cells, whose tractions oppose their slips (eq. 10).
+/// Indices, in the list of slip cells, of the cells whose tractions oppose their slips (eq. 10).
 fn opposed(system: &SlipSystem, t: &[f64]) -> Vec<usize> {
     let count = system.slip_cells.len();
     let slip = system.slip(t);
@@ -220,7 +216,7 @@ fn opposed(system: &SlipSystem, t: &[f64]) -> Vec<usize> {
         .collect()
 }
 
-/// The tractions, with those that oppose their slips reversed.
+/// The tractions with the opposing ones reversed.
 fn turned(system: &SlipSystem, t: &[f64]) -> Vec<f64> {
     let count = system.slip_cells.len();
     let mut next = t.to_vec();
@@ -231,7 +227,7 @@ fn turned(system: &SlipSystem, t: &[f64]) -> Vec<f64> {
     next
 }
 
-/// The initial guess for all slip cells, x before y.
+/// The initial guess for the slip cells, x before y.
 fn start_tractions(
     task: &DenseProblem,
     system: &SlipSystem,
@@ -251,7 +247,7 @@ fn start_tractions(
 }
 
 /// The cells whose tractions or slips contradict their zones.
-fn load_mismatch(task: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usize> {
+fn contradicting_cells(task: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usize> {
     let n = task.cells;
     let mut found: Vec<usize> = system
         .stick_cells
@@ -268,26 +264,24 @@ fn load_mismatch(task: &DenseProblem, system: &SlipSystem, t: &[f64]) -> Vec<usi
     found
 }
 
-/// How the directions of the slip tractions are chosen; their magnitude is always the friction bound.
+/// The directions of the slip tractions at the start; their length is always the friction bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InitialGuess {
     /// Initial guess 1: along the rigid slip `(ν_x − φ y, ν_y + φ x)` (eq. 14).
     RigidSlip,
     /// Initial guess 2: around a spin pole, `sgn φ (−(y − y_p), x − x_p)` (eq. 15).
     ///
-    /// The paper prints a minus under the root of eq. 15, which must be a plus, and leaves out the sign of φ. With the
-    /// rigid pole `(−ν_y/φ, ν_x/φ)` this would equal guess 1; the pole of the elastic problem differs from it.
+    /// The paper prints a minus under the root of eq. 15, which must be a plus, and omits the sign of φ. With the rigid pole `(−ν_y/φ, ν_x/φ)` this would equal
+    /// guess 1; the pole of the elastic problem differs.
     SpinPole([f64; 2]),
-    /// Along the tractions of the previous division, see the third run in
-    /// [`liu_hsu`](crate::rolling::methods::liu_hsu) (not in the paper).
+    /// Along the tractions of the previous division; not in the paper (see [`liu_hsu`](crate::rolling::methods::liu_hsu)).
     Continued,
 }
 
 impl InitialGuess {
-    /// Unit direction at a cell at `(x, y)`, where the previous division gave the traction `before`.
+    /// Unit direction at a cell at `(x, y)` with the traction `before` in the previous division.
     ///
-    /// Where the direction is undefined (at a pole, or without a previous traction) it is that of the rigid slip, and at
-    /// the rigid pole that of x; the iteration works with any direction there.
+    /// An undefined direction (at a pole, or without a previous traction) is replaced by that of the rigid slip, and at the rigid pole by x; any direction works.
     pub fn direction(self, motion: &Motion, at: [f64; 2], before: [f64; 2]) -> [f64; 2] {
         let [x, y] = at;
         let rigid = [
@@ -312,28 +306,26 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
     (length > 0.0 && length.is_finite()).then(|| [v[0] / length, v[1] / length])
 }
 
-/// Steps of Newton's method after which it ends without convergence.
-const ITERATIONS_MAX: u32 = 40;
 /// Largest number of halvings of a step on the circles.
 const HALVINGS_MAX: u32 = 6;
-/// The iteration has converged when no traction changes by more than this share of its bound; the remaining error is about the
-/// square of this.
+/// The iteration has converged if no traction changes by more than this share of its bound. The error left is about the square of this.
 const STEP_SMALL: f64 = 1e-8;
 
-/// How a step is taken.
+/// The form of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepRule {
     /// As in the paper: full steps; `|T|² = g²` is one of the equations.
     Full,
-    /// The unknown is the angle of each traction, so that tractions stay on their friction circles; a step is halved until
-    /// the component of slip perpendicular to the traction decreases.
+    /// The unknown is the angle of each traction, so tractions stay on their friction circles. A step is halved until the component of slip perpendicular to the
+    /// traction decreases.
     OnCircles,
 }
 
 /// Solves `|T|² = g²` (eq. 8) and `s_x T_y − s_y T_x = 0` (eq. 9), `s = q' + K T` (eq. 13), on the slip cells.
 ///
-/// `t` holds the initial guess and receives the answer, x of all slip cells before y; no traction in it may be 0. `bound`
-/// is g of the slip cells, more than 0. The guess determines which root is found (traction along or against the slip). Returns whether the last step
+/// `t` contains the initial guess and receives the solution, x of all slip cells before y; no initial traction is 0. `bound` is g of the slip cells, more than
+/// 0. The guess determines the root (traction along or against the slip). Returns whether the last step was small, and the number of steps. A step that is not
+/// finite ends the iteration.
 /// was small, and the number of steps; the iteration ends with a step that is not finite.
 ///
 /// # Errors
@@ -348,7 +340,7 @@ pub fn solve(
     if bound.is_empty() {
         return Ok((true, 0));
     }
-    for taken in 1..=ITERATIONS_MAX {
+    for taken in 1..=ITERATIONS_MAX as u32 {
         monitor.go_on(0.0)?;
         let step = newton_step(system, bound, t, monitor)?;
         let n = bound.len();
@@ -374,15 +366,14 @@ pub fn solve(
             return Ok((true, taken));
         }
     }
-    Ok((false, ITERATIONS_MAX))
+    Ok((false, ITERATIONS_MAX as u32))
 }
 
 /// One step of Newton's method on all equations (8) and (9).
 ///
-/// The row of (8) contains only the cell's own traction and is eliminated in closed form: with `n ⟂ T` a unit vector, the
-/// step is `ρ T + τ n`, `ρ = (g² − |T|²)/(2|T|²)`, which leaves one unknown τ per cell and the row of (9),
-/// `Σ_j n_i·K_ij n_j τ_j − τ_i s_i·T_i/|T_i|² = −(1 + ρ_i) n_i·s_i − Σ_j n_i·K_ij T_j ρ_j`. The iterates are those of
-/// the full system at an eighth of its cost.
+/// The row of (8) contains only the cell's own traction and is eliminated: with a unit vector `n ⟂ T` the step is `ρ T + τ n`, `ρ = (g² − |T|²)/(2|T|²)`. This
+/// leaves one unknown τ per cell and the row of (9), `Σ_j n_i·K_ij n_j τ_j − τ_i s_i·T_i/|T_i|² = −(1 + ρ_i) n_i·s_i − Σ_j n_i·K_ij T_j ρ_j`. The iterates are
+/// those of the full system at an eighth of its cost.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -433,7 +424,7 @@ pub fn newton_step(
     Ok(radial_part)
 }
 
-/// Moves `t` along the step and projects it onto the circles; takes the first of the halved steps that reduces the residual of eq. 9.
+/// Moves `t` along the step and projects it onto the circles. Accepts the first of the halved steps that reduces the residual of eq. 9.
 fn search_on_circles(system: &SlipSystem, bound: &[f64], step: &[f64], t: &mut [f64]) {
     let n = bound.len();
     let before = t.to_vec();

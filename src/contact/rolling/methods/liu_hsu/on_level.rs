@@ -1,4 +1,4 @@
-//! The method applied to one mesh level of a case.
+//! The method on one mesh of a case.
 
 use crate::half_space::strip_operator::operator::StripOperator;
 use crate::monitor::{Monitor, Stop};
@@ -13,8 +13,7 @@ use crate::rolling::slip_rules::Rule;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
-/// Solves one motion (about the origin of the case) with the trapezoid rule. The spin pole comes from the level `coarse`;
-/// without it, guess 2 is skipped.
+/// Solves one motion about the origin of the case with the trapezoid rule. The spin pole comes from the mesh `coarse`; without it, guess 2 is skipped.
 ///
 /// # Errors
 /// [`LevelFailure::NotConverged`] with the residual of the final tractions; [`LevelFailure::Stopped`].

@@ -1,4 +1,4 @@
-//! The attempts in order: the guesses of the paper, then a start from an upwind solution. The outcome of each is kept.
+//! The sequence of runs: the guesses of the paper, then a start from an upwind solution.
 
 use crate::monitor::{Monitor, Stop};
 use crate::numerics::simd::length;
@@ -15,52 +15,51 @@ use crate::rolling::slip_rules::Rule;
 /// The results of a solve besides the tractions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ZonesOutcome {
-    /// Residual of the tractions returned, as in [`Convergence`].
+    /// Residual of the final tractions, see [`Convergence`].
     pub residual: f64,
-    /// The runs of the outer iteration on the fine mesh, in order; the last one determines the outcome.
+    /// The runs on the fine mesh, in order; the last one determines the outcome.
     pub attempts: Vec<ZonesRun>,
-    /// Slip of every cell for the tractions returned, in the layout of the equations.
+    /// Slip of every cell for the final tractions, in the layout of the equations.
     pub slip: Vec<f64>,
     /// Whether each cell slips.
     pub slips: Vec<bool>,
 }
 
 impl ZonesOutcome {
-    /// The run that determines the outcome.
+    /// The last run.
     pub fn last(&self) -> &ZonesRun {
         &self.attempts[self.attempts.len() - 1]
     }
 
-    /// How the solve ended.
+    /// The end of the last run.
     pub fn exit(&self) -> ZonesTermination {
         self.last().exit
     }
 
-    /// Why the solve did not converge and what to do, as a clause for messages.
+    /// The reason for a failure, with advice, as a clause.
     pub fn advice(&self) -> String {
         let reason = self.exit().reason();
         format!("{reason}; use \"boundary_element\", which solves the same equations")
     }
 
-    /// Divisions into stick and slip that were solved, over all runs.
+    /// Number of divisions that were solved in all runs.
     pub fn outer_iterations(&self) -> u32 {
         self.attempts.iter().map(|a| a.outer_iterations).sum()
     }
 
-    /// Newton–Raphson steps over all runs.
+    /// Number of Newton–Raphson steps in all runs.
     pub fn newton_iterations(&self) -> u32 {
         self.attempts.iter().map(|a| a.newton_iterations).sum()
     }
 }
 
-/// Solves for the tractions on the fine mesh: guess 1, then guess 2, then the continued run (see the [module](super)).
+/// Solves for the tractions on the fine mesh with guess 1, then guess 2, then the continued run (see the [module](super)).
 ///
-/// `t` holds the tractions from which the continued run starts (0 if none are known). It receives the answer, or without
-/// convergence the tractions with the smallest residual found. Without a coarse mesh, or without spin, there is no pole
-/// and guess 2 is skipped.
+/// `t` contains the start of the continued run (0 if unknown). It receives the solution or, without convergence, the tractions with the smallest residual.
+/// Without a coarse mesh or without spin there is no pole, and guess 2 is skipped.
 ///
 /// # Errors
-/// Only if the monitor stops the work; an iteration that does not converge is told in the outcome.
+/// Only if the monitor stops the work; the outcome reports other failures.
 pub fn solve(
     fine: &DenseTask,
     coarse: Option<&DenseTask>,
@@ -74,11 +73,11 @@ pub fn solve(
     Ok(search.finish(t))
 }
 
-/// Like [`solve`], but the continued run starts from a solution of `upwind`, the same mesh and motion with
-/// [`Rule::Upwind`]. Used for the other rules, because their own continued run fails more often.
+/// Solves like [`solve`], but starts the continued run from a solution of `upwind`, the same mesh and motion with [`Rule::Upwind`]. The continued run of the
+/// other rules fails more often.
 ///
 /// # Errors
-/// Only if the monitor stops the work; an iteration that does not converge is told in the outcome.
+/// Only if the monitor stops the work; the outcome reports other failures.
 pub fn solve_by_upwind(
     fine: &DenseTask,
     upwind: &DenseTask,
@@ -99,7 +98,7 @@ pub fn solve_by_upwind(
     Ok(search.finish(t))
 }
 
-/// Solves with one guess alone. `t` is as in [`solve`]; only [`InitialGuess::Continued`] reads it.
+/// Solves with one guess. `t` is as in [`solve`]; only [`InitialGuess::Continued`] reads it.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -130,12 +129,12 @@ pub fn coarse_pole(coarse: &DenseTask, monitor: &dyn Monitor) -> Result<Option<[
     Ok(vortex_centre(&division.tractions, &task.x, &task.y, &load))
 }
 
-/// The runs on one mesh and the best tractions so far.
+/// The runs on one mesh with the best tractions found.
 struct ZonesSearch<'a> {
     stage: &'a DenseTask<'a>,
     monitor: &'a dyn Monitor,
     task: DenseProblem,
-    /// Tractions given by the caller, one pair per cell, without padding.
+    /// Start of the continued run, one pair per cell without padding.
     start: Vec<f64>,
     newton: Newton<'a>,
     workspace: NewtonWorkspace,
@@ -162,7 +161,7 @@ impl<'a> ZonesSearch<'a> {
         })
     }
 
-    /// Tries guess 1, then guess 2 about the pole of the coarse mesh; returns whether either converged.
+    /// Tries guess 1, then guess 2 about the pole of the coarse mesh; returns whether one converged.
     fn as_in_the_paper(&mut self, coarse: Option<&DenseTask>) -> Result<bool, Stop> {
         if self.attempt(InitialGuess::RigidSlip)? {
             return Ok(true);
@@ -198,7 +197,7 @@ impl<'a> ZonesSearch<'a> {
         Ok(converged)
     }
 
-    /// Residual of the projected friction law, the measure that `boundary_element` uses as well.
+    /// Residual of the projected friction law, as in `boundary_element`.
     fn residual(&mut self, tractions: &[f64]) -> f64 {
         let padded = self.task.padded(tractions);
         let mut unused = Convergence::default();
@@ -213,7 +212,7 @@ impl<'a> ZonesSearch<'a> {
             let slips = vec![false; self.task.cells];
             (f64::INFINITY, Zoning { tractions, slips })
         });
-        // Evaluated again, because the slips kept are those of the most recent evaluation.
+        // The workspace contains the slips of the last evaluation.
         let residual = self.residual(&division.tractions);
         t.copy_from_slice(&self.task.padded(&division.tractions));
         ZonesOutcome {
@@ -225,11 +224,9 @@ impl<'a> ZonesSearch<'a> {
     }
 }
 
-/// The point around which tractions turn: least squares of `n·(x − x_p) = 0` over all cells, `n = T/|T|`, each cell
-/// weighted with the load `weight` it carries.
+/// The point around which tractions turn: the least-squares solution of `n·(x − x_p) = 0` over all cells, with `n = T/|T|` and the load of each cell as `weight`.
 ///
-/// `t` has x of all cells before y. `None` if the tractions do not turn (all parallel, or none at all): the pole is then
-/// nowhere near the patch.
+/// `t` has x of all cells before y. `None` if the tractions do not turn, because all are parallel or 0; the pole is then far from the patch.
 pub fn vortex_centre(t: &[f64], x: &[f64], y: &[f64], weight: &[f64]) -> Option<[f64; 2]> {
     let n = x.len();
     let (mut xx, mut xy, mut yy, mut rhs) = (0.0, 0.0, 0.0, [0.0; 2]);

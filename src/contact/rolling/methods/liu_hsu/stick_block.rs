@@ -1,4 +1,4 @@
-//! Eliminates the stick tractions, which leaves slip on the slip cells as a function of their own tractions (eq. 11 to 13).
+//! Elimination of the stick tractions, so that slip on the slip cells is a function of their own tractions (eq. 11 to 13).
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
@@ -29,7 +29,7 @@ pub struct DenseProblem {
     pub x: Vec<f64>,
     /// y of every node.
     pub y: Vec<f64>,
-    /// The motion, of which the direction at every cell is used.
+    /// The motion, of which only the direction of rigid slip is used.
     pub motion: Motion,
 }
 
@@ -74,15 +74,14 @@ impl DenseProblem {
     }
 }
 
-/// The slip cells with the stick cells eliminated: `s = q' + K t_S`, for one division into zones.
+/// The slip cells after elimination of the stick cells: `s = q' + K t_S`, for one division into zones.
 ///
-/// With the map split by zones, stick cells obey `0 = q_L + M_LL t_L + M_LS t_S` (eq. 11 with `A = −M_LL`,
-/// `B = −M_LS`, `e = q_L`) and slip cells `s = q_S + M_SL t_L + M_SS t_S` (eq. 12 with `C = −M_SL`, `D = −M_SS`).
-/// So `q' = q − C A⁻¹ e` and `K = C A⁻¹ B − D` (eq. 13). Without stick cells there is nothing to eliminate and
-/// `K = −D`. Cells without pressure carry no traction and have no unknowns.
+/// With the map divided by zones, stick cells satisfy `0 = q_L + M_LL t_L + M_LS t_S` (eq. 11 with `A = −M_LL`, `B = −M_LS`, `e = q_L`), and slip cells
+/// `s = q_S + M_SL t_L + M_SS t_S` (eq. 12 with `C = −M_SL`, `D = −M_SS`). So `q' = q − C A⁻¹ e` and `K = C A⁻¹ B − D` (eq. 13), or `K = −D` without stick
+/// cells. Cells without pressure have no traction and no unknowns.
 #[derive(Debug)]
 pub struct SlipSystem {
-    /// The cells with unknown slip tractions.
+    /// The cells with unknown tractions.
     pub slip_cells: Vec<usize>,
     /// The cells that stick.
     pub stick_cells: Vec<usize>,
@@ -95,7 +94,7 @@ pub struct SlipSystem {
 }
 
 impl SlipSystem {
-    /// Eliminates the cells that stick.
+    /// Eliminates the stick cells.
     ///
     /// # Errors
     /// Only if the monitor stops the work.
@@ -172,7 +171,7 @@ impl SlipSystem {
     }
 }
 
-/// Indices of both components of the given cells in a vector over all `cells`.
+/// Indices of both components of chosen cells in a vector over all `cells`.
 pub fn both_components(chosen: &[usize], cells: usize) -> Vec<usize> {
     let y = chosen.iter().map(|i| cells + i);
     chosen.iter().copied().chain(y).collect()

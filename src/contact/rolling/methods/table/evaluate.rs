@@ -1,6 +1,4 @@
-//! The table as a function: creep forces, the share that sticks, and derivatives, of one ellipse and any creepage.
-//!
-//! Sums of the table's spline over the coefficients around a place, compiled for the level of SIMD that the machine has.
+//! Evaluation of the table: creep forces, the share that sticks, and derivatives, for an ellipse and any creepage.
 
 use pulp::{Simd, WithSimd};
 
@@ -12,11 +10,11 @@ use crate::rolling::methods::table::spline::{
     spin_factor,
 };
 
-/// The size at which everything slips without spin: f(r) = 1 from here on (Vermeulen and Johnson 1964).
+/// The size at which everything slips without spin: f(r) = 1 from there on (Vermeulen and Johnson 1964).
 const SIZE_FULL: f64 = 3.0;
 
-/// Derivatives by creepages below this part of the spin, by size, are differences. From 0.02 to 0.05 those of long ellipses change by up to
-/// 0.02 of C; 0.01 is chosen by judgement, near the limit and above the rounding of values.
+/// Ratio of creepages to spin, by size, below which derivatives by creepages are differences. From 0.02 to 0.05 those of long ellipses change by up to 0.02 of C;
+/// 0.01 is chosen by judgement, well above the rounding of values.
 const BESIDE_SPIN: f64 = 0.01;
 
 /// The table, ready to be evaluated.
@@ -30,7 +28,7 @@ pub struct CreepTable {
     direction: Axis,
     size: Axis,
     shapes: ShapeCoefficients,
-    /// Of every cell between nodes.
+    /// Error bounds of the cells between nodes.
     bounds: Vec<f32>,
 }
 
@@ -41,7 +39,7 @@ pub struct Creep {
     pub force: [f64; 3],
     /// Share of the patch that sticks, 0 to 1.
     pub stick: f64,
-    /// What the three are off by at most, in 99 of 100 motions that were held out.
+    /// Bound of the errors of the three forces, which holds for 99 of 100 held-out motions.
     pub bound: f64,
 }
 
@@ -52,7 +50,7 @@ pub struct EllipseTable<'a> {
     shape: Shape,
     /// C11, C22, C23, C33.
     kalker: [f64; 4],
-    /// C11, C22 and h: the creepage in these units has the length r.
+    /// C11, C22 and h. The creepage multiplied by these has the length r.
     scale: [f64; 3],
     ln_ratio: f64,
     ratio: Weights,
@@ -68,14 +66,14 @@ struct Sums {
     by_direction: [f64; OUTPUTS],
 }
 
-/// f(r), which forces grow with, and its derivative.
+/// f(r), the growth of the forces with the size, and its derivative.
 #[inline(always)]
 pub fn growth(size: f64) -> [f64; 2] {
     let rest = (1.0 - size / SIZE_FULL).max(0.0);
     [1.0 - rest * rest * rest, 3.0 / SIZE_FULL * rest * rest]
 }
 
-/// The part of linear theory that is left out of the table, and its derivative by σ.
+/// The factor of the part of linear theory that is not in the table, and its derivative by σ.
 #[inline(always)]
 pub fn linear_part(sigma: f64) -> [f64; 2] {
     let rest = 1.0 - sigma;
@@ -89,8 +87,8 @@ pub fn linear([c11, c22, c23, c33]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 impl CreepTable {
-    /// The table with these values at its nodes, `[a/b][pole][direction][size][ν][function]`: for forces and moment `F/f(r)` without
-    /// the part of linear theory, for the share that sticks itself; and the bounds of errors of the cells between them.
+    /// The table with these values at its nodes, `[a/b][pole][direction][size][ν][function]`, and the error bounds of the cells between them. Values are `F/f(r)`
+    /// without the part of linear theory for forces and moment, and the share that sticks.
     pub fn new(values: &[f32], bounds: &[f32]) -> CreepTable {
         let exact = coefficients(values);
         let mut largest = [f32::MIN_POSITIVE; OUTPUTS];
@@ -115,7 +113,7 @@ impl CreepTable {
         }
     }
 
-    /// The table for semi-axes of the ratio a/b, 0.1 to 10, and Poisson's ratio 0 to 0.5; beyond, the nearest of these.
+    /// The table for an ellipse with a/b from 0.1 to 10 and Poisson's ratio 0 to 0.5; both are clamped.
     #[inline(always)]
     pub fn ellipse(&self, ratio: f64, poisson_ratio: f64) -> EllipseTable<'_> {
         let ln_ratio = ratio.ln();
@@ -137,7 +135,7 @@ impl CreepTable {
     }
 }
 
-/// Weights of the values at `POISSON_RATIOS` in those of a Poisson's ratio: a parabola.
+/// Weights of the values at `POISSON_RATIOS` for a Poisson's ratio: a parabola.
 #[inline(always)]
 fn parabola(poisson_ratio: f64) -> [f64; 3] {
     let nu = 4.0 * poisson_ratio;
@@ -162,7 +160,7 @@ impl EllipseTable<'_> {
         creep
     }
 
-    /// The interpolated values before they are limited: the force may exceed μN by the error of the table.
+    /// The interpolated values without the limit: the force may exceed μN by the error of the table.
     #[inline(always)]
     pub(crate) fn interpolated(&self, creepage: [f64; 3]) -> Creep {
         let Quarter { inside, signs } = Quarter::of(creepage);
@@ -180,7 +178,7 @@ impl EllipseTable<'_> {
         let linear = linear(self.kalker, inside);
         let [growth, _] = growth(size);
         let part = linear_part(sigma)[0] / size;
-        // What vanishes by symmetry is 0, not the rounding of the spline.
+        // Components that vanish by symmetry are exactly 0.
         let [x, y, z] = inside.map(|part| part != 0.0);
         let there = [x, y || z, y || z];
         let force = |k: usize| signs[k] * growth * (sums.value[k] + part * linear[k]);
@@ -191,7 +189,7 @@ impl EllipseTable<'_> {
         }
     }
 
-    /// The same with the derivatives of the three by the creepages: `[force][creepage]`.
+    /// The creep forces with the derivatives of the three by the creepages, `[force][creepage]`.
     pub fn with_slopes(&self, creepage: [f64; 3]) -> (Creep, [[f64; 3]; 3]) {
         let Quarter { inside, signs } = Quarter::of(creepage);
         let [c11, c22, c23, c33] = self.kalker;
@@ -208,8 +206,6 @@ impl EllipseTable<'_> {
         let [part, less] = linear_part(sigma);
         let by_size = SIZE_HALF / ((size + SIZE_HALF) * (size + SIZE_HALF));
         let size_by = [0, 1, 2].map(|j| self.scale[j] * self.scale[j] * inside[j] / size);
-        // The signs of the creepages are those of their forces, the moment's that of the spin.
-        let turned = [signs[0], signs[1], signs[2]];
         let slope = |k: usize, j: usize| {
             let whole = sums.value[k] + part * linear[k] / size;
             let inner = sums.by_size[k] * by_size * size_by[j]
@@ -217,7 +213,8 @@ impl EllipseTable<'_> {
                 + sums.by_direction[k] * angles[1][j]
                 + less * by_size * size_by[j] * linear[k] / size
                 + part * (stiffness[k][j] - linear[k] * size_by[j] / size) / size;
-            turned[k] * turned[j] * (faster * size_by[j] * whole + growth * inner)
+            // A creepage has the sign of its force, and the spin that of the moment.
+            signs[k] * signs[j] * (faster * size_by[j] * whole + growth * inner)
         };
         let mut slopes = [0, 1, 2].map(|k| [0, 1, 2].map(|j| slope(k, j)));
         let flat = (self.scale[0] * inside[0]).hypot(self.scale[1] * inside[1]);
@@ -228,7 +225,7 @@ impl EllipseTable<'_> {
         (self.creep(creepage), slopes)
     }
 
-    /// Derivatives by the creepages near spin alone, where the direction turns within no distance: differences over steps of this size.
+    /// Derivatives by the creepages near pure spin, where the direction changes within no distance: differences over steps of a size.
     fn difference(&self, creepage: [f64; 3], size: f64, slopes: &mut [[f64; 3]; 3]) {
         for j in 0..2 {
             let step = size / self.scale[j];
@@ -255,7 +252,7 @@ impl EllipseTable<'_> {
         largest * (x * x + y * y + z * z).sqrt()
     }
 
-    /// The sums of the spline, derivatives only if asked for.
+    /// The sums of the spline, with derivatives on request.
     #[inline(always)]
     fn sums<const SLOPES: bool>(&self, sigma: f64, theta: f64, chi: f64) -> Sums {
         let table = self.table;
@@ -303,7 +300,7 @@ impl EllipseTable<'_> {
     }
 }
 
-/// A creepage mirrored to x, z ≥ 0, and the signs that its forces get back.
+/// A creepage mirrored to x, z ≥ 0, and the signs of its forces.
 struct Quarter {
     inside: [f64; 3],
     signs: [f64; 3],
@@ -312,7 +309,7 @@ struct Quarter {
 impl Quarter {
     #[inline(always)]
     fn of([x, y, z]: [f64; 3]) -> Quarter {
-        // Without spin both signs mean the same; one of them is chosen, so that reversed creepages meet at the same place.
+        // Without spin both signs are equivalent; the choice maps reversed creepages to the same place.
         let spin = if z < 0.0 || (z == 0.0 && y < 0.0) {
             -1.0
         } else {
@@ -326,9 +323,9 @@ impl Quarter {
     }
 }
 
-/// Numbers of one size: Poisson's ratios, functions.
+/// Number of values of one size: Poisson's ratios, functions.
 pub const SIZE_ROW: usize = POISSON_RATIOS.len() * OUTPUTS;
-/// Numbers of the four sizes around a creepage.
+/// Number of values of the four sizes around a creepage.
 pub const NEAR: usize = 4 * SIZE_ROW;
 
 /// The coefficients around a place.
@@ -345,7 +342,7 @@ pub struct NearNodes {
 }
 
 impl NearNodes {
-    /// The numbers of four sizes at one a/b, pole and direction, of a spline `[a/b][pole][direction][size][number]`.
+    /// The values of four sizes at one a/b, pole and direction, of a spline `[a/b][pole][direction][size][number]`.
     #[inline(always)]
     fn row<'a>(&self, spline: &'a [i16], [i, j, k]: [usize; 3]) -> &'a [i16; NEAR] {
         let pole = (self.ratio.first + i) * POLE_COEFFICIENTS + self.pole.first + j;
@@ -357,7 +354,7 @@ impl NearNodes {
         }
     }
 
-    /// The value, and with three sums the derivatives by pole and direction.
+    /// The value and, for `N = 3`, the derivatives by pole and direction.
     #[inline(always)]
     fn sums<const N: usize>(&self, spline: &[i16]) -> [[f32; NEAR]; N] {
         let mut sums = [[0.0_f32; NEAR]; N];
@@ -384,7 +381,7 @@ impl NearNodes {
     }
 }
 
-/// The sums of the table. What is compiled for each level of SIMD: a closure would not be, the compiler does not inline one of this length.
+/// The sums of the table, compiled for each level of SIMD. The compiler would not inline a closure of this length.
 pub struct NearSums<'a, const N: usize>(pub &'a [i16], pub NearNodes);
 
 impl<const N: usize> WithSimd for NearSums<'_, N> {

@@ -1,4 +1,4 @@
-//! Creep forces of an elliptic patch from a table that the boundary-element solver made.
+//! Creep forces of an elliptic patch from a table computed with the boundary element method.
 
 pub mod evaluate;
 pub mod file;

@@ -1,17 +1,17 @@
-//! Kalker's coefficients as splines in ln(a/b), for many ellipses in little time.
+//! Kalker's coefficients as splines in ln(a/b), which are faster for many ellipses.
 
 use crate::numerics::interpolation;
 use crate::rolling::linear_theory::{POISSON_RATIOS, coefficients, spin_coefficient};
 use crate::rolling::methods::table::spline::{Axis, free_coefficients, ln_ratio_max};
 
-/// Nodes in ln(a/b): closer than those of the tables in `linear_theory`, so that its interpolation is met to 1e-5.
+/// Number of nodes in ln(a/b): enough to reproduce the interpolation of `linear_theory` to 1e-5.
 const NODES: u8 = 57;
 
 /// Logarithms of C11, C22, C23 and C33 at the Poisson's ratios of [`POISSON_RATIOS`], as splines.
 #[derive(Debug, Clone)]
 pub struct ShapeCoefficients {
     axis: Axis,
-    /// Of each node, of each Poisson's ratio.
+    /// Coefficients for each node and Poisson's ratio.
     spline: Vec<[[f64; 4]; 5]>,
 }
 

@@ -1,4 +1,4 @@
-//! The table as a method: resultants of the patches of a footprint for one motion.
+//! The table as a method: resultants of the patches of a footprint for a motion.
 
 use std::ops::RangeInclusive;
 
@@ -15,18 +15,18 @@ use crate::rolling::methods::table::evaluate::Creep;
 use crate::rolling::methods::table::file::table;
 use crate::rolling::task::{Motion, RollingTask};
 
-/// a/b that the table covers.
+/// Ratios a/b in the table.
 pub const RATIO_RANGE: RangeInclusive<f64> = 0.1..=10.0;
-/// Largest share of load_mismatch load of a patch that an ellipse may stand for: above it errors reach 0.08 μN.
+/// Largest load mismatch of a patch that is replaced by its equivalent ellipse; above it errors reach 0.08 μN.
 const MISPLACED_MAX: f64 = 0.1;
-/// Error of the ellipse that stands for another shape, relative to μN: `0.3 D + 0.006` holds for 27 patches with D up to 0.9.
+/// Slope of the error of the equivalent ellipse, relative to μN: `0.3 D + 0.006` holds for 27 patches with load mismatches D up to 0.9.
 const PER_MISPLACED: f64 = 0.3;
-/// Its part that does not depend on D.
+/// The part of this error that does not depend on D.
 const ANY_SHAPE: f64 = 0.006;
-/// What is added where patches turn each other's tractions elastically, which the table leaves out.
+/// Additional error with several patches, whose elastic interaction is not in the table.
 const NEIGHBOURS: f64 = 0.01;
 
-/// Solves a motion; `ellipses` stand for the patches.
+/// Solves a motion for the equivalent ellipses of the patches.
 ///
 /// # Errors
 /// The table does not cover a patch.
@@ -75,7 +75,7 @@ pub fn solve(
     })
 }
 
-/// Why the table has no answer for a pair of materials, if it has none.
+/// The reason why the table does not cover a pair of materials, if it does not.
 pub fn unlike(elasticity: &Elasticity) -> Option<String> {
     (elasticity.difference != 0.0).then(|| {
         format!(
@@ -85,7 +85,7 @@ pub fn unlike(elasticity: &Elasticity) -> Option<String> {
     })
 }
 
-/// Why the table has no answer for an ellipse with this ratio of semi-axes, if it has none.
+/// The reason why the table does not cover an ellipse with this ratio of semi-axes, if it does not.
 pub fn outside(ratio: f64) -> Option<String> {
     (!RATIO_RANGE.contains(&ratio)).then(|| {
         format!(
@@ -110,14 +110,12 @@ fn covers(number: usize, load_mismatch: f64, ratio: f64) -> Result<(), SolveErro
     reason.map_or(Ok(()), |reason| Err(SolveError::NotCovered { reason }))
 }
 
-/// Can the table tell where a search should begin? It knows like bodies with nothing between them but a coefficient of friction that does
-/// not fall with slip.
+/// Whether the table can estimate forces: for like bodies without a layer, with friction that does not depend on slip.
 pub(crate) fn tells(elasticity: &Elasticity, interface: Interface, friction: &FrictionLaw) -> bool {
     elasticity.difference == 0.0 && interface.layer == 0.0 && !friction.depends_on_slip()
 }
 
-/// F_x and F_y in N on an ellipse for a motion about the origin of the case, with a limit μN in N; beyond the ratios of its axes that the
-/// table covers, those at the nearest one.
+/// F_x and F_y in N on an ellipse for a motion about the origin of the case, with a limit μN in N. A ratio of semi-axes outside the table is clamped.
 pub(crate) fn forces(
     shear_modulus: f64,
     poisson_ratio: f64,
@@ -137,7 +135,7 @@ pub(crate) fn forces(
     [limit * force[0], limit * force[1]]
 }
 
-/// `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` about the centre of an ellipse as resultants about the origin of the case.
+/// Converts `[F_x/(μN), F_y/(μN), M_z/(μN√(ab))]` about the centre of an ellipse to resultants about the origin of the case.
 fn about_origin(ellipse: &LoadEllipse, limit: f64, force: [f64; 3]) -> Resultants {
     let [x, y] = ellipse.centre;
     let [force_x, force_y] = [force[0], force[1]].map(|part| limit * part);
@@ -148,7 +146,7 @@ fn about_origin(ellipse: &LoadEllipse, limit: f64, force: [f64; 3]) -> Resultant
     }
 }
 
-/// Creepages about the centre of an ellipse and spin, as the table has them.
+/// Dimensionless creepages about the centre of an ellipse, and spin.
 fn dimensionless(
     shear_modulus: f64,
     ellipse: &LoadEllipse,
@@ -166,7 +164,7 @@ fn dimensionless(
     ]
 }
 
-/// What the table says of one patch.
+/// The result for one patch.
 struct PatchAnswer {
     resultants: Resultants,
     error: f64,
@@ -174,7 +172,7 @@ struct PatchAnswer {
     gradients: PatchGradients,
 }
 
-/// Forces in N on a patch that an ellipse stands for, about the origin of the case; `limit` is μN in N.
+/// Results on an equivalent ellipse about the origin of the case; `limit` is μN in N.
 fn on_ellipse(
     task: &RollingTask,
     ellipse: &LoadEllipse,
@@ -203,7 +201,7 @@ fn on_ellipse(
         },
         slopes,
     ) = here.with_slopes(creepage);
-    // In N and mm about the centre; then by ν_x, ν_y and φ about the origin; then the moment about the origin.
+    // First in N and mm about the centre, then by ν_x, ν_y and φ about the origin, then with the moment about the origin.
     let arms = [1.0, 1.0, c];
     let own =
         [0, 1, 2].map(|k| [0, 1, 2].map(|j| slopes[k][j] * (limit * unit) * arms[k] * arms[j]));

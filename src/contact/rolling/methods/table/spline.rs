@@ -1,20 +1,14 @@
-//! From the values at the nodes of the table to the coefficients of its spline.
+//! The nodes of the table, the spline through its values, and the coordinates in which creep forces are smooth: the size of the creepage, the place of the spin
+//! pole, and the direction.
 //!
-//! The nodes of the table: a/b, ν, size, pole and direction of the creepage.
-//!
-//! Cubic splines along one axis of the table: from values at nodes to coefficients, and the weights of coefficients at a point.
-//!
-//! Coordinates in which creep forces are smooth: size of the creepage, place of the spin pole, direction.
-//!
-//! Creepages are dimensionless: `x = G c² ν_x/(μN)`, `y = G c² ν_y/(μN)`, `z = G c³ φ/(μN)` with c = √(ab), for x, z ≥ 0. With Kalker's
-//! coefficients C11 and C22, `u = (C11 x, C22 y, h z)` with `h = ½ √(C22² a/b + C11² b/a)` has the size `r = |u|`, about 3 at full slip
-//! without spin. The direction is given by two angles,
+//! Creepages are dimensionless: `x = G c² ν_x/(μN)`, `y = G c² ν_y/(μN)`, `z = G c³ φ/(μN)` with c = √(ab), for x, z ≥ 0. With Kalker's coefficients C11 and C22,
+//! `u = (C11 x, C22 y, h z)` with `h = ½ √(C22² a/b + C11² b/a)` has the size `r = |u|`, about 3 at full slip without spin. The direction has two angles,
 //!
 //! `u ∝ (cos θ √(m² cos² θ + α² sin² θ) cos χ, cos θ √(m² cos² θ + β² sin² θ) sin χ, sin θ)`,
 //!
-//! with `α = C11/(h √(a/b))`, `β = C22 √(a/b)/h`, `m = (α + β)/2`, all of ν = 1/4: full slip is kinematics and does not depend on ν at
-//! given angles. Lines of constant θ are ellipses of the pole: of the shape of the patch near its centre (θ → π/2), circles in u far
-//! away (θ → 0); at θ = π/4 the pole is near the edge. The map continues smoothly to θ < 0, which turns z, and beyond π/2.
+//! with `α = C11/(h √(a/b))`, `β = C22 √(a/b)/h`, `m = (α + β)/2`, all for ν = 1/4, because full slip is kinematic and does not depend on ν at given angles. Lines
+//! of constant θ are ellipses of the pole: of the shape of the patch near its centre (θ → π/2), and circles in u far away (θ → 0). At θ = π/4 the pole is near the
+//! edge. The map continues smoothly to θ < 0, which reverses z, and beyond π/2.
 
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 use std::ops::Range;
@@ -22,27 +16,26 @@ use std::ops::Range;
 use crate::numerics::lu::inverse;
 use crate::rolling::methods::table::spline::Mirror::{Even, Odd};
 
-/// Functions in the table: F_x, F_y, M_z and the share that sticks.
+/// Number of functions in the table: F_x, F_y, M_z and the share that sticks.
 pub const OUTPUTS: usize = 4;
-/// Coefficients in the pole and in the direction: one more beyond each end.
+/// Number of coefficients in the pole: one more beyond each end.
 pub const POLE_COEFFICIENTS: usize = POLES + 2;
-/// The same in the direction.
+/// Number of coefficients in the direction: one more beyond each end.
 pub const DIRECTION_COEFFICIENTS: usize = DIRECTIONS + 2;
-/// Numbers of one a/b, pole and direction: sizes, Poisson's ratios, functions.
+/// Number of values of one a/b, pole and direction: sizes, Poisson's ratios, functions.
 pub const ROW: usize = SIZES.len() * POISSON_RATIOS.len() * OUTPUTS;
-/// Numbers of all coefficients.
-pub const COEFFICIENTS: usize = RATIOS * POLE_COEFFICIENTS * DIRECTION_COEFFICIENTS * ROW;
-/// Values at all nodes.
+
+/// Number of values at all nodes.
 pub const VALUES: usize = RATIOS * POLES * DIRECTIONS * ROW;
 
-/// How a function continues beyond χ = ±π/2, where the creepage along rolling changes its sign.
+/// The continuation of the functions beyond χ = ±π/2, where the creepage along rolling changes sign.
 const ACROSS_ROLLING: [Mirror; OUTPUTS] = [Odd, Even, Even, Even];
 
-/// How the part of a function that is even in χ continues beyond θ = 0 (the spin changes its sign) and θ = π/2 (both creepages do); the
-/// part that is odd in χ continues the other way.
+/// The continuation of the part of a function that is even in χ beyond θ = 0 (the spin changes sign) and θ = π/2 (both creepages do). The part that is odd in χ
+/// continues with the opposite sign.
 ///
-/// Of a function f(x, y, z) there is `F_x(x, y, −z) = F_x(x, −y, z)` and `F_x(−x, −y, z) = −F_x(x, −y, z)`; lateral force and moment have
-/// the other sign in the first and not in the second, the share that sticks in neither.
+/// The forces satisfy `F_x(x, y, −z) = F_x(x, −y, z)` and `F_x(−x, −y, z) = −F_x(x, −y, z)`. Lateral force and moment have the opposite sign in the first
+/// relation and not in the second, the share that sticks in neither.
 const OF_SPIN: [[Mirror; 2]; OUTPUTS] = [[Even, Odd], [Odd, Even], [Odd, Even], [Even, Even]];
 
 /// Coefficients `[a/b][pole][direction][size][ν][function]` of the spline through values `[a/b][pole][direction][size][ν][function]`.
@@ -67,7 +60,7 @@ pub fn coefficients(values: &[f32]) -> Vec<f32> {
     over_directions(&poles)
 }
 
-/// A matrix applied to one index of an array `[before][nodes][inner]`.
+/// Applies a matrix to one index of an array `[before][nodes][inner]`.
 fn transformed(matrix: &[Vec<f64>], before: usize, from: &[f32], inner: usize) -> Vec<f32> {
     let nodes = matrix[0].len();
     let mut to = vec![0.0; before * matrix.len() * inner];
@@ -85,7 +78,7 @@ fn transformed(matrix: &[Vec<f64>], before: usize, from: &[f32], inner: usize) -
     to
 }
 
-/// Adds the rows of an array times the weight of each function.
+/// Adds the rows of an array, multiplied by the weight of each function.
 fn add(to: &mut [f32], from: &[f32], weights: [f32; OUTPUTS]) {
     let (to, _) = to.as_chunks_mut::<OUTPUTS>();
     let (from, _) = from.as_chunks::<OUTPUTS>();
@@ -96,7 +89,7 @@ fn add(to: &mut [f32], from: &[f32], weights: [f32; OUTPUTS]) {
     }
 }
 
-/// Splines over the poles of an array `[a/b][pole][direction][row]`: the parts even and odd in the direction by themselves.
+/// Splines over the poles of an array `[a/b][pole][direction][row]`, separately for the parts even and odd in the direction.
 fn over_poles(from: &[f32]) -> Vec<f32> {
     let of_ends = |ends: [Mirror; 2]| mirrored_coefficients(POLES, ends);
     let matrices = OF_SPIN.map(|ends| [of_ends(ends), of_ends(ends.map(Mirror::other))]);
@@ -106,7 +99,7 @@ fn over_poles(from: &[f32]) -> Vec<f32> {
     for (from, to) in blocks.zip(to.chunks_exact_mut(POLE_COEFFICIENTS * block)) {
         for (pole, to) in to.chunks_exact_mut(block).enumerate() {
             for (node, from) in from.chunks_exact(block).enumerate() {
-                // Half the sum and half the difference of the two weights act on χ and on −χ.
+                // Half the sum and half the difference of the two weights apply to χ and −χ.
                 let half = |sign: f64| -> [f32; OUTPUTS] {
                     std::array::from_fn(|k| {
                         let [same, other] = &matrices[k];
@@ -129,7 +122,7 @@ fn over_poles(from: &[f32]) -> Vec<f32> {
 /// Splines over the directions of an array `[a/b][pole][direction][row]`.
 fn over_directions(from: &[f32]) -> Vec<f32> {
     let matrices = ACROSS_ROLLING.map(|end| mirrored_coefficients(DIRECTIONS, [end; 2]));
-    let mut to = vec![0.0; COEFFICIENTS];
+    let mut to = vec![0.0; from.len() / DIRECTIONS * DIRECTION_COEFFICIENTS];
     let blocks = from.chunks_exact(DIRECTIONS * ROW);
     for (from, to) in blocks.zip(to.chunks_exact_mut(DIRECTION_COEFFICIENTS * ROW)) {
         for (chi, to) in to.chunks_exact_mut(ROW).enumerate() {
@@ -143,25 +136,25 @@ fn over_directions(from: &[f32]) -> Vec<f32> {
     to
 }
 
-/// Nodes in ln(a/b), uniform from 1/10 to 10.
+/// Number of nodes in ln(a/b), uniform from 1/10 to 10.
 pub const RATIOS: usize = 10;
 /// Nodes in Poisson's ratio, between which values are parabolas.
 pub const POISSON_RATIOS: [f64; 3] = [0.0, 0.25, 0.5];
-/// Nodes in the place of the spin pole, uniform from no spin (θ = 0) to spin alone (θ = π/2).
+/// Number of nodes in the place of the spin pole, uniform from no spin (θ = 0) to spin alone (θ = π/2).
 pub const POLES: usize = 18;
-/// Nodes in the direction, uniform from χ = −π/2 to π/2 (χ = 0: creepage along rolling).
+/// Number of nodes in the direction, uniform from χ = −π/2 to π/2, where χ = 0 is creepage along rolling.
 pub const DIRECTIONS: usize = 21;
-/// Nodes in the size, in 48ths of σ: closest where the last of the patch begins to slip, and one near full slip, which is approached
-/// slowly while the spin pole is within the patch.
+/// Nodes in the size, in 48ths of σ. They are closest where the last of the patch begins to slip, with one near full slip, which is approached slowly while the
+/// spin pole is within the patch.
 pub const SIZES: [u8; 22] = [
     0, 5, 10, 15, 19, 21, 22, 23, 24, 25, 26, 27, 28, 30, 32, 34, 36, 38, 40, 44, 46, 48,
 ];
-/// What the nodes of [`SIZES`] count.
+/// Unit of [`SIZES`] over σ.
 pub const SIZE_STEPS: f64 = 48.0;
-/// The size of creepage at σ = 1/2.
+/// The size of the creepage at σ = 1/2.
 pub const SIZE_HALF: f64 = 1.5;
 
-/// ln(a/b) at its ends.
+/// The largest ln(a/b).
 pub fn ln_ratio_max() -> f64 {
     LN_10
 }
@@ -183,7 +176,7 @@ pub fn direction(node: usize) -> f64 {
 
 /// σ = r/(r + 3/2) of a size r, 0 to 1.
 pub fn sigma(size: f64) -> f64 {
-    // Of any size, also one that is 0 or beyond all numbers.
+    // This form is also correct for the sizes 0 and infinity.
     1.0 / (1.0 + SIZE_HALF / size)
 }
 
@@ -192,10 +185,10 @@ pub fn size(sigma: f64) -> f64 {
     SIZE_HALF * sigma / (1.0 - sigma)
 }
 
-/// Cells between nodes: in a/b, pole, direction and size.
+/// Number of cells between nodes in a/b, pole, direction and size.
 pub const CELLS: usize = (RATIOS - 1) * (POLES - 1) * (DIRECTIONS - 1) * (SIZES.len() - 1);
 
-/// The last node at or before each of the 48ths of σ.
+/// The last node at or before each 48th of σ.
 const SIZE_CELL: [u8; SIZE_STEPS as usize] = {
     let mut cells = [0; SIZE_STEPS as usize];
     let mut node = 0;
@@ -210,7 +203,7 @@ const SIZE_CELL: [u8; SIZE_STEPS as usize] = {
     cells
 };
 
-/// The number of the cell that holds a place, `[a/b][pole][direction][size]`; beyond the ends the last one.
+/// The number of the cell that contains a place, `[a/b][pole][direction][size]`, clamped to the ends.
 #[inline(always)]
 pub fn cell(ln_ratio: f64, sigma: f64, theta: f64, chi: f64) -> usize {
     let bin = |part: f64, bins: usize| ((part * bins as f64).max(0.0) as usize).min(bins - 1);
@@ -221,18 +214,18 @@ pub fn cell(ln_ratio: f64, sigma: f64, theta: f64, chi: f64) -> usize {
     ((ratio * (POLES - 1) + pole) * (DIRECTIONS - 1) + direction) * (SIZES.len() - 1) + size
 }
 
-/// Cubic pieces: how the four coefficients from a first one on weigh in each bin, by powers of the place in the bin.
+/// A cubic spline on an axis: polynomials of four coefficients in each bin.
 #[derive(Debug, Clone)]
 pub struct Axis {
     low: f64,
     bins_per_unit: f64,
     /// The first coefficient of each bin.
     first: Vec<usize>,
-    /// In each bin the polynomials of four coefficients.
+    /// The polynomials of the four coefficients in each bin, by powers of the place in the bin.
     pieces: Vec<[[f64; 4]; 4]>,
 }
 
-/// The coefficients at a point: the first of four, their weights, and the derivatives of these by the place on the axis.
+/// The coefficients at a place: the first of four, their weights, and the derivatives of these by the place.
 #[derive(Debug, Clone, Copy)]
 pub struct Weights {
     /// The first of four coefficients.
@@ -243,17 +236,17 @@ pub struct Weights {
     pub slope: [f64; 4],
 }
 
-/// What values become behind an end of an axis where the table continues as its own mirror image.
+/// The continuation of a function beyond an end of an axis as its own mirror image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mirror {
-    /// The same.
+    /// Equal values.
     Even,
-    /// Turned around; 0 at the end itself.
+    /// Opposite values; 0 at the end.
     Odd,
 }
 
 impl Mirror {
-    /// The other way.
+    /// The opposite continuation.
     #[must_use]
     pub fn other(self) -> Mirror {
         match self {
@@ -264,7 +257,7 @@ impl Mirror {
 }
 
 impl Axis {
-    /// An axis of `nodes` uniform nodes that has one more coefficient before the first node and one behind the last.
+    /// An axis of uniform nodes with one more coefficient before the first node and one after the last.
     pub fn mirrored(ends: Range<f64>, nodes: usize) -> Axis {
         let piece = [
             [1.0, -3.0, 3.0, -1.0],
@@ -281,8 +274,8 @@ impl Axis {
         }
     }
 
-    /// An axis with nodes at whole steps from `places[0] = 0` to the last, `step` wide, whose second and last but one are no knots: as
-    /// many coefficients as nodes.
+    /// An axis with nodes at the multiples `places` of `step`, the first of which is 0. The second node and the last but one are no knots, so there are as many
+    /// coefficients as nodes.
     pub fn free(low: f64, step: f64, places: &[u8]) -> Axis {
         let knots = knots(places);
         let bins = usize::from(places[places.len() - 1]);
@@ -305,7 +298,7 @@ impl Axis {
         axis
     }
 
-    /// The weights at a place; beyond the ends those of the end.
+    /// The weights at a place, clamped to the ends.
     #[inline(always)]
     pub fn at(&self, place: f64) -> Weights {
         let last = self.first.len() - 1;
@@ -333,7 +326,7 @@ impl Axis {
     }
 }
 
-/// The matrix from values at uniform nodes to their coefficients and one more at each end, row by row.
+/// The matrix from values at uniform nodes to the coefficients of [`Axis::mirrored`], row by row.
 pub fn mirrored_coefficients(nodes: usize, ends: [Mirror; 2]) -> Vec<Vec<f64>> {
     let mut system = vec![vec![0.0; nodes]; nodes];
     for (node, row) in system.iter_mut().enumerate() {
@@ -364,7 +357,7 @@ pub fn free_coefficients(places: &[u8]) -> Vec<Vec<f64>> {
     inverse(&system)
 }
 
-/// The node that stands for one beyond the ends, and its sign.
+/// The node whose value replaces one beyond the ends, and its sign.
 fn reflected(node: isize, nodes: usize, ends: [Mirror; 2]) -> (usize, f64) {
     let last = nodes as isize - 1;
     let sign = |mirror| if mirror == Odd { -1.0 } else { 1.0 };
@@ -377,7 +370,7 @@ fn reflected(node: isize, nodes: usize, ends: [Mirror; 2]) -> (usize, f64) {
     }
 }
 
-/// Knots of a cubic spline through the places, the second and the last but one left out.
+/// Knots of a cubic spline through the places, without the second and the last but one.
 fn knots(places: &[u8]) -> Vec<f64> {
     let at = |k: usize| f64::from(places[k]);
     let last = places.len() - 1;
@@ -418,7 +411,7 @@ fn basis(knots: &[f64], k: usize, interval: usize, x: f64) -> f64 {
     part(knots, k, 3, interval, x)
 }
 
-/// The cubic with these values at 0, 1/3, 2/3 and 1, by powers.
+/// The powers of the cubic with these values at 0, 1/3, 2/3 and 1.
 fn cubic_through(v: [f64; 4]) -> [f64; 4] {
     let [a, b, c, d] = v;
     [
@@ -489,7 +482,7 @@ mod axis_tests {
     }
 }
 
-/// The shape of an ellipse as far as it decides on coordinates.
+/// The properties of the shape of an ellipse that determine the coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {
     /// √(a/b).
@@ -506,13 +499,12 @@ pub fn spin_factor(root: f64, [c11, c22]: [f64; 2]) -> f64 {
     0.5 * (x * x + y * y).sqrt()
 }
 
-/// Steps of the search for θ, each of third order. With 3 angles are right to 3e-9, with 4 to rounding (`angles_of_a_creepage`).
-/// Always as many, without a test in between as the common root finders make: the start is never far off, and rows are evaluated by the million.
+/// Number of steps of the search for θ, each of third order. With 3 angles are accurate to 3e-9, with 4 to rounding (`angles_of_a_creepage`). The number is fixed,
+/// because the start is always close and rows are evaluated by the million.
 const STEPS: usize = 4;
-/// Squares of creepages beside spin of this size, relative to its square, turn θ by less than 1e-9: θ differs
-/// from a right angle by about the square root of this.
+/// Squares of creepages relative to that of the spin up to which the pole is at the centre. θ then differs from a right angle by about the square root of this.
 const SPIN_ALONE: f64 = 1e-20;
-/// Where derivatives at spin alone are taken: creepages of this part of the spin, by size.
+/// Ratio of creepages to spin, by size, at which derivatives at pure spin are taken.
 const BESIDE_SPIN: f64 = 1e-3;
 
 impl Shape {
@@ -528,7 +520,7 @@ impl Shape {
         }
     }
 
-    /// A creepage (x, y, z) of the angles θ and χ, of any size.
+    /// A creepage (x, y, z) with the angles θ and χ, of arbitrary size.
     pub fn creepage(&self, theta: f64, chi: f64) -> [f64; 3] {
         let [alpha, beta, m] = self.squares;
         let (sin, cos) = theta.sin_cos();
@@ -537,14 +529,14 @@ impl Shape {
         [0, 1, 2].map(|k| u[k] / self.scale[k])
     }
 
-    /// The same of the size r with `[C11, C22]` of the material.
+    /// A creepage with the size r and the angles θ and χ, for `[C11, C22]` of the material.
     pub fn creepage_of_size(&self, size: f64, theta: f64, chi: f64, c: [f64; 2]) -> [f64; 3] {
         let direction = self.creepage(theta, chi);
         let factor = size / self.size(direction, c);
         direction.map(|part| factor * part)
     }
 
-    /// The size r of a creepage with `[C11, C22]` of the material.
+    /// The size r of a creepage, for `[C11, C22]` of the material.
     pub fn size(&self, [x, y, z]: [f64; 3], c: [f64; 2]) -> f64 {
         let h = spin_factor(self.root, c);
         (c[0] * x).hypot(c[1] * y).hypot(h * z)
@@ -556,8 +548,7 @@ impl Shape {
         self.angles_of(self.stretched(creepage))
     }
 
-    /// The angles with their derivatives by x, y and z. At spin alone, where the direction has no derivative, a creepage beside it stands
-    /// for it.
+    /// The angles with their derivatives by x, y and z. At pure spin, where the direction has no derivative, they are those at a creepage near it.
     pub fn angles_with_slopes(&self, creepage: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
         let whole = self.stretched(creepage);
         let share = 1.0 / whole[0].abs().max(whole[1].abs()).max(whole[2].abs());
