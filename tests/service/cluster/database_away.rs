@@ -44,7 +44,7 @@ async fn a_database_that_is_away_is_no_full_disk_and_costs_no_job() {
     let (service, cable) = or_skip!(node_at_a_cable(&[]).await);
     let done = service.submit(&case("done")).await;
     service.until(&done, "succeeded").await;
-    let solving = service.submit(&long_case("solving", 60)).await;
+    let solving = service.submit(&long_case("solving", 1_000)).await;
     service.until(&solving, "running").await;
 
     cable.set_whole(false);

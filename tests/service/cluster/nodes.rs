@@ -151,7 +151,7 @@ async fn a_worker_that_stood_still_for_longer_than_its_lease_changes_nothing() {
     let url = or_skip!(tables().await);
     let api = node(&url, "serve", &[]);
     let paused = node(&url, "worker", &[]);
-    let id = api.submit(&long_case("taken over", 60)).await;
+    let id = api.submit(&long_case("taken over", 1_000)).await;
     let path = format!("/v1/jobs/{id}");
     api.until(&id, "running").await;
     paused.signal("STOP");
