@@ -9,7 +9,8 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use machine::{lu_seconds, median, quantile, seconds_of};
-use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::case::rail_pair::KnownPair;
+use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
 use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::{check, check_with, solve, solve_with};

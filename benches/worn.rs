@@ -1,6 +1,6 @@
 //! Solves a worn wheel on a worn rail in 336 states, and prints which reach equilibrium and how smoothly forces depend on the load.
 //!
-//! `cargo bench --bench worn` needs the reference files beside the checkout (or `RAILHEAD_REFERENCE`). It ends with an error if more than one state
+//! `cargo bench --bench worn` needs the reference files next to the checkout (or `RAILHEAD_REFERENCE`). It ends with an error if more than one state
 //! in a hundred has no answer.
 
 use std::collections::BTreeMap;

@@ -146,7 +146,7 @@ async fn bodies(workers: usize, packed: bool) -> Vec<Row> {
     rows
 }
 
-/// Measures `count` clients that request a grid and read nothing of it.
+/// Measures `count` clients that request a grid but do not read the response.
 async fn grids(workers: usize, count: usize, format: &str, grid: &str) -> Vec<Row> {
     let service = Service::start(workers, &["--grid-max-samples", "1000000"]);
     let mut client = Client::new(&service.url);

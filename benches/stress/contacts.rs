@@ -249,7 +249,7 @@ fn gap(kind: &str, random: &mut Random) -> Value {
     let across = |y: f64| match shape {
         0 => square * y * y + fourth * y.powi(4),
         1 => (square * (y - half).powi(2)).min(square * (y + half).powi(2) + offset),
-        // Another curvature on one side, and a kink beside the contact.
+        // Another curvature on one side, and a kink next to the contact.
         2 => square * y * y * if y > 0.0 { 1.0 } else { 3.0 } + 0.01 * (y - half).max(0.0),
         _ => square * y * y,
     };

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use railhead_contact as contact;
-use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::case::rail_pair::KnownPair;
+use railhead_contact::case::solver::Limits;
 use railhead_contact::evaluate::answer::{ManyAnswer, RowStatus, RowsAnswer};
 use railhead_contact::evaluate::many::{ManyTask, solve_many};
 use railhead_contact::evaluate::rows::Rows;

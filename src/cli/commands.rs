@@ -131,7 +131,7 @@ pub(super) const DATA_DIR_VARIABLE: &str = "RAILHEAD_DATA_DIR";
 /// Default data folder.
 pub(super) const DATA_DIR_DEFAULT: &str = "./railhead-data";
 
-/// The data folder of a command that runs beside the service.
+/// The data folder of a command that runs at the same time as the service.
 #[derive(Debug, Clone, Args)]
 pub(super) struct DataFolderArgs {
     /// Data folder of the service.

@@ -85,7 +85,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use crate::case::draft;
-use crate::case::solver::KnownPair;
+use crate::case::rail_pair::KnownPair;
 use crate::monitor::MonitorPart;
 use crate::normal::footprint::NormalTask;
 use crate::profile_assessment::trust;

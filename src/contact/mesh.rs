@@ -322,6 +322,9 @@ pub fn strips_about(pole: f64, low: f64, high: f64, count: usize) -> Vec<(f64, f
         .collect()
 }
 
+/// Number of strips, and of cells in a strip, from which a mesh given by the client counts as fine.
+pub(crate) const SIDE_GOOD: u32 = 8;
+
 /// An explicit mesh: equal strips, cosine-graded cells along x, no clustering.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Members)]
 pub struct MeshSize {

@@ -369,7 +369,7 @@ impl<'a> WheelSolve<'a> {
         Ok((place, over))
     }
 
-    /// Fails if a profile ends beside a patch, or the rail turns away from a plane there.
+    /// Fails if a profile ends next to a patch, or the rail turns away from a plane there.
     fn check_ends(&self, contact: &CurveContact) -> Result<(), SolveError> {
         let beyond = contact.grid.step[1];
         let known = self.curve.range();

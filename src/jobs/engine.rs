@@ -6,7 +6,8 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::case::rail_pair::KnownPair;
+use railhead_contact::case::solver::Limits;
 use railhead_contact::check_with;
 use railhead_contact::error::{CaseError, SolveError};
 use railhead_contact::monitor::Monitor;

@@ -17,7 +17,7 @@ use crate::shared::Shared;
 use crate::storage_fault::StoragePlace;
 use crate::store::Usage;
 use crate::trace::Tracer;
-use railhead_contact::case::solver::KnownPair;
+use railhead_contact::case::rail_pair::KnownPair;
 use railhead_contact::error::{CaseError, Fault, FaultCode};
 use railhead_contact::problem::checked_case::CheckedCase;
 

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use railhead_contact as contact;
-use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::case::rail_pair::KnownPair;
+use railhead_contact::case::solver::Limits;
 use railhead_contact::case::words::solver::MethodName;
 use railhead_contact::evaluate::many::{ManyTask, evaluate_at_once};
 use railhead_contact::monitor::{Monitor, Unmonitored};

@@ -32,7 +32,7 @@ fn arc(centre: f64, radius: f64, [from, to]: [f64; 2], count: usize) -> Vec<[f64
     points.collect()
 }
 
-/// Returns a gauge corner of radius 12.7 mm beside a crown of radius 300 mm.
+/// Returns a gauge corner of radius 12.7 mm next to a crown of radius 300 mm.
 fn gauge_corner() -> Vec<[f64; 2]> {
     let mut points = arc(12.7, 12.7, [-1.35, 0.0], 200);
     let [y, z] = points[0];
@@ -48,7 +48,7 @@ fn gauge_corner() -> Vec<[f64; 2]> {
     points
 }
 
-/// Returns a flange root of this radius, beside a tread that slopes away.
+/// Returns a flange root of this radius, next to a tread that slopes away.
 fn flange_root(radius: f64) -> Vec<[f64; 2]> {
     let mut points = arc(radius, radius, [-1.3, 0.0], 200);
     let [y, z] = points[0];
@@ -97,7 +97,7 @@ fn round_wheel() -> Vec<[f64; 2]> {
     (-99..=99).map(tread).collect()
 }
 
-/// Returns the section of a state: a generated shape, or a file beside the checkout.
+/// Returns the section of a state: a generated shape, or a file next to the checkout.
 fn section(file: &str) -> Option<Value> {
     let points = |points: Vec<[f64; 2]>| {
         Some(json!({ "points_mm": points, "mirror_y": false, "mirror_z": false }))
@@ -620,7 +620,7 @@ fn a_history_on_a_flat_rail_has_the_forces_of_a_plane() {
 #[test]
 fn the_history_of_the_left_wheel_is_the_mirror_image_of_the_right_one() {
     let corner = usual("curve", -6.0, 0.003);
-    // A light patch on the tread beside a heavy one at the gauge corner.
+    // A light patch on the tread next to a heavy one at the gauge corner.
     let mut unequal = usual("curve", -4.5, 0.0);
     unequal["load"] = json!({ "approach_mm": 0.12 });
     for (mut right, patches) in [(corner, 1), (unequal, 2)] {

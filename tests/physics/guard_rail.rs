@@ -23,7 +23,7 @@ fn solve(case: &Value) -> Solution {
     solution
 }
 
-/// Returns S1002 on 60E1 beside a guard rail with a straight face. The back of the flange has the same radius as its tip.
+/// Returns S1002 on 60E1 next to a guard rail with a straight face. The back of the flange has the same radius as its tip.
 fn beside_guard_rail(shift: f64) -> Value {
     let text = include_str!("../../api/examples/guard-rail.case.json");
     let mut case: Value = serde_json::from_str(text).unwrap();

@@ -1,4 +1,4 @@
-//! Tests that frames and creepages of wheel and rail agree with CONTACT's. Needs the reference files beside the checkout.
+//! Tests that frames and creepages of wheel and rail agree with CONTACT's. Needs the reference files next to the checkout.
 
 use railhead_contact::geometry::contact_locus::ContactLocus;
 use railhead_contact::geometry::formats;

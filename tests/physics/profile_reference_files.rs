@@ -1,9 +1,9 @@
-//! Reference files that may be read beside the checkout but not be copied into it. Tests that need missing files print that they are skipped. Other
+//! Reference files that may be read next to the checkout but not be copied into it. Tests that need missing files print that they are skipped. Other
 //! tests check the same on generated profiles.
 
 use std::path::{Path, PathBuf};
 
-/// Returns the text of a file in the folder `RAILHEAD_REFERENCE`, by default `../shared/reference` beside the checkout.
+/// Returns the text of a file in the folder `RAILHEAD_REFERENCE`, by default `../shared/reference` next to the checkout.
 pub fn reference_file(name: &str) -> Option<String> {
     let folder = std::env::var_os("RAILHEAD_REFERENCE").map(PathBuf::from);
     let beside = || {

@@ -52,7 +52,7 @@ fn a_target_that_the_measurement_does_not_support_is_told() {
     );
 }
 
-/// Tests a hole beside the patch. The curve through the remaining points lies so near the wheel that it might touch.
+/// Tests a hole next to the patch. The curve through the remaining points lies so near the wheel that it might touch.
 #[test]
 fn a_hole_beside_the_patch_is_told_with_its_place_and_length() {
     let points = rail_60e1();

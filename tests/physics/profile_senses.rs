@@ -289,7 +289,7 @@ fn a_stated_back_outside_the_points_is_refused_and_one_elsewhere_in_them_is_told
     assert!(told(9.0));
 }
 
-/// Returns the nose of a crossing, and one with a wing rail beside it: y to the field side, z down.
+/// Returns the nose of a crossing, and one with a wing rail next to it: y to the field side, z down.
 fn crossings() -> [Points; 2] {
     let nose = |y: f64| match y {
         _ if y < 8.0 => [

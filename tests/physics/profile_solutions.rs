@@ -1,4 +1,4 @@
-//! Tests patches, pressures and forces of wheel on rail against converged results of an independent program. Needs the reference files beside the
+//! Tests patches, pressures and forces of wheel on rail against converged results of an independent program. Needs the reference files next to the
 //! checkout.
 
 use std::f64::consts::PI;

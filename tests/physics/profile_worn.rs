@@ -1,4 +1,4 @@
-//! Tests a measured worn wheel on a worn rail, where tread, gauge corner and flange touch close to each other. Needs the reference files beside the
+//! Tests a measured worn wheel on a worn rail, where tread, gauge corner and flange touch close to each other. Needs the reference files next to the
 //! checkout. `profile_conforming.rs` tests the same with a generated pair.
 
 use railhead_contact::case::solver::Limits;

@@ -190,7 +190,7 @@ fn a_wheel_that_moves_with_its_wheelset_is_coupled_too() {
     assert!(off < 0.005, "{off}");
 }
 
-/// Returns a lobe beside another one that is `height` mm lower.
+/// Returns a lobe next to another one that is `height` mm lower.
 fn two_lobes(height: f64) -> Value {
     let y: Vec<f64> = (-60..=180).map(|k| 0.1 * f64::from(k)).collect();
     let lobe = |y: f64| (y * y / 600.0).min(height + (y - 12.0).powi(2) / 600.0);

@@ -107,7 +107,7 @@ fn no_stage_leaves_the_caller_unasked_on_the_largest_inputs() {
     }
 }
 
-/// Returns a case with the back of a flange beside the face of a guard rail, 41 mm from the gauge face and 20 mm higher than the running rail.
+/// Returns a case with the back of a flange next to the face of a guard rail, 41 mm from the gauge face and 20 mm higher than the running rail.
 fn beside_guard_rail() -> Value {
     let text = include_str!("../../api/examples/wheel-rail.case.json");
     let mut case: Value = serde_json::from_str(text).unwrap();

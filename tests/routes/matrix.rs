@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use railhead_contact as contact;
-use railhead_contact::case::solver::{KnownPair, Limits};
+use railhead_contact::case::rail_pair::KnownPair;
+use railhead_contact::case::solver::Limits;
 use railhead_contact::evaluate::many::{ManyTask, evaluate_at_once, solve_many};
 use railhead_contact::evaluate::rows::Rows;
 use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};

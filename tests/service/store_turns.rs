@@ -38,7 +38,7 @@ async fn a_bystander_of_a_dead_process_counts_no_attempt(kind: StoreKind) {
     assert_eq!(store.claim(&without).await.unwrap(), []);
     let beside = table.add(new_job()).await.id;
     assert_eq!(store.claim(&without).await.unwrap()[0].id, beside);
-    // The suspect is the cause. The job that ran beside it is not.
+    // The suspect is the cause. The job that ran at the same time is not.
     let mut taken = store.reap(Reap::Dead, 3, 1).await.unwrap();
     taken.sort_unstable();
     assert_eq!(taken, [(ids[0], State::Failed), (beside, State::Queued)]);

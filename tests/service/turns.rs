@@ -1,4 +1,4 @@
-//! Tests that short jobs are served beside long solves, and that a job that kills its process is found.
+//! Tests that short jobs are served during long solves, and that a job that kills its process is found.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
@@ -151,7 +151,7 @@ async fn a_clock_that_is_set_forward_makes_nothing_late_or_old() {
     let job = lab.get(long).await;
     assert_eq!((job.state, job.attempt), (State::Running, 1));
     lab.gate.set_open(true);
-    // Its solver was neither told that it is late nor that its job is lost.
+    // Its solver received neither the deadline nor the loss of its job.
     lab.succeeds_at_once(long).await;
     lab.end().await;
 }

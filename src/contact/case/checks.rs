@@ -4,7 +4,8 @@
 
 use crate::case::draft::CaseDraft;
 use crate::case::motions::ExpandedMotions;
-use crate::case::solver::{KnownPair, Limits, resolution};
+use crate::case::rail_pair::KnownPair;
+use crate::case::solver::{Limits, resolution};
 use crate::case::words::contact::{Contact, OnRails, SurfaceName};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, Thermal};

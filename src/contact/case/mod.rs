@@ -8,6 +8,7 @@ pub mod conversions;
 pub mod digest;
 pub mod draft;
 pub mod motions;
+pub mod rail_pair;
 pub mod solve_time;
 pub mod solver;
 pub mod understood;

@@ -1,15 +1,9 @@
-//! The resolution of a case, the limits of its size, and the cache of profiles that were read.
+//! The resolution of a case and the limits of its size.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-use crate::case::wheel_task::PairWords;
-use crate::case::words::cross_section::CrossSection;
 use crate::case::words::solver::{MethodName, Solver};
 use crate::error::Fault;
-use crate::geometry::wheel_rail::{Placement, WheelRail};
 use crate::method::Method;
 use crate::problem::memory::SizeInput;
-use crate::remark::list::Remark;
 use crate::rolling::methods::fastsim;
 use crate::rolling::operator_store::BYTES_DEFAULT;
 use crate::rolling::task::{Resolution, TARGET_USUAL};
@@ -90,84 +84,5 @@ impl SizeInput {
             faults.push(Fault::new(pointer, detail));
         }
         faults
-    }
-}
-
-/// Maximum number of pairs in the cache: left and right wheels of a few vehicles whose cases alternate.
-const PAIRS_MAX: usize = 16;
-
-/// A cache of the pairs of cross-sections that were read last, the most recent first.
-///
-/// Rows of a run and steps of a simulation usually differ in placement, load and motion, but not in their profiles.
-#[derive(Debug, Default)]
-pub struct KnownPair(Mutex<Vec<Arc<PairRead>>>);
-
-/// A wheel over its rail, with a remark on the back of its flange.
-pub(crate) type Placed = (WheelRail, Option<Remark>);
-
-/// A placed pair, and the members that it was read from.
-#[derive(Debug)]
-struct PairRead {
-    sections: [CrossSection; 2],
-    flange_back: Option<f64>,
-    accept_rough: bool,
-    /// The placement without the pose of the wheelset.
-    track: Placement,
-    placed: Placed,
-}
-
-impl KnownPair {
-    /// Returns the pair of rail and wheel in place: a known one with the pose of `words`, or the one that `read` returns.
-    pub(crate) fn placed(
-        &self,
-        words: &PairWords,
-        read: impl FnOnce() -> Result<Placed, Vec<Fault>>,
-    ) -> Result<Placed, Vec<Fault>> {
-        let Placement {
-            lateral_shift,
-            yaw,
-            roll,
-            ..
-        } = words.placement;
-        let track = Placement {
-            lateral_shift: 0.0,
-            yaw: 0.0,
-            roll: 0.0,
-            ..words.placement
-        };
-        let mut pairs = self.pairs();
-        let found = pairs.iter().position(|known| {
-            known.flange_back == words.flange_back
-                && known.accept_rough == words.accept_rough
-                && known.track == track
-                && known.sections.each_ref() == words.sections
-        });
-        let known = found.map(|found| {
-            pairs[..=found].rotate_right(1);
-            Arc::clone(&pairs[0])
-        });
-        drop(pairs);
-        let pair = match known {
-            Some(pair) => pair,
-            None => {
-                let pair = Arc::new(PairRead {
-                    sections: words.sections.map(CrossSection::clone),
-                    flange_back: words.flange_back,
-                    accept_rough: words.accept_rough,
-                    track,
-                    placed: read()?,
-                });
-                let mut pairs = self.pairs();
-                pairs.insert(0, Arc::clone(&pair));
-                pairs.truncate(PAIRS_MAX);
-                pair
-            }
-        };
-        let (geometry, remark) = &pair.placed;
-        Ok((geometry.posed(lateral_shift, yaw, roll), remark.clone()))
-    }
-
-    fn pairs(&self) -> MutexGuard<'_, Vec<Arc<PairRead>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

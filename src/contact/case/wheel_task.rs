@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::case::contact_task;
-use crate::case::solver::{KnownPair, Placed};
-use crate::case::words::contact::{Contact, Load, OnRails};
+use crate::case::rail_pair::{KnownPair, PairWords, Placed};
+use crate::case::words::contact::{Contact, Load};
 use crate::case::words::cross_section::{CrossSection, Smoothing, SmoothingWord};
 use crate::case::words::motion::{Motions, Wheelset};
 use crate::error::Fault;
@@ -13,68 +13,14 @@ use crate::geometry::formats;
 use crate::geometry::formats::{Format, ProfileFile};
 use crate::geometry::orientation::{FormatSenses, Senses, StatedSenses};
 use crate::geometry::profile::{Body, LengthUnit, Profile, Reading};
-use crate::geometry::wheel_rail::{NotPlaced, Placement, Side, WheelRail};
+use crate::geometry::wheel_rail::{NotPlaced, Placement, WheelRail};
 use crate::geometry::wheelset_pose::WheelsetMotion;
 use crate::normal::footprint::NormalTask;
-use crate::normal::wheel::{ProfileTrust, ReferenceSurface, WheelLoad, WheelTask, WheelsetMove};
+use crate::normal::wheel::{ReferenceSurface, WheelLoad, WheelTask, WheelsetMove};
 use crate::problem::checked_case;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 use crate::rolling::task::PrescribedForces;
-
-/// The members of a case that describe a wheel over its rail.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PairWords<'a> {
-    /// Cross-sections of rail and wheel.
-    pub(crate) sections: [&'a CrossSection; 2],
-    /// JSON pointers to them.
-    pub(crate) pointers: [&'static str; 2],
-    /// JSON pointer to the rolling radius.
-    pub(crate) radius_pointer: &'static str,
-    /// y of the back of the flange in mm, if the case states it.
-    pub(crate) flange_back: Option<f64>,
-    /// Whether rough or exchanged profiles are accepted.
-    pub(crate) accept_rough: bool,
-    /// The placement, in which the position of the back of the flange is still 0.
-    pub(crate) placement: Placement,
-}
-
-impl<'a> PairWords<'a> {
-    /// The pair of one side, with the wheelset at a shift to the left in mm, a yaw and a roll in rad.
-    pub(crate) fn new(
-        rails: &OnRails<'a>,
-        side: Side,
-        [lateral_shift, yaw, roll]: [f64; 3],
-    ) -> PairWords<'a> {
-        PairWords {
-            sections: rails.sections,
-            pointers: ["/contact/rail", "/contact/wheel"],
-            radius_pointer: "/contact/rolling_radius_mm",
-            flange_back: rails.flange_back_position_mm,
-            accept_rough: rails.accept_rough_profiles,
-            placement: Placement {
-                side,
-                rolling_radius: rails.rolling_radius_mm,
-                rail: rails.rail,
-                cant: rails.cant_rad,
-                flange_back_distance: rails.flange_back_distance_mm,
-                flange_back_position: 0.0,
-                lateral_shift,
-                yaw,
-                roll,
-            },
-        }
-    }
-
-    /// Whether the smoothing of the profiles is automatic and rough profiles are accepted.
-    pub(crate) fn trust(&self) -> ProfileTrust {
-        let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
-        ProfileTrust {
-            auto: self.sections.map(auto),
-            accept_rough: self.accept_rough,
-        }
-    }
-}
 
 /// Returns the normal problem of a wheel on a rail with its remarks; `None` without faults if the load or the contact modulus in MPa is
 /// unknown.

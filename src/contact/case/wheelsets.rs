@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::case::solver::{KnownPair, Limits};
-use crate::case::wheel_task::{PairWords, moves, placed};
+use crate::case::rail_pair::{KnownPair, PairWords};
+use crate::case::solver::Limits;
+use crate::case::wheel_task::{moves, placed};
 use crate::case::words::contact::{Contact, Load, OnRails, RightSide};
 use crate::case::words::motion::{Combine, Motions, Swept};
 use crate::error::Fault;

@@ -12,8 +12,9 @@ use std::time::Duration;
 
 use serde_json::Value;
 
+use crate::case::rail_pair::KnownPair;
 use crate::case::solve_time::TABLE_SECONDS;
-use crate::case::solver::{KnownPair, Limits};
+use crate::case::solver::Limits;
 use crate::case::words::solver::{MethodName, Output};
 use crate::error::{CaseError, Fault, SolveError};
 use crate::evaluate::answer::{

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use crate::case::solver::{KnownPair, Limits};
+use crate::case::rail_pair::KnownPair;
+use crate::case::solver::Limits;
 use crate::case::wheel_task::profile_at;
 use crate::case::words::evolution::{EvolutionEvent, EvolutionWords, TrafficColumn};
 use crate::error::{CaseError, Fault};

@@ -172,7 +172,7 @@ const STEEP: f64 = 1.3;
 /// Height in mm of the piece that is taken as the tip of a flange.
 const TIP_DEPTH: f64 = 2.0;
 /// Range of the width in mm of the tip. Flanges of EN 13715 and AAR have 12 to 18 mm; the edge of a rim has less than 1 mm. The back of the
-/// flange is no farther from the tip than the upper bound. It is 15 mm in EN 13715, while a groove beside a second rail continues farther.
+/// flange is no farther from the tip than the upper bound. It is 15 mm in EN 13715, while a groove next to a second rail continues farther.
 const TIP_WIDTH: [f64; 2] = [4.0, 25.0];
 /// Range of the height in mm of a flange above its tread. Trams have 18 mm, worn wheels up to 40 mm.
 const FLANGE_HEIGHT: [f64; 2] = [15.0, 45.0];
@@ -200,7 +200,7 @@ const CROWN_TURN: f64 = 0.05;
 const SURE_CROWN: f64 = 30.0;
 /// Least fall in mm of each face of such a section.
 const SURE_FALL: f64 = 10.0;
-/// Largest turn in rad of such a section within 2 mm beside its crown. Corners of rails have radii of at least 9 mm; edges of rollers are sharp.
+/// Largest turn in rad of such a section within 2 mm next to its crown. Corners of rails have radii of at least 9 mm; edges of rollers are sharp.
 const SURE_CORNER: f64 = 0.3;
 /// Range of the width in mm over the faces of such a section. Heads of EN 13674 are 65 to 75 mm wide.
 const SURE_WIDTH: [f64; 2] = [50.0, 90.0];
@@ -575,7 +575,7 @@ fn evenly(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 mod tests {
     use super::*;
 
-    /// A wheel, z up: a flange of 28 mm with a round tip of 15 mm beside a tread of 100 mm.
+    /// A wheel, z up: a flange of 28 mm with a round tip of 15 mm next to a tread of 100 mm.
     fn wheel() -> Vec<[f64; 2]> {
         (-650..=600)
             .map(|k| 0.1 * f64::from(k))

@@ -31,7 +31,7 @@ pub const POINTS_MAX: usize = 20_000;
 pub(crate) const POINT_SPACING: f64 = 0.25;
 /// Length in mm of the profile needed beyond a contact. With less there is a remark.
 pub(crate) const NEEDED_BEYOND: f64 = 5.0;
-/// Least depth in mm of the groove beside a guard rail, below the highest point of the running rail: twice the height of a flange.
+/// Least depth in mm of the groove next to a guard rail, below the highest point of the running rail: twice the height of a flange.
 const GROOVE_DEPTH: f64 = 60.0;
 /// Least depth in mm of the groove below the points at its sides.
 const GROOVE_WALL: f64 = 5.0;
@@ -174,7 +174,7 @@ impl Profile {
     ///
     /// # Errors
     /// Returns a sentence if a number is not finite, the arc length is outside 5 to 500 mm, the points form a loop, or the guard rail is not
-    /// beside the rail.
+    /// next to the rail.
     pub fn with_guard_rail(&self, points: &[[f64; 2]]) -> Result<Profile, String> {
         let own = &self.measured;
         check_length(checked(points)?)?;

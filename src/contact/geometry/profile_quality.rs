@@ -484,7 +484,7 @@ pub const REFERENCE_MIN: f64 = 3.0;
 pub struct Roughness {
     /// Root mean square over the contact of the waves between the smoothing in use and twice that, at least 3 mm.
     pub waviness: f64,
-    /// Standard deviation of the same waves in and beside the contact, from their median. It is small if the waviness comes from a single place.
+    /// Standard deviation of the same waves in the contact and next to it, from their median. It is small if the waviness comes from a single place.
     pub everywhere: f64,
     /// Root mean square of the difference between the spline in use and Akima's curve through the same points; 0 with smoothing.
     pub ambiguity: f64,
@@ -505,7 +505,7 @@ pub struct PointsRead<'a> {
     pub rounding: Option<f64>,
 }
 
-/// Roughness at the contact `[low, high]`, in mm along the profile, from the curves there and beside it. The contact modulus is in MPa.
+/// Roughness at the contact `[low, high]`, in mm along the profile, from the curves there and next to it. The contact modulus is in MPa.
 fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Roughness {
     let PointsRead {
         points,

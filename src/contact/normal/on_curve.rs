@@ -280,7 +280,7 @@ impl CurveTask<'_> {
     }
 
     /// Finds the contact without friction on cells of an intermediate size if the wanted cells are much smaller than those of the coarse grid, for example for a
-    /// narrow patch beside a wide one. `None` otherwise, and on planes.
+    /// narrow patch next to a wide one. `None` otherwise, and on planes.
     ///
     /// # Errors
     /// See [`coarse`](Self::coarse).

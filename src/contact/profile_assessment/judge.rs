@@ -290,7 +290,7 @@ pub struct Defect {
     pub load_share: f64,
     /// Noise that remains after smoothing, as a pressure relative to the largest one; 0 without smoothing.
     pub left: f64,
-    /// Median waviness of this body in and beside the contact, relative to the largest pressure.
+    /// Median waviness of this body in the contact and next to it, relative to the largest pressure.
     pub everywhere: f64,
     /// The longest chord, as a range of y in mm.
     pub chord: [f64; 2],

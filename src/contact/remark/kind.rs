@@ -108,7 +108,7 @@ impl Display for Rounded {
 
 /// Declares the enum `Remark`. The documentation of a variant is the explanation that clients read, and its name in kebab case is its code.
 /// Every figure has a value for the example. `detail` is an expression that forms the sentence from references to the figures. A figure with
-/// `@short` or `@percent` stands for its rounded value there.
+/// `@short` or `@percent` denotes its rounded value there.
 macro_rules! remarks {
     ($(
         $(#[doc = $meaning:literal])+

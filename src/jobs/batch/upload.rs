@@ -18,7 +18,7 @@ use crate::model::{CaseOptions, Kind, SubmitOptions, WorkOptions, created_at};
 use crate::profiles::KnownSections;
 use crate::store::{NewBatch, NewJob, StoredCase};
 use crate::submit::outputs_text;
-use railhead_contact::case::solver::KnownPair;
+use railhead_contact::case::rail_pair::KnownPair;
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::varied::{named_sections, put};
 use railhead_contact::problem::checked_case::CheckedCase;

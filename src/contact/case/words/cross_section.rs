@@ -23,7 +23,7 @@ pub struct CrossSection {
     /// Points `[y, z]` in order along the cross-section, in mm or in `unit`.
     #[member(with = points)]
     pub points_mm: Option<Vec<[f64; 2]>>,
-    /// Points `[y, z]` of a guard rail beside a rail, toward the track centre, in order along its surface; unit, origin and directions are
+    /// Points `[y, z]` of a guard rail next to a rail, toward the track centre, in order along its surface; unit, origin and directions are
     /// those of the rail's own points. The gauge and the highest point are those of the running rail.
     #[member(with = points)]
     pub guard_rail_points_mm: Option<Vec<[f64; 2]>>,

@@ -4,7 +4,7 @@ use std::ops::{ControlFlow, Range};
 
 use pulp::NullaryFnOnce;
 
-use crate::half_space::strip_operator::operator::blocks;
+use crate::half_space::strip_operator::product::blocks;
 use crate::mesh::{Mesh, observe};
 use crate::monitor::{Monitor, Stop};
 use crate::numerics::simd;

@@ -8,7 +8,7 @@ use pulp::WithSimd;
 
 use crate::half_space::strip_operator::assembly::OperatorAssembly;
 use crate::half_space::strip_operator::kind::{Parity, Precision};
-use crate::half_space::strip_operator::product::{Product, RowLayout};
+use crate::half_space::strip_operator::product::{Product, RowLayout, blocks};
 use crate::mesh::Mesh;
 use crate::monitor::{Monitor, Stop};
 use crate::numerics::simd;
@@ -331,11 +331,6 @@ impl StripOperator {
             }
         }
     }
-}
-
-/// Number of blocks of a row.
-pub(crate) fn blocks(folded: bool) -> usize {
-    if folded { 6 } else { 3 }
 }
 
 /// The place of `i` in the mirrored segment; `first` contains the starts of the first half of the segments, and the end of the last.

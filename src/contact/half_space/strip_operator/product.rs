@@ -2,6 +2,11 @@
 
 use pulp::{Simd, WithSimd};
 
+/// Returns the number of blocks of a row; `folded` if two mirror images share it.
+pub(crate) fn blocks(folded: bool) -> usize {
+    if folded { 6 } else { 3 }
+}
+
 /// The division of the rows of a matrix into blocks, and the roles of the blocks.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowLayout {

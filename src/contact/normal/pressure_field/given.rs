@@ -26,7 +26,7 @@ const CHORD_LEAST: f64 = 1e-3;
 struct RowsAbout<'a> {
     weights: [f64; 4],
     q: [&'a [f64]; 4],
-    /// Smoothness of the two rows beside the line.
+    /// Smoothness of the two rows next to the line.
     smooth: [&'a [bool]; 2],
 }
 

@@ -115,7 +115,7 @@ fn parabola_weights(axis: &[f64]) -> Vec<ParabolaWeights> {
 }
 
 /// Value of the unknown sample `k` from the most reliable extrapolations along the axes, if there are any. Their harmonic mean prevents the steep edge of a heavily loaded
-/// patch from shifting that of a lightly loaded one beside it.
+/// patch from shifting that of a lightly loaded one next to it.
 fn continued(
     grid: &SampleGrid,
     weights: &[Vec<ParabolaWeights>; 2],

@@ -46,7 +46,7 @@ struct PatchColumns<'a> {
 }
 
 impl PatchColumns<'_> {
-    /// Converts `[x/a, y/b, ln(depth/small)]` to `[x, y, depth]`. Returns `None` beside the patch.
+    /// Converts `[x/a, y/b, ln(depth/small)]` to `[x, y, depth]`. Returns `None` outside the patch.
     fn place(&self, [s, t, depth]: [f64; 3]) -> Option<[f64; 3]> {
         let y = self.middle + self.half * t;
         let chords = self.footprint.chords(self.patch, &[(y, self.half)]);

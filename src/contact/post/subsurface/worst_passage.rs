@@ -1,7 +1,7 @@
 //! The worst lines along x below a patch for a passage of the contact.
 //!
 //! While a contact in steady rolling passes over a point of a body, the point has the stresses on a line along x, and none before and after. The worst
-//! line is found by a scan over y and depth, and a search in `(y/b, ln depth)` with additional states beside the decisive ones.
+//! line is found by a scan over y and depth, and a search in `(y/b, ln depth)` with additional states next to the decisive ones.
 //!
 //! **Dang Van's criterion** (Dang Van, Cailletaud, Flavenot, Le Douaron, Lieurade 1989): a grain shakes down to the residual stress in the centre of the
 //! smallest ball that encloses the stress deviators. The criterion is the largest value over time of half of Tresca's stress of the remaining
@@ -33,7 +33,7 @@ const NEAR: usize = 16;
 const NEAR_REACH: f64 = 1.5;
 /// Positions of the states farther out, relative to the half-length.
 const FAR: [f64; 4] = [1.8, 2.3, 3.2, 5.0];
-/// Number of times that the intervals beside decisive states are halved.
+/// Number of times that the intervals next to decisive states are halved.
 const HALVINGS: usize = 4;
 /// Evaluations of the search.
 const EVALUATIONS: usize = 24;
@@ -167,7 +167,7 @@ impl<'a> Lines<'a> {
         stations.iter().copied().zip(stresses).collect()
     }
 
-    /// The measure of one line and the gap of its ball, with states added beside the decisive ones.
+    /// The measure of one line and the gap of its ball, with states added next to the decisive ones.
     fn value(
         &self,
         measure: PassageMeasure,

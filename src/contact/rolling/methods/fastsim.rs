@@ -11,7 +11,7 @@ use crate::error::SolveError;
 use crate::friction::law::FrictionLaw;
 use crate::friction::path_dependent::Interface;
 use crate::half_space::unlike_bodies::Elasticity;
-use crate::mesh::MeshSize;
+use crate::mesh::{MeshSize, SIDE_GOOD};
 use crate::method::{Method, TractionBound};
 use crate::normal::footprint::Footprint;
 use crate::normal::hertz::{Ellipse, NormalLoad, Patch};
@@ -19,7 +19,6 @@ use crate::numerics::simd::length;
 use crate::rolling::answer::{LevelAnswer, Work};
 use crate::rolling::linear_theory;
 use crate::rolling::methods::full_slip;
-use crate::rolling::refinement::mesh_family::SIDE_GOOD;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Motion, Resolution, RollingTask};
 

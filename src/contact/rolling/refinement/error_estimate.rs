@@ -2,12 +2,12 @@
 
 use std::f64::consts::PI;
 
+use crate::mesh::SIDE_GOOD;
 use crate::method::Method;
 use crate::normal::hertz::Patch;
 use crate::rolling::answer::{RelativeErrors, Resultants, Skip};
 use crate::rolling::methods::fastsim;
 use crate::rolling::methods::full_slip::NEGLIGIBLE;
-use crate::rolling::refinement::mesh_family::SIDE_GOOD;
 use crate::rolling::refinement::on_mesh::DiscreteSolution;
 use crate::rolling::task::{Resolution, RollingTask};
 

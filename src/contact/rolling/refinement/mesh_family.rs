@@ -21,8 +21,6 @@ const LAST_OVER_FIRST: f64 = 4.0;
 /// Strips, and cells in a strip, of the coarsest mesh before they are rounded. Each doubling of the cells then adds to both. With fewer, the
 /// meshes of a slender patch have 4 strips one after another, and agree although their strips are too wide.
 const SIDE_FIRST: f64 = 3.6;
-/// Number of strips, and of cells in a strip, from which a mesh given by the client counts as fine.
-pub(crate) const SIDE_GOOD: u32 = 8;
 /// Dimensionless spin `φ c G/(μ p_max)` from which meshes are refined about the pole of the rigid slip. Values from 1 to 4 change the work by 20 %.
 const SPIN_GRADED: f64 = 2.0;
 /// Distance from the middle of the patch, in semi-axes, beyond which a pole counts as outside.

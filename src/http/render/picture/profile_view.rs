@@ -6,7 +6,7 @@ use railhead_contact::solution::words::answer::{PatchCells, PlacedProfiles, Posi
 
 /// Range of z relative to the top of the rail, in mm.
 const SHOWN_Z: [f64; 2] = [-38.0, 34.0];
-/// Space beside the rail in mm, for the pressure and the number of a patch at the gauge face.
+/// Space next to the rail in mm, for the pressure and the number of a patch at the gauge face.
 const BESIDE: f64 = 30.0;
 /// Height of the largest pressure in mm.
 const COMB: f64 = 16.0;

@@ -91,7 +91,7 @@ pub(crate) async fn connect(
     Ok((options, pool))
 }
 
-/// Checks a connection; rolls back a transaction that was left open.
+/// Checks a connection; rolls back a transaction that is still open.
 async fn alive(connection: &mut PgConnection) -> Result<(), sqlx::Error> {
     let silent = |_| sqlx::Error::Io(ErrorKind::TimedOut.into());
     timeout(ALIVE_WITHIN, connection.ping())

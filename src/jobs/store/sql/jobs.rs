@@ -202,7 +202,7 @@ impl SqlStore {
 const CHANGES: &str = "SELECT id, batch_id, kind, updated_at FROM jobs WHERE tenant = $1 AND (updated_at, id) > ($2, $3) \
      ORDER BY updated_at, id LIMIT $4";
 
-/// The states whose jobs are read one after the other; `None` stands for all states.
+/// The states whose jobs are read one after the other; `None` means all states.
 fn walked(filter: &Filter) -> Vec<Option<State>> {
     let all = State::ALL.iter().all(|state| filter.states.contains(state));
     match filter.states.is_empty() || all {
