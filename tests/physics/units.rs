@@ -71,6 +71,39 @@ fn a_likely_unit_is_named() {
         let contact = json!({ "type": "radii", "rolling_mm": radii[0], "lateral_mm": radii[1] });
         assert_suspect(&good_with("/contact", contact), "/contact/rolling_mm", unit);
     }
+    let steel = json!({
+        "conductivity_w_per_mk": 50, "specific_heat_j_per_kgk": 450, "density_kg_per_m3": 7850, "bulk_c": 20
+    });
+    for (name, value, unit) in [
+        ("conductivity_w_per_mk", 0.05, "W/(mm K)"),
+        ("specific_heat_j_per_kgk", 0.45, "J/(g K)"),
+        ("density_kg_per_m3", 7.85, "g/cm³"),
+    ] {
+        let hot = with(
+            &good_with("/outputs", json!(["temperature"])),
+            "/motion/speed_mm_per_s",
+            Some(json!(20_000)),
+        );
+        let same = with(&steel, &format!("/{name}"), Some(json!(value)));
+        let pair = json!({ "lower": steel, "upper": same });
+        for (thermal, place) in [(&same, "/thermal"), (&pair, "/thermal/upper")] {
+            let case = with(&hot, "/thermal", Some(thermal.clone()));
+            assert_suspect(&case, &format!("{place}/{name}"), unit);
+        }
+    }
+    for (name, value, unit) in [
+        ("density_kg_per_m3", 7.85, "g/cm³"),
+        ("hardness_mpa", 260.0, "HB or HV"),
+        ("shear_yield_mpa", 0.3, "GPa"),
+    ] {
+        let damage = json!({ "parameters": { name: value } });
+        let case = with(
+            &good_with("/outputs", json!(["damage"])),
+            "/damage",
+            Some(damage),
+        );
+        assert_suspect(&case, &format!("/damage/parameters/{name}"), unit);
+    }
     let ellipse = json!({ "type": "ellipse", "a_mm": 0.006, "b_mm": 0.005 });
     assert_suspect(&good_with("/contact", ellipse), "/contact/a_mm", "m");
 }

@@ -4,9 +4,10 @@
 //! `contact_task`.
 
 use crate::case::words::contact::{Contact, Load};
-use crate::case::words::material::{Elastic, Material};
+use crate::case::words::material::{Elastic, Material, Thermal};
 use crate::case::words::motion::{AskedMotion, Course, Motions, Swept, Wheelset};
 use crate::case::words::solver::Case;
+use crate::case::words::subsurface::DamageParameterWords;
 use crate::geometry::profile::LengthUnit;
 use crate::normal::hertz::Patch;
 use crate::remark::entry::RemarkEntry;
@@ -31,6 +32,15 @@ const PRESSURES: [f64; 2] = [200.0, 3500.0];
 /// Pressure in MPa above which the lengths that determine a patch are suspect: the static limit of ball bearings (ISO 76).
 const PRESSURE_DOUBTED: f64 = 4200.0;
 
+/// Properties of metals that are often given in another unit: the smallest usual value, its unit and the other one.
+const LEAST_OF_METALS: [(&str, f64, &str, &str); 5] = [
+    ("conductivity_w_per_mk", 1.0, "W/(m K)", "W/(mm K)"),
+    ("specific_heat_j_per_kgk", 10.0, "J/(kg K)", "J/(g K)"),
+    ("density_kg_per_m3", 100.0, "kg/m³", "g/cm³"),
+    ("hardness_mpa", 700.0, "MPa", "HB or HV"),
+    ("shear_yield_mpa", 10.0, "MPa", "GPa"),
+];
+
 /// Returns the remark on a number that seems to be in another unit.
 fn suspect(pointer: &str, given: f64, unit: &str, likely_unit: &str) -> RemarkEntry {
     let remark = Remark::UnitSuspected {
@@ -49,6 +59,7 @@ fn is_within(value: f64, [low, high]: [f64; 2]) -> bool {
 pub(crate) fn remarks(case: &Case, patches: &[Patch]) -> Vec<RemarkEntry> {
     let (contact, load) = (&case.contact, case.load.as_ref());
     let mut suspects = of_material(&case.material);
+    suspects.extend(of_metal(case));
     suspects.extend(of_load(&case.material, contact, load, patches));
     suspects.extend(lengths_of_patch(contact, patches));
     suspects.extend(of_place(contact));
@@ -94,6 +105,50 @@ fn is_metal(material: &Material) -> bool {
         let shear = body.shear().unwrap_or(0.0);
         shear >= 1e3 * SHEAR_GPA[0] || pointers.any(|own| own.starts_with(pointer))
     })
+}
+
+/// Returns the remarks on thermal properties and on parameters of damage models.
+fn of_metal(case: &Case) -> Vec<RemarkEntry> {
+    if !is_metal(&case.material) {
+        return Vec::new();
+    }
+    let bodies = match &case.thermal {
+        None => Vec::new(),
+        Some(Thermal::Same(both)) => vec![("/thermal", both)],
+        Some(Thermal::Pair { lower, upper }) => {
+            vec![("/thermal/lower", lower), ("/thermal/upper", upper)]
+        }
+    };
+    let thermal = bodies.into_iter().flat_map(|(pointer, body)| {
+        let values = [
+            body.conductivity_w_per_mk,
+            body.specific_heat_j_per_kgk,
+            body.density_kg_per_m3,
+        ];
+        LEAST_OF_METALS
+            .iter()
+            .zip(values)
+            .map(move |(usual, value)| (pointer, usual, value))
+    });
+    let parameters = case
+        .damage
+        .as_ref()
+        .and_then(|damage| damage.parameters.as_ref());
+    let own = match parameters {
+        Some(DamageParameterWords::Own(own)) => {
+            [own.density_kg_per_m3, own.hardness_mpa, own.shear_yield_mpa]
+        }
+        _ => [None; 3],
+    };
+    let damage = LEAST_OF_METALS[2..].iter().zip(own);
+    let damage = damage.filter_map(|(usual, value)| Some(("/damage/parameters", usual, value?)));
+    thermal
+        .chain(damage)
+        .filter(|(_, (_, least, ..), value)| value < least)
+        .map(|(pointer, (name, _, unit, likely), value)| {
+            suspect(&format!("{pointer}/{name}"), value, unit, likely)
+        })
+        .collect()
 }
 
 fn of_load(
