@@ -435,7 +435,7 @@ mod tests {
             .await
             .unwrap();
         assert_ne!(first, second);
-        // What a process killed in the middle of a write leaves behind.
+        // A process that is killed in the middle of a write leaves such a file.
         std::fs::write(folder.path().join(&first).join("fields.bin#1"), b"half").unwrap();
 
         results.remove(&first).await.unwrap();

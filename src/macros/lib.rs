@@ -346,7 +346,7 @@ fn read_field(field: &Field) -> Tokens {
     }
 }
 
-/// What stands in all attributes of this name.
+/// Returns the arguments of all attributes with this name.
 fn items(attributes: &[Attribute], name: &str) -> Vec<Expr> {
     let own = attributes.iter().filter(|it| it.path().is_ident(name));
     own.filter_map(|it| {
@@ -395,7 +395,7 @@ fn word(variant: &Variant) -> String {
         .iter()
         .filter(|it| it.path().is_ident("serde"))
     {
-        // What is not a new name is for serde to judge.
+        // Serde reports errors of its other arguments.
         let _ = attribute.parse_nested_meta(|meta| {
             if meta.path.is_ident("rename") {
                 word = meta.value()?.parse::<LitStr>()?.value();

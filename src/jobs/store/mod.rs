@@ -409,7 +409,7 @@ pub struct ClaimRequest<'a> {
     pub worker: &'a str,
     /// The queue.
     pub queue: &'a Queue,
-    /// Which of its jobs.
+    /// The kind of jobs to claim.
     pub kind: ClaimKind,
     /// Maximum number of jobs; begun jobs are claimed one at a time.
     pub jobs: usize,
@@ -455,7 +455,7 @@ pub enum Renewal {
     Lost,
 }
 
-/// Which running jobs to take from their workers.
+/// The running jobs that are taken from their workers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reap {
     /// Jobs whose lease has expired.

@@ -158,7 +158,7 @@ export async function drawn(page, selector = 'field-map.main') {
   }, selector);
 }
 
-/** What the readout of a map says, by name. @param {import('playwright-core').Page} page */
+/** The values in the readout of a map, by name. @param {import('playwright-core').Page} page */
 export const readout = (page, selector = 'field-map.main') => page.locator(`${selector} .readout div`).evaluateAll((entries) =>
   Object.fromEntries(entries.map((entry) => [entry.querySelector('dt')?.textContent, entry.querySelector('dd')?.textContent])));
 

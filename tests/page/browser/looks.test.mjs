@@ -42,7 +42,7 @@ async function visit(page, [, hash, sign]) {
   await page.waitForTimeout(150);
 }
 
-/** What is drawn and has no name, and fields that have none. @param {import('playwright-core').Page} page */
+/** Drawings and form fields without an accessible name. @param {import('playwright-core').Page} page */
 const nameless = (page) => page.evaluate(() => [...document.querySelectorAll('main :is(svg[role="img"], section, [role="region"], [role="group"], input, select, button)')].filter((element) => {
   const said = (/** @type {Iterable<Element | null>} */ elements) => [...elements].some((of) => of?.textContent?.trim());
   const labels = /** @type {HTMLInputElement} */ (element).labels ?? [];

@@ -108,7 +108,7 @@ impl SqliteStore {
 
     pub(crate) fn remember_queues(&self, _: &[(Queue, u64)]) {}
 
-    /// Nothing is cached between claims.
+    /// Does nothing: this store caches nothing between claims.
     pub(crate) fn requeued(&self) {}
 
     /// Size of the file and its write-ahead log in bytes.
