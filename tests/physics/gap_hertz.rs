@@ -1,5 +1,7 @@
 //! Tests that Hertz's contact given as a gap has Hertz's solution.
 
+use std::f64::consts::PI;
+
 use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
@@ -106,6 +108,36 @@ fn a_loose_target_takes_fewer_cells_and_region_and_pressure_stay_within_it() {
         let told = format!("{rolling} {lateral}: {default:?} {loose:?}");
         assert!(default.1 < 0.003 && loose.1 < 0.012, "{told}");
         assert!((0..2).all(|k| 4 * loose.0[k] < 3 * default.0[k]), "{told}");
+    }
+}
+
+#[test]
+fn ellipses_oblique_to_the_axes_have_hertzs_area_and_pressure() {
+    let force = 20_000.0;
+    for lateral in [250.0, 50.0, 10.0] {
+        let (rolling, ellipse) = (1000.0, hertz(1000.0, lateral, force));
+        for degrees in [10.0_f64, 30.0, 45.0, 80.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let reach = |a: f64, b: f64| 1.6 * (ellipse.a * a).hypot(ellipse.b * b);
+            let axis = |half: f64| spread(-half, half, 121);
+            let contact = grid(&axis(reach(cos, sin)), &axis(reach(sin, cos)), |x, y| {
+                let (along, across) = (x * cos + y * sin, y * cos - x * sin);
+                0.5 * along * along / rolling + 0.5 * across * across / lateral
+            });
+            let load = json!({ "normal_force_n": force });
+            let mut case = steel(contact, load, [0.0; 3]);
+            case["solver"] = json!({ "mesh": { "strips": 16, "cells": 16 } });
+            let (solution, _) = solve(&case);
+            assert_eq!(solution.patches.len(), 1);
+            let patch = &solution.patches[0];
+            let area = patch.area_mm2 / (PI * ellipse.a * ellipse.b) - 1.0;
+            let pressure = patch.pressure_max_mpa / ellipse.pressure_max - 1.0;
+            assert!(
+                area.abs() < 0.005 && pressure.abs() < 0.005,
+                "a/b {:.1} at {degrees} degrees: area off by {area:+.4}, pressure by {pressure:+.4}",
+                ellipse.a / ellipse.b
+            );
+        }
     }
 }
 

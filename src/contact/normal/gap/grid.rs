@@ -258,13 +258,18 @@ impl PressureGrid {
         let mut contact = Extent::default();
         let total: f64 = pressed.pressure.iter().sum();
         let mut steps = [f64::INFINITY; 2];
-        for patch in self.patches(&pressed.pressure) {
-            let extent = self.extent(&patch);
-            contact.join(extent);
+        let patches = self.patches(&pressed.pressure);
+        for patch in &patches {
+            contact.join(self.extent(patch));
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
             if load >= SHARE_MIN * total {
+                let wanted = match patches.len() {
+                    1 => resolution.contact,
+                    _ => resolution.patch,
+                };
+                let chords = self.chords_of(patch);
                 for (k, step) in steps.iter_mut().enumerate() {
-                    *step = step.min(extent.length(k) * self.step[k] / resolution.patch);
+                    *step = step.min(chords[k] * self.step[k] / wanted);
                 }
             }
         }
@@ -289,10 +294,23 @@ impl PressureGrid {
         }
     }
 
-    /// Numbers of cells along both axes from the first to the last of some cells.
-    pub(crate) fn extent_of(&self, cells: &[usize]) -> [f64; 2] {
+    /// Lengths in cells of the chords along both axes through the middle of some cells.
+    ///
+    /// The chords of an ellipse oblique to the axes are those of the box around it times √(1 − ρ²), where ρ is the correlation of the coordinates of its points.
+    pub(crate) fn chords_of(&self, cells: &[usize]) -> [f64; 2] {
         let extent = self.extent(cells);
-        [0, 1].map(|k| extent.length(k))
+        let mut sums = [0.0; 5];
+        for cell in cells {
+            let [x, y] = [cell % self.cells[0], cell / self.cells[0]].map(|i| i as f64);
+            for (sum, part) in sums.iter_mut().zip([x, y, x * x, y * y, x * y]) {
+                *sum += part;
+            }
+        }
+        let [x, y, xx, yy, xy] = sums.map(|sum| sum / cells.len() as f64);
+        // A cell has a variance of its own, so that a single line of cells has a width.
+        let [along, across] = [xx - x * x, yy - y * y].map(|variance| variance + 1.0 / 12.0);
+        let oblique = (1.0 - (xy - x * y).powi(2) / (along * across)).sqrt();
+        [0, 1].map(|k| oblique * extent.length(k))
     }
 
     /// The box of some cells in mm.

@@ -21,7 +21,7 @@ const CELLS_ACROSS_MIN: f64 = 11.0;
 struct Coarse {
     /// Middle `[x, y]` of the patch in mm.
     middle: [f64; 2],
-    /// Number of cells across its narrower side.
+    /// Number of cells on the shorter chord through its middle.
     cells: f64,
     /// Its part of the load.
     share: f64,
@@ -116,7 +116,7 @@ fn coarse(patch_grids: &[PatchGrid]) -> Vec<Coarse> {
         for patch in grid.patches(&pressed.pressure) {
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
             let share = load * area / total;
-            let [along, across] = grid.extent_of(&patch);
+            let [along, across] = grid.chords_of(&patch);
             let cells = along.min(across);
             if share >= SHARE_MIN && cells < CELLS_ACROSS_MIN {
                 let middle = grid.window_of(&patch).map(|[low, high]| 0.5 * (low + high));

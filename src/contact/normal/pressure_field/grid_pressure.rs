@@ -67,18 +67,18 @@ pub struct Jump {
 const JUMP: f64 = 0.35;
 
 impl GridPressure {
-    /// Number of grid spacings across each patch, along the axis with fewer.
+    /// Number of grid spacings across each patch, along the axis with fewer. It is smaller for patches oblique to the axes, which fill less of their box than an ellipse
+    /// along them.
     pub fn cells_across(&self) -> Vec<f64> {
         let axes = [&self.grid.x, &self.grid.y];
         let spacing = axes.map(|axis| (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64);
-        let across = |extent: [f64; 4]| {
-            let along = [0, 1].map(|k| (extent[2 * k + 1] - extent[2 * k]) / spacing[k]);
-            along[0].min(along[1])
+        let across = |patch: &Patch| {
+            let extent = patch.extent;
+            let sides = [0, 1].map(|k| extent[2 * k + 1] - extent[2 * k]);
+            let filled = patch.area / (0.25 * PI * sides[0] * sides[1]);
+            (sides[0] / spacing[0]).min(sides[1] / spacing[1]) * filled.min(1.0)
         };
-        self.patches()
-            .iter()
-            .map(|patch| across(patch.extent))
-            .collect()
+        self.patches().iter().map(across).collect()
     }
 
     /// The largest excess fall between neighbouring samples (see [`JUMP`]), and the jump there if it is one. Must be called before edges are found, while squared pressures
