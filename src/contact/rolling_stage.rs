@@ -155,12 +155,15 @@ impl StagedMotion<'_> {
             point.take_resultants(found);
         }
         if self.case.run.wants(Output::Gradients) && point.gradients.is_none() {
+            let predictor = state.predictor.clone();
             match add_gradients(task, state, self.index, &mut point, self.watch) {
                 Err(SolveError::NotConverged { .. }) => {
                     point.remarks.push(Remark::GradientsNotConverged {});
                 }
                 other => other?,
             }
+            // The next motion starts as it does without gradients.
+            state.predictor = predictor;
         }
         add_coupling_error(&mut point, self.solved.coupling_error);
         if assembly.is_empty() {

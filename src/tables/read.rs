@@ -224,6 +224,22 @@ fn groups<R: ChunkReader + 'static>(
     Ok((0..reader.groups()).map(move |group| reader.read(group, |_| true).map_err(damaged)))
 }
 
+/// Smallest number above which not every whole number has a value of its own, 2⁵³.
+const WHOLE_MAX: f64 = 9_007_199_254_740_992.0;
+
+/// Refuses a copied number that may have been a longer whole number, such as the id of a measurement.
+///
+/// # Errors
+/// The reason.
+pub fn require_exact(number: f64) -> std::result::Result<(), String> {
+    match number.abs() < WHOLE_MAX || !number.is_finite() {
+        true => Ok(()),
+        false => Err(format!(
+            "{number:e} given; copied numbers must be less than 2^53, since larger whole numbers are rounded: give long ids as texts"
+        )),
+    }
+}
+
 fn values_of((_, column): (String, TableColumn)) -> Values {
     match column {
         TableColumn::Numbers(numbers) => Values::Numbers(numbers),

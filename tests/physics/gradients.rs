@@ -206,6 +206,27 @@ fn every_method_and_contact_gives_gradients_with_their_error() {
 }
 
 #[test]
+fn outputs_change_no_force_of_a_list() {
+    for method in ["auto", "boundary_element"] {
+        let creepage = json!({ "from": 0, "to": 0.006, "points": 4 });
+        let motion = json!({ "sweep": { "creepage_x": creepage, "spin_per_mm": 2e-4 } });
+        let mut case = good_with("/motion", motion);
+        case["solver"] = json!({ "method": method, "target_error": 0.02 });
+        let mut forces = |outputs: Value| {
+            case["outputs"] = outputs;
+            let (solution, _) = solve(&case);
+            let points = solution.total.into_iter();
+            let forces = points.map(|total| [total.force_x_n, total.force_y_n]);
+            forces.collect::<Vec<_>>()
+        };
+        let alone = forces(json!(["resultants"]));
+        for outputs in [json!(["gradients"]), json!(["slip", "tractions", "damage"])] {
+            assert_eq!(forces(outputs.clone()), alone, "{method} with {outputs}");
+        }
+    }
+}
+
+#[test]
 fn a_history_has_no_gradients() {
     let mut case = good_with("/outputs", json!(["gradients"]));
     case["motion"] = json!({ "history": { "distance_mm": [1.0], "creepage_x": [0.001] } });

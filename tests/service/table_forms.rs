@@ -127,6 +127,24 @@ async fn copied_columns_of_csv_come_back_as_they_were_written() {
         copied,
         "axle_no,order,km\n007,12345678901234567890,1.5\n8,2,2.0\n"
     );
+    // Numbers of NDJSON with more than 53 bits would be rounded.
+    let long = "{\"creepage_x\":0.001,\"order\":9007199254740993}";
+    let refused = send_rows(&server, &query, "application/x-ndjson", long).await;
+    assert!(
+        refused.text.contains("long ids as texts"),
+        "{}",
+        refused.text
+    );
+    let labelled = r#"{"creepage_x":0.001,"label:order":9007199254740993}"#;
+    let path = format!("/v1/batches?template={template}");
+    let refused = server
+        .post_as(&path, "application/x-ndjson", labelled)
+        .await;
+    assert!(
+        refused.text.contains("long ids as texts"),
+        "{}",
+        refused.text
+    );
     let twice = "{\"creepage_x\":0.001,\"creepage_x\":0.002}";
     let refused = send_rows(&server, &template, "application/x-ndjson", twice).await;
     assert_problem(&refused, 422, "faulty-table", "written twice");

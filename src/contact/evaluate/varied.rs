@@ -42,6 +42,17 @@ impl Values {
         self.len() == 0
     }
 
+    /// Memory of the values in bytes.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Values::Numbers(numbers) => size_of_val(&**numbers),
+            Values::Texts(texts) => {
+                let letters = texts.iter().flatten().map(String::len);
+                size_of_val(&**texts) + letters.sum::<usize>()
+            }
+        }
+    }
+
     /// Returns the values of some rows.
     #[must_use]
     pub fn pick(&self, rows: &[usize]) -> Values {

@@ -25,7 +25,7 @@ use railhead_contact::evaluate::varied::{Values, members};
 use railhead_jobs::Jobs;
 use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
-use railhead_tables::read::{TableForm, TableRows, TableSource};
+use railhead_tables::read::{TableForm, TableRows, TableSource, require_exact};
 use railhead_tables::table::{Chunk, Title};
 use railhead_tables::text::{CsvRows, Decimals, StringRecord, without_mark};
 use railhead_tables::titles::{Place, converted, is_text, place, question, short_names};
@@ -287,7 +287,11 @@ fn rows_of(columns: &[TemplateColumn], chunk: &Chunk) -> impl Iterator<Item = Ro
                     Some(text) => Value::from(text),
                 },
                 Values::Numbers(numbers) if numbers[row].is_nan() => continue,
-                Values::Numbers(numbers) if column.text => numbers[row].to_string().into(),
+                Values::Numbers(numbers) if column.text => {
+                    let exact = require_exact(numbers[row]);
+                    exact.map_err(|detail| format!("the column `{}`: {detail}", column.title))?;
+                    numbers[row].to_string().into()
+                }
                 Values::Numbers(numbers) if column.path.is_empty() => {
                     serde_json::from_str(&numbers[row].to_string()).unwrap_or_default()
                 }

@@ -212,6 +212,9 @@ pub(crate) async fn evaluate(
             Some(table) => {
                 let limits = (evaluation.rows_max, bytes_max);
                 let rows = read_rows(table.form, &text, limits, pace)?;
+                if packed && let Some(share) = &mut share {
+                    share.shrink_to(2 * (text.len() + rows.bytes()));
+                }
                 (table.template, rows, table.share)
             }
             None => {
@@ -254,7 +257,6 @@ fn read_rows(
 ) -> Result<ReceivedRows> {
     let source = TableSource::Memory(text.clone());
     let mut table = TableRows::new(form, source, bytes_max)?;
-    let columns = table.titles.len();
     let mut rows = varied_alone(table.named(&NamedColumns::default())?)?;
     for chunk in table {
         pace.step()?;
@@ -262,7 +264,7 @@ fn read_rows(
         if rows.held() > rows_max {
             return Err(too_many(rows.held(), rows_max));
         }
-        if form.packed() && rows.held() * columns * size_of::<f64>() > bytes_max {
+        if form.packed() && rows.bytes() > bytes_max {
             return Err(too_large(bytes_max).into());
         }
     }

@@ -21,6 +21,7 @@ use railhead_contact::evaluate::answer::NumberColumns;
 use railhead_contact::evaluate::many::{ManyTask, expected_seconds};
 use railhead_contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
 use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_tables::read::require_exact;
 use railhead_tables::table::COLUMNS_MAX;
 use railhead_tables::titles::TitledColumn;
 
@@ -308,6 +309,12 @@ impl ReceivedRows {
         self.values.first().map_or(0, Values::len)
     }
 
+    /// Memory of the values in bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.values.iter().map(Values::bytes).sum()
+    }
+
     /// The columns that vary the case, with at most this many of the rows that are held.
     #[must_use]
     pub fn varied(&self, most: usize) -> Vec<VariedColumn> {
@@ -365,6 +372,8 @@ impl ReceivedRows {
                 faults.extend(faults_of_texts(&column.name, texts, self.received));
             } else if let Some(place) = &column.pointer {
                 faults.extend(of_values(&column.name, place, values, self.received));
+            } else if let Values::Numbers(numbers) = values {
+                faults.extend(fault_of_copied(&pointer, numbers, self.received));
             }
         }
         faults
@@ -376,8 +385,9 @@ fn fields_asked_for(checked: &CheckedCase) -> Option<Fault> {
     let numbers = [Output::Resultants, Output::Zones, Output::Gradients];
     let mut asked = checked.run.outputs.iter();
     let other = asked.find(|asked| !numbers.contains(asked))?;
+    let other = other.name();
     let detail = format!(
-        "{other:?} requested; rows have numbers only: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
+        "`{other}` requested; rows have numbers only: allowed are `resultants`, `zones`, which gives the share that sticks, and `gradients`"
     );
     Some(Fault::new("/outputs", detail))
 }
@@ -445,6 +455,14 @@ fn faults_of_texts(name: &str, texts: &[Option<String>], first: u64) -> Vec<Faul
             Fault::new(format!("{}/{row}", column_pointer(name)), detail)
         })
         .collect()
+}
+
+/// The fault of the first number that cannot be copied exactly; `first` is the row of the first number.
+fn fault_of_copied(column: &str, numbers: &[f64], first: u64) -> Option<Fault> {
+    (first..).zip(numbers).find_map(|(row, number)| {
+        let detail = require_exact(*number).err()?;
+        Some(Fault::new(format!("{column}/{row}"), detail))
+    })
 }
 
 fn has_controls(text: &str) -> bool {

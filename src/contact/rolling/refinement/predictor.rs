@@ -10,13 +10,13 @@ const STEP_MAX: f64 = 1.5;
 const NEAR: f64 = 0.25;
 
 /// Tractions of the last two motions on every mesh.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Predictor {
     /// The newest step of a mesh is last.
     steps: Vec<Step>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Step {
     /// Number of the mesh.
     mesh: usize,
