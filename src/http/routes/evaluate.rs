@@ -187,14 +187,15 @@ pub(crate) async fn evaluate(
     let EvaluateQuery { template, format } = EvaluateQuery::read(request.uri())?;
     let format = choose(request.headers(), format, FORMATS)?;
     let state = (&jobs, &memory, &options);
+    let declared = declared_bytes(&request, &options).min(options.evaluate_max_bytes);
     let (request, table) = separate_table(state, template, JSON, request).await?;
     let packed = table.as_ref().is_some_and(|table| table.form.packed());
-    // First the text and its numbers, then the numbers and the response, each about twice the text.
+    // First the text and its numbers, then the numbers and the response, each about twice the text. The size of a packed table is not known yet.
     let bytes = match packed {
         true => options.evaluate_max_bytes,
-        false => declared_bytes(&request, &options).min(options.evaluate_max_bytes),
+        false => 2 * declared,
     };
-    let mut share = memory.rows(jobs.tenant(), 2 * bytes).await?;
+    let mut share = memory.rows(jobs.tenant(), bytes).await?;
     let text = read_body(request, &options).await?;
     if !packed && let Some(share) = &mut share {
         share.shrink_to(2 * text.len());
