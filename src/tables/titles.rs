@@ -251,12 +251,12 @@ pub fn place(title: &str, below: Option<&str>) -> Result<Option<Place>, String> 
         let pointer = pointer.to_owned();
         Ok(Some(Place { pointer, factor }))
     };
-    let direct = match title.starts_with('/') {
-        true => Some(title),
+    let direct = match bare.starts_with('/') {
+        true => Some(bare),
         false => named_members().find_map(|(name, pointer)| (name == title).then_some(pointer)),
     };
     if let Some(pointer) = direct {
-        return found(pointer, factor_at(pointer, below)?);
+        return found(pointer, factor_at(pointer, unit)?);
     }
     let stem = normal(bare);
     for quantity in &QUANTITIES {
@@ -386,10 +386,9 @@ fn factor_at(pointer: &str, unit: Option<&str>) -> Result<f64, String> {
     let Some(unit) = unit else {
         return Ok(1.0);
     };
-    let known = MEMBER_UNITS.iter().find(|(end, _)| pointer.ends_with(end));
-    match known {
-        Some((_, units)) if units.factor(unit) == Some(1.0) => Ok(1.0),
-        Some((_, units)) => Err(format!(
+    match units_at(pointer) {
+        Some(units) if units.factor(unit) == Some(1.0) => Ok(1.0),
+        Some(units) => Err(format!(
             "is in {} by its name, and the column has the unit `{unit}`; they must agree",
             units.list[0].0
         )),
@@ -397,6 +396,12 @@ fn factor_at(pointer: &str, unit: Option<&str>) -> Result<f64, String> {
             .factor(unit)
             .ok_or_else(|| format!("does not allow the unit `{unit}` of the column by its name")),
     }
+}
+
+/// Returns the units of a member, by the suffix of its name.
+fn units_at(pointer: &str) -> Option<&'static Units> {
+    let known = MEMBER_UNITS.iter().find(|(end, _)| pointer.ends_with(end));
+    known.map(|(_, units)| *units)
 }
 
 /// Returns the short names as a list for messages.
@@ -589,7 +594,14 @@ fn place_of(
         // A row has no name, unlike a job.
         None if title == "name" => Ok(None),
         Some(what) => {
-            let place = place(what, unit_of(title, below));
+            let unit = unit_of(title, below);
+            // The client names both the unit of the column and the member, so that the values are converted.
+            let factor = unit.and_then(|unit| units_at(what)?.factor(unit));
+            if let Some(factor) = factor.filter(|_| what.starts_with('/')) {
+                let pointer = what.to_owned();
+                return Ok(Some(Place { pointer, factor }));
+            }
+            let place = place(what, unit);
             match place.map_err(|detail| format!("`{what}` {detail}"))? {
                 Some(place) => Ok(Some(place)),
                 None => {
@@ -709,9 +721,14 @@ pub fn is_line_of_units<'a>(fields: impl Iterator<Item = &'a str>) -> bool {
     all && some
 }
 
-/// Splits a title into its name and the unit in brackets at its end.
+/// Splits a title into its name and the unit at its end: in brackets, or after ` / ` or ` in `.
 fn parted(title: &str) -> (&str, Option<&str>) {
-    match bracketed(title) {
+    let behind = |word: &str| {
+        let parts = title.trim().rsplit_once(word);
+        parts.filter(|(_, unit)| !unit.is_empty() && is_unit(unit))
+    };
+    let parts = bracketed(title).or_else(|| behind(" / "));
+    match parts.or_else(|| behind(" in ")) {
         Some((stem, unit)) => (stem.trim(), Some(unit)),
         None => (title.trim(), None),
     }
@@ -789,6 +806,8 @@ mod tests {
             ("wheel_load (kN)", None, "/load/vertical_force_n", 1e3),
             ("normal_force_kn", None, "/load/normal_force_n", 1e3),
             ("FN [kN]", None, "/load/normal_force_n", 1e3),
+            ("FN / kN", None, "/load/normal_force_n", 1e3),
+            ("Normal force in N", None, "/load/normal_force_n", 1.0),
             ("N", Some("[N]"), "/load/normal_force_n", 1.0),
             ("Longitudinal creepage", None, "/motion/creepage_x", 1.0),
             ("creepage_x", Some("%"), "/motion/creepage_x", 1e-2),
@@ -917,6 +936,7 @@ mod tests {
             ("lateral_shift", Some("s"), "`s`"),
             ("normal_force_n", Some("kN"), "agree"),
             ("/load/normal_force_n", Some("kN"), "agree"),
+            ("/motion/wheelset/speed_mm_per_s [m/s]", None, "agree"),
             ("normal_force_kn [N]", None, "agree"),
             ("spin [1/m]", Some("1/mm"), "two units, `1/m` and `1/mm`"),
             ("rolling_radius_m [mm]", None, "agree"),
@@ -963,6 +983,14 @@ mod tests {
         assert!(of(&["a:load"]).contains("not a place in a case"));
         assert!(of(&["a:creepage_x", "a:creepage_y"]).contains("twice"));
         assert!(of(&["b:creepage_x"]).contains("not a title"));
+        let columns = NamedColumns(Some(vec![(
+            "v".to_owned(),
+            "/motion/wheelset/speed_mm_per_s".to_owned(),
+        )]));
+        let columns = columns
+            .columns(&[column("v [m/s]", None)])
+            .expect("a speed");
+        assert_eq!(columns[0].factor, 1e3);
         let refused = of(&["a:spin"]);
         assert!(
             refused.contains("`spin` has no unit") && refused.contains("column `a`"),
