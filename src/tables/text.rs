@@ -101,20 +101,25 @@ impl<R: BufRead> CsvRows<R> {
         }
         let names = rows.fetch()?.map(|(_, names)| names).unwrap_or_default();
         require_few(names.len())?;
-        let names: Vec<&str> = names
+        let mut names: Vec<&str> = names
             .iter()
             .map(|name| name.trim_start_matches('\u{feff}'))
             .collect();
+        // Spreadsheets write separators after the last column.
+        while names.pop_if(|name| name.is_empty()).is_some() {}
         let second = rows.fetch()?;
         // Columns of texts have no units.
         let has_unit = |(name, unit): (&&str, &str)| !is_text(name) && !unit.is_empty();
         let units = second.as_ref().map(|(_, units)| units).filter(|units| {
-            units.len() == names.len()
+            require_fields(units, names.len()).is_ok()
                 && names.iter().zip(*units).any(has_unit)
                 && is_line_of_units(units.iter())
         });
         let units: Vec<Option<String>> = match units {
-            Some(units) => units.iter().map(|unit| Some(unit.to_owned())).collect(),
+            Some(units) => {
+                let units = units.iter().take(names.len());
+                units.map(|unit| Some(unit.to_owned())).collect()
+            }
             None => {
                 rows.ahead.extend(second.clone());
                 vec![None; names.len()]
@@ -166,13 +171,8 @@ impl<R: BufRead> CsvRows<R> {
             let Some((line, record)) = self.record()? else {
                 break;
             };
-            if record.len() != self.titles.len() {
-                return Err(faulty(format!(
-                    "line {line} has {} fields, the header has {}",
-                    record.len(),
-                    self.titles.len()
-                )));
-            }
+            require_fields(&record, self.titles.len())
+                .map_err(|detail| faulty(format!("line {line}: {detail}")))?;
             for ((field, column), values) in record.iter().zip(&self.titles).zip(&mut values) {
                 let wrong =
                     |detail| faulty(format!("line {line}, column `{}`: {detail}", column.name));
@@ -227,6 +227,21 @@ impl<R: BufRead> CsvRows<R> {
 }
 
 /// The refusal of a CSV table that cannot be read.
+/// Refuses a line whose number of fields is not that of the titles. Empty fields after the last title are ignored.
+///
+/// # Errors
+/// The reason.
+pub fn require_fields(line: &StringRecord, titles: usize) -> std::result::Result<(), String> {
+    let is_longer = line.iter().skip(titles).any(|field| !field.is_empty());
+    match is_longer || line.len() < titles {
+        false => Ok(()),
+        true => Err(format!(
+            "the number of fields is {}, that of the titles {titles}",
+            line.len()
+        )),
+    }
+}
+
 fn unread(error: &csv::Error) -> TableError {
     faulty(match error.kind() {
         csv::ErrorKind::Utf8 { pos, .. } => {
@@ -514,7 +529,10 @@ mod tests {
             .unwrap()
             .next();
         let refused = tabs.unwrap().unwrap_err().to_string();
-        assert!(refused.contains("line 4 has 1 fields"), "{refused}");
+        assert!(
+            refused.contains("line 4: the number of fields is 1"),
+            "{refused}"
+        );
     }
 
     #[test]
@@ -568,8 +586,7 @@ mod tests {
     fn tables_of_simulations_are_read_with_their_units_and_decimal_commas() {
         let comma =
             "time,Normal force,longitudinal creepage,spin\n[s],[kN],[-],[1/m]\n0.1,80,0.001,0.4\n";
-        let semicolon =
-            "time;Normal force [kN];longitudinal creepage;spin (1/m)\r\n0,1;80;0,001;4,0e-1\r\n";
+        let semicolon = "time;Normal force [kN];longitudinal creepage;spin (1/m);;\r\n0,1;80;0,001;4,0e-1;;\r\n";
         let tab = "time\tnormal_force\tcreepage_x\tspin\ns\tkN\t-\t1/m\n0.1\t80\t0.001\t0.4\n";
         for text in [comma, semicolon, tab] {
             let mut rows = rows(TableForm::Csv, text).unwrap();
@@ -646,7 +663,7 @@ mod tests {
                 csv("creepage_x\r\n0.1\r\n\r\nx\r\n"),
                 ["line 4", "creepage_x"],
             ),
-            (csv("creepage_x,s\n0.1\n"), ["line 2", "1 fields"]),
+            (csv("creepage_x,s\n0.1\n"), ["line 2", "fields is 1"]),
             (
                 csv("creepage_x,s\n\n0,\"a\nb\"\n\nx,"),
                 ["line 6", "creepage_x"],

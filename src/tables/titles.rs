@@ -540,6 +540,11 @@ impl NamedColumns {
             if let Some((name, _)) = found {
                 missing.remove(name);
             }
+            if name.is_empty() {
+                let detail = format!("number {} has no title", number + 1);
+                faults.insert(number, (name, detail));
+                continue;
+            }
             match place_of(name, below, found.map(|(_, name)| *name), self.0.is_some()) {
                 Ok(place) => columns.push(TitledColumn {
                     name: name.to_owned(),
@@ -980,6 +985,9 @@ mod tests {
             let columns = named.columns(&[column("a", None)]);
             format!("{:?}", columns.expect_err("a refusal"))
         };
+        let nameless = NamedColumns::default().columns(&[column("", None)]);
+        let nameless = format!("{:?}", nameless.expect_err("a refusal"));
+        assert!(nameless.contains("number 1 has no title"), "{nameless}");
         assert!(of(&["a:load"]).contains("not a place in a case"));
         assert!(of(&["a:creepage_x", "a:creepage_y"]).contains("twice"));
         assert!(of(&["b:creepage_x"]).contains("not a title"));

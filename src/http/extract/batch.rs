@@ -27,7 +27,7 @@ use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
 use railhead_tables::read::{TableForm, TableRows, TableSource, require_exact};
 use railhead_tables::table::{Chunk, Title};
-use railhead_tables::text::{CsvRows, Decimals, StringRecord, without_mark};
+use railhead_tables::text::{CsvRows, Decimals, StringRecord, require_fields, without_mark};
 use railhead_tables::titles::{Place, converted, is_text, place, question, short_names};
 
 /// Adds a case, with the number of its line in a body of lines.
@@ -355,13 +355,7 @@ fn column(title: &str, unit: Option<&str>) -> Result<TemplateColumn, String> {
 /// # Errors
 /// The record has another number of fields or a number with another decimal mark, or the value of an option is not allowed.
 pub fn row_of(columns: &[TemplateColumn], decimals: &mut Decimals, record: &StringRecord) -> Row {
-    if record.len() != columns.len() {
-        return Err(format!(
-            "the line has {} fields, the header has {}",
-            record.len(),
-            columns.len()
-        ));
-    }
+    require_fields(record, columns.len())?;
     let mut row = BatchRow::default();
     for (column, field) in columns.iter().zip(record) {
         if field.is_empty() {
@@ -639,7 +633,7 @@ mod tests {
     #[test]
     fn lines_that_do_not_fit_say_so() {
         for (header, line, word) in [
-            ("name,a_mm", "x", "1 fields, the header has 2"),
+            ("name,a_mm", "x", "fields is 1, that of the titles 2"),
             ("priority", "soon", "allowed: high, normal, low"),
         ] {
             let fault = taken(&[header, line])
