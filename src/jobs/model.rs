@@ -480,8 +480,10 @@ pub struct RunRecord {
     pub template: Bytes,
     /// The part of the head that is specific to the run; `None` in the first format, whose template contains everything.
     pub head: Option<Bytes>,
-    /// Number of rows without an answer in ended chunks.
+    /// Number of rows without an answer in succeeded chunks.
     pub without_answer: u64,
+    /// Whether the last chunk, which may be smaller, failed or was cancelled.
+    pub last_lost: bool,
     /// Sum of the progress of running chunks.
     pub running: f64,
 }

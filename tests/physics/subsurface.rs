@@ -6,6 +6,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good, with};
+use crate::profile_cases::generated;
 use crate::reference::{Ellipse, assert_none, read, solve};
 
 /// Returns the stresses of a case at points, and at the worst point.
@@ -27,6 +28,20 @@ fn asking(contact: &Ellipse, subsurface: Value) -> Value {
 fn components(point: &StressPoint) -> [f64; 6] {
     let s = point.stress_mpa;
     [s.xx, s.yy, s.zz, s.xy, s.xz, s.yz]
+}
+
+#[test]
+fn points_under_a_wheel_are_the_same_with_and_without_other_fields() {
+    let subsurface = json!({ "points_mm": [[0.0, 0.0, 1.0], [1.0, 0.5, 3.0]] });
+    let mut case = with(&generated(), "/subsurface", Some(subsurface));
+    let mut under = |outputs: Value| {
+        case["outputs"] = outputs;
+        stresses(&case).0
+    };
+    let alone = under(json!(["resultants", "subsurface"]));
+    assert_eq!(alone.len(), 2);
+    assert!(alone.iter().all(|point| point.von_mises_mpa > 0.0));
+    assert_eq!(alone, under(json!(["pressure", "subsurface"])));
 }
 
 /// Below the centre of a circle without friction: σ_zz = −p0/(1 + ζ²), σ_xx = σ_yy = −p0[(1 + ν)(1 − ζ atan 1/ζ) − ½/(1 + ζ²)] (Johnson 1985, eqs.

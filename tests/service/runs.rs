@@ -6,7 +6,7 @@ use railhead::tables::table::{RowTable, TableColumn};
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
-use crate::server::{Answer, Server, Setup};
+use crate::server::{Answer, Server, Setup, example};
 use crate::support::files_below;
 
 pub fn template(method: &str) -> Value {
@@ -48,6 +48,32 @@ pub async fn answers(server: &Server, run: &str) -> Vec<Value> {
     ended(server, run).await;
     let results = format!("{run}/results?format=ndjson");
     server.get(&results).await.is(200).lines()
+}
+
+#[tokio::test]
+async fn a_solved_row_has_the_remarks_of_its_case() {
+    let server = Server::start().await;
+    let mut template = example("wheel-rail.case.json");
+    template["outputs"] = json!(["resultants"]);
+    let columns = json!({ "lateral_shift_mm": [0, -60] });
+    let run = submit(
+        &server,
+        &json!({ "template": template, "columns": columns }),
+    )
+    .await;
+    let rows = answers(&server, &run).await;
+    for (shift, row) in [0, -60].into_iter().zip(&rows) {
+        template["contact"]["lateral_shift_mm"] = json!(shift);
+        let job = server.solve(&template).await;
+        let remarks = job["result"]["remarks"].as_array().expect("remarks");
+        let codes = row["remarks"].as_str().unwrap_or_default();
+        let is_named = |remark: &Value| codes.split(' ').any(|code| remark["code"] == code);
+        // Rows have no uncertainty of their profiles, and no remark on it.
+        let mut warnings = remarks.iter().filter(|one| one["severity"] == "warning");
+        assert!(warnings.all(is_named), "{codes}: {remarks:#?}");
+    }
+    let of_tip = rows[1]["remarks"].as_str().expect("codes");
+    assert!(of_tip.contains("contact-on-flange-tip"), "{of_tip}");
 }
 
 /// Asserts that an answer refuses a case with an error that contains `word`.
@@ -301,14 +327,22 @@ async fn a_run_is_listed_by_name_and_label_and_a_cancelled_one_keeps_what_it_has
         let cancelled = server.cancel(&run).await;
         assert_eq!(cancelled.json["state"], "succeeded");
     }
-    let idle = Server::idle().await;
     let mut columns = columns(130);
     columns["/solver/target_error"] = json!(vec![0.001; 130]);
-    let run = submit(
-        &idle,
-        &json!({ "template": template("boundary_element"), "columns": columns }),
-    )
-    .await;
+    let body = json!({ "template": template("boundary_element"), "columns": columns });
+    let server = Server::start().await;
+    let run = submit(&server, &body).await;
+    while server.read(&run).await["progress"].as_f64() < Some(0.4) {
+        tokio::time::sleep(std::time::Duration::from_millis(10)).await;
+    }
+    // The last chunk has fewer rows than the others.
+    server.cancel(&run).await;
+    let about = ended(&server, &run).await;
+    let rows = server.get(&format!("{run}/results")).await.lines();
+    let lost = rows.iter().filter(|row| row["force_x_n"].is_null()).count();
+    assert_eq!(about["rows_without_answer"], lost, "{about}");
+    let idle = Server::idle().await;
+    let run = submit(&idle, &body).await;
     let early = idle.get(&format!("{run}/results")).await;
     assert_problem(&early, 409, "result-not-ready", "queued");
     let cancelled = idle.cancel(&run).await.is(200);

@@ -6,6 +6,7 @@ use crate::case::words::solver::{MethodName, Output};
 use crate::error::{CaseError, SolveError};
 use crate::problem::checked_case::CheckedCase;
 use crate::problem::physics::Problem;
+use crate::remark::entry::RemarkEntry;
 use crate::solution::words::answer::{PatchSolution, PointSolution, Solution};
 
 /// The status of a row. Only rows with the first two have resultants.
@@ -342,8 +343,22 @@ const NOT_SOLVED: &str = "the row was not solved; submit its case as a job";
 pub(crate) struct SolvedRow {
     pub(crate) status: RowStatus,
     pub(crate) method: Option<MethodName>,
+    /// Codes of its remarks, separated by blanks.
+    pub(crate) remarks: String,
     /// The numbers in the order of [`NumberColumns::names`].
     pub(crate) numbers: Vec<f64>,
+}
+
+impl SolvedRow {
+    /// Returns a row without an answer.
+    fn without(status: RowStatus) -> SolvedRow {
+        SolvedRow {
+            status,
+            method: None,
+            remarks: String::new(),
+            numbers: Vec::new(),
+        }
+    }
 }
 
 /// The answers to rows in their order.
@@ -355,6 +370,8 @@ pub struct ManyAnswer {
     pub method: Vec<Option<MethodName>>,
     /// The reason why a row has no answer; empty for a row with one.
     pub reason: Vec<String>,
+    /// Codes of the remarks of each row that the solver answered, each code once, separated by blanks. Empty for rows by the table or FASTSIM.
+    pub remarks: Vec<String>,
     /// The columns.
     pub columns: NumberColumns,
     /// The numbers of each column, one for each row; NaN for a row without it.
@@ -368,6 +385,7 @@ impl ManyAnswer {
             status: vec![RowStatus::SolverFailed; rows],
             method: vec![None; rows],
             reason: vec![NOT_SOLVED.to_owned(); rows],
+            remarks: vec![String::new(); rows],
             numbers: vec![vec![f64::NAN; rows]; columns.names().len()],
             columns,
         }
@@ -390,17 +408,18 @@ impl ManyAnswer {
                 })
             }
         });
-        let numbers;
-        (
-            self.status[row],
-            self.method[row],
-            self.reason[row],
-            numbers,
-        ) = match outcome {
-            Ok(solved) => (solved.status, solved.method, String::new(), solved.numbers),
-            Err(failure) => (failure.status, None, failure.reason, Vec::new()),
+        let (solved, reason) = match outcome {
+            Ok(solved) => (solved, String::new()),
+            Err(RowFailure { status, reason }) => (SolvedRow::without(status), reason),
         };
-        let numbers = numbers.into_iter().chain(std::iter::repeat(f64::NAN));
+        self.status[row] = solved.status;
+        self.method[row] = solved.method;
+        self.reason[row] = reason;
+        self.remarks[row] = solved.remarks;
+        let numbers = solved
+            .numbers
+            .into_iter()
+            .chain(std::iter::repeat(f64::NAN));
         for (column, number) in self.numbers.iter_mut().zip(numbers) {
             column[row] = number;
         }
@@ -419,6 +438,7 @@ impl ManyAnswer {
                 false => RowStatus::TargetMissed,
             },
             method,
+            remarks: RemarkEntry::codes(&solution.remarks),
             numbers,
         };
         self.set(row, Ok(solved));
@@ -509,6 +529,7 @@ mod many_tests {
         SolvedRow {
             status: RowStatus::Ok,
             method: Some(MethodName::BoundaryElement),
+            remarks: String::new(),
             numbers: vec![1.0; NUMBER_NAMES.len()],
         }
     }

@@ -220,6 +220,7 @@ fn take(
             MethodName::Auto => MethodName::Table,
             asked => asked,
         }),
+        remarks: String::new(),
         numbers: numbers.into_iter().chain(slopes).collect(),
     };
     answer.set(row, Ok(solved));

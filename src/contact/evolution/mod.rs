@@ -126,6 +126,39 @@ mod tests {
         assert_eq!(state.bodies[1].worn.points_mm, state.bodies[1].start_mm);
     }
 
+    #[test]
+    fn the_conicity_of_a_record_is_that_of_a_wheelset_with_its_sections() {
+        let mut request = request(&[-2.0], &[1.0], 1);
+        request["accuracy"] = json!({ "step_tolerance": 1.0, "step_depth_mm": 1.0 });
+        let task = checked(&request);
+        let (_, records) = run(&task);
+        let record = records.last().expect("a record");
+        let section = |points: &[[f64; 2]]| json!({ "points_mm": points, "mirror_y": false, "mirror_z": false });
+        let text = include_str!("../../../api/examples/wheelset.case.json");
+        let mut case: Value = serde_json::from_str(text).expect("an example is JSON");
+        let contact = &mut case["contact"];
+        contact["rail"] = section(&record.rail.points_mm);
+        contact["wheel"] = section(&record.wheel.points_mm);
+        contact["rail_origin_mm"] = json!(task.geometry.rail_origin());
+        contact["flange_back_position_mm"] = json!(task.geometry.placement.flange_back_position);
+        contact["lateral_shift_mm"] = json!(0);
+        contact["accept_rough_profiles"] = json!(true);
+        // The kinematics do not depend on friction.
+        case["friction"] = json!({ "coefficient": 0.0 });
+        case["motion"] =
+            json!({ "wheelset": { "speed_mm_per_s": 2e4, "free_rolling_radius_mm": 460 } });
+        let case = crate::check(&case, &Limits::default()).expect("no faults");
+        let (solution, _) = crate::solve(&case, &Unmonitored).expect("a solution");
+        let kinematics = solution
+            .wheelset
+            .expect("a wheelset")
+            .kinematics
+            .expect("kinematics");
+        let found = kinematics.conicity[2].conicity.expect("a conicity");
+        let of_record = record.conicity.expect("a conicity");
+        assert!((of_record - found).abs() < 2e-4, "{of_record} {found}");
+    }
+
     /// Halving the step at least halves the distance to the finest run.
     #[test]
     fn steps_converge() {

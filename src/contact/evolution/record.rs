@@ -4,12 +4,14 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use crate::case::words::evolution::WearLosses;
 use crate::case::words::subsurface::DamageModel;
+use crate::error::SolveError;
 use crate::evolution::section::{distance, lengths};
 use crate::evolution::task::Evolution;
-use crate::geometry::conicity::RadiusDifference;
 use crate::geometry::profile::{Body, Profile, Reading};
 use crate::geometry::wheel_rail::{Placement, RailPlace, Side, WheelRail};
 use crate::geometry::wheelset_pose::PairOfRails;
+use crate::monitor::Monitor;
+use crate::normal::wheel::KinematicsTask;
 use crate::numerics::quadrature::halton;
 use crate::numerics::roots::bounds;
 use crate::remark::entry::RemarkEntry;
@@ -18,6 +20,7 @@ use crate::solution::words::evolution::{
     BodyState, ContactRange, EvolutionAnswer, EvolutionRecord, EvolutionState, LimitReached,
     StateContact, WearUncertainty, WornBody,
 };
+use crate::wheelset::kinematics::level_radii;
 
 /// Depth below the top of the rail in mm at which the loss of the gauge face (W2) is measured.
 const GAUGE_DEPTH: f64 = 14.0;
@@ -26,27 +29,31 @@ const FLANGE_DEPTH: f64 = 10.0;
 /// Amplitude in mm for which EN 15302 defines the conicity.
 const AMPLITUDE: f64 = 3.0;
 /// Reach and step in mm of the shifts at which the radius difference is sampled.
-const SHIFTS: [f64; 2] = [8.0, 0.25];
+const SHIFTS: [f64; 2] = [8.0, 0.1];
 /// Number of samples of the wear coefficients.
 const SAMPLES: u32 = 2000;
 
 /// The record of a state.
+///
+/// # Errors
+/// The monitor stopped the work.
 pub(crate) fn record(
     task: &Evolution,
     state: &EvolutionState,
     states: Vec<StateContact>,
-) -> EvolutionRecord {
+    monitor: &dyn Monitor,
+) -> Result<EvolutionRecord, SolveError> {
     let [rail, wheel] = [0, 1].map(|k| with_uncertainty(task, state, k));
-    EvolutionRecord {
+    Ok(EvolutionRecord {
         progress: task.progress(state.share),
         events_done: state.events_done,
         losses: losses(&state.bodies),
-        conicity: conicity(task, &state.bodies),
+        conicity: conicity(task, &state.bodies, monitor)?,
         contact: range(&states),
         states,
         rail,
         wheel,
-    }
+    })
 }
 
 fn with_uncertainty(task: &Evolution, state: &EvolutionState, k: usize) -> WornBody {
@@ -110,7 +117,29 @@ fn losses(bodies: &[BodyState; 2]) -> WearLosses {
     }
 }
 
-fn conicity(task: &Evolution, bodies: &[BodyState; 2]) -> Option<f64> {
+/// The conicity at [`AMPLITUDE`] of a track with these sections on both sides; `None` if it has none.
+fn conicity(
+    task: &Evolution,
+    bodies: &[BodyState; 2],
+    monitor: &dyn Monitor,
+) -> Result<Option<f64>, SolveError> {
+    let Some(mut rails) = pair_of_rails(task, bodies) else {
+        return Ok(None);
+    };
+    let [reach, step] = SHIFTS;
+    let asked = KinematicsTask {
+        reach,
+        step,
+        amplitudes: Vec::new(),
+    };
+    match level_radii(&mut rails, &asked, monitor) {
+        Ok(radii) => Ok(radii.conicity(AMPLITUDE).ok().map(|found| found.conicity)),
+        Err(SolveError::NormalProblem { .. }) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+fn pair_of_rails(task: &Evolution, bodies: &[BodyState; 2]) -> Option<PairOfRails> {
     let profile = |body: Body, own: &BodyState| {
         let reading = Reading {
             mirror_y: Some(false),
@@ -129,21 +158,7 @@ fn conicity(task: &Evolution, bodies: &[BodyState; 2]) -> Option<f64> {
         };
         WheelRail::new(rail.clone(), wheel.clone(), placement).ok()
     };
-    let mut pair = PairOfRails::new([on(Side::Left)?, on(Side::Right)?]);
-    let [reach, step] = SHIFTS;
-    let count = (reach / step) as i32;
-    let shifts = (-count..=count).map(|k| step * f64::from(k));
-    let poses = shifts.filter_map(|shift| {
-        let pose = pair.pose_without_roll(shift, 0.0).ok()?;
-        pair.not_cut_off(&pose).ok()?;
-        Some((shift, pose.radius_difference()))
-    });
-    let (shifts, differences): (Vec<f64>, Vec<f64>) = poses.unzip();
-    if shifts.len() < 2 {
-        return None;
-    }
-    let found = RadiusDifference::new(shifts, differences).conicity(AMPLITUDE);
-    found.ok().map(|found| found.conicity)
+    Some(PairOfRails::new([on(Side::Left)?, on(Side::Right)?]))
 }
 
 fn range(states: &[StateContact]) -> ContactRange {

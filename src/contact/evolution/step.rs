@@ -98,7 +98,8 @@ impl Evolution {
         let (now, states) = solver.evaluate(before, &before.bodies)?;
         state.solves += states.len() as u32;
         state.wheel_y = touched(&states, &before.wheel_y);
-        let found = (!before.recorded).then(|| record(self, before, states));
+        let found = (!before.recorded).then(|| record(self, before, states, monitor));
+        let found = found.transpose()?;
         state.recorded = true;
         if self.due(&state).is_some() {
             while let Some(event) = self.due(&state) {

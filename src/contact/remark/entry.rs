@@ -113,6 +113,17 @@ impl Remark {
 }
 
 impl RemarkEntry {
+    /// Returns the codes of remarks, each once, separated by blanks.
+    pub fn codes<'a>(remarks: impl IntoIterator<Item = &'a RemarkEntry>) -> String {
+        let mut codes: Vec<&str> = Vec::new();
+        for remark in remarks {
+            if !codes.contains(&&*remark.code) {
+                codes.push(&remark.code);
+            }
+        }
+        codes.join(" ")
+    }
+
     /// Whether it applies to this motion.
     pub fn holds_at(&self, point: usize) -> bool {
         let among = |range: &[usize; 2]| (range[0]..=range[1]).contains(&point);

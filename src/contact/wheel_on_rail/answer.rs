@@ -7,11 +7,11 @@ use crate::normal::on_curve::CurveContact;
 use crate::normal::wheel::WheelContact;
 use crate::numerics::roots::bounds;
 use crate::post::damage::{DamagedPatch, damage};
-use crate::problem::physics::Run;
+use crate::problem::checked_case::CheckedCase;
 use crate::remark::entry::{RemarkEntry, merged};
 use crate::remark::list::Remark;
 use crate::rolling::task::Resolution;
-use crate::solution::assemble::normalised;
+use crate::solution::assemble::{normalised, wants_fields};
 use crate::solution::finish::move_origin;
 use crate::solution::words::answer::{
     ErrorEstimate, Fields, Origin, PatchFields, Position, Solution, Total,
@@ -144,7 +144,7 @@ impl WheelSolve<'_> {
         let Some((mut solution, mut fields)) = whole else {
             unreachable!("a wheel at rest touches its rail")
         };
-        drop_unasked(&self.case.run, &mut fields);
+        drop_unasked(self.case, &mut fields);
         if let Some(normal) = &mut solution.normal {
             normal.seconds = seconds;
         }
@@ -255,9 +255,9 @@ impl WheelSolve<'_> {
 }
 
 /// Removes values per cell that were not requested.
-fn drop_unasked(run: &Run, fields: &mut Fields) {
-    let kept = |output| run.wants(output);
-    if !run.outputs.iter().any(|output| output.is_per_cell()) {
+fn drop_unasked(case: &CheckedCase, fields: &mut Fields) {
+    let kept = |output| case.run.wants(output);
+    if !wants_fields(case) {
         fields.patches.clear();
         return;
     }

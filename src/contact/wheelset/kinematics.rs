@@ -39,10 +39,7 @@ pub(crate) fn of(
     asked: &KinematicsTask,
     monitor: &dyn Monitor,
 ) -> Result<Kinematics, SolveError> {
-    let (level, end) = over_shifts(asked, monitor, |shift, _| {
-        let pose = rails.pose_without_roll(shift, 0.0)?;
-        rails.not_cut_off(&pose).map(|()| pose)
-    })?;
+    let (level, end) = level_poses(rails, asked, monitor)?;
     let (rolled, rolled_end) = over_shifts(asked, monitor, |shift, roll| {
         let pose = rails.pose(shift, 0.0, roll)?;
         rails.not_cut_off(&pose).map(|()| pose)
@@ -103,6 +100,33 @@ pub(crate) fn of(
     })
 }
 
+/// The radius difference with a level axle, with more shifts where it bends or jumps.
+///
+/// # Errors
+/// See [`of`].
+pub(crate) fn level_radii(
+    rails: &mut PairOfRails,
+    asked: &KinematicsTask,
+    monitor: &dyn Monitor,
+) -> Result<RadiusDifference, SolveError> {
+    let (level, _) = level_poses(rails, asked, monitor)?;
+    Ok(sampled(&level, |shift| rails.pose_without_roll(shift, 0.0)).fine)
+}
+
+fn level_poses(
+    rails: &mut PairOfRails,
+    asked: &KinematicsTask,
+    monitor: &dyn Monitor,
+) -> Result<PosesOverShifts, SolveError> {
+    over_shifts(asked, monitor, |shift, _| {
+        let pose = rails.pose_without_roll(shift, 0.0)?;
+        rails.not_cut_off(&pose).map(|()| pose)
+    })
+}
+
+/// Poses at increasing shifts, and the reason if they end before the requested reach.
+type PosesOverShifts = (Vec<RigidPose>, Option<String>);
+
 /// The pose with the same shift as another one.
 fn at_shift<'p>(poses: &'p [RigidPose], other: &RigidPose) -> Option<&'p RigidPose> {
     poses
@@ -121,7 +145,7 @@ fn over_shifts(
     asked: &KinematicsTask,
     monitor: &dyn Monitor,
     mut pose: impl FnMut(f64, f64) -> Result<RigidPose, String>,
-) -> Result<(Vec<RigidPose>, Option<String>), SolveError> {
+) -> Result<PosesOverShifts, SolveError> {
     let centred = pose(0.0, 0.0).map_err(|reason| SolveError::NormalProblem { reason })?;
     let steps = (asked.reach / asked.step).round() as i32;
     let (mut poses, mut end) = (vec![centred], None);

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::answer::{
     ErrorEstimate, PatchPoint, PointSolution, Solution,
 };
@@ -264,15 +265,10 @@ impl TableLine<'_> {
 
     /// Returns the codes of the remarks about the row, each once.
     fn codes(&self) -> String {
-        let mut codes: Vec<&str> = Vec::new();
-        for remark in self.solution.into_iter().flat_map(|found| &found.remarks) {
-            let here = remark
-                .patch
-                .is_none_or(|patch| self.parts().any(|part| part.number == patch));
-            if here && remark.holds_at(self.point) && !codes.contains(&&*remark.code) {
-                codes.push(&remark.code);
-            }
-        }
-        codes.join(" ")
+        let remarks = self.solution.into_iter().flat_map(|found| &found.remarks);
+        RemarkEntry::codes(remarks.filter(|remark| {
+            let is_part = |patch| self.parts().any(|part| part.number == patch);
+            remark.patch.is_none_or(is_part) && remark.holds_at(self.point)
+        }))
     }
 }

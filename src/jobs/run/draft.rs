@@ -12,7 +12,7 @@ use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::model::{Kind, WorkOptions};
 use crate::profiles::KnownSections;
-use crate::run::model::{REASON, RunChunk, RunHead};
+use crate::run::model::{REASON, REMARKS, RunChunk, RunHead};
 use crate::submit::microseconds;
 use crate::sync::blocking;
 use railhead_contact::case::words::solver::Output;
@@ -404,7 +404,7 @@ fn faults_of_columns(columns: &[TitledColumn]) -> Vec<Fault> {
     let answered = NumberColumns::all().names();
     let answered: HashSet<&str> = answered
         .into_iter()
-        .chain(["row", "status", "method", REASON])
+        .chain(["row", "status", "method", REASON, REMARKS])
         .collect();
     let (mut names, mut places) = (HashSet::new(), HashMap::new());
     for column in columns {

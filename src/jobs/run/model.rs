@@ -2,6 +2,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Read;
+use std::ops::Not;
 
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
@@ -18,6 +19,8 @@ const FORM: u32 = 1;
 
 /// Name of the column with the reason why a row has no answer.
 pub const REASON: &str = "reason";
+/// Name of the column with the codes of the remarks of a row.
+pub const REMARKS: &str = "remarks";
 
 /// Converts a column of rows to a column of a table.
 #[must_use]
@@ -49,6 +52,9 @@ pub struct RunHead {
     /// Whether the answers have the column of reasons, which older runs lack.
     #[serde(default)]
     pub with_reasons: bool,
+    /// Whether the answers have the column of remarks, which older runs lack.
+    #[serde(default, skip_serializing_if = "Not::not")]
+    pub with_remarks: bool,
     /// Number of rows.
     pub rows: u64,
     /// Number of rows of each chunk but the last.
@@ -83,6 +89,7 @@ impl RunHead {
             method,
             from_neighbours: false,
             with_reasons: true,
+            with_remarks: true,
             rows: 0,
             chunk_rows: 0,
             first_row: Vec::new(),
@@ -92,7 +99,12 @@ impl RunHead {
     /// The JSON text of the whole head, which identifies a submission.
     #[must_use]
     pub fn whole(&self) -> Vec<u8> {
-        serde_json::to_vec(self).unwrap_or_default()
+        // An older version identified the same submission without this member.
+        let older = RunHead {
+            with_remarks: false,
+            ..self.clone()
+        };
+        serde_json::to_vec(&older).unwrap_or_default()
     }
 
     /// The stored form: the part that runs with the same template share, and the rest. `first_row` are the values that turn
@@ -110,7 +122,8 @@ impl RunHead {
             first_row,
             ..self
         };
-        (common.into(), own.whole().into())
+        let own = serde_json::to_vec(&own).unwrap_or_default();
+        (common.into(), own.into())
     }
 
     /// Reads a stored head from its common part and the rest. Runs of earlier versions have everything in the first.
@@ -148,7 +161,7 @@ impl RunHead {
         Ok(head)
     }
 
-    /// Names and types of the result columns in their order: row, copied columns, status and method, numbers, reason.
+    /// Names and types of the result columns in their order: row, copied columns, status and method, numbers, reason, remarks.
     #[must_use]
     pub fn answers(&self) -> Vec<(String, TableKind)> {
         let carried = self
@@ -156,16 +169,17 @@ impl RunHead {
             .iter()
             .filter(|column| column.pointer.is_none());
         let carried = carried.map(|column| (column.name.clone(), column.kind()));
-        let words = ["status", "method"].map(|name| (name.to_owned(), TableKind::Texts));
+        let text = |name: &str| (name.to_owned(), TableKind::Texts);
+        let words = ["status", "method"].map(text);
         let numbers = self.numbers.iter();
         let numbers = numbers.map(|name| (name.clone(), TableKind::Numbers));
         let row = ("row".to_owned(), TableKind::Integers);
-        let reason = (REASON.to_owned(), TableKind::Texts);
         std::iter::once(row)
             .chain(carried)
             .chain(words)
             .chain(numbers)
-            .chain(self.with_reasons.then_some(reason))
+            .chain(self.with_reasons.then(|| text(REASON)))
+            .chain(self.with_remarks.then(|| text(REMARKS)))
             .collect()
     }
 
@@ -306,11 +320,15 @@ impl Run {
     pub fn new(chunks: Batch, head: RunHead, record: &RunRecord) -> Run {
         let each = u64::from(head.chunk_rows);
         let lost = chunks.in_state(State::Failed) + chunks.in_state(State::Cancelled);
+        let missing = match record.last_lost {
+            true => head.rows.next_multiple_of(each.max(1)) - head.rows,
+            false => 0,
+        };
         let (ended, all) = chunks.ended();
         #[expect(clippy::cast_precision_loss, reason = "far fewer chunks than 2^53")]
         let progress = (ended as f64 + record.running) / all.max(1) as f64;
         Run {
-            without_answer: (record.without_answer + lost * each).min(head.rows),
+            without_answer: record.without_answer + lost * each - missing,
             progress: if ended == all { 1.0 } else { progress.min(1.0) },
             chunks,
             head,

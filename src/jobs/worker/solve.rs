@@ -17,7 +17,7 @@ use crate::codec::fields::encode;
 use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
 use crate::model::{Failure, FailureKind, Kind, Queue};
-use crate::run::model::{REASON, RunChunk, RunHead, parted};
+use crate::run::model::{REASON, REMARKS, RunChunk, RunHead, parted};
 use crate::shared::Shared;
 use crate::store::{Claim, SliceRecord, StoredCase};
 use crate::sync::lock;
@@ -264,10 +264,14 @@ fn table(
     columns.push(("method".to_owned(), TableColumn::Texts(method.collect())));
     let numbers = head.numbers.iter().cloned().zip(answer.numbers);
     columns.extend(numbers.map(|(name, values)| (name, TableColumn::Numbers(values))));
-    if head.with_reasons {
-        let reasons = answer.reason.into_iter();
-        let reasons = reasons.map(|reason| Some(reason).filter(|reason| !reason.is_empty()));
-        columns.push((REASON.to_owned(), TableColumn::Texts(reasons.collect())));
+    let texts = [
+        (head.with_reasons, REASON, answer.reason),
+        (head.with_remarks, REMARKS, answer.remarks),
+    ];
+    for (_, name, texts) in texts.into_iter().filter(|(is_there, ..)| *is_there) {
+        let texts = texts.into_iter();
+        let texts = texts.map(|text| Some(text).filter(|text| !text.is_empty()));
+        columns.push((name.to_owned(), TableColumn::Texts(texts.collect())));
     }
     RowTable { columns }
 }

@@ -331,6 +331,7 @@ impl Batches for SqlStore {
             template: read_bytes(&row, "body")?,
             head: read_optional_bytes(&row, "head")?,
             without_answer: read_count(&row, "without_answer")?,
+            last_lost: read_count(&row, "last_lost")? > 0,
             running: row.try_get("running")?,
         }))
     }
@@ -498,6 +499,8 @@ fn push_page(
 /// In rows of chunks, `field_patches` is the number of rows without an answer.
 const GET_RUN: &str = "SELECT body, head, \
      (SELECT CAST(COALESCE(SUM(field_patches), 0) AS bigint) FROM jobs WHERE batch_id = batches.id AND state = 'succeeded') AS without_answer, \
+     (SELECT CAST(COUNT(*) AS bigint) FROM jobs WHERE batch_id = batches.id AND state IN ('failed', 'cancelled') \
+      AND batch_index = (SELECT MAX(batch_index) FROM jobs WHERE batch_id = batches.id)) AS last_lost, \
      (SELECT CAST(COALESCE(SUM(progress), 0.0) AS double precision) FROM jobs WHERE batch_id = batches.id AND state = 'running') AS running \
      FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
      WHERE batches.id = $1 AND batches.tenant = $2 AND kind = 'rows' AND complete = 1";
