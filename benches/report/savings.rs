@@ -125,7 +125,7 @@ fn beside_the_median(curve: &Value) -> String {
         whole / median(each.collect())
     });
     format!(
-        "The creep curve takes as long as {:.1} solves of the Hertz references at the same target, in the median of them, solved in turns.\n\n",
+        "The creep curve takes {:.1} times as long as the median Hertz reference at the same target; curve and references were solved alternately.\n\n",
         median(ratios.collect())
     )
 }

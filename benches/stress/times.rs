@@ -95,7 +95,7 @@ fn sweeps(seed: u64) -> impl Iterator<Item = Value> {
 /// Returns the section of the report, with creep curves made of the samples of a seed.
 pub fn section<'a>(kinds: impl Iterator<Item = (&'a str, &'a Times)>, seed: u64) -> String {
     let mut text = format!(
-        "## Time expected and taken\n\nSeconds that `/v1/cases/check` tells beside processor time of the solve; less than {SHORTEST} s counts as \
+        "## Time expected and taken\n\nThe time estimated by `/v1/cases/check` compared with the processor time of the solve; less than {SHORTEST} s counts as \
          {SHORTEST} s. *Within 3×*: neither is more\nthan {FACTOR} times the other. *Part*: cases whose solve did not end within the {} ms of the \
          check. *Formulas*: the same share without\nsolving anything.\n\n\
          | cases | number | within 3× | took longer | took less | part | taken: median, s | largest | formulas |\n\
