@@ -3,7 +3,8 @@
 use railhead_contact::solution::words::answer::Total;
 use serde_json::{Value, json};
 
-use crate::profile_cases::{put, wheel_on_rail};
+use crate::cases::with;
+use crate::profile_cases::{generated, put, wheel_on_rail};
 use crate::profile_reference_files::reference_file;
 use crate::reference::solve;
 
@@ -111,4 +112,40 @@ fn totals_are_as_near_the_reference_as_the_curve() {
     assert_eq!(records.len(), 22);
     // At y = 14.6 mm a second patch with 0.6 % of the load matters. Here it shares a half-space with the first patch, which lifts it off.
     assert!(far.len() <= 1, "{far:?}");
+}
+
+/// The pressures of a list under a vertical load are those of its first motion or of none. The estimates contain what friction does to the lateral part
+/// of the normal forces.
+#[test]
+fn a_motion_of_a_list_differs_from_the_motion_alone_by_no_more_than_both_estimates() {
+    let mut case = with(
+        &generated(),
+        "/contact/lateral_shift_mm",
+        Some(json!(-6.45)),
+    );
+    case["contact"]["yaw_rad"] = json!(-0.02);
+    case["contact"]["reference_surface"] = json!("plane");
+    case["outputs"] = json!(["resultants"]);
+    let motions = [
+        json!({ "creepage_x": 0.0015, "creepage_y": -0.0005, "spin_per_mm": 2e-4 }),
+        json!({ "creepage_x": -0.002, "creepage_y": 0.001, "spin_per_mm": 1e-4 }),
+        json!({ "creepage_x": 0.0, "creepage_y": 0.0, "spin_per_mm": 5e-4 }),
+    ];
+    let lateral = |motion: Value| {
+        let case = with(&case, "/motion", Some(motion));
+        let totals = solve(&case).0.total.into_iter();
+        let of = |total: Total| {
+            let error = total.error_estimate.expect("an estimate");
+            [total.force_y_n, error.force_y_n]
+        };
+        totals.map(of).collect::<Vec<_>>()
+    };
+    let together = lateral(json!(motions));
+    for (motion, [force, error]) in motions.into_iter().zip(together) {
+        let [own, own_error] = lateral(motion)[0];
+        assert!(
+            (force - own).abs() <= error + own_error,
+            "{force} ± {error} in the list, {own} ± {own_error} alone"
+        );
+    }
 }

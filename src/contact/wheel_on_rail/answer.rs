@@ -41,10 +41,10 @@ const FRAME: &str = "every patch on the surface of the rail: x along rolling (le
                      to the lower one";
 
 impl Part {
-    /// Adds an error, relative to the friction limit, to the estimates of all forces of a motion.
-    fn add_error(&mut self, index: usize, share: f64) {
+    /// Adds errors to the estimates of all forces of a motion: an error relative to the friction limit, and one of the pressures relative to them.
+    fn add_error(&mut self, index: usize, [share, of_load]: [f64; 2], forces: &[PatchForces]) {
         let mut all = ErrorEstimate::default();
-        for patch in &mut self.solution.patches {
+        for (patch, forces) in self.solution.patches.iter_mut().zip(forces) {
             let limit = patch.friction_limit_n.unwrap_or(0.0);
             let open = ErrorEstimate {
                 force_x_n: share * limit,
@@ -53,7 +53,8 @@ impl Part {
             };
             let point = &mut patch.points[index];
             point.error_estimate = point.error_estimate.map(|error| error.plus(open));
-            let of_pressure = share * FRICTION_LEAST * patch.normal_force_n;
+            let of_pressure =
+                share * FRICTION_LEAST * patch.normal_force_n + of_load * forces.pressed[0].abs();
             all = all.plus(ErrorEstimate {
                 force_y_n: open.force_y_n.max(of_pressure),
                 ..open
@@ -116,7 +117,9 @@ impl WheelSolve<'_> {
                 ..remark.clone()
             }));
             for (index, total) in totals.iter_mut().enumerate() {
-                part.add_error(index, error + changes[index]);
+                let [of_forces, of_load] = changes[index];
+                let errors = [error + of_forces, of_load];
+                part.add_error(index, errors, &of_motions[index][number]);
                 let own = self.error_of(&part, index, centre);
                 total.error_estimate = total.error_estimate.zip(own).map(|(a, b)| a.plus(b));
             }

@@ -35,16 +35,16 @@ const CHANGE_POOR: f64 = 0.03;
 pub(super) struct Found {
     pub(super) contact: CurveContact,
     pub(super) parts: Vec<Part>,
-    /// Change of the forces of each motion if its tractions and the pressures agreed, relative to μN.
-    pub(super) changes: Vec<f64>,
+    /// Changes of each motion if its tractions and the pressures agreed: of the forces relative to μN, and of the pressures relative to them.
+    pub(super) changes: Vec<[f64; 2]>,
 }
 
 /// The neglected effect of tractions on the pressures.
 struct Neglected {
-    /// Change of the forces of each motion relative to μN.
-    pub(super) changes: Vec<f64>,
+    /// Changes of each motion: of the forces relative to μN, and of the pressures by the vertical force, relative to them.
+    changes: Vec<[f64; 2]>,
     /// The largest change of the vertical force by friction, relative to it.
-    pub(super) by_lift: f64,
+    by_lift: f64,
 }
 
 impl WheelSolve<'_> {
@@ -115,12 +115,15 @@ impl WheelSolve<'_> {
                     1 => first,
                     _ => self.wheel(&contact)?,
                 };
-                let mut changes = vec![residual; problem.motions.len()];
+                let mut changes = vec![[residual, 0.0]; problem.motions.len()];
                 if problem.history.is_some() || !with_friction {
                     let reference = with_friction.then_some(last);
                     let neglected = self.neglected(coarse, &parts, reference, workspace)?;
                     let sums = changes.iter_mut().zip(&neglected.changes);
-                    sums.for_each(|(sum, change)| *sum += change);
+                    sums.for_each(|([sum, lift], change)| {
+                        *sum += change[0];
+                        *lift = change[1];
+                    });
                     if with_friction && neglected.by_lift > balance {
                         let remark = Remark::PressuresOfLastPoint {
                             part: neglected.by_lift,
@@ -193,7 +196,7 @@ impl WheelSolve<'_> {
         let changes = by_gap.iter().zip(&by_lift).enumerate();
         Ok(Neglected {
             changes: changes
-                .map(|(index, (gap, lift))| share * gap + lift * force(index))
+                .map(|(index, (gap, lift))| [share * gap + lift * force(index), *lift])
                 .collect(),
             by_lift: by_lift.into_iter().fold(0.0, f64::max),
         })
