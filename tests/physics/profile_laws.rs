@@ -90,6 +90,18 @@ fn a_cone_on_an_arc_is_hertzs_contact_at_its_angle() {
 }
 
 #[test]
+fn each_patch_has_its_own_overlap() {
+    let (solution, _) = solve(&place(&generated(), -4.9, 0.0, 0.0));
+    let overlap = |k: usize| solution.patches[k].approach_mm.expect("an approach");
+    let lowering = solution.wheel_lowering_mm.expect("a lowering");
+    assert_eq!(solution.patches.len(), 2);
+    let cosine = position(&solution.patches[0]).contact_angle_rad.cos();
+    // Patch 0 touches first, and patch 1 after two hundredths of a millimetre.
+    assert!((overlap(0) / (lowering * cosine) - 1.0).abs() < 0.02);
+    assert!((0.5..0.9).contains(&(overlap(1) / overlap(0))));
+}
+
+#[test]
 fn normal_and_tangential_forces_together_carry_the_vertical_force() {
     for (shift, y) in [(0.0, 0.0), (-2.0, 0.004), (-8.0, 0.02), (-8.0, -0.02)] {
         let case = moving(&place(&generated(), shift, 0.0, 0.0), 0.001, y, 0.0);

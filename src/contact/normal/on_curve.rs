@@ -745,8 +745,9 @@ impl CurveContact {
 
     fn all_patches(&self) -> Vec<(usize, GridPressure)> {
         let [nx, ny] = self.grid.cells();
-        let depth = self.gap.iter().fold(0.0, |depth: f64, gap| depth.max(-gap));
         let field = |patch: Vec<usize>| {
+            let overlaps = patch.iter().map(|k| -self.gap[*k]);
+            let depth = overlaps.fold(0.0, f64::max);
             let strip = patch[0] / nx;
             let range = |of: fn(usize, usize) -> usize, cells: usize| {
                 let numbers = patch.iter().map(|k| of(*k, nx));
