@@ -10,8 +10,6 @@ pub(crate) const LENGTH_MIN: f64 = 1.0;
 pub(crate) const WIDE: f64 = 1.5;
 /// Spacing in mm of the points of the other body that are compared with a chord.
 const STEP: f64 = 0.1;
-/// Largest slope of a tangent at the end of a chord. Steeper tangents are cut to it.
-const SLOPE_MAX: f64 = 1e3;
 
 /// A chord over which the bodies may touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,11 +100,8 @@ impl Bulge {
         let slope = |from: [f64; 2], to: [f64; 2]| {
             let step = [to[0] - from[0], to[1] - from[1]];
             let [along, up] = axes.map(|axis| axis[0] * step[0] + axis[1] * step[1]);
-            if along > 0.0 {
-                (up / along).clamp(-SLOPE_MAX, SLOPE_MAX)
-            } else {
-                SLOPE_MAX.copysign(up)
-            }
+            // A tangent that leads backward counts as vertical.
+            up / along.max(f64::EPSILON)
         };
         Bulge {
             start,

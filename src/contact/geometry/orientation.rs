@@ -1,6 +1,6 @@
 //! Recognises the directions of y and z of the points of a cross-section, the flange of a wheel and its back, and the head of a rail.
 //!
-//! A section is compared in all four combinations of directions with the shape of its body. A wheel has a flange: a lobe of 15 to 45 mm height
+//! A section is compared in all four combinations of directions with the shape of its body. A wheel has a flange: a lobe of 12 to 45 mm height
 //! on one side of its tread. A rail has a head: a convex crown whose sides fall off. Extreme values are not used, because the face of a rim,
 //! the back of a flange, a groove or a foot may reach farther than flange or head.
 
@@ -106,7 +106,7 @@ pub(crate) fn orient_wheel(
 }
 
 fn wheel_unclear(points: &[[f64; 2]], several: bool, y: Option<bool>, z: Option<bool>) -> String {
-    let reason = if sure_body(points) == Some(SureBody::Rail) {
+    let reason = if sure_body(points, false) == Some(SureBody::Rail) {
         "the points look like the head of a rail (were rail and wheel exchanged?)"
     } else if several {
         "the shape has a flange for more than one direction of y and z"
@@ -139,7 +139,7 @@ pub(crate) fn orient_rail(
         None => rail_mirror_z(points),
     };
     let mirror_z = stated.mirror_z.or(shown).ok_or_else(|| {
-        let reason = if sure_body(points) == Some(SureBody::Wheel) {
+        let reason = if sure_body(points, false) == Some(SureBody::Wheel) {
             "the points look like a wheel with its flange (were rail and wheel exchanged?)"
         } else {
             "no head of a rail was found, so the shape does not show whether z is positive up or down"
@@ -174,20 +174,16 @@ const TIP_DEPTH: f64 = 2.0;
 /// Range of the width in mm of the tip. Flanges of EN 13715 and AAR have 12 to 18 mm; the edge of a rim has less than 1 mm. The back of the
 /// flange is no farther from the tip than the upper bound. It is 15 mm in EN 13715, while a groove next to a second rail continues farther.
 const TIP_WIDTH: [f64; 2] = [4.0, 25.0];
-/// Range of the height in mm of a flange above its tread. Trams have 18 mm, worn wheels up to 40 mm.
-const FLANGE_HEIGHT: [f64; 2] = [15.0, 45.0];
-/// Range of the distance in mm from the beginning of the flange root to the tip. Wheels of EN 13715 have 24 mm.
-const ROOT_TO_TIP: [f64; 2] = [8.0, 45.0];
+/// Range of the height in mm of a flange above its tread. Trams have 18 mm, worn wheels up to 40 mm; points that end before the tip show
+/// less.
+const FLANGE_HEIGHT: [f64; 2] = [12.0, 45.0];
 /// Least length in mm of a tread.
 const TREAD: f64 = 20.0;
-/// Least height in mm of a flange whose points end before its tip.
-const PART_HEIGHT: f64 = 12.0;
-/// Range of the largest inclination in rad of a flange whose points end before its tip. Flange faces have 60 to 78°; the face of a rim is
-/// steeper.
-const PART_SLOPE: [f64; 2] = [0.87, 1.38];
+/// Largest inclination in rad of a flange whose points end before its tip (79°). Flange faces have 60 to 78°; the face of a rim is steeper.
+const PART_SLOPE_MAX: f64 = 1.38;
 /// Least length in mm of the crown of a head. The nose of a crossing has 15 mm where wheels reach it.
 const CROWN: f64 = 15.0;
-/// Least fall in mm at one side of a head.
+/// Least fall in mm at one side of a head, and least length of the steep part of a face.
 const FALL: f64 = 6.0;
 /// Least fall in mm at the other side of a head. Within one descent, lips and steps of worn profiles may rise by this much.
 const FALL_LEAST: f64 = 1.0;
@@ -198,18 +194,10 @@ const CUT_SLOPE: f64 = 0.1;
 const CROWN_TURN: f64 = 0.05;
 /// Least length in mm of the crown of a section that can only be a rail.
 const SURE_CROWN: f64 = 30.0;
-/// Least fall in mm of each face of such a section.
-const SURE_FALL: f64 = 10.0;
-/// Largest turn in rad of such a section within 2 mm next to its crown. Corners of rails have radii of at least 9 mm; edges of rollers are sharp.
-const SURE_CORNER: f64 = 0.3;
-/// Range of the width in mm over the faces of such a section. Heads of EN 13674 are 65 to 75 mm wide.
-const SURE_WIDTH: [f64; 2] = [50.0, 90.0];
 /// Least length in mm of the back of a flange, and distance between the three points from which the rounding of a back is continued.
 const BACK: f64 = 3.0;
-/// Largest radius in mm of that rounding. It is 20.5 mm in EN 13715.
-const ROUNDING_MAX: f64 = 50.0;
-/// Least inclination in rad at the end of the points (72°), so that a rounding of 20.5 mm is continued by at most 1.0 mm.
-const ROUNDING_SLOPE: f64 = 1.25;
+/// Length in mm by which that rounding is continued at most.
+const CONTINUED_MAX: f64 = 1.5;
 
 /// The flange of a wheel, in the directions in which it was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -284,12 +272,15 @@ fn sure_rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
     heads.iter().any(sure).then_some(mirror_z)
 }
 
-/// The body whose shape the points have in any directions; `None` if the other body may have this shape.
-pub fn sure_body(points: &[[f64; 2]]) -> Option<SureBody> {
+/// The body whose shape the points have; `None` if the other body may have this shape. A flange is looked for in all directions. A head is
+/// looked for with z up only if `z_up` is true, because the rim of a wheel is like a head upside down.
+pub fn sure_body(points: &[[f64; 2]], z_up: bool) -> Option<SureBody> {
+    let is_head = |senses: &&Senses| senses.mirror_z || !z_up;
     let head = |senses: &Senses| heads(points, *senses).iter().any(Head::has_both_faces);
     let whole =
         |senses: &Senses| flange(&in_senses(points, *senses)).is_some_and(|f| f.tip.is_some());
-    match (ALL.iter().any(head), ALL.iter().any(whole)) {
+    let is_rail = ALL.iter().filter(is_head).any(head);
+    match (is_rail, ALL.iter().any(whole)) {
         (true, false) => Some(SureBody::Rail),
         (false, true) => Some(SureBody::Wheel),
         _ => None,
@@ -320,15 +311,11 @@ struct Fall {
     lowest: usize,
     /// Length in mm of its steep stretches.
     steep: f64,
-    /// Largest turn within 2 mm before the first steep stretch, in rad.
-    turn: f64,
-    /// y of the lowest sample in mm.
-    y: f64,
 }
 
 impl Fall {
     fn is_face(&self) -> bool {
-        self.depth >= SURE_FALL && self.steep >= 0.5 * SURE_FALL
+        self.steep >= FALL
     }
 }
 
@@ -345,12 +332,7 @@ impl Head {
         let [Some(first), Some(last)] = self.falls else {
             return false;
         };
-        let [narrowest, widest] = SURE_WIDTH;
-        first.is_face()
-            && last.is_face()
-            && first.turn.max(last.turn) <= SURE_CORNER
-            && self.crown >= SURE_CROWN
-            && (narrowest..=widest).contains(&(last.y - first.y))
+        first.is_face() && last.is_face() && self.crown >= SURE_CROWN
     }
 }
 
@@ -393,11 +375,9 @@ impl Section<'_> {
             depth: 0.0,
             lowest: from,
             steep: 0.0,
-            turn: 0.0,
-            y: self.points[from][0],
         };
         let start = self.points[from][1];
-        let (mut steep, mut turn) = (0.0, 0.0_f64);
+        let mut steep = 0.0;
         let mut at = from;
         loop {
             let next = if back {
@@ -410,14 +390,6 @@ impl Section<'_> {
             };
             at = next;
             let depth = start - self.points[at][1];
-            let before = if back {
-                (at + 4).min(self.points.len() - 1)
-            } else {
-                at.saturating_sub(4)
-            };
-            if steep == 0.0 {
-                turn = turn.max((self.angles[at] - self.angles[before]).abs());
-            }
             if self.angles[at].abs() >= STEEP {
                 steep += STEP;
             }
@@ -426,8 +398,6 @@ impl Section<'_> {
                     depth,
                     lowest: at,
                     steep,
-                    turn,
-                    y: self.points[at][0],
                 };
             } else if depth < found.depth - FALL_LEAST {
                 return found;
@@ -446,13 +416,13 @@ impl Section<'_> {
         heights.sort_by(f64::total_cmp);
         let height = heights[heights.len() / 2] - self.points[inner.lowest][1];
         let tip = self.tip(inner.lowest);
-        let to_tip = self.points[first][0] - 0.5 * (tip[0] + tip[1]);
         let within = |[least, most]: [f64; 2], value: f64| (least..=most).contains(&value);
+        if !within(FLANGE_HEIGHT, height) {
+            return None;
+        }
         let [end, _] = bounds(self.points[..=first].iter().map(|at| at[0]));
-        let whole = within(TIP_WIDTH, tip[1] - tip[0])
-            && within(FLANGE_HEIGHT, height)
-            && within(ROOT_TO_TIP, to_tip)
-            && 0.5 * (tip[0] + tip[1]) - end <= TIP_WIDTH[1];
+        let whole =
+            within(TIP_WIDTH, tip[1] - tip[0]) && 0.5 * (tip[0] + tip[1]) - end <= TIP_WIDTH[1];
         if whole {
             return Some(Flange {
                 tip: Some(tip),
@@ -464,9 +434,7 @@ impl Section<'_> {
             .iter()
             .copied()
             .fold(0.0, f64::max);
-        let part = inner.lowest == 0
-            && within([PART_HEIGHT, FLANGE_HEIGHT[1]], height)
-            && within(PART_SLOPE, steepest);
+        let part = inner.lowest == 0 && steepest <= PART_SLOPE_MAX;
         part.then_some(Flange {
             tip: None,
             back: None,
@@ -506,9 +474,9 @@ impl Section<'_> {
             return None;
         }
         let (centre, radius) = circle(end, middle, inner)?;
-        let inclination = (centre[0] - end[0]).atan2((centre[1] - end[1]).abs());
         let leftmost = centre[0] - radius;
-        (radius <= ROUNDING_MAX && inclination >= ROUNDING_SLOPE && end[0] >= leftmost)
+        (0.0..=CONTINUED_MAX)
+            .contains(&(end[0] - leftmost))
             .then_some(leftmost)
     }
 

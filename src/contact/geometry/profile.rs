@@ -35,6 +35,8 @@ pub(crate) const NEEDED_BEYOND: f64 = 5.0;
 const GROOVE_DEPTH: f64 = 60.0;
 /// Least depth in mm of the groove below the points at its sides.
 const GROOVE_WALL: f64 = 5.0;
+/// Least step in mm of heights that counts as rounding. Finer steps are below the noise of all instruments.
+const ROUNDING_MIN: f64 = 1e-3;
 /// Distance in mm below which two points are merged.
 pub(crate) const NEAR: f64 = 1e-3;
 /// Cosine of the turn from which a point runs backwards (102°). No corner of a measured profile turns as much, while points at a joint of two
@@ -82,10 +84,8 @@ struct MeasuredCurve {
     along: Vec<f64>,
     /// Cut wavelength of the smoothing in mm.
     smoothing: f64,
-    /// Step of which the given heights are multiples, in mm.
-    rounding: Option<f64>,
-    /// Step of which all given coordinates are multiples, in mm.
-    digits: f64,
+    /// Steps in mm of which all given y and all given z are multiples.
+    steps: [f64; 2],
     /// The directions of the given points.
     senses: Senses,
     /// Number of points of the guard rail and the groove, which precede those of the running rail.
@@ -159,8 +159,7 @@ impl Profile {
             along: lengths(&points)?,
             points,
             smoothing: reading.smoothing,
-            rounding: profile_quality::rounding(given),
-            digits: profile_quality::digits(given),
+            steps: [0, 1].map(|part| profile_quality::decimal_step(given, part)),
             senses,
             beside: 0,
             flange,
@@ -227,7 +226,7 @@ impl Profile {
         *self
             .measured
             .sure_body
-            .get_or_make(|| orientation::sure_body(points))
+            .get_or_make(|| orientation::sure_body(points, true))
     }
 
     /// The flange of a wheel, if the points show one on the side of the track centre.
@@ -265,8 +264,8 @@ impl Profile {
             points: self.points(),
             curve: &self.curve,
             smoothing: self.smoothing(),
-            digits: self.measured.digits,
-            rounding: self.measured.rounding,
+            digits: self.measured.steps[0].max(self.measured.steps[1]),
+            rounding: self.rounding(),
         }
     }
 
@@ -292,7 +291,8 @@ impl Profile {
 
     /// The step in mm of which all given heights are multiples, if it is at least 0.001 mm.
     pub fn rounding(&self) -> Option<f64> {
-        self.measured.rounding
+        let [_, step] = self.measured.steps;
+        (step >= ROUNDING_MIN).then_some(step)
     }
 
     /// The curve, with y to the field side and z up.

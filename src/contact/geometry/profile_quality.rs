@@ -1,68 +1,40 @@
 //! Quality of the points of a profile: noise, outliers, steps, polygons, rounding, roughness under a contact, and the smoothing that the
 //! noise requires.
 //!
+//! Noise and displaced points are found with one statistic, the fourth divided difference of five neighbours, which vanishes for every cubic.
 //! Roughness is found by comparing two curves through the same points: the spline in use with a smoother one, and with Akima's curve.
 
-use std::cell::RefCell;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
-use realfft::RealFftPlanner;
-
-use crate::geometry::plane_curve::{PlaneCurve, chords, is_corner, turn};
+use crate::geometry::plane_curve::{CurvePoint, PlaneCurve, chords, is_corner, turn};
 use crate::numerics::lu::first_coefficient;
 
-/// Chords in one window of the noise estimate.
-const NOISE_CHORDS: usize = 4;
-/// Largest length of a window in mm. The shape over longer windows is not a cubic.
-const NOISE_SPAN_MAX: f64 = 3.0;
-/// Largest length of a window of coarse points in mm.
-const COARSE_SPAN_MAX: f64 = 12.0;
-/// Fewest windows for a median.
-const WINDOWS_MIN: usize = 12;
-/// Fewest windows of coarse points for a quartile.
-const COARSE_WINDOWS_MIN: usize = 30;
-/// Largest noise in mm that the shape of sound profiles simulates if points are 1 mm apart. It grows with the fourth power of the spacing.
-///
-/// Population: sound rails and wheels of the class *damaged profile* with true points 0.8 to 4 mm apart. They show 0.002 to 0.1 µm at 1 mm.
-/// Noise of 1 µm at 1.7 mm and of 3 µm at 2.5 mm is above this limit.
-const COARSE_SHAPE: f64 = 6e-5;
-/// Spacing in mm up to which the shape of sound profiles simulates less than 0.2 µm of noise, or 1 % of a usual pressure.
-const SHAPE_NEGLIGIBLE_SPACING: f64 = 1.8;
+/// Points on either side of the one whose fourth divided difference is taken.
+const SIDE: usize = 2;
+/// Largest length of five points in mm. The shape over longer stretches is not a cubic.
+const SPAN_MAX: f64 = 12.0;
+/// Fewest fourth differences for a quartile.
+const DIFFERENCES_MIN: usize = 12;
 /// Lower quartile of the absolute value of a standard normal variable.
 const QUARTILE_OF_NORMAL: f64 = 0.3186;
-/// Median of the absolute value of a standard normal variable.
-const MEDIAN_OF_NORMAL: f64 = 0.6745;
-/// Least deviation of an outlier in local medians. Population: seeded damage of the stress bench (class *damaged profile*). An outlier of 2 µm
-/// may cause half of the largest pressure.
-const OUTLIER_MEDIANS: f64 = 12.0;
-/// Least deviation of an outlier in mm; same population.
-const OUTLIER_MIN: f64 = 1.2e-3;
-/// Spacing in mm above which the least deviation grows with the square of the spacing. So do the deviations where the curvature jumps, between
-/// arcs and between the polynomials of a tread.
-const OUTLIER_SPACING: f64 = 0.25;
-/// Points on either side of a local median.
-const OUTLIER_WINDOW: usize = 15;
-/// Longest stretch in mm in which a cubic through six neighbours is used however uneven their spacing.
-const OUTLIER_SPAN_MAX: f64 = 3.5;
-/// Longest chord among seven points in mean chords. Next to a hole the cubic is undetermined.
-const OUTLIER_CHORD_MAX: f64 = 2.0;
+/// Largest noise in mm that the shape of sound profiles simulates if points are 1 mm apart. It grows with the fourth power of the spacing.
+/// Population: sound rails and wheels with true points 0.8 to 4 mm apart show 0.002 to 0.1 µm at 1 mm.
+const COARSE_SHAPE: f64 = 6e-5;
+/// Spacing in mm up to which the shape of sound profiles simulates less than 0.2 µm of noise, or 1 % of a usual pressure; same population.
+const SHAPE_NEGLIGIBLE_SPACING: f64 = 1.8;
+/// Least fourth difference of a displaced point, as a multiple of the noise. White noise exceeds it once in 10¹¹ points.
+const DISPLACED: f64 = 7.0;
+/// Least fourth difference of a displaced point per square of the spacing, in 1/mm. A jump of the curvature by 0.27/mm causes as much, while
+/// the arcs of 13 and 20 mm at root and face of a flange differ by 0.13/mm.
+const DISPLACED_BEND: f64 = 0.02;
 /// Least deviation of a point of a group, relative to the largest one of the group.
 const GROUP_SHARE: f64 = 0.3;
 /// Most points of a group. Larger groups are waves.
 const GROUP_POINTS_MAX: usize = 12;
-/// Sound points on either side of a group from which its deviations are measured.
-const GROUP_NEIGHBOURS: usize = 4;
 /// Fewest kinks of a polygon.
 const KINKS_MIN: usize = 4;
-/// Least ratio of the sum of the turns at kinks to the sum of their magnitudes. A rail or a wheel bends to one side over many chords.
-const KINKS_ONE_WAY: f64 = 0.8;
-/// Most decimals that are looked for.
-const DIGITS_MAX: i32 = 7;
-/// Step in mm of coordinates with more decimals, which the arithmetic of a reader blurs.
-const DIGITS_LEAST: f64 = 1e-9;
-/// Least share of neighbouring fourth differences with opposite signs in white noise. There the share is 0.8, because the correlation is
-/// −56/70; in waves longer than four points it is at most 0.5.
-const WHITE: f64 = 0.65;
+/// Most decimals of a coordinate that are looked for. Further ones come from the arithmetic of a reader.
+const DIGITS_MAX: i32 = 9;
 
 /// A defect of one or a few neighbouring points.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,59 +69,40 @@ impl LocalDefect {
     }
 }
 
-/// Standard deviation in mm of white noise along the normal in a range of points. Returns `None` if too few points are close enough together
-/// to determine it.
+/// Standard deviation in mm of white noise along the normal in a range of points. Returns `None` if the points are too few, too far apart, or
+/// show no more than the shape of a sound profile with such coarse points.
 ///
 /// The fourth divided difference of five neighbours, `Σ w_i h_i` with `w_i = 1/Π_{j≠i}(t_i − t_j)` and `Σ w_i² = 1`, vanishes for every
-/// cubic, and for white noise of deviation s it has the deviation s. The median of its magnitude divided by 0.6745 is therefore s,
-/// unaffected by single outliers. (Correlated noise, as left by an instrument that filters, is not detected.)
-///
-/// If points are more than 0.75 mm apart, half of the windows may contain the junction of two arcs. Then the lower quartile divided by 0.3186
-/// is used, provided that it exceeds the contribution of the shape.
+/// cubic, and for white noise of deviation s it has the deviation s. The lower quartile of its magnitude divided by 0.3186 is therefore s,
+/// unaffected by displaced points and, if points are coarse, by the junctions of arcs. Correlated noise, as left by an instrument that
+/// filters, is not detected.
 pub fn noise(points: Points, range: [usize; 2]) -> Option<f64> {
-    let (mut fine, mut coarse) = (Vec::new(), Vec::new());
+    let inner = range[0] + SIDE..range[1].saturating_sub(SIDE);
     let mut length = 0.0;
-    for k in range[0]..range[1].saturating_sub(NOISE_CHORDS) {
-        let found = window_at(points, k).and_then(fourth_difference);
-        let Some((span, difference)) = found else {
-            continue;
-        };
-        if span <= NOISE_SPAN_MAX {
-            fine.push(difference.abs());
-        } else if span <= COARSE_SPAN_MAX {
-            coarse.push(difference.abs());
+    let mut sizes: Vec<f64> = inner
+        .filter_map(|k| fourth_difference(points, k))
+        .map(|(span, difference)| {
             length += span;
-        }
-    }
-    if fine.len() >= WINDOWS_MIN {
-        return Some(median(&mut fine) / MEDIAN_OF_NORMAL);
-    }
-    if coarse.len() < COARSE_WINDOWS_MIN {
+            difference.abs()
+        })
+        .collect();
+    if sizes.len() < DIFFERENCES_MIN {
         return None;
     }
-    let spacing = length / (NOISE_CHORDS * coarse.len()) as f64;
-    coarse.sort_by(f64::total_cmp);
-    let found = coarse[coarse.len() / 4] / QUARTILE_OF_NORMAL;
+    let spacing = length / (2 * SIDE * sizes.len()) as f64;
+    let quarter = sizes.len() / 4;
+    let found = *sizes.select_nth_unstable_by(quarter, f64::total_cmp).1 / QUARTILE_OF_NORMAL;
     (spacing <= SHAPE_NEGLIGIBLE_SPACING || found > COARSE_SHAPE * spacing.powi(4)).then_some(found)
 }
 
-/// Returns whether the fourth differences in a range of points are those of white noise, whose signs alternate, and not those of waves.
-fn is_white(points: Points, range: [usize; 2]) -> bool {
-    let differences: Vec<f64> = (range[0]..range[1].saturating_sub(NOISE_CHORDS))
-        .filter_map(|k| window_at(points, k).and_then(fourth_difference))
-        .map(|(_, difference)| difference)
-        .collect();
-    let pairs = differences.windows(2);
-    let opposite = pairs.clone().filter(|pair| pair[0] * pair[1] < 0.0);
-    opposite.count() as f64 > WHITE * pairs.len() as f64
-}
-
-/// Length of the chord over five points in mm, and their normalised fourth divided difference in mm.
-fn fourth_difference(window: &[[f64; 2]; NOISE_CHORDS + 1]) -> Option<(f64, f64)> {
-    let local = in_chord(window);
-    let span = local[NOISE_CHORDS][0] - local[0][0];
-    let weights: [f64; NOISE_CHORDS + 1] = std::array::from_fn(|i| {
-        let others = (0..=NOISE_CHORDS).filter(|j| *j != i);
+/// Length in mm of the chord over five points, and the normalised fourth divided difference in mm at the middle one. Returns `None` if there
+/// are fewer points, or if they are too far apart.
+fn fourth_difference(points: Points, k: usize) -> Option<(f64, f64)> {
+    let window: &[[f64; 2]; 2 * SIDE + 1] = points.at.get(k.checked_sub(SIDE)?..)?.first_chunk()?;
+    let (to_chord, span) = chord_axes(window);
+    let local = window.map(|at| to_chord(&at));
+    let weights: [f64; 2 * SIDE + 1] = std::array::from_fn(|i| {
+        let others = (0..=2 * SIDE).filter(|j| *j != i);
         1.0 / others
             .map(|j| (local[i][0] - local[j][0]) / span)
             .product::<f64>()
@@ -157,46 +110,36 @@ fn fourth_difference(window: &[[f64; 2]; NOISE_CHORDS + 1]) -> Option<(f64, f64)
     let length = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
     let sum: f64 = weights.iter().zip(&local).map(|(w, at)| w * at[1]).sum();
     let difference = sum / length;
-    (span > 0.0 && difference.is_finite()).then_some((span, difference))
+    (span <= SPAN_MAX && difference.is_finite()).then_some((span, difference))
 }
 
 /// The largest defect of a few points in a range.
 ///
-/// A point is suspect if it deviates from the least-squares cubic of its six neighbours by more than 12 local medians and by at least 1.2 µm
-/// (more if points are coarse). Neighbouring points with similar deviations belong to the same group.
-///
-/// A displaced point makes its neighbours deviate by 0.43 of its own displacement, and several displaced points disturb each other. The group
-/// is therefore compared with the cubic through the sound points on both sides of it. If that cubic plus a step between two points fits all of
-/// them, the defect is a step. Where two arcs meet, the curvature jumps by about 0.06/mm. Points 0.25 mm apart then deviate by 0.2 µm, and the
-/// deviation grows with the square of the spacing.
-pub fn local_defect(points: Points, range: [usize; 2]) -> Option<LocalDefect> {
-    let around = [
-        range[0].saturating_sub(OUTLIER_WINDOW),
-        (range[1] + OUTLIER_WINDOW).min(points.at.len()),
-    ];
-    let off: Vec<f64> = (around[0]..around[1])
-        .map(|k| off_neighbours(points, k).unwrap_or_default())
-        .collect();
-    let size = |j: usize| off[j].abs();
+/// A point is suspect if its fourth difference is the largest nearby, exceeds 7 times the noise in mm, and exceeds what a jump of the
+/// curvature causes at such a spacing. A displaced point also changes the fourth differences of its neighbours, and several displaced points
+/// disturb each other. The neighbours with similar differences are therefore compared, as a group, with the cubic through the sound points on
+/// both sides of them. If that cubic plus a step between two points fits all of them, the defect is a step.
+pub fn local_defect(points: Points, range: [usize; 2], noise: f64) -> Option<LocalDefect> {
+    let last = points.at.len() - 1;
+    let size = |k: usize| {
+        let has_corner = || (k - 1..=k + 1).any(|at| is_corner(points.at, at));
+        let found = fourth_difference(points, k).filter(|_| !has_corner());
+        found.map_or(0.0, |(_, difference)| difference.abs())
+    };
     let mut worst: Option<LocalDefect> = None;
-    for here in range[0] - around[0]..range[1] - around[0] {
+    for here in range[0]..range[1] {
         let own = size(here);
-        let near = here.saturating_sub(3)..(here + 4).min(off.len());
-        let spacing = spacing_around(points, around[0] + here);
-        let least = OUTLIER_MIN * (spacing / OUTLIER_SPACING).powi(2).max(1.0);
-        if own < least || near.clone().any(|j| size(j) > own) {
+        let near = || here.saturating_sub(SIDE)..=(here + SIDE).min(last);
+        let chords = here.saturating_sub(SIDE)..(here + SIDE).min(last);
+        let longest = chords.map(|k| points.chord(k)).fold(0.0, f64::max);
+        let least = (DISPLACED * noise).max(DISPLACED_BEND * longest * longest);
+        if own <= least || near().any(|k| size(k) > own) {
             continue;
         }
-        let far = here.saturating_sub(OUTLIER_WINDOW)..(here + OUTLIER_WINDOW + 1).min(off.len());
-        // The neighbours are excluded, because an outlier makes them deviate too.
-        let mut usual: Vec<f64> = far.filter(|j| !near.contains(j)).map(size).collect();
-        if own <= OUTLIER_MEDIANS * median(&mut usual) {
-            continue;
-        }
-        let belongs = |j: &usize| size(*j) > GROUP_SHARE * own;
+        let belongs = |k: &usize| size(*k) > GROUP_SHARE * own;
         let first = (0..=here).rev().take_while(belongs).last().unwrap_or(here);
-        let last = (here..off.len()).take_while(belongs).last().unwrap_or(here);
-        let found = group_defect(points, [around[0] + first, around[0] + last]);
+        let last = (here..=last).take_while(belongs).last().unwrap_or(here);
+        let found = group_defect(points, [first, last]);
         if let Some(found) = found
             && worst.is_none_or(|known| found.size() > known.size())
         {
@@ -211,8 +154,8 @@ fn group_defect(points: Points, [first, last]: [usize; 2]) -> Option<LocalDefect
     if last + 1 - first > GROUP_POINTS_MAX {
         return None;
     }
-    let from = first.saturating_sub(GROUP_NEIGHBOURS);
-    let to = (last + GROUP_NEIGHBOURS + 1).min(points.at.len());
+    let from = first.saturating_sub(2 * SIDE);
+    let to = (last + 2 * SIDE + 1).min(points.at.len());
     let (to_chord, length) = chord_axes(&points.at[from..to]);
     let local: Vec<[f64; 2]> = points.at[from..to].iter().map(to_chord).collect();
     let inside = |k: usize| (first..=last).contains(&(from + k));
@@ -283,29 +226,6 @@ fn above_cubic(
     Some(h - first_coefficient(&others.map(powers).collect::<Vec<_>>())?)
 }
 
-/// Mean spacing in mm of the seven points around a point; of fewer points at the ends.
-fn spacing_around(points: Points, k: usize) -> f64 {
-    let (first, last) = (k.saturating_sub(3), (k + 3).min(points.along.len() - 1));
-    (points.along[last] - points.along[first]) / (last - first).max(1) as f64
-}
-
-/// Height in mm of a point above the least-squares cubic of its six neighbours. Returns `None` if the neighbours are too far away or unevenly
-/// spaced, or include a corner.
-fn off_neighbours(points: Points, k: usize) -> Option<f64> {
-    let first = k.checked_sub(3)?;
-    let local = in_chord(window_at::<7>(points, first)?);
-    let span = local[6][0] - local[0][0];
-    let longest = (first..first + 6)
-        .map(|k| points.chord(k))
-        .fold(0.0, f64::max);
-    let uneven = span > OUTLIER_SPAN_MAX && longest > OUTLIER_CHORD_MAX * span / 6.0;
-    if span > COARSE_SPAN_MAX || uneven || (first + 1..first + 6).any(|k| is_corner(points.at, k)) {
-        return None;
-    }
-    let others = [0, 1, 2, 4, 5, 6].map(|j| local[j]);
-    above_cubic(local[3], others.into_iter(), 0.5 * span)
-}
-
 /// Median length in mm of the sides of the polygon on which the points of a range lie, if they were interpolated linearly between fewer
 /// points.
 ///
@@ -319,73 +239,44 @@ pub fn polygon(points: Points, range: [usize; 2], digits: f64) -> Option<f64> {
         2.0_f64.sqrt() * digits * (1.0 / before + 1.0 / after)
     };
     let last = range[1].min(points.at.len()).saturating_sub(1);
-    let (mut kinks, mut others): (Vec<[f64; 2]>, usize) = (Vec::new(), 0);
-    // The points after the last straight one, and their turns.
-    let mut open: Option<Vec<(usize, f64)>> = None;
+    let (mut kinks, mut others): (Vec<f64>, usize) = (Vec::new(), 0);
+    // The points after the last straight one.
+    let mut open: Option<Vec<usize>> = None;
     for k in range[0].max(1)..last {
         let turned = turn(points.at, k);
         if turned.abs() <= bound(k) {
             match open.replace(Vec::new()).as_deref() {
-                Some([(at, turned)]) => kinks.push([points.along[*at], *turned]),
-                Some([(at, one), (_, two)]) => {
-                    kinks.push([points.along[*at] + 0.5 * points.chord(*at), one + two]);
-                }
+                Some([at]) => kinks.push(points.along[*at]),
+                Some([at, _]) => kinks.push(points.along[*at] + 0.5 * points.chord(*at)),
                 Some([]) | None => {}
                 Some(_) => others += 1,
             }
         } else if turned.abs() > 3.0 * bound(k) {
             if let Some(open) = &mut open {
-                open.push((k, turned));
+                open.push(k);
             }
         } else {
             open = None;
         }
     }
-    let (sum, sizes) = kinks
-        .iter()
-        .fold((0.0_f64, 0.0), |(sum, sizes), [_, turned]| {
-            (sum + turned, sizes + turned.abs())
-        });
-    let one_way = sum.abs() >= KINKS_ONE_WAY * sizes;
-    if kinks.len() < KINKS_MIN.max(others) || !one_way {
+    if kinks.len() < KINKS_MIN.max(others) {
         return None;
     }
-    let chords = kinks.windows(2).map(|pair| pair[1][0] - pair[0][0]);
+    let chords = kinks.windows(2).map(|pair| pair[1] - pair[0]);
     Some(median(&mut chords.collect::<Vec<f64>>()))
 }
 
-/// Resolution of the coordinates: the coarser of the steps in mm of which all y and all z are multiples, at least 1e-9 mm.
-pub fn digits(given: &[[f64; 2]]) -> f64 {
-    let of = |part| step_of(given, part, DIGITS_MAX, 1e-4).unwrap_or(DIGITS_LEAST);
-    of(0).max(of(1))
-}
-
-/// The largest power of ten, at most 0.1, of which all coordinates in one direction are multiples.
-fn step_of(given: &[[f64; 2]], part: usize, digits: i32, tolerance: f64) -> Option<f64> {
-    let multiples = |places: &f64| {
+/// The largest power of ten in mm, from 1e-9 to 0.1, of which all coordinates in one direction are multiples: 0 for y, 1 for z.
+pub fn decimal_step(given: &[[f64; 2]], part: usize) -> f64 {
+    let all_are_multiples = |step: &f64| {
         given.iter().all(|at| {
-            let scaled = at[part] * places;
-            (scaled - scaled.round()).abs() < tolerance
+            let steps = at[part] / step;
+            (steps - steps.round()).abs() < 1e-4
         })
     };
-    let mut places = (1..=digits).map(|places| 10.0_f64.powi(places));
-    places.find(multiples).map(f64::recip)
-}
-
-/// The step in mm of which all heights are multiples (0.1, 0.01 or 0.001), if there is one.
-pub fn rounding(given: &[[f64; 2]]) -> Option<f64> {
-    step_of(given, 1, 3, 1e-6)
-}
-
-/// The `N` points from an index on, if there are as many.
-fn window_at<const N: usize>(points: Points<'_>, first: usize) -> Option<&[[f64; 2]; N]> {
-    points.at.get(first..)?.first_chunk()
-}
-
-/// The points in axes along and perpendicular to the chord from the first to the last of them.
-fn in_chord<const N: usize>(window: &[[f64; 2]; N]) -> [[f64; 2]; N] {
-    let (to_chord, _) = chord_axes(window);
-    window.map(|at| to_chord(&at))
+    let mut steps = (1..=DIGITS_MAX).map(|digits| 10.0_f64.powi(-digits));
+    let found = steps.find(all_are_multiples);
+    found.unwrap_or(10.0_f64.powi(-DIGITS_MAX))
 }
 
 /// Axes along and perpendicular to the chord from the first to the last point, and its length.
@@ -466,11 +357,8 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Range of the spacing in mm at which curves are compared. Its influence was not measured beyond the tests and the class *damaged profile* of
-/// `docs/stability.md`.
-const STEP: [f64; 2] = [0.1, 0.2];
-/// Number of comparisons per mean chord, within this range. It resolves a cubic between two points.
-const SAMPLES_PER_CHORD: f64 = 4.0;
+/// Spacing in mm at which curves are compared. It resolves a cubic between two points of usual profiles.
+const STEP: f64 = 0.1;
 /// Distance in mm by which the comparison and the noise estimate extend beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
 /// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
@@ -484,8 +372,6 @@ pub const REFERENCE_MIN: f64 = 3.0;
 pub struct Roughness {
     /// Root mean square over the contact of the waves between the smoothing in use and twice that, at least 3 mm.
     pub waviness: f64,
-    /// Standard deviation of the same waves in the contact and next to it, from their median. It is small if the waviness comes from a single place.
-    pub everywhere: f64,
     /// Root mean square of the difference between the spline in use and Akima's curve through the same points; 0 with smoothing.
     pub ambiguity: f64,
 }
@@ -505,6 +391,15 @@ pub struct PointsRead<'a> {
     pub rounding: Option<f64>,
 }
 
+impl PointsRead<'_> {
+    /// Standard deviation in mm of the noise along the normal in a range of points; see [`noise`]. Rounded heights have at least the noise of
+    /// the rounding, because neighbours are equal where a profile is level.
+    pub fn noise(&self, range: [usize; 2]) -> Option<f64> {
+        let least = ROUNDED * self.rounding.unwrap_or(0.0);
+        Some(noise(self.points, range)?.max(least))
+    }
+}
+
 /// Roughness at the contact `[low, high]`, in mm along the profile, from the curves there and next to it. The contact modulus is in MPa.
 fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Roughness {
     let PointsRead {
@@ -518,92 +413,45 @@ fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Rough
     let last = (high + beyond).min(points.along[points.along.len() - 1]);
     let reference = REFERENCE_MIN.max(2.0 * smoothing);
     let part = points.within([first - SUPPORT * reference, last + SUPPORT * reference]);
-    let spacing =
-        (part.along[part.along.len() - 1] - part.along[0]) / (part.along.len() - 1) as f64;
-    let step = (spacing / SAMPLES_PER_CHORD).clamp(STEP[0], STEP[1]);
-    let count = ((last - first) / step).floor() as usize + 1;
-    let places = || (0..count).map(|k| first + step * k as f64);
-    let used: Vec<([f64; 2], [f64; 2])> = places()
-        .map(|s| curve.at(s))
-        .map(|used| (used.at, used.tangent()))
-        .collect();
-    let pressures = |other: &PlaneCurve| {
-        let heights: Vec<f64> = (used.iter().zip(places()))
-            .map(|(used, s)| above(*used, other.position(s)))
+    let count = ((last - first) / STEP).floor() as usize + 1;
+    let places: Vec<f64> = (0..count).map(|k| first + STEP * k as f64).collect();
+    let used: Vec<CurvePoint> = places.iter().map(|s| curve.at(*s)).collect();
+    let inside = places.partition_point(|s| *s < low)..places.partition_point(|s| *s <= high);
+    let pressure = |other: &PlaneCurve| {
+        let differences = used.iter().zip(&places);
+        let heights: Vec<f64> = differences
+            .map(|(used, s)| above(used, other.position(*s)))
             .collect();
-        flattening(&heights, step, 1.0)
+        let squares = inside.clone().map(|k| flattening(&heights, k).powi(2));
+        modulus * (squares.sum::<f64>() / inside.len().max(1) as f64).sqrt()
     };
-    let over_contact = |pressures: &[f64]| {
-        let inside = places().zip(pressures);
-        let inside = inside.filter(|(s, _)| (low..=high).contains(s));
-        let (sum, count) = inside.fold((0.0, 0.0_f64), |(sum, count), (_, pressure)| {
-            (sum + pressure * pressure, count + 1.0)
-        });
-        modulus * (sum / count.max(1.0)).sqrt()
-    };
-    let waves = pressures(&PlaneCurve::through(part.at, part.along, reference));
-    let ambiguity = match smoothing > 0.0 {
-        true => 0.0,
-        false => over_contact(&pressures(&PlaneCurve::akima(part.at, part.along))),
-    };
-    let mut sizes: Vec<f64> = waves.iter().map(|pressure| pressure.abs()).collect();
     Roughness {
-        waviness: over_contact(&waves),
-        everywhere: modulus * (median(&mut sizes) / MEDIAN_OF_NORMAL),
-        ambiguity,
+        waviness: pressure(&PlaneCurve::through(part.at, part.along, reference)),
+        ambiguity: match smoothing > 0.0 {
+            true => 0.0,
+            false => pressure(&PlaneCurve::akima(part.at, part.along)),
+        },
     }
 }
 
-/// Distance along the normal from a point of a curve, given with its unit tangent, to a point of another curve; positive if the first curve is
-/// above.
-fn above((at, tangent): ([f64; 2], [f64; 2]), other: [f64; 2]) -> f64 {
-    tangent[0] * (at[1] - other[1]) - tangent[1] * (at[0] - other[0])
+/// Distance along the normal from a point of a curve to a point of another curve; positive if the first curve is above.
+fn above(used: &CurvePoint, other: [f64; 2]) -> f64 {
+    let tangent = used.tangent();
+    tangent[0] * (used.at[1] - other[1]) - tangent[1] * (used.at[0] - other[0])
 }
 
-/// Length in mm over which heights are tapered to 0 at both ends.
-const TAPER: f64 = 2.0;
-
-thread_local! {
-    /// Plans of the Fourier transforms, of which there are about a dozen. Making a plan takes longer than using it.
-    static PLANNER: RefCell<RealFftPlanner<f32>> = RefCell::new(RealFftPlanner::new());
-}
-
-/// Pressures in MPa that flatten `heights` in mm, `step` mm apart, for a contact modulus in MPa.
-fn flattening(heights: &[f64], step: f64, modulus: f64) -> Vec<f64> {
-    let count = heights.len();
-    // Zeros keep the periodic transform from coupling the two ends.
-    let padded = (2 * count).max(2).next_power_of_two();
-    let mut values = vec![0.0; padded];
-    for (k, height) in heights.iter().enumerate() {
-        let from_end = step * k.min(count - 1 - k) as f64;
-        let share = match from_end < TAPER {
-            true => 0.5 * (1.0 - (PI * from_end / TAPER).cos()),
-            false => 1.0,
-        };
-        values[k] = (share * height) as f32;
-    }
-    let (forward, backward) = PLANNER.with_borrow_mut(|planner| {
-        (
-            planner.plan_fft_forward(padded),
-            planner.plan_fft_inverse(padded),
-        )
-    });
-    let mut spectrum = forward.make_output_vec();
-    // The buffers have the lengths of the plans, so that neither transform can fail.
-    let done = forward.process(&mut values, &mut spectrum);
-    debug_assert!(done.is_ok());
-    for (m, entry) in spectrum.iter_mut().enumerate() {
-        let wavenumber = TAU * m as f64 / (padded as f64 * step);
-        *entry *= (0.5 * modulus * wavenumber / padded as f64) as f32;
-    }
-    if let Some(last) = spectrum.last_mut() {
-        last.im = 0.0;
-    }
-    spectrum[0].im = 0.0;
-    let done = backward.process(&mut spectrum, &mut values);
-    debug_assert!(done.is_ok());
-    values.truncate(count);
-    values.into_iter().map(f64::from).collect()
+/// Pressure at one of evenly spaced places that flattens `heights` in mm, relative to the contact modulus.
+///
+/// A wave `r` of the wavenumber k needs the pressure `E* |k| r / 2`. For samples a distance h apart, `|k|` is the sum with the weights `π/(2h)`
+/// at the place itself and `−2/(π m² h)` at the odd distances m.
+fn flattening(heights: &[f64], at: usize) -> f64 {
+    let odd = |(k, height): (usize, &f64)| {
+        let distance = k.abs_diff(at);
+        let is_odd = distance % 2 == 1;
+        is_odd.then(|| height / (distance * distance) as f64)
+    };
+    let others: f64 = heights.iter().enumerate().filter_map(odd).sum();
+    0.5 * (0.5 * PI * heights[at] - 2.0 / PI * others) / STEP
 }
 
 /// Standard deviation in MPa of the pressure that white noise leaves after a smoothing that halves waves of `cut` mm. The noise has the
@@ -617,11 +465,10 @@ pub fn noise_pressure(modulus: f64, noise: f64, spacing: f64, cut: f64) -> f64 {
 /// Range of advised smoothing lengths in mm. Shorter ones do not remove the noise of neighbouring points. Longer ones distort gauge corners and
 /// flange roots with radii of 13 to 20 mm: 5 mm changes the largest pressure by 2 %, 10 mm by 27 % in one of ten cases.
 pub const SMOOTHING_ADVISED: [f64; 2] = [2.0, 8.0];
-/// Noise that remains after the advised smoothing, as a share of the largest pressure. Between 0.05 and 0.1 neither pressures nor forces
-/// change by more than their scatter. Population: 18 positions on three pairs with noise of 1 to 20 µm.
+/// Noise that remains after the advised smoothing, as a share of the largest pressure; no smoothing is advised if there is no more without
+/// one. Between 0.05 and 0.1 neither pressures nor forces change by more than their scatter. Population: 18 positions on three pairs with
+/// noise of 1 to 20 µm.
 const NOISE_LEFT: f64 = 0.07;
-/// Noise without smoothing, as a share of the largest pressure, up to which no smoothing is advised.
-const NOISE_HARMLESS: f64 = 0.01;
 /// Smoothing length, in chords, that turns a polygon into a smooth curve. A shorter one does not change coarse points.
 pub(crate) const CHORDS: f64 = 2.0;
 /// Standard deviation of the rounding error in steps: 1/√12. Noise up to twice this is due to the rounding.
@@ -652,13 +499,6 @@ pub struct UnderContact {
     pub rounding: Option<f64>,
 }
 
-/// Standard deviation in mm of the noise along the normal in a range of points. Returns `None` if too few points are close enough together to
-/// determine it. Rounded heights have at least the noise of the rounding, because neighbours are equal where a profile is level.
-pub fn noise_of(reading: &PointsRead, range: [usize; 2]) -> Option<f64> {
-    let least = ROUNDED * reading.rounding.unwrap_or(0.0);
-    Some(noise(reading.points, range)?.max(least))
-}
-
 /// Quality of the points of a body under the contact `[low, high]` (mm along the profile); the contact modulus is in MPa.
 pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> UnderContact {
     let points = reading.points;
@@ -678,14 +518,12 @@ pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> U
     } else {
         points.chord(widest)
     };
-    let whole = [0, points.at.len()];
     let near = half.max(REFERENCE_MIN);
     let near = points.numbers([low - near, high + near]);
-    let noise = noise_of(reading, around).or_else(|| noise_of(reading, whole));
+    let noise = (reading.noise(around)).or_else(|| reading.noise([0, points.at.len()]));
     let roughness = roughness(reading, contact, modulus);
     let rounding = reading.rounding;
     let rounding = rounding.filter(|step| noise.is_some_and(|noise| noise <= 2.0 * ROUNDED * step));
-    let white = rounding.is_some() || is_white(points, around);
     let cut = reading.smoothing.max(2.0 * spacing);
     let explained = noise_pressure(modulus, noise.unwrap_or(0.0), spacing, cut);
     UnderContact {
@@ -695,8 +533,8 @@ pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> U
         noise,
         roughness,
         polygon: polygon(points, around, reading.digits),
-        local_defect: local_defect(points, near),
-        noisy: white && roughness.waviness <= EXPLAINED * explained,
+        local_defect: local_defect(points, near, noise.unwrap_or(0.0)),
+        noisy: roughness.waviness <= EXPLAINED * explained,
         rounding,
     }
 }
@@ -715,7 +553,7 @@ pub struct NoiseLevel {
 /// The smoothing advised for each of two bodies, in mm, given the largest pressure and the contact modulus in MPa; 0 if none is needed.
 ///
 /// `L = (2.34 E* √(s₁² h₁ + s₂² h₂) / (0.07 p))^(2/3)` leaves noise of 7 % of the pressure (see [`noise_pressure`]). It is limited to 2 to
-/// 8 mm. A body whose own noise without smoothing is below 1 % of the pressure is not smoothed. A polygon is smoothed by at least two
+/// 8 mm. A body whose own noise without smoothing is below that is not smoothed. A polygon is smoothed by at least two
 /// sides.
 pub fn advised_smoothing(bodies: [NoiseLevel; 2], modulus: f64, pressure: f64) -> [f64; 2] {
     let share = |body: &NoiseLevel| body.noise * body.spacing.sqrt();
@@ -725,7 +563,7 @@ pub fn advised_smoothing(bodies: [NoiseLevel; 2], modulus: f64, pressure: f64) -
     let length = (unsmoothed / (NOISE_LEFT * pressure)).powf(2.0 / 3.0);
     bodies.map(|body| {
         let raw = noise_pressure(modulus, body.noise, body.spacing, 2.0 * body.spacing);
-        let of_noise = if raw < NOISE_HARMLESS * pressure {
+        let of_noise = if raw < NOISE_LEFT * pressure {
             0.0
         } else {
             length.clamp(least, most)
@@ -747,6 +585,10 @@ mod tests {
         let along = arc_lengths(at);
         let points = Points { at, along: &along };
         of(points, [0, at.len()])
+    }
+
+    fn defect(points: Points, range: [usize; 2]) -> Option<LocalDefect> {
+        local_defect(points, range, noise(points, range).unwrap_or(0.0))
     }
 
     /// Points of a circle of 80 mm every 0.3 mm.
@@ -813,9 +655,9 @@ mod tests {
             count: 1,
             farthest: 90,
             distance,
-        }) = with(&points, local_defect)
+        }) = with(&points, defect)
         else {
-            panic!("{:?}", with(&points, local_defect))
+            panic!("{:?}", with(&points, defect))
         };
         assert!((distance / 0.02 - 1.0).abs() < 0.01, "{distance}");
         assert!(with(&points, noise).expect("enough points") < 1e-6);
@@ -832,7 +674,7 @@ mod tests {
                 for (at, sign) in points[90..].iter_mut().zip(&signs) {
                     at[1] += 0.03 * sign;
                 }
-                let found = with(&points, local_defect);
+                let found = with(&points, defect);
                 let Some(LocalDefect::Outliers {
                     points: [first, last],
                     count,
@@ -853,8 +695,8 @@ mod tests {
     fn a_jump_between_two_points_is_a_step_of_its_height() {
         let mut points = arc(200);
         points.iter_mut().skip(101).for_each(|at| at[1] -= 0.03);
-        let Some(LocalDefect::Step { point, height }) = with(&points, local_defect) else {
-            panic!("{:?}", with(&points, local_defect))
+        let Some(LocalDefect::Step { point, height }) = with(&points, defect) else {
+            panic!("{:?}", with(&points, defect))
         };
         assert_eq!(point, 100);
         assert!((height / -0.03 - 1.0).abs() < 0.05, "{height}");
@@ -909,35 +751,11 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_white_and_waves_are_not() {
-        let mut points = arc(400);
-        for (at, noise) in points.iter_mut().zip(normal(400)) {
-            at[1] += 0.002 * noise;
-        }
-        assert!(with(&points, is_white));
-        for length in [4.0, 7.0, 12.0] {
-            let mut points = arc(400);
-            for (k, at) in points.iter_mut().enumerate() {
-                at[1] += 0.002 * (TAU * k as f64 / length).sin();
-            }
-            assert!(!with(&points, is_white), "{length}");
-        }
-    }
-
-    #[test]
-    fn the_digits_are_those_of_the_coarser_coordinate() {
-        assert_eq!(digits(&[[0.25, 1.5], [-1.0, 3.125]]), 0.01);
-        assert_eq!(digits(&[[0.1, 1.0], [-1.0, 3.0]]), 0.1);
-        let third = 1.0 / 3.0;
-        assert_eq!(digits(&[[0.1, third], [0.2, 1.0]]), 0.1);
-        assert_eq!(digits(&[[third, third], [third, 1.0]]), DIGITS_LEAST);
-    }
-
-    #[test]
-    fn the_coarsest_decimal_of_all_heights_is_the_rounding() {
-        assert_eq!(rounding(&[[0.0, 1.2], [1.0, 3.4]]), Some(0.1));
-        assert_eq!(rounding(&[[0.0, 1.2], [1.0, 3.45]]), Some(0.01));
-        assert_eq!(rounding(&[[0.0, 1.2345], [1.0, 3.45]]), None);
+    fn the_decimal_step_is_the_coarsest_of_all_coordinates() {
+        assert_eq!(decimal_step(&[[0.0, 1.2], [1.0, 3.4]], 1), 0.1);
+        assert_eq!(decimal_step(&[[0.25, 1.2], [1.0, 3.45]], 0), 0.01);
+        assert_eq!(decimal_step(&[[0.0, 1.2345], [1.0, 3.45]], 1), 1e-4);
+        assert_eq!(decimal_step(&[[1.0 / 3.0, 0.0], [1.0, 3.45]], 0), 1e-9);
     }
 
     /// A head of 70 mm, z up: flat on top with a fall of `y²/600`, sides that fall steeply.
@@ -963,6 +781,8 @@ mod tests {
 
 #[cfg(test)]
 mod readings_tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     const MODULUS: f64 = 115_000.0;
@@ -1017,14 +837,6 @@ mod readings_tests {
                 "{length} mm: {found} MPa, {expected} expected"
             );
         }
-    }
-
-    #[test]
-    fn a_single_dent_is_not_everywhere_and_a_wave_is() {
-        let dent = of(0.0, |s| 0.005 * (-(s - 30.0).powi(2) / 0.1).exp());
-        assert!(dent.everywhere < 0.1 * dent.waviness, "{dent:?}");
-        let wave = of(0.0, |s| 0.002 * (4.0 * s).cos());
-        assert!(wave.everywhere > 0.5 * wave.waviness, "{wave:?}");
     }
 
     #[test]

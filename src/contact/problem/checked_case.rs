@@ -9,7 +9,7 @@ use crate::case::words::contact::Contact;
 use crate::case::words::solver::MethodName;
 use crate::geometry::orientation::SureBody;
 use crate::geometry::profile::{Body, Profile};
-use crate::geometry::profile_quality::{NoiseLevel, advised_smoothing, noise_of, polygon};
+use crate::geometry::profile_quality::{NoiseLevel, advised_smoothing, polygon};
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::footprint::Footprint;
 use crate::normal::gap::outcome::{APPROACH_USUAL_MAX, HALF_WIDTH_USUAL_MAX};
@@ -105,7 +105,7 @@ pub(crate) fn noise_level(profile: &Profile) -> NoiseLevel {
     let reading = profile.read();
     let whole = [0, reading.points.at.len()];
     NoiseLevel {
-        noise: noise_of(&reading, whole).unwrap_or(0.0),
+        noise: reading.noise(whole).unwrap_or(0.0),
         spacing: profile.usual_chord(),
         polygon: polygon(reading.points, whole, reading.digits),
     }
@@ -115,7 +115,7 @@ pub(crate) fn noise_level(profile: &Profile) -> NoiseLevel {
 pub(crate) fn tells_noise(profile: &Profile) -> bool {
     let reading = profile.read();
     let whole = [0, reading.points.at.len()];
-    noise_of(&reading, whole).is_some() || polygon(reading.points, whole, reading.digits).is_some()
+    reading.noise(whole).is_some() || polygon(reading.points, whole, reading.digits).is_some()
 }
 
 /// Returns the quality of both profiles before a solve, with the contact modulus in MPa.
@@ -140,7 +140,10 @@ pub(crate) fn section(profile: &Profile, advised: f64) -> SectionQuality {
         spacing_mm: profile.usual_chord(),
         hole_mm: points.along[longest + 1] - points.along[longest],
         y_mm: [points.at[longest][0], points.at[longest + 1][0]],
-        noise_um: noise_of(&profile.read(), [0, points.at.len()]).map(|noise| 1e3 * noise),
+        noise_um: profile
+            .read()
+            .noise([0, points.at.len()])
+            .map(|noise| 1e3 * noise),
         rounding_mm: profile.rounding(),
         smoothing_mm: profile.smoothing(),
         smoothing_suggested_mm: advised,

@@ -1,10 +1,11 @@
 //! Assesses the points of both profiles under the patches found, and describes their defects so that they can be corrected.
 
+use std::mem::discriminant;
+
 use crate::geometry::holes::{LENGTH_MIN, WIDE};
 use crate::geometry::profile::{Body, NEEDED_BEYOND, Profile};
 use crate::geometry::profile_quality::{
-    LocalDefect, NoiseLevel, REFERENCE_MIN, UnderContact, advised_smoothing, noise_pressure,
-    under_contact,
+    LocalDefect, NoiseLevel, REFERENCE_MIN, UnderContact, advised_smoothing, under_contact,
 };
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::wheel::WheelPatch;
@@ -13,14 +14,24 @@ use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 use crate::solution::words::damage::{PatchQuality, ProfileQuality};
 
-/// Least roughness of one body, relative to that of both, that is reported.
-const ROUGHNESS_SHARE: f64 = 0.6;
-/// Length in mm up to which a chord is assessed by its ambiguity alone, however narrow the patch. The arcs of heads and treads are 10 to
-/// 50 mm long, so that a longer chord may hide an arc that neither of the two curves through the points shows.
+/// Roughness relative to the largest pressure up to which it is harmless.
+pub(crate) const HARMLESS: f64 = 0.03;
+/// Roughness relative to the largest pressure from which a remark is due whatever its effect.
 ///
-/// Population: holes and coarse points at 384 positions on the pairs of the thresholds, seeds 1001 to 1004 and 2001 to 2012 of the class
-/// *damaged profile*. With this bound 38 of 487 correct and 165 of 174 wrong answers get the remark, with 0 mm 43 and 166.
+/// Population: holes and coarse points at 384 positions of the class *damaged profile*. At 0.08, 47 of 487 correct and 166 of 174 wrong
+/// answers get the remark, at 0.09 38 and 165, at 0.10 34 and 163.
+const ROUGH: f64 = 0.09;
+/// Ambiguity relative to the largest pressure from which a job fails.
+const AMBIGUOUS_MAX: f64 = 0.5;
+/// Waviness relative to the largest pressure from which it is a defect without noise, outlier or step. Two arcs that meet have some too: an
+/// unworn 60E1 reaches 0.12 at its gauge corner.
+const WAVES_BEYOND_SHAPE: f64 = 0.3;
+/// Length in mm from which a chord wider than the patch gets a remark, however certain the curve across it is. The arcs of heads and treads are
+/// 10 to 50 mm long, so that a longer chord may hide an arc that neither of the two curves through the points shows.
 const CHORD_HIDES_ARC: f64 = 10.0;
+/// Share of the load up to which a patch may lie entirely where two arcs meet. Its pressure does not show the quality of the profiles, and the
+/// forces do not depend on it.
+const LIGHT: f64 = 0.02;
 /// Pressure in MPa below which errors of a profile are harmless, so that no job fails because of them.
 const PRESSURE_LIGHT: f64 = 200.0;
 
@@ -37,6 +48,74 @@ pub struct FoundPatch<'a> {
     pub number: usize,
 }
 
+/// A defect of a profile under or next to a patch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Defect {
+    /// The body whose profile it is.
+    pub body: Body,
+    /// Index of the patch in the answer.
+    pub patch: usize,
+    /// Roughness of both bodies relative to the largest pressure of the patch; 0 for a defect that is no roughness.
+    pub share: f64,
+    /// Length in mm of the chord or stretch without points; 0 for other defects.
+    pub length: f64,
+    /// Whether a remark is due in any case.
+    pub certain: bool,
+    /// Whether a remark is due if other readings of the points change the answer.
+    pub suspicious: bool,
+    /// Whether the answer would be unreliable, so that the job fails unless rough profiles are accepted.
+    pub refused: bool,
+    /// The remark.
+    pub remark: Remark,
+}
+
+impl Defect {
+    /// Returns a defect that gets its remark in any case.
+    pub fn certain(body: Body, patch: usize, length: f64, remark: Remark) -> Defect {
+        Defect {
+            body,
+            patch,
+            share: 0.0,
+            length,
+            certain: true,
+            suspicious: false,
+            refused: false,
+            remark,
+        }
+    }
+
+    /// Returns whether it becomes a remark. `changes` states whether another reading of the points changes the patch much.
+    pub fn is_reported(&self, changes: bool) -> bool {
+        self.certain || self.refused || self.suspicious && changes
+    }
+
+    /// Returns whether `other` gives the same remark about another place.
+    pub fn is_like(&self, other: &Defect) -> bool {
+        self.body == other.body && discriminant(&self.remark) == discriminant(&other.remark)
+    }
+
+    /// Returns whether it is worse than another defect of its kind.
+    pub fn worse_than(&self, other: &Defect) -> bool {
+        [self.share, self.length] > [other.share, other.length]
+    }
+
+    /// JSON pointer to the profile.
+    pub fn pointer(&self) -> &'static str {
+        match self.body {
+            Body::Rail => "/contact/rail",
+            Body::Wheel => "/contact/wheel",
+        }
+    }
+
+    /// The remark for the answer.
+    pub fn entry(&self) -> RemarkEntry {
+        RemarkEntry {
+            patch: Some(self.patch),
+            ..self.remark.clone().at_pointer(self.pointer())
+        }
+    }
+}
+
 /// The profile of one body under a patch.
 struct Under<'a> {
     body: Body,
@@ -46,23 +125,10 @@ struct Under<'a> {
     found: UnderContact,
 }
 
-impl<'a> Under<'a> {
-    fn new(body: Body, profile: &'a Profile, contact: [f64; 2], modulus: f64) -> Under<'a> {
-        Under {
-            body,
-            profile,
-            contact,
-            found: under_contact(&profile.read(), contact, modulus),
-        }
-    }
-
+impl Under<'_> {
     /// y in mm at a length along the profile.
     fn y(&self, s: f64) -> f64 {
         self.profile.at(s).at[0]
-    }
-
-    fn y_of_point(&self, point: usize) -> f64 {
-        self.profile.points().at[point][0]
     }
 
     fn rough(&self) -> f64 {
@@ -70,11 +136,35 @@ impl<'a> Under<'a> {
         found.waviness.hypot(found.ambiguity)
     }
 
-    /// The cause of the roughness. Noise counts only if it needs a smoothing, as `harmful` says.
-    fn cause(&self, harmful: bool) -> Cause {
+    /// The longest chord, whose length in mm is also returned.
+    fn spacing(&self) -> (Remark, f64) {
         let found = &self.found;
-        if let Some(chord) = found.polygon {
-            return Cause::Polygon { chord };
+        let length = found.chord[1] - found.chord[0];
+        let remark = Remark::ProfileSpacing {
+            profile: self.body.name(),
+            y_mm: found.chord.map(|s| self.y(s)),
+            spacing_mm: length,
+            spacing_over_width: found.over_width,
+            ambiguity_mpa: self.rough(),
+        };
+        (remark, length)
+    }
+
+    /// The remark on the cause of the roughness, whose share of the pressure is `share`. `more` is the smoothing to recommend, in mm.
+    fn cause(&self, share: f64, more: Option<f64>) -> Remark {
+        let (found, profile) = (&self.found, self.body.name());
+        let y_mm = self.contact.map(|s| self.y(s));
+        let waviness_mpa = self.rough();
+        let y_of = |point: usize| self.profile.points().at[point][0];
+        if let Some(chord_mm) = found.polygon {
+            return Remark::ProfilePolygon {
+                profile,
+                y_mm,
+                chord_mm,
+                waviness_mpa,
+                share,
+                smoothing_mm: more,
+            };
         }
         match found.local_defect {
             Some(LocalDefect::Outliers {
@@ -82,84 +172,78 @@ impl<'a> Under<'a> {
                 count,
                 farthest,
                 distance,
-            }) => Cause::Outliers {
-                y: self.y_of_point(farthest),
-                distance,
-                between: points.map(|point| self.y_of_point(point)),
-                count,
+            }) => Remark::ProfileOutlier {
+                profile,
+                at_y_mm: y_of(farthest),
+                distance_um: 1e3 * distance,
+                points: count,
+                y_mm: points.map(y_of),
+                waviness_mpa,
+                share,
             },
-            Some(LocalDefect::Step { point, height }) => Cause::Step {
-                y: self.y_of_point(point),
-                height,
+            Some(LocalDefect::Step { point, height }) => Remark::ProfileStep {
+                profile,
+                at_y_mm: y_of(point),
+                height_um: 1e3 * height,
+                waviness_mpa,
+                share,
             },
-            None if harmful && found.noisy => Cause::Noise {
-                noise: found.noise.unwrap_or(0.0),
-                spacing: found.spacing,
-                rounding: found.rounding,
+            None if found.noisy => Remark::ProfileNoise {
+                profile,
+                y_mm,
+                noise_um: 1e3 * found.noise.unwrap_or(0.0),
+                spacing_mm: found.spacing,
+                rounding_mm: found.rounding,
+                waviness_mpa,
+                share,
+                smoothing_mm: more,
             },
-            None if found.roughness.ambiguity > found.roughness.waviness => Cause::Coarse,
-            None => Cause::Waves,
-        }
-    }
-
-    /// The noise that remains after smoothing, as a pressure in MPa.
-    fn noise_left(&self, modulus: f64) -> f64 {
-        let smoothing = self.profile.smoothing();
-        match self.found.noise {
-            Some(noise) if smoothing > 0.0 => {
-                noise_pressure(modulus, noise, self.found.spacing, smoothing)
-            }
-            _ => 0.0,
-        }
-    }
-
-    /// A defect under a patch because of which no job fails.
-    fn defect(&self, patch: FoundPatch, cause: Cause) -> Defect {
-        let found = &self.found;
-        Defect {
-            y: self.contact.map(|s| self.y(s)),
-            pressure: self.rough(),
-            load_share: patch.load_share,
-            chord: found.chord.map(|s| self.y(s)),
-            chord_length: found.chord[1] - found.chord[0],
-            over_width: found.over_width,
-            smoothing: self.profile.smoothing(),
-            ..Defect::new(self.body, patch.number, cause)
-        }
-    }
-
-    fn noise_level(&self) -> NoiseLevel {
-        NoiseLevel {
-            noise: self.found.noise.unwrap_or(0.0),
-            spacing: self.found.spacing,
-            polygon: self.found.polygon,
+            None if found.roughness.ambiguity > found.roughness.waviness => self.spacing().0,
+            None => Remark::ProfileWaves {
+                profile,
+                y_mm,
+                shorter_than_mm: REFERENCE_MIN.max(2.0 * self.profile.smoothing()),
+                waviness_mpa,
+                share,
+            },
         }
     }
 }
 
-/// The quality of both profiles under a patch, and their defects. Roughness is always among the defects, however small. `auto` states whose
-/// smoothing is chosen automatically.
+/// The quality of both profiles under a patch, and their defects. `auto` states whose smoothing is chosen automatically.
 pub fn judge(
     geometry: &WheelRail,
     patch: FoundPatch,
     modulus: f64,
     auto: [bool; 2],
 ) -> (PatchQuality, Vec<Defect>) {
-    let contacts = [0, 1].map(|body| bounds(patch.patch.ends.map(|end| end[body])));
-    let [rail, wheel] = geometry.profiles();
-    let both = [
-        Under::new(Body::Rail, rail, contacts[0], modulus),
-        Under::new(Body::Wheel, wheel, contacts[1], modulus),
-    ];
+    let profiles = geometry.profiles();
+    let both = [Body::Rail, Body::Wheel].map(|body| {
+        let profile = profiles[body as usize];
+        let contact = bounds(patch.patch.ends.map(|end| end[body as usize]));
+        Under {
+            body,
+            profile,
+            contact,
+            found: under_contact(&profile.read(), contact, modulus),
+        }
+    });
     // Without the lower bound, a lightly loaded patch would need far more smoothing than the one that carries the load.
     let pressure = patch.pressure.max(PRESSURE_LIGHT);
-    let levels = both.each_ref().map(Under::noise_level);
+    let levels = both.each_ref().map(|own| NoiseLevel {
+        noise: own.found.noise.unwrap_or(0.0),
+        spacing: own.found.spacing,
+        polygon: own.found.polygon,
+    });
     let advised = advised_smoothing(levels, modulus, pressure);
+    let share = both[0].rough().hypot(both[1].rough()) / pressure;
     let mut defects = Vec::new();
-    let rough = both[0].rough().hypot(both[1].rough());
     for (k, own) in both.iter().enumerate() {
-        if own.rough() >= ROUGHNESS_SHARE * rough {
-            defects.push(roughness(own, rough, advised[k], auto[k], patch, modulus));
+        // Of two bodies with little roughness the rougher one is named.
+        if own.rough() >= both[1 - k].rough() || own.rough() > ROUGH * pressure {
+            let more = advised[k] > own.profile.smoothing() && !auto[k];
+            let more = more.then(|| (10.0 * advised[k]).round() / 10.0);
+            defects.push(roughness(own, share, pressure, more, patch));
         }
         defects.extend(spacing(own, patch));
         defects.extend(place(own, patch));
@@ -182,46 +266,43 @@ pub fn judge(
     (quality, defects)
 }
 
-/// The roughness of a profile with its cause.
+/// The roughness of a profile, however small, with its cause.
 fn roughness(
     own: &Under,
-    both: f64,
-    advised: f64,
-    auto: bool,
+    share: f64,
+    pressure: f64,
+    more: Option<f64>,
     patch: FoundPatch,
-    modulus: f64,
 ) -> Defect {
-    let found = &own.found;
-    let pressure = patch.pressure.max(PRESSURE_LIGHT);
-    let more = !auto && advised > own.profile.smoothing();
+    let remark = own.cause(share, more);
+    let loaded = patch.load_share > LIGHT;
+    // The shape of a sound profile, such as two arcs that meet, has some waviness and some ambiguity.
+    let is_beyond_shape = match remark {
+        _ if own.profile.smoothing() > 0.0 => true,
+        Remark::ProfileWaves { .. } => share > WAVES_BEYOND_SHAPE && loaded,
+        Remark::ProfileSpacing { .. } => share > ROUGH,
+        _ => true,
+    };
     Defect {
-        share: both / pressure,
-        left: own.noise_left(modulus) / patch.pressure,
-        everywhere: found.roughness.everywhere / patch.pressure,
-        advised: if more { advised } else { 0.0 },
-        refused: patch.load_share > LIGHT && found.roughness.ambiguity > AMBIGUOUS_MAX * pressure,
-        ..own.defect(patch, own.cause(advised > 0.0))
+        share,
+        certain: is_beyond_shape && share > ROUGH,
+        suspicious: is_beyond_shape && share > HARMLESS,
+        refused: loaded && own.found.roughness.ambiguity > AMBIGUOUS_MAX * pressure,
+        ..Defect::certain(own.body, patch.number, own.spacing().1, remark)
     }
 }
 
 /// Points too far apart for the width of the patch.
 fn spacing(own: &Under, patch: FoundPatch) -> Option<Defect> {
     let found = &own.found;
-    let length = found.chord[1] - found.chord[0];
-    let hides_arc = length > CHORD_HIDES_ARC;
-    let least = if hides_arc {
-        AMBIGUOUS_LEAST
-    } else {
-        AMBIGUOUS
-    };
-    let open = found.roughness.ambiguity > least * patch.pressure;
-    // Chords up to this length are too long only for the patch of a lightly loaded flange, which touches over some tenths of a mm.
-    let wide = length > LENGTH_MIN
-        && (found.over_width > 1.0 && open || found.over_width > WIDE && hides_arc);
-    wide.then(|| Defect {
+    let (remark, length) = own.spacing();
+    let is_open = found.roughness.ambiguity > ROUGH * patch.pressure;
+    // Chords up to the least length are too long only for the patch of a lightly loaded flange, which touches over some tenths of a mm.
+    let is_wide = length > LENGTH_MIN && found.over_width > 1.0;
+    (is_wide && (is_open || length > CHORD_HIDES_ARC)).then(|| Defect {
         share: own.rough() / patch.pressure,
         refused: patch.load_share > LIGHT && found.over_width > WIDE,
-        ..own.defect(patch, Cause::Spacing)
+        ..Defect::certain(own.body, patch.number, length, remark)
     })
 }
 
@@ -230,298 +311,20 @@ fn place(own: &Under, patch: FoundPatch) -> Option<Defect> {
     let [first, last] = own.profile.range();
     let [low, high] = own.contact;
     let middle = own.y(0.5 * (low + high));
-    let tip = match own.body {
-        Body::Rail => None,
-        Body::Wheel => own.profile.flange().and_then(|flange| flange.tip),
-    };
-    let on_tip = tip.is_some_and(|[from, to]| (from..=to).contains(&middle));
-    let cause = if on_tip {
-        Cause::FlangeTip
-    } else if low - first < NEEDED_BEYOND || last - high < NEEDED_BEYOND {
-        Cause::End {
-            left: (low - first).min(last - high),
+    let left = (low - first).min(last - high);
+    let flange = own.profile.flange().filter(|_| own.body == Body::Wheel);
+    let tip = flange.and_then(|flange| flange.tip);
+    let (profile, y_mm) = (own.body.name(), own.contact.map(|s| own.y(s)));
+    let remark = if tip.is_some_and(|[from, to]| (from..=to).contains(&middle)) {
+        Remark::ContactOnFlangeTip { profile, y_mm }
+    } else if left < NEEDED_BEYOND {
+        Remark::ContactAtProfileEnd {
+            profile,
+            y_mm,
+            left_mm: left.max(0.0),
         }
     } else {
         return None;
     };
-    // The length of a chord is no measure of this defect.
-    Some(Defect {
-        chord_length: 0.0,
-        ..own.defect(patch, cause)
-    })
-}
-
-/// Ambiguity, relative to the pressure, up to which the spacing does not matter, as on a straight stretch.
-const AMBIGUOUS_LEAST: f64 = 0.02;
-/// Ambiguity of both bodies together, relative to the largest pressure, from which coarse points get a remark.
-///
-/// Population: that of [`CHORD_HIDES_ARC`]. At 0.08, 47 of 487 correct and 166 of 174 wrong answers get the remark, at 0.09 38 and 165, at
-/// 0.10 34 and 163.
-const AMBIGUOUS: f64 = 0.09;
-/// Ambiguity, relative to the largest pressure, from which a job fails.
-const AMBIGUOUS_MAX: f64 = 0.5;
-/// Waviness, relative to the largest pressure, from which it is a defect even without noise, outlier or step. Two arcs that meet have
-/// some too: an unworn 60E1 reaches 0.12 at its gauge corner.
-const WAVES_BEYOND_SHAPE: f64 = 0.3;
-/// Share of the largest pressure up to which waves and noise are harmless. A larger median waviness indicates waves beyond the contact.
-pub(crate) const HARMLESS: f64 = 0.03;
-/// Share of the load up to which a patch may lie entirely where two arcs meet. Its pressure does not show the quality of the profiles, and the
-/// forces do not depend on it.
-pub const LIGHT: f64 = 0.02;
-/// Roughness, relative to the largest pressure, that gets a remark even if other readings of the points hardly change the answer.
-const ROUGH_IN_ANY_CASE: f64 = 0.15;
-/// Noise, relative to the largest pressure, that may remain on each body after smoothing. The advised smoothing leaves 0.07 on both together.
-const NOISE_LEFT_MAX: f64 = 0.08;
-
-/// A defect of a profile under a patch.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Defect {
-    /// The body whose profile it is.
-    pub body: Body,
-    /// Index of the patch in the answer.
-    pub patch: usize,
-    /// Range of y on the profile, in mm.
-    pub y: [f64; 2],
-    /// Roughness of this body as a pressure in MPa.
-    pub pressure: f64,
-    /// Roughness of both bodies relative to the largest pressure of the patch.
-    pub share: f64,
-    /// Share of the load that the patch carries.
-    pub load_share: f64,
-    /// Noise that remains after smoothing, as a pressure relative to the largest one; 0 without smoothing.
-    pub left: f64,
-    /// Median waviness of this body in the contact and next to it, relative to the largest pressure.
-    pub everywhere: f64,
-    /// The longest chord, as a range of y in mm.
-    pub chord: [f64; 2],
-    /// Length of that chord in mm.
-    pub chord_length: f64,
-    /// Length of that chord relative to the width of the patch.
-    pub over_width: f64,
-    /// Smoothing in use, in mm.
-    pub smoothing: f64,
-    /// Smoothing advised, in mm; 0 if it is not more than the one in use, or if the smoothing is chosen automatically.
-    pub advised: f64,
-    /// Whether the answer would be unreliable, so that the job fails unless rough profiles are accepted.
-    pub refused: bool,
-    /// The kind of defect.
-    pub cause: Cause,
-}
-
-/// A kind of defect of a profile.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Cause {
-    /// One point or a few neighbours are displaced.
-    Outliers {
-        /// y of the point displaced most, in mm.
-        y: f64,
-        /// Displacement of that point in mm.
-        distance: f64,
-        /// y of the first and of the last displaced point, in mm.
-        between: [f64; 2],
-        /// Number of displaced points.
-        count: usize,
-    },
-    /// The profile jumps between two points.
-    Step {
-        /// y of the jump in mm.
-        y: f64,
-        /// Height of the jump in mm.
-        height: f64,
-    },
-    /// The points were interpolated linearly between fewer points.
-    Polygon {
-        /// Length of the sides in mm.
-        chord: f64,
-    },
-    /// Noise of the measurement or of rounding.
-    Noise {
-        /// Standard deviation in mm.
-        noise: f64,
-        /// Mean spacing of the points in mm.
-        spacing: f64,
-        /// Step of rounding in mm.
-        rounding: Option<f64>,
-    },
-    /// Waves that are none of these.
-    Waves,
-    /// The points are too coarse to determine the curve between them.
-    Coarse,
-    /// The points are far apart for the width of the patch.
-    Spacing,
-    /// A stretch without points near the patch, where the bodies may touch too.
-    Hole,
-    /// The contact is on the tip of the flange.
-    FlangeTip,
-    /// The contact is near the end of the profile.
-    End {
-        /// Length of the profile beyond the contact, in mm.
-        left: f64,
-    },
-}
-
-impl Defect {
-    /// A defect without any measures.
-    pub(crate) fn new(body: Body, patch: usize, cause: Cause) -> Defect {
-        Defect {
-            body,
-            patch,
-            y: [0.0; 2],
-            pressure: 0.0,
-            share: 0.0,
-            load_share: 0.0,
-            left: 0.0,
-            everywhere: 0.0,
-            chord: [0.0; 2],
-            chord_length: 0.0,
-            over_width: 0.0,
-            smoothing: 0.0,
-            advised: 0.0,
-            refused: false,
-            cause,
-        }
-    }
-
-    /// Returns whether this is a kind of roughness, which matters only above a threshold.
-    pub fn is_roughness(&self) -> bool {
-        matches!(
-            self.cause,
-            Cause::Outliers { .. }
-                | Cause::Step { .. }
-                | Cause::Polygon { .. }
-                | Cause::Noise { .. }
-                | Cause::Waves
-                | Cause::Coarse
-        )
-    }
-
-    /// Returns whether it exceeds the effect of the shape of a sound profile, such as two arcs that meet.
-    pub fn has_evidence(&self) -> bool {
-        match self.cause {
-            Cause::Waves => {
-                self.smoothing > 0.0
-                    || self.everywhere > HARMLESS
-                    || self.share > WAVES_BEYOND_SHAPE && self.load_share > LIGHT
-            }
-            Cause::Coarse => self.smoothing > 0.0 || self.share > AMBIGUOUS,
-            _ => true,
-        }
-    }
-
-    /// Returns whether `other` gives the same remark about another place.
-    pub fn is_like(&self, other: &Defect) -> bool {
-        let kind = std::mem::discriminant::<Cause>;
-        self.body == other.body && kind(&self.cause) == kind(&other.cause)
-    }
-
-    /// Returns whether it becomes a remark. `changes` states whether another reading of the points changes the patch much.
-    pub fn is_reported(&self, changes: bool) -> bool {
-        match self.cause {
-            Cause::Coarse => self.has_evidence(),
-            Cause::Noise { .. } | Cause::Waves | Cause::Polygon { .. } if self.smoothing > 0.0 => {
-                self.share > ROUGH_IN_ANY_CASE || self.left > NOISE_LEFT_MAX
-            }
-            _ if self.is_roughness() && !self.refused => {
-                self.has_evidence() && (changes || self.share > ROUGH_IN_ANY_CASE)
-            }
-            _ => true,
-        }
-    }
-
-    /// Returns whether it is worse than another defect of its kind.
-    pub fn worse_than(&self, other: &Defect) -> bool {
-        [self.share, self.chord_length] > [other.share, other.chord_length]
-    }
-
-    /// JSON pointer to the profile.
-    pub fn pointer(&self) -> &'static str {
-        match self.body {
-            Body::Rail => "/contact/rail",
-            Body::Wheel => "/contact/wheel",
-        }
-    }
-
-    /// The remark for the answer.
-    pub fn remark(&self) -> RemarkEntry {
-        RemarkEntry {
-            patch: Some(self.patch),
-            ..self.report().at_pointer(self.pointer())
-        }
-    }
-
-    fn report(&self) -> Remark {
-        let profile = self.body.name();
-        let (y_mm, waviness_mpa, share) = (self.y, self.pressure, self.share);
-        let smoothing_mm = (self.advised > 0.0).then(|| (10.0 * self.advised).round() / 10.0);
-        match self.cause {
-            Cause::Outliers {
-                y,
-                distance,
-                between,
-                count,
-            } => Remark::ProfileOutlier {
-                profile,
-                at_y_mm: y,
-                distance_um: 1e3 * distance,
-                points: count,
-                y_mm: between,
-                waviness_mpa,
-                share,
-            },
-            Cause::Step { y, height } => Remark::ProfileStep {
-                profile,
-                at_y_mm: y,
-                height_um: 1e3 * height,
-                waviness_mpa,
-                share,
-            },
-            Cause::Polygon { chord } => Remark::ProfilePolygon {
-                profile,
-                y_mm,
-                chord_mm: chord,
-                waviness_mpa,
-                share,
-                smoothing_mm,
-            },
-            Cause::Noise {
-                noise,
-                spacing,
-                rounding,
-            } => Remark::ProfileNoise {
-                profile,
-                y_mm,
-                noise_um: 1e3 * noise,
-                spacing_mm: spacing,
-                rounding_mm: rounding,
-                waviness_mpa,
-                share,
-                smoothing_mm,
-            },
-            Cause::Waves => Remark::ProfileWaves {
-                profile,
-                y_mm,
-                shorter_than_mm: REFERENCE_MIN.max(2.0 * self.smoothing),
-                waviness_mpa,
-                share,
-            },
-            Cause::Coarse | Cause::Spacing => Remark::ProfileSpacing {
-                profile,
-                y_mm: self.chord,
-                spacing_mm: self.chord_length,
-                spacing_over_width: self.over_width,
-                ambiguity_mpa: self.pressure,
-            },
-            Cause::Hole => Remark::ProfileHole {
-                profile,
-                y_mm: self.chord,
-                hole_mm: self.chord_length,
-            },
-            Cause::FlangeTip => Remark::ContactOnFlangeTip { profile, y_mm },
-            Cause::End { left } => Remark::ContactAtProfileEnd {
-                profile,
-                y_mm,
-                left_mm: left.max(0.0),
-            },
-        }
-    }
+    Some(Defect::certain(own.body, patch.number, 0.0, remark))
 }

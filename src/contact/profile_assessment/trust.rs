@@ -12,7 +12,7 @@ use crate::normal::wheel::{ReferenceSurface, WheelContact, WheelPatch, WheelTask
 use crate::numerics::roots::bounds;
 use crate::problem::checked_case;
 use crate::problem::checked_case::{CheckedCase, PRESSURE_USUAL};
-use crate::profile_assessment::judge::{Cause, Defect, FoundPatch, HARMLESS, judge};
+use crate::profile_assessment::judge::{Defect, FoundPatch, judge};
 use crate::profile_assessment::uncertainty;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
@@ -102,17 +102,14 @@ fn assessed(
     for (patch, quality) in solution.patches.iter_mut().zip(qualities) {
         patch.quality = Some(quality);
     }
-    let rough = defects
-        .iter()
-        .any(|defect| defect.is_roughness() && defect.has_evidence() && defect.share > HARMLESS);
-    let suspicious = rough || undecided(contact);
+    let suspicious = defects.iter().any(|defect| defect.suspicious) || undecided(contact);
     let changes = uncertainty::add(operators, case, contact, suspicious, solution, monitor)?;
     let reported = defects
         .into_iter()
         .filter(|defect| defect.is_reported(changes[defect.patch]));
     let worst = worst_of_each(reported);
     solution.remarks.extend(remarks(contact));
-    solution.remarks.extend(worst.iter().map(Defect::remark));
+    solution.remarks.extend(worst.iter().map(Defect::entry));
     let target_below = uncertainty::target_below(case, solution);
     solution.remarks.extend(target_below);
     Ok(found)
@@ -146,7 +143,7 @@ const ACCEPT: &str = "; to solve it anyway, give accept_rough_profiles: true";
 fn rough(defect: &Defect, more: &str) -> SolveError {
     SolveError::RoughProfile {
         pointer: defect.pointer().to_owned(),
-        reason: defect.remark().detail + more,
+        reason: defect.entry().detail + more,
     }
 }
 
@@ -242,7 +239,7 @@ impl<'a> Judgement<'a> {
         };
         holes(&search, wheel.lowering, width)
             .into_iter()
-            .filter_map(|hole| self.beside(&hole, wheel, width, qualities))
+            .filter_map(|hole| self.beside(&hole, wheel, qualities))
             .collect()
     }
 
@@ -251,7 +248,6 @@ impl<'a> Judgement<'a> {
         &self,
         hole: &Hole,
         wheel: &WheelContact,
-        width: f64,
         qualities: &mut [PatchQuality],
     ) -> Option<Defect> {
         let body = hole.body as usize;
@@ -273,14 +269,14 @@ impl<'a> Judgement<'a> {
             Body::Wheel => &mut qualities[nearest].wheel,
         };
         quality.hole_mm = Some(quality.hole_mm.unwrap_or(0.0).max(length));
+        let remark = Remark::ProfileHole {
+            profile: hole.body.name(),
+            y_mm: y,
+            hole_mm: length,
+        };
         Some(Defect {
-            y,
-            chord: y,
-            chord_length: length,
-            over_width: length / width,
-            smoothing: profile.smoothing(),
             refused: hole.wide,
-            ..Defect::new(hole.body, nearest, Cause::Hole)
+            ..Defect::certain(hole.body, nearest, length, remark)
         })
     }
 }
@@ -300,7 +296,7 @@ fn noise_level_near(profile: &Profile, place: f64, modulus: f64) -> NoiseLevel {
 }
 
 /// Remarks on the smoothing chosen.
-pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
+fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
     let profiles = contact
         .geometry
         .profiles()
@@ -326,7 +322,7 @@ pub(crate) fn remarks(contact: &WheelTask) -> Vec<RemarkEntry> {
 }
 
 /// Returns whether an automatic smoothing was requested for points from which the noise cannot be determined.
-pub(crate) fn undecided(contact: &WheelTask) -> bool {
+fn undecided(contact: &WheelTask) -> bool {
     let profiles = contact.geometry.profiles().into_iter();
     profiles
         .zip(contact.trust.auto)

@@ -8,11 +8,10 @@ use std::sync::Arc;
 
 use crate::error::SolveError;
 use crate::geometry::profile::Profile;
-use crate::geometry::profile_quality::{CHORDS, SMOOTHING_ADVISED, noise_pressure};
+use crate::geometry::profile_quality::{CHORDS, SMOOTHING_ADVISED};
 use crate::monitor::{Monitor, MonitorPart};
 use crate::normal::wheel::WheelTask;
 use crate::problem::checked_case::CheckedCase;
-use crate::profile_assessment::judge::HARMLESS;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 use crate::rolling::operator_store::OperatorStore;
@@ -23,10 +22,12 @@ use crate::wheel_on_rail;
 
 /// Factors of the smoothing in the companion solves.
 pub(crate) const COMPANIONS: [f64; 2] = [0.4, 2.0];
-/// Part of the uncertainty of the pressure in any case, relative to the largest pressure.
+/// Part of the uncertainty in any case, which sound profiles have too: of the pressure relative to the largest pressure.
 const PRESSURE_FLOOR: f64 = 0.01;
-/// Part of the uncertainty of the forces in any case, relative to μN.
+/// The same part of the forces, relative to μN.
 const FORCE_FLOOR: f64 = 0.003;
+/// Change between two readings from which there is a remark, as a multiple of these parts.
+const CHANGE: f64 = 6.0;
 /// Uncertainty of the pressure due to the points, as a multiple of their roughness.
 const BY_ROUGHNESS: f64 = 2.0;
 /// Uncertainty of the forces due to the points, relative to μN, as a multiple of that of the pressure relative to the pressure.
@@ -35,14 +36,9 @@ const FORCE_BY_PRESSURE: f64 = 0.1;
 const TARGET: f64 = 0.01;
 /// Most motions for which companions are solved.
 const MOTIONS_MAX: usize = 5;
-/// Change of the pressure, relative to the largest pressure, from which there is a remark.
-const PRESSURE_CHANGE: f64 = 0.06;
-/// Change of a force, relative to μN, from which there is a remark.
-const FORCE_CHANGE: f64 = 0.02;
-/// Largest lateral distance in mm between corresponding patches of a solve and its companion.
-const SAME_PATCH: f64 = 6.0;
 
-/// Writes the uncertainty into every point and total. Returns for each patch whether another reading changes it so much that a remark is due.
+/// Writes the uncertainty into every point and total. Returns for each patch whether it changes so much without any smoothing that a remark is
+/// due.
 ///
 /// # Errors
 /// Returns an error if the monitor stopped the work.
@@ -64,8 +60,8 @@ pub(crate) fn add(
             .collect()
     };
     let mut companions = Vec::new();
-    let noisy = |patch: &PatchSolution| noisy(patch, contact.contact_modulus);
-    if suspicious || solution.patches.iter().any(noisy) {
+    let is_smoothed = contact.geometry.profiles().map(Profile::smoothing) != [0.0; 2];
+    if suspicious || is_smoothed {
         for smoothing in readings(contact, solution) {
             let other = contact.smoothed(smoothing);
             match wheel_on_rail::solve(
@@ -90,12 +86,17 @@ pub(crate) fn add(
             }
         }
     }
-    Ok(write(
+    let mut changes = write(
         case.problem.friction.largest(),
         &chosen,
         &companions,
         solution,
-    ))
+    );
+    // Companions of a smoothed profile always differ, by their smoothing.
+    if is_smoothed {
+        changes.fill(false);
+    }
+    Ok(changes)
 }
 
 /// The remark on a target below the uncertainty due to the profiles, where that was determined.
@@ -121,37 +122,6 @@ pub(crate) fn target_below(case: &CheckedCase, solution: &Solution) -> Option<Re
         }
         .into()
     })
-}
-
-/// Returns whether the noise that remains after smoothing is a significant share of the pressure.
-fn noisy(patch: &PatchSolution, modulus: f64) -> bool {
-    let Some(quality) = &patch.quality else {
-        return false;
-    };
-    let noise = |own: &ProfileQuality| match own.noise_um {
-        Some(noise) if own.smoothing_mm > 0.0 => {
-            noise_pressure(modulus, 1e-3 * noise, own.spacing_mm, own.smoothing_mm)
-        }
-        _ => 0.0,
-    };
-    let both = noise(&quality.rail).hypot(noise(&quality.wheel));
-    both > HARMLESS * patch.pressure_max_mpa
-}
-
-/// Roughness of both bodies in MPa: their ambiguity, and their waviness if it is not due to the shape.
-fn roughness(patch: &PatchSolution, rough: bool) -> f64 {
-    let Some(quality) = &patch.quality else {
-        return 0.0;
-    };
-    let own = |body: &ProfileQuality| {
-        let waviness = if rough || body.smoothing_mm > 0.0 {
-            body.waviness_mpa
-        } else {
-            0.0
-        };
-        waviness.hypot(body.ambiguity_mpa)
-    };
-    own(&quality.rail).hypot(own(&quality.wheel))
 }
 
 /// The smoothings of rail and wheel for the companions. Profiles without smoothing have one companion, with the smoothing that suits
@@ -194,115 +164,90 @@ fn companion(case: &CheckedCase, chosen: &[usize]) -> CheckedCase {
     }
 }
 
-/// Differences between answers, in forces (N) and in the largest pressure (MPa).
-#[derive(Debug, Clone, Copy, Default)]
-struct Differences {
-    force: [f64; 2],
-    pressure: f64,
+/// Changes of the forces along x and y in N and of the largest pressure in MPa.
+type Changes = [f64; 3];
+
+/// The larger one of each pair of changes.
+fn widest(one: Changes, other: Changes) -> Changes {
+    [0, 1, 2].map(|k| one[k].max(other[k]))
 }
 
-impl Differences {
-    /// Enlarges the differences to at least these.
-    fn widen(&mut self, force: [f64; 2], pressure: f64) {
-        self.force = [0, 1].map(|k| self.force[k].max(force[k]));
-        self.pressure = self.pressure.max(pressure);
-    }
-
-    /// The uncertainty for a friction limit μN and a largest pressure.
-    fn report(self, limit: f64, pressure: f64) -> ProfileUncertainty {
-        ProfileUncertainty {
-            force_x_n: self.force[0] + FORCE_FLOOR * limit,
-            force_y_n: self.force[1] + FORCE_FLOOR * limit,
-            pressure_max_mpa: self.pressure + PRESSURE_FLOOR * pressure,
-        }
+/// The uncertainty with these changes where the friction limit μN is `limit` and the largest pressure is `pressure`, of a motion with
+/// `[load, pressure]` relative to these.
+fn report(changes: Changes, limit: f64, pressure: f64, share: [f64; 2]) -> ProfileUncertainty {
+    let [force_x, force_y, change] = changes;
+    let floor = FORCE_FLOOR * limit;
+    ProfileUncertainty {
+        force_x_n: share[0] * (force_x + floor),
+        force_y_n: share[0] * (force_y + floor),
+        pressure_max_mpa: share[1] * (change + PRESSURE_FLOOR * pressure),
     }
 }
 
-impl ProfileUncertainty {
-    /// The uncertainty in another motion, given its load and its largest pressure relative to those of the first one.
-    fn in_proportion(self, [load, pressure]: [f64; 2]) -> ProfileUncertainty {
-        ProfileUncertainty {
-            force_x_n: self.force_x_n * load,
-            force_y_n: self.force_y_n * load,
-            pressure_max_mpa: self.pressure_max_mpa * pressure,
-        }
-    }
-}
-
-/// Writes the uncertainties of all motions, in proportion to their loads and pressures.
+/// Writes the uncertainties of all motions, in proportion to their loads and pressures. Returns for each patch whether a companion differs so
+/// much that a remark is due.
 fn write(
     friction: f64,
     chosen: &[usize],
     companions: &[Solution],
     solution: &mut Solution,
 ) -> Vec<bool> {
-    let rough = !companions.is_empty();
-    let patches = solution.patches.iter();
-    let of_patches: Vec<[Differences; 2]> = patches
-        .map(|patch| {
-            let limit = friction * patch.normal_force_n;
-            of_patch(patch, chosen, companions, limit, rough)
-        })
+    let is_compared = !companions.is_empty();
+    let patches = || solution.patches.iter();
+    let changes: Vec<Changes> = patches()
+        .map(|patch| changes(patch, chosen, companions))
         .collect();
-    let mut of_all = Differences::default();
-    for [_, all] in &of_patches {
-        of_all.pressure = of_all.pressure.max(all.pressure);
-        of_all.force = [0, 1].map(|k| of_all.force[k] + all.force[k]);
-    }
-    if rough {
-        of_all.force = [0.0; 2];
+    let all: Vec<Changes> = patches()
+        .zip(&changes)
+        .map(|(patch, own)| widest(*own, by_points(patch, friction, is_compared)))
+        .collect();
+    let mut total = all.iter().fold([0.0; 3], |sum: Changes, own| {
+        [sum[0] + own[0], sum[1] + own[1], sum[2].max(own[2])]
+    });
+    if is_compared {
+        total = [0.0, 0.0, total[2]];
     }
     for companion in companions {
         let pressure = (largest(companion) - largest(solution)).abs();
         for (k, other) in chosen.iter().zip(&companion.total) {
             let own = &solution.total[*k];
-            let force = [
-                (other.force_x_n - own.force_x_n).abs(),
-                (other.force_y_n - own.force_y_n).abs(),
-            ];
-            of_all.widen(force, pressure);
+            let force_x = (other.force_x_n - own.force_x_n).abs();
+            let force_y = (other.force_y_n - own.force_y_n).abs();
+            total = widest(total, [force_x, force_y, pressure]);
         }
     }
-    let first: f64 = solution
-        .patches
-        .iter()
-        .map(|patch| patch.normal_force_n)
-        .sum();
-    let reported = of_all.report(friction * first, largest(solution));
+    let load: f64 = patches().map(|patch| patch.normal_force_n).sum();
+    let pressure = largest(solution);
     let shares: Vec<[f64; 2]> = (0..solution.total.len())
         .map(|motion| {
             let regions = || solution.at(motion).map(|part| part.region);
-            let load: f64 = regions().map(|region| region.normal_force_n).sum();
-            let pressure = regions().map(|region| region.pressure_max_mpa);
-            [
-                load / first,
-                pressure.fold(0.0, f64::max) / largest(solution),
-            ]
+            let own: f64 = regions().map(|region| region.normal_force_n).sum();
+            let pressures = regions().map(|region| region.pressure_max_mpa);
+            [own / load, pressures.fold(0.0, f64::max) / pressure]
         })
         .collect();
-    for (total, share) in solution.total.iter_mut().zip(shares) {
-        total.profile_uncertainty = Some(reported.in_proportion(share));
+    for (motion, share) in solution.total.iter_mut().zip(shares) {
+        motion.profile_uncertainty = Some(report(total, friction * load, pressure, share));
     }
-    let mut changes = Vec::with_capacity(of_patches.len());
-    for (patch, [between, all]) in solution.patches.iter_mut().zip(of_patches) {
-        let limit = FORCE_CHANGE * friction * patch.normal_force_n;
-        let is_large = |force: &f64| *force > limit && limit > 0.0;
-        changes.push(
-            between.pressure > PRESSURE_CHANGE * patch.pressure_max_mpa
-                || between.force.iter().any(is_large),
+    let mut remarkable = Vec::with_capacity(changes.len());
+    for (patch, (own, all)) in solution.patches.iter_mut().zip(changes.iter().zip(all)) {
+        let (load, pressure) = (patch.normal_force_n, patch.pressure_max_mpa);
+        let limit = CHANGE * FORCE_FLOOR * friction * load;
+        let is_large = |force: f64| force > limit && limit > 0.0;
+        remarkable.push(
+            own[2] > CHANGE * PRESSURE_FLOOR * pressure || is_large(own[0]) || is_large(own[1]),
         );
-        let reported = all.report(friction * patch.normal_force_n, patch.pressure_max_mpa);
         for point in &mut patch.points {
             let share = point.region.as_deref().map_or([1.0; 2], |region| {
                 [
-                    region.normal_force_n / patch.normal_force_n,
-                    region.pressure_max_mpa / patch.pressure_max_mpa,
+                    region.normal_force_n / load,
+                    region.pressure_max_mpa / pressure,
                 ]
             });
-            point.profile_uncertainty = Some(reported.in_proportion(share));
+            point.profile_uncertainty = Some(report(all, friction * load, pressure, share));
         }
     }
-    changes
+    remarkable
 }
 
 fn largest(solution: &Solution) -> f64 {
@@ -310,42 +255,39 @@ fn largest(solution: &Solution) -> f64 {
     all.fold(0.0, f64::max)
 }
 
-/// The differences of a patch, whose friction limit μN is `limit`, from the nearest patch of each companion; and the same including the effect
-/// of the roughness of its points.
-fn of_patch(
-    patch: &PatchSolution,
-    chosen: &[usize],
-    companions: &[Solution],
-    limit: f64,
-    rough: bool,
-) -> [Differences; 2] {
-    let by_points = BY_ROUGHNESS * roughness(patch, rough);
-    let force = FORCE_BY_PRESSURE * limit * by_points / patch.pressure_max_mpa;
-    let mut between = Differences::default();
+/// The changes of a patch from the nearest patch of each companion.
+fn changes(patch: &PatchSolution, chosen: &[usize], companions: &[Solution]) -> Changes {
     let across = |patch: &PatchSolution| patch.position.map_or(0.0, |place| place.track_mm[1]);
     let far = |other: &PatchSolution| (across(other) - across(patch)).abs();
+    let mut changes = [0.0; 3];
     for companion in companions {
-        let same = companion
-            .patches
-            .iter()
-            .min_by(|a, b| far(a).total_cmp(&far(b)))
-            .filter(|same| far(same) < SAME_PATCH);
-        let Some(same) = same else {
-            // The companion has no such patch, so that the patch is entirely uncertain.
-            between.widen([limit; 2], patch.pressure_max_mpa);
+        let others = companion.patches.iter();
+        let Some(same) = others.min_by(|a, b| far(a).total_cmp(&far(b))) else {
             continue;
         };
         let pressure = (same.pressure_max_mpa - patch.pressure_max_mpa).abs();
         for (k, other) in chosen.iter().zip(&same.points) {
             let own = &patch.points[*k];
-            let force = [
-                (other.force_x_n - own.force_x_n).abs(),
-                (other.force_y_n - own.force_y_n).abs(),
-            ];
-            between.widen(force, pressure);
+            let force_x = (other.force_x_n - own.force_x_n).abs();
+            let force_y = (other.force_y_n - own.force_y_n).abs();
+            changes = widest(changes, [force_x, force_y, pressure]);
         }
     }
-    let mut all = between;
-    all.widen([force; 2], by_points);
-    [between, all]
+    changes
+}
+
+/// The changes that the roughness of both bodies may cause: their ambiguity, and their waviness if it is not due to the shape.
+fn by_points(patch: &PatchSolution, friction: f64, is_rough: bool) -> Changes {
+    let Some(quality) = &patch.quality else {
+        return [0.0; 3];
+    };
+    let roughness = |body: &ProfileQuality| {
+        let is_shape = !is_rough && body.smoothing_mm == 0.0;
+        let waviness = if is_shape { 0.0 } else { body.waviness_mpa };
+        waviness.hypot(body.ambiguity_mpa)
+    };
+    let pressure = BY_ROUGHNESS * roughness(&quality.rail).hypot(roughness(&quality.wheel));
+    let limit = friction * patch.normal_force_n;
+    let force = FORCE_BY_PRESSURE * limit * pressure / patch.pressure_max_mpa;
+    [force, force, pressure]
 }
