@@ -1,6 +1,6 @@
 //! Computes the values at the nodes of the table from the solved columns.
 
-use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
+use railhead_contact::rolling::linear_theory::coefficients_with_spin;
 use railhead_contact::rolling::methods::table::evaluate::{growth, linear, linear_part};
 use railhead_contact::rolling::methods::table::spline::{
     DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, Shape, VALUES,
@@ -49,10 +49,10 @@ pub fn values() -> Vec<f32> {
                 continue;
             };
             let (ratio, root) = (ratio(node_ratio), ratio(node_ratio).sqrt());
-            let [q11, q22, _] = coefficients(ratio, 0.25);
+            let [q11, q22, ..] = coefficients_with_spin(ratio, 0.25);
             let shape = Shape::new(root, [q11, q22]);
-            let [c11, c22, c23] = coefficients(ratio, nu);
-            let kalker = [c11, c22, c23, spin_coefficient(ratio, nu)];
+            let kalker = coefficients_with_spin(ratio, nu);
+            let [c11, c22, ..] = kalker;
             for (chi, column) in columns.iter().enumerate() {
                 for p in 0..POLES {
                     for (k, step) in SIZES.into_iter().enumerate() {

@@ -2,7 +2,7 @@
 //! answers.
 
 use railhead_contact::remark::entry::RemarkEntry;
-use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
+use railhead_contact::rolling::linear_theory::coefficients_with_spin;
 use railhead_contact::solution::words::answer::{Gradients, PointSolution};
 use serde_json::{Value, json};
 
@@ -71,8 +71,7 @@ fn gradients_at_rest_are_kalkers_coefficients_within_their_errors() {
     let mut failures = Vec::new();
     for (ratio, nu) in [(1.0, 0.28), (0.3, 0.28), (2.5, 0.1)] {
         let contact = Ellipse::steel(ratio, nu).moving(0.0, 0.0, 0.0);
-        let [c11, c22, c23] = coefficients(ratio, nu);
-        let c33 = spin_coefficient(ratio, nu);
+        let [c11, c22, c23, c33] = coefficients_with_spin(ratio, nu);
         let unit = units(&contact);
         for target in TARGETS {
             let found = *only(&case(&contact, to(target)))

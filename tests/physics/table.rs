@@ -3,7 +3,7 @@
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
-use railhead_contact::rolling::linear_theory::{coefficients, spin_coefficient};
+use railhead_contact::rolling::linear_theory::{coefficients, coefficients_with_spin};
 use railhead_contact::rolling::methods::table::evaluate::EllipseTable;
 use railhead_contact::rolling::methods::table::file::table;
 use serde::Deserialize;
@@ -92,7 +92,7 @@ fn on_planes_of_symmetry_the_components_that_vanish_are_0() {
 fn vanishing_creepage_gives_linear_theory_exactly() {
     for (shape, ellipse) in shapes() {
         let [ratio, nu] = shape;
-        let ([c11, c22, c23], c33) = (coefficients(ratio, nu), spin_coefficient(ratio, nu));
+        let [c11, c22, c23, c33] = coefficients_with_spin(ratio, nu);
         for direction in directions() {
             let size = 1e-7;
             let [x, y, z] = creepage(shape, direction, size);

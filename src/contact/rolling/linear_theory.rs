@@ -5,6 +5,7 @@
 //! compares. They agree with Kalker's printed table to its rounding, about 1 % for slender ellipses.
 
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 use crate::numerics::interpolation;
 
@@ -24,14 +25,8 @@ pub fn ratio(row: usize) -> f64 {
 /// proportion to the asymptotes of slender ellipses.
 pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     let inside = a_over_b.clamp(ratio(0), ratio(RATIOS - 1));
-    let (first, along, across) = places(inside, poisson_ratio);
-    let mut found = [0, 1, 2].map(|k| {
-        let row = |r: usize| -> f64 {
-            let entries = TABLE[first + r][k].iter().zip(across);
-            entries.map(|(c, weight)| weight * c.ln()).sum()
-        };
-        (0..4).map(|r| along[r] * row(r)).sum::<f64>().exp()
-    });
+    let [c11, c22, c23, _] = coefficients_with_spin(inside, poisson_ratio);
+    let mut found = [c11, c22, c23];
     if a_over_b.to_bits() != inside.to_bits() {
         let (here, edge) = (
             slender(a_over_b, poisson_ratio),
@@ -44,15 +39,29 @@ pub fn coefficients(a_over_b: f64, poisson_ratio: f64) -> [f64; 3] {
     found
 }
 
-/// C33 for a/b from 1/32 to 32, clamped, and Poisson's ratio 0 to 0.5; interpolated like [`coefficients`].
-pub fn spin_coefficient(a_over_b: f64, poisson_ratio: f64) -> f64 {
+/// `[C11, C22, C23, C33]` for a/b from 1/32 to 32, clamped, and Poisson's ratio 0 to 0.5; interpolated like [`coefficients`].
+pub fn coefficients_with_spin(a_over_b: f64, poisson_ratio: f64) -> [f64; 4] {
     let (first, along, across) = places(a_over_b.clamp(ratio(0), ratio(RATIOS - 1)), poisson_ratio);
-    let row = |r: usize| -> f64 {
-        let entries = SPIN[first + r].iter().zip(across);
-        entries.map(|(c, weight)| weight * c.ln()).sum()
-    };
-    (0..4).map(|r| along[r] * row(r)).sum::<f64>().exp()
+    let rows = &LOGARITHMS[first..first + 4];
+    [0, 1, 2, 3].map(|k| {
+        let of_row = |row: &[[f64; 5]; 4]| -> f64 {
+            let entries = row[k].iter().zip(across);
+            entries.map(|(ln, weight)| weight * ln).sum()
+        };
+        let rows = rows.iter().zip(along);
+        rows.map(|(row, weight)| weight * of_row(row))
+            .sum::<f64>()
+            .exp()
+    })
 }
+
+/// The logarithms of the entries of [`TABLE`] and [`SPIN`].
+static LOGARITHMS: LazyLock<[[[f64; 5]; 4]; RATIOS]> = LazyLock::new(|| {
+    std::array::from_fn(|row| {
+        let [c11, c22, c23] = TABLE[row];
+        [c11, c22, c23, SPIN[row]].map(|entries| entries.map(f64::ln))
+    })
+});
 
 /// The first of four rows, the weights of these rows, and the weights of the columns.
 fn places(inside: f64, poisson_ratio: f64) -> (usize, [f64; 4], [f64; 5]) {

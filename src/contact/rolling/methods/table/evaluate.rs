@@ -3,7 +3,7 @@
 use pulp::{Simd, WithSimd};
 
 use crate::numerics::simd;
-use crate::rolling::methods::table::shape_coefficients::{ShapeCoefficients, poisson_weights};
+use crate::rolling::linear_theory::coefficients_with_spin;
 use crate::rolling::methods::table::spline::{
     Axis, DIRECTION_COEFFICIENTS, DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLE_COEFFICIENTS, POLES,
     RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, Shape, Weights, cell, coefficients, ln_ratio_max, sigma,
@@ -27,7 +27,6 @@ pub struct CreepTable {
     pole: Axis,
     direction: Axis,
     size: Axis,
-    shapes: ShapeCoefficients,
     /// Error bounds of the cells between nodes.
     bounds: Vec<f32>,
 }
@@ -108,20 +107,19 @@ impl CreepTable {
             pole: Axis::mirrored(0.0..quarter, POLES),
             direction: Axis::mirrored(-quarter..quarter, DIRECTIONS),
             size: Axis::free(0.0, 1.0 / SIZE_STEPS, &SIZES),
-            shapes: ShapeCoefficients::new(),
             bounds: bounds.to_vec(),
         }
     }
 
-    /// The table for an ellipse with a/b from 0.1 to 10 and Poisson's ratio 0 to 0.5; both are clamped.
-    #[inline(always)]
+    /// The table for an ellipse with a/b from 0.1 to 10 and Poisson's ratio from 0 to 0.5.
     pub fn ellipse(&self, ratio: f64, poisson_ratio: f64) -> EllipseTable<'_> {
         let ln_ratio = ratio.ln();
-        let (kalker, quarter) = self.shapes.at(ln_ratio, &poisson_weights(poisson_ratio));
+        let kalker = coefficients_with_spin(ratio, poisson_ratio);
+        let [c11, c22, ..] = coefficients_with_spin(ratio, 0.25);
         let root = ratio.sqrt();
         EllipseTable {
             table: self,
-            shape: Shape::new(root, quarter),
+            shape: Shape::new(root, [c11, c22]),
             scale: [
                 kalker[0],
                 kalker[1],

@@ -2,6 +2,5 @@
 
 pub mod evaluate;
 pub mod file;
-pub mod shape_coefficients;
 pub mod solve;
 pub mod spline;
