@@ -171,6 +171,14 @@ impl Footprint {
         }
     }
 
+    /// The sampled pressure, unless the footprint is Hertz's ellipse.
+    pub(crate) fn field(&self) -> Option<&PressureField> {
+        match &self.shape {
+            FootprintShape::Hertz(_) => None,
+            FootprintShape::Sampled(field) => Some(field),
+        }
+    }
+
     /// Whether the pressure jumps from one sample to the next.
     pub fn jumps(&self) -> bool {
         matches!(&self.shape, FootprintShape::Sampled(field) if field.jump().is_some())

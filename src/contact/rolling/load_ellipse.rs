@@ -67,7 +67,15 @@ impl LoadEllipse {
         }
     }
 
-    /// The equivalent ellipse of a patch from the samples of its pressure, without the mismatch, for an estimate.
+    /// The ellipse of one patch of a footprint, without the mismatch. That of a sampled pressure follows from its samples.
+    pub(crate) fn rough(footprint: &Footprint, patch: usize) -> LoadEllipse {
+        match footprint.field() {
+            Some(field) => LoadEllipse::of_samples(field, patch),
+            None => LoadEllipse::of(footprint, patch),
+        }
+    }
+
+    /// The equivalent ellipse of a patch from the samples of its pressure, without the mismatch.
     pub(crate) fn of_samples(field: &PressureField, patch: usize) -> LoadEllipse {
         LoadEllipse {
             centre: field.load_centre(Some(patch)),

@@ -14,12 +14,13 @@ use crate::half_space::unlike_bodies::Elasticity;
 use crate::mesh::{MeshSize, SIDE_GOOD};
 use crate::method::{Method, TractionBound};
 use crate::normal::footprint::Footprint;
-use crate::normal::hertz::{Ellipse, NormalLoad, Patch};
+use crate::normal::hertz::{Ellipse, NormalLoad};
 use crate::numerics::simd::length;
 use crate::rolling::answer::{LevelAnswer, Work};
 use crate::rolling::linear_theory;
+use crate::rolling::load_ellipse::LoadEllipse;
 use crate::rolling::methods::full_slip;
-use crate::rolling::strip_mesh::StripMesh;
+use crate::rolling::strip_mesh::{Scale, StripMesh};
 use crate::rolling::task::{Motion, Resolution, RollingTask};
 
 /// The default mesh. Finer ones change the resultants by a small fraction of the error of the theory.
@@ -97,10 +98,12 @@ fn brushes<'a>(
     level: &'a StripMesh,
     motion: &'a Motion,
 ) -> impl Iterator<Item = SimplifiedTheory> + 'a {
-    let patches = task.footprint.patches().iter().enumerate();
-    patches.map(move |(p, patch)| {
-        let ellipse = EquivalentEllipse::like(level, p, patch);
-        SimplifiedTheory::new(&ellipse, task.elasticity.poisson_ratio, motion)
+    let Scale { origin, length, .. } = level.scale;
+    (0..task.footprint.patches().len()).map(move |patch| {
+        let ellipse = LoadEllipse::rough(task.footprint, patch);
+        let centre = [0, 1].map(|k| (ellipse.centre[k] - origin[k]) / length);
+        let semi_axes = ellipse.semi_axes.map(|axis| axis / length);
+        SimplifiedTheory::new(centre, semi_axes, task.elasticity.poisson_ratio, motion)
     })
 }
 
@@ -160,12 +163,7 @@ impl EllipseMesh {
         }
         let motion = Motion::of(creepage.map(|part| PER_LIMIT * part));
         let (a, b) = (a_over_b.sqrt(), 1.0 / a_over_b.sqrt());
-        let ellipse = EquivalentEllipse {
-            centre: [0.0; 2],
-            a,
-            b,
-        };
-        let brush = SimplifiedTheory::new(&ellipse, poisson_ratio, &motion);
+        let brush = SimplifiedTheory::new([0.0; 2], [a, b], poisson_ratio, &motion);
         let mesh = &self.level.normalised;
         let (mut force, mut stick, mut whole) = ([0.0; 3], 0.0, 0.0);
         for (segment, load_y) in mesh.segments.iter().zip(&mesh.load_y) {
@@ -215,42 +213,6 @@ fn make_parabolic(level: &StripMesh, patch: usize, bound: &mut [f64]) {
     }
 }
 
-/// The equivalent ellipse of a patch, dimensionless.
-#[derive(Debug, Clone, Copy)]
-struct EquivalentEllipse {
-    centre: [f64; 2],
-    a: f64,
-    b: f64,
-}
-
-impl EquivalentEllipse {
-    fn like(level: &StripMesh, index: usize, patch: &Patch) -> EquivalentEllipse {
-        let mesh = &level.normalised;
-        let (mut load, mut first, mut second) = (0.0, [0.0; 2], [0.0; 2]);
-        for segment in mesh.segments.iter().filter(|s| s.chord.patch == index) {
-            for i in segment.cells.clone() {
-                let own = level.pressure[i] * level.area[i];
-                let along = (
-                    0.5 * (mesh.left[i] + mesh.right[i]),
-                    mesh.right[i] - mesh.left[i],
-                );
-                let across = (segment.chord.y, segment.chord.dy);
-                load += own;
-                for (k, (place, width)) in [along, across].into_iter().enumerate() {
-                    first[k] += own * place;
-                    second[k] += own * (place * place + width * width / 12.0);
-                }
-            }
-        }
-        let centre = first.map(|moment| moment / load);
-        let [a, b] = match patch.semi_axes {
-            Some(semi_axes) => semi_axes.map(|axis| axis / level.scale.length),
-            None => [0, 1].map(|k| (5.0 * (second[k] / load - centre[k] * centre[k])).sqrt()),
-        };
-        EquivalentEllipse { centre, a, b }
-    }
-}
-
 /// Rigid slip over flexibility, `(ν_x/L1 − φy/L3, ν_y/L2 + φx/L3)`, which is the growth of sticking tractions along a strip.
 #[derive(Debug, Clone, Copy)]
 struct SimplifiedTheory {
@@ -262,8 +224,13 @@ struct SimplifiedTheory {
 }
 
 impl SimplifiedTheory {
-    fn new(ellipse: &EquivalentEllipse, poisson_ratio: f64, motion: &Motion) -> SimplifiedTheory {
-        let EquivalentEllipse { centre, a, b } = *ellipse;
+    /// The theory for an ellipse with this centre and these semi-axes, dimensionless.
+    fn new(
+        centre: [f64; 2],
+        [a, b]: [f64; 2],
+        poisson_ratio: f64,
+        motion: &Motion,
+    ) -> SimplifiedTheory {
         let [c11, c22, c23] = linear_theory::coefficients(a / b, poisson_ratio);
         let [l1, l2] = [c11, c22].map(|c| 8.0 * a / (3.0 * c));
         let l3 = PI * a * (a / b).sqrt() / (4.0 * c23);
