@@ -29,15 +29,11 @@ const COARSER: f64 = 0.6;
 const ERROR_FEW: f64 = 0.3;
 /// Meshes with fewer strips or cells cannot be compared with a coarser one. Their least relative error is the inverse square of that number.
 const SIDE_FEW: u32 = 3;
-/// Error of the resultants due to region and pressure of a gap with [`REGION_CELLS`] cells of the normal problem across a patch (100 gaps and 96 patches of
-/// wheels on rails).
-const REGION: f64 = 6e-4;
-/// Number of cells of the normal problem across a patch to which [`REGION`] belongs.
-const REGION_CELLS: f64 = 44.0;
+/// Error of the resultants due to region and pressure of a gap with one cell of the normal problem across a patch (100 gaps and 96 patches of wheels on
+/// rails with about 44 cells).
+const REGION: f64 = 0.45;
 /// Power of the number of cells with which that error falls.
 const REGION_POWER: f64 = 1.75;
-/// Number of cells at which the error is twice that of the power law. Chosen on one patch with a few ten-thousandths of the load.
-const REGION_CELLS_FEW: f64 = 3.0;
 
 /// Resultants with their relative errors.
 #[derive(Debug, Clone)]
@@ -201,11 +197,7 @@ fn normal_errors(task: &RollingTask, patches: &[Patch]) -> Vec<f64> {
     let Some(uncertainty) = task.footprint.uncertainty() else {
         return vec![0.0; patches.len() + 1];
     };
-    let of = |cells: &f64| {
-        let cells = cells.max(1.0);
-        let region = REGION * (REGION_CELLS / cells).powf(REGION_POWER);
-        region * (1.0 + (REGION_CELLS_FEW / cells).powi(2))
-    };
+    let of = |cells: &f64| REGION * cells.max(1.0).powf(-REGION_POWER);
     let mut errors: Vec<f64> = uncertainty.cells_across.iter().map(of).collect();
     // An error of the deepest patch, or a distance between surfaces that should touch, shifts the surface at the other patches by a part of the largest depth.
     // The load of a patch grows with the power 3/2 of its own depth.
