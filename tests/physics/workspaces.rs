@@ -163,7 +163,7 @@ fn a_workspace_that_has_served_other_motions_moves_no_answer() {
         let zero = vec![0.0; 2 * equations.padded()];
         let mut served = NewtonWorkspace::default();
         let first = solve(&mut served, STEPS_MAX, &zero, 0.50);
-        // With this few steps, starts count as near.
+        // A start nearby needs few steps.
         let near =
             |workspace: &mut NewtonWorkspace, creepage_x| solve(workspace, 8, &first, creepage_x);
         near(&mut served, 0.505);

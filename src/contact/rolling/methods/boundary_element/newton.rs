@@ -12,7 +12,7 @@ use crate::numerics::simd::length;
 use crate::rolling::answer::Work;
 use crate::rolling::methods::boundary_element::linearisation::{FallingRow, Linearisation};
 use crate::rolling::methods::boundary_element::preconditioner::{OwnBlocks, StripFactors};
-use crate::rolling::methods::boundary_element::task::{Convergence, NewtonTask, STEPS_MAX};
+use crate::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
 use crate::rolling::methods::boundary_element::workspace::{NewtonWorkspace, StepVectors, zeroed};
 use crate::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::rolling::slip_rules::Rule;
@@ -23,10 +23,6 @@ use crate::rolling::strip_mesh::StripMesh;
 
 /// Projection parameter r times `M_ii`. 0.2 takes 2 to 8 % more Newton steps; 0.45 takes 1 to 4 % fewer but is closer to values that cycle.
 const PROJECTION: f64 = 0.3;
-/// Number of first steps that are never halved: far from the solution the residual may grow for a step or two. With 4 or 16 the steps change by at most 0.6 %.
-const FREE_STEPS: u32 = 8;
-/// Largest number of halvings of a step. 3 and 8 give the same steps.
-const HALVINGS_MAX: u32 = 5;
 /// Distance of the tractions of slipping cells from the tangents of their friction circles, relative to the residual, up to which they are not moved there,
 /// which saves a product. 0.03 takes 1 % more products, 0.3 takes 1 % fewer and 1 % more steps.
 const LIFT_NEGLIGIBLE: f64 = 0.1;
@@ -35,9 +31,6 @@ const LIFT_NEGLIGIBLE: f64 = 0.1;
 const INNER_TOLERANCE: (f64, f64) = (1e-4, 1e-1);
 /// Least tolerance of a linear system over the ratio of the final to the present residual. Chosen by judgement.
 const INNER_OF_GOAL: f64 = 0.3;
-/// Factor by which the residual may exceed the largest of the last three before a step is halved. 1.2 is alike, 2 takes up to 2 % more steps.
-const GROWTH_ALLOWED: f64 = 1.5;
-
 /// Solver for one rule on one mesh. It is immutable, so threads may share it.
 #[derive(Debug)]
 pub struct Newton<'a> {
@@ -132,15 +125,8 @@ impl<'a> Newton<'a> {
         let mut report = Convergence::default();
         let mut vectors = std::mem::take(&mut workspace.vectors);
         vectors.copy(t);
-        let StepVectors {
-            step,
-            rhs,
-            best,
-            before,
-            candidate,
-        } = &mut vectors;
+        let StepVectors { step, rhs, best } = &mut vectors;
         let mut least = f64::INFINITY;
-        let mut recent = [0.0_f64; 3];
         let mut last = f64::INFINITY;
         report.residual = self.evaluate(law, t, workspace, &mut report);
         loop {
@@ -157,25 +143,14 @@ impl<'a> Newton<'a> {
             if report.iterations == law.steps_max || report.residual.is_nan() {
                 break;
             }
-            recent[report.iterations as usize % 3] = report.residual;
-            before.copy_from_slice(t);
             self.linearise(law, t, rhs, workspace, &mut report);
             let NewtonWorkspace { blocks, linear, .. } = &mut *workspace;
-            // Iterations from a distant start may cycle, so they use complete blocks.
-            let near = law.steps_max < STEPS_MAX;
-            blocks.factor(&self.own, self.equations, linear, near);
+            blocks.factor(&self.own, self.equations, linear);
             let inner = inner_tolerance(report.residual, last, law.tolerance);
             self.linear_step(rhs, inner, step, workspace, monitor, &mut report)?;
             last = report.residual;
-            self.candidate(law, t, step, &workspace.linear, candidate);
-            t.copy_from_slice(candidate);
+            self.advance(law, t, step, &workspace.linear);
             report.residual = self.evaluate(law, t, workspace, &mut report);
-            let allowed = if report.iterations < FREE_STEPS {
-                f64::INFINITY
-            } else {
-                GROWTH_ALLOWED * recent.iter().copied().fold(0.0, f64::max)
-            };
-            self.halve(law, [before, candidate], allowed, t, workspace, &mut report);
             report.iterations += 1;
         }
         if !report.converged {
@@ -184,27 +159,6 @@ impl<'a> Newton<'a> {
         }
         workspace.vectors = vectors;
         Ok(report)
-    }
-
-    /// Halves the step between two iterates until the residual is allowed or the limit of halvings is reached.
-    fn halve(
-        &self,
-        law: &NewtonTask,
-        [before, candidate]: [&[f64]; 2],
-        allowed: f64,
-        t: &mut [f64],
-        workspace: &mut NewtonWorkspace,
-        report: &mut Convergence,
-    ) {
-        let mut halvings = 0;
-        while report.residual > allowed && halvings < HALVINGS_MAX {
-            halvings += 1;
-            let share = 0.5_f64.powi(halvings as i32);
-            for i in 0..t.len() {
-                t[i] = before[i] + share * (candidate[i] - before[i]);
-            }
-            report.residual = self.evaluate(law, t, workspace, report);
-        }
     }
 
     /// The bounds of all cells at the slips of a solution; those without slip where cells stick.
@@ -416,28 +370,20 @@ impl<'a> Newton<'a> {
         Ok(())
     }
 
-    /// Writes `t` plus the step to `next`, with slipping cells projected onto the friction circle.
-    fn candidate(
-        &self,
-        law: &NewtonTask,
-        t: &[f64],
-        step: &[f64],
-        linear: &Linearisation,
-        next: &mut [f64],
-    ) {
+    /// Adds the step to `t`, with slipping cells projected onto the friction circle.
+    fn advance(&self, law: &NewtonTask, t: &mut [f64], step: &[f64], linear: &Linearisation) {
         let padded = self.equations.padded();
-        next.copy_from_slice(t);
         for i in 0..self.equations.cells() {
             if linear.slips(i) {
                 let (ux, uy) = linear.direction[i];
                 let (x, y) = (t[i] + ux * step[i], t[padded + i] + uy * step[i]);
                 let size = length(x, y);
                 let factor = if size > 0.0 { law.bound[i] / size } else { 0.0 };
-                next[i] = factor * x;
-                next[padded + i] = factor * y;
+                t[i] = factor * x;
+                t[padded + i] = factor * y;
             } else {
-                next[i] += step[i];
-                next[padded + i] += step[padded + i];
+                t[i] += step[i];
+                t[padded + i] += step[padded + i];
             }
         }
     }

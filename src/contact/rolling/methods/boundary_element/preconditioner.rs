@@ -9,13 +9,6 @@ use crate::rolling::methods::boundary_element::linearisation::{
 use crate::rolling::methods::boundary_element::strip_blocks::StripBlocks;
 use crate::rolling::slip_equations::SlipEquations;
 
-/// A segment with slipping cells gets a block per axis, like one that sticks, if the tangents of its cells are no farther from the axes than this (sine of
-/// the angle). GMRES corrects what such blocks neglect. With such blocks in all iterations, the 62 Hertz references at 0.005 take 1.4 % more instructions with
-/// .25 (callgrind), 0.8 % and 9 % more products with 1 (always), and 2.9 % with one block each; a creep curve takes 12 % more with one block each. Iterations
-/// from a distant start use one block each: otherwise five of eleven targets have no solution on an ellipse 30 times as long as wide under spin, instead of
-/// one.
-const SKEW_MAX: f64 = 0.5;
-
 /// Self-influence blocks of the operator, for one rule and mesh.
 #[derive(Debug)]
 pub struct OwnBlocks {
@@ -71,40 +64,16 @@ pub struct StripFactors {
     gathered: Vec<f64>,
     /// Cells of the last block that have two unknowns.
     stick: Vec<usize>,
-    gathered_axis: Gathered,
     pivots: Vec<usize>,
 }
 
-/// Unknowns of one axis in a segment.
-#[derive(Debug, Default)]
-struct Gathered {
-    /// The cells with an unknown of this axis.
-    rows: Vec<usize>,
-    /// Directions of the unknowns of all cells.
-    units: [Vec<f64>; 2],
-    /// One column of the block over all cells.
-    line: Vec<f64>,
-}
-
 impl StripFactors {
-    /// Builds and factors the blocks of a linearisation. There is one block per segment, or one per axis where nothing slips (sticking x and y do not interact
-    /// inside a segment) and, `near` a start, where all cells slip nearly along an axis.
-    pub fn factor(
-        &mut self,
-        own: &OwnBlocks,
-        equations: &SlipEquations,
-        linear: &Linearisation,
-        near: bool,
-    ) {
+    /// Builds and factors the blocks of a linearisation. There is one block per segment, or one per axis where nothing slips, because sticking x and y do not
+    /// interact inside a segment.
+    pub fn factor(&mut self, own: &OwnBlocks, equations: &SlipEquations, linear: &Linearisation) {
         self.blocks.clear();
         for (j, blocks) in own.blocks().enumerate() {
-            self.factor_segment(
-                blocks,
-                equations.segment(j),
-                linear,
-                near,
-                equations.padded(),
-            );
+            self.factor_segment(blocks, equations.segment(j), linear, equations.padded());
         }
         self.blocks.starts.push(self.blocks.places.len());
     }
@@ -114,20 +83,10 @@ impl StripFactors {
         (xx, yy): (&[f64], &[f64]),
         cells: Range<usize>,
         linear: &Linearisation,
-        by_axes: bool,
         padded: usize,
     ) {
         let falling = linear.falling_in(cells.clone());
-        let skew = skew(linear, cells.clone());
-        let by_axes = by_axes && falling.is_empty();
-        if by_axes && skew.is_some_and(|skew| skew <= SKEW_MAX) {
-            for axis in [0, 1] {
-                let start = self.open_block();
-                self.gather(linear, cells.clone(), axis, padded);
-                self.fill_gathered(xx, yy, cells.len(), cells.start, linear);
-                self.close_block(start);
-            }
-        } else if !falling.is_empty() || skew.is_some() {
+        if !falling.is_empty() || cells.clone().any(|i| linear.slips(i)) {
             let start = self.open_block();
             let places = &mut self.blocks.places;
             places.extend(cells.clone());
@@ -147,61 +106,6 @@ impl StripFactors {
                 self.blocks.factors.extend_from_slice(matrix);
                 self.close_block(start);
             }
-        }
-    }
-
-    /// Gathers the unknowns of a segment that belong to an axis: those of sticking cells along it, and those of slipping cells that are closer to it than to the
-    /// other.
-    fn gather(&mut self, linear: &Linearisation, cells: Range<usize>, axis: usize, padded: usize) {
-        let Gathered { rows, units, .. } = &mut self.gathered_axis;
-        rows.clear();
-        units.iter_mut().for_each(Vec::clear);
-        for (k, i) in cells.enumerate() {
-            let (x, y) = linear.direction(i);
-            let slips = linear.slips(i);
-            let (x, y) = if slips || axis == 0 {
-                (x, y)
-            } else {
-                (0.0, 1.0)
-            };
-            units[0].push(x);
-            units[1].push(y);
-            if !slips || usize::from(y.abs() > x.abs()) == axis {
-                rows.push(k);
-                let shift = if slips { 0 } else { axis * padded };
-                self.blocks.places.push(i + shift);
-            }
-        }
-    }
-
-    /// Fills a block with the unknowns gathered last.
-    fn fill_gathered(
-        &mut self,
-        xx: &[f64],
-        yy: &[f64],
-        n: usize,
-        first: usize,
-        linear: &Linearisation,
-    ) {
-        let Gathered { rows, units, line } = &mut self.gathered_axis;
-        let [x, y] = units;
-        let (x, y) = (&x[..n], &y[..n]);
-        line.resize(n, 0.0);
-        let line = &mut line[..n];
-        for (c, column) in rows.iter().enumerate() {
-            let (xx, yy) = (
-                &xx[column * n..(column + 1) * n],
-                &yy[column * n..(column + 1) * n],
-            );
-            let (ux, uy) = (x[*column], y[*column]);
-            for r in 0..n {
-                line[r] = ux * x[r] * xx[r] + uy * y[r] * yy[r];
-            }
-            let start = self.blocks.factors.len();
-            self.blocks
-                .factors
-                .extend(rows.iter().map(|row| line[*row]));
-            self.blocks.factors[start + c] -= linear.stiffness(first + column);
         }
     }
 
@@ -289,14 +193,4 @@ impl StripFactors {
     pub fn apply(&mut self, x: &mut [f64]) {
         self.blocks.apply(&mut self.gathered, x);
     }
-}
-
-/// The largest angle (its sine) between a tangent of a slipping cell of a segment and the nearest axis; `None` if no cell slips.
-fn skew(linear: &Linearisation, cells: Range<usize>) -> Option<f64> {
-    let slipping = cells.filter(|i| linear.slips(*i));
-    let skews = slipping.map(|i| {
-        let (x, y) = linear.direction(i);
-        x.abs().min(y.abs())
-    });
-    skews.reduce(f64::max)
 }

@@ -52,8 +52,6 @@ pub(crate) struct StepVectors {
     pub(crate) step: Vec<f64>,
     pub(crate) rhs: Vec<f64>,
     pub(crate) best: Vec<f64>,
-    pub(crate) before: Vec<f64>,
-    pub(crate) candidate: Vec<f64>,
 }
 
 impl NewtonWorkspace {
@@ -66,14 +64,8 @@ impl NewtonWorkspace {
 impl StepVectors {
     /// Copies an iterate to all vectors.
     pub(crate) fn copy(&mut self, t: &[f64]) {
-        let StepVectors {
-            step,
-            rhs,
-            best,
-            before,
-            candidate,
-        } = self;
-        for values in [step, rhs, best, before, candidate] {
+        let StepVectors { step, rhs, best } = self;
+        for values in [step, rhs, best] {
             values.clear();
             values.extend_from_slice(t);
         }
