@@ -83,7 +83,9 @@ impl Convergence {
         let linear = match self.inexact_steps {
             0 => String::new(),
             steps => {
-                format!("in {steps} steps the restarts of the linear solver were used up; ")
+                format!(
+                    "in {steps} steps the linear solver reached its largest number of iterations; "
+                )
             }
         };
         format!("{linear}try another mesh, with cells and strips of similar width")
