@@ -1,7 +1,7 @@
 //! The worst point of a patch, and the smallest enclosing ball of stress deviators.
 //!
 //! **Worst point**: the point with the largest von Mises stress. It is found by a scan of columns at several depths, and a search in
-//! `(x/a, y/b, ln depth)` from the three best points that lie apart.
+//! `(x/a, y/b, ln depth)` from the best point.
 //!
 //! **Smallest enclosing ball**: required by the fatigue criterion of Dang Van and the theorem of Melan. A deviator is a point with five coordinates,
 //! whose distances are those of the tensors. The centre may be free only in the first coordinates and is 0 in the others. The dual problem maximises
@@ -22,10 +22,6 @@ use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 const COLUMNS: [(usize, f64); 2] = [(13, 1.02), (7, 0.9)];
 /// Depths relative to the half-width of the patch.
 pub(crate) const DEPTHS: [f64; 8] = [0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0];
-/// Number of points from which a search starts.
-const STARTS: usize = 3;
-/// Least distance of these points in one of the coordinates.
-const APART: f64 = 0.4;
 /// First steps in `x/a`, `y/b` and `ln depth`.
 pub(crate) const STEPS: [f64; 3] = [0.12, 0.15, 0.2];
 /// Evaluations of a search.
@@ -83,34 +79,22 @@ pub fn worst_place(
     let spread = |(count, reach): (usize, f64)| {
         (0..count).map(move |k| reach * (2.0 * k as f64 / (count - 1) as f64 - 1.0))
     };
-    let mut scanned: Vec<(f64, [f64; 3])> = Vec::new();
+    let mut best = (f64::NEG_INFINITY, [0.0; 3]);
     for x in spread(COLUMNS[0]) {
         for y in spread(COLUMNS[1]) {
-            scanned.extend(DEPTHS.map(|depth| {
+            for depth in DEPTHS {
                 let at = [x, y, depth.ln()];
-                (badness(at, LoadResolution::COARSE), at)
-            }));
+                let found = badness(at, LoadResolution::COARSE);
+                if found > best.0 {
+                    best = (found, at);
+                }
+            }
         }
     }
-    scanned.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut starts: Vec<[f64; 3]> = Vec::new();
-    for (_, at) in scanned {
-        let far = |other: &[f64; 3]| (0..3).any(|k| (at[k] - other[k]).abs() > APART);
-        if starts.iter().all(far) {
-            starts.push(at);
-        }
-        if starts.len() == STARTS {
-            break;
-        }
-    }
-    let found = starts.into_iter().map(|start| {
-        let Ok(found) = climb(start, STEPS, EVALUATIONS, |at| {
-            Ok::<_, Infallible>((badness(at, LoadResolution::FINE), ()))
-        });
-        found
+    let Ok((at, _)) = climb(best.1, STEPS, EVALUATIONS, |at| {
+        Ok::<_, Infallible>((badness(at, LoadResolution::FINE), ()))
     });
-    let (best, _) = found.max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    columns.place(best)
+    columns.place(at)
 }
 
 /// Searches for the maximum of a function by steps along the axes. Returns the argument, the value and the additional result of the function there.
