@@ -23,8 +23,6 @@ const LAST_OVER_FIRST: f64 = 4.0;
 const SIDE_FIRST: f64 = 3.6;
 /// Dimensionless spin `φ c G/(μ p_max)` from which meshes are refined about the pole of the rigid slip. Values from 1 to 4 change the work by 20 %.
 const SPIN_GRADED: f64 = 2.0;
-/// Distance from the middle of the patch, in semi-axes, beyond which a pole counts as outside.
-const POLE_INSIDE: f64 = 0.9;
 /// Ratio of length to width of a patch beyond which cells become longer for a motion with spin and no pole inside. With 4 and a power of 0.75 in place of 8
 /// and 1.5, 1.5 % of the errors of random ellipses exceed twice their estimate instead of 0.5 %.
 const SLENDER_SPINNING: f64 = 8.0;
@@ -126,7 +124,7 @@ fn pole(task: &RollingTask, motion: &Motion) -> Option<[f64; 2]> {
         (2.0 * at[0] - x0 - x1) / (x1 - x0) - 1.0 / (1.0 + spin),
         (2.0 * at[1] - y0 - y1) / (y1 - y0),
     ];
-    let inside = place[0].hypot(place[1]) < POLE_INSIDE;
+    let inside = place[0].hypot(place[1]) < 1.0;
     inside.then(|| place.map(|p| (p / POLE_GRID).round() * POLE_GRID))
 }
 

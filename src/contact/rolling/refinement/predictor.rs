@@ -48,8 +48,8 @@ impl Predictor {
         self.steps.retain(|step| step.mesh != mesh);
     }
 
-    /// The predicted tractions of a motion, within their bounds: extrapolated on the line through the last two motions, or on that through the last one and rest,
-    /// or those of the last motion if it is near.
+    /// The predicted tractions of a motion, within their bounds: extrapolated on the line through the last two motions, or those of
+    /// the last motion if it is near.
     pub fn start(&self, mesh: usize, motion: &Motion, bound: &[f64]) -> Option<[Vec<f64>; 2]> {
         let mut steps = self.steps.iter().rev().filter(|step| step.mesh == mesh);
         let last = steps.next()?;
@@ -63,12 +63,7 @@ impl Predictor {
                 let pairs = last.traction[k].iter().zip(&before.traction[k]);
                 pairs.map(|(t, before)| t + along * (t - before)).collect()
             }),
-            None => {
-                let times = from_rest(motion, &last.motion)
-                    .or_else(|| is_near(motion, &last.motion).then_some(1.0))?;
-                let scaled = |values: &Vec<f64>| values.iter().map(|t| times * t).collect();
-                [scaled(&last.traction[0]), scaled(&last.traction[1])]
-            }
+            None => is_near(motion, &last.motion).then(|| last.traction.clone())?,
         };
         shrink(&mut start, bound);
         Some(start)
@@ -81,14 +76,6 @@ fn on_line(to: [f64; 3], step: [f64; 3]) -> Option<f64> {
     let aside = [0, 1, 2].map(|k| to[k] - along * step[k]);
     // Parallel up to rounding.
     (dot(aside, aside).sqrt() <= 1e-6 * dot(to, to).sqrt()).then_some(along)
-}
-
-/// The ratio of a motion to the last one, if they are parallel and of similar size. Sticking tractions grow in proportion.
-fn from_rest(motion: &Motion, last: &Motion) -> Option<f64> {
-    let along = on_line(motion.components(), last.components())?;
-    (1.0 / (1.0 + STEP_MAX)..=1.0 + STEP_MAX)
-        .contains(&along)
-        .then_some(along)
 }
 
 /// Whether the tractions of the last motion can be used unchanged.
