@@ -99,11 +99,11 @@ pub(super) fn bound_label(text: &str) -> Result<(String, String), String> {
 #[command(next_help_heading = "Solver")]
 pub(super) struct CaseArgs {
     /// Maximum estimated memory of a case in MiB; a larger case is refused.
-    #[arg(long, env = "RAILHEAD_MEMORY_LIMIT_MB", default_value_t = 2048, value_name = "MIB",
+    #[arg(long, default_value_t = 2048, value_name = "MIB",
           value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     pub memory_limit_mb: u64,
     /// Memory in MiB for mesh operators, which all workers share and later cases of the same shape reuse; 0: none are stored.
-    #[arg(long, env = "RAILHEAD_OPERATOR_STORE_MB", default_value_t = BYTES_DEFAULT >> 20, value_name = "MIB",
+    #[arg(long, default_value_t = BYTES_DEFAULT >> 20, value_name = "MIB",
           value_parser = clap::value_parser!(u64).range(..=1 << 30))]
     pub operator_store_mb: u64,
 }
@@ -126,8 +126,6 @@ impl CaseArgs {
     }
 }
 
-/// Environment variable of the data folder.
-pub(super) const DATA_DIR_VARIABLE: &str = "RAILHEAD_DATA_DIR";
 /// Default data folder.
 pub(super) const DATA_DIR_DEFAULT: &str = "./railhead-data";
 
@@ -135,12 +133,7 @@ pub(super) const DATA_DIR_DEFAULT: &str = "./railhead-data";
 #[derive(Debug, Clone, Args)]
 pub(super) struct DataFolderArgs {
     /// Data folder of the service.
-    #[arg(
-        long,
-        env = DATA_DIR_VARIABLE,
-        default_value = DATA_DIR_DEFAULT,
-        value_name = "FOLDER"
-    )]
+    #[arg(long, default_value = DATA_DIR_DEFAULT, value_name = "FOLDER")]
     pub(crate) data_dir: PathBuf,
 }
 
@@ -151,26 +144,16 @@ pub(super) struct DatabaseArgs {
     /// PostgreSQL database (15 or later) that stores jobs and results and that any number of nodes share, such as
     /// `postgres://user:password@host/database`. Without it, they are stored in the data folder. Requires a build with the feature
     /// `cluster`.
-    #[arg(
-        long,
-        env = "RAILHEAD_DATABASE_URL",
-        hide_env_values = true,
-        value_name = "URL"
-    )]
+    #[arg(long, hide_env_values = true, value_name = "URL")]
     pub database_url: Option<String>,
     /// Maximum number of database connections of this process, in addition to one that receives notifications.
-    #[arg(long, env = "RAILHEAD_DATABASE_CONNECTIONS", default_value_t = 10, value_name = "N",
+    #[arg(long, default_value_t = 10, value_name = "N",
           value_parser = clap::value_parser!(u32).range(2..))]
     pub database_connections: u32,
     /// URL for notifications between nodes, if `--database-url` points to a pooler in transaction mode (such as PgBouncer): the same
     /// database without the pooler. `none`: no notifications; nodes poll and see changes up to a second later. Default: the value of
     /// `--database-url`.
-    #[arg(
-        long,
-        env = "RAILHEAD_DATABASE_DIRECT_URL",
-        hide_env_values = true,
-        value_name = "URL"
-    )]
+    #[arg(long, hide_env_values = true, value_name = "URL")]
     pub database_direct_url: Option<String>,
     #[command(flatten)]
     pub results: ResultsArgs,
@@ -183,12 +166,11 @@ pub(super) struct ResultsArgs {
     /// Location of results larger than 32 KiB if there is a database: `s3://bucket/prefix` (keys, region and address from the usual
     /// `AWS_…` variables) or `file:///folder`. Without it, they are stored in the database. Buckets require the feature `cluster`. All
     /// nodes of a database must use the same location.
-    #[arg(long, env = "RAILHEAD_RESULTS_URL", value_name = "URL")]
+    #[arg(long, value_name = "URL")]
     pub results_url: Option<ResultsUrl>,
     /// Confirms that the folder in `--results-url` is the same one on every node (a network file system).
     #[arg(
         long,
-        env = "RAILHEAD_RESULTS_SHARED",
         default_value_t = false,
         action = ArgAction::Set,
         num_args = 0..=1,
@@ -230,12 +212,7 @@ impl DatabaseArgs {
 #[command(next_help_heading = "Shared database")]
 pub(super) struct DatabaseUrlArgs {
     /// PostgreSQL 15 or later, such as `postgres://user:password@host/database`.
-    #[arg(
-        long,
-        env = "RAILHEAD_DATABASE_URL",
-        hide_env_values = true,
-        value_name = "URL"
-    )]
+    #[arg(long, hide_env_values = true, value_name = "URL")]
     pub database_url: String,
 }
 
@@ -254,7 +231,7 @@ pub(super) struct ServeArgs {
     /// IP address and port to listen on. Port 0 selects a free port; the log event `listening` contains it.
     #[arg(
         long,
-        env = "RAILHEAD_LISTEN", help_heading = "Service",
+        help_heading = "Service",
         default_value = "127.0.0.1:8080",
         value_name = "ADDRESS:PORT",
         value_parser = address
@@ -262,33 +239,22 @@ pub(super) struct ServeArgs {
     pub listen: SocketAddr,
     /// Folder of the job table and the results; with a database, only of batches that are being received. It is created if it does not
     /// exist. Only one process can use it at a time.
-    #[arg(
-        long,
-        env = DATA_DIR_VARIABLE, help_heading = "Service",
-        default_value = DATA_DIR_DEFAULT,
-        value_name = "FOLDER"
-    )]
+    #[arg(long, help_heading = "Service", default_value = DATA_DIR_DEFAULT, value_name = "FOLDER")]
     pub data_dir: PathBuf,
     #[command(flatten)]
     pub database: DatabaseArgs,
     /// Number of jobs solved at the same time, each on its own thread. 0: other nodes solve the jobs, which requires a database
     /// [default: cores − 1, at least 1].
-    #[arg(
-        long,
-        env = "RAILHEAD_WORKERS",
-        help_heading = "Jobs",
-        value_name = "N"
-    )]
+    #[arg(long, help_heading = "Jobs", value_name = "N")]
     pub workers: Option<u16>,
     #[command(flatten)]
     pub case: CaseArgs,
     /// Time for which ended jobs and their results are kept, such as `30d`, `30days` or `12h`; `forever`: until they are deleted.
-    #[arg(long, env = "RAILHEAD_RETENTION", help_heading = "Jobs", default_value = "forever", value_name = "TIME", value_parser = retention)]
+    #[arg(long, help_heading = "Jobs", default_value = "forever", value_name = "TIME", value_parser = retention)]
     pub retention: Retention,
     /// Seconds for which running jobs may continue after a stop signal; after that they return to the queue.
     #[arg(
         long,
-        env = "RAILHEAD_SHUTDOWN_GRACE_S",
         help_heading = "Service",
         default_value_t = 10,
         value_name = "SECONDS"
@@ -298,7 +264,6 @@ pub(super) struct ServeArgs {
     /// time. After SIGINT the port closes at once.
     #[arg(
         long,
-        env = "RAILHEAD_DRAIN_DELAY_S",
         help_heading = "Service",
         default_value_t = 2,
         value_name = "SECONDS"
@@ -306,41 +271,24 @@ pub(super) struct ServeArgs {
     pub drain_delay_s: u32,
     /// When requests without an API key are answered. The service does not start if there are no keys and anonymous requests are not
     /// answered.
-    #[arg(
-        long,
-        env = "RAILHEAD_ANONYMOUS",
-        help_heading = "Access",
-        value_enum,
-        default_value = "loopback"
-    )]
+    #[arg(long, help_heading = "Access", value_enum, default_value = "loopback")]
     pub anonymous: Anonymous,
     /// Maximum number of requests per second of one API key, with bursts of twice this number; 0: no limit. Requests without a key are
     /// counted by client address; those from this machine are not counted.
-    #[arg(
-        long,
-        env = "RAILHEAD_RATE_LIMIT",
-        help_heading = "Access",
-        default_value_t = 200,
-        value_name = "N"
-    )]
+    #[arg(long, help_heading = "Access", default_value_t = 200, value_name = "N")]
     pub rate_limit: u32,
     /// Comma-separated origins of web pages that may read responses, such as `https://dashboard.example`.
-    #[arg(long, env = "RAILHEAD_CORS_ORIGIN", help_heading = "Access", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
+    #[arg(long, help_heading = "Access", value_delimiter = ',', value_name = "ORIGIN", value_parser = origin)]
     pub cors_origin: Vec<String>,
     /// Collector that receives spans of requests and jobs by OTLP over HTTP, such as `http://127.0.0.1:4318`. Without it, no spans are
     /// recorded. Requires a build with the feature `otlp`.
-    #[arg(
-        long,
-        env = "RAILHEAD_OTLP_ENDPOINT",
-        help_heading = "Log and traces",
-        value_name = "URL"
-    )]
+    #[arg(long, help_heading = "Log and traces", value_name = "URL")]
     pub otlp_endpoint: Option<Endpoint>,
     #[command(flatten)]
     pub jobs: Options,
     /// IP address and port of a second listener that serves only `/healthz`, `/readyz` and `/metrics`. Without it, only the first
     /// listener serves them, with a few connections reserved for them.
-    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", help_heading = "Service", value_name = "ADDRESS:PORT", value_parser = address)]
+    #[arg(long, help_heading = "Service", value_name = "ADDRESS:PORT", value_parser = address)]
     pub probe_listen: Option<SocketAddr>,
     #[command(flatten)]
     pub http: HttpOptions,
@@ -349,7 +297,6 @@ pub(super) struct ServeArgs {
     /// `--address-connections-max` to the proxies.
     #[arg(
         long,
-        env = "RAILHEAD_TRUSTED_PROXIES",
         help_heading = "Access",
         value_delimiter = ',',
         value_name = "ADDRESSES"
@@ -359,7 +306,6 @@ pub(super) struct ServeArgs {
     /// names are refused, because a web page could point its own name to this service (DNS rebinding).
     #[arg(
         long,
-        env = "RAILHEAD_ALLOWED_HOST",
         help_heading = "Access",
         value_delimiter = ',',
         value_name = "NAME"
@@ -374,15 +320,10 @@ pub(super) struct ServeArgs {
 #[command(next_help_heading = "Log and traces")]
 pub(super) struct LogArgs {
     /// Format of log lines.
-    #[arg(long, env = "RAILHEAD_LOG_FORMAT", value_enum, default_value = "text")]
+    #[arg(long, value_enum, default_value = "text")]
     pub log_format: LogFormat,
     /// Log filter, such as `info,railhead_jobs=debug`.
-    #[arg(
-        long,
-        env = "RAILHEAD_LOG",
-        default_value = "info",
-        value_name = "FILTER"
-    )]
+    #[arg(long, default_value = "info", value_name = "FILTER")]
     pub log: String,
 }
 
@@ -464,14 +405,8 @@ pub(super) struct BackupArgs {
 /// Settings of `move`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct MoveArgs {
-    /// Data folder to move.
-    #[arg(
-        long,
-        env = DATA_DIR_VARIABLE,
-        default_value = DATA_DIR_DEFAULT,
-        value_name = "FOLDER"
-    )]
-    pub data_dir: PathBuf,
+    #[command(flatten)]
+    pub folder: DataFolderArgs,
     #[command(flatten)]
     pub database: DatabaseUrlArgs,
     #[command(flatten)]
@@ -553,12 +488,11 @@ pub(super) struct HealthcheckArgs {
     #[arg(long, env = "RAILHEAD_HEALTHCHECK_URL", value_name = "URL")]
     pub url: Option<String>,
     /// Address and port of the service's listener for probes, if it has one.
-    #[arg(long, env = "RAILHEAD_PROBE_LISTEN", value_name = "ADDRESS:PORT", value_parser = address)]
+    #[arg(long, value_name = "ADDRESS:PORT", value_parser = address)]
     pub probe_listen: Option<SocketAddr>,
     /// Address and port on which the service listens.
     #[arg(
         long,
-        env = "RAILHEAD_LISTEN",
         default_value = "127.0.0.1:8080",
         value_name = "ADDRESS:PORT",
         value_parser = address
@@ -566,10 +500,35 @@ pub(super) struct HealthcheckArgs {
     pub listen: SocketAddr,
 }
 
+/// Flags that no variable sets.
+const WITHOUT_VARIABLE: [&str; 5] = ["to", "tenant", "name", "read-only", "label"];
+
+/// The command line. The flag `--some-name` is also set by the variable `RAILHEAD_SOME_NAME`.
+#[must_use]
+pub(super) fn command_line() -> clap::Command {
+    with_variables(Cli::command())
+}
+
+fn with_variables(command: clap::Command) -> clap::Command {
+    let of_flag = |flag: clap::Arg| {
+        let name = flag
+            .get_long()
+            .filter(|name| !WITHOUT_VARIABLE.contains(name));
+        match name.filter(|_| flag.get_env().is_none()) {
+            Some(name) => {
+                let name = name.to_uppercase().replace('-', "_");
+                flag.env(&*format!("RAILHEAD_{name}").leak())
+            }
+            None => flag,
+        }
+    };
+    command.mut_args(of_flag).mut_subcommands(with_variables)
+}
+
 /// Variables named `RAILHEAD_…` that no command reads; most likely misspelt.
 #[must_use]
 pub(super) fn unknown_variables() -> Vec<String> {
-    let command = Cli::command();
+    let command = command_line();
     let mut known = Vec::new();
     let mut commands = vec![&command];
     while let Some(command) = commands.pop() {
@@ -618,12 +577,12 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        Cli::command().debug_assert();
+        command_line().debug_assert();
     }
 
     #[test]
     fn every_setting_of_a_service_has_its_variable() {
-        let command = Cli::command();
+        let command = command_line();
         let serve = command.find_subcommand("serve").unwrap();
         for arg in serve
             .get_arguments()

@@ -44,7 +44,7 @@ pub(super) fn doctor(args: &DoctorArgs) -> anyhow::Result<ExitCode> {
 pub(super) fn move_folder(args: &MoveArgs) -> anyhow::Result<ExitCode> {
     let place = args.results.place();
     let moved = block_on(relocate(
-        &args.data_dir,
+        &args.folder.data_dir,
         &args.database.database_url,
         place.as_ref(),
     ))??;

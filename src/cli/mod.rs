@@ -16,9 +16,9 @@ mod solve;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, FromArgMatches};
+use clap::FromArgMatches;
 
-use crate::cli::commands::{Cli, Command};
+use crate::cli::commands::{Cli, Command, command_line};
 use crate::cli::output::{print, print_error, reasons};
 use crate::cli::serve::Role;
 use crate::http;
@@ -28,7 +28,7 @@ use crate::jobs::JobsError;
 /// Parses the command line, runs the command, and returns the exit code.
 #[must_use]
 pub fn run() -> ExitCode {
-    let mut command = Cli::command();
+    let mut command = command_line();
     let given = command.get_matches_mut();
     let cli = Cli::from_arg_matches(&given).unwrap_or_else(|error| error.exit());
     let done = match cli.command {

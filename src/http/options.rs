@@ -19,93 +19,93 @@ use railhead_jobs::options::{defaults, mib, seconds};
 pub struct HttpOptions {
     /// Maximum number of open connections. A further one replaces the connection that has waited longest for a request. The number is
     /// lowered if the process may not open so many files.
-    #[arg(long, env = "RAILHEAD_CONNECTIONS_MAX", default_value = "4096", value_name = "N", value_parser = count(1..))]
+    #[arg(long, default_value = "4096", value_name = "N", value_parser = count(1..))]
     pub connections_max: usize,
     /// Maximum number of open connections of one address, loopback included. For IPv6, the addresses of a /64 network count together.
-    #[arg(long, env = "RAILHEAD_ADDRESS_CONNECTIONS_MAX", default_value = "1024", value_name = "N", value_parser = count(1..))]
+    #[arg(long, default_value = "1024", value_name = "N", value_parser = count(1..))]
     pub address_connections_max: usize,
     /// Maximum number of concurrent requests of one tenant, except event streams and waits; beyond it: 429.
-    #[arg(long, env = "RAILHEAD_TENANT_REQUESTS_MAX", default_value = "512", value_name = "N", value_parser = count(1..))]
+    #[arg(long, default_value = "512", value_name = "N", value_parser = count(1..))]
     pub tenant_requests_max: usize,
     /// Maximum number of open event streams; beyond it: 429.
-    #[arg(long, env = "RAILHEAD_STREAMS_MAX", default_value = "1024", value_name = "N", value_parser = count(..))]
+    #[arg(long, default_value = "1024", value_name = "N", value_parser = count(..))]
     pub streams_max: usize,
     /// Maximum number of open event streams of one tenant; beyond it: 429.
-    #[arg(long, env = "RAILHEAD_TENANT_STREAMS_MAX", default_value = "256", value_name = "N", value_parser = count(..))]
+    #[arg(long, default_value = "256", value_name = "N", value_parser = count(..))]
     pub tenant_streams_max: usize,
     /// Maximum number of requests that wait for the end of a job or a batch. Beyond it, a request for a job is answered without
     /// waiting, and one for a batch with 429.
-    #[arg(long, env = "RAILHEAD_WAITS_MAX", default_value = "1024", value_name = "N", value_parser = count(..))]
+    #[arg(long, default_value = "1024", value_name = "N", value_parser = count(..))]
     pub waits_max: usize,
     /// Maximum number of waiting requests of one tenant; beyond it, as for `--waits-max`.
-    #[arg(long, env = "RAILHEAD_TENANT_WAITS_MAX", default_value = "256", value_name = "N", value_parser = count(..))]
+    #[arg(long, default_value = "256", value_name = "N", value_parser = count(..))]
     pub tenant_waits_max: usize,
     /// Seconds within which the head of the first request on a connection must arrive.
-    #[arg(long = "first-head-timeout-s", env = "RAILHEAD_FIRST_HEAD_TIMEOUT_S", default_value = "10", value_name = "SECONDS", value_parser = seconds(1..))]
+    #[arg(long = "first-head-timeout-s", default_value = "10", value_name = "SECONDS", value_parser = seconds(1..))]
     pub first_head_timeout: Duration,
     /// Seconds within which the head of each further request must arrive, including idle time.
     // The default is longer than common proxies keep an idle connection, so that the proxy closes it.
-    #[arg(long = "head-timeout-s", env = "RAILHEAD_HEAD_TIMEOUT_S", default_value = "75", value_name = "SECONDS", value_parser = seconds(1..))]
+    #[arg(long = "head-timeout-s", default_value = "75", value_name = "SECONDS", value_parser = seconds(1..))]
     pub head_timeout: Duration,
     /// Seconds within which the body of a case must arrive. For a batch, a run or an evaluation: maximum time between two parts of the
     /// body.
-    #[arg(long = "body-timeout-s", env = "RAILHEAD_BODY_TIMEOUT_S", default_value = "60", value_name = "SECONDS", value_parser = seconds(1..))]
+    #[arg(long = "body-timeout-s", default_value = "60", value_name = "SECONDS", value_parser = seconds(1..))]
     pub body_timeout: Duration,
     /// Seconds within which a client must read each part of a response.
-    #[arg(long = "write-timeout-s", env = "RAILHEAD_WRITE_TIMEOUT_S", default_value = "60", value_name = "SECONDS", value_parser = seconds(1..))]
+    #[arg(long = "write-timeout-s", default_value = "60", value_name = "SECONDS", value_parser = seconds(1..))]
     pub write_timeout: Duration,
     /// Maximum memory in MiB for bodies, parsed cases and responses of all requests; beyond it, requests wait or get 503.
-    #[arg(long = "request-memory-mb", env = "RAILHEAD_REQUEST_MEMORY_MB", default_value = "512", value_name = "MIB", value_parser = memory(64..=1 << 20))]
+    #[arg(long = "request-memory-mb", default_value = "512", value_name = "MIB", value_parser = memory(64..=1 << 20))]
     pub memory_max_bytes: usize,
     /// Maximum memory in MiB for bodies, parsed cases and responses of the requests of one tenant.
-    #[arg(long = "tenant-request-memory-mb", env = "RAILHEAD_TENANT_REQUEST_MEMORY_MB", default_value = "256", value_name = "MIB", value_parser = memory(64..=1 << 20))]
+    #[arg(long = "tenant-request-memory-mb", default_value = "256", value_name = "MIB", value_parser = memory(64..=1 << 20))]
     pub tenant_memory_max_bytes: usize,
     /// Maximum memory in MiB of one parsed case; beyond it: 413.
-    #[arg(long = "parsed-case-max-mb", env = "RAILHEAD_PARSED_CASE_MAX_MB", default_value = "96", value_name = "MIB", value_parser = memory(1..=1 << 20))]
+    #[arg(long = "parsed-case-max-mb", default_value = "96", value_name = "MIB", value_parser = memory(1..=1 << 20))]
     pub parsed_max_bytes: usize,
     /// Maximum size in MiB of the body of one case, or of one case in a batch; beyond it: 413.
-    #[arg(long = "body-max-mib", env = "RAILHEAD_BODY_MAX_MIB", default_value = "8", value_name = "MIB", value_parser = memory(1..=1024))]
+    #[arg(long = "body-max-mib", default_value = "8", value_name = "MIB", value_parser = memory(1..=1024))]
     pub body_max_bytes: usize,
     /// Maximum size in MiB of the body of a batch; beyond it: 413.
-    #[arg(long = "batch-max-mib", env = "RAILHEAD_BATCH_MAX_MIB", default_value = "1024", value_name = "MIB", value_parser = mib(1..=65536))]
+    #[arg(long = "batch-max-mib", default_value = "1024", value_name = "MIB", value_parser = mib(1..=65536))]
     pub batch_max_bytes: u64,
     /// Maximum number of cases in a batch; beyond it: 413.
-    #[arg(long, env = "RAILHEAD_BATCH_MAX_CASES", default_value = "200000", value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, default_value = "200000", value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub batch_max_cases: u32,
     /// Milliseconds for which `/v1/cases/check` solves a case to estimate its solve time; 0: formulas alone give the estimate.
-    #[arg(long = "check-trial-ms", env = "RAILHEAD_CHECK_TRIAL_MS", default_value = "200", value_name = "MS", value_parser = milliseconds(..=10_000))]
+    #[arg(long = "check-trial-ms", default_value = "200", value_name = "MS", value_parser = milliseconds(..=10_000))]
     pub check_trial: Duration,
     /// Number of pictures, grids and tables rendered at the same time [default: half of the cores, at least 1].
-    #[arg(long, env = "RAILHEAD_RENDERINGS", default_value_t = half_of_the_cores(), hide_default_value = true, value_name = "N",
+    #[arg(long, default_value_t = half_of_the_cores(), hide_default_value = true, value_name = "N",
           value_parser = value_parser!(u16).range(1..).map(usize::from))]
     pub renderings: usize,
     /// Maximum number of requests that wait to be rendered, half as many for one tenant; beyond it: 503.
-    #[arg(long, env = "RAILHEAD_RENDERINGS_WAITING_MAX", default_value = "512", value_name = "N", value_parser = count(2..))]
+    #[arg(long, default_value = "512", value_name = "N", value_parser = count(2..))]
     pub renderings_waiting_max: usize,
     /// Maximum number of samples of a regular grid (`?grid=NXxNY`); beyond it: 400.
-    #[arg(long, env = "RAILHEAD_GRID_MAX_SAMPLES", default_value = "250000", value_name = "N", value_parser = count(4..=1_000_000))]
+    #[arg(long, default_value = "250000", value_name = "N", value_parser = count(4..=1_000_000))]
     pub grid_max_samples: usize,
     /// Maximum size in MiB of the body of `POST /v1/evaluate`; beyond it: 413.
-    #[arg(long = "evaluate-max-mib", env = "RAILHEAD_EVALUATE_MAX_MIB", default_value = "64", value_name = "MIB", value_parser = memory(1..=1024))]
+    #[arg(long = "evaluate-max-mib", default_value = "64", value_name = "MIB", value_parser = memory(1..=1024))]
     pub evaluate_max_bytes: usize,
     /// Maximum number of rows of `POST /v1/evaluate`; beyond it: 422.
-    #[arg(long, env = "RAILHEAD_EVALUATE_MAX_ROWS", default_value = "1000000", value_name = "N", value_parser = count(1..))]
+    #[arg(long, default_value = "1000000", value_name = "N", value_parser = count(1..))]
     pub evaluate_max_rows: usize,
     /// Maximum size in MiB of the body of `POST /v1/runs`; beyond it: 413.
-    #[arg(long = "run-max-mib", env = "RAILHEAD_RUN_MAX_MIB", default_value = "1024", value_name = "MIB", value_parser = mib(1..=65536))]
+    #[arg(long = "run-max-mib", default_value = "1024", value_name = "MIB", value_parser = mib(1..=65536))]
     pub run_max_bytes: u64,
     /// Maximum number of rows of a run; beyond it: 413.
-    #[arg(long, env = "RAILHEAD_RUN_MAX_ROWS", default_value = "10000000", value_name = "N", value_parser = value_parser!(u64).range(1..=1_000_000_000))]
+    #[arg(long, default_value = "10000000", value_name = "N", value_parser = value_parser!(u64).range(1..=1_000_000_000))]
     pub run_max_rows: u64,
     /// Maximum processor time in seconds for reading a batch, run or table, or for evaluating its rows; beyond it: 413.
     // The default is ten times what the largest usual table takes on a slow core; a judgement.
-    #[arg(long = "table-time-s", env = "RAILHEAD_TABLE_TIME_S", default_value = "300", value_name = "SECONDS", value_parser = seconds(1..))]
+    #[arg(long = "table-time-s", default_value = "300", value_name = "SECONDS", value_parser = seconds(1..))]
     pub table_time: Duration,
     /// Maximum solver time in seconds for the rows of one evaluation; beyond it: 422.
-    #[arg(long = "evaluate-time-s", env = "RAILHEAD_EVALUATE_TIME_S", default_value = "10", value_name = "SECONDS", value_parser = seconds(1..))]
+    #[arg(long = "evaluate-time-s", default_value = "10", value_name = "SECONDS", value_parser = seconds(1..))]
     pub evaluate_time: Duration,
     /// Folder from which the files of the page at `/` are read for each request, for development of the page.
-    #[arg(long, env = "RAILHEAD_PAGE_DIR", value_name = "FOLDER", hide = true,
+    #[arg(long, value_name = "FOLDER", hide = true,
           value_parser = PathBufValueParser::new().map(|path: PathBuf| Arc::<Path>::from(path)))]
     pub page_dir: Option<Arc<Path>>,
     /// Addresses of proxies whose headers with the addresses of their clients are trusted.

@@ -53,41 +53,41 @@ pub struct Options {
     #[arg(skip)]
     pub limits: Limits,
     /// Number of attempts after which a job fails if its worker is lost each time.
-    #[arg(long, env = "RAILHEAD_ATTEMPTS_MAX", default_value = "5", value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    #[arg(long, default_value = "5", value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub attempts_max: u32,
     /// Maximum number of queued jobs; further jobs are refused.
-    #[arg(long, env = "RAILHEAD_QUEUE_MAX", default_value = "300000", value_name = "N", value_parser = value_parser!(u64).range(1..))]
+    #[arg(long, default_value = "300000", value_name = "N", value_parser = value_parser!(u64).range(1..))]
     pub queue_max: u64,
     /// Maximum number of queued jobs of one tenant; further jobs are refused.
-    #[arg(long, env = "RAILHEAD_TENANT_QUEUE_MAX", default_value = "250000", value_name = "N", value_parser = value_parser!(u64).range(1..))]
+    #[arg(long, default_value = "250000", value_name = "N", value_parser = value_parser!(u64).range(1..))]
     pub tenant_queue_max: u64,
     /// Return the stored result for a case that is identical to one solved before, instead of solving it again.
-    #[arg(long, env = "RAILHEAD_CACHE", default_value_t = true, value_name = "BOOL", action = ArgAction::Set)]
+    #[arg(long, default_value_t = true, value_name = "BOOL", action = ArgAction::Set)]
     pub cache: bool,
     /// How long ended jobs are kept; `None`: until they are deleted.
     #[arg(skip)]
     pub retention: Option<Duration>,
     /// Maximum size in MB of the stored profiles of one tenant; beyond it: 429.
-    #[arg(long = "tenant-profiles-mb", env = "RAILHEAD_TENANT_PROFILES_MB", default_value = "64", value_name = "MB", value_parser = mib(1..=65536))]
+    #[arg(long = "tenant-profiles-mb", default_value = "64", value_name = "MB", value_parser = mib(1..=65536))]
     pub tenant_profiles_max_bytes: u64,
     /// Maximum solver time of a case in seconds: the largest `time_limit_s`, and the limit of cases without it.
-    #[arg(long = "time-limit-s", env = "RAILHEAD_TIME_LIMIT_S", default_value = "86400", value_name = "SECONDS", value_parser = seconds(1..))]
+    #[arg(long = "time-limit-s", default_value = "86400", value_name = "SECONDS", value_parser = seconds(1..))]
     pub time_limit: Duration,
     /// Lease of a job in seconds. A worker renews it three times in this time; if it does not, another worker takes the job.
-    #[arg(long = "lease-s", env = "RAILHEAD_LEASE_S", default_value = "30", value_name = "SECONDS", value_parser = seconds(1..=3600))]
+    #[arg(long = "lease-s", default_value = "30", value_name = "SECONDS", value_parser = seconds(1..=3600))]
     pub lease: Duration,
     /// Solver time in seconds after which a job yields to others that wait.
-    #[arg(long = "slice-s", env = "RAILHEAD_SLICE_S", default_value = "2", value_name = "SECONDS", value_parser = part_of_a_day)]
+    #[arg(long = "slice-s", default_value = "2", value_name = "SECONDS", value_parser = part_of_a_day)]
     pub slice: Duration,
     /// Maximum number of solver threads that ignore a stop request. With more, the process ends with exit code 75 so that it can be
     /// restarted.
-    #[arg(long, env = "RAILHEAD_ABANDONED_MAX", default_value = "3", value_name = "N", value_parser = value_parser!(u16).map(usize::from))]
+    #[arg(long, default_value = "3", value_name = "N", value_parser = value_parser!(u16).map(usize::from))]
     pub abandoned_max: usize,
     /// Bounds of the batches that are being received.
     #[command(flatten)]
     pub staging: StagingBounds,
     /// Maximum size in MB of the stored cases, templates and results of one tenant; beyond it: 507 [default: no limit].
-    #[arg(long = "tenant-stored-mb", env = "RAILHEAD_TENANT_STORED_MB", value_name = "MB", value_parser = mib(..))]
+    #[arg(long = "tenant-stored-mb", value_name = "MB", value_parser = mib(..))]
     pub tenant_stored_max_bytes: Option<u64>,
     /// Maximum number of small jobs that a worker claims together; 1: no groups.
     #[arg(skip = 256_usize)]
@@ -108,10 +108,10 @@ pub struct Options {
 #[command(next_help_heading = "Jobs")]
 pub struct StagingBounds {
     /// Maximum size in MB of all batches that are being received; a row of a table counts with its template.
-    #[arg(id = "staged", long = "staged-mb", env = "RAILHEAD_STAGED_MB", default_value = "16384", value_name = "MB", value_parser = mib(..))]
+    #[arg(id = "staged", long = "staged-mb", default_value = "16384", value_name = "MB", value_parser = mib(..))]
     pub all: u64,
     /// Maximum size in MB of the batches of one tenant that are being received.
-    #[arg(id = "tenant_staged", long = "tenant-staged-mb", env = "RAILHEAD_TENANT_STAGED_MB", default_value = "4096", value_name = "MB", value_parser = mib(..))]
+    #[arg(id = "tenant_staged", long = "tenant-staged-mb", default_value = "4096", value_name = "MB", value_parser = mib(..))]
     pub tenant: u64,
 }
 
@@ -126,12 +126,12 @@ impl Options {
     }
 }
 
-/// The default values of flags, regardless of the environment.
+/// The default values of flags.
 ///
 /// # Panics
 /// Panics if a flag has no default.
 pub fn defaults<T: Args>() -> T {
-    let mut command = T::augment_args(Command::new("")).mut_args(|flag| flag.env(None::<&str>));
+    let mut command = T::augment_args(Command::new(""));
     let none = command
         .try_get_matches_from_mut([""])
         .expect("no flag is needed");
