@@ -51,6 +51,13 @@ macro_rules! values {
     };
 }
 
+/// Defines macros for parts of the shared statements, which expand to a literal.
+macro_rules! words {
+    ($($(#[doc = $about:literal])+ $name:ident = $text:expr;)*) => {
+        $($(#[doc = $about])+ macro_rules! $name { () => { $text } })*
+    };
+}
+
 pub mod open;
 #[cfg(feature = "cluster")]
 pub mod postgres;

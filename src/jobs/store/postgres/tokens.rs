@@ -1,17 +1,22 @@
 //! Parts of the shared statements in the words of PostgreSQL.
 
-/// Locks the selected rows; rows that another transaction has locked are skipped.
-macro_rules! skip_locked {
-    () => {
-        " FOR UPDATE SKIP LOCKED"
-    };
-}
-
-/// Locks the selected rows.
-macro_rules! for_update {
-    () => {
-        " FOR UPDATE"
-    };
+words! {
+    /// Locks the selected rows; rows that another transaction has locked are skipped.
+    skip_locked = " FOR UPDATE SKIP LOCKED";
+    /// Locks the selected rows.
+    for_update = " FOR UPDATE";
+    /// The greater of two values.
+    greatest = "GREATEST";
+    /// The lesser of two values.
+    least = "LEAST";
+    /// Position of a text in another, 0 if it does not occur.
+    place_in = "strpos";
+    /// The pairs of the column `labels`, a JSON object.
+    pairs_of_labels = "json_each_text(CAST(labels AS json))";
+    /// The current time in ms.
+    clock = "CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint)";
+    /// 1 if another process is filling a batch.
+    being_filled = concat!("CAST(CASE WHEN filled_until > ", clock!(), " THEN 1 ELSE 0 END AS bigint)");
 }
 
 /// A column; the planner chooses the index.
@@ -29,48 +34,9 @@ macro_rules! unordered {
     };
 }
 
-/// The greater of two values.
-macro_rules! greatest {
-    () => {
-        "GREATEST"
-    };
-}
-
-/// The lesser of two values.
-macro_rules! least {
-    () => {
-        "LEAST"
-    };
-}
-
-/// Position of a text in another, 0 if it does not occur.
-macro_rules! place_in {
-    () => {
-        "strpos"
-    };
-}
-
-/// The pairs of the column `labels`, a JSON object.
-macro_rules! pairs_of_labels {
-    () => {
-        "json_each_text(CAST(labels AS json))"
-    };
-}
-
 /// The current time by which leases are judged: this parameter, or the clock of the database if it is NULL.
 macro_rules! lease_now {
     ($parameter:literal) => {
-        concat!(
-            "COALESCE(",
-            $parameter,
-            ", CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint))"
-        )
-    };
-}
-
-/// 1 if another process is filling a batch.
-macro_rules! being_filled {
-    () => {
-        "CAST(CASE WHEN filled_until > CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) THEN 1 ELSE 0 END AS bigint)"
+        concat!("COALESCE(", $parameter, ", ", clock!(), ")")
     };
 }
