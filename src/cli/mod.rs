@@ -3,7 +3,6 @@
 //! [`commands`], [`Options`](crate::jobs::Options) and [`HttpOptions`](crate::http::HttpOptions) declare the flags;
 //! [`serve`] starts and stops a service.
 
-mod backup;
 mod commands;
 mod config;
 #[cfg(feature = "cluster")]
@@ -18,12 +17,13 @@ use std::process::ExitCode;
 
 use clap::FromArgMatches;
 
-use crate::cli::commands::{Cli, Command, command_line};
+use crate::cli::commands::{BackupArgs, Cli, Command, command_line};
 use crate::cli::output::{print, print_error, reasons};
-use crate::cli::serve::Role;
+use crate::cli::serve::{Role, block_on};
 use crate::http;
 #[cfg(not(feature = "cluster"))]
 use crate::jobs::JobsError;
+use crate::jobs::data_dir;
 
 /// Parses the command line, runs the command, and returns the exit code.
 #[must_use]
@@ -58,7 +58,7 @@ pub fn run() -> ExitCode {
             }
             .into())
         }
-        Command::Backup(args) => backup::run(&args),
+        Command::Backup(args) => backup(&args),
         Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args),
         Command::Openapi => print(&http::openapi_json()),
@@ -67,4 +67,10 @@ pub fn run() -> ExitCode {
         print_error(&reasons(&error));
         ExitCode::FAILURE
     })
+}
+
+/// Copies the data folder of a service into a new folder, and prints its path.
+fn backup(args: &BackupArgs) -> anyhow::Result<ExitCode> {
+    block_on(data_dir::backup(&args.folder.data_dir, &args.to))??;
+    print(&args.to.display().to_string())
 }

@@ -1,4 +1,3 @@
 //! Stored forms of solutions and fields.
 
 pub mod fields;
-pub mod result;

@@ -5,4 +5,3 @@
 
 pub mod draft;
 pub mod model;
-pub mod results;

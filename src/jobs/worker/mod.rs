@@ -5,4 +5,3 @@ pub mod heartbeat;
 pub mod pool;
 pub mod record;
 pub mod solve;
-pub mod turn;

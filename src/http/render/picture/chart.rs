@@ -1,6 +1,10 @@
-//! The plotting area of a picture: axes with equal or different scales, and ticks at round numbers.
+//! Charts as SVG: the plotting area with axes and ticks at round numbers, the colour scale, paths and texts.
+//!
+//! Every text of a client passes through [`escape`].
 
-use crate::render::picture::svg::{Anchor, FONTS, Svg, escape, px, shorten};
+use std::fmt::Write;
+
+use crate::render::picture::draw::Heat;
 
 /// Width of a picture in its own units.
 pub(super) const WIDTH: f64 = 800.0;
@@ -221,6 +225,354 @@ pub(super) fn exponent(largest: f64) -> i32 {
     decade.div_euclid(3) * 3
 }
 
+/// Number of nodes of the scale.
+pub(super) const VIRIDIS_PLACES: usize = 17;
+
+/// The map viridis (S. van der Walt, N. Smith and E. Firing 2015, CC0) colour_at 17 equidistant nodes; linear in between.
+const VIRIDIS: [[u8; 3]; VIRIDIS_PLACES] = [
+    [68, 1, 84],
+    [72, 24, 106],
+    [71, 45, 123],
+    [66, 64, 134],
+    [59, 82, 139],
+    [51, 99, 141],
+    [44, 114, 142],
+    [38, 130, 142],
+    [33, 145, 140],
+    [31, 160, 136],
+    [40, 174, 128],
+    [63, 188, 115],
+    [94, 201, 98],
+    [132, 212, 75],
+    [173, 220, 48],
+    [216, 226, 25],
+    [253, 231, 37],
+];
+
+/// Colour of cells that stick.
+pub(super) const STICK: &str = "#31688e";
+/// Colour of cells that slip, much lighter, so that both are distinct without colour.
+pub(super) const SLIP: &str = "#fde725";
+
+/// Returns the colour colour_at a position on the scale from 0 to 1, as `#rrggbb`.
+#[must_use]
+pub(super) fn colour_at(share: f64) -> String {
+    let [r, g, b] = rgb(share);
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+fn rgb(share: f64) -> [u8; 3] {
+    let last = VIRIDIS_PLACES - 1;
+    let place = share.clamp(0.0, 1.0) * last as f64;
+    let span = (place as usize).min(last - 1);
+    let share = place - span as f64;
+    std::array::from_fn(|part| {
+        let [from, to] = [VIRIDIS[span][part], VIRIDIS[span + 1][part]].map(f64::from);
+        (from + share * (to - from)).round() as u8
+    })
+}
+
+/// Fonts in order of preference; raster pictures use the first.
+pub(super) const FONTS: &str = "DejaVu Sans, Verdana, sans-serif";
+
+/// An SVG drawing.
+#[derive(Debug, Default)]
+pub(crate) struct Svg {
+    /// Markup and lines of text, in order.
+    parts: Vec<Part>,
+}
+
+#[derive(Debug)]
+enum Part {
+    Markup(String),
+    Line(Line),
+}
+
+/// A line of text.
+#[derive(Debug)]
+pub(super) struct Line {
+    /// Position of the anchor.
+    pub at: (f64, f64),
+    /// Font size.
+    pub size: f64,
+    /// The part of the text at the position.
+    pub anchor: Anchor,
+    /// Further attributes.
+    pub attributes: String,
+    /// The text.
+    pub text: String,
+}
+
+/// The part of a text that is at its position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Anchor {
+    /// The beginning.
+    Start,
+    /// The middle.
+    Middle,
+    /// The end.
+    End,
+}
+
+impl Svg {
+    /// Adds an element without content; `attributes` is not escaped.
+    pub(super) fn element(&mut self, name: &str, attributes: &str) {
+        self.raw(&format!("<{name} {attributes}/>\n"));
+    }
+
+    /// Adds a rectangle `[x, y, width, height]`.
+    pub(super) fn rect(&mut self, area: [f64; 4], attributes: &str) {
+        let [x, y, width, height] = area.map(px);
+        let place = format!("x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"");
+        self.element("rect", &format!("{place} {attributes}"));
+    }
+
+    /// Adds a path.
+    pub(super) fn path(&mut self, data: &str, attributes: &str) {
+        self.raw(&format!("<path d=\"{data}\" {attributes}/>\n"));
+    }
+
+    /// Adds a line of text; `text` is escaped, `attributes` is not.
+    pub(super) fn text(
+        &mut self,
+        at: (f64, f64),
+        size: f64,
+        anchor: Anchor,
+        attributes: &str,
+        text: &str,
+    ) {
+        self.parts.push(Part::Line(Line {
+            at,
+            size,
+            anchor,
+            attributes: attributes.to_owned(),
+            text: text.to_owned(),
+        }));
+    }
+
+    /// Adds SVG markup.
+    pub(super) fn raw(&mut self, text: &str) {
+        self.parts.push(Part::Markup(text.to_owned()));
+    }
+
+    /// Returns the SVG, with lines of text as elements.
+    #[must_use]
+    pub(crate) fn finish(&self) -> String {
+        self.with_lines(Line::element)
+    }
+
+    /// Returns the SVG, with lines of text written by `element`.
+    pub(super) fn with_lines(&self, element: impl Fn(&Line) -> String) -> String {
+        let text = |part: &Part| match part {
+            Part::Markup(text) => text.clone(),
+            Part::Line(line) => element(line),
+        };
+        self.parts.iter().map(text).collect()
+    }
+}
+
+impl Line {
+    fn element(&self) -> String {
+        let anchor = match self.anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let ((x, y), size, attributes) = (self.at, self.size, &self.attributes);
+        let (x, y, text) = (px(x), px(y), escape(&self.text));
+        format!(
+            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" text-anchor=\"{anchor}\" {attributes}>{text}</text>\n"
+        )
+    }
+}
+
+/// Formats a length in units of the drawing, to a hundredth.
+#[must_use]
+pub(super) fn px(value: f64) -> String {
+    let mut text = format!("{value:.2}");
+    let kept = text.trim_end_matches('0').trim_end_matches('.').len();
+    text.truncate(kept);
+    if text == "-0" { "0".to_owned() } else { text }
+}
+
+/// Returns the path through points.
+#[must_use]
+pub(super) fn polyline(points: impl IntoIterator<Item = (f64, f64)>, closed: bool) -> String {
+    let mut data = String::new();
+    for (index, (x, y)) in points.into_iter().enumerate() {
+        let command = if index == 0 { 'M' } else { 'L' };
+        // Writing to a string cannot fail.
+        let _ = write!(data, "{command}{} {}", px(x), px(y));
+    }
+    if closed {
+        data.push('Z');
+    }
+    data
+}
+
+/// Returns the path of closed curves, to a tenth, without points within `tolerance` of the simplified curve.
+#[must_use]
+pub(super) fn curves(loops: impl IntoIterator<Item = Vec<(f64, f64)>>, tolerance: f64) -> String {
+    let tenths = |(x, y): (f64, f64)| [(10.0 * x).round() as i64, (10.0 * y).round() as i64];
+    let mut data = String::new();
+    for points in loops {
+        let Some(&first) = points.first() else {
+            continue;
+        };
+        let mut kept = vec![first];
+        // The point farthest from the first divides a closed curve into two open ones.
+        let far = |at: &(f64, f64)| (at.0 - first.0).hypot(at.1 - first.1);
+        let middle = (0..points.len())
+            .max_by(|a, b| far(&points[*a]).total_cmp(&far(&points[*b])))
+            .unwrap_or(0);
+        simplify(&points[..=middle], tolerance, &mut kept);
+        let back: Vec<(f64, f64)> = points[middle..].iter().copied().chain([first]).collect();
+        simplify(&back, tolerance, &mut kept);
+        let [mut x, mut y] = tenths(first);
+        let mut steps = String::new();
+        for point in &kept[1..kept.len() - 1] {
+            let [to_x, to_y] = tenths(*point);
+            if (to_x, to_y) != (x, y) {
+                let _ = write!(steps, "{}{}", step(to_x - x), step(to_y - y));
+                (x, y) = (to_x, to_y);
+            }
+        }
+        if !steps.is_empty() {
+            let [x, y] = tenths(first);
+            let _ = write!(
+                data,
+                "M{}{}l{}z",
+                step(x).trim_start(),
+                step(y),
+                steps.trim_start()
+            );
+        }
+    }
+    data
+}
+
+/// Formats a number in tenths, with a separator from the number before.
+fn step(tenths: i64) -> String {
+    let sign = if tenths < 0 { "-" } else { " " };
+    let (whole, rest) = (tenths.abs() / 10, tenths.abs() % 10);
+    match (whole, rest) {
+        (whole, 0) => format!("{sign}{whole}"),
+        (0, rest) => format!("{sign}.{rest}"),
+        (whole, rest) => format!("{sign}{whole}.{rest}"),
+    }
+}
+
+/// Adds the points after the first, simplified within the tolerance (D. H. Douglas and T. K. Peucker, 1973).
+fn simplify(points: &[(f64, f64)], tolerance: f64, kept: &mut Vec<(f64, f64)>) {
+    let (Some(&from), Some(&to)) = (points.first(), points.last()) else {
+        return;
+    };
+    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+    let length = dx.hypot(dy).max(f64::MIN_POSITIVE);
+    let away = |at: &(f64, f64)| ((at.0 - from.0) * dy - (at.1 - from.1) * dx).abs() / length;
+    let farthest = (1..points.len().saturating_sub(1))
+        .max_by(|a, b| away(&points[*a]).total_cmp(&away(&points[*b])));
+    match farthest {
+        Some(middle) if away(&points[middle]) > tolerance => {
+            simplify(&points[..=middle], tolerance, kept);
+            simplify(&points[middle..], tolerance, kept);
+        }
+        _ => kept.push(to),
+    }
+}
+
+/// Escapes text as XML character data. Characters that XML does not allow, control characters, and marks that change the direction of
+/// text are replaced by U+FFFD.
+#[must_use]
+pub(super) fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            '\t' | '\n' | '\r' => out.push(' '),
+            '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}' => {
+                out.push('\u{fffd}');
+            }
+            c if c.is_control() => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// Truncates a text to `most` characters, with an ellipsis.
+#[must_use]
+pub(super) fn shorten(text: &str, most: usize) -> String {
+    if text.chars().count() <= most {
+        return text.to_owned();
+    }
+    let kept: String = text.chars().take(most.saturating_sub(1)).collect();
+    kept.trim_end().to_owned() + "…"
+}
+
+/// Draws the scale of the heat map between two values.
+pub(super) fn colour_bar(svg: &mut Svg, chart: &Chart, heat: &Heat, [low, high]: [f64; 2]) {
+    let [left, y, width, height] = chart.area;
+    let x = left + width + 26.0;
+    svg.raw("<linearGradient id=\"scale\" x1=\"0\" y1=\"1\" x2=\"0\" y2=\"0\">");
+    for place in 0..VIRIDIS_PLACES {
+        let share = place as f64 / (VIRIDIS_PLACES - 1) as f64;
+        let (offset, colour) = (px(share), colour_at(share));
+        svg.raw(&format!(
+            "<stop offset=\"{offset}\" stop-color=\"{colour}\"/>"
+        ));
+    }
+    svg.raw("</linearGradient>\n");
+    let bar = "fill=\"url(#scale)\" stroke=\"#333\"";
+    svg.rect([x, y, 18.0, height], bar);
+    let power = exponent(low.abs().max(high.abs()));
+    let factor = 10f64.powi(power);
+    let (values, digits) = ticks(low / factor, high / factor, height / 45.0);
+    for tick in values {
+        let at = y + height * (1.0 - (tick * factor - low) / (high - low));
+        svg.path(
+            &format!("M{} {}h5", px(x + 18.0), px(at)),
+            "stroke=\"#333\"",
+        );
+        let place = (x + 27.0, at + 4.0);
+        svg.text(place, 12.0, Anchor::Start, "", &label(tick, digits));
+    }
+    let unit = match (power, heat.unit) {
+        (0, "") => String::new(),
+        (0, unit) => format!(" in {unit}"),
+        (power, unit) => format!(" in {} {unit}", power_of_ten(power))
+            .trim_end()
+            .to_owned(),
+    };
+    let (place_x, place_y) = (x + 92.0, y + 0.5 * height);
+    let turned = format!("transform=\"rotate(-90 {} {})\"", px(place_x), px(place_y));
+    let text = format!("{}{unit}", heat.label);
+    svg.text((place_x, place_y), 13.0, Anchor::Middle, &turned, &text);
+}
+
+/// Formats a power of ten, such as `10⁻³`.
+fn power_of_ten(power: i32) -> String {
+    let raised = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '0' => '⁰',
+        c => c
+            .to_digit(10)
+            .and_then(|digit| char::from_u32(0x2070 + digit))
+            .unwrap_or(c),
+    };
+    format!(
+        "10{}",
+        power.to_string().chars().map(raised).collect::<String>()
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -289,6 +641,102 @@ mod tests {
             (0.5, 0),
         ] {
             assert_eq!(exponent(value), power, "{value}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod svg_tests {
+    use super::*;
+
+    #[test]
+    fn text_cannot_become_markup() {
+        let evil = "</text><script>alert('1')</script>&\"\u{0}\u{8}\u{202e}\n";
+        let safe = escape(evil);
+        assert!(!safe.contains(['<', '>', '"', '\'', '\u{0}', '\u{8}', '\u{202e}', '\n']));
+        assert_eq!(escape("R₁ < 300 & µ = 0.3"), "R₁ &lt; 300 &amp; µ = 0.3");
+    }
+
+    #[test]
+    fn lengths_have_two_digits_at_most() {
+        for (value, text) in [(1.0, "1"), (-0.001, "0"), (12.345, "12.35"), (100.0, "100")] {
+            assert_eq!(px(value), text);
+        }
+    }
+
+    #[test]
+    fn curves_keep_their_corners_and_lose_what_lies_between() {
+        let square = [
+            (0.0, 0.0),
+            (5.0, 0.01),
+            (10.0, 0.0),
+            (10.0, 10.0),
+            (4.0, 10.0),
+            (0.0, 10.0),
+        ];
+        assert_eq!(curves([square.to_vec()], 0.1), "M0 0l10 0 0 10-10 0z");
+        let dot = vec![(1.0, 1.0), (1.01, 1.0), (1.0, 1.01)];
+        assert_eq!(curves([dot, Vec::new()], 0.1), "");
+        assert_eq!(
+            curves([vec![(0.5, 1.0), (0.0, 2.5), (-0.4, 1.0)]], 0.1),
+            "M.5 1l-.5 1.5-.4-1.5z"
+        );
+    }
+
+    #[test]
+    fn long_texts_are_cut_between_characters() {
+        assert_eq!(shorten("äöüß", 4), "äöüß");
+        assert_eq!(shorten("äöüßx", 4), "äöü…");
+    }
+}
+
+#[cfg(test)]
+mod colour_tests {
+    use super::*;
+
+    /// CIE 1976 lightness of an sRGB colour, 0 to 100.
+    fn lightness(rgb: [u8; 3]) -> f64 {
+        let linear = rgb.map(|part| {
+            let part = f64::from(part) / 255.0;
+            if part <= 0.04045 {
+                part / 12.92
+            } else {
+                ((part + 0.055) / 1.055).powf(2.4)
+            }
+        });
+        let y = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
+        if y > 0.008_856 {
+            116.0 * y.cbrt() - 16.0
+        } else {
+            903.3 * y
+        }
+    }
+
+    #[test]
+    fn lightness_rises_evenly_along_the_ramp() {
+        let shares = (0..=128).map(|step| f64::from(step) / 128.0);
+        let lights: Vec<f64> = shares.map(|share| lightness(rgb(share))).collect();
+        let (first, last) = (lights[0], lights[128]);
+        assert!(first < 20.0 && last > 88.0, "from {first} to {last}");
+        for (level, light) in lights.iter().enumerate() {
+            let even = first + (last - first) * level as f64 / 128.0;
+            assert!(
+                (light - even).abs() < 2.0,
+                "step {level}: {light}, not {even}"
+            );
+        }
+        assert!(lights.is_sorted_by(|a, b| a <= b));
+    }
+
+    #[test]
+    fn values_are_brought_onto_the_ramp() {
+        for (share, colour) in [
+            (0.0, "#440154"),
+            (1.0, "#fde725"),
+            (-3.0, "#440154"),
+            (7.0, "#fde725"),
+        ] {
+            assert_eq!(colour_at(share), colour, "{share}");
         }
     }
 }

@@ -9,12 +9,10 @@ mod tokens;
 
 mod claim_memory;
 pub mod cluster;
-pub mod connection;
 pub mod database;
 pub mod doctor;
 pub mod engine;
 mod import;
-pub mod notifier;
 pub mod objects;
 pub mod schema;
 #[path = "../sql/mod.rs"]
@@ -23,4 +21,3 @@ pub mod schema;
     reason = "the shared statements are compiled once for each database"
 )]
 pub mod sql;
-pub(crate) mod url;
