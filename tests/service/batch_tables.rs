@@ -1,6 +1,6 @@
 //! Tests tables of cases: columns by name or pointer, and errors by line.
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::batches::{results, send, small};
 use crate::errors::assert_problem;
@@ -17,38 +17,24 @@ async fn faults_of_a_table_are_named_by_line() {
     let query = template(&server).await;
     let table =
         "normal_force_n,creepage_x\n80000,0.001\n-5,0.001\n80000\n\"8\n0000\",0\n80000,fast\n";
-    let answer = send(&server, &query, "text/csv", table.to_owned()).await;
+    let answer = send(&server, &query, "text/csv", table).await;
     assert_problem(&answer, 422, "faulty-batch", "4 of 5");
     let faults = answer.json["errors"].as_array().expect("errors");
-    let found: Vec<_> = faults
+    let found = faults
         .iter()
-        .map(|fault| {
-            (
-                fault["line"].as_u64().expect("a line"),
-                fault["pointer"].as_str().expect("a pointer"),
-            )
-        })
-        .collect();
-    assert_eq!(
-        found,
-        [
-            (3, "/1/load/normal_force_n"),
-            (4, "/2"),
-            (5, "/3/load/normal_force_n"),
-            (7, "/4/motion/creepage_x")
-        ]
-    );
-    let taken = send(
-        &server,
-        &format!("{query}&on_invalid=skip"),
-        "text/csv",
-        table.to_owned(),
-    )
-    .await;
-    assert_eq!(
-        (taken.status, &taken.json["count"], &taken.json["rejected"]),
-        (202, &json!(1), &json!(4))
-    );
+        .map(|fault| json!([fault["line"], fault["pointer"]]));
+    let expected = json!([
+        [3, "/1/load/normal_force_n"],
+        [4, "/2"],
+        [5, "/3/load/normal_force_n"],
+        [7, "/4/motion/creepage_x"]
+    ]);
+    assert_eq!(found.collect::<Value>(), expected);
+    let skip = format!("{query}&on_invalid=skip");
+    let taken = send(&server, &skip, "text/csv", table).await.is(202);
+    let counts = ["count", "rejected"].map(|name| &taken.json[name]);
+    assert_eq!(counts, [1, 4]);
+    let unknown = format!("?template={}", uuid::Uuid::nil());
     for (query, table, status, kind, word) in [
         (query.as_str(), "speed\n3\n", 422, "faulty-table", "`speed`"),
         (query.as_str(), "name;b\nx;3\n", 422, "faulty-table", "`b`"),
@@ -56,18 +42,12 @@ async fn faults_of_a_table_are_named_by_line() {
         (query.as_str(), "name\n", 422, "faulty-batch", "no case"),
         ("", "name\nx\n", 400, "bad-query", "template"),
         ("?template=x", "name\nx\n", 400, "bad-query", "template"),
-        (
-            "?template=0198c0de-0000-7000-8000-000000000000",
-            "name\nx\n",
-            404,
-            "job-not-found",
-            "",
-        ),
+        (&*unknown, "name\nx\n", 404, "job-not-found", ""),
     ] {
-        let answer = send(&server, query, "text/csv", table.to_owned()).await;
+        let answer = send(&server, query, "text/csv", table).await;
         assert_problem(&answer, status, kind, word);
     }
-    let answer = send(&server, &query, "application/json", "[]".to_owned()).await;
+    let answer = send(&server, &query, "application/json", "[]").await;
     assert_problem(&answer, 400, "bad-query", "text/csv");
 }
 
@@ -94,7 +74,7 @@ async fn numbers_may_have_a_plus_sign() {
     let server = Server::idle().await;
     let query = template(&server).await;
     let table = "normal_force_n,creepage_x,deadline_s,/solver/mesh/strips\n+100000,+.5e-3,+60,+6\n";
-    let batch = send(&server, &query, "text/csv", table.to_owned()).await;
+    let batch = send(&server, &query, "text/csv", table).await;
     let batch = batch.is(202);
     let jobs = results(&server, &batch.json, "").await;
     let case = server

@@ -1,4 +1,4 @@
-//! Tests batches: atomic acceptance, solution in groups, results in input order.
+//! Tests batches: atomic acceptance, solution in groups, results in input order, options of single cases.
 
 use std::time::Duration;
 
@@ -35,7 +35,12 @@ pub fn small_loaded(name: &str, newtons: usize) -> Value {
 }
 
 /// Sends the body of a batch with this media type.
-pub async fn send(server: &Server, query: &str, content: &str, body: String) -> Answer {
+pub async fn send(
+    server: &Server,
+    query: &str,
+    content: &str,
+    body: impl Into<reqwest::Body>,
+) -> Answer {
     server
         .post_as(&format!("/v1/batches{query}"), content, body)
         .await
@@ -44,8 +49,7 @@ pub async fn send(server: &Server, query: &str, content: &str, body: String) -> 
 /// Returns the lines of the results of a batch.
 pub async fn results(server: &Server, batch: &Value, query: &str) -> Vec<Value> {
     let path = link(batch, "results");
-    let answer = server.get(&format!("{path}{query}")).await;
-    assert_eq!(answer.status, 200);
+    let answer = server.get(&format!("{path}{query}")).await.is(200);
     assert_eq!(answer.header("content-type"), Some("application/x-ndjson"));
     answer.lines()
 }
@@ -106,8 +110,9 @@ async fn one_faulty_case_refuses_the_batch_and_names_its_line() {
     let jobs = server.read("/v1/jobs").await;
     assert_eq!(jobs["jobs"], json!([]), "nothing was stored");
 
-    let answer = send(&server, "?on_invalid=skip", "application/x-ndjson", body).await;
-    assert_eq!(answer.status, 202, "{}", answer.text);
+    let answer = send(&server, "?on_invalid=skip", "application/x-ndjson", body)
+        .await
+        .is(202);
     assert_eq!(answer.json["count"], 2);
     assert_eq!(answer.json["rejected"], 2);
     assert_eq!(
@@ -135,16 +140,10 @@ async fn bodies_that_are_no_batch_are_refused() {
         ("application/x-ndjson", "\n \n", 422, "faulty-batch"),
         ("text/plain", "a,b", 415, "unsupported-media-type"),
     ] {
-        let answer = send(&server, "?on_invalid=skip", content, body.to_owned()).await;
+        let answer = send(&server, "?on_invalid=skip", content, body).await;
         assert_problem(&answer, status, kind, "");
     }
-    let answer = send(
-        &server,
-        "?on_invalid=some",
-        "application/json",
-        "[]".to_owned(),
-    )
-    .await;
+    let answer = send(&server, "?on_invalid=some", "application/json", "[]").await;
     assert_problem(&answer, 400, "bad-query", "on_invalid");
 }
 
@@ -177,17 +176,14 @@ async fn a_batch_is_bounded_by_case_by_bytes_and_by_count() {
 #[tokio::test]
 async fn cancelling_a_batch_ends_its_queued_jobs_and_no_other() {
     let server = Server::idle().await;
-    let alone = server
-        .send(Method::POST, "/v1/jobs", |request| {
-            request.json(&small("alone"))
-        })
-        .await
-        .json;
+    let alone = server.post("/v1/jobs", &small("alone")).await.json;
     let body = lines(&vec![small("x"); 5]);
     let batch = send(&server, "", "application/x-ndjson", body).await.json;
     let path = link(&batch, "cancel");
-    let answer = server.send(Method::POST, path, |request| request).await;
-    assert_eq!(answer.status, 200, "{}", answer.text);
+    let answer = server
+        .send(Method::POST, path, |request| request)
+        .await
+        .is(200);
     assert_eq!(answer.json["states"]["cancelled"], 5);
     let lines = results(&server, &batch, "?wait=10").await;
     assert!(lines.iter().all(|line| line["state"] == "cancelled"));
@@ -204,13 +200,8 @@ async fn results_as_csv_have_a_header_and_a_line_per_motion() {
     sweep["friction"]["coefficient"] = json!(1.5);
     let motion = sweep["motion"].clone();
     sweep["motion"] = json!([motion, motion]);
-    let batch = send(
-        &server,
-        "",
-        "application/json",
-        json!([small("one"), sweep]).to_string(),
-    )
-    .await;
+    let cases = json!([small("one"), sweep]);
+    let batch = server.post("/v1/batches", &cases).await;
     let path = link(&batch.json, "results");
     let answer = server.get(&format!("{path}?wait=60&format=csv")).await;
     let rows: Vec<&str> = answer.text.lines().collect();
@@ -257,13 +248,8 @@ async fn a_running_group_stops_when_its_batch_is_cancelled() {
         .solving(|_, monitor| Err(tick_forever(monitor)))
         .start()
         .await;
-    let batch = send(
-        &server,
-        "",
-        "application/x-ndjson",
-        lines(&vec![small("x"); 3]),
-    )
-    .await;
+    let cases = json!(vec![small("x"); 3]);
+    let batch = server.post("/v1/batches", &cases).await;
     let path = link(&batch.json, "self");
     while server.read(path).await["states"]["running"] == 0 {
         pause().await;
@@ -307,4 +293,47 @@ async fn a_group_is_handed_back_when_the_service_stops() {
         let job = lab.get(id).await;
         assert_eq!((job.state.name(), job.attempt), ("queued", 0));
     }
+}
+
+const NDJSON: &str = "application/x-ndjson";
+
+/// Returns, for each job of a batch in the order of the cases, its priority and whether it has a deadline.
+async fn options(server: &Server, batch: &Value) -> Vec<(String, bool)> {
+    let id = batch["id"].as_str().expect("an id");
+    let page = server.read(&format!("/v1/jobs?batch={id}")).await;
+    let jobs = page["jobs"].as_array().expect("jobs").iter().rev();
+    jobs.map(|job| {
+        let priority = job["priority"].as_str().expect("a priority");
+        (priority.to_owned(), job["deadline_at"].is_string())
+    })
+    .collect()
+}
+
+#[tokio::test]
+async fn a_case_of_a_batch_may_have_options_of_its_own_in_every_form_of_a_batch() {
+    let server = Server::idle().await;
+    let own = json!({ "case": small("b"), "priority": "high", "deadline_s": 600 });
+    let cases = [small("a"), own, json!({ "case": small("c") })];
+    let expected = [("low", false), ("high", true), ("low", false)]
+        .map(|(priority, deadline)| (priority.to_owned(), deadline));
+    for (content, body) in [
+        (NDJSON, lines(&cases)),
+        ("application/json", json!(cases).to_string()),
+    ] {
+        let batch = send(&server, "?priority=low", content, body).await.is(202);
+        assert_eq!(options(&server, &batch.json).await, expected);
+    }
+    let template = server.keep(&small("template")).await;
+    let query = format!("?priority=low&template={template}");
+    let table = "name,priority,deadline_s\na,,\nb,high,600\nc,,\n".to_owned();
+    let batch = send(&server, &query, "text/csv", table).await;
+    assert_eq!(options(&server, &batch.json).await, expected);
+
+    // Only the case is stored.
+    let id = batch.json["id"].as_str().expect("an id");
+    let page = server.read(&format!("/v1/jobs?batch={id}")).await;
+    let job = page["jobs"][1]["id"].as_str().expect("an id");
+    let case = server.read(&format!("/v1/jobs/{job}/case")).await;
+    assert_eq!(case["name"], "b");
+    assert!(case.get("priority").is_none() && case.get("case").is_none());
 }

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use crate::metrics::samples;
 use crate::results::path_of;
-use crate::server::{Answer, Server, Setup, link};
+use crate::server::{Answer, Server, Setup};
 use crate::support::{Service, case, files_below, loaded};
 
 /// Starts a service that counts its solves.
@@ -109,25 +109,13 @@ async fn what_changes_the_answer_or_refuses_the_cache_is_solved() {
 async fn a_batch_is_answered_from_earlier_results() {
     let (server, solves) = counting(|_| {}).await;
     let cases: Vec<Value> = (1..=30).map(|number| loaded(10_000 * number)).collect();
-    let submit = async |cases: &[Value], fresh: bool| {
-        let control = if fresh { "no-cache" } else { "max-age=60" };
-        let cases = json!(cases);
-        let sent = server.post_with("/v1/batches", "cache-control", control, &cases);
-        sent.await.is(202).location()
-    };
-    let lines = async |batch: &str| -> Vec<Value> {
-        server
-            .get(&format!("{batch}/results?wait=60"))
-            .await
-            .lines()
-    };
-    let first = submit(&cases[..20], false).await;
-    let solved = lines(&first).await;
+    let first = submit(&server, &cases[..20], false).await;
+    let solved = lines(&server, &first).await;
     assert_eq!(solves.load(Ordering::SeqCst), 20);
-    let second = submit(&cases, false).await;
+    let second = submit(&server, &cases, false).await;
     let known = server.read(&second).await;
     assert!(known["states"]["succeeded"].as_u64() >= Some(20), "{known}");
-    let again = lines(&second).await;
+    let again = lines(&server, &second).await;
     assert_eq!(solves.load(Ordering::SeqCst), 30);
     for (index, line) in again.iter().enumerate() {
         assert_eq!(line["state"], "succeeded");
@@ -136,17 +124,22 @@ async fn a_batch_is_answered_from_earlier_results() {
     for (old, new) in solved.iter().zip(&again) {
         assert_eq!(bare(&new["result"]), bare(&old["result"]));
     }
-    lines(&submit(&cases, true).await).await;
+    let fresh = submit(&server, &cases, true).await;
+    lines(&server, &fresh).await;
     assert_eq!(solves.load(Ordering::SeqCst), 60);
 }
 
-/// Sends a batch and returns its result lines once all jobs have ended.
-async fn batch_items(server: &Server, cases: &[Value], fresh: bool) -> Vec<Value> {
+/// Sends a batch and returns its path.
+async fn submit(server: &Server, cases: &[Value], fresh: bool) -> String {
     let (cases, control) = (json!(cases), if fresh { "no-cache" } else { "max-age=60" });
     let sent = server.post_with("/v1/batches", "cache-control", control, &cases);
-    let batch = sent.await.json;
-    let results = link(&batch, "results");
-    server.get(&format!("{results}?wait=60")).await.lines()
+    sent.await.is(202).location()
+}
+
+/// Returns the result lines of a batch once all jobs have ended.
+async fn lines(server: &Server, batch: &str) -> Vec<Value> {
+    let results = format!("{batch}/results?wait=60");
+    server.get(&results).await.lines()
 }
 
 #[tokio::test]
@@ -159,7 +152,8 @@ async fn of_identical_cases_in_one_batch_one_is_solved() {
             case
         })
         .collect();
-    let lines = batch_items(&server, &cases, false).await;
+    let batch = submit(&server, &cases, false).await;
+    let lines = lines(&server, &batch).await;
     assert_eq!(solves.load(Ordering::SeqCst), 2);
     for (index, line) in lines.iter().enumerate() {
         assert_eq!(line["state"], "succeeded", "{line}");
@@ -169,7 +163,8 @@ async fn of_identical_cases_in_one_batch_one_is_solved() {
             bare(&lines[index % 2]["result"])["total"]
         );
     }
-    batch_items(&server, &cases[..10], true).await;
+    let fresh = submit(&server, &cases[..10], true).await;
+    server.get(&format!("{fresh}?wait=60")).await.is(200);
     assert_eq!(solves.load(Ordering::SeqCst), 12, "no-cache is kept to");
 }
 
@@ -184,7 +179,8 @@ async fn identical_cases_that_fail_all_say_why() {
         })
         .start()
         .await;
-    let lines = batch_items(&server, &vec![case("hopeless"); 100], false).await;
+    let batch = submit(&server, &vec![case("hopeless"); 100], false).await;
+    let lines = lines(&server, &batch).await;
     for line in &lines {
         assert_eq!(
             line["error"]["type"], "/problems/out-of-time",

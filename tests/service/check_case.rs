@@ -69,7 +69,8 @@ async fn wheel_and_rail_are_placed_where_they_touch_when_solved() {
     let server = Server::start().await;
     for file in ["wheel-rail.case.json", "wheel-rail-flange.case.json"] {
         let case = example(file);
-        let placed = understood(&server, &case).await["placement"].take();
+        let checked = server.post("/v1/cases/check", &case).await.is(200).json;
+        let placed = &checked["understood"]["placement"];
         let (rail, wheel) = (curve(&placed["rail_mm"]), curve(&placed["wheel_mm"]));
         let touch = &placed["first_touch"];
         let at = numbers(&touch["track_mm"]);
@@ -95,6 +96,13 @@ async fn wheel_and_rail_are_placed_where_they_touch_when_solved() {
         }
         let solved = server.solve(&case).await["result"].take();
         let patches = solved["patches"].as_array().expect("patches");
+        // The quality of the profiles is reported before the solve and under the patch.
+        for quality in [&checked["quality"], &patches[0]["quality"]] {
+            for side in ["rail", "wheel"] {
+                let spacing = &quality[side]["spacing_mm"];
+                assert!(spacing.is_number(), "{file}: {side}: {quality}");
+            }
+        }
         let near = patches.iter().any(|patch| {
             let there = numbers(&patch["position"]["track_mm"]);
             let angle = number(&patch["position"]["contact_angle_rad"]);

@@ -33,7 +33,11 @@ async fn a_column_that_is_not_known_is_refused_with_what_it_may_be() {
     let template = kept_template(&server).await;
     let table = "Time;s_track;Q_left;nu_x;nu_y;spin\n[s];[m];[kN];[%];[%];[rad/m]\n\
                  0,1;1,5;61,5;0,1;-0,02;0,4\n0,2;3,1;74;-0,05;0,01;0,38\n";
-    let refused = send_rows(&server, &template, "text/csv", table).await;
+    let send = async |query: &str| {
+        let query = format!("{template}{query}");
+        send_rows(&server, &query, "text/csv", table).await
+    };
+    let refused = send("").await;
     assert_problem(&refused, 422, "faulty-table", "`Q_left`");
     for word in [
         "normal_force [kN]",
@@ -46,13 +50,7 @@ async fn a_column_that_is_not_known_is_refused_with_what_it_may_be() {
     assert_eq!(errors.len(), 1);
     assert_eq!(errors[0]["pointer"], "/columns/Q_left");
     // If the column is mapped and its unit comes from the line of units, the run is the same as with the names of the service.
-    let named = send_rows(
-        &server,
-        &format!("{template}&column=Q_left:normal_force"),
-        "text/csv",
-        table,
-    )
-    .await;
+    let named = send("&column=Q_left:normal_force").await;
     assert_eq!(named.json["columns"][2]["factor"], 1e3, "{}", named.text);
     assert_eq!(named.json["columns"][0]["unit"], "s");
     let own = "Time,s_track,normal_force_n,creepage_x,creepage_y,spin_per_mm\n\
@@ -61,14 +59,7 @@ async fn a_column_that_is_not_known_is_refused_with_what_it_may_be() {
     let (named, own) = (rows_of(&server, &named).await, rows_of(&server, &own).await);
     assert_eq!(named, own);
     // A column that is only copied does not change the results.
-    let carried = send_rows(
-        &server,
-        &format!("{template}&carry=Q_left"),
-        "text/csv",
-        table,
-    )
-    .await;
-    let carried = rows_of(&server, &carried).await;
+    let carried = rows_of(&server, &send("&carry=Q_left").await).await;
     assert_eq!(carried[0]["Q_left"], 61.5);
     assert_ne!(carried[0]["force_x_n"], own[0]["force_x_n"]);
     for (query, word) in [
@@ -77,7 +68,7 @@ async fn a_column_that_is_not_known_is_refused_with_what_it_may_be() {
         ("column=Q_left:speed", "`kN`"),
         ("column=Q_left:normal_force%20%5BN%5D", "agree"),
     ] {
-        let refused = send_rows(&server, &format!("{template}&{query}"), "text/csv", table).await;
+        let refused = send(&format!("&{query}")).await;
         assert_problem(&refused, 422, "faulty-table", word);
     }
 }

@@ -167,8 +167,8 @@ async fn large_results_are_passed_on_as_they_are_stored() {
     let case = crate::batches::small("large");
     let waited = server
         .post_with("/v1/jobs", "prefer", "wait=60", &case)
-        .await;
-    assert_eq!(waited.status, 200, "{}", waited.text);
+        .await
+        .is(200);
     assert_eq!(waited.json["state"], "succeeded");
     let id = waited.json["id"].as_str().unwrap();
     let result = server.get(&format!("/v1/jobs/{id}/result")).await;

@@ -35,8 +35,8 @@ async fn an_evolution_is_answered_as_json_tables_and_sections() {
     let server = Server::start().await;
     let answer = server
         .post("/v1/evolutions?name=short&label=line:A", &request(2))
-        .await;
-    assert_eq!(answer.status, 202, "{}", answer.text);
+        .await
+        .is(202);
     let path = answer.location();
     let done = ended(&server, &path).await;
     assert_eq!(done["state"], "succeeded");
@@ -101,8 +101,8 @@ async fn an_evolution_is_answered_as_json_tables_and_sections() {
     ] {
         let file = server
             .get(&format!("{path}/sections/{body}?format={format}"))
-            .await;
-        assert_eq!(file.status, 200, "{}", file.text);
+            .await
+            .is(200);
         let mut case = example("wheel-rail.case.json");
         case["contact"][body] = json!({ "format": form, "text": file.text });
         let checked = server.post("/v1/cases/check", &case).await;
@@ -118,8 +118,7 @@ async fn an_evolution_is_answered_as_json_tables_and_sections() {
             "{body} {format}: {found} {known}"
         );
     }
-    let deleted = server.delete(&path).await;
-    assert_eq!(deleted.status, 204);
+    server.delete(&path).await.is(204);
     assert_problem(&server.get(&path).await, 404, "job-not-found", "id");
 }
 

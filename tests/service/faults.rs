@@ -32,8 +32,7 @@ async fn faults_of_a_case_have_codes_values_ranges_units_and_words() {
     case["name"] = json!("x".repeat(300));
     case["solver"] = json!({ "method": "magic" });
     case.as_object_mut().expect("an object").remove("material");
-    let answer = server.post("/v1/cases/check", &case).await;
-    assert_eq!(answer.status, 422);
+    let answer = server.post("/v1/cases/check", &case).await.is(422);
     let fault = |pointer| at(&answer.json, pointer);
     let range = json!({ "code": "out-of-range", "value": -0.5, "minimum": 0.0, "maximum": 100.0 });
     assert_eq!(fault("/friction/coefficient"), range);

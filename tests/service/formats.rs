@@ -1,17 +1,17 @@
-//! Tests that results in other formats have exactly the same numbers as in JSON.
+//! Tests that results in other formats, and all fields of a motion in one response, have exactly the same numbers as in JSON.
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::csv_table::Csv;
 use crate::errors::assert_problem;
 use crate::results::{number, numbers, path_of};
-use crate::server::{Answer, Server, example};
+use crate::server::{Answer, Server, example, link};
 
 /// The parts with values per cell, and their columns.
-pub const PARTS: [(&str, &[&str]); 4] = [
+const PARTS: [(&str, &[&str]); 4] = [
     ("tractions", &["traction_x_mpa", "traction_y_mpa"]),
     ("pressure", &["pressure_mpa"]),
     ("slip", &["slip_x", "slip_y"]),
@@ -47,7 +47,7 @@ pub fn flat(rows: &Value) -> Vec<f64> {
         .collect()
 }
 
-pub fn bits(values: &[f64]) -> Vec<u64> {
+fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
@@ -69,7 +69,7 @@ fn each<const N: usize>(data: &[u8], read: impl Fn([u8; N]) -> f64) -> Vec<f64> 
 }
 
 /// Returns the arrays of an NPZ archive with their shapes as text.
-pub fn read_npz(answer: &Answer) -> BTreeMap<String, (String, Vec<f64>)> {
+fn read_npz(answer: &Answer) -> BTreeMap<String, (String, Vec<f64>)> {
     let mut archive = zip::ZipArchive::new(Cursor::new(&answer.bytes)).expect("an archive");
     let mut arrays = BTreeMap::new();
     for index in 0..archive.len() {
@@ -205,4 +205,98 @@ async fn the_form_is_chosen_by_query_before_accept() {
     }
     let answer = ask("resultants?format=npz", "*/*").await;
     assert_problem(&answer, 400, "bad-query", "`json`, `csv`");
+}
+
+async fn solved(server: &Server, outputs: Value) -> Value {
+    let mut case = example("spin.case.json");
+    case["outputs"] = outputs;
+    server.solve(&case).await
+}
+
+#[tokio::test]
+async fn one_answer_has_all_fields_of_a_motion_as_their_parts_have_them() {
+    let server = Server::start().await;
+    let all = json!(["resultants", "zones", "tractions", "pressure", "slip"]);
+    let job = solved(&server, all).await;
+    let path = path_of(&job);
+    let link = link(&job["result"], "fields");
+    let fields = server.read(link).await;
+    let grid = server.read(&format!("{link}?grid=20x30")).await;
+    for (part, names) in PARTS {
+        let cells = server.read(&format!("{path}/{part}")).await;
+        let sampled = server.read(&format!("{path}/{part}?grid=20x30")).await;
+        assert_eq!(cells["outlines"]["patch"], fields["outlines"]["patch"]);
+        assert_eq!(sampled["outlines"]["patch"], fields["outlines"]["patch"]);
+        for name in names.iter().copied().chain(["x_mm", "y_mm"]) {
+            assert!(fields["cells"][name].is_array(), "{name}");
+            assert_eq!(fields["cells"][name], cells["cells"][name], "{name}");
+            assert_eq!(grid[name], sampled[name], "{name} on a grid");
+        }
+    }
+}
+
+#[tokio::test]
+async fn parts_are_chosen_by_name_and_must_be_there() {
+    let server = Server::start().await;
+    let some = json!(["resultants", "pressure", "tractions"]);
+    let path = path_of(&solved(&server, some).await);
+    let fields = server.read(&format!("{path}/fields")).await;
+    assert!(
+        fields["cells"]["pressure_mpa"].is_array() && fields["cells"]["traction_x_mpa"].is_array()
+    );
+    assert!(fields["cells"]["zone"].is_null() && fields["outlines"]["stick"].is_null());
+    let one = server.read(&format!("{path}/fields?parts=pressure")).await;
+    assert!(one["cells"]["pressure_mpa"].is_array() && one["cells"]["traction_x_mpa"].is_null());
+    let missing = server
+        .get(&format!("{path}/fields?parts=pressure,slip"))
+        .await;
+    assert_problem(&missing, 404, "output-not-asked", "slip");
+    for parts in ["resultants", "pressure,pressure", "", "pressure, slip"] {
+        let path = format!("{path}/fields?parts={}", parts.replace(' ', "%20"));
+        let answer = server.get(&path).await;
+        assert_problem(&answer, 400, "bad-query", "parts");
+    }
+    let none = path_of(&solved(&server, json!(["resultants"])).await);
+    let nothing = server.get(&format!("{none}/fields")).await;
+    assert_problem(&nothing, 404, "output-not-asked", "outputs");
+    let nothing = server.get(&format!("{none}/fields?parts=slip")).await;
+    assert_problem(&nothing, 404, "output-not-asked", "outputs");
+}
+
+#[tokio::test]
+async fn single_precision_rounds_each_number_and_is_smaller() {
+    let server = Server::start().await;
+    let all = json!(["resultants", "zones", "pressure", "tractions"]);
+    let path = path_of(&solved(&server, all).await);
+    let whole = format!("{path}/fields?grid=60x40");
+    let exact = server.get(&whole).await;
+    let single = format!("{whole}&precision=single");
+    let json = server.get(&single).await;
+    let npz = server.get(&format!("{single}&format=npz")).await;
+    let double = server.get(&format!("{whole}&format=npz")).await;
+    assert!(json.bytes.len() < exact.bytes.len() && npz.bytes.len() < double.bytes.len());
+    let archive = read_npz(&npz);
+    #[expect(clippy::cast_possible_truncation, reason = "that is what is asked for")]
+    let rounded = |values: Vec<f64>| {
+        values
+            .iter()
+            .map(|value| f64::from(*value as f32))
+            .collect::<Vec<_>>()
+    };
+    for name in ["pressure_mpa", "traction_x_mpa", "zone"] {
+        let expected = flat(&exact.json[name]);
+        let expected = match name {
+            "zone" => expected,
+            _ => rounded(expected),
+        };
+        assert_eq!(bits(&archive[name].1), bits(&expected), "{name}");
+        let read = rounded(flat(&json.json[name]));
+        assert_eq!(bits(&read), bits(&expected), "{name} as JSON");
+    }
+    let border = &exact.json["outlines"]["patch"][0];
+    let corners = flat(border);
+    let (shape, values) = &archive["outline_patch_mm"];
+    assert_eq!(*shape, format!("{}, 2", corners.len() / 2));
+    assert_eq!(bits(values), bits(&rounded(corners)));
+    assert_eq!(archive["outline_patch_start"].1, [0.0]);
 }

@@ -20,10 +20,11 @@ const SPLICES: &str = r#"null true [] {} "" - -0 0 1e999 -1e308 5e-324 1e-400 99
 const BLANKS: [&str; 3] = ["\n", "\r", "\u{feff}"];
 
 /// A reproducible generator of pseudo-random numbers (Marsaglia's xorshift64*).
-struct Chance(u64);
+pub struct Chance(pub u64);
 
 impl Chance {
-    fn below(&mut self, bound: usize) -> usize {
+    /// Returns a number below the bound.
+    pub fn below(&mut self, bound: usize) -> usize {
         self.0 ^= self.0 >> 12;
         self.0 ^= self.0 << 25;
         self.0 ^= self.0 >> 27;

@@ -13,8 +13,7 @@ fn linked(text: &str) -> Vec<String> {
 #[tokio::test]
 async fn page_and_its_files_have_a_strict_policy() {
     let server = Server::idle().await;
-    let page = server.get("/").await;
-    assert_eq!(page.status, 200);
+    let page = server.get("/").await.is(200);
     let script = linked(&page.text).pop().expect("a script");
     for answer in [&page, &server.get(&script).await] {
         let policy = answer.header("content-security-policy").expect("a policy");
@@ -50,8 +49,10 @@ async fn files_of_the_page_may_be_kept_for_good_and_the_page_itself_not() {
         assert!(lifetime.contains("immutable"), "{path}: {lifetime}");
     }
     // A page that was loaded before an update of the service still finds its files, but must revalidate them.
-    let other = server.get("/page/0123456789abcdef/js/page.js").await;
-    assert_eq!(other.status, 200, "{}", other.text);
+    let other = server
+        .get("/page/0123456789abcdef/js/page.js")
+        .await
+        .is(200);
     assert_eq!(other.header("cache-control"), Some("no-cache"));
     for path in [
         "/page/-/none.js",

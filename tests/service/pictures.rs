@@ -32,8 +32,8 @@ async fn every_field_is_drawn_as_svg_and_as_png() {
     ] {
         let svg = server
             .get(&format!("{path}/plot.svg?field={field}&patch=1"))
-            .await;
-        assert_eq!(svg.status, 200, "{}", svg.text);
+            .await
+            .is(200);
         assert_eq!(svg.header("content-type"), Some("image/svg+xml"));
         Tree::from_str(&svg.text, &Options::default()).expect("well-formed SVG");
         for word in [label, "x in mm", "y in mm", "rolling", "patch 1 of 0 to 1"] {
@@ -46,8 +46,8 @@ async fn every_field_is_drawn_as_svg_and_as_png() {
         assert_eq!(arrows, field != "pressure", "arrows of {field}");
         let png = server
             .get(&format!("{path}/plot.png?field={field}&patch=1&width=320"))
-            .await;
-        assert_eq!(png.status, 200, "{}", png.text);
+            .await
+            .is(200);
         assert_eq!(png.header("content-type"), Some("image/png"));
         let pixels = Pixmap::decode_png(&png.bytes).expect("a PNG");
         assert_eq!(pixels.width(), 320);
@@ -107,33 +107,26 @@ async fn pictures_that_cannot_be_drawn_say_why() {
     let server = Server::start().await;
     let case = asked("spin.case.json", &json!(["tractions"]));
     let path = path_of(&server.solve(&case).await);
-    for (query, status, kind, word) in [
-        ("plot.svg?field=stress", 400, "bad-query", "`traction`"),
-        ("plot.png?width=47", 400, "bad-query", "48 to 2400"),
-        ("plot.svg?width=2401", 400, "bad-query", "48 to 2400"),
-        ("plot.svg?range=3", 400, "bad-query", "`low,high`"),
-        ("plot.svg?range=3,3", 400, "bad-query", "`low,high`"),
-        ("plot.svg?range=0,inf", 400, "bad-query", "`low,high`"),
-        (
-            "plot.svg?field=zones&range=0,1",
-            400,
-            "bad-query",
-            "no scale",
-        ),
-        ("plot.svg?patch=1", 400, "bad-query", "patch"),
-        ("plot.svg?point=1", 400, "bad-query", "point"),
-        ("plot.svg?grid=4x4", 400, "bad-query", "`grid`"),
-        (
-            "tractions?format=png&grid=4x4",
-            400,
-            "bad-query",
-            "cells themselves",
-        ),
-        ("plot.svg?field=zones", 404, "output-not-asked", "`zones`"),
-        ("plot.png?field=slip", 404, "output-not-asked", "`slip`"),
+    for (query, word) in [
+        ("plot.svg?field=stress", "`traction`"),
+        ("plot.png?width=47", "48 to 2400"),
+        ("plot.svg?width=2401", "48 to 2400"),
+        ("plot.svg?range=3", "`low,high`"),
+        ("plot.svg?range=3,3", "`low,high`"),
+        ("plot.svg?range=0,inf", "`low,high`"),
+        ("plot.svg?field=zones&range=0,1", "no scale"),
+        ("plot.svg?patch=1", "patch"),
+        ("plot.svg?point=1", "point"),
+        ("plot.svg?grid=4x4", "`grid`"),
+        ("tractions?format=png&grid=4x4", "cells themselves"),
     ] {
         let answer = server.get(&format!("{path}/{query}")).await;
-        assert_problem(&answer, status, kind, word);
+        assert_problem(&answer, 400, "bad-query", word);
+    }
+    for field in ["zones", "slip"] {
+        let answer = server.get(&format!("{path}/plot.svg?field={field}")).await;
+        let word = format!("`{field}`");
+        assert_problem(&answer, 404, "output-not-asked", &word);
     }
     let idle = Server::idle().await;
     let path = idle.submit(&example("spin.case.json")).await;
@@ -270,8 +263,10 @@ async fn small_pictures_are_small_files() {
 async fn a_creep_curve_has_a_bar_for_every_estimated_error() {
     let server = Server::start().await;
     let path = path_of(&server.solve(&example("sweep.case.json")).await);
-    let svg = server.get(&format!("{path}/plot.svg?view=curve")).await;
-    assert_eq!(svg.status, 200, "{}", svg.text);
+    let svg = server
+        .get(&format!("{path}/plot.svg?view=curve"))
+        .await
+        .is(200);
     Tree::from_str(&svg.text, &Options::default()).expect("well-formed SVG");
     for word in ["creepage x", "force in N", "force y (across)", "μN"] {
         assert!(svg.text.contains(word), "the curve lacks `{word}`");
@@ -322,8 +317,10 @@ async fn sections_and_patches_on_the_profiles_are_drawn_where_there_are_any() {
     let job = server.solve(&case).await;
     let path = path_of(&job);
     let patches = job["result"]["patches"].as_array().expect("patches").len();
-    let standing = server.get(&format!("{path}/plot.svg?view=profiles")).await;
-    assert_eq!(standing.status, 200, "{}", standing.text);
+    let standing = server
+        .get(&format!("{path}/plot.svg?view=profiles"))
+        .await
+        .is(200);
     Tree::from_str(&standing.text, &Options::default()).expect("well-formed SVG");
     let tags = standing.text.matches("<circle").count();
     let combs = standing.text.matches("fill-opacity=\"0.75\"").count();
@@ -332,8 +329,8 @@ async fn sections_and_patches_on_the_profiles_are_drawn_where_there_are_any() {
 
     let section = server
         .get(&format!("{path}/plot.svg?view=section&patch=1"))
-        .await;
-    assert_eq!(section.status, 200, "{}", section.text);
+        .await
+        .is(200);
     Tree::from_str(&section.text, &Options::default()).expect("well-formed SVG");
     for word in [
         "along rolling at y =",

@@ -138,19 +138,10 @@ async fn bodies_too_long_of_unknown_length_broken_or_missing_are_refused() {
     })
     .await;
     let long = format!("c8\r\n{}\r\n0\r\n\r\n", " ".repeat(200));
+    let chunked = "Transfer-Encoding: chunked";
     for (length, body, status, slug) in [
-        (
-            "Transfer-Encoding: chunked",
-            long.as_str(),
-            413,
-            "body-too-large",
-        ),
-        (
-            "Transfer-Encoding: chunked",
-            "no chunk\r\n",
-            400,
-            "unreadable-body",
-        ),
+        (chunked, &*long, 413, "body-too-large"),
+        (chunked, "no chunk\r\n", 400, "unreadable-body"),
         ("Content-Length: 10", "{", 408, "body-timeout"),
     ] {
         let head = "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\nContent-Type: application/json";

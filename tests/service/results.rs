@@ -1,4 +1,4 @@
-//! Tests results: fields, zones, grids and sweeps, compared with each other and with the solver.
+//! Tests results: fields, zones, grids, sweeps and rolling histories, compared with each other and with the solver.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -64,7 +64,7 @@ async fn a_result_is_read_without_a_look_at_the_case() {
 }
 
 /// Returns the area inside closed polygons. Holes count as negative.
-pub fn area(polygons: &Value) -> f64 {
+fn area(polygons: &Value) -> f64 {
     let polygons = polygons
         .as_array()
         .expect("polygons")
@@ -178,4 +178,40 @@ async fn each_motion_of_a_sweep_is_fetched_by_its_number() {
         let answer = server.get(&format!("{fields}/tractions?{query}")).await;
         assert_problem(&answer, 400, "bad-query", "");
     }
+}
+
+#[tokio::test]
+async fn a_history_is_answered_point_by_point_in_json_and_csv() {
+    let server = Server::start().await;
+    let case = example("rolling.case.json");
+    server.post("/v1/cases/check", &case).await.is(200);
+    let job = server.solve(&case).await;
+    assert_eq!(job["state"], "succeeded", "{job}");
+    let distances = case["motion"]["history"]["distance_mm"].as_array().unwrap();
+    let points = job["result"]["patches"][0]["points"].as_array().unwrap();
+    assert_eq!(points.len(), distances.len());
+    let mut dissipated = 0.0;
+    for (point, distance) in points.iter().zip(distances) {
+        let history = &point["history"];
+        assert_eq!(number(&history["distance_mm"]), number(distance));
+        assert!(number(&history["dissipated_n_mm"]) >= dissipated, "{point}");
+        dissipated = number(&history["dissipated_n_mm"]);
+    }
+    // The two points without rolling are tangential shifts.
+    let shifted = |k: usize| number(&points[k]["history"]["shift_x_mm"]);
+    assert!(shifted(0) > 0.0 && shifted(12) < 0.0, "{job}");
+    assert!(points[1]["history"].get("shift_x_mm").is_none());
+    let path = format!("/v1/jobs/{}/resultants", job["id"].as_str().unwrap());
+    let table = server.get(&format!("{path}?format=csv")).await.text;
+    let mut lines = table.lines();
+    let head = lines.next().unwrap();
+    assert!(
+        head.contains(",distance_mm,dissipated_n_mm,shift_x_mm"),
+        "{head}"
+    );
+    let columns = head.split(',').count();
+    assert!(lines.all(|line| line.split(',').count() == columns));
+    let mut faulty = case;
+    faulty["motion"]["history"]["distance_mm"] = json!([1, 0]);
+    server.post("/v1/jobs", &faulty).await.is(422);
 }

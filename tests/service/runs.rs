@@ -127,21 +127,17 @@ async fn assert_forms(server: &Server, results: &str, all: &[Value]) {
 async fn assert_manifest(server: &Server, run: &str, rows: u64) {
     let manifest = server.get(&format!("{run}/manifest")).await;
     let files = manifest.json["files"].as_array().expect("files").clone();
-    assert_eq!(
-        files
-            .iter()
-            .filter_map(|file| file["rows"].as_u64())
-            .sum::<u64>(),
-        rows
-    );
-    let first = server.get(files[0]["url"].as_str().expect("a path")).await;
-    assert_eq!(first.status, 200, "{}", first.text);
+    let counts = files.iter().filter_map(|file| file["rows"].as_u64());
+    assert_eq!(counts.sum::<u64>(), rows);
+    server
+        .get(files[0]["url"].as_str().expect("a path"))
+        .await
+        .is(200);
 }
 
 /// Asserts that row 17 has the expected case and answer, and that rows outside the run are not found.
 async fn assert_row(server: &Server, run: &str, sent: &Value, line: &Value) {
-    let alone = server.get(&format!("{run}/rows/17")).await;
-    assert_eq!(alone.status, 200, "{}", alone.text);
+    let alone = server.get(&format!("{run}/rows/17")).await.is(200);
     assert_eq!(alone.json["answer"], *line);
     let case = &alone.json["case"];
     assert_eq!(

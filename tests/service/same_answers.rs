@@ -1,9 +1,8 @@
-//! Asks the same question on every route over HTTP. Each answer agrees with that of a single job within both error estimates. `tests/routes` covers
-//! all features and routes.
+//! Asks the same question in jobs, in a run and in an evaluation. The answers agree within both error estimates. `tests/routes` covers all features
+//! and routes.
 
 use serde_json::{Value, json};
 
-use crate::batches::{results, send};
 use crate::results::number;
 use crate::runs::answers;
 use crate::server::Server;
@@ -66,89 +65,37 @@ fn assert_agrees(what: &str, found: &[[[f64; 2]; 2]], alone: &[[[f64; 2]; 2]]) {
     }
 }
 
-/// Returns the two motions of a case as single cases.
-fn singles(case: &Value) -> [Value; 2] {
-    CREEPAGES.map(|[x, y]| {
-        let mut single = case.clone();
-        single["motion"]["creepage_x"] = json!(x);
-        single["motion"]["creepage_y"] = json!(y);
-        single
-    })
-}
-
-fn totals(job: &Value) -> Vec<[[f64; 2]; 2]> {
-    let totals = job["result"]["total"].as_array().expect("totals");
-    totals.iter().map(of_total).collect()
-}
-
-/// Tests jobs with several motions, and batches.
-async fn assert_jobs(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]]) {
-    let friction = &case["friction"];
-    let singles = singles(case);
-    let mut list = case.clone();
-    list["motion"] = singles
-        .iter()
-        .map(|single| single["motion"].clone())
-        .collect();
-    let list = totals(&server.solve(&list).await);
-    assert_agrees(&format!("list, {friction}"), &list, alone);
-    let mut sweep = case.clone();
-    let values = |k: usize| json!({ "values": CREEPAGES.map(|creepages| creepages[k]) });
-    sweep["motion"] = json!({ "sweep": { "creepage_x": values(0), "creepage_y": values(1), "speed_mm_per_s": 20000 } });
-    let sweep = totals(&server.solve(&sweep).await);
-    assert_agrees(&format!("sweep, {friction}"), &sweep, alone);
-    let query = format!("?template={}", server.keep(&singles[0]).await);
-    let table = "creepage_x,creepage_y\n1e-3,-5e-4\n-2e-3,1e-3\n".to_owned();
-    let cases = Value::from(singles.to_vec()).to_string();
-    for (query, content, body) in [
-        ("", "application/json", cases),
-        (&*query, "text/csv", table),
-    ] {
-        let batch = send(server, query, content, body).await.is(202);
-        let answers = results(server, &batch.json, "?wait=60").await;
-        let found: Vec<_> = answers
-            .iter()
-            .map(|line| of_total(&line["result"]["total"][0]))
-            .collect();
-        assert_agrees(&format!("batch of {content}, {friction}"), &found, alone);
-    }
-}
-
-/// Tests runs and evaluations.
-async fn assert_rows(server: &Server, case: &Value, alone: &[[[f64; 2]; 2]]) {
-    let friction = &case["friction"];
-    let columns = json!({
-        "/motion/creepage_x": CREEPAGES.map(|creepages| creepages[0]),
-        "/motion/creepage_y": CREEPAGES.map(|creepages| creepages[1]),
-    });
-    let rows = json!({ "template": case, "columns": columns });
-    let run = server.post("/v1/runs", &rows).await.is(202);
-    let run = run.location();
-    let answers = answers(server, &run).await;
-    let found: Vec<_> = answers.iter().map(of_row).collect();
-    assert_agrees(&format!("run, {friction}"), &found, alone);
-    let answer = server.post("/v1/evaluate", &rows).await.is(200);
-    let columns = &answer.json["columns"];
-    let row = |k: usize| {
-        let of = |name: &str| columns[name][k].clone();
-        json!({ "force_x_n": of("force_x_n"), "force_y_n": of("force_y_n"), "error_estimate": of("error_estimate") })
-    };
-    assert_eq!(columns["status"], json!(["ok", "ok"]), "{friction}");
-    let found = [0, 1].map(|k| of_row(&row(k)));
-    assert_agrees(&format!("evaluate, {friction}"), &found, alone);
-}
-
 #[tokio::test]
-async fn a_case_has_the_same_answer_on_every_route_whatever_its_friction() {
+async fn a_case_has_the_same_answer_alone_in_a_run_and_in_an_evaluation() {
     let server = Server::start().await;
     for friction in frictions() {
         let case = template(&friction);
         let mut alone = Vec::new();
-        for single in singles(&case) {
+        for [x, y] in CREEPAGES {
+            let mut single = case.clone();
+            single["motion"]["creepage_x"] = json!(x);
+            single["motion"]["creepage_y"] = json!(y);
             let job = server.solve(&single).await;
             alone.push(of_total(&job["result"]["total"][0]));
         }
-        assert_jobs(&server, &case, &alone).await;
-        assert_rows(&server, &case, &alone).await;
+        let columns = json!({
+            "/motion/creepage_x": CREEPAGES.map(|creepages| creepages[0]),
+            "/motion/creepage_y": CREEPAGES.map(|creepages| creepages[1]),
+        });
+        let rows = json!({ "template": case, "columns": columns });
+        let run = server.post("/v1/runs", &rows).await.is(202);
+        let answers = answers(&server, &run.location()).await;
+        let found: Vec<_> = answers.iter().map(of_row).collect();
+        assert_agrees(&format!("run, {friction}"), &found, &alone);
+        let answer = server.post("/v1/evaluate", &rows).await.is(200);
+        let columns = answer.json["columns"].as_object().expect("columns");
+        assert_eq!(columns["status"], json!(["ok", "ok"]), "{friction}");
+        let row = |k: usize| {
+            let cells = columns
+                .iter()
+                .map(|(name, cells)| (name.clone(), cells[k].clone()));
+            of_row(&cells.collect())
+        };
+        assert_agrees(&format!("evaluate, {friction}"), &[0, 1].map(row), &alone);
     }
 }

@@ -11,23 +11,6 @@ use crate::store::{claim_up_to, open_beside};
 use crate::support::{Service, case, endless_case, long_case, pause};
 
 #[tokio::test]
-async fn a_running_job_goes_back_to_the_queue_uncounted() {
-    let mut lab = Lab::start(|_| {}).await;
-    let id = lab.begin(case("long")).await;
-    lab.reopen(Duration::ZERO).await;
-    let job = lab.get(id).await;
-    assert_eq!(job.failure, None);
-    assert_eq!(
-        (job.state, job.attempt, job.started_at),
-        (State::Queued, 0, None)
-    );
-    lab.gate.set_open(true);
-    lab.jobs.start().unwrap();
-    lab.succeeds_at_once(id).await;
-    lab.end().await;
-}
-
-#[tokio::test]
 async fn a_job_that_ends_within_the_grace_period_is_not_run_again() {
     // Jobs are claimed one by one, so that the second one is still queued.
     let mut lab = Lab::start(|options| options.group_max = 1).await;
@@ -120,12 +103,6 @@ async fn a_stopped_service_hands_its_running_job_to_the_next_one() {
     service.until(&id, "cancelled").await;
 }
 
-async fn until_stopping(service: &Service) {
-    while service.logged("stopping") == 0 {
-        pause().await;
-    }
-}
-
 #[tokio::test]
 async fn a_second_signal_ends_a_service_at_once_that_solves_or_waits_for_its_load_balancer() {
     for (flag, signal) in [("--shutdown-grace-s", "INT"), ("--drain-delay-s", "TERM")] {
@@ -133,7 +110,7 @@ async fn a_second_signal_ends_a_service_at_once_that_solves_or_waits_for_its_loa
         let id = service.submit(&endless_case("long")).await;
         service.until(&id, "running").await;
         service.signal(signal);
-        until_stopping(&service).await;
+        service.until_logged("stopping", 1).await;
         service.signal(signal);
         assert_eq!(service.wait().code(), Some(130));
     }
@@ -151,7 +128,7 @@ async fn a_service_says_that_it_is_not_ready_before_its_port_closes() {
     };
     assert_eq!(look().await.unwrap(), 200);
     service.signal("TERM");
-    until_stopping(&service).await;
+    service.until_logged("stopping", 1).await;
     let mut refusals = 0;
     while let Ok(status) = look().await {
         assert!(

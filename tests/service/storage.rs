@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use crate::batches::{small, small_loaded};
 use crate::errors::assert_problem;
 use crate::server::Answer;
-use crate::support::{Service, case, endless_case, loaded, long_case, pause, railhead, skip};
+use crate::support::{Service, case, endless_case, large_case, loaded, pause, railhead, skip};
 use crate::sweeps::sliced_case;
 
 /// A small file system that is unmounted when dropped.
@@ -98,19 +98,6 @@ async fn submit_until_refused(service: &Service) -> (Vec<String>, Answer) {
     panic!("nothing was refused");
 }
 
-/// Returns a case whose result is stored outside the job table.
-fn large_case() -> Value {
-    let mut case = long_case("large", 150);
-    case["outputs"] = json!(["resultants", "tractions"]);
-    case
-}
-
-async fn until_ready(service: &Service) {
-    while ready(service).await.status != 200 {
-        pause().await;
-    }
-}
-
 async fn all_succeed(service: &Service, accepted: &[String]) {
     for id in accepted {
         let job = service.until(id, "succeeded").await;
@@ -123,7 +110,7 @@ async fn all_succeed(service: &Service, accepted: &[String]) {
 async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     let disk = or_skip!(Disk::mount("size=24m"));
     let service = disk.serve(&[]);
-    let large = service.submit(&large_case()).await;
+    let large = service.submit(&large_case("large", 150)).await;
     service.until(&large, "running").await;
     let ballast = disk.fill();
     let (mut accepted, refusal) = submit_until_refused(&service).await;
@@ -134,14 +121,12 @@ async fn a_full_disk_refuses_what_comes_and_loses_nothing_it_has() {
     let batch = service.post("/v1/batches", &cases).await;
     assert_problem(&batch, 507, "storage-full", "");
     // A result that is ready now waits for space and is kept.
-    while service.logged("could not be written yet") == 0 {
-        pause().await;
-    }
+    service.until_logged("could not be written yet", 1).await;
     let state = service.get(&format!("/v1/jobs/{large}")).await["state"].clone();
     assert_eq!(state, "running", "what is known can still be read");
 
     std::fs::remove_file(ballast).unwrap();
-    until_ready(&service).await;
+    service.until_ready().await;
     accepted.push(large);
     all_succeed(&service, &accepted).await;
     service.submit(&case("after")).await;
@@ -189,7 +174,7 @@ async fn a_batch_that_fills_the_disk_leaves_nothing_and_its_key_is_free_at_once(
 
 #[tokio::test]
 async fn a_service_starts_on_a_full_disk_and_serves_what_it_has() {
-    // After a kill a start has most to do. After an orderly shutdown there are the fewest files.
+    // After a kill on the full disk a start has most to do. After an orderly shutdown there are the fewest files.
     for killed in [true, false] {
         starts_on_a_full_disk(killed).await;
     }
@@ -202,11 +187,15 @@ async fn starts_on_a_full_disk(killed: bool) {
     service.until(&solved, "succeeded").await;
     let running = service.submit(&endless_case("running")).await;
     service.until(&running, "running").await;
-    match killed {
-        true => service.kill(),
-        false => service.stop().await,
+    let (accepted, ballast);
+    if killed {
+        ballast = disk.fill();
+        accepted = submit_until_refused(&service).await.0;
+        service.kill();
+    } else {
+        service.stop().await;
+        (accepted, ballast) = (Vec::new(), disk.fill());
     }
-    let ballast = disk.fill();
     let service = disk.serve(&[]);
     service.get(&format!("/v1/jobs/{solved}/result")).await;
     if killed {
@@ -216,8 +205,11 @@ async fn starts_on_a_full_disk(killed: bool) {
         assert_problem(&ready(&service).await, 507, "storage-full", "");
     }
     std::fs::remove_file(ballast).unwrap();
-    until_ready(&service).await;
+    service.until_ready().await;
     service.until(&running, "running").await;
+    for id in &accepted {
+        service.until(id, "succeeded").await;
+    }
     let after = service.submit(&case("after")).await;
     all_succeed(&service, &[after]).await;
 }
@@ -230,13 +222,9 @@ async fn a_full_disk_costs_a_sweep_no_slice() {
     let problem = railhead::contact::check(&question, &Limits::default()).unwrap();
     let slices = railhead::contact::slices::slices(&problem).len();
     let id = service.submit(&question).await;
-    while service.logged("slice stored") < 1 {
-        pause().await;
-    }
+    service.until_logged("slice stored", 1).await;
     let ballast = disk.fill();
-    while service.logged("could not be written yet") < 2 {
-        pause().await;
-    }
+    service.until_logged("could not be written yet", 2).await;
     let stored = service.logged("slice stored");
     assert!(stored < slices, "{stored} of {slices}");
     std::fs::remove_file(ballast).unwrap();
@@ -246,22 +234,6 @@ async fn a_full_disk_costs_a_sweep_no_slice() {
         slices,
         "each was solved once"
     );
-}
-
-#[tokio::test]
-async fn a_full_disk_and_a_kill_lose_nothing_either() {
-    let disk = or_skip!(Disk::mount("size=16m"));
-    let service = disk.serve(&[]);
-    service.submit(&case("first")).await;
-    let ballast = disk.fill();
-    let (accepted, refusal) = submit_until_refused(&service).await;
-    assert_problem(&refusal, 507, "storage-full", "");
-    service.kill();
-    std::fs::remove_file(ballast).unwrap();
-    let service = disk.serve(&[]);
-    for id in &accepted {
-        service.until(id, "succeeded").await;
-    }
 }
 
 #[test]
@@ -291,10 +263,8 @@ async fn results_without_room_are_told_although_the_table_takes_data() {
     let results = folder.path().join("results");
     std::os::unix::fs::symlink(disk.folder.path(), results).unwrap();
     let service = Service::start(folder.path(), &["--cache", "false", "--workers", "1"]);
-    let large = service.submit(&large_case()).await;
-    while service.logged("could not be written yet") < 2 {
-        pause().await;
-    }
+    let large = service.submit(&large_case("large", 150)).await;
+    service.until_logged("could not be written yet", 2).await;
     let mut accepted = vec![large];
     for number in 0..10 {
         let small = submit(&service, &case(&format!("small {number}"))).await;
@@ -304,7 +274,7 @@ async fn results_without_room_are_told_although_the_table_takes_data() {
         assert!(failing(&service).await);
     }
     disk.remount("size=16m");
-    until_ready(&service).await;
+    service.until_ready().await;
     assert!(!failing(&service).await);
     all_succeed(&service, &accepted).await;
 }
@@ -331,7 +301,7 @@ async fn a_body_that_fills_the_disk_is_told_until_there_is_room() {
         assert!(failing(&service).await);
     }
     std::fs::remove_file(ballast).unwrap();
-    until_ready(&service).await;
+    service.until_ready().await;
     assert!(!failing(&service).await);
 }
 
@@ -353,7 +323,7 @@ async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     shell.arg(env!("CARGO_BIN_EXE_railhead"));
     let flags = ["--cache", "false", "--workers", "1"];
     let service = Service::start_as(&mut shell, "serve", folder.path(), &flags);
-    let first = service.submit(&large_case()).await;
+    let first = service.submit(&large_case("large", 150)).await;
     service.until(&first, "running").await;
     limit_files(&service, "0");
     let refusal = submit(&service, &case("refused")).await;
@@ -361,11 +331,9 @@ async fn a_disk_that_takes_nothing_is_told_from_a_full_one() {
     assert_problem(&ready(&service).await, 503, "storage-unwritable", "");
     service.get(&format!("/v1/jobs/{first}")).await;
     assert!(failing(&service).await);
-    while service.logged("could not be written yet") == 0 {
-        pause().await;
-    }
+    service.until_logged("could not be written yet", 1).await;
     limit_files(&service, "unlimited");
-    until_ready(&service).await;
+    service.until_ready().await;
     all_succeed(&service, &[first]).await;
     service.submit(&case("after")).await;
     assert_eq!(service.logged("the disk accepts writes again"), 1);
@@ -382,7 +350,7 @@ async fn a_table_locked_by_another_process_is_waited_for_and_then_told() {
     assert_problem(&refusal, 503, "storage-unwritable", "");
     service.get(&format!("/v1/jobs/{before}/result")).await;
     other.execute_batch("ROLLBACK").unwrap();
-    until_ready(&service).await;
+    service.until_ready().await;
     let after = service.submit(&loaded(70_000)).await;
     service.until(&after, "succeeded").await;
 }

@@ -13,7 +13,7 @@ use railhead::contact::remark::list::Remark;
 use railhead::jobs::model::{Kind, Queue, SubmitOptions};
 use railhead::jobs::store::{
     BatchBegun, Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Filter, Lease, NewBatch,
-    NewJob, Page, QueueBounds, ReleaseReason, ResultRef, Store, StoredResult,
+    NewJob, Page, QueueBounds, ReleaseReason, Store, StoredResult,
 };
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
@@ -123,14 +123,6 @@ impl Table {
     /// Returns a job of the tenant `anonymous`.
     pub async fn job(&self, id: Uuid) -> Option<Job> {
         self.store.job("anonymous", id).await.unwrap()
-    }
-
-    pub async fn state(&self, id: Uuid) -> State {
-        self.job(id).await.unwrap().state
-    }
-
-    pub async fn result(&self, id: Uuid) -> Option<(Job, Option<ResultRef>)> {
-        self.store.result("anonymous", id).await.unwrap()
     }
 
     pub async fn cancel(&self, id: Uuid, now: i64) -> Option<Job> {

@@ -255,6 +255,20 @@ impl Service {
             .count()
     }
 
+    /// Waits until this number of log events have this message.
+    pub async fn until_logged(&self, message: &str, count: usize) {
+        while self.logged(message) < count {
+            pause().await;
+        }
+    }
+
+    /// Waits until the service is ready.
+    pub async fn until_ready(&self) {
+        while self.ask("/readyz").await.status != 200 {
+            pause().await;
+        }
+    }
+
     /// Returns all log events so far as lines of JSON.
     pub fn log_text(&self) -> String {
         let log = self.log.lock().unwrap();
@@ -378,6 +392,13 @@ pub fn long_case(name: &str, motions: u32) -> Value {
     } });
     case["solver"] = json!({ "method": "boundary_element", "mesh": { "strips": 16, "cells": 16 } });
     case["outputs"] = json!(["resultants", "zones"]);
+    case
+}
+
+/// Returns a case whose result is stored outside the job table.
+pub fn large_case(name: &str, motions: u32) -> Value {
+    let mut case = long_case(name, motions);
+    case["outputs"] = json!(["resultants", "tractions"]);
     case
 }
 

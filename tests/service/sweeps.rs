@@ -16,7 +16,7 @@ use uuid::Uuid;
 use crate::batches::small_loaded;
 use crate::lab::{Gate, Lab};
 use crate::store::open_beside;
-use crate::support::{Service, files_below, long_case, pause};
+use crate::support::{Service, files_below, long_case};
 
 /// Returns a case that is slow according to its estimate and is therefore cut into slices. It is fast in fact, since all cells slip.
 pub fn sliced_case(name: &str, motions: u32) -> Value {
@@ -259,9 +259,7 @@ async fn a_killed_process_costs_a_sweep_no_more_than_the_slice_it_was_at() {
     let slices = contact::slices::slices(&problem).len();
     assert!(slices > 5, "{slices}");
     let id = service.submit(&question).await;
-    while service.logged("slice stored") < 2 {
-        pause().await;
-    }
+    service.until_logged("slice stored", 2).await;
     let before = service.get(&format!("/v1/jobs/{id}")).await;
     assert!(
         before["progress"].as_f64().unwrap() > 1.5 / slices as f64,
@@ -294,9 +292,9 @@ async fn a_killed_process_costs_a_sweep_no_more_than_the_slice_it_was_at() {
         assert_eq!(zeroed(&found[part]), zeroed(&expected[part]), "{part}");
     }
     let cancelled = service.submit(&sliced_case("cancelled", 400)).await;
-    while service.logged("slice stored") < slices - stored + 1 {
-        pause().await;
-    }
+    service
+        .until_logged("slice stored", slices - stored + 1)
+        .await;
     service.cancel(&cancelled).await;
     service.until(&cancelled, "cancelled").await;
 }

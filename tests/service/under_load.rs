@@ -9,6 +9,7 @@ use std::time::Duration;
 use reqwest::{Client, Method};
 use serde_json::{Value, json};
 
+use crate::malformed::Chance;
 use crate::support::{Service, case};
 
 const KILLS: usize = 8;
@@ -19,19 +20,6 @@ const CASES_PER_ROUND: usize = 25;
 /// The number of cases of the batch in every third round.
 const BATCH: usize = 30;
 const FLAGS: [&str; 4] = ["--workers", "2", "--shutdown-grace-s", "0"];
-
-/// A reproducible generator of pseudo-random numbers.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, bound: u64) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % bound
-    }
-}
 
 /// Returns a case that differs from all others of the test. Every tenth case is larger.
 fn distinct(number: usize) -> Value {
@@ -106,7 +94,7 @@ struct Flooded {
 
 /// Starts a service on this folder several times, and ends it each time while clients send requests.
 async fn ended_in_floods(folder: &Path, times: usize, end: impl Fn(Service)) -> Flooded {
-    let mut random = Random(7);
+    let mut random = Chance(7);
     let mut clients: Vec<Known> = (0..CLIENTS).map(|_| Known::default()).collect();
     let (mut batches, mut succeeded) = (BTreeMap::new(), BTreeMap::new());
     for round in 0..times {
@@ -132,7 +120,7 @@ async fn ended_in_floods(folder: &Path, times: usize, end: impl Fn(Service)) -> 
                 (key, id)
             })
         });
-        tokio::time::sleep(Duration::from_millis(30 + random.below(500))).await;
+        tokio::time::sleep(Duration::from_millis(30 + random.below(500) as u64)).await;
         succeeded.extend(all_jobs(&service, "&state=succeeded").await);
         end(service);
         stop.store(true, Ordering::SeqCst);

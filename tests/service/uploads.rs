@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::batches::{results, small};
 use crate::errors::assert_problem;
-use crate::runs::{ended, template};
+use crate::runs::template;
 use crate::server::{Answer, Server};
 
 const BOUNDARY: &str = "a-boundary";
@@ -36,7 +36,11 @@ async fn a_table_with_its_template_is_answered_like_one_over_a_job() {
     let case = case.to_string();
     let parts = [
         ("name=\"template\"; filename=\"case.json\"", case.as_str()),
-        ("name=\"table\"; filename=\"rows.csv\"", table),
+        // Programs that do not know the format of a file send this content type.
+        (
+            "name=\"table\"; filename=\"rows.CSV\"\r\nContent-Type: application/octet-stream",
+            table,
+        ),
     ];
     let alone = upload(&server, "/v1/batches", &parts).await.is(202);
     let [expected, found] = [
@@ -49,44 +53,6 @@ async fn a_table_with_its_template_is_answered_like_one_over_a_job() {
         assert!(found["result"].is_object(), "{found}");
         assert_eq!(found["result"]["patches"], expected["result"]["patches"]);
     }
-}
-
-#[tokio::test]
-async fn a_run_takes_every_form_of_table_with_its_template() {
-    let server = Server::start().await;
-    let case = template("auto").to_string();
-    let csv = "normal_force_n,/motion/creepage_x,section\n5e4,1e-3,a\n6e4,0,b\n";
-    let ndjson = "{\"normal_force_n\":5e4,\"/motion/creepage_x\":1e-3,\"section\":\"a\"}\n\
-                  {\"normal_force_n\":6e4,\"/motion/creepage_x\":0,\"section\":\"b\"}\n";
-    let rows = json!({ "template": template("auto"), "columns": {
-        "normal_force_n": [5e4, 6e4], "/motion/creepage_x": [1e-3, 0.0], "section": ["a", "b"]
-    } });
-    let expected = server.post("/v1/runs?wait=60", &rows).await.is(200);
-    let template = ("name=\"template\"", case.as_str());
-    let mut answers = vec![answers_of(&server, &expected).await];
-    for table in [
-        // Programs that do not know the format of a file send this content type.
-        (
-            "name=\"table\"; filename=\"rows.CSV\"\r\nContent-Type: application/octet-stream",
-            csv,
-        ),
-        ("name=\"table\"; filename=\"rows.ndjson\"", ndjson),
-    ] {
-        let run = upload(&server, "/v1/runs?wait=60", &[template, table]).await;
-        assert_eq!(run.status, 200, "{}: {}", table.0, run.text);
-        answers.push(answers_of(&server, &run).await);
-    }
-    assert!(answers[0].contains(",ok,"), "{}", answers[0]);
-    assert!(
-        answers.iter().all(|answer| *answer == answers[0]),
-        "{answers:#?}"
-    );
-}
-
-async fn answers_of(server: &Server, run: &Answer) -> String {
-    let path = run.location();
-    ended(server, &path).await;
-    server.get(&format!("{path}/results?format=csv")).await.text
 }
 
 #[tokio::test]

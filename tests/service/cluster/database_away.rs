@@ -6,7 +6,7 @@ use reqwest::{Method, RequestBuilder};
 
 use crate::cluster::cable::Cable;
 use crate::cluster::postgres::at_port;
-use crate::cluster::{WITHIN, node, tables, until};
+use crate::cluster::{WITHIN, node, tables};
 use crate::support::{Answer, Service, case, long_case};
 
 /// Starts a node with a worker whose connection to the database passes through a proxy.
@@ -32,13 +32,6 @@ async fn assert_unreachable(request: RequestBuilder) {
     );
 }
 
-async fn until_ready(service: &Service) {
-    until("it is ready again", async || {
-        service.ask("/readyz").await.status == 200
-    })
-    .await;
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_database_that_is_away_is_no_full_disk_and_costs_no_job() {
     let (service, cable) = or_skip!(node_at_a_cable(&[]).await);
@@ -62,7 +55,7 @@ async fn a_database_that_is_away_is_no_full_disk_and_costs_no_job() {
     }
 
     cable.set_whole(true);
-    until_ready(&service).await;
+    service.until_ready().await;
     let job = service.until(&solving, "succeeded").await;
     assert_eq!(job["attempt"], 1, "{job}\n{}", service.log_text());
 }
@@ -85,7 +78,7 @@ async fn a_way_that_swallows_everything_keeps_no_connection_and_no_request() {
         "TCP gives up after a quarter of an hour"
     );
     cable.set_whole(true);
-    until_ready(&service).await;
+    service.until_ready().await;
     let later = service.submit(&case("later")).await;
     service.until(&later, "succeeded").await;
 }

@@ -7,16 +7,9 @@ use serde_json::{Value, json};
 use crate::cluster::faulty_server::FaultyServer;
 use crate::cluster::seaweed::{railhead_at, server};
 use crate::cluster::{node_by, said_by, tables, until};
-use crate::support::{Service, long_case};
+use crate::support::{Service, large_case};
 
 const PLACE: &str = "s3://results/of/tests";
-
-/// Returns a case whose result is too large for a row of the table.
-fn large_case(name: &str) -> Value {
-    let mut case = long_case(name, 12);
-    case["outputs"] = json!(["resultants", "tractions"]);
-    case
-}
 
 /// Runs `doctor`. Returns whether its check of the result store passed, and its report on it.
 fn doctor(port: u16, url: &str, place: &str) -> (bool, String) {
@@ -73,7 +66,7 @@ async fn results_in_s3_survive_its_faults_and_are_read_at_every_node() {
     faults.cut.store(5, Ordering::Relaxed);
     let mut ids = Vec::new();
     for number in 0..4 {
-        ids.push(one.submit(&large_case(&format!("case {number}"))).await);
+        ids.push(one.submit(&large_case(&format!("case {number}"), 12)).await);
     }
     for id in &ids {
         let job = other.until(id, "succeeded").await;
@@ -92,7 +85,7 @@ async fn results_in_s3_survive_its_faults_and_are_read_at_every_node() {
 
     // With permanent faults, stored results are unavailable for the time being, and solved jobs wait.
     faults.refused.store(1, Ordering::Relaxed);
-    let waiting = one.submit(&large_case("waiting")).await;
+    let waiting = one.submit(&large_case("waiting", 12)).await;
     let answer = result(&other, &ids[0]).await;
     assert_eq!(
         (answer.0, &answer.1["type"]),
