@@ -9,8 +9,7 @@ use axum::routing::get;
 use serde::Serialize;
 use serde_json::{Value, json};
 use utoipa::openapi::path::{OperationBuilder, ParameterIn};
-use utoipa::openapi::schema::{ArrayBuilder, Type};
-use utoipa::openapi::{Content, HttpMethod, ObjectBuilder, Ref, RefOr, ResponseBuilder, Schema};
+use utoipa::openapi::{HttpMethod, RefOr, Schema};
 use utoipa::{IntoParams, PartialSchema};
 use utoipa_axum::router::OpenApiRouter;
 use uuid::Uuid;
@@ -21,8 +20,7 @@ use crate::extract::query::{
     Parameters, Query, Reader, count, label, name, query, reader, repeated, time,
 };
 use crate::problem::{ApiError, ProblemKind, Result, describe};
-use crate::render::format::Format;
-use crate::routes::work::{WorkAnswer, answer_name, route, text_header};
+use crate::routes::work::{WorkAnswer, answer_name, json_answer, route, schema, text_header};
 use crate::state::AppState;
 use railhead_jobs::model::{Kind, State as JobState};
 use railhead_jobs::{Filter, Membership, PAGE_MAX, Total};
@@ -120,12 +118,8 @@ pub(crate) fn list(kind: Kind) -> OpenApiRouter<AppState> {
         list_work(kind, Caller(jobs), &uri).await
     };
     let nouns = kind.nouns();
-    let page = Content::new(Some(Ref::from_schema_name(page_name(kind))));
     let link = text_header("The next page (`rel=next`); absent on the last page");
-    let found = ResponseBuilder::new()
-        .description(format!("A page of {nouns}"))
-        .content(Format::Json.media_type(), page)
-        .header("Link", link);
+    let found = json_answer(&page_name(kind), &format!("A page of {nouns}")).header("Link", link);
     let mut parameters = groups(kind).1;
     parameters
         .iter_mut()
@@ -250,31 +244,18 @@ fn page_schema(kind: Kind) -> RefOr<Schema> {
         true => "ListedJob",
         false => answer_name(kind),
     };
-    let count = |what: &str| {
-        let number = ObjectBuilder::new().schema_type(Type::Integer);
-        number.minimum(Some(0)).description(Some(what))
-    };
-    let cursor = ObjectBuilder::new()
-        .schema_type(
-            [Type::String, Type::Null]
-                .into_iter()
-                .collect::<utoipa::openapi::schema::SchemaType>(),
-        )
-        .description(Some("`cursor` of the next page; null on the last page"));
-    ObjectBuilder::new()
-        .description(Some(format!("A page of {}, newest first", kind.nouns())))
-        .property(
-            kind.nouns(),
-            ArrayBuilder::new().items(Ref::from_schema_name(entry)),
-        )
-        .required(kind.nouns())
-        .property("next_cursor", cursor)
-        .property("total", count("Number of entries in the whole list"))
-        .property(
-            "total_at_least",
-            count("Lower bound, in place of `total` if an exact count is too expensive"),
-        )
-        .into()
+    let count = |about: &str| json!({ "type": "integer", "minimum": 0, "description": about });
+    schema(json!({
+        "type": "object",
+        "description": format!("A page of {}, newest first", kind.nouns()),
+        "required": [kind.nouns()],
+        "properties": {
+            kind.nouns(): { "type": "array", "items": { "$ref": format!("#/components/schemas/{entry}") } },
+            "next_cursor": { "type": ["string", "null"], "description": "`cursor` of the next page; null on the last page" },
+            "total": count("Number of entries in the whole list"),
+            "total_at_least": count("Lower bound, in place of `total` if an exact count is too expensive"),
+        },
+    }))
 }
 
 /// Returns the schema of a job in a list, whose members are all optional. The schema of a job describes them.

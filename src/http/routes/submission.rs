@@ -8,9 +8,8 @@ use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
+use utoipa::openapi::RefOr;
 use utoipa::openapi::path::{Parameter, ParameterBuilder, ParameterIn};
-use utoipa::openapi::schema::Type;
-use utoipa::openapi::{Content, ObjectBuilder, Ref, RefOr, ResponseBuilder};
 use utoipa::{IntoParams, IntoResponses};
 
 use crate::extract::caller::Caller;
@@ -22,7 +21,9 @@ use crate::problem::{ApiError, Fault, Result, seconds_header};
 use crate::render::format::Format;
 use crate::routes::results::result_text;
 use crate::routes::wait::{Wait, WaitQuery};
-use crate::routes::work::{WorkAnswer, header_parameter, prefer, text_header};
+use crate::routes::work::{
+    WorkAnswer, header_parameter, json_answer, prefer, text as text_schema, text_header,
+};
 use crate::state::AppState;
 use railhead_jobs::Jobs;
 use railhead_jobs::model::{Kind, Labels, State as JobState, WorkOptions};
@@ -212,8 +213,7 @@ pub(crate) struct SubmitParameters;
 
 impl IntoParams for SubmitParameters {
     fn into_params(place: impl Fn() -> Option<ParameterIn>) -> Vec<Parameter> {
-        let key = ObjectBuilder::new()
-            .schema_type(Type::String)
+        let key = text_schema()
             .min_length(Some(1))
             .max_length(Some(IDEMPOTENCY_KEY_MAX_CHARS))
             .pattern(Some("^[!-~]+$"));
@@ -257,10 +257,7 @@ accepted!(RunAccepted: "Run");
 
 fn accepted_as(schema: &str) -> BTreeMap<String, RefOr<utoipa::openapi::Response>> {
     let response = |about: &str| {
-        let content = Content::new(Some(Ref::from_schema_name(schema)));
-        ResponseBuilder::new()
-            .description(about)
-            .content(Format::Json.media_type(), content)
+        json_answer(schema, about)
             .header("Location", text_header("Path of the created resource"))
             .header(
                 "Preference-Applied",

@@ -11,7 +11,7 @@ use axum::routing::{MethodRouter, delete, get, post};
 use axum::{Extension, Json};
 use futures_util::stream::{Stream, StreamExt, once, unfold};
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 use utoipa::openapi::extensions::Extensions;
 use utoipa::openapi::path::{OperationBuilder, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::{SchemaFormat, Type};
@@ -285,10 +285,7 @@ pub(crate) fn schemas() -> Vec<(String, RefOr<Schema>)> {
 
 /// Returns the schema of an event with these names, whose data has the schema `data`.
 pub(crate) fn event_schema(data: &str, names: &str) -> RefOr<Schema> {
-    let text = |what: &str| {
-        let text = ObjectBuilder::new().schema_type(Type::String);
-        text.description(Some(what))
-    };
+    let text = |what: &str| text().description(Some(what));
     let holds = json!({ "$ref": format!("#/components/schemas/{data}") });
     let data = text("Data of the event, as JSON")
         .content_media_type("application/json")
@@ -310,9 +307,7 @@ pub(crate) fn event_schema(data: &str, names: &str) -> RefOr<Schema> {
 
 /// Returns an operation on one piece of work.
 fn operation(kind: Kind, verb: &str, summary: &str, more: &[ProblemKind]) -> OperationBuilder {
-    let id = ObjectBuilder::new()
-        .schema_type(Type::String)
-        .format(Some(SchemaFormat::Custom("uuid".to_owned())));
+    let id = text().format(Some(SchemaFormat::Custom("uuid".to_owned())));
     let id = ParameterBuilder::new()
         .name("id")
         .parameter_in(ParameterIn::Path)
@@ -331,17 +326,31 @@ fn operation(kind: Kind, verb: &str, summary: &str, more: &[ProblemKind]) -> Ope
     operation
 }
 
-fn answer(kind: Kind, description: &str) -> ResponseBuilder {
-    let content = Content::new(Some(Ref::from_schema_name(answer_name(kind))));
+/// Describes a response with JSON of this schema.
+pub(crate) fn json_answer(schema: &str, description: &str) -> ResponseBuilder {
+    let content = Content::new(Some(Ref::from_schema_name(schema)));
     ResponseBuilder::new()
         .description(description)
         .content(Format::Json.media_type(), content)
 }
 
+fn answer(kind: Kind, description: &str) -> ResponseBuilder {
+    json_answer(answer_name(kind), description)
+}
+
+/// Returns a schema of the contract from its JSON. A test compares the contract with the committed one.
+pub(crate) fn schema(json: Value) -> RefOr<Schema> {
+    serde_json::from_value(json).unwrap_or_else(|_| Schema::default().into())
+}
+
+/// Returns the schema of a text.
+pub(crate) fn text() -> ObjectBuilder {
+    ObjectBuilder::new().schema_type(Type::String)
+}
+
 /// Describes a response header with a text.
 pub(crate) fn text_header(description: &str) -> utoipa::openapi::Header {
-    let text = ObjectBuilder::new().schema_type(Type::String);
-    let header = HeaderBuilder::new().schema(Some(text));
+    let header = HeaderBuilder::new().schema(Some(text()));
     header.description(Some(description)).build()
 }
 
@@ -352,7 +361,7 @@ pub(crate) fn header_parameter(name: &str, about: &str) -> ParameterBuilder {
         .parameter_in(ParameterIn::Header)
         .required(Required::False)
         .description(Some(about))
-        .schema(Some(ObjectBuilder::new().schema_type(Type::String)))
+        .schema(Some(text()))
 }
 
 /// Describes `Prefer: wait=N` of a request.

@@ -17,8 +17,8 @@ use railhead_contact::solution::words::evolution::EvolutionState;
 #[derive(Debug)]
 pub(crate) struct SlicedCase {
     pub(crate) checked: CheckedCase,
-    slices: Vec<Range<usize>>,
-    done: usize,
+    pub(crate) slices: Vec<Range<usize>>,
+    pub(crate) done: usize,
     /// Solver time of the stored slices.
     pub(crate) spent: Duration,
 }
@@ -46,11 +46,6 @@ impl SlicedCase {
         }
     }
 
-    /// Whether the case has a single slice.
-    pub(crate) fn is_one(&self) -> bool {
-        self.slices.len() <= 1
-    }
-
     /// The next slice, if any is left.
     pub(crate) fn next(&self) -> Option<Range<usize>> {
         self.slices.get(self.done).cloned()
@@ -71,22 +66,6 @@ impl SlicedCase {
     pub(crate) fn done_after_next(&self) -> f64 {
         let motions = self.next().map_or(0, |slice| slice.end);
         motions as f64 / self.checked.problem.motions.len().max(1) as f64
-    }
-
-    /// Records that the next slice is stored.
-    pub(crate) fn advance(&mut self, spent: Duration) {
-        self.done += 1;
-        self.spent = spent;
-    }
-
-    /// Starts again, because the stored slices cannot be used.
-    pub(crate) fn begin_again(&mut self) {
-        self.done = 0;
-    }
-
-    /// Whether this number of parts is the whole case.
-    pub(crate) fn is_whole(&self, parts: usize) -> bool {
-        parts == self.slices.len()
     }
 }
 
@@ -169,7 +148,10 @@ impl SlicedWork {
     /// Records that the last solved slice is stored.
     pub(crate) fn advance(&mut self, spent: Duration) {
         match self {
-            SlicedWork::Case(case) => case.advance(spent),
+            SlicedWork::Case(case) => {
+                case.done += 1;
+                case.spent = spent;
+            }
             SlicedWork::Evolution(evolution) => {
                 evolution.done += 1;
                 evolution.spent = spent;
@@ -180,69 +162,9 @@ impl SlicedWork {
     /// Starts again, because the stored slices cannot be used.
     pub(crate) fn begin_again(&mut self) {
         match self {
-            SlicedWork::Case(case) => case.begin_again(),
+            SlicedWork::Case(case) => case.done = 0,
             SlicedWork::Evolution(evolution) => evolution.begin_again(),
         }
-    }
-}
-
-#[cfg(test)]
-pub(crate) mod tests {
-    use serde_json::json;
-
-    use super::*;
-    use railhead_contact as contact;
-    use railhead_contact::case::solver::Limits;
-
-    /// Seven motions with all fields.
-    pub(crate) fn checked_case() -> CheckedCase {
-        let case = json!({
-            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
-            "friction": { "coefficient": 0.3 },
-            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
-            "load": { "normal_force_n": 100_000 },
-            "motion": { "sweep": { "creepage_x": { "from": 0.0005, "to": 0.003, "points": 7 } } },
-            "solver": { "mesh": { "strips": 6, "cells": 6 } },
-            "outputs": ["resultants", "zones", "tractions", "slip", "pressure"]
-        });
-        contact::check(&case, &Limits::default()).unwrap()
-    }
-
-    fn note(number: u32, motions: u32, checked: &CheckedCase) -> SliceRecord {
-        SliceRecord {
-            number,
-            motions,
-            digest: checked.label.digest.clone(),
-            spent: Duration::from_secs(u64::from(motions)),
-        }
-    }
-
-    #[test]
-    fn only_what_was_cut_here_and_solved_by_this_solver_counts_as_done() {
-        let checked = checked_case();
-        let cuts = || vec![0..3, 3..5, 5..7];
-        let sliced = |stored: &[SliceRecord]| SlicedCase::new(checked.clone(), cuts(), stored);
-        let good = [note(0, 3, &checked), note(1, 5, &checked)];
-        let going = sliced(&good);
-        assert_eq!(
-            (going.next(), going.spent),
-            (Some(5..7), Duration::from_secs(5))
-        );
-        assert_eq!(going.note(Duration::ZERO).motions, 7);
-        assert!((going.done_after_next() - 1.0).abs() < f64::EPSILON);
-        assert_eq!(sliced(&[]).next(), Some(0..3));
-        // Cut elsewhere, a hole, another solver.
-        assert_eq!(sliced(&[note(0, 2, &checked)]).next(), Some(0..3));
-        assert_eq!(sliced(&good[1..]).next(), Some(0..3));
-        let other = SliceRecord {
-            digest: "of another revision".to_owned(),
-            ..good[1].clone()
-        };
-        let half = sliced(&[good[0].clone(), other]);
-        assert_eq!(
-            (half.next(), half.spent),
-            (Some(3..5), Duration::from_secs(3))
-        );
     }
 }
 
@@ -319,4 +241,64 @@ pub(crate) fn internal_failure(reason: &str) -> Failure {
     tracing::error!(reason, "a job fails inside the service");
     let detail = "the job could not be solved because of a fault of the service; its log has the reason under the id of the job";
     Failure::new(FailureKind::Internal, detail)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use serde_json::json;
+
+    use super::*;
+    use railhead_contact as contact;
+    use railhead_contact::case::solver::Limits;
+
+    /// Seven motions with all fields.
+    pub(crate) fn checked_case() -> CheckedCase {
+        let case = json!({
+            "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": { "type": "radii", "rolling_mm": 460, "lateral_mm": 300 },
+            "load": { "normal_force_n": 100_000 },
+            "motion": { "sweep": { "creepage_x": { "from": 0.0005, "to": 0.003, "points": 7 } } },
+            "solver": { "mesh": { "strips": 6, "cells": 6 } },
+            "outputs": ["resultants", "zones", "tractions", "slip", "pressure"]
+        });
+        contact::check(&case, &Limits::default()).unwrap()
+    }
+
+    fn note(number: u32, motions: u32, checked: &CheckedCase) -> SliceRecord {
+        SliceRecord {
+            number,
+            motions,
+            digest: checked.label.digest.clone(),
+            spent: Duration::from_secs(u64::from(motions)),
+        }
+    }
+
+    #[test]
+    fn only_what_was_cut_here_and_solved_by_this_solver_counts_as_done() {
+        let checked = checked_case();
+        let cuts = || vec![0..3, 3..5, 5..7];
+        let sliced = |stored: &[SliceRecord]| SlicedCase::new(checked.clone(), cuts(), stored);
+        let good = [note(0, 3, &checked), note(1, 5, &checked)];
+        let going = sliced(&good);
+        assert_eq!(
+            (going.next(), going.spent),
+            (Some(5..7), Duration::from_secs(5))
+        );
+        assert_eq!(going.note(Duration::ZERO).motions, 7);
+        assert!((going.done_after_next() - 1.0).abs() < f64::EPSILON);
+        assert_eq!(sliced(&[]).next(), Some(0..3));
+        // Cut elsewhere, a hole, another solver.
+        assert_eq!(sliced(&[note(0, 2, &checked)]).next(), Some(0..3));
+        assert_eq!(sliced(&good[1..]).next(), Some(0..3));
+        let other = SliceRecord {
+            digest: "of another revision".to_owned(),
+            ..good[1].clone()
+        };
+        let half = sliced(&[good[0].clone(), other]);
+        assert_eq!(
+            (half.next(), half.spent),
+            (Some(3..5), Duration::from_secs(3))
+        );
+    }
 }

@@ -85,7 +85,7 @@ fn solve_next(shared: &Shared, control: &AttemptControl, sliced: SlicedCase) -> 
         error,
         remarks: sliced.checked.remarks.clone(),
     })?;
-    if sliced.is_one() {
+    if sliced.slices.len() <= 1 {
         return whole(shared, &sliced, spent, solution, &fields);
     }
     Ok(Outcome::Slice {
@@ -100,7 +100,7 @@ fn join_parts(
     mut sliced: SlicedCase,
     parts: &[EncodedResult],
 ) -> Ended {
-    let joined = match sliced.is_whole(parts.len()) {
+    let joined = match parts.len() == sliced.slices.len() {
         true => join(parts, || control.tick(1.0).is_continue()),
         false => Err(JobsError::Damaged(
             "slices of a sweep are missing".to_owned(),
@@ -114,7 +114,7 @@ fn join_parts(
         }),
         Err(error) => {
             tracing::error!(%error, "the slices of a sweep cannot be used; it is solved again");
-            sliced.begin_again();
+            sliced.done = 0;
             let sliced = Box::new(SlicedWork::Case(sliced));
             Ok(Outcome::Slice { sliced, part: None })
         }
