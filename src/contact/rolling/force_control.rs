@@ -41,6 +41,9 @@ const NEAR_LIMIT: f64 = 10.0;
 /// Least tolerance of a force, relative to μN or, if they are smaller, to the forces of the first motion tried. Where everything slips, elastic slip still turns
 /// the tractions by this much. Chosen by judgement.
 const MISSED_LEAST: f64 = 2e-7;
+/// Largest number of choices of meshes. Further choices follow if the motion found does not meet its target on the meshes chosen before.
+const MESH_CHOICES_MAX: u32 = 3;
+
 /// Solves motion `index` of a problem. Where forces are prescribed, finds the creepages that give them.
 ///
 /// # Errors
@@ -118,11 +121,23 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         }
     }
 
-    /// Finds the places on the meshes that the adaptive solve of a rough start compares.
+    /// Finds the places on meshes on which the motion found meets its target.
     fn find_on_chosen_meshes(&mut self, start: [f64; 2]) -> Result<FoundPlaces, SolveError> {
-        let place = self.start_on_coarsest(start)?;
-        self.choose_meshes(place)?;
-        self.find(place, false)
+        let mut place = self.start_on_coarsest(start)?;
+        let target = self.task.target().unwrap_or(f64::INFINITY);
+        let mut choices = 0;
+        loop {
+            self.choose_meshes(place)?;
+            let found = self.find(place, false)?;
+            choices += 1;
+            let met = found.value.error().is_some_and(|error| error <= target);
+            // Where the force jumps, other meshes do not help.
+            let ends = matches!(found.end, Termination::AtLimit | Termination::Jump);
+            if met || ends || choices == MESH_CHOICES_MAX {
+                return Ok(found);
+            }
+            place = found.place;
+        }
     }
 
     /// Finds the places roughly on the coarsest mesh; the start if that fails.
