@@ -94,31 +94,17 @@ async fn numbers_may_have_a_plus_sign() {
 async fn a_table_that_is_not_utf8_says_so() {
     let server = Server::idle().await;
     let query = template(&server).await;
-    let utf16 = |text: &str, bytes: fn(u16) -> [u8; 2]| -> Vec<u8> {
-        "\u{feff}"
-            .encode_utf16()
-            .chain(text.encode_utf16())
-            .flat_map(bytes)
-            .collect()
+    let utf16 = |bytes: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        let table = "\u{feff}normal_force_n\n80000\n";
+        table.encode_utf16().flat_map(bytes).collect()
     };
-    let table = "normal_force_n\n80000\n";
+    let wide = "the table is UTF-16, not UTF-8";
+    let (first, second) = (b"name,speed_\xb5\nx,1\n", b"creepage_x,name\n0.001,\xb0\n");
     for (body, said) in [
-        (
-            utf16(table, u16::to_le_bytes),
-            "the table is UTF-16, not UTF-8",
-        ),
-        (
-            utf16(table, u16::to_be_bytes),
-            "the table is UTF-16, not UTF-8",
-        ),
-        (
-            b"name,speed_\xb5\nx,1\n".to_vec(),
-            "not UTF-8, as its line 1 shows",
-        ),
-        (
-            b"creepage_x,name\n0.001,\xb0\n".to_vec(),
-            "not UTF-8, as its line 2 shows",
-        ),
+        (utf16(u16::to_le_bytes), wide),
+        (utf16(u16::to_be_bytes), wide),
+        (first.to_vec(), "not UTF-8, as its line 1 shows"),
+        (second.to_vec(), "not UTF-8, as its line 2 shows"),
     ] {
         for kind in ["batches", "runs", "evaluate"] {
             let path = format!("/v1/{kind}{query}");
