@@ -31,6 +31,8 @@ use crate::numerics::simd::LANES;
 const FIRST: f64 = 24.0;
 /// Largest number of cells along x or s.
 const CELLS_MAX: usize = 600;
+/// A grid is fine enough if its cells have at most the wanted size over this part.
+const FINE_ENOUGH: f64 = 0.9;
 
 /// Tolerance of the contact conditions on the coarse grid, relative to the deepest overlap.
 const FIRST_TOLERANCE: f64 = 5e-3;
@@ -42,6 +44,8 @@ const FORCE: f64 = 2e-5;
 const FORCE_POOR: f64 = 5e-3;
 /// Least lowering of the wheel in mm.
 const LOWERING_LEAST: f64 = 1e-4;
+/// Usual upper limit of the lowering in mm of a wheel that rests where it touches first.
+const LOWERING_USUAL: f64 = 1.0;
 /// Change of height over the deepest overlap up to which the gap is linear in the height. Beyond it, the gap is computed again.
 const LINEAR: f64 = 0.05;
 /// Cosine of the angle of a face below which the face is steep.
@@ -175,7 +179,7 @@ impl CurveTask<'_> {
             _ => self.expected.max(LOWERING_LEAST),
         };
         // Grids reach slightly deeper than the lowering.
-        let deepest = |lowering: f64| self.touch - 1.1 * lowering;
+        let deepest = |lowering: f64| self.touch - lowering - 0.1 * lowering.min(LOWERING_USUAL);
         let mut overlaps = self.curve.overlaps(deepest(lowering));
         if let Some(lower) = self.below_steep_faces(lowering, &overlaps)? {
             lowering = lower;
@@ -402,7 +406,13 @@ impl CurveTask<'_> {
             }
         }
         let lengths = [0, 1].map(|axis| grid.cells()[axis] as f64 * grid.step[axis]);
-        [0, 1].map(|axis| step[axis].max(lengths[axis] / CELLS_MAX as f64))
+        [0, 1].map(|axis| {
+            let wanted = step[axis];
+            match grid.step[axis] * FINE_ENOUGH < wanted {
+                true => grid.step[axis],
+                false => wanted.max(lengths[axis] / CELLS_MAX as f64),
+            }
+        })
     }
 
     /// Brings the wheel to rest on a grid, which is enlarged where the contact reaches its border.
