@@ -5,10 +5,10 @@ use std::panic;
 use std::str::FromStr;
 use std::sync::OnceLock;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use axum::http::Uri;
 use tracing_appender::non_blocking::{ErrorCounter, NonBlockingBuilder, WorkerGuard};
-use tracing_subscriber::filter::Targets;
+use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::fmt::format::FmtSpan;
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
@@ -48,6 +48,18 @@ pub fn start(format: LogFormat, filter: &str) -> anyhow::Result<WorkerGuard> {
     let renamed = renamed.fold(filter.to_owned(), |filter, name| {
         filter.replace(&format!("railhead::{name}"), &format!("railhead_{name}"))
     });
+    let directives = renamed.split(',').filter(|part| !part.trim().is_empty());
+    for part in directives {
+        // `Targets` takes any other word for the name of a target, and then logs nothing else.
+        let (target, level) = part.rsplit_once('=').unwrap_or(("", part));
+        let is_name = |of: char| of.is_ascii_alphanumeric() || "_:-".contains(of);
+        if level.trim().parse::<LevelFilter>().is_err() || !target.trim().chars().all(is_name) {
+            bail!(
+                "--log: `{part}` is neither a level (`error`, `warn`, `info`, `debug`, `trace` or `off`) nor a target with a \
+                 level, such as `railhead_jobs=debug`"
+            );
+        }
+    }
     let targets: Targets = renamed.parse().context("--log")?;
     let (writer, guard) = NonBlockingBuilder::default()
         .lossy(true)

@@ -61,24 +61,24 @@ impl Anonymous {
     }
 }
 
-/// Parses an origin: scheme and authority.
+/// Parses an origin, scheme and authority, into the form in which browsers send it.
 pub(super) fn origin(text: &str) -> Result<String, String> {
-    let rest = text
-        .strip_prefix("https://")
-        .or_else(|| text.strip_prefix("http://"));
-    let plain = |rest: &str| {
-        !rest.is_empty()
-            && rest
-                .bytes()
-                .all(|byte| byte.is_ascii_graphic() && !b"/*?#@".contains(&byte))
+    let text = text.trim().to_ascii_lowercase();
+    let (scheme, authority) = text.split_once("://").unwrap_or_default();
+    let default_port = match scheme {
+        "http" => ":80",
+        "https" => ":443",
+        _ => return Err("an origin begins with `http://` or `https://`".to_owned()),
     };
-    if rest.is_some_and(plain) {
-        return Ok(text.to_owned());
+    let authority = authority.strip_suffix(default_port).unwrap_or(authority);
+    let stray = |of: char| !of.is_ascii_graphic() || "/*?#@".contains(of);
+    match authority.chars().find(|of| stray(*of)) {
+        Some(stray) => Err(format!(
+            "an origin is a scheme and a host, perhaps with a port; `{stray}` is not allowed in them"
+        )),
+        None if authority.is_empty() => Err("the host is missing".to_owned()),
+        None => Ok(format!("{scheme}://{authority}")),
     }
-    Err(
-        "an origin is `http://` or `https://` and a host, perhaps with a port, and no path"
-            .to_owned(),
-    )
 }
 
 /// Parses an address to listen on.

@@ -13,6 +13,7 @@ mod output;
 mod serve;
 mod solve;
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::FromArgMatches;
@@ -71,6 +72,17 @@ pub fn run() -> ExitCode {
 
 /// Copies the data folder of a service into a new folder, and prints its path.
 fn backup(args: &BackupArgs) -> anyhow::Result<ExitCode> {
+    let parent = std::path::absolute(&args.to)?
+        .parent()
+        .map(Path::canonicalize);
+    if let (Some(Ok(parent)), Ok(inside)) = (parent, args.folder.data_dir.canonicalize())
+        && parent.starts_with(inside)
+    {
+        anyhow::bail!(
+            "--to: `{}` is inside the data folder; name a folder outside of it",
+            args.to.display()
+        );
+    }
     block_on(data_dir::backup(&args.folder.data_dir, &args.to))??;
     print(&args.to.display().to_string())
 }

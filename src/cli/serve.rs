@@ -185,9 +185,22 @@ fn request_threads() -> usize {
     cores.max(REQUEST_THREADS_MIN)
 }
 
+/// Refuses names that no request can have in `Host`.
+fn require_host_names(names: &[String]) -> anyhow::Result<()> {
+    let is_plain = |of: char| of.is_ascii_alphanumeric() || "-._".contains(of);
+    let strange = |name: &&String| name.is_empty() || !name.chars().all(is_plain);
+    match names.iter().find(strange) {
+        Some(name) => bail!(
+            "--allowed-host: `{name}` is not a host name; give it without scheme, port and blanks"
+        ),
+        None => Ok(()),
+    }
+}
+
 /// Starts a service, waits for a signal, and stops it.
 async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     role.require(args)?;
+    require_host_names(&args.allowed_host)?;
     let mut signals = Signals::listen()?;
     let traces = args.otlp_endpoint.as_ref().map(Traces::start).transpose()?;
     let jobs = open_jobs(args, traces.as_ref()).await?;
@@ -196,10 +209,14 @@ async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     let anonymous = args.anonymous.on(address);
     if role == Role::Serve && !anonymous && !jobs.any_key().await? {
         jobs.shutdown(Duration::ZERO).await;
+        let answered = match args.anonymous {
+            Anonymous::Never => "not answered (`--anonymous never`)",
+            Anonymous::Loopback | Anonymous::Always => "only answered on loopback",
+        };
         bail!(
-            "no client could use a service on {address}: there is no API key, and requests without one are only answered on \
-             loopback; create a key with `railhead keys create --tenant NAME --data-dir {}`, or answer everyone who can reach \
-             the port with `--anonymous always`",
+            "no client could use a service on {address}: there is no API key, and requests without one are {answered}; \
+             create a key with `railhead keys create --tenant NAME --data-dir {}`, or answer everyone who can reach the port \
+             with `--anonymous always`",
             args.data_dir.display()
         );
     }

@@ -52,7 +52,10 @@ pub(super) fn run(args: &SolveArgs) -> anyhow::Result<ExitCode> {
     let case: Value = match serde_json::from_slice(&text) {
         Ok(case) => case,
         Err(error) => {
-            print_error(&format!("{} is not JSON: {error}", args.file.display()));
+            print_error(&format!(
+                "{} cannot be read as JSON: {error}",
+                args.file.display()
+            ));
             return Ok(ExitCode::from(FAULTY_CASE));
         }
     };

@@ -52,7 +52,7 @@ macro_rules! kinds {
 }
 
 kinds! {
-    MalformedJson 400 "malformed-json" "The body is not JSON" "The body is not valid JSON; `line` and `column` give the position. Repeated members and numbers too large for a 64-bit float count as malformed."
+    MalformedJson 400 "malformed-json" "The JSON of the body cannot be read" "The body cannot be read as JSON; `line` and `column` give the position. Repeated members and numbers too large for a 64-bit float are refused too."
     BadQuery 400 "bad-query" "The query is not valid" "A query parameter is unknown, repeated or has a value that is not allowed; `errors` names every such parameter."
     BadHeader 400 "bad-header" "A header is not valid" "A request header has a value that is not allowed; `errors` names it."
     UnreadableBody 400 "unreadable-body" "The body could not be read" "The connection ended before the whole body had arrived."
@@ -468,23 +468,20 @@ impl ApiError {
     /// Creates the problem of malformed JSON, or of JSON with a value of a wrong type, with its position.
     #[must_use]
     pub fn malformed(error: &serde_json::Error) -> Self {
-        let what = match error.is_data() {
-            true => "the body is JSON that cannot be used",
-            false => "the body is not JSON",
-        };
-        let mut failure = ApiError::new(ProblemKind::MalformedJson, format!("{what}: {error}"));
+        let detail = format!("the JSON of the body cannot be read: {error}");
+        let mut failure = ApiError::new(ProblemKind::MalformedJson, detail);
         failure.problem.line = Some(error.line());
         failure.problem.column = Some(error.column());
         failure
     }
 
-    /// Creates the problem of an element of an array that is not JSON, with its index.
+    /// Creates the problem of an element of an array whose JSON cannot be read, with its index.
     #[must_use]
     pub fn malformed_element(index: u32, error: &serde_json::Error) -> Self {
         ApiError::new(
             ProblemKind::MalformedJson,
             format!(
-                "the body is not JSON: element {index} (counted from 0): {error}, within the element"
+                "element {index} (counted from 0) cannot be read as JSON: {error}, within the element"
             ),
         )
     }
@@ -568,12 +565,6 @@ impl From<JobsError> for ApiError {
     fn from(error: JobsError) -> Self {
         let kind = match error {
             JobsError::Case(faults) => return faults.into(),
-            JobsError::NoSuchPatch(_) => {
-                return ApiError::bad_parameter("patch", error.to_string());
-            }
-            JobsError::NoSuchPoint(_) => {
-                return ApiError::bad_parameter("point", error.to_string());
-            }
             JobsError::BadCursor => return ApiError::bad_parameter("cursor", error.to_string()),
             JobsError::NotFound(kind) => ProblemKind::not_found(kind),
             JobsError::ProfileNotFound => ProblemKind::ProfileNotFound,

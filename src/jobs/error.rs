@@ -141,15 +141,13 @@ pub enum JobsError {
     #[error("{}", without_result(.0))]
     NotSucceeded(Box<Job>),
     /// The requested patch does not exist; contains the number of patches with stored fields, 0 without fields.
-    #[error("`patch` is too large; allowed: 0 to {}", .0.saturating_sub(1))]
+    #[error("there are {0} patches with fields")]
     NoSuchPatch(usize),
     /// The requested motion does not exist; contains the number of motions with stored fields.
-    #[error("`point` is too large; allowed: 0 to {}", .0.saturating_sub(1))]
+    #[error("there are {0} motions with fields")]
     NoSuchPoint(usize),
     /// The cursor is invalid or belongs to another filter.
-    #[error(
-        "`cursor` is not one that this service gave out for the same filters; start again without it"
-    )]
+    #[error("`cursor` belongs to other filters or is damaged; start again without it")]
     BadCursor,
     /// The service is stopping.
     #[error("the service is shutting down and takes no new jobs")]
@@ -158,7 +156,7 @@ pub enum JobsError {
     #[error("the data folder {} is in use by another process", .0.display())]
     DataDirInUse(PathBuf),
     /// The data folder cannot be used.
-    #[error("the data folder {} cannot be used: {source}", path.display())]
+    #[error("`{}` cannot be used: {source}", path.display())]
     DataDir {
         /// The folder or file.
         path: PathBuf,

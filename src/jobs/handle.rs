@@ -306,7 +306,8 @@ impl Jobs {
 
 fn other_value(key: &str, given: &str, bound: &str) -> Fault {
     let pointer = format!("/labels/{}", key.replace('~', "~0").replace('/', "~1"));
-    let detail = format!("is `{given}`; the key of this request is bound to `{bound}`");
+    let detail =
+        format!("the label `{key}` is `{given}`; the key of this request is bound to `{bound}`");
     let mut fault = Fault::new(pointer, detail);
     fault.figures.code = FaultCode::Invalid;
     fault.figures.value = Some(given.into());

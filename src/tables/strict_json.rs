@@ -14,6 +14,14 @@ impl<'de> Deserialize<'de> for Strict {
     }
 }
 
+/// Returns the message of the parser without the position at its end.
+#[must_use]
+pub fn without_position(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let end = text.rfind(" at line ").unwrap_or(text.len());
+    text[..end].to_owned()
+}
+
 struct StrictVisitor;
 
 impl<'de> Visitor<'de> for StrictVisitor {

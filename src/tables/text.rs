@@ -12,7 +12,7 @@ use railhead_contact::evaluate::varied::Values;
 pub use csv::StringRecord;
 
 use crate::error::{Result, TableError, faulty};
-use crate::strict_json::Strict;
+use crate::strict_json::{Strict, without_position};
 use crate::table::{Chunk, Title};
 use crate::titles::{is_line_of_units, is_text, is_thing, require_few};
 
@@ -458,7 +458,12 @@ impl<R: BufRead> JsonRows<R> {
                     "line {}: expected an object, a member for each column",
                     self.lines
                 ))),
-                Err(error) => Err(faulty(format!("line {}: {error}", self.lines))),
+                Err(error) => Err(faulty(format!(
+                    "line {}, column {}: {}",
+                    self.lines,
+                    error.column(),
+                    without_position(&error)
+                ))),
             };
         }
     }
@@ -671,7 +676,10 @@ mod tests {
             (json("{\"s\":1}\n{\"b\":1}"), ["line 2", "`s`"]),
             (json("{\"s\":1}\n{\"s\":\"x\"}"), ["line 2", "type"]),
             (json("{\"s\":1}\n{\"s\":1,\"b\":2}"), ["line 2", "`b`"]),
-            (json("{\"s\":1}\nnothing"), ["line 2", "expected"]),
+            (
+                json("{\"s\":1}\nnothing"),
+                ["line 2, column 2: expected", ""],
+            ),
             (json("{\"s\":1}\n[2]"), ["line 2", "an object"]),
             (json("{\"s\":1,\"s\":2}"), ["line 1", "written twice"]),
         ] {

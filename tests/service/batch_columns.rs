@@ -40,8 +40,13 @@ async fn columns_are_those_asked_for_and_say_what_the_result_says() {
     ];
     let (path, lines) = solved(&server, &cases).await;
     let columns = "label:km,name,area_mm2,pressure_max_mpa,stick_share,friction_limit_n,target_met,saturated,error";
-    let Csv { head, rows } = table(&server, &format!("{path}?format=csv&columns={columns}")).await;
-    assert_eq!(head.join(","), columns);
+    let path_of_table = format!("{path}?format=csv&columns={columns},name");
+    let Csv { head, rows } = table(&server, &path_of_table).await;
+    assert_eq!(
+        head.join(","),
+        columns,
+        "a column that is named twice is there once"
+    );
     assert_eq!(rows.len(), 3);
     assert_eq!((rows[0][0].as_str(), rows[0][1].as_str()), ("1", "'=a"));
     for (row, line) in rows.iter().zip(&lines).take(2) {

@@ -156,6 +156,51 @@ fn settings_come_from_the_environment_too_and_flags_win() {
 }
 
 #[test]
+fn settings_that_cannot_work_are_refused_at_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("data");
+    for (flags, code, said) in [
+        (["--log", "foo bar["], 1, "`foo bar[` is neither a level"),
+        (["--log", "info,warning"], 1, "`warning` is neither a level"),
+        (
+            ["--allowed-host", "http://x"],
+            1,
+            "`http://x` is not a host name",
+        ),
+        (
+            ["--cors-origin", "https://a.example/x"],
+            2,
+            "`/` is not allowed",
+        ),
+        (
+            ["--anonymous", "never"],
+            1,
+            "not answered (`--anonymous never`)",
+        ),
+    ] {
+        let mut serve = railhead();
+        serve.args(["serve", "--listen", "127.0.0.1:0", "--data-dir"]);
+        fails(&serve.arg(&data).args(flags).output().unwrap(), code, said);
+    }
+    for (to, said) in [
+        (data.join("sub"), "is inside the data folder"),
+        (folder.path().into(), "File exists"),
+    ] {
+        let mut backup = railhead();
+        backup
+            .args(["backup", "--data-dir"])
+            .arg(&data)
+            .arg("--to")
+            .arg(&to);
+        let refusal = fails(&backup.output().unwrap(), 1, said);
+        assert!(
+            refusal.contains(&format!("`{}`", to.display())),
+            "{refusal}"
+        );
+    }
+}
+
+#[test]
 fn config_tells_every_setting_and_where_it_comes_from() {
     let mut config = railhead();
     config.env("RAILHEAD_RETENTION", "30d");

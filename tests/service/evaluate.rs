@@ -175,7 +175,7 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
         let body =
             json!({ "template": template("table"), "columns": { "normal_force_n": values } });
         let answer = server.post("/v1/evaluate", &body).await;
-        let said = format!("the body is JSON that cannot be used: column `normal_force_n`, {said}");
+        let said = format!("the JSON of the body cannot be read: column `normal_force_n`, {said}");
         assert_problem(&answer, 400, "malformed-json", &said);
         let allowed = "expected a number, or a text if the whole column has texts";
         assert!(answer.text.contains("row 0 has") || answer.text.contains(allowed));

@@ -212,7 +212,7 @@ async fn a_service_that_nobody_or_everybody_could_use_says_so_at_the_start() {
 #[tokio::test]
 async fn only_pages_of_listed_origins_may_read_answers() {
     let folder = tempfile::tempdir().unwrap();
-    let listed = "https://a.example,http://localhost:3000";
+    let listed = "HTTPS://A.example:443, http://localhost:3000";
     let service = Service::start(folder.path(), &["--cors-origin", listed]);
     for (origin, allowed) in [
         ("https://a.example", true),

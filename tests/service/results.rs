@@ -176,7 +176,7 @@ async fn each_motion_of_a_sweep_is_fetched_by_its_number() {
     for query in ["point=11", "patch=1"] {
         let fields = path_of(&server.solve(&example("spin.case.json")).await);
         let answer = server.get(&format!("{fields}/tractions?{query}")).await;
-        assert_problem(&answer, 400, "bad-query", "");
+        assert_problem(&answer, 400, "bad-query", "`; allowed: 0 to 0");
     }
 }
 

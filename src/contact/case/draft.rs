@@ -11,11 +11,11 @@ use crate::case::words::contact::{Contact, Load};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, Thermal};
 use crate::case::words::motion::Motions;
-use crate::case::words::object::{Faults, Member, Object, has_controls, join, shown};
+use crate::case::words::object::{Faults, Member, Object, figures, has_controls, join, shown};
 use crate::case::words::solver::{Case, MethodName, Output, Solver};
 use crate::case::words::subsurface::{DamageWords, Subsurface};
 use crate::case::words::{contact, material, motion, solver, subsurface};
-use crate::error::{CaseError, Fault};
+use crate::error::{CaseError, Fault, FaultCode};
 use crate::method::Method;
 
 /// Maximum number of characters of the name of a case.
@@ -207,7 +207,12 @@ fn labels(case: &mut Object) -> BTreeMap<String, String> {
             let detail = format!(
                 "{given} given; a text of at most {LABEL_VALUE_LENGTH_MAX} characters without control characters is needed"
             );
-            case.faults().add(&pointer, detail);
+            let code = match value.is_string() {
+                true => FaultCode::Invalid,
+                false => FaultCode::WrongType,
+            };
+            let figures = figures(code, Some(value));
+            case.faults().add_with(&pointer, detail, figures);
         }
     }
     labels

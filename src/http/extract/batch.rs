@@ -26,6 +26,7 @@ use railhead_jobs::Jobs;
 use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
 use railhead_tables::read::{TableForm, TableRows, TableSource, require_exact};
+use railhead_tables::strict_json::without_position;
 use railhead_tables::table::{Chunk, Title};
 use railhead_tables::text::{CsvRows, Decimals, StringRecord, require_fields, without_mark};
 use railhead_tables::titles::{Place, converted, is_text, place, question, short_names};
@@ -475,7 +476,7 @@ fn require_count(draft: &BatchUpload, options: &HttpOptions) -> Result<()> {
     ))
 }
 
-/// Adds a case to a draft, with its faults. A line that is not JSON is a faulty case, an element is not.
+/// Adds a case to a draft, with its faults. A line whose JSON cannot be read is a faulty case, an element is not.
 fn add(
     draft: &mut BatchUpload,
     line: Option<u64>,
@@ -487,7 +488,8 @@ fn add(
         (Ok(case), _) => read_options(case),
         (Err(error), None) => return Err(ApiError::malformed_element(draft.cases, &error)),
         (Err(error), Some(_)) => {
-            let detail = format!("the line is not JSON: {error}");
+            let (column, reason) = (error.column(), without_position(&error));
+            let detail = format!("column {column} of the line: {reason}");
             Err(vec![Fault::new("", detail)])
         }
     };

@@ -115,7 +115,7 @@ pub fn read_json(text: &[u8]) -> Result<Value> {
     read_strict(text).map_err(|error| not_json(unlike_json(text), &error))
 }
 
-/// Returns the refusal of a body that is not JSON; `unlike` is the fault of its beginning, if there is one.
+/// Returns the refusal of a body whose JSON cannot be read; `unlike` is the fault of its beginning, if there is one.
 #[must_use]
 pub fn not_json(unlike: Option<&str>, error: &serde_json::Error) -> ApiError {
     let refusal = ApiError::malformed(error);

@@ -239,7 +239,11 @@ impl Query {
         for (name, value) in pairs {
             if known.contains(&name.as_str()) {
                 query.pairs.push((name, value));
-            } else {
+            } else if !query
+                .faults
+                .iter()
+                .any(|fault| fault.parameter.as_deref() == Some(&name))
+            {
                 let allowed = if known.is_empty() {
                     "none".to_owned()
                 } else {
@@ -331,15 +335,15 @@ pub fn whole(text: &str, low: u32, high: u32) -> Option<u32> {
 /// `bad-query` naming the parameter, its value and the largest number allowed.
 pub fn require_index(name: &str, index: Option<usize>, count: usize) -> Result<()> {
     match index {
-        Some(index) if index >= count => Err(ApiError::bad_parameter(
-            name,
-            format!(
-                "`{name}` is `{index}`; allowed: 0 to {}",
-                count.saturating_sub(1)
-            ),
-        )),
+        Some(index) if index >= count => Err(no_such_index(name, index, count)),
         _ => Ok(()),
     }
+}
+
+/// Returns the refusal of an index that is not below `count`.
+pub fn no_such_index(name: &str, index: usize, count: usize) -> ApiError {
+    let last = count.saturating_sub(1);
+    ApiError::bad_parameter(name, format!("`{name}` is `{index}`; allowed: 0 to {last}"))
 }
 
 fn quoted(names: &[&str]) -> String {

@@ -1,5 +1,6 @@
 //! Results of a batch as a table, with a row per job and motion, or per job, motion and patch.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use railhead_contact::remark::entry::RemarkEntry;
@@ -104,10 +105,10 @@ impl Columns {
             let of = label.map(|_| Of::Label).or(known.map(|(_, of)| *of))?;
             Some((name.to_owned(), of))
         };
-        text.split(',')
-            .map(column)
-            .collect::<Option<_>>()
-            .map(Columns)
+        let mut columns: Vec<(String, Of)> = text.split(',').map(column).collect::<Option<_>>()?;
+        let mut seen = HashSet::new();
+        columns.retain(|(name, _)| seen.insert(name.clone()));
+        Some(Columns(columns))
     }
 
     /// Returns a description of the allowed names.

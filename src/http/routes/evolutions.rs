@@ -77,7 +77,7 @@ fn name_columns(request: &mut Value) -> Result<Vec<Title>> {
     };
     for (title, mut values) in std::mem::take(columns) {
         let unknown = || {
-            let allowed = "allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs";
+            let allowed = "allowed are JSON pointers such as `/contact/lateral_shift_mm` and the names of columns of runs that replace a member";
             let asked = question(&title, None);
             let detail = format!("names nothing in the case; {allowed}; {asked}");
             detail.trim_end_matches("; ").to_owned()

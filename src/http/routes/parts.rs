@@ -6,7 +6,7 @@ use axum::response::Response;
 use uuid::Uuid;
 
 use crate::extract::caller::{Caller, JobId};
-use crate::extract::query::{index, query, require_index};
+use crate::extract::query::{index, no_such_index, query, require_index};
 use crate::layers::etag::{tag_of, tagged};
 use crate::limits::Rendering;
 use crate::problem::{ApiError, ProblemKind, Result, problems};
@@ -132,6 +132,10 @@ pub(crate) async fn stored(
             };
             return not_asked(jobs, id, *output).await;
         }
+        Err(JobsError::NoSuchPatch(patches)) => {
+            return Err(no_such_index("patch", patch, patches));
+        }
+        Err(JobsError::NoSuchPoint(points)) => return Err(no_such_index("point", point, points)),
         fields => fields?,
     };
     // There is one entry and one mesh, because one motion was requested.

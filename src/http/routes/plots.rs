@@ -346,7 +346,7 @@ query! {
         /// For the view `patch`: `low,high`, both ends of the scale in the unit of the field, so that pictures can share a scale; default:
         /// 0 to the largest value. Not for zones
         #[param(example = "0,400")]
-        range: [f64; 2] as String = reader("`low,high`: two numbers, the second above the first", range);
+        range: [f64; 2] as String = reader("`low,high`: two numbers, the second above the first; their difference is finite and at least 1e-9 of the larger one", range);
     }
 }
 

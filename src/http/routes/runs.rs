@@ -9,7 +9,7 @@ use axum::response::Response;
 use axum::{Extension, Json};
 use futures_util::stream::{self, Stream, StreamExt, TryStreamExt, try_unfold};
 use railhead_macros::none_is_absent;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -451,7 +451,10 @@ fn numbers(text: &str) -> Option<Vec<f64>> {
             .ok()
             .filter(|number: &f64| number.is_finite())
     };
-    text.split(',').map(number).collect()
+    let mut numbers = text.split(',').map(number).collect::<Option<Vec<f64>>>()?;
+    numbers.sort_unstable_by(f64::total_cmp);
+    numbers.dedup();
+    Some(numbers)
 }
 
 /// Statistics of the results of a run.
@@ -468,7 +471,7 @@ pub(crate) struct RunTotals {
 #[none_is_absent]
 #[derive(Debug, Serialize, ToSchema)]
 pub(crate) struct SectionTotals {
-    /// Value of the column `by`; only for texts.
+    /// Value of the column `by`; only for texts, and absent for rows without one.
     value: Option<String>,
     /// Start of the interval; only for numbers.
     from: Option<f64>,
@@ -492,9 +495,21 @@ pub(crate) struct ColumnTotals {
     /// Mean value.
     mean: Option<f64>,
     /// Percentiles of the absolute values.
-    percentiles: BTreeMap<String, f64>,
+    #[serde(serialize_with = "in_order")]
+    #[schema(value_type = BTreeMap<String, f64>)]
+    percentiles: Vec<(String, f64)>,
     /// Number of rows whose absolute value is at least each threshold.
-    above: BTreeMap<String, u64>,
+    #[serde(serialize_with = "in_order")]
+    #[schema(value_type = BTreeMap<String, u64>)]
+    above: Vec<(String, u64)>,
+}
+
+/// Writes an object whose members keep their order.
+fn in_order<S: Serializer, V: Serialize>(
+    members: &[(String, V)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(members.iter().map(|(name, value)| (name, value)))
 }
 
 /// Returns statistics of the results of an ended run: percentiles and exceedances, in total and per section of the line.
@@ -590,11 +605,11 @@ fn section_of(
     }
 }
 
-/// Identifies a section: the index of its interval, or its text.
+/// Identifies a section: the index of its interval, or its text, if it has one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 enum SectionKey {
     Interval(i64),
-    Text(String),
+    Text(Option<String>),
 }
 
 /// The numbers of all rows, and of each section.
@@ -647,9 +662,11 @@ impl Gathered {
         let sections = self.sections.into_iter().map(|(key, numbers)| {
             let mut totals = totals_of(names, numbers, percentiles, above);
             match key {
-                SectionKey::Text(text) => totals.value = Some(text),
+                SectionKey::Text(text) => totals.value = text,
                 SectionKey::Interval(place) => {
-                    totals.from = width.map(|width| place as f64 * width);
+                    // 15 digits: -14 times 0.1 is -1.4.
+                    let start = width.map(|width| format!("{:.14e}", place as f64 * width));
+                    totals.from = start.and_then(|start| start.parse().ok());
                 }
             }
             totals
@@ -665,12 +682,18 @@ impl RowSection {
     fn key(&self, table: &RowTable, row: usize) -> Option<SectionKey> {
         let number = match table.column(&self.name)? {
             TableColumn::Texts(texts) => {
-                return Some(SectionKey::Text(texts[row].clone().unwrap_or_default()));
+                return Some(SectionKey::Text(texts[row].clone()));
             }
             TableColumn::Numbers(numbers) => numbers[row],
             TableColumn::Integers(numbers) => numbers[row] as f64,
         };
-        let place = (number / self.width?).floor();
+        let quotient = number / self.width?;
+        let nearest = quotient.round();
+        // 0.3 begins the fourth interval of length 0.1, although the quotient is less than 3.
+        let place = match (quotient - nearest).abs() <= 4.0 * f64::EPSILON * nearest.abs() {
+            true => nearest,
+            false => quotient.floor(),
+        };
         (!place.is_nan()).then_some(SectionKey::Interval(place as i64))
     }
 }
@@ -765,14 +788,14 @@ mod tests {
             .map(|k| f64::from(k) * if k % 2 == 0 { -1.0 } else { 1.0 })
             .collect();
         let totals = column_totals(values, &[0.0, 50.0, 99.0, 100.0], &[90.0, 90.5]);
-        let percentiles: Vec<f64> = ["0", "50", "99", "100"]
-            .map(|p| totals.percentiles[p])
-            .to_vec();
-        assert_eq!(percentiles, [1.0, 50.0, 99.0, 100.0]);
-        assert_eq!((totals.above["90"], totals.above["90.5"]), (11, 10));
+        let percentiles = [("0", 1.0), ("50", 50.0), ("99", 99.0), ("100", 100.0)];
+        let named = percentiles.map(|(name, value)| (name.to_owned(), value));
+        assert_eq!(totals.percentiles, named);
+        let above = [("90", 11), ("90.5", 10)].map(|(name, count)| (name.to_owned(), count));
+        assert_eq!(totals.above, above);
         assert_eq!((totals.min, totals.max), (Some(-100.0), Some(99.0)));
         let none = column_totals(Vec::new(), &[50.0], &[1.0]);
-        assert_eq!((none.count, none.mean, none.above["1"]), (0, None, 0));
+        assert_eq!((none.count, none.mean, none.above[0].1), (0, None, 0));
         assert!(none.percentiles.is_empty());
     }
 }

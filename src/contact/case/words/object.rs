@@ -137,7 +137,7 @@ impl<'v, 'f> Object<'v, 'f> {
         for (name, value) in members {
             if !allowed.contains(&name.as_str()) && !reserved.contains(&name.as_str()) {
                 let detail = format!(
-                    "unknown member with the value {}; allowed here: {}",
+                    "unknown member (its value is {}); allowed here: {}",
                     shown(value),
                     allowed.join(", ")
                 );
@@ -469,7 +469,7 @@ pub(crate) fn shown(value: &Value) -> String {
         Value::Object(members) if members.is_empty() => "an empty object".to_owned(),
         Value::Object(members) => {
             let names: Vec<&str> = members.keys().map(String::as_str).collect();
-            format!("an object with {}", cut(&names.join(", ")))
+            format!("an object with the members {}", cut(&names.join(", ")))
         }
         Value::String(text) => Value::String(cut(text)).to_string(),
         scalar => scalar.to_string(),
@@ -518,7 +518,7 @@ impl Faults {
     }
 
     /// Adds a fault with its code and values for programs.
-    fn add_with(
+    pub(crate) fn add_with(
         &mut self,
         pointer: impl Into<String>,
         detail: impl Into<String>,
