@@ -10,7 +10,7 @@ use railhead_contact::mesh::MeshSize;
 use railhead_contact::monitor::{Monitor, Stop, Unmonitored};
 use railhead_contact::normal_stage;
 use railhead_contact::rolling::history::level_run::LevelRun;
-use railhead_contact::rolling::history::plan::PointRecord;
+use railhead_contact::rolling::history::plan::{Pace, PointRecord};
 use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead_contact::rolling::strip_mesh::StripMesh;
 use railhead_contact::solution::words::answer::{HistoryPoint, PointSolution, Solution};
@@ -214,7 +214,11 @@ fn on_level(case: &Value, size: MeshSize, longest: f64) -> Vec<PointRecord> {
         &mut workspace,
         &Unmonitored,
     );
-    run.unwrap().run(longest).unwrap()
+    let pace = Pace {
+        first: longest,
+        finer: 1.0,
+    };
+    run.unwrap().run(pace).unwrap()
 }
 
 const SIZE: MeshSize = MeshSize {
@@ -370,6 +374,60 @@ impl Monitor for Listener {
 
     fn elapsed(&self) -> Duration {
         Duration::ZERO
+    }
+}
+
+/// Returns the largest distance between the forces of every `pieces`-th point of the second case and those of the points of the first, over the sum of both
+/// estimates.
+fn apart_over_estimates(case: &Value, divided: &Value, pieces: usize) -> f64 {
+    let [points, divided] = [case, divided].map(|case| solve(case).0.patches[0].points.clone());
+    let over = |(a, b): (&PointSolution, &PointSolution)| {
+        let [one, other] = [a, b].map(|p| p.error_estimate.unwrap().force_x_n);
+        let apart = [a.force_x_n - b.force_x_n, a.force_y_n - b.force_y_n];
+        println!("{apart:.1?} N, estimates {one:.1} and {other:.1} N");
+        apart[0].abs().max(apart[1].abs()) / (one + other)
+    };
+    let pairs = points.iter().zip(divided.iter().step_by(pieces));
+    pairs.map(over).fold(0.0, f64::max)
+}
+
+/// Tests motions that change within less than a step. Points on the straight lines between those of a history do not change the motion.
+#[test]
+fn points_between_those_of_a_history_change_forces_within_the_estimates() {
+    const PIECES: usize = 8;
+    let waves: Vec<f64> = (0..24)
+        .map(|k| 0.002 * (0.9 * f64::from(k)).sin())
+        .collect();
+    let places: Vec<f64> = (0..24).map(|k| 0.9 * f64::from(k)).collect();
+    for (places, along, across) in [
+        (
+            vec![0.0, 10.0, 10.5, 20.0],
+            vec![0.002, 0.002, -0.002, -0.002],
+            vec![0.0, 0.0, 0.002, 0.002],
+        ),
+        (vec![0.0, 0.4, 5.0], vec![0.0, 0.004, 0.004], vec![0.0; 3]),
+        (places, waves, vec![0.0; 24]),
+    ] {
+        let case = |pieces: usize| {
+            let divided = |values: &[f64]| -> Vec<f64> {
+                let piece = |ends: &[f64]| {
+                    let [from, to] = [ends[0], ends[1]];
+                    (0..pieces).map(move |k| from + (to - from) * k as f64 / pieces as f64)
+                };
+                let last = values.last().copied();
+                values.windows(2).flat_map(piece).chain(last).collect()
+            };
+            sphere(
+                0.28,
+                json!({ "history": {
+                    "distance_mm": divided(&places),
+                    "creepage_x": divided(&along),
+                    "creepage_y": divided(&across),
+                } }),
+            )
+        };
+        let apart = apart_over_estimates(&case(1), &case(PIECES), PIECES);
+        assert!(apart < 1.0, "{places:?}: {apart} of the estimates");
     }
 }
 

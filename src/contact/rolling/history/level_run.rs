@@ -12,7 +12,8 @@ use crate::numerics::equilibrium::{Search, Trial};
 use crate::rolling::answer::{LevelFailure, Work};
 use crate::rolling::displacement_memory::LeadingEdges;
 use crate::rolling::history::plan::{
-    HistoryStep, HistoryTask, PointRecord, StepEquations, StepKind, memory, steady, steps, weights,
+    HistoryStep, HistoryTask, Pace, PointRecord, StepEquations, StepKind, memory, steady, steps,
+    weights,
 };
 use crate::rolling::methods::boundary_element::newton::Newton;
 use crate::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
@@ -130,13 +131,15 @@ impl<'a> LevelRun<'a> {
         })
     }
 
-    /// Solves all points with steps of at most `longest` mm.
+    /// Solves all points.
     ///
     /// # Errors
     /// The point to which a step did not converge, or at which the monitor stopped the work.
-    pub fn run(mut self, longest: f64) -> Result<Vec<PointRecord>, (usize, LevelFailure)> {
+    pub fn run(mut self, pace: Pace) -> Result<Vec<PointRecord>, (usize, LevelFailure)> {
         let forced = self.task.forces.iter().any(|forces| *forces != [None; 2]);
-        let steps = steps(self.history, longest, forced);
+        // The creepages of prescribed forces are less accurate with short steps.
+        let pace = if forced { pace.by_length() } else { pace };
+        let steps = steps(self.history, pace, forced);
         let mut points = Vec::with_capacity(self.history.distances.len());
         let (level, operator) = (self.level, Arc::clone(&self.operator));
         let (parity, edges) = (self.parity, self.edges.clone());

@@ -74,9 +74,36 @@ pub fn weights(growth: f64) -> [f64; 3] {
     ]
 }
 
+/// The length of the steps on a mesh.
+#[derive(Debug, Clone, Copy)]
+pub struct Pace {
+    /// Longest step on the first mesh in mm.
+    pub first: f64,
+    /// Number of steps over that on the first mesh. It counts from point to point, so that steps shrink from mesh to mesh however close the points are, and the
+    /// change from mesh to mesh contains the error of the steps.
+    pub finer: f64,
+}
+
+impl Pace {
+    /// Number of steps over a distance in mm, at least `least` on the first mesh.
+    fn count(self, distance: f64, least: f64) -> f64 {
+        let first = (distance / self.first).ceil().max(least);
+        (self.finer * first - 1e-9).ceil()
+    }
+
+    /// The same longest step without more steps between close points.
+    pub fn by_length(self) -> Pace {
+        Pace {
+            first: self.first / self.finer,
+            finer: 1.0,
+        }
+    }
+}
+
 /// Lengths of the steps that roll to a point.
-fn rolled(distance: f64, longest: f64, before: Option<f64>) -> Vec<f64> {
-    let count = (distance / longest).ceil().max(1.0);
+fn rolled(distance: f64, pace: Pace, before: Option<f64>) -> Vec<f64> {
+    // The first step of a sequence is divided. With a second step, the last one shrinks from mesh to mesh too.
+    let count = pace.count(distance, if before.is_none() { 2.0 } else { 1.0 });
     let even = distance / count;
     let count = count as usize;
     match before {
@@ -105,10 +132,12 @@ fn rolled(distance: f64, longest: f64, before: Option<f64>) -> Vec<f64> {
     }
 }
 
-/// Number of steps of a history, none longer than `longest` mm.
-pub fn count(history: &HistoryTask, longest: f64) -> f64 {
-    let points = 0..history.distances.len();
-    let steps = points.map(|k| (history.rolled(k) / longest).ceil().max(1.0));
+/// Number of steps of a history.
+pub fn count(history: &HistoryTask, pace: Pace) -> f64 {
+    let steps = (0..history.distances.len()).map(|k| match history.rolled(k) {
+        distance if distance > 0.0 => pace.count(distance, 1.0),
+        _ => 1.0,
+    });
     3.0 + steps.sum::<f64>()
 }
 
@@ -121,8 +150,8 @@ fn begins_with_shift(history: &HistoryTask, forced: bool) -> bool {
     }
 }
 
-/// The steps of a history, none longer than `longest` mm. With `forced`, a force that is prescribed at the start is applied by a shift before the bodies roll.
-pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistoryStep> {
+/// The steps of a history. With `forced`, a force that is prescribed at the start is applied by a shift before the bodies roll.
+pub fn steps(history: &HistoryTask, pace: Pace, forced: bool) -> Vec<HistoryStep> {
     let mut steps = Vec::new();
     let whole = |kind, point| HistoryStep {
         kind,
@@ -142,7 +171,7 @@ pub fn steps(history: &HistoryTask, longest: f64, forced: bool) -> Vec<HistorySt
     for point in 0..history.distances.len() {
         let distance = history.rolled(point);
         if distance > 0.0 {
-            let lengths = rolled(distance, longest, before);
+            let lengths = rolled(distance, pace, before);
             let mut done = 0.0;
             for length in lengths {
                 done += length;
@@ -292,7 +321,11 @@ mod tests {
     #[test]
     fn steps_end_at_every_point_and_grow_by_two_at_most() {
         let history = history(&[0.0, 0.3, 5.0, 5.0, 5.01, 9.0, 100.0]);
-        let steps = steps(&history, 0.7, false);
+        let pace = Pace {
+            first: 1.05,
+            finer: 1.5,
+        };
+        let steps = steps(&history, pace, false);
         let (mut done, mut points) = (0.0, Vec::new());
         for step in &steps {
             if let StepKind::Roll { distance, growth } = step.kind {

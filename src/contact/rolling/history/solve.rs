@@ -9,7 +9,7 @@ use crate::rolling::answer::{
 };
 use crate::rolling::history::level_run::LevelRun;
 use crate::rolling::history::plan;
-use crate::rolling::history::plan::{HistoryStart, HistoryTask, PointRecord};
+use crate::rolling::history::plan::{HistoryStart, HistoryTask, Pace, PointRecord};
 use crate::rolling::history::self_similar::SelfSimilarState;
 use crate::rolling::refinement::interpolate::RefinementState;
 use crate::rolling::refinement::on_mesh::named;
@@ -55,8 +55,7 @@ const CREEPAGE_SHARE: f64 = 10.0;
 #[derive(Debug, Clone, Copy)]
 struct HistoryLevel {
     size: MeshSize,
-    /// Longest step in mm.
-    longest: f64,
+    pace: Pace,
 }
 
 /// A history solved on one mesh.
@@ -86,13 +85,13 @@ struct Change {
 /// The reason why a history takes more steps than are allowed, if it does; `extents` are those of the patches.
 pub fn too_long(history: &HistoryTask, extents: &[[f64; 4]], steps_max: usize) -> Option<String> {
     let half = half_length(extents)?;
-    let longest = half / (STEPS_PER_CELL * CELLS_FIRST);
-    let steps = plan::count(history, longest);
+    let pace = pace(half, CELLS_FIRST, 0);
+    let steps = plan::count(history, pace);
     (steps > steps_max as f64).then(|| {
         let rolled = history.distances.last().copied().unwrap_or(0.0);
         format!(
             "{rolled} mm of rolling take {steps:.0} steps of {} mm; at most {steps_max} are allowed in one case",
-            short(longest)
+            short(pace.first)
         )
     })
 }
@@ -103,11 +102,12 @@ pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64
         return (history.distances.len() as f64, CELLS_FIRST * CELLS_FIRST);
     };
     let cells = along.unwrap_or(CELLS_FIRST * FINER * FINER);
+    let level = if along.is_some() { 1 } else { 2 };
     let pressing = match history.start {
         HistoryStart::Pressed => STEPS_PRESSED,
         HistoryStart::Rest | HistoryStart::Steady => 0.0,
     };
-    let steps = plan::count(history, half / (STEPS_PER_CELL * cells));
+    let steps = plan::count(history, pace(half, cells, level));
     (steps + pressing, cells * cells / SHAPES[0])
 }
 
@@ -119,6 +119,15 @@ pub fn pressed_cells_max() -> f64 {
 /// Memory in bytes of a pressing on a mesh.
 pub fn pressed_bytes(cells: f64) -> f64 {
     SelfSimilarState::bytes(cells)
+}
+
+/// The steps on a mesh with `cells` cells along x, which follows `level` coarser ones, for the half-length of the shortest patch.
+fn pace(half: f64, cells: f64, level: i32) -> Pace {
+    let finer = FINER.powi(level);
+    Pace {
+        first: half * finer / (STEPS_PER_CELL * cells),
+        finer,
+    }
 }
 
 /// Half the length of the shortest patch.
@@ -199,18 +208,18 @@ fn level_plans(task: &RollingTask, shape: f64) -> Vec<HistoryLevel> {
     let patches = task.footprint.patches();
     let extents: Vec<[f64; 4]> = patches.iter().map(|patch| patch.extent).collect();
     let half = half_length(&extents).unwrap_or(1.0);
-    let plan = |strips: f64, cells: f64| HistoryLevel {
+    let plan = |strips: f64, cells: f64, level: i32| HistoryLevel {
         size: MeshSize {
             strips: strips.max(2.0) as u32,
             cells: cells.max(2.0) as u32,
         },
-        longest: half / (STEPS_PER_CELL * cells.max(8.0)),
+        pace: pace(half, cells.max(8.0), level),
     };
     if let Resolution::Mesh(size) = task.resolution {
         let [strips, cells] = [size.strips, size.cells].map(f64::from);
         let even = 2.0 * (0.5 * strips / FINER).round();
-        let coarse = plan(even.max(4.0), (cells / FINER).round().max(6.0));
-        return vec![coarse, plan(strips, cells)];
+        let coarse = plan(even.max(4.0), (cells / FINER).round().max(6.0), 0);
+        return vec![coarse, plan(strips, cells, 1)];
     }
     // All patches have the mesh of the one with the largest load, in any order.
     let heaviest = patches
@@ -222,7 +231,7 @@ fn level_plans(task: &RollingTask, shape: f64) -> Vec<HistoryLevel> {
     let levels = (0..LEVELS_MAX).map(|k| {
         let cells = (CELLS_FIRST * FINER.powi(k) / patches).round().max(8.0);
         let strips = 2.0 * (0.5 * cells / shape).round().max(2.0);
-        plan(strips, cells)
+        plan(strips, cells, k)
     });
     levels.collect()
 }
@@ -243,7 +252,7 @@ fn on_level(
     let workspace = &mut state.workspace;
     let run = LevelRun::new(task, history, &level, tolerance, workspace, monitor)?;
     let points = run
-        .run(plan.longest)
+        .run(plan.pace)
         .map_err(|(point, failure)| named(failure, task, task.first_motion + point))?;
     Ok(SolvedHistory {
         level: number,
