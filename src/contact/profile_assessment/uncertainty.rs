@@ -24,7 +24,7 @@ use crate::wheel_on_rail;
 pub(crate) const COMPANIONS: [f64; 2] = [0.4, 2.0];
 /// Part of the uncertainty in any case, which sound profiles have too: of the pressure relative to the largest pressure.
 const PRESSURE_FLOOR: f64 = 0.01;
-/// The same part of the forces, relative to μN.
+/// Part of the uncertainty of the forces that is always present, relative to μN.
 const FORCE_FLOOR: f64 = 0.003;
 /// Change between two readings from which there is a remark, as a multiple of these parts.
 const CHANGE: f64 = 6.0;

@@ -67,7 +67,7 @@ impl LoadEllipse {
         }
     }
 
-    /// The ellipse of one patch of a footprint, without the mismatch. That of a sampled pressure follows from its samples.
+    /// The ellipse of one patch of a footprint, without the mismatch. For a sampled pressure it follows from the samples.
     pub(crate) fn rough(footprint: &Footprint, patch: usize) -> LoadEllipse {
         match footprint.field() {
             Some(field) => LoadEllipse::of_samples(field, patch),

@@ -91,7 +91,8 @@ impl Pace {
         (self.finer * first - 1e-9).ceil()
     }
 
-    /// The same longest step without more steps between close points.
+    /// Steps of the same length that take no further steps between close points.
+    #[must_use]
     pub fn by_length(self) -> Pace {
         Pace {
             first: self.first / self.finer,
