@@ -79,18 +79,13 @@ fn values_per_cell_come_along_only_if_asked_for() {
 
 #[test]
 fn a_faulty_case_names_every_fault_and_exits_with_2() {
-    let output = railhead()
-        .arg("solve")
-        .arg(example("faulty.case.json"))
-        .output()
-        .unwrap();
+    let mut solved = railhead();
+    let output = solved.arg("solve").arg(example("faulty.case.json"));
+    let output = output.output().unwrap();
     assert_eq!(output.stdout, b"");
     let faults = fails(&output, 2, "");
-    assert!(faults.lines().count() > 1, "{faults}");
-    assert!(
-        faults.lines().all(|line| line.starts_with("railhead: /")),
-        "{faults}"
-    );
+    let are_named = faults.lines().all(|line| line.starts_with("railhead: /"));
+    assert!(faults.lines().count() > 1 && are_named, "{faults}");
 
     fails(&solve("{\"name\": "), 2, "line 1 column 9");
 }
@@ -159,44 +154,26 @@ fn settings_come_from_the_environment_too_and_flags_win() {
 fn settings_that_cannot_work_are_refused_at_the_start() {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data");
-    for (flags, code, said) in [
-        (["--log", "foo bar["], 1, "`foo bar[` is neither a level"),
-        (["--log", "info,warning"], 1, "`warning` is neither a level"),
-        (
-            ["--allowed-host", "http://x"],
-            1,
-            "`http://x` is not a host name",
-        ),
-        (
-            ["--cors-origin", "https://a.example/x"],
-            2,
-            "`/` is not allowed",
-        ),
-        (
-            ["--anonymous", "never"],
-            1,
-            "not answered (`--anonymous never`)",
-        ),
+    for (flag, code, said) in [
+        ("--log=foo bar[", 1, "`foo bar[` is neither a level"),
+        ("--log=info,warning", 1, "`warning` is neither a level"),
+        ("--allowed-host=http://x", 1, "`http://x` is not a host"),
+        ("--cors-origin=https://a.b/x", 2, "`/` is not allowed"),
+        ("--anonymous=never", 1, "not answered (`--anonymous never`)"),
     ] {
         let mut serve = railhead();
         serve.args(["serve", "--listen", "127.0.0.1:0", "--data-dir"]);
-        fails(&serve.arg(&data).args(flags).output().unwrap(), code, said);
+        fails(&serve.arg(&data).arg(flag).output().unwrap(), code, said);
     }
     for (to, said) in [
         (data.join("sub"), "is inside the data folder"),
         (folder.path().into(), "File exists"),
     ] {
         let mut backup = railhead();
-        backup
-            .args(["backup", "--data-dir"])
-            .arg(&data)
-            .arg("--to")
-            .arg(&to);
-        let refusal = fails(&backup.output().unwrap(), 1, said);
-        assert!(
-            refusal.contains(&format!("`{}`", to.display())),
-            "{refusal}"
-        );
+        backup.args(["backup", "--data-dir"]).arg(&data);
+        let refusal = fails(&backup.arg("--to").arg(&to).output().unwrap(), 1, said);
+        let named = format!("`{}`", to.display());
+        assert!(refusal.contains(&named), "{refusal}");
     }
 }
 

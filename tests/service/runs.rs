@@ -88,26 +88,17 @@ fn assert_faults(answer: &Answer, word: &str) {
 
 /// Asserts that all formats of the answers have the same numbers.
 async fn assert_forms(server: &Server, results: &str, all: &[Value]) {
-    let csv = server
-        .get(&format!(
-            "{results}?format=csv&columns=row,force_x_n&rows=117:"
-        ))
-        .await;
-    let expected = all[117..]
-        .iter()
-        .map(|row| format!("{},{}\n", row["row"], row["force_x_n"]));
-    assert_eq!(
-        csv.text,
-        format!("row,force_x_n\n{}", expected.collect::<String>())
-    );
+    let path = format!("{results}?format=csv&columns=row,force_x_n&rows=117:");
+    let line = |row: &Value| format!("{},{}\n", row["row"], row["force_x_n"]);
+    let expected: String = all[117..].iter().map(line).collect();
+    let csv = server.get(&path).await.text;
+    assert_eq!(csv, format!("row,force_x_n\n{expected}"));
     let parquet = server.get(&format!("{results}?format=parquet")).await;
     let parquet = TableReader::new(bytes::Bytes::from(parquet.bytes)).expect("Parquet");
     let arrow = server.get(&format!("{results}?format=arrow")).await;
     let arrow = read(std::io::Cursor::new(arrow.bytes)).expect("Arrow");
-    let forces: Vec<f64> = all
-        .iter()
-        .filter_map(|row| row["force_x_n"].as_f64())
-        .collect();
+    let forces = all.iter().filter_map(|row| row["force_x_n"].as_f64());
+    let forces: Vec<f64> = forces.collect();
     let of = |table: &RowTable| match table.column("force_x_n") {
         Some(TableColumn::Numbers(numbers)) => numbers.clone(),
         _ => Vec::new(),
@@ -115,12 +106,8 @@ async fn assert_forms(server: &Server, results: &str, all: &[Value]) {
     let groups = (0..parquet.groups())
         .flat_map(|group| of(&parquet.read(group, |_| true).expect("a group")));
     assert_eq!(groups.collect::<Vec<_>>(), forces);
-    assert_eq!(
-        arrow
-            .flat_map(|table| of(&table.expect("a batch")))
-            .collect::<Vec<_>>(),
-        forces
-    );
+    let batches = arrow.flat_map(|table| of(&table.expect("a batch")));
+    assert_eq!(batches.collect::<Vec<_>>(), forces);
 }
 
 /// Asserts that the files of the manifest have every row once.
@@ -192,15 +179,10 @@ async fn a_run_answers_each_of_its_rows_once_in_every_format() {
         ] {
             assert_eq!(server.get(&other).await.status, 404);
         }
-        let jobs = server.get("/v1/jobs").await;
-        assert_eq!(
-            jobs.json["total"], 0,
-            "pieces of runs are no jobs of the client"
-        );
-        assert_eq!(
-            server.read("/v1/runs?limit=1").await["runs"][0]["id"],
-            about["id"]
-        );
+        // The chunks of a run are not jobs of the client.
+        assert_eq!(server.read("/v1/jobs").await["total"], 0);
+        let listed = server.read("/v1/runs?limit=1").await;
+        assert_eq!(listed["runs"][0]["id"], about["id"]);
         assert_eq!(server.delete(&run).await.status, 204);
         assert_problem(&server.get(&results).await, 404, "run-not-found", "run");
     }
@@ -241,13 +223,10 @@ async fn totals_are_those_of_the_rows_in_all_and_by_section() {
     }
     let by_length = server.read(&format!("{run}/totals?by=km&width=3")).await;
     let lengths = by_length["sections"].as_array().expect("sections");
-    assert_eq!(
-        lengths
-            .iter()
-            .map(|section| section["rows"].as_u64().expect("rows"))
-            .sum::<u64>(),
-        90
-    );
+    let counts = lengths
+        .iter()
+        .filter_map(|section| section["rows"].as_u64());
+    assert_eq!(counts.sum::<u64>(), 90);
     assert_eq!(lengths[1]["from"], 3.0);
     let fault = server.get(&format!("{run}/totals?by=km")).await;
     assert_problem(&fault, 400, "bad-query", "width");
@@ -273,22 +252,12 @@ async fn a_row_that_cannot_be_solved_has_a_status_and_faults_of_a_run_are_named(
     let statuses: Vec<_> = all.iter().map(|row| row["status"].as_str()).collect();
     assert_eq!(statuses, [Some("ok"), Some("refused"), Some("ok")]);
     assert!(all[1]["force_x_n"].is_null() && all[1]["method"].is_null());
+    let load = "/load/normal_force_n";
+    let of_load = "/columns/~1load~1normal_force_n/1";
     for (pointer, values, word) in [
-        (
-            "/load/normal_force_n",
-            json!([1e5, -1.0]),
-            "/columns/~1load~1normal_force_n/1",
-        ),
-        (
-            "/load/normal_force_n",
-            json!([1e5]),
-            "all columns need as many",
-        ),
-        (
-            "/load/normal_force_n",
-            json!([]),
-            "all columns need as many",
-        ),
+        (load, json!([1e5, -1.0]), of_load),
+        (load, json!([1e5]), "all columns need as many"),
+        (load, json!([]), "all columns need as many"),
         ("force_x_n", json!(["a", "b"]), "/columns/force_x_n/0"),
         ("status", json!(["a", "b"]), "a column that is copied"),
     ] {
