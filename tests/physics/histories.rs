@@ -431,6 +431,41 @@ fn points_between_those_of_a_history_change_forces_within_the_estimates() {
     }
 }
 
+/// A creepage that grows and vanishes again leaves neither force nor stored energy: its work is dissipated.
+#[test]
+fn the_energy_dissipated_at_rest_is_the_work_of_the_motion() {
+    let creepage = |q: f64| 0.003 * (0.5 * q).min(0.5 * (18.0 - q)).clamp(0.0, 1.0);
+    let solved = |places: &[f64]| {
+        let along: Vec<f64> = places.iter().map(|q| creepage(*q)).collect();
+        let motion = json!({ "history": { "distance_mm": places, "creepage_x": along } });
+        let (solution, _) = solve(&sphere(0.28, motion));
+        let points = solution.patches[0].points.iter();
+        let of = |point: &PointSolution| {
+            let history = point.history.as_ref().expect("a history");
+            [point.force_x_n, history.dissipated_n_mm]
+        };
+        points.map(of).collect::<Vec<_>>()
+    };
+    let fine: Vec<f64> = (0..=40).map(|k| 0.5 * f64::from(k)).collect();
+    let work: f64 = (fine.windows(2).zip(solved(&fine).windows(2)))
+        .map(|(q, points)| {
+            let power = |k: usize| creepage(q[k]) * points[k][0].abs();
+            0.5 * (q[1] - q[0]) * (power(0) + power(1))
+        })
+        .sum();
+    for places in [
+        vec![0.0, 2.0, 16.0, 18.0, 90.0],
+        [&fine[..], &[90.0]].concat(),
+    ] {
+        let points = solved(&places);
+        let [_, dissipated] = points[points.len() - 1];
+        assert!(
+            (dissipated / work - 1.0).abs() < 0.01,
+            "{dissipated} {work}"
+        );
+    }
+}
+
 #[test]
 fn progress_of_a_history_grows_while_it_is_solved() {
     let history = json!({ "history": { "distance_mm": [0, 5, 10, 20], "creepage_x": 0.001 } });

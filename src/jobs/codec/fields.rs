@@ -419,7 +419,7 @@ fn zone_code(zone: Zone) -> u8 {
 pub struct EncodedResult {
     /// The solution as JSON.
     pub solution: Bytes,
-    /// The fields as written by [`encode`](crate::codec::fields::encode), or the table of a chunk of rows; `None` if the
+    /// The fields as written by [`encode`], or the table of a chunk of rows; `None` if the
     /// case requested no fields.
     pub fields: Option<Bytes>,
 }

@@ -7,15 +7,20 @@ use crate::rolling::slip_equations::SlipSource;
 use crate::rolling::task::Motion;
 
 impl LevelRun<'_> {
-    /// Adds the energy that friction has dissipated in a step that began with the tractions `from`: the work of the motion minus the stored energy.
+    /// Adds the energy that friction has dissipated in a step that began with the tractions and the motion `from`: the work of the motion minus the stored energy.
     ///
     /// The power summed over the cells, `∬T·s`, would be several per cent too small: in steady rolling its error is that of the slip at the trailing edge, while ν·F
     /// is as accurate as the forces. A shift has no such slip, and the sum is used.
-    pub(super) fn dissipate(&mut self, of: &StepEquations, from: &[f64]) {
+    pub(super) fn dissipate(&mut self, of: &StepEquations, (tractions, motion): (&[f64], Motion)) {
         let rigid = self.rigid(of, &self.state.motion);
+        let rigid_before = match of.kind {
+            StepKind::Roll { growth, .. } if growth > 0.0 => &self.rigid(of, &motion),
+            // A sequence begins with the motion of its first step, which is short.
+            _ => &rigid,
+        };
         let slip = self.workspace.slip().to_vec();
         let [before, now, over] = [
-            self.per_patch(from, &rigid),
+            self.per_patch(tractions, rigid_before),
             self.per_patch(&self.state.tractions, &rigid),
             self.per_patch(&self.state.tractions, &slip),
         ];

@@ -372,8 +372,8 @@ impl<'a> LevelRun<'a> {
         };
         state.displacement = displacement;
         let from = std::mem::replace(&mut state.tractions, tractions);
-        state.motion = motion;
-        self.dissipate(of, &from);
+        let moved = std::mem::replace(&mut state.motion, motion);
+        self.dissipate(of, (&from, moved));
         self.follow_slips(of);
     }
 

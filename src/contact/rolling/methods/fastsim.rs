@@ -42,7 +42,7 @@ pub fn stated_error(mesh: MeshSize) -> f64 {
 
 /// Tractions, slips and zones of one dimensionless motion on a mesh.
 ///
-/// Each patch is solved separately, with the flexibilities of its equivalent ellipse (see [`LoadEllipse`](crate::rolling::load_ellipse::LoadEllipse)) and
+/// Each patch is solved separately, with the flexibilities of its equivalent ellipse (see [`LoadEllipse`]) and
 /// the creepages at its load centre. Slips are those of the single flexibility `(L1|ν_x| + L2|ν_y| + L3|φ|c)/√(ν_x² + ν_y² + φ²c²)`. Tractions with the
 /// parabolic bound exceed μp in the middle of a patch.
 pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAnswer {
