@@ -319,7 +319,7 @@ pub(crate) struct Gridded<T = f64> {
 ///
 /// Along a strip, values are linear between the centres of cells, and constant beyond the first and last centre. Between the mid-lines of
 /// two strips, the ends of the chord are linear in y, and so are values at equal relative positions in both chords. Beyond the first and
-/// last mid-line the chord is extrapolated as in [`patch_outline`](super::outlines::patch_outline). If segments branch, every segment
+/// last mid-line the chord is extrapolated as in [`patch_outline`]. If segments branch, every segment
 /// continues unchanged to the borders of its strip. Constants are reproduced everywhere, linear fields between the outermost centres of a
 /// chord and between the outermost mid-lines.
 ///

@@ -39,7 +39,7 @@ impl Sheet {
     /// Creates the grid over a patch; `None` if the patch has fewer than three strips, or gaps.
     ///
     /// Between the mid-lines of strips, the squared half-length and the centre of the chord are monotone cubics, so that the border of an ellipse
-    /// is round even with few strips. The ends are those of [`patch_outline`].
+    /// is round even with few strips. The ends are those of [`patch_outline`](super::outlines::patch_outline).
     #[must_use]
     pub(crate) fn new(cells: &PatchCells) -> Option<Sheet> {
         let found = Strips::new(cells);
