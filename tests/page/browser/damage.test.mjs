@@ -111,7 +111,7 @@ test('from a noisy worn pair to its damage, smoothed, and against new profiles',
   await page.getByRole('button', { name: /^Solve/ }).click();
   await drawn(page);
   await page.locator('.remark[data-code="profile-noise"]').first().waitFor();
-  await page.getByRole('button', { name: 'Solve again with the wheel smoothed by 2.0 mm and the rail smoothed by 2.0 mm' }).click();
+  await page.getByRole('button', { name: 'Solve again with the rail smoothed by 2.0 mm and the wheel smoothed by 2.0 mm' }).click();
   await page.waitForFunction(() => document.querySelector('field-map.main') && !document.querySelector('.remark[data-code="profile-noise"]'));
   // The patch with the largest load is selected.
   assert.ok(parsed(await page.locator('.figures .figure-of').filter({ has: page.locator('dt', { hasText: /^N$/ }) }).locator('b').innerText()) > 37.5);
