@@ -122,6 +122,7 @@ pub mod slices;
 pub mod solution;
 pub(crate) mod surface_fallback;
 pub mod time_limit;
+pub(crate) mod traction_estimate;
 pub mod unlike_bodies;
 pub(crate) mod vertical_equilibrium;
 pub(crate) mod wheel_force_control;

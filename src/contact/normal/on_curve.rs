@@ -33,6 +33,8 @@ const FIRST: f64 = 24.0;
 const CELLS_MAX: usize = 600;
 /// A grid is fine enough if its cells have at most the wanted size over this part.
 const FINE_ENOUGH: f64 = 0.9;
+/// An intermediate grid is solved if the wanted cells are smaller by more than this factor. Chosen on contacts at gauge corners and flanges.
+const FINER_MAX: f64 = 4.0;
 
 /// Tolerance of the contact conditions on the coarse grid, relative to the deepest overlap.
 const FIRST_TOLERANCE: f64 = 5e-3;
@@ -275,6 +277,30 @@ impl CurveTask<'_> {
         monitor: &dyn Monitor,
     ) -> Result<CurveContact, NormalError> {
         self.finer(coarse, self.wanted(coarse), friction, workspace, monitor)
+    }
+
+    /// Finds the contact without friction on cells of an intermediate size if the wanted cells are much smaller than those of the coarse grid, for example for a
+    /// narrow patch next to a wide one. `None` otherwise, and on planes.
+    ///
+    /// # Errors
+    /// See [`coarse`](Self::coarse).
+    pub(crate) fn between(
+        &self,
+        coarse: &CurveContact,
+        workspace: &mut Workspace,
+        monitor: &dyn Monitor,
+    ) -> Result<Option<CurveContact>, NormalError> {
+        let (wanted, present) = (self.wanted(coarse), coarse.grid.step);
+        if self.curve.is_flat() || (0..2).all(|axis| present[axis] < FINER_MAX * wanted[axis]) {
+            return Ok(None);
+        }
+        let step = [0, 1].map(|axis| (present[axis] * wanted[axis]).sqrt());
+        let none = Friction::default();
+        let mut found = self
+            .roughly()
+            .finer(coarse, step, &none, workspace, monitor)?;
+        found.overlaps.clone_from(&coarse.overlaps);
+        Ok(Some(found))
     }
 
     /// Brings the wheel to rest on a grid with cells of a given size in mm around the contact on another grid.

@@ -2,25 +2,31 @@
 
 use crate::case::words::solver::Output;
 use crate::error::SolveError;
+use crate::geometry::reference_curve::RigidMotion;
 use crate::normal::gap::grid::NormalError;
 use crate::normal::on_curve::{CurveContact, Friction, Workspace};
-use crate::normal::wheel::WheelContact;
+use crate::normal::wheel::{WheelContact, WheelPatch};
 use crate::problem::checked_case::CheckedCase;
 use crate::problem::physics::Run;
 use crate::remark::list::Remark;
 use crate::rolling::task::NEGLIGIBLE_OF_TARGET;
 use crate::solution::words::answer::Total;
+use crate::traction_estimate::{can_estimate, patch_forces};
 use crate::unlike_bodies::LEFT_BY_PRESSURE;
 use crate::vertical_equilibrium::{next_share, tolerance};
-use crate::wheel_on_rail::tractions::Part;
+use crate::wheel_on_rail::tractions::{Part, creepages};
 use crate::wheel_on_rail::{BeforeMotions, WheelSolve, minus};
 
 /// Target error of the resultants relative to μN on the coarse grid. It leads to the coarsest meshes.
 const TARGET_ROUGH: f64 = 0.2;
 /// Most rounds; 3 to 6 suffice.
 const ROUNDS_MAX: u32 = 16;
+/// Relative error of the gap that tractions open if they are taken as proportional to the pressure.
+const OPENED_ERROR: f64 = 0.3;
 /// Change of the forces relative to μN that ends the rounds with coarse tractions. The step after it leaves about a fiftieth of this.
 const CHANGE_ROUGH: f64 = 0.05;
+/// Relative change of the vertical force that ends the rounds with the table.
+const CHANGE_TABLE: f64 = 0.02;
 /// Largest change of the forces, relative to μN, that is accepted with a remark after the last round. It is part of the error estimate. If a strip
 /// at the edge of a patch comes and goes with the tractions, these jump by the error of their mesh, and the rounds do not converge.
 const CHANGE_POOR: f64 = 0.03;
@@ -196,7 +202,8 @@ impl WheelSolve<'_> {
         })
     }
 
-    /// The wheel in equilibrium on a coarse grid with an estimate of the friction from coarse tractions.
+    /// The wheel in equilibrium on a coarse grid with an estimate of the friction: from the table of creep forces if that is accurate enough,
+    /// otherwise from coarse tractions.
     pub(super) fn coarse(
         &self,
         coupled: bool,
@@ -209,21 +216,88 @@ impl WheelSolve<'_> {
         if !coupled {
             return Ok((friction, coarse));
         }
+        if let Some(between) = task.between(&coarse, workspace, self.watch)? {
+            coarse = between;
+        }
         let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
+        let negligible = NEGLIGIBLE_OF_TARGET * run.resolution.target_or_usual();
         let limit = problem.friction.largest();
+        let mut by_table = problem.history.is_none() && can_estimate(problem);
         let mut earlier = None;
         for _ in 0..ROUNDS_MAX {
-            let parts = self.tractions(&coarse, &rough, 0.0, workspace)?;
-            let next = self.friction(&coarse, &parts, problem.motions.len() - 1, workspace);
+            let of_table = by_table;
+            let next = if of_table {
+                let mut next = self.estimate(&coarse, workspace)?;
+                let [_, opened] = coarse.change_by(&Friction::default(), &next, self.shared());
+                // If the table is not accurate enough, the rounds with tractions begin with its first estimate.
+                by_table = opened <= negligible / OPENED_ERROR * limit;
+                // The estimate may be ten times too small.
+                if 10.0 * opened <= negligible * limit {
+                    next.opened = None;
+                }
+                next
+            } else {
+                let parts = self.tractions(&coarse, &rough, 0.0, workspace)?;
+                self.friction(&coarse, &parts, problem.motions.len() - 1, workspace)
+            };
             let [by_lift, by_gap] = coarse.change_by(&friction, &next, self.shared());
             friction = accelerated(&friction, next, &mut earlier);
+            if by_table && by_lift <= CHANGE_TABLE {
+                break;
+            }
             coarse = task.again(coarse, &friction, workspace, self.watch)?;
             friction.opened.clone_from(&coarse.opened);
-            if by_lift.max(by_gap / limit) <= CHANGE_ROUGH {
+            if !of_table && by_lift.max(by_gap / limit) <= CHANGE_ROUGH {
                 break;
             }
         }
         Ok((friction, coarse))
+    }
+
+    /// Estimates the friction by the table of creep forces, with tractions proportional to the pressures.
+    fn estimate(
+        &self,
+        contact: &CurveContact,
+        workspace: &mut Workspace,
+    ) -> Result<Friction, SolveError> {
+        let edges = self.case.problem.friction.across().is_some();
+        let patches = self.patches(contact, edges)?;
+        let mut forces = Vec::with_capacity(patches.len());
+        for patch in &patches {
+            let CheckedCase { problem, .. } = self.case;
+            let motion = match &problem.wheelset {
+                None => problem.motions[0],
+                Some(wheelset) => {
+                    let geometry = &self.contact.geometry;
+                    let rigid = RigidMotion::of_wheelset(geometry, contact.centre, wheelset);
+                    creepages(&rigid, patch.x, &patch.place, &patch.wheel)
+                }
+            };
+            let extents = std::iter::once(patch.patch().extent);
+            let friction = self.friction_at([patch.x, patch.place.s], extents);
+            let problem = problem.of_gap(friction, vec![motion]);
+            forces.push((patch, patch_forces(&problem, patch, &motion)));
+        }
+        let (mut traction, mut lift) = ([Vec::new(), Vec::new()], 0.0);
+        let rows = contact.pressure.chunks_exact(contact.grid.x.len());
+        for (row, place) in rows.zip(&contact.grid.places) {
+            let far = |patch: &WheelPatch| (patch.place.s - place.s).abs();
+            let nearest = forces
+                .iter()
+                .min_by(|(a, _), (b, _)| far(a).total_cmp(&far(b)));
+            let share = nearest.map_or([0.0; 2], |(patch, force)| {
+                force.map(|force| force / patch.normal_force())
+            });
+            for (traction, share) in traction.iter_mut().zip(share) {
+                traction.extend(row.iter().map(|p| share * p));
+            }
+            if self.is_vertical() {
+                lift +=
+                    share[1] * contact.grid.area() * row.iter().sum::<f64>() * place.angle.sin();
+            }
+        }
+        let opened = self.opened(contact, &traction, workspace);
+        Ok(Friction { lift, opened })
     }
 
     /// The gap in mm that tractions open; `None` on planes.
