@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use railhead::jobs::State;
-use railhead::jobs::codec::fields::EncodedResult;
+use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::{Kind, Queue};
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;

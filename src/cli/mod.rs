@@ -3,6 +3,7 @@
 //! [`commands`], [`Options`](crate::jobs::Options) and [`HttpOptions`](crate::http::HttpOptions) declare the flags;
 //! [`serve`] starts and stops a service.
 
+mod backup;
 mod commands;
 mod config;
 #[cfg(feature = "cluster")]
@@ -13,18 +14,16 @@ mod output;
 mod serve;
 mod solve;
 
-use std::path::Path;
 use std::process::ExitCode;
 
 use clap::FromArgMatches;
 
-use crate::cli::commands::{BackupArgs, Cli, Command, command_line};
+use crate::cli::commands::{Cli, Command, command_line};
 use crate::cli::output::{print, print_error, reasons};
-use crate::cli::serve::{Role, block_on};
+use crate::cli::serve::Role;
 use crate::http;
 #[cfg(not(feature = "cluster"))]
 use crate::jobs::JobsError;
-use crate::jobs::data_dir;
 
 /// Parses the command line, runs the command, and returns the exit code.
 #[must_use]
@@ -59,7 +58,7 @@ pub fn run() -> ExitCode {
             }
             .into())
         }
-        Command::Backup(args) => backup(&args),
+        Command::Backup(args) => backup::run(&args),
         Command::Keys(args) => keys::run(&args),
         Command::Healthcheck(args) => healthcheck::run(&args),
         Command::Openapi => print(&http::openapi_json()),
@@ -68,21 +67,4 @@ pub fn run() -> ExitCode {
         print_error(&reasons(&error));
         ExitCode::FAILURE
     })
-}
-
-/// Copies the data folder of a service into a new folder, and prints its path.
-fn backup(args: &BackupArgs) -> anyhow::Result<ExitCode> {
-    let parent = std::path::absolute(&args.to)?
-        .parent()
-        .map(Path::canonicalize);
-    if let (Some(Ok(parent)), Ok(inside)) = (parent, args.folder.data_dir.canonicalize())
-        && parent.starts_with(inside)
-    {
-        anyhow::bail!(
-            "--to: `{}` is inside the data folder; name a folder outside of it",
-            args.to.display()
-        );
-    }
-    block_on(data_dir::backup(&args.folder.data_dir, &args.to))??;
-    print(&args.to.display().to_string())
 }

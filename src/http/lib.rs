@@ -5,8 +5,8 @@
 //! 1. [`server::serve`] accepts the connection. [`server::connections`] limits the number of connections, and closes those whose client
 //!    sends no request or does not read its response.
 //! 2. The [`layers`] around all routes, from the outside inward: headers for browsers ([`response::secure`]), the client behind a trusted
-//!    proxy ([`client_address`]), [`connections::drain_body`], the request's id and its line in the log ([`request_log`]), `otel` (feature
-//!    `otlp`), [`metrics`], [`etag::complete`], compression and the final line break ([`response`]), the path in problems
+//!    proxy ([`client_address`]), [`drain_body`], the request's id and its line in the log ([`request_log`]), `otel` (feature `otlp`),
+//!    [`metrics`], [`etag::complete`], compression and the final line break ([`response`]), the path in problems
 //!    ([`problem::name_instance`]), [`auth::admit`], the rate limit ([`auth::add_rate_limit_headers`]), the permits of the request
 //!    ([`limits::hold`]), panics, [`admission`] and decompression of compressed bodies.
 //! 3. The layers of a group of routes: content negotiation ([`accept::require_json`]) and caching ([`etag::immutable`],
@@ -55,7 +55,7 @@ use crate::routes::{
     batches, cases, evaluate, evolutions, fields, jobs, lists, plots, profiles, results, runs,
     service, work,
 };
-use crate::server::connections;
+use crate::server::drain_body;
 use crate::state::{AppState, Document};
 use railhead_jobs::Jobs;
 use railhead_jobs::model::Kind;
@@ -148,7 +148,7 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
     let router = router
         .layer(request_log::span_layer())
         .layer(from_fn(request_log::carry_request_id))
-        .layer(from_fn(connections::drain_body))
+        .layer(from_fn(drain_body::drain_body))
         .layer(from_fn_with_state(options.clone(), client_address::resolve))
         .with_state(AppState::new(jobs, options, metrics, DOCUMENT));
     response::secure(router)

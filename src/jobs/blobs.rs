@@ -16,7 +16,8 @@ use object_store::path::Path;
 use object_store::{GetOptions, ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
-use crate::codec::fields::{EncodedResult, Header, PREFIX_BYTES};
+use crate::codec::fields::{Header, PREFIX_BYTES};
+use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
 use crate::store::Claim;
 use crate::sync::blocking;

@@ -7,10 +7,7 @@ use std::io::{self, Write};
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use crate::blobs::Blobs;
 use crate::error::{JobsError, Result};
-use crate::store::Store;
-use crate::store::sqlite::database::SqliteStore;
 
 /// The file that marks a job table as closed in good order.
 const CLOSED: &str = "closed";
@@ -107,30 +104,6 @@ pub(crate) fn nameless(folder: &Path) -> io::Result<File> {
 /// Removes the reserve; `false` if there was none.
 pub(crate) fn remove_reserve(data_dir: &Path) -> bool {
     std::fs::remove_file(data_dir.join(RESERVE)).is_ok()
-}
-
-/// Copies jobs and results into a new folder, from which a service can be started; a service may use `data_dir` meanwhile.
-///
-/// The job table is copied first, as a snapshot. Results never change, and all results of the snapshot exist already. Only
-/// a job that is deleted during the copy can lose its result.
-///
-/// # Errors
-/// The folder `to` exists already, or a read or write failed.
-pub async fn backup(data_dir: &Path, to: &Path) -> Result<()> {
-    let store = SqliteStore::open_existing(&table_file(data_dir)).await?;
-    let made = DirBuilder::new().mode(0o700).create(to);
-    made.map_err(JobsError::at(to))?;
-    let copied = store.copy_into(&table_file(to)).await;
-    store.close().await;
-    copied?;
-    let snapshot = SqliteStore::open_existing(&table_file(to)).await?;
-    let keys = snapshot.large_results().await;
-    snapshot.close().await;
-    let (from, to) = (Blobs::open(data_dir)?, Blobs::open(to)?);
-    for key in keys? {
-        from.copy(&key, &to).await?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use crate::model::{Job, Kind, Labels, State};
 use crate::options::Options;
 use crate::runtime_probe::{ProbedTime, probe};
 use crate::shared::Shared;
-use crate::storage_health::StoragePlace;
+use crate::storage_fault::StoragePlace;
 use crate::store::Usage;
 use crate::trace::Tracer;
 use railhead_contact::case::rail_pair::KnownPair;

@@ -13,7 +13,7 @@
 //! 5. **Renew the lease** ([`worker::heartbeat`]): while the solver makes progress and while results are being stored. If the lease
 //!    expires, the [reaper](maintenance) returns the job to the queue.
 //! 6. **Skip the solve** ([`worker::record`]): jobs whose result is in the cache end with it. Equal jobs of the group wait for the first.
-//! 7. **Solve** ([`worker::pool`], [`worker::solve`]): on a solver thread, outside transactions, one case after the other. A long sweep
+//! 7. **Solve** ([`worker::turn`], [`worker::solve`]): on a solver thread, outside transactions, one case after the other. A long sweep
 //!    is divided into [slices](attempts::slices), each stored when it is solved, and yields to other jobs in between. While every worker
 //!    runs a solve that does not yield, a spare worker serves short jobs.
 //! 8. **Decide** ([`worker::record::disposition_of`]): the one place that decides the effect of an outcome on its job.
@@ -37,6 +37,7 @@
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod attempts;
+pub mod backup;
 pub mod batch;
 pub mod blobs;
 pub mod clock;
@@ -61,6 +62,7 @@ pub mod results;
 pub mod run;
 pub mod runtime_probe;
 pub mod shared;
+pub mod storage_fault;
 pub mod storage_health;
 pub mod store;
 pub mod submit;

@@ -26,7 +26,7 @@ use crate::model::{ANONYMOUS, Kind};
 use crate::options::Options;
 use crate::result_place::settle::settle;
 use crate::shared::{Shared, StagedBytes, UnfinishedBatches};
-use crate::storage_health::StorageFaults;
+use crate::storage_fault::StorageFaults;
 use crate::store::open::open_for_service;
 use crate::store::{Node, Store};
 use crate::sync::lock;

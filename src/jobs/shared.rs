@@ -21,7 +21,7 @@ use crate::error::{JobsError, Result};
 use crate::metrics::Metrics;
 use crate::model::Trusted;
 use crate::options::{Options, StagingBounds};
-use crate::storage_health::StorageFaults;
+use crate::storage_fault::StorageFaults;
 use crate::store::{Lease, Node, Notification, Store};
 use crate::sync::lock;
 use crate::work::{RecentReads, Work};

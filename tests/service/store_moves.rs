@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
-use railhead::jobs::codec::fields::EncodedResult;
+use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::{Priority, SubmitOptions};
 use railhead::jobs::store::{
     Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Lease, Moment, NewJob, NewSlice,

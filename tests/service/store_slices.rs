@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use railhead::jobs::State;
-use railhead::jobs::codec::fields::EncodedResult;
+use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::store::{
     Claim, ClaimKind, ClaimRequest, NewSlice, Reap, ReleaseReason, SliceRecord, Store, StoredResult,
 };

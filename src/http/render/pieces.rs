@@ -1,22 +1,12 @@
 //! Streams the text of a table, which is written while the client receives it, so that a large response needs no memory beyond its table.
-//!
-//! Tables of cells are written as CSV or JSON, tables of rows as CSV, JSON, NDJSON, an Arrow stream or a Parquet file.
 
 use std::convert::Infallible;
-use std::ops::Range;
 
 use axum::body::{Body, Bytes};
 use futures_util::stream;
-use futures_util::stream::{Stream, StreamExt, TryStreamExt, iter, try_unfold};
 
-use crate::render::format::Format;
-use railhead_contact::evaluate::answer::RowsAnswer;
-use railhead_jobs::sync::blocking;
 use railhead_tables::cells::{CellRows, CellTable};
 use railhead_tables::csv;
-use railhead_tables::csv::{Precision, write_number};
-use railhead_tables::table::{RowTable, TableColumn, TableKind};
-use railhead_tables::write::{RowWriter, WriteError};
 
 /// Least size of a piece except the last, in bytes.
 const PIECE_BYTES: usize = 32 << 10;
@@ -136,111 +126,6 @@ where
     Body::from_stream(stream::iter(pieces))
 }
 
-/// Some rows of a table.
-pub(crate) enum Piece {
-    /// Text in the format of the response.
-    Text(Bytes),
-    /// A table that is not yet written.
-    Table(RowTable),
-}
-
-/// Writes tables of these columns as they arrive, with the head and the end of the format.
-///
-/// # Errors
-/// The head cannot be written.
-pub(crate) fn stream<P: Stream<Item = Result<Piece, WriteError>> + Send>(
-    format: Format,
-    columns: &[(String, TableKind)],
-    pieces: P,
-) -> Result<impl Stream<Item = Result<Bytes, WriteError>> + Send + use<P>, WriteError> {
-    let mut writer = RowWriter::new(format.table(), columns)?;
-    let head = Bytes::from(writer.head()?);
-    let state = Some((Box::pin(pieces), writer));
-    let text = try_unfold(state, async |state| {
-        let Some((mut pieces, mut writer)) = state else {
-            return Ok(None);
-        };
-        let text = match pieces.try_next().await? {
-            Some(Piece::Text(text)) => text,
-            Some(Piece::Table(table)) => {
-                let written = blocking(move || (writer.write(table), writer));
-                let (text, back) = written.await?;
-                writer = back;
-                text?.into()
-            }
-            None => return Ok(Some((writer.finish()?.into(), None))),
-        };
-        Ok(Some((text, Some((pieces, writer)))))
-    });
-    Ok(iter([Ok(head)]).chain(text))
-}
-
-/// Number of rows of an Arrow record batch or a Parquet row group.
-const BATCH_ROWS: usize = 1 << 15;
-
-/// Number of rows of text written at once.
-const ROWS_PER_PIECE: usize = 1024;
-
-/// `{"rows": …, "columns": {"force_x_n": […], …, "status": […]}}`; null where a row has no number.
-pub(crate) fn rows_json_body(answer: RowsAnswer) -> Body {
-    let rows = answer.status.len();
-    let names = answer.numbers.iter().map(|(name, _)| *name);
-    let columns = names.chain(["status"]);
-    let columns = columns.map(|name| JsonColumn::new(name, rows)).collect();
-    let open = format!("{{\"rows\":{rows},\"columns\":{{");
-    json_columns(open, columns, "}}", move |out, column, row| {
-        match answer.numbers.get(column) {
-            Some((_, values)) => write_number(out, values[row], Precision::Double, "null"),
-            None => *out += &format!("\"{}\"", answer.status[row].name()),
-        }
-    })
-}
-
-/// Returns the columns as a table in this format.
-///
-/// # Errors
-/// The head cannot be written.
-pub(crate) fn table_body(format: Format, answer: RowsAnswer) -> Result<Body, WriteError> {
-    let columns = answer.columns().into_iter();
-    let columns: Vec<_> = columns
-        .map(|(name, _)| (name.to_owned(), TableKind::Numbers))
-        .chain([("status".to_owned(), TableKind::Texts)])
-        .collect();
-    let rows = answer.status.len();
-    let step = match format {
-        Format::Arrow | Format::Parquet => BATCH_ROWS,
-        _ => ROWS_PER_PIECE,
-    };
-    let mut writer = RowWriter::new(format.table(), &columns)?;
-    let head = writer.head()?;
-    let starts = (0..rows).step_by(step).map(Some).chain([None]);
-    let pieces = starts.map(move |start| {
-        let written = match start {
-            Some(start) => writer.write(part(&answer, start..(start + step).min(rows))),
-            None => writer.finish(),
-        };
-        written.map_err(std::io::Error::other)
-    });
-    Ok(body(std::iter::once(Ok(head)).chain(pieces)))
-}
-
-fn part(answer: &RowsAnswer, range: Range<usize>) -> RowTable {
-    let status = answer.status[range.clone()].iter();
-    let status = status
-        .map(|status| Some(status.name().to_owned()))
-        .collect();
-    let numbers = answer.columns().into_iter();
-    let numbers = numbers.map(|(name, column)| {
-        let column = TableColumn::Numbers(column[range.clone()].to_vec());
-        (name.to_owned(), column)
-    });
-    RowTable {
-        columns: numbers
-            .chain([("status".to_owned(), TableColumn::Texts(status))])
-            .collect(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use http_body_util::BodyExt;
@@ -343,67 +228,5 @@ mod tests {
             lines[..3],
             ["x_mm,y_mm,pressure_mpa", "1.0,1.0,1.5", "0.5,1.0,"]
         );
-    }
-}
-
-#[cfg(test)]
-mod row_tables_tests {
-    use http_body_util::BodyExt;
-    use serde_json::{Value, json};
-
-    use super::*;
-    use railhead_contact::evaluate::answer::RowStatus;
-
-    fn answer(rows: usize) -> RowsAnswer {
-        let column = |scale: f64| (0..rows).map(|k| scale * k as f64).collect();
-        let mut numbers: Vec<(&'static str, Vec<f64>)> = vec![
-            ("force_x_n", column(0.1)),
-            ("force_y_n", column(-1e-9)),
-            ("moment_z_n_mm", column(1e12)),
-            ("error_estimate", column(3.0)),
-            ("friction_power_n", column(0.0)),
-            ("stick_share", column(1.0)),
-        ];
-        numbers[5].1[1] = f64::NAN;
-        let mut answer = RowsAnswer {
-            numbers,
-            status: vec![RowStatus::Ok; rows],
-        };
-        answer.status[1] = RowStatus::NotCovered;
-        answer
-    }
-
-    async fn text(body: Body) -> String {
-        let bytes = body.collect().await.unwrap().to_bytes();
-        String::from_utf8(bytes.to_vec()).unwrap()
-    }
-
-    #[tokio::test]
-    async fn columns_are_json_and_csv_of_the_same_numbers() {
-        let rows = 2 * ROWS_PER_PIECE + 7;
-        let given = answer(rows);
-        let read: Value = serde_json::from_str(&text(rows_json_body(given.clone())).await).unwrap();
-        assert_eq!(read["rows"], json!(rows));
-        assert_eq!(read["columns"]["stick_share"][1], Value::Null);
-        assert_eq!(read["columns"]["status"][1], json!("not_covered"));
-        let csv = text(table_body(Format::Csv, given.clone()).unwrap()).await;
-        let lines: Vec<&str> = csv.lines().collect();
-        assert_eq!(lines.len(), rows + 1);
-        for row in [0, 1, ROWS_PER_PIECE, rows - 1] {
-            let fields: Vec<&str> = lines[row + 1].split(',').collect();
-            let names: Vec<&str> = lines[0].split(',').collect();
-            for (name, field) in names.iter().zip(fields) {
-                let known = &read["columns"][*name][row];
-                match known {
-                    Value::Null => assert_eq!(field, ""),
-                    Value::String(word) => assert_eq!(field, word),
-                    number => assert_eq!(field.parse::<f64>().ok(), number.as_f64()),
-                }
-            }
-            assert_eq!(
-                read["columns"]["force_x_n"][row],
-                json!(given.column("force_x_n")[row])
-            );
-        }
     }
 }

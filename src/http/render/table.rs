@@ -1,13 +1,14 @@
 //! Fields as tables, per cell or on a grid.
 
-use utoipa::ToSchema;
-
-use crate::dto::Outlines;
-use crate::render::shape::outlines::{Gridded, outlines, patch_outline, resample, resample_zone};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 use railhead_tables::cells::{CellColumn, CellData, CellRows, CellTable, PLACES};
 use railhead_tables::csv::Precision;
+use utoipa::ToSchema;
+
+use crate::dto::Outlines;
+use crate::render::shape::outlines::{outlines, patch_outline};
+use crate::render::shape::resample::{Gridded, resample, resample_zone};
 
 /// A binary body.
 #[derive(Debug, ToSchema)]

@@ -25,7 +25,7 @@ use crate::options::HttpOptions;
 use crate::problem::{ApiError, Fault, ProblemBody, ProblemKind, Result, problems};
 use crate::render::batch_table::Columns;
 use crate::render::format::Format;
-use crate::render::pieces::Piece;
+use crate::render::row_tables::Piece;
 use crate::routes::submission::{BatchAccepted, NamedQuery, Submission, SubmitParameters};
 use crate::routes::wait::{Wait, WaitQuery};
 use crate::routes::work::{RESULT_FORMATS, table_answer};

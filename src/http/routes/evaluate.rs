@@ -26,7 +26,7 @@ use crate::limits::{Memory, Pace, hold_while_sent};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind, Result, faulty, problems};
 use crate::render::format::Format;
-use crate::render::pieces::{rows_json_body, table_body};
+use crate::render::row_tables::{json_body, table_body};
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::answer::RowsAnswer;
 use railhead_contact::evaluate::many::{NotAtOnce, SOLVED_ROWS_MAX};
@@ -228,7 +228,7 @@ pub(crate) async fn evaluate(
         drop(text);
         let answer = evaluation.answer(template, rows, pace)?;
         let (bytes, body) = match format {
-            Format::Json => (answer.bytes(), rows_json_body(answer)),
+            Format::Json => (answer.bytes(), json_body(answer)),
             Format::Npz => {
                 let archive = npz::write_rows(&answer).map_err(ApiError::internal)?;
                 (archive.len(), Body::from(archive))

@@ -2,6 +2,7 @@
 
 use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
+use railhead_macros::Names;
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -11,19 +12,19 @@ use crate::extract::query::{Parameters, count, query, reader, word};
 use crate::limits::hold_while_sent;
 use crate::problem::{ApiError, Result};
 use crate::render::format::Format;
-use crate::render::picture::chart::Svg;
 use crate::render::picture::curve::{self, Curve, CurveLine};
-use crate::render::picture::draw::{Scene, draw};
+use crate::render::picture::draw::draw;
 use crate::render::picture::profile_view::{self, ProfileView, ProfileViewPatch};
 use crate::render::picture::raster;
+use crate::render::picture::scene::Scene;
 use crate::render::picture::section::{self, Sections};
+use crate::render::picture::svg::Svg;
 use crate::render::table::File;
 use crate::routes::parts::{FieldProblems, PartRequest, PlaceQuery, motion_of, stored};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
 use railhead_jobs::Jobs;
 use railhead_jobs::error::JobsError;
-use railhead_macros::Names;
 
 /// View shown by a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Names)]

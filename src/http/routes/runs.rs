@@ -23,7 +23,7 @@ use crate::limits::{Memory, hold_while_sent};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind, Result, problems};
 use crate::render::format::Format;
-use crate::render::pieces::Piece;
+use crate::render::row_tables::Piece;
 use crate::routes::submission::{NamedQuery, RunAccepted, Submission, SubmitParameters};
 use crate::routes::wait::{Wait, WaitQuery};
 use crate::routes::work::{RESULT_FORMATS, await_end, table_answer};

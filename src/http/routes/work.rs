@@ -27,7 +27,7 @@ use crate::dto::{BatchAnswer, BatchReceipt, JobAnswer, RunAnswer};
 use crate::extract::caller::{Caller, Credential, revoked, until_revoked, work_id};
 use crate::problem::{ApiError, PlainProblems, ProblemKind, Result, describe};
 use crate::render::format::Format;
-use crate::render::pieces::{Piece, stream};
+use crate::render::row_tables::{Piece, stream};
 use crate::routes::wait::{EventRequest, Wait, WaitQuery, changed, event};
 use crate::state::AppState;
 use railhead_jobs::Jobs;

@@ -1,6 +1,7 @@
 //! The accept loop: limits of connections, and graceful shutdown.
 
 pub(super) mod connections;
+pub(super) mod drain_body;
 
 use std::convert::Infallible;
 use std::pin::pin;

@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use crate::codec::fields::EncodedResult;
+use crate::codec::result::EncodedResult;
 use crate::model::{Failure, FailureKind};
 use crate::store::{SliceRecord, StoredCase};
 use railhead_contact::error::{CaseError, SolveError};

@@ -13,7 +13,7 @@ use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::model::{BatchItem, ItemFault, Kind, State, SubmitOptions, WorkOptions};
 use crate::shared::Shared;
-use crate::storage_health::StoragePlace;
+use crate::storage_fault::StoragePlace;
 use crate::store::{BatchBegun, NewBatch, NewJob};
 use crate::sync::blocking;
 use crate::trace::{KeyValue, SubmitSpan};

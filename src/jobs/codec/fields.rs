@@ -16,15 +16,12 @@
 use std::io;
 use std::ops::Range;
 
-use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use zstd::bulk::Compressor;
 
-use crate::error::{JobsError, Result};
 use railhead_contact::solution::words::answer::{
     Fields, PatchCells, PatchFields, PointFields, Zone,
 };
-use railhead_tables::parquet;
 
 const MAGIC: &[u8; 8] = b"RHFIELD2";
 
@@ -411,69 +408,6 @@ fn zone_code(zone: Zone) -> u8 {
     match zone {
         Zone::Stick => 0,
         Zone::Slip => 1,
-    }
-}
-
-/// The stored form of a result.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct EncodedResult {
-    /// The solution as JSON.
-    pub solution: Bytes,
-    /// The fields as written by [`encode`], or the table of a chunk of rows; `None` if the
-    /// case requested no fields.
-    pub fields: Option<Bytes>,
-}
-
-impl EncodedResult {
-    /// Encodes a solution, or a part of one, that has no fields.
-    ///
-    /// # Errors
-    /// JSON serialisation failed.
-    pub fn as_json(answer: &impl Serialize) -> Result<EncodedResult, String> {
-        let text = serde_json::to_vec(answer);
-        let text =
-            text.map_err(|error| format!("the answer cannot be written as JSON: {error}"))?;
-        Ok(EncodedResult {
-            solution: Bytes::from(text),
-            fields: None,
-        })
-    }
-
-    /// Size in bytes.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.solution.len() + self.fields.as_ref().map_or(0, Bytes::len)
-    }
-
-    /// Whether this is the result of a chunk of rows, with a table instead of fields.
-    #[must_use]
-    pub fn is_rows(&self) -> bool {
-        let fields = self.fields.as_ref();
-        fields.is_some_and(|fields| fields.starts_with(parquet::MAGIC))
-    }
-
-    /// Decodes the cells of one patch, with the values of one motion or of all motions.
-    ///
-    /// # Errors
-    /// The motion does not exist, or the fields cannot be decoded.
-    pub fn patch_fields(&self, patch: usize, point: Option<usize>) -> Result<PatchFields> {
-        let file = self.fields.as_deref().unwrap_or_default();
-        let damaged = |error: String| JobsError::Damaged(format!("stored fields: {error}"));
-        let cut = || damaged("cut short".to_owned());
-        let (header, body) = Header::of_file(file).map_err(damaged)?;
-        let header = header.ok_or_else(cut)?;
-        let points = header.points(patch);
-        if point.is_some_and(|point| point >= points) {
-            return Err(JobsError::NoSuchPoint(points));
-        }
-        let mut pieces = Vec::new();
-        for range in header.ranges(patch, point) {
-            let start = usize::try_from(range.start).unwrap_or(usize::MAX);
-            let end = usize::try_from(range.end).unwrap_or(usize::MAX);
-            let piece = file[body..].get(start..end).ok_or_else(cut)?;
-            pieces.extend_from_slice(piece);
-        }
-        header.decode(patch, point, &pieces).map_err(damaged)
     }
 }
 

@@ -1,3 +1,4 @@
 //! Stored forms of solutions and fields.
 
 pub mod fields;
+pub mod result;

@@ -12,7 +12,7 @@ use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
 use crate::model::{FailureKind, Job, State, too_late};
 use crate::shared::{Shared, heartbeat};
-use crate::storage_health::StoragePlace;
+use crate::storage_fault::StoragePlace;
 use crate::store::{Moment, Reap, RetentionRule};
 use crate::sync::blocking;
 

@@ -26,7 +26,7 @@ use object_store::ObjectStore;
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
 
-use crate::codec::fields::EncodedResult;
+use crate::codec::result::EncodedResult;
 use crate::error::StoreError;
 use crate::model::{
     Batch, BatchItem, Failure, Job, Key, Kind, Queue, RunRecord, State, SubmitOptions,

@@ -9,7 +9,7 @@ use rusqlite::ErrorCode;
 use crate::error::{JobsError, StorageFault, StoreError};
 
 #[cfg(feature = "cluster")]
-use crate::storage_health::fault_of_io;
+use crate::storage_fault::fault_of_io;
 
 impl From<rusqlite::Error> for StoreError {
     fn from(error: rusqlite::Error) -> Self {

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::attempts::attempt::AttemptControl;
 use crate::attempts::slices::{Ended, Outcome, SlicedEvolution, SlicedWork, Solved};
-use crate::codec::fields::EncodedResult;
+use crate::codec::result::EncodedResult;
 use crate::shared::Shared;
 use crate::store::SliceRecord;
 use railhead_contact::error::SolveError;

@@ -5,3 +5,4 @@ pub mod heartbeat;
 pub mod pool;
 pub mod record;
 pub mod solve;
+pub mod turn;

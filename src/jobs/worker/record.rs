@@ -6,10 +6,10 @@ use uuid::Uuid;
 
 use crate::attempts::attempt::{Attempt, Phase, StopReason};
 use crate::attempts::slices::{Outcome, SlicedWork, Solved, Work, internal_failure};
-use crate::codec::fields::EncodedResult;
+use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
 use crate::model::{Failure, FailureKind, State, too_late};
-use crate::storage_health::StoragePlace;
+use crate::storage_fault::StoragePlace;
 use crate::store::{Claim, Ending, NewSlice, ReleaseReason, SliceRecord, StoredResult};
 use crate::submit::microseconds;
 use crate::trace::JobTrace;

@@ -13,7 +13,8 @@ use crate::attempts::attempt::{
     Attempt, AttemptControl, Member, Outcomes, Phase, Solver, SolverThread, Task,
 };
 use crate::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Solved, Work};
-use crate::codec::fields::{EncodedResult, encode};
+use crate::codec::fields::encode;
+use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
 use crate::model::{Failure, FailureKind, Kind, Queue};
 use crate::run::model::{REASON, REMARKS, RunChunk, RunHead, parted};

@@ -1,6 +1,6 @@
 //! Tests that claims and ends cost no more while a transaction stays open, so that dead rows remain. The tests count work, not time.
 
-use railhead::jobs::codec::fields::EncodedResult;
+use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::Queue;
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::{

@@ -2,9 +2,8 @@
 
 use std::fmt::Write;
 
-use crate::render::picture::chart::{
-    Anchor, Chart, Svg, WIDTH, legend_line, open, polyline, px, roomy,
-};
+use crate::render::picture::chart::{Chart, WIDTH, legend_line, open, roomy};
+use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 
 /// Height of the picture in its units.
 const HEIGHT: f64 = 480.0;

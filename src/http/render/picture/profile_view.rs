@@ -1,6 +1,7 @@
 //! Draws a wheel on a rail, seen along the rolling direction, with the pressure of every patch on the rail.
 
-use crate::render::picture::chart::{Anchor, Chart, Svg, WIDTH, open, polyline, px};
+use crate::render::picture::chart::{Chart, WIDTH, open};
+use crate::render::picture::svg::{Anchor, Svg, polyline, px};
 use railhead_contact::solution::words::answer::{PatchCells, PlacedProfiles, Position};
 
 /// Range of z relative to the top of the rail, in mm.

@@ -9,7 +9,7 @@ use resvg::usvg::{Options, Tree};
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 use unicode_normalization::UnicodeNormalization;
 
-use crate::render::picture::chart::{Anchor, Line, Svg};
+use crate::render::picture::svg::{Anchor, Line, Svg};
 
 const FONT: &[u8] = include_bytes!("DejaVuSans.ttf");
 

@@ -1,6 +1,7 @@
 //! Draws sections of a patch through its largest traction, with traction and friction bound.
 
-use crate::render::picture::chart::{Anchor, Chart, Svg, WIDTH, legend_line, open, polyline};
+use crate::render::picture::chart::{Chart, WIDTH, legend_line, open};
+use crate::render::picture::svg::{Anchor, Svg, polyline};
 use railhead_contact::solution::words::answer::{PatchCells, PointFields, Zone};
 
 /// Height of the picture in its units.

@@ -2,5 +2,7 @@
 //!
 //! `benches/figures` compiles this folder too. It therefore uses only `railhead_contact` and its own files.
 
+mod monotone;
 pub(crate) mod outlines;
+pub(crate) mod resample;
 pub(crate) mod sheet;

@@ -4,7 +4,7 @@ use sqlx::postgres::PgPool;
 use sqlx::query_scalar;
 
 use crate::error::JobsError;
-use crate::store::postgres::database::connect;
+use crate::store::postgres::connection::connect;
 use crate::store::postgres::schema::require;
 
 /// Oldest supported version of the server, in its own notation.

@@ -2,18 +2,20 @@
 
 use async_trait::async_trait;
 use futures_util::TryStreamExt;
+use railhead_macros::repeat_conflicts;
 use sqlx::Transaction;
 use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow, Postgres};
 use sqlx::query::Query;
-pub(crate) use sqlx::{Row, query, query_scalar};
 use uuid::Uuid;
 
 use crate::error::StoreError;
 use crate::model::Queue;
-use crate::store::postgres::database::{ADMISSION, PostgresStore, in_time, lock};
+use crate::store::postgres::connection::{ADMISSION, in_time, lock};
+use crate::store::postgres::database::PostgresStore;
 use crate::store::postgres::engine;
 use crate::store::{ClaimRequest, Cluster, Result, Store};
-use railhead_macros::repeat_conflicts;
+
+pub(crate) use sqlx::{Row, query, query_scalar};
 
 pub(crate) type Db = Postgres;
 pub(crate) type QueryBuilder = sqlx::QueryBuilder<Postgres>;

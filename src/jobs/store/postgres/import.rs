@@ -1,11 +1,13 @@
 //! Import of an embedded job table into an empty database, in one transaction.
 
 use sqlx::postgres::PgConnection;
-use sqlx::{AssertSqlSafe, Connection, query_scalar};
+use sqlx::query_scalar;
+use sqlx::{AssertSqlSafe, Connection};
 
 use crate::error::JobsError;
 use crate::store::Result;
-use crate::store::postgres::database::{ADMISSION, PostgresStore, lock};
+use crate::store::postgres::connection::{ADMISSION, lock};
+use crate::store::postgres::database::PostgresStore;
 use crate::store::sqlite::database::SqliteStore;
 
 /// The imported tables, referenced tables first. Counters are computed again by the database.

@@ -9,10 +9,12 @@ mod tokens;
 
 mod claim_memory;
 pub mod cluster;
+pub mod connection;
 pub mod database;
 pub mod doctor;
 pub mod engine;
 mod import;
+pub mod notifier;
 pub mod objects;
 pub mod schema;
 #[path = "../sql/mod.rs"]
@@ -21,3 +23,4 @@ pub mod schema;
     reason = "the shared statements are compiled once for each database"
 )]
 pub mod sql;
+pub(crate) mod url;

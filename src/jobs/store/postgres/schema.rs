@@ -5,11 +5,12 @@
 //! each migration names the oldest version that can use the tables. Leftovers are removed by a migration of the next
 //! version.
 
+use sqlx::PgConnection;
 use sqlx::postgres::PgPool;
-use sqlx::{PgConnection, query, query_scalar};
+use sqlx::{query, query_scalar};
 
 use crate::error::JobsError;
-use crate::store::postgres::database::{self, connect, lock};
+use crate::store::postgres::connection::{self, connect, lock};
 
 /// The statements that create the tables of version 1.
 const SCHEMA: &str = include_str!("schema.sql");
@@ -68,7 +69,7 @@ async fn make(pool: &PgPool) -> Result<Migrated, JobsError> {
         .execute(&mut *transaction)
         .await?;
     // The lock ends with the transaction, because a session lock would not work with a pooler.
-    lock(&mut transaction, database::SCHEMA).await?;
+    lock(&mut transaction, connection::SCHEMA).await?;
     let before = form(&mut transaction).await?;
     if before.is_some_and(|form| form >= SCHEMA_VERSION) {
         require_within(&mut transaction).await?;

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use uuid::Uuid;
 
 use super::engine::{DbRow, QueryBuilder, Row};
-use crate::codec::fields::EncodedResult;
+use crate::codec::result::EncodedResult;
 use crate::error::StoreError;
 use crate::model::{Job, Kind, Priority, State};
 use crate::store::{CacheKey, Claim, Result, StoredResult};

@@ -10,14 +10,16 @@ use uuid::Uuid;
 
 use crate::error::StoreError;
 use crate::model::Queue;
+use crate::store::sqlite::connection::{Pooled, Query};
+use crate::store::sqlite::database::SqliteStore;
+use crate::store::sqlite::schema::mark;
+use crate::store::sqlite::sql::claim::{PEEK, first_queued};
+use crate::store::{ClaimRequest, Cluster, Result, Store};
+
 pub(crate) use crate::store::sqlite::connection::{
     Connection as DbConnection, Pool as DbPool, QueryBuilder, Row, SqliteRow as DbRow, query,
     query_scalar,
 };
-use crate::store::sqlite::connection::{Pooled, Query};
-use crate::store::sqlite::database::{SqliteStore, mark};
-use crate::store::sqlite::sql::claim::{PEEK, first_queued};
-use crate::store::{ClaimRequest, Cluster, Result, Store};
 
 pub(crate) type SqlStore = SqliteStore;
 

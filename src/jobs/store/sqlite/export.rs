@@ -4,7 +4,7 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
 use crate::store::Result;
-use crate::store::sqlite::connection::{Row, query};
+use crate::store::sqlite::connection::{Row, query, query_scalar};
 use crate::store::sqlite::database::SqliteStore;
 
 /// Maximum number of rows and bytes of a portion.
@@ -65,5 +65,11 @@ impl SqliteStore {
             Ok(())
         });
         Ok((portions, reading))
+    }
+
+    /// The keys of all referenced large results.
+    pub(crate) async fn large_results(&self) -> Result<Vec<String>> {
+        let keys = query_scalar("SELECT DISTINCT key FROM blobs WHERE key IS NOT NULL");
+        keys.fetch_all(&self.readers).await
     }
 }

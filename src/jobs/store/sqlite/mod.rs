@@ -8,6 +8,7 @@ pub mod database;
 pub mod engine;
 #[cfg(feature = "cluster")]
 mod export;
+pub mod schema;
 #[path = "../sql/mod.rs"]
 pub mod sql;
 
