@@ -75,13 +75,17 @@ impl Client<'_> {
     }
 }
 
+/// Above the number of starts of a test: each start that is killed takes one attempt of the jobs in the folder.
+const ATTEMPTS: [&str; 2] = ["--attempts-max", "20"];
+
 /// Starts and kills the service several times, because a process may die at any moment of its first starts.
 fn kill_while_starting(folder: &Path) {
     for ms in [0, 5, 20, 50, 100, 200] {
         let mut program = railhead();
         program
             .args(["serve", "--listen", "127.0.0.1:0", "--data-dir"])
-            .arg(folder);
+            .arg(folder)
+            .args(ATTEMPTS);
         let mut started = program
             .stdout(std::process::Stdio::null())
             .stderr(std::process::Stdio::null())
@@ -106,7 +110,8 @@ async fn a_folder_of_form_8_opens_with_all_that_is_in_it() {
 async fn opens_with_all_that_is_in_it(form: u32) {
     let (folder, expected) = of_form(form);
     kill_while_starting(folder.path());
-    let service = Service::start(folder.path(), &["--workers", "1"]);
+    let [option, attempts] = ATTEMPTS;
+    let service = Service::start(folder.path(), &["--workers", "1", option, attempts]);
     let text = |name: &str| expected[name].as_str().unwrap().to_owned();
     let id = text;
     let key = text("key");
