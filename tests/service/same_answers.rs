@@ -43,12 +43,9 @@ fn of_total(total: &Value) -> [[f64; 2]; 2] {
 }
 
 /// Returns both forces of a row. The row has one error estimate, that of the less certain force, which is returned for both.
-fn of_row(row: &Value) -> [[f64; 2]; 2] {
-    let estimate = number(&row["error_estimate"]);
-    [
-        ["force_x_n", "force_y_n"].map(|name| number(&row[name])),
-        [estimate; 2],
-    ]
+fn of_row<'a>(cell: impl Fn(&str) -> &'a Value) -> [[f64; 2]; 2] {
+    let [x, y, error] = ["force_x_n", "force_y_n", "error_estimate"].map(|name| number(cell(name)));
+    [[x, y], [error; 2]]
 }
 
 /// Asserts that forces agree with those of single motions within both error estimates.
@@ -63,6 +60,30 @@ fn assert_agrees(what: &str, found: &[[[f64; 2]; 2]], alone: &[[[f64; 2]; 2]]) {
             );
         }
     }
+}
+
+/// Returns the columns of an evaluation and the rows of a run. Their texts agree.
+async fn evaluated(server: &Server, rows: &Value) -> (Value, Vec<Value>) {
+    let run = server.post("/v1/runs", rows).await.is(202);
+    let of_run = answers(server, &run.location()).await;
+    let columns = server.post("/v1/evaluate", rows).await.is(200).json["columns"].take();
+    for name in ["status", "reason", "remarks"] {
+        let texts: Vec<&Value> = of_run.iter().map(|row| &row[name]).collect();
+        assert_eq!(columns[name], json!(texts), "{name}");
+    }
+    (columns, of_run)
+}
+
+#[tokio::test]
+async fn a_row_without_a_result_has_the_same_reason_in_a_run_and_in_an_evaluation() {
+    let mut case = template(&frictions()[0]);
+    case["solver"] = json!({ "method": "table" });
+    let columns =
+        json!({ "/contact/lateral_mm": [300, 1, 300], "/friction/coefficient": [0.3, 0.3, 1e-13] });
+    let rows = json!({ "template": case, "columns": columns });
+    let (columns, _) = evaluated(&Server::start().await, &rows).await;
+    assert_eq!(columns["status"], json!(["ok", "not_covered", "refused"]));
+    assert!(columns["reason"][2].is_string(), "{columns}");
 }
 
 #[tokio::test]
@@ -83,19 +104,12 @@ async fn a_case_has_the_same_answer_alone_in_a_run_and_in_an_evaluation() {
             "/motion/creepage_y": CREEPAGES.map(|creepages| creepages[1]),
         });
         let rows = json!({ "template": case, "columns": columns });
-        let run = server.post("/v1/runs", &rows).await.is(202);
-        let answers = answers(&server, &run.location()).await;
-        let found: Vec<_> = answers.iter().map(of_row).collect();
+        let (columns, of_run) = evaluated(&server, &rows).await;
+        let found = of_run.iter().map(|row| of_row(|name| &row[name]));
+        let found: Vec<_> = found.collect();
         assert_agrees(&format!("run, {friction}"), &found, &alone);
-        let answer = server.post("/v1/evaluate", &rows).await.is(200);
-        let columns = answer.json["columns"].as_object().expect("columns");
         assert_eq!(columns["status"], json!(["ok", "ok"]), "{friction}");
-        let row = |k: usize| {
-            let cells = columns
-                .iter()
-                .map(|(name, cells)| (name.clone(), cells[k].clone()));
-            of_row(&cells.collect())
-        };
+        let row = |k: usize| of_row(|name| &columns[name][k]);
         assert_agrees(&format!("evaluate, {friction}"), &[0, 1].map(row), &alone);
     }
 }

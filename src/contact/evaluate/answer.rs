@@ -1,5 +1,7 @@
 //! Answers to rows: columns of numbers, and for each row a status, the method, and the reason if it has no answer.
 
+use std::collections::BTreeMap;
+
 use railhead_macros::{Named, Names};
 
 use crate::case::words::solver::{MethodName, Output};
@@ -7,6 +9,7 @@ use crate::error::{CaseError, SolveError};
 use crate::problem::checked_case::CheckedCase;
 use crate::problem::physics::Problem;
 use crate::remark::entry::RemarkEntry;
+use crate::rolling::methods::table::solve::RATIO_RANGE;
 use crate::solution::words::answer::{PatchSolution, PointSolution, Solution};
 
 /// The status of a row. Only rows with the first two have resultants.
@@ -38,6 +41,21 @@ impl RowStatus {
     /// Whether the row has resultants.
     pub fn has_answer(self) -> bool {
         matches!(self, RowStatus::Ok | RowStatus::TargetMissed)
+    }
+
+    /// Returns the reason of a row that was evaluated without the solver; empty for a row with resultants.
+    pub(crate) fn reason(self) -> String {
+        match self {
+            RowStatus::NotCovered => format!(
+                "a/b of the ellipse is outside {} to {}, the range of \"method\": \"table\"; use boundary_element or fastsim",
+                RATIO_RANGE.start(),
+                RATIO_RANGE.end()
+            ),
+            RowStatus::NeedsSolver => "too many rows need the solver; submit a run".to_owned(),
+            RowStatus::Refused => "the case has faults; a check of it alone lists them".to_owned(),
+            RowStatus::NotFinite => "a number of the result is not finite".to_owned(),
+            _ => String::new(),
+        }
     }
 
     /// Returns the status of a row whose solve failed; `None` if the caller stopped the solve.
@@ -73,6 +91,8 @@ pub struct RowsAnswer {
     pub numbers: Vec<(&'static str, Vec<f64>)>,
     /// The status of each row.
     pub status: Vec<RowStatus>,
+    /// The reason and the codes of the remarks of each row that the solver was given, by the index of the row.
+    notes: BTreeMap<usize, [String; 2]>,
 }
 
 /// The answer to one row.
@@ -103,6 +123,7 @@ impl RowsAnswer {
         RowsAnswer {
             numbers: names.map(|name| (name, Vec::with_capacity(rows))).collect(),
             status: Vec::with_capacity(rows),
+            notes: BTreeMap::new(),
         }
     }
 
@@ -118,6 +139,17 @@ impl RowsAnswer {
             column.push(number);
         }
         self.status.push(row.status);
+    }
+
+    /// Returns why a row has no resultants; empty for a row with resultants.
+    pub fn reason(&self, row: usize) -> String {
+        let noted = self.notes.get(&row);
+        noted.map_or_else(|| self.status[row].reason(), |[reason, _]| reason.clone())
+    }
+
+    /// Returns the codes of the remarks of a row, separated by blanks. Empty for rows by the table or FASTSIM.
+    pub fn remarks(&self, row: usize) -> &str {
+        self.notes.get(&row).map_or("", |[_, remarks]| remarks)
     }
 
     /// The memory of the answer in bytes.
@@ -149,11 +181,14 @@ impl RowsAnswer {
         RowsAnswer {
             numbers,
             status: answer.status,
+            notes: (0..)
+                .zip(std::iter::zip(answer.reason, answer.remarks).map(Into::into))
+                .collect(),
         }
     }
 
     /// Replaces `rows` by answers of the solver in the same order.
-    pub(crate) fn replace(&mut self, rows: &[usize], solved: &RowsAnswer) {
+    pub(crate) fn replace(&mut self, rows: &[usize], solved: RowsAnswer) {
         for ((_, column), (_, numbers)) in self.numbers.iter_mut().zip(&solved.numbers) {
             for (row, number) in rows.iter().zip(numbers) {
                 column[*row] = *number;
@@ -162,6 +197,8 @@ impl RowsAnswer {
         for (row, status) in rows.iter().zip(&solved.status) {
             self.status[*row] = *status;
         }
+        let notes = solved.notes.into_values();
+        self.notes.extend(rows.iter().copied().zip(notes));
     }
 }
 

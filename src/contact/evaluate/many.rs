@@ -24,7 +24,6 @@ use crate::evaluate::rows::Rows;
 use crate::evaluate::varied::{VariedColumn, case_of_row};
 use crate::monitor::{Monitor, Stop};
 use crate::problem::checked_case::CheckedCase;
-use crate::rolling::methods::table::solve::RATIO_RANGE;
 use crate::solution::words::answer::Solution;
 
 /// Solves rows. Rows of Hertz contacts are evaluated without meshes by `table` and `fastsim`, or by `auto` if the bound of the table meets the
@@ -85,8 +84,8 @@ pub enum NotAtOnce<E> {
 /// Evaluates rows immediately, by the table or FASTSIM if they apply, otherwise by the solver. The case of the task is that of its first row,
 /// and `checked` is its checked form. `step` is called after each row of the table or FASTSIM and may end the evaluation.
 ///
-/// With `auto`, at most [`SOLVED_ROWS_MAX`] rows that the table does not answer are solved. If there are more, their status is
-/// [`RowStatus::NeedsSolver`].
+/// At most [`SOLVED_ROWS_MAX`] rows without an answer of the table or FASTSIM are solved, as in [`solve_many`]. If there are more, their status
+/// is that of their evaluation, such as [`RowStatus::NeedsSolver`].
 ///
 /// # Errors
 /// Too many rows need the solver, or the evaluation was stopped.
@@ -107,13 +106,14 @@ pub fn evaluate_at_once<E>(
     };
     let answered = rows.evaluate_to(|_| step());
     let mut answer = answered.map_err(NotAtOnce::Step)?;
-    let open: Vec<usize> = (0..answer.status.len())
-        .filter(|row| match answer.status[*row] {
-            RowStatus::NeedsSolver => true,
-            RowStatus::NotCovered => method == MethodName::Auto,
-            _ => false,
-        })
+    let mut open: Vec<usize> = (0..answer.status.len())
+        .filter(|row| to_solve(answer.status[*row], method))
         .collect();
+    if open.len() > SOLVED_ROWS_MAX {
+        // The solver finds only the reason of these rows.
+        let without = [RowStatus::Refused, RowStatus::NotFinite];
+        open.retain(|row| !without.contains(&answer.status[*row]));
+    }
     if !open.is_empty() && open.len() <= SOLVED_ROWS_MAX {
         let columns = task.columns.iter();
         let columns: Vec<VariedColumn> = columns
@@ -128,7 +128,7 @@ pub fn evaluate_at_once<E>(
         };
         let first = first.filter(|_| open[0] == 0);
         let solved = solve_rows(&task, checked, first, solve, monitor)?;
-        answer.replace(&open, &solved);
+        answer.replace(&open, solved);
     }
     Ok(answer)
 }
@@ -181,18 +181,8 @@ fn take(
         return false;
     }
     if !status.has_answer() {
-        let reason = format!(
-            "a/b of the ellipse is outside {} to {}, the range of \"method\": \"table\"; use boundary_element or fastsim",
-            RATIO_RANGE.start(),
-            RATIO_RANGE.end()
-        );
-        answer.set(
-            row,
-            Err(RowFailure {
-                status: RowStatus::NotCovered,
-                reason,
-            }),
-        );
+        let reason = status.reason();
+        answer.set(row, Err(RowFailure { status, reason }));
         return true;
     }
     let area = std::f64::consts::PI * c * c;

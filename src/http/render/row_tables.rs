@@ -4,10 +4,12 @@ use std::ops::Range;
 
 use axum::body::{Body, Bytes};
 use futures_util::stream::{Stream, StreamExt, TryStreamExt, iter, try_unfold};
+use serde_json::json;
 
 use crate::render::format::Format;
 use crate::render::pieces::{JsonColumn, body, json_columns};
 use railhead_contact::evaluate::answer::RowsAnswer;
+use railhead_jobs::run::model::{REASON, REMARKS};
 use railhead_jobs::sync::blocking;
 use railhead_tables::csv::{Precision, write_number};
 use railhead_tables::table::{RowTable, TableColumn, TableKind};
@@ -58,17 +60,33 @@ const BATCH_ROWS: usize = 1 << 15;
 /// Number of rows of text written at once.
 const ROWS: usize = 1024;
 
-/// `{"rows": …, "columns": {"force_x_n": […], …, "status": […]}}`; null where a row has no number.
+/// The columns of texts of an evaluation, after those of numbers.
+const TEXTS: [&str; 3] = ["status", REASON, REMARKS];
+
+/// Returns the text of a row in a column of [`TEXTS`], if it has one.
+fn text_of(answer: &RowsAnswer, name: &str, row: usize) -> Option<String> {
+    let text = match name {
+        REASON => answer.reason(row),
+        REMARKS => answer.remarks(row).to_owned(),
+        _ => answer.status[row].name().to_owned(),
+    };
+    Some(text).filter(|text| !text.is_empty())
+}
+
+/// `{"rows": …, "columns": {"force_x_n": […], …, "status": […], …}}`; null where a row has no number or text.
 pub(crate) fn json_body(answer: RowsAnswer) -> Body {
     let rows = answer.status.len();
     let names = answer.numbers.iter().map(|(name, _)| *name);
-    let columns = names.chain(["status"]);
+    let columns = names.chain(TEXTS);
     let columns = columns.map(|name| JsonColumn::new(name, rows)).collect();
     let open = format!("{{\"rows\":{rows},\"columns\":{{");
     json_columns(open, columns, "}}", move |out, column, row| {
         match answer.numbers.get(column) {
             Some((_, values)) => write_number(out, values[row], Precision::Double, "null"),
-            None => *out += &format!("\"{}\"", answer.status[row].name()),
+            None => {
+                let text = text_of(&answer, TEXTS[column - answer.numbers.len()], row);
+                *out += &json!(text).to_string();
+            }
         }
     })
 }
@@ -78,17 +96,12 @@ pub(crate) fn json_body(answer: RowsAnswer) -> Body {
 /// # Errors
 /// The head cannot be written.
 pub(crate) fn table_body(format: Format, answer: RowsAnswer) -> Result<Body, WriteError> {
-    let columns = answer.columns().into_iter();
-    let columns: Vec<_> = columns
-        .map(|(name, _)| (name.to_owned(), TableKind::Numbers))
-        .chain([("status".to_owned(), TableKind::Texts)])
-        .collect();
     let rows = answer.status.len();
     let step = match format {
         Format::Arrow | Format::Parquet => BATCH_ROWS,
         _ => ROWS,
     };
-    let mut writer = RowWriter::new(format.table(), &columns)?;
+    let mut writer = RowWriter::new(format.table(), &part(&answer, 0..0).kinds())?;
     let head = writer.head()?;
     let starts = (0..rows).step_by(step).map(Some).chain([None]);
     let pieces = starts.map(move |start| {
@@ -102,26 +115,23 @@ pub(crate) fn table_body(format: Format, answer: RowsAnswer) -> Result<Body, Wri
 }
 
 fn part(answer: &RowsAnswer, range: Range<usize>) -> RowTable {
-    let status = answer.status[range.clone()].iter();
-    let status = status
-        .map(|status| Some(status.name().to_owned()))
-        .collect();
-    let numbers = answer.columns().into_iter();
-    let numbers = numbers.map(|(name, column)| {
+    let numbers = answer.numbers.iter().map(|(name, column)| {
         let column = TableColumn::Numbers(column[range.clone()].to_vec());
-        (name.to_owned(), column)
+        ((*name).to_owned(), column)
+    });
+    let texts = TEXTS.map(|name| {
+        let texts = range.clone().map(|row| text_of(answer, name, row));
+        (name.to_owned(), TableColumn::Texts(texts.collect()))
     });
     RowTable {
-        columns: numbers
-            .chain([("status".to_owned(), TableColumn::Texts(status))])
-            .collect(),
+        columns: numbers.chain(texts).collect(),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use http_body_util::BodyExt;
-    use serde_json::{Value, json};
+    use serde_json::Value;
 
     use super::*;
     use railhead_contact::evaluate::answer::RowStatus;
@@ -137,10 +147,9 @@ mod tests {
             ("stick_share", column(1.0)),
         ];
         numbers[5].1[1] = f64::NAN;
-        let mut answer = RowsAnswer {
-            numbers,
-            status: vec![RowStatus::Ok; rows],
-        };
+        let mut answer = RowsAnswer::default();
+        answer.numbers = numbers;
+        answer.status = vec![RowStatus::Ok; rows];
         answer.status[1] = RowStatus::NotCovered;
         answer
     }

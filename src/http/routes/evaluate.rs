@@ -138,11 +138,14 @@ pub(crate) struct EvaluateColumns {
     angular_velocity_rad_per_s: Option<Vec<Option<f64>>>,
     /// Lateral velocity found for a prescribed force, in mm/s.
     lateral_velocity_mm_per_s: Option<Vec<Option<f64>>>,
-    /// `ok`; `target_missed`: the estimated error exceeds the target; `needs_solver`: with `auto`, the table does not cover the row, and
-    /// more than 200 rows need the solver (submit a run); `not_covered`: the method does not cover the patch; `refused`: the case has
-    /// faults (see `POST /v1/cases/check`); `not_finite`: the result is not finite; `not_converged`, `unsolvable`, `out_of_time`,
-    /// `solver_failed`: the solver found no solution. Only rows with `ok` or `target_missed` have numbers.
+    /// `ok`; `target_missed`: the estimated error exceeds the target; `needs_solver`: more than 200 rows need the solver (submit a run);
+    /// `not_covered`: the method does not cover the patch; `refused`: the case has faults; `not_finite`; `not_converged`, `unsolvable`,
+    /// `out_of_time`, `solver_failed`: the solver found no solution. Only rows with `ok` or `target_missed` have numbers.
     status: Vec<String>,
+    /// Why a row has no result.
+    reason: Vec<Option<String>>,
+    /// Codes of the remarks of a solved row, separated by blanks.
+    remarks: Vec<Option<String>>,
 }
 
 problems! {

@@ -161,7 +161,7 @@ pub(crate) struct RunRow {
     method: Option<String>,
     /// Why the row has no result, such as the first fault of its case; null with a result.
     reason: Option<String>,
-    /// Codes of the remarks of a row that the solver answered, separated by blanks.
+    /// Codes of the remarks of a solved row, separated by blanks.
     remarks: Option<String>,
 }
 
