@@ -373,3 +373,64 @@ fn unusual_sections_are_not_taken_for_the_other_body() {
         );
     }
 }
+
+#[test]
+fn a_tread_far_from_the_height_of_its_radius_is_reported() {
+    let told = |by: f64| {
+        let wheel: Points = s1002().iter().map(|[y, z]| [*y, z + by]).collect();
+        let case = pair(
+            json!({ "points_mm": rail_60e1() }),
+            json!({ "points_mm": wheel }),
+        );
+        codes(&checked(&case).expect("a case")).contains(&"wheel-height-unusual")
+    };
+    assert!(!told(0.0) && !told(8.0) && !told(-8.0));
+    assert!(told(30.0) && told(-30.0));
+}
+
+#[test]
+fn a_stray_point_at_either_end_changes_nothing_and_parts_in_the_wrong_order_are_refused() {
+    let contact = |rail: &[[f64; 2]], wheel: &[[f64; 2]]| {
+        checked(&pair(
+            json!({ "points_mm": rail }),
+            json!({ "points_mm": wheel }),
+        ))
+    };
+    let (rail, wheel) = (rail_60e1(), s1002());
+    let expected = touch(&contact(&rail, &wheel).expect("a case"));
+    let with = |points: &[[f64; 2]], first: bool, stray: [f64; 2]| {
+        let mut points = points.to_vec();
+        points.insert(if first { 0 } else { points.len() }, stray);
+        points
+    };
+    // A closed outline, and the line of a file that counts its points.
+    let far = [83.0, 1.0];
+    for first in [true, false] {
+        for (rail, wheel) in [
+            (with(&rail, first, far), wheel.clone()),
+            (rail.clone(), with(&wheel, first, [far[0] + 20.0, far[1]])),
+            (rail.clone(), with(&wheel, false, wheel[0])),
+            (with(&rail, true, rail[rail.len() - 1]), wheel.clone()),
+        ] {
+            let found = contact(&rail, &wheel).expect("a case");
+            assert!(codes(&found).contains(&"profile-end-dropped"));
+            near(touch(&found), expected, "a stray point");
+        }
+    }
+    let halves = |points: &[[f64; 2]]| {
+        let mut points = points.to_vec();
+        let middle = points.len() / 2;
+        points.rotate_left(middle);
+        points
+    };
+    for (rail, wheel) in [
+        (halves(&rail), wheel.clone()),
+        (rail.clone(), halves(&wheel)),
+    ] {
+        let refused = contact(&rail, &wheel).expect_err("parts in the wrong order");
+        assert!(
+            refused.contains("jumps over most of its points"),
+            "{refused}"
+        );
+    }
+}

@@ -247,6 +247,20 @@ fn find(wheel: &Profile) -> Result<(f64, Option<Remark>), String> {
     }
 }
 
+/// Largest height in mm of a tread over z = 0 without a remark. Worn treads are hollow by less.
+const TREAD_HEIGHT_MAX: f64 = 10.0;
+
+/// Returns a remark if the tread is far from z = 0, where the rolling radius is measured.
+pub(crate) fn unusual_height(wheel: &Profile, flange_back: f64) -> Option<Remark> {
+    let y_mm = flange_back - BACK_USUAL;
+    let z_mm = -wheel.lowest_at(y_mm)?;
+    (z_mm.abs() > TREAD_HEIGHT_MAX).then_some(Remark::WheelHeightUnusual {
+        profile: "wheel",
+        y_mm,
+        z_mm,
+    })
+}
+
 /// Returns remarks on lengths of a contact with cross-sections that would be usual in another unit.
 pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
     let Some(rails) = contact.on_rails() else {

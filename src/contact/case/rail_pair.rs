@@ -72,8 +72,8 @@ const PAIRS_MAX: usize = 16;
 #[derive(Debug, Default)]
 pub struct KnownPair(Mutex<Vec<Arc<PairRead>>>);
 
-/// A wheel over its rail, with a remark on the back of its flange.
-pub(crate) type Placed = (WheelRail, Option<Remark>);
+/// A wheel over its rail, with remarks on the position of the wheel's points.
+pub(crate) type Placed = (WheelRail, Vec<Remark>);
 
 /// A placed pair, and the members that it was read from.
 #[derive(Debug)]
@@ -133,8 +133,8 @@ impl KnownPair {
                 pair
             }
         };
-        let (geometry, remark) = &pair.placed;
-        Ok((geometry.posed(lateral_shift, yaw, roll), remark.clone()))
+        let (geometry, remarks) = &pair.placed;
+        Ok((geometry.posed(lateral_shift, yaw, roll), remarks.clone()))
     }
 
     fn pairs(&self) -> MutexGuard<'_, Vec<Arc<PairRead>>> {

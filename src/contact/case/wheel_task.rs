@@ -72,14 +72,14 @@ pub(crate) fn placed(
     words: &PairWords,
     known: &KnownPair,
 ) -> Result<(WheelRail, Vec<RemarkEntry>), Vec<Fault>> {
-    let (geometry, flange_back) = known.placed(words, || place(words))?;
+    let (geometry, of_wheel) = known.placed(words, || place(words))?;
     if let Err(detail) = ContactLocus::new(&geometry) {
         let faults = vec![Fault::new("/contact", detail)];
         return Err(with_reasons(faults, &reasons(geometry.profiles())));
     }
     let mut remarks = remarks_of(&geometry, words.pointers);
-    let flange_back = flange_back.map(|remark| remark.at_pointer(words.pointers[1]));
-    remarks.extend(flange_back);
+    let of_wheel = of_wheel.into_iter();
+    remarks.extend(of_wheel.map(|remark| remark.at_pointer(words.pointers[1])));
     Ok((geometry, remarks))
 }
 
@@ -164,7 +164,7 @@ fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
     faults
 }
 
-/// Reads both profiles and places the wheel over the rail. Returns it with the remark on the back of its flange.
+/// Reads both profiles and places the wheel over the rail. Returns it with remarks on the position of the wheel's points.
 fn place(words: &PairWords) -> Result<Placed, Vec<Fault>> {
     let [rail, wheel] = read_both(words)?;
     let reasons = reasons([&rail, &wheel]);
@@ -173,9 +173,10 @@ fn place(words: &PairWords) -> Result<Placed, Vec<Fault>> {
         exchanged([&rail, &wheel], words.pointers).map_err(explained)?;
     }
     let distance = words.placement.flange_back_distance;
-    let (flange_back_position, remark) =
+    let (flange_back_position, flange_back) =
         contact_task::position(&wheel, words.flange_back, distance)
             .map_err(|fault| explained(vec![fault]))?;
+    let height = contact_task::unusual_height(&wheel, flange_back_position);
     let placement = Placement {
         flange_back_position,
         ..words.placement
@@ -187,7 +188,7 @@ fn place(words: &PairWords) -> Result<Placed, Vec<Fault>> {
         };
         explained(vec![Fault::new(pointer, reason.to_string())])
     })?;
-    Ok((geometry, remark))
+    Ok((geometry, flange_back.into_iter().chain(height).collect()))
 }
 
 /// Reads both profiles. If only one can be read and it looks like the other body, the faults include that.

@@ -117,7 +117,7 @@ impl Profile {
         format: FormatSenses,
     ) -> Result<Profile, String> {
         let mut remarks = Vec::new();
-        let given = checked(points)?;
+        let given = without_stray_ends(body, checked(points)?, &mut remarks);
         let likely = likely_unit(body, given);
         check_length(given).map_err(|reason| match likely {
             Some((width, unit)) => {
@@ -127,7 +127,7 @@ impl Profile {
                 )
             }
             None => format!(
-                "{reason} (is another unit than mm used, or are the points not in order?)"
+                "{reason} (is another unit than mm used, are the points not in order, or is the foot of the rail included?)"
             ),
         })?;
         remarks.extend(likely.map(|(width_mm, unit)| Remark::ProfileSizeUnusual {
@@ -138,8 +138,8 @@ impl Profile {
         let scale = likely.map_or(1.0, |(_, unit)| unit.mm());
         let (senses, flange) = orient(body, given, scale, reading, format, &mut remarks)?;
         let mut points = orientation::in_senses(given, senses);
+        check_order(&points)?;
         drop_backward_points(body, &mut points, &mut remarks)?;
-        cut_stray_ends(body, &mut points, &mut remarks);
         let before = points.len();
         points.dedup_by(|after, before| distance(*after, *before) < NEAR);
         if points.len() < before {
@@ -248,6 +248,16 @@ impl Profile {
     pub(crate) fn width(&self) -> [f64; 2] {
         let points = &self.measured.points[self.measured.beside..];
         bounds(points.iter().map(|at| at[0]))
+    }
+
+    /// The least z in mm at which the chords of the points pass `y`, with z up.
+    pub(crate) fn lowest_at(&self, y: f64) -> Option<f64> {
+        let passing = self.measured.points.windows(2).filter_map(|ends| {
+            let [[y0, z0], [y1, z1]] = [ends[0], ends[1]];
+            let part = (y - y0) / (y1 - y0);
+            (0.0..=1.0).contains(&part).then(|| z0 + part * (z1 - z0))
+        });
+        passing.reduce(f64::min)
     }
 
     /// The points of the curve with z up, in order of the parameter.
@@ -359,12 +369,8 @@ fn orient(
         mirror_y: reading.mirror_y,
         mirror_z: reading.mirror_z,
     };
-    let [first, last] =
-        profile_quality::stray_ends(points).map(|stray| stray.map_or(0, |(count, _)| count));
-    let shown: Vec<[f64; 2]> = points[first..points.len() - last]
-        .iter()
-        .map(|point| point.map(|part| scale * part))
-        .collect();
+    let scaled = points.iter().map(|point| point.map(|part| scale * part));
+    let shown: Vec<[f64; 2]> = scaled.collect();
     let FoundSenses {
         senses,
         contradicted,
@@ -447,18 +453,38 @@ fn drop_backward_points(
     Ok(())
 }
 
-/// Drops one or two points at an end that a long chord separates from the others, as they occur in measurements.
-fn cut_stray_ends(body: Body, points: &mut Vec<[f64; 2]>, remarks: &mut Vec<Remark>) {
-    let [first, last] = profile_quality::stray_ends(points);
-    let stray = |end: Option<(usize, f64)>| end.map_or(0, |(count, _)| count);
-    points.truncate(points.len() - stray(last));
-    points.drain(..stray(first));
+/// Drops one or two points at an end that a long chord separates from the others, as they occur in measurements and in closed outlines.
+fn without_stray_ends<'p>(
+    body: Body,
+    points: &'p [[f64; 2]],
+    remarks: &mut Vec<Remark>,
+) -> &'p [[f64; 2]] {
+    let stray = profile_quality::stray_ends(points);
     let dropped = |(count, distance_mm)| Remark::ProfileEndDropped {
         profile: body.name(),
         count,
         distance_mm,
     };
-    remarks.extend([last, first].into_iter().flatten().map(dropped));
+    remarks.extend(stray.into_iter().flatten().map(dropped));
+    let [first, last] = stray.map(|end| end.map_or(0, |(count, _)| count));
+    &points[first..points.len() - last]
+}
+
+/// Refuses a chord that passes most of the points, as between two halves of a section in the wrong order.
+fn check_order(points: &[[f64; 2]]) -> Result<(), String> {
+    let long = profile_quality::long_chord(points);
+    let passes_most = |ends: &&[[f64; 2]]| {
+        let [least, largest] = bounds(ends.iter().map(|point| point[0]));
+        let passed = points.iter().filter(|[y, _]| *y > least && *y < largest);
+        distance(ends[0], ends[1]) > long && 2 * passed.count() > points.len()
+    };
+    points.windows(2).find(passes_most).map_or(Ok(()), |ends| {
+        let [[y0, z0], [y1, z1]] = [ends[0], ends[1]];
+        Err(format!(
+            "the profile jumps over most of its points, from [{y0:.3}, {:.3}] to [{y1:.3}, {:.3}]; are its parts in the wrong order, or given twice?",
+            -z0, -z1
+        ))
+    })
 }
 
 /// Length of the chords up to each point.

@@ -301,25 +301,30 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Least length in mm of a stray chord at an end of a profile.
-const STRAY: f64 = 10.0;
-/// Least length of a stray chord relative to the median chord.
-const STRAY_MEDIANS: f64 = 8.0;
-/// Most points beyond a stray chord.
+/// Least length in mm of a long chord.
+const LONG: f64 = 10.0;
+/// Least length of a long chord relative to the median chord.
+const LONG_MEDIANS: f64 = 8.0;
+/// Most points at an end beyond a long chord that are dropped.
 const STRAY_POINTS_MAX: usize = 2;
 
-/// The points beyond a stray chord at the first and at the last end: their number, and the length of the chord in mm.
+/// The length in mm from which a chord is long against the others: it joins parts that do not belong together, or spans a hole.
+pub(crate) fn long_chord(points: &[[f64; 2]]) -> f64 {
+    let mut chords: Vec<f64> = chords(points).collect();
+    LONG.max(LONG_MEDIANS * median(&mut chords))
+}
+
+/// The points beyond a long chord at the first and at the last end: their number, and the length of the chord in mm.
 pub fn stray_ends(points: &[[f64; 2]]) -> [Option<(usize, f64)>; 2] {
-    let chords: Vec<f64> = chords(points).collect();
-    let usual = median(&mut chords.clone());
-    let farthest = |from_end: &mut dyn Iterator<Item = &f64>| {
-        let near = (1..).zip(from_end.copied()).take(STRAY_POINTS_MAX);
-        near.filter(|(_, chord)| *chord > STRAY.max(STRAY_MEDIANS * usual))
-            .last()
+    let long = long_chord(points);
+    let farthest = |from_end: &mut dyn Iterator<Item = f64>| {
+        let near = (1..).zip(from_end).take(STRAY_POINTS_MAX);
+        near.filter(|(_, chord)| *chord > long).last()
     };
+    let chords: Vec<f64> = chords(points).collect();
     [
-        farthest(&mut chords.iter()),
-        farthest(&mut chords.iter().rev()),
+        farthest(&mut chords.iter().copied()),
+        farthest(&mut chords.iter().rev().copied()),
     ]
 }
 

@@ -123,6 +123,21 @@ remarks! {
          solved as stated"
     ),
 
+    /// The tread of a wheel is far from z = 0, where `rolling_radius_mm` is measured.
+    Warning WheelHeightUnusual {
+        /// `rail` or `wheel`.
+        profile: &'static str = "wheel",
+        /// y of the tread, 70 mm from the back of the flange.
+        y_mm: f64 = 0.0,
+        /// z there, positive down.
+        z_mm: f64 = 30.0,
+    }
+    advice: "Check the origin of z: `rolling_radius_mm` is the radius at z = 0 of the wheel's cross-section. Give the radius there, or move the points.",
+    detail: format!(
+        "{profile}: the tread, 70 mm from the back of the flange at y = {y_mm:.2} mm, has z = {z_mm:.2} mm; rolling_radius_mm is the radius at \
+         z = 0"
+    ),
+
     /// The header of a profile file states another number of points than the file has, commented-out rows included.
     Warning ProfileCountDiffers {
         /// `rail` or `wheel`.
