@@ -6,6 +6,8 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use axum::http::Uri;
+use axum::http::uri::PathAndQuery;
 
 use crate::cli::commands::HealthcheckArgs;
 
@@ -40,24 +42,15 @@ fn url(listen: SocketAddr) -> String {
 
 /// Splits `http://host[:port][/path]` into `host:port` and path.
 fn parse(url: &str) -> anyhow::Result<(String, String)> {
-    let rest = url
-        .strip_prefix("http://")
-        .with_context(|| format!("{url:?} does not begin with http://"))?;
-    let (authority, path) = match rest.find('/') {
-        Some(at) => rest.split_at(at),
-        None => (rest, "/"),
+    let uri: Uri = url
+        .parse()
+        .with_context(|| format!("{url:?} is not a URL"))?;
+    let (Some("http"), Some(authority)) = (uri.scheme_str(), uri.authority()) else {
+        bail!("{url:?} does not begin with http://");
     };
-    if authority.is_empty() || url.contains(|c: char| c.is_whitespace() || c.is_control()) {
-        bail!("{url:?} is not a URL");
-    }
-    // A colon inside brackets belongs to an IPv6 address.
-    let has_port = authority.rfind(':') > authority.rfind(']');
-    let authority = if has_port {
-        authority.to_owned()
-    } else {
-        format!("{authority}:80")
-    };
-    Ok((authority, path.to_owned()))
+    let port = authority.port_u16().unwrap_or(80);
+    let path = uri.path_and_query().map_or("/", PathAndQuery::as_str);
+    Ok((format!("{}:{port}", authority.host()), path.to_owned()))
 }
 
 fn ask(authority: &str, path: &str) -> anyhow::Result<u16> {

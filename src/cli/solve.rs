@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use serde::Serialize;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::cli::commands::SolveArgs;
 use crate::cli::output::{print, print_error};
@@ -63,10 +63,9 @@ pub(super) fn run(args: &SolveArgs) -> anyhow::Result<ExitCode> {
         Ok(checked) => checked,
         Err(faults) => {
             for fault in &faults.0 {
-                let place = if fault.pointer.is_empty() {
-                    "the case"
-                } else {
-                    &fault.pointer
+                let place = match fault.pointer.as_str() {
+                    "" => "the case",
+                    pointer => pointer,
                 };
                 print_error(&format!("{place}: {}", fault.detail));
             }
@@ -104,37 +103,32 @@ fn patch_json(fields: &PatchFields) -> Value {
 }
 
 fn cells_json(cells: &PatchCells) -> Value {
-    let mut members = Map::new();
-    members.insert("x_mm".to_owned(), json!(cells.x_mm));
-    members.insert("y_mm".to_owned(), json!(cells.y_mm));
-    members.insert("dx_mm".to_owned(), json!(cells.dx_mm));
-    members.insert("dy_mm".to_owned(), json!(cells.dy_mm));
-    members.insert("strip".to_owned(), json!(cells.strip));
-    if let Some(pressure) = &cells.pressure_mpa {
-        members.insert("pressure_mpa".to_owned(), json!(pressure));
-    }
-    Value::Object(members)
+    computed(json!({
+        "x_mm": cells.x_mm,
+        "y_mm": cells.y_mm,
+        "dx_mm": cells.dx_mm,
+        "dy_mm": cells.dy_mm,
+        "strip": cells.strip,
+        "pressure_mpa": cells.pressure_mpa,
+    }))
 }
 
 fn point_json(values: &PointFields) -> Value {
-    let mut members = Map::new();
-    members.insert("mesh".to_owned(), json!(values.mesh));
-    if let Some(zone) = &values.zone {
-        members.insert("zone".to_owned(), json!(zone));
-    }
-    for (name, array) in [
-        ("traction_x_mpa", &values.traction_x_mpa),
-        ("traction_y_mpa", &values.traction_y_mpa),
-        ("slip_x", &values.slip_x),
-        ("slip_y", &values.slip_y),
-        ("temperature_c", &values.temperature_c),
-    ] {
-        if let Some(array) = array {
-            members.insert(name.to_owned(), json!(array));
-        }
-    }
-    if let Some(stored) = &values.subsurface {
-        members.insert("subsurface".to_owned(), json!(points(stored)));
-    }
-    Value::Object(members)
+    computed(json!({
+        "mesh": values.mesh,
+        "zone": values.zone,
+        "traction_x_mpa": values.traction_x_mpa,
+        "traction_y_mpa": values.traction_y_mpa,
+        "slip_x": values.slip_x,
+        "slip_y": values.slip_y,
+        "temperature_c": values.temperature_c,
+        "subsurface": values.subsurface.as_deref().map(points),
+    }))
+}
+
+/// Removes the members that are null.
+fn computed(mut values: Value) -> Value {
+    let members = values.as_object_mut().into_iter();
+    members.for_each(|members| members.retain(|_, value| !value.is_null()));
+    values
 }

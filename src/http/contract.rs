@@ -7,14 +7,13 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::{Map, Value, json};
 use utoipa::OpenApi;
-use utoipa::openapi::example::ExampleBuilder;
-use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, Components};
 use utoipa::openapi::security::{HttpAuthScheme, HttpBuilder, SecurityRequirement, SecurityScheme};
-use utoipa::openapi::{Discriminator, Ref, RefOr, ResponseBuilder, Schema};
+use utoipa::openapi::{RefOr, ResponseBuilder};
 use utoipa_axum::router::OpenApiRouter;
 
+use crate::dto::BatchReceipt;
 use crate::problem::{ProblemBody, ProblemKind, describe, describe_together};
-use crate::routes::work::{header_parameter, text_header};
+use crate::routes::work::{JobEvent, WorkAnswer, header_parameter, text_header};
 use crate::state::Document;
 
 #[derive(OpenApi)]
@@ -35,7 +34,7 @@ use crate::state::Document;
         (name = "cases", description = "Checks of cases, and their possible values"),
         (name = "service", description = "State of the service, its problems and this document")
     ),
-    components(schemas(ProblemBody))
+    components(schemas(ProblemBody, WorkAnswer, BatchReceipt, JobEvent))
 )]
 struct Head;
 
@@ -70,14 +69,11 @@ pub(super) fn conditional<S: Clone + Send + Sync + 'static>(
 
 /// Returns the contract as JSON text that ends with a line break, from the document of all routes.
 pub(super) fn text(mut document: utoipa::openapi::OpenApi) -> String {
-    for path in ["/v1/jobs", "/v1/cases/check"] {
-        add_examples(&mut document, path);
-    }
-    add_batches(&mut document);
     require_keys(&mut document);
-    complete(&mut document);
     // Serialisation fails only for maps with keys that are not strings, which the document does not have.
     let mut document = serde_json::to_value(&document).unwrap_or_default();
+    add_examples(&mut document);
+    complete(&mut document["components"]["schemas"]);
     share(&mut document);
     lines(&document)
 }
@@ -142,46 +138,27 @@ fn require_keys(document: &mut utoipa::openapi::OpenApi) {
     }
 }
 
-fn add_examples(document: &mut utoipa::openapi::OpenApi, path: &str) {
+/// Adds the examples to the routes that take a case, and two of them to the submission of a batch, in JSON and in NDJSON.
+fn add_examples(document: &mut Value) {
+    let mut add = |path: &str, media: &str, [name, summary]: [&str; 2], value: Value| {
+        let body = &mut document["paths"][path]["post"]["requestBody"];
+        let example = json!({ "summary": summary, "value": value });
+        body["content"][media]["examples"][name] = example;
+    };
+    let json = "application/json";
+    let mut cases: Vec<Value> = Vec::new();
     for (name, summary, text) in EXAMPLES {
-        let Ok(value) = serde_json::from_str::<Value>(text) else {
-            continue;
-        };
-        add_example(document, path, "application/json", [name, summary], value);
+        let case: Value = serde_json::from_str(text).unwrap_or_default();
+        for path in ["/v1/jobs", "/v1/cases/check"] {
+            add(path, json, [name, summary], case.clone());
+        }
+        cases.push(case);
     }
-}
-
-/// Adds a batch as an example in JSON and in NDJSON.
-fn add_batches(document: &mut utoipa::openapi::OpenApi) {
-    let cases = EXAMPLES.iter().take(2);
-    let cases = cases.filter_map(|(_, _, text)| serde_json::from_str(text).ok());
-    let cases: Vec<Value> = cases.collect();
+    cases.truncate(2);
     let lines: String = cases.iter().map(|case| format!("{case}\n")).collect();
-    let path = "/v1/batches";
-    let words = ["two", "Two cases"];
-    add_example(document, path, "application/x-ndjson", words, lines.into());
-    add_example(document, path, "application/json", words, cases.into());
-}
-
-fn add_example(
-    document: &mut utoipa::openapi::OpenApi,
-    path: &str,
-    media: &str,
-    [name, summary]: [&str; 2],
-    value: Value,
-) {
-    let item = document.paths.paths.get_mut(path);
-    let operation = item.and_then(|item| item.post.as_mut());
-    let Some(RefOr::T(body)) = operation.and_then(|operation| operation.request_body.as_mut())
-    else {
-        return;
-    };
-    let Some(RefOr::T(content)) = body.content.get_mut(media) else {
-        return;
-    };
-    let example = ExampleBuilder::new().summary(summary).value(Some(value));
-    let example = RefOr::T(example.build());
-    content.examples.insert(name.to_owned(), example);
+    let (path, words) = ("/v1/batches", ["two", "Two cases"]);
+    add(path, "application/x-ndjson", words, lines.into());
+    add(path, json, words, cases.into());
 }
 
 /// Returns this document.
@@ -315,163 +292,118 @@ const TUPLES: [(&str, &str, usize); 38] = [
 ];
 
 /// Adds what derived schemas lack: names of alternatives, discriminators, closed requests, numbers of members, lengths of arrays.
-fn complete(document: &mut utoipa::openapi::OpenApi) {
-    let components = document.components.get_or_insert_default();
-    name_alternatives(components);
+fn complete(schemas: &mut Value) {
+    name_alternatives(schemas);
     for (name, member) in DISCRIMINATORS {
-        add_discriminator(components, name, member);
+        add_discriminator(schemas, name, member);
     }
-    for name in reached(components) {
-        if let Some(schema) = components.schemas.get_mut(&name) {
-            close(schema);
-        }
+    for name in reached(schemas) {
+        close(&mut schemas[name]);
     }
     for (name, least, most) in MEMBERS {
-        if let Some(RefOr::T(Schema::Object(object))) = components.schemas.get_mut(name) {
-            object.min_properties = Some(least);
-            object.max_properties = most;
+        schemas[name]["minProperties"] = least.into();
+        if let Some(most) = most {
+            schemas[name]["maxProperties"] = most.into();
         }
     }
     for (name, member, length) in TUPLES {
-        if let Some(RefOr::T(Schema::Object(object))) = components.schemas.get_mut(name)
-            && let Some(RefOr::T(schema)) = object.properties.get_mut(member)
-        {
-            fix_length(schema, length);
-        }
-    }
-}
-
-fn alternatives<'a>(
-    components: &'a mut Components,
-    name: &str,
-) -> Option<&'a mut Vec<RefOr<Schema>>> {
-    match components.schemas.get_mut(name) {
-        Some(RefOr::T(Schema::OneOf(choice))) => Some(&mut choice.items),
-        _ => None,
+        fix_length(&mut schemas[name]["properties"][member], length);
     }
 }
 
 /// Disallows additional members in a schema and in the schemas written inside it.
-fn close(schema: &mut RefOr<Schema>) {
-    match schema {
-        RefOr::T(Schema::Object(object)) => {
-            if !object.properties.is_empty() && object.additional_properties.is_none() {
-                let none = AdditionalProperties::FreeForm(false);
-                object.additional_properties = Some(Box::new(none));
-            }
-            object.properties.values_mut().for_each(close);
+fn close(schema: &mut Value) {
+    let Value::Object(members) = schema else {
+        return;
+    };
+    if members.contains_key("properties") {
+        let more = members.entry("additionalProperties");
+        more.or_insert(false.into());
+    }
+    for (name, part) in members {
+        match (name.as_str(), part) {
+            ("properties", Value::Object(parts)) => parts.values_mut().for_each(close),
+            ("oneOf", Value::Array(parts)) => parts.iter_mut().for_each(close),
+            ("items", part) => close(part),
+            _ => {}
         }
-        RefOr::T(Schema::OneOf(choice)) => choice.items.iter_mut().for_each(close),
-        RefOr::T(Schema::Array(array)) => {
-            if let ArrayItems::RefOrSchema(items) = &mut array.items {
-                close(items);
-            }
-        }
-        RefOr::T(_) | RefOr::Ref(_) => {}
     }
 }
 
 /// Moves the unnamed alternatives of schemas into components of their own.
-fn name_alternatives(components: &mut Components) {
+fn name_alternatives(schemas: &mut Value) {
     for (choice, names) in ALTERNATIVES {
-        let mut names = names.iter();
-        let mut named = BTreeMap::new();
-        let Some(forms) = alternatives(components, choice) else {
+        let Some(forms) = schemas[choice]["oneOf"].as_array_mut() else {
             continue;
         };
         // Some clients take the first alternative whose required members are present.
-        forms.sort_by_key(|form| !requires(form));
-        for form in forms {
-            if matches!(form, RefOr::T(Schema::Object(object)) if !object.properties.is_empty())
-                && let Some(name) = names.next()
-            {
-                let leading = RefOr::Ref(Ref::from_schema_name(*name));
-                named.insert((*name).to_owned(), std::mem::replace(form, leading));
-            }
+        forms.sort_by_key(|form| form.get("required").is_none());
+        let unnamed = forms
+            .iter_mut()
+            .filter(|form| form.get("properties").is_some());
+        let named: Vec<(&str, Value)> = std::iter::zip(names, unnamed)
+            .map(|(name, form)| {
+                let leading = json!({ "$ref": format!("#/components/schemas/{name}") });
+                (*name, std::mem::replace(form, leading))
+            })
+            .collect();
+        for (name, form) in named {
+            schemas[name] = form;
         }
-        components.schemas.extend(named);
     }
-}
-
-/// Whether an alternative has required members.
-fn requires(form: &RefOr<Schema>) -> bool {
-    matches!(form, RefOr::T(Schema::Object(object)) if !object.required.is_empty())
 }
 
 /// Adds the discriminator of a schema: the word of a member that selects each alternative.
-fn add_discriminator(components: &mut Components, choice: &str, member: &str) {
-    let leading = alternatives(components, choice).map(|forms| references(forms.iter()));
-    let mut told = Discriminator::new(member);
-    for form in leading.unwrap_or_default() {
-        if let Some(RefOr::T(Schema::Object(object))) = components.schemas.get(&form)
-            && let Some(RefOr::T(Schema::Object(words))) = object.properties.get(member)
-            && let Some([word]) = words.enum_values.as_deref()
-            && let Some(word) = word.as_str()
-        {
+fn add_discriminator(schemas: &mut Value, choice: &str, member: &str) {
+    let mut mapping = Map::new();
+    for form in references(&schemas[choice]["oneOf"]) {
+        let words = schemas[&form]["properties"][member]["enum"].as_array();
+        if let Some([Value::String(word)]) = words.map(Vec::as_slice) {
             let place = format!("#/components/schemas/{form}");
-            told.mapping.insert(word.to_owned(), place);
+            mapping.insert(word.clone(), place.into());
         }
     }
-    if let Some(RefOr::T(Schema::OneOf(choice))) = components.schemas.get_mut(choice) {
-        choice.discriminator = Some(told);
-    }
+    schemas[choice]["discriminator"] = json!({ "propertyName": member, "mapping": mapping });
 }
 
 /// Returns the names of the schemas of requests and of all schemas that they refer to.
-fn reached(components: &Components) -> BTreeSet<String> {
+fn reached(schemas: &Value) -> BTreeSet<String> {
     let mut seen = BTreeSet::new();
     let mut next: Vec<String> = REQUESTS.map(str::to_owned).into();
     while let Some(name) = next.pop() {
-        if let Some(schema) = components.schemas.get(&name)
+        if let Some(schema) = schemas.get(&name)
             && seen.insert(name)
         {
-            next.extend(references([schema]));
+            next.extend(references(schema));
         }
     }
     seen
 }
 
-/// Returns the names of the schemas that these refer to directly.
-fn references<'a>(schemas: impl IntoIterator<Item = &'a RefOr<Schema>>) -> Vec<String> {
-    let mut found = Vec::new();
-    for schema in schemas {
-        match schema {
-            RefOr::Ref(leading) => {
-                found.extend(leading.ref_location.rsplit('/').next().map(str::to_owned));
-            }
-            RefOr::T(Schema::Object(object)) => {
-                found.extend(references(object.properties.values()));
-            }
-            RefOr::T(Schema::OneOf(choice)) => found.extend(references(&choice.items)),
-            RefOr::T(Schema::Array(array)) => {
-                if let ArrayItems::RefOrSchema(items) = &array.items {
-                    found.extend(references([&**items]));
-                }
-            }
-            RefOr::T(_) => {}
+/// Returns the names of the schemas that a part of the document refers to directly.
+fn references(part: &Value) -> Vec<String> {
+    match part {
+        Value::Object(members) => {
+            let target = members.get("$ref").and_then(Value::as_str);
+            let own = target.and_then(|target| Some(target.rsplit_once('/')?.1.to_owned()));
+            let inner = members.values().flat_map(references);
+            own.into_iter().chain(inner).collect()
         }
+        Value::Array(items) => items.iter().flat_map(references).collect(),
+        _ => Vec::new(),
     }
-    found
 }
 
 /// Sets the length of the innermost array.
-fn fix_length(schema: &mut Schema, length: usize) {
-    let Schema::Array(array) = schema else {
-        return;
-    };
-    let ArrayItems::RefOrSchema(items) = &mut array.items else {
-        return;
-    };
-    match &mut **items {
-        RefOr::T(inner @ Schema::Array(_)) => fix_length(inner, length),
-        RefOr::T(number @ Schema::Object(_)) => {
-            array.prefix_items = vec![number.clone(); length];
-            array.min_items = Some(length);
-            // `items: false` means the same, but some generators of clients cannot read it.
-            array.max_items = Some(length);
-        }
-        _ => {}
+fn fix_length(schema: &mut Value, length: usize) {
+    let items = schema["items"].clone();
+    if items.get("items").is_some() {
+        return fix_length(&mut schema["items"], length);
     }
+    schema["prefixItems"] = vec![items; length].into();
+    schema["minItems"] = length.into();
+    // `items: false` means the same, but some generators of clients cannot read it.
+    schema["maxItems"] = length.into();
 }
 
 /// Moves headers, responses, parameters and examples that several operations have into `components`.
@@ -651,19 +583,6 @@ mod tests {
         }
     }
 
-    /// Finds the schemas that a part of the document refers to directly.
-    fn leads(part: &Value, found: &mut Vec<String>) {
-        match part {
-            Value::Object(members) => {
-                let target = members.get("$ref").and_then(Value::as_str);
-                found.extend(target.and_then(|target| Some(target.rsplit_once('/')?.1.to_owned())));
-                members.values().for_each(|member| leads(member, found));
-            }
-            Value::Array(items) => items.iter().for_each(|item| leads(item, found)),
-            _ => {}
-        }
-    }
-
     #[test]
     fn requests_say_that_they_have_no_unknown_members() {
         let document = document();
@@ -673,11 +592,11 @@ mod tests {
             &document["paths"]["/v1/jobs"],
             &document["paths"]["/v1/batches"],
         ] {
-            leads(&operation["post"]["requestBody"], &mut next);
+            next.extend(references(&operation["post"]["requestBody"]));
         }
         while let Some(name) = next.pop() {
             if seen.insert(name.clone()) {
-                leads(&schemas[&name], &mut next);
+                next.extend(references(&schemas[&name]));
             }
         }
         assert!(seen.len() > 20, "{seen:?}");

@@ -245,6 +245,18 @@ pub(crate) struct BatchStates {
     cancelled: u64,
 }
 
+impl From<&Batch> for BatchStates {
+    fn from(batch: &Batch) -> Self {
+        BatchStates {
+            queued: batch.in_state(JobState::Queued),
+            running: batch.in_state(JobState::Running),
+            succeeded: batch.in_state(JobState::Succeeded),
+            failed: batch.in_state(JobState::Failed),
+            cancelled: batch.in_state(JobState::Cancelled),
+        }
+    }
+}
+
 impl From<Batch> for BatchAnswer {
     fn from(batch: Batch) -> Self {
         let (ended, all) = batch.ended();
@@ -265,13 +277,7 @@ impl From<Batch> for BatchAnswer {
             ended_at: ended_at.map(rfc3339),
             count: batch.count,
             rejected: batch.rejected,
-            states: BatchStates {
-                queued: batch.in_state(JobState::Queued),
-                running: batch.in_state(JobState::Running),
-                succeeded: batch.in_state(JobState::Succeeded),
-                failed: batch.in_state(JobState::Failed),
-                cancelled: batch.in_state(JobState::Cancelled),
-            },
+            states: (&batch).into(),
             progress,
             ended: ended == all,
             links: batch_links(&batch),
@@ -367,11 +373,8 @@ pub(crate) struct RunChunks {
     count: u32,
     /// Rows of each chunk except the last.
     rows: u32,
-    queued: u64,
-    running: u64,
-    succeeded: u64,
-    failed: u64,
-    cancelled: u64,
+    #[serde(flatten)]
+    states: BatchStates,
 }
 
 /// A submitted column.
@@ -432,11 +435,7 @@ impl From<Run> for RunAnswer {
             chunks: RunChunks {
                 count: chunks.count,
                 rows: run.head.chunk_rows,
-                queued: chunks.in_state(JobState::Queued),
-                running: chunks.in_state(JobState::Running),
-                succeeded: chunks.in_state(JobState::Succeeded),
-                failed: chunks.in_state(JobState::Failed),
-                cancelled: chunks.in_state(JobState::Cancelled),
+                states: chunks.into(),
             },
             columns: run.head.columns.iter().map(sent).collect(),
             answers: answer_columns(&run),
@@ -627,27 +626,21 @@ impl Resultants {
         patch: Option<usize>,
     ) -> Resultants {
         let motions = point.map_or(0..solution.total.len(), |point| point..point + 1);
-        let mut patches: Vec<PatchResultants> = Vec::new();
+        let mut patches = BTreeMap::new();
         for number in motions.clone() {
-            for part in solution.at(number) {
-                if patch.is_some_and(|patch| patch != part.number) {
-                    continue;
-                }
-                let known = patches.iter().position(|patch| patch.patch == part.number);
-                let place = known.unwrap_or_else(|| {
-                    patches.push(PatchResultants {
-                        patch: part.number,
-                        normal_force_n: part.patch.normal_force_n,
-                        points: Vec::new(),
-                    });
-                    patches.len() - 1
+            let parts = solution.at(number);
+            for part in parts.filter(|part| patch.is_none_or(|patch| patch == part.number)) {
+                let own = patches.entry(part.number);
+                let own = own.or_insert_with(|| PatchResultants {
+                    patch: part.number,
+                    normal_force_n: part.patch.normal_force_n,
+                    points: Vec::new(),
                 });
-                let point = PointResultants::of_patch(number, &part);
-                patches[place].points.push(point);
+                own.points.push(PointResultants::of_patch(number, &part));
             }
         }
         Resultants {
-            patches,
+            patches: patches.into_values().collect(),
             total: solution.total[motions].to_vec(),
             origin: solution.origin,
         }

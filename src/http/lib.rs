@@ -47,6 +47,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 use utoipa_swagger_ui::{Config, SwaggerUi};
 
+use crate::extract::caller::KINDS;
 use crate::extract::{accept, query};
 use crate::layers::metrics::{self, Metrics};
 use crate::layers::{admission, auth, client_address, etag, request_log, response};
@@ -157,7 +158,7 @@ fn api(jobs: Jobs, options: HttpOptions, metrics: Metrics) -> Router {
 /// Returns every documented route, in the order of the contract.
 fn resources() -> OpenApiRouter<AppState> {
     let every = |routes: fn(Kind) -> OpenApiRouter<AppState>| {
-        let routes = work::KINDS.map(routes).into_iter();
+        let routes = KINDS.map(routes).into_iter();
         routes.fold(OpenApiRouter::new(), OpenApiRouter::merge)
     };
     let changing = OpenApiRouter::with_openapi(contract::head())

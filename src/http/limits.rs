@@ -60,6 +60,15 @@ impl TenantSemaphore {
         Some(Permit { of_tenant, of_all })
     }
 
+    /// Takes one unit.
+    ///
+    /// # Errors
+    /// `too-many-requests` with this detail: no unit is free.
+    fn require(&self, tenant: &str, detail: &str) -> Result<Permit> {
+        let taken = self.try_take(tenant, 1);
+        taken.ok_or_else(|| ApiError::new(ProblemKind::TooManyRequests, detail))
+    }
+
     /// Waits for `many` units, first come, first served. Returns `None` if they are not free within the time, or never can be.
     pub(crate) async fn take(&self, tenant: &str, many: u32, within: Duration) -> Option<Permit> {
         if many as usize > self.of_tenant {
@@ -247,11 +256,10 @@ impl ConcurrencyLimits {
     /// # Errors
     /// `too-many-requests`: the limit is reached.
     pub fn request(&self, tenant: &str) -> Result<Permit> {
-        self.requests.try_take(tenant, 1).ok_or_else(|| {
-            too_many(
-                "the tenant has reached its limit of concurrent requests (`--tenant-requests-max`)",
-            )
-        })
+        self.requests.require(
+            tenant,
+            "the tenant has reached its limit of concurrent requests (`--tenant-requests-max`)",
+        )
     }
 
     /// Counts an event stream of a tenant.
@@ -259,9 +267,10 @@ impl ConcurrencyLimits {
     /// # Errors
     /// See [`ConcurrencyLimits::request`].
     pub fn stream(&self, tenant: &str) -> Result<Permit> {
-        self.streams.try_take(tenant, 1).ok_or_else(|| {
-            too_many("the limit of open event streams is reached (`--tenant-streams-max`, `--streams-max`)")
-        })
+        self.streams.require(
+            tenant,
+            "the limit of open event streams is reached (`--tenant-streams-max`, `--streams-max`)",
+        )
     }
 
     /// Counts a waiting request; `None` if the limit is reached. The request is then answered at once, since `Prefer: wait` is not binding.
@@ -275,16 +284,11 @@ impl ConcurrencyLimits {
     /// # Errors
     /// See [`ConcurrencyLimits::request`].
     pub fn require_wait(&self, tenant: &str) -> Result<Permit> {
-        self.wait(tenant).ok_or_else(|| {
-            too_many(
-                "the limit of waiting requests is reached (`--tenant-waits-max`, `--waits-max`)",
-            )
-        })
+        self.waits.require(
+            tenant,
+            "the limit of waiting requests is reached (`--tenant-waits-max`, `--waits-max`)",
+        )
     }
-}
-
-fn too_many(detail: &str) -> ApiError {
-    ApiError::new(ProblemKind::TooManyRequests, detail)
 }
 
 /// Keeps `held` until the body of a response has been sent.

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, value_parser};
+use ipnet::IpNet;
 
 use railhead_jobs::options::{defaults, mib, seconds};
 
@@ -154,26 +155,13 @@ fn milliseconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value =
 
 /// A range of addresses with the same leading bits, written as `10.0.0.0/8`; a single address is a range too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct AddressRange {
-    first: IpAddr,
-    bits: u32,
-}
+pub struct AddressRange(IpNet);
 
 impl AddressRange {
     /// Whether the range contains an address. An IPv4-mapped IPv6 address counts as IPv4.
     #[must_use]
     pub fn contains(&self, address: IpAddr) -> bool {
-        match (self.first, address.to_canonical()) {
-            (IpAddr::V4(first), IpAddr::V4(address)) => {
-                let differs = first.to_bits() ^ address.to_bits();
-                differs.leading_zeros() >= self.bits
-            }
-            (IpAddr::V6(first), IpAddr::V6(address)) => {
-                let differs = first.to_bits() ^ address.to_bits();
-                differs.leading_zeros() >= self.bits
-            }
-            _ => false,
-        }
+        self.0.contains(&address.to_canonical())
     }
 }
 
@@ -181,20 +169,12 @@ impl FromStr for AddressRange {
     type Err = String;
 
     fn from_str(text: &str) -> Result<AddressRange, String> {
-        let (address, bits) = match text.split_once('/') {
-            Some((address, bits)) => (address, Some(bits)),
-            None => (text, None),
+        let address = || {
+            text.parse()
+                .map(|address: IpAddr| address.to_canonical().into())
         };
-        let read = || {
-            let first = address.parse::<IpAddr>().ok()?.to_canonical();
-            let most = if first.is_ipv4() { 32 } else { 128 };
-            let bits = match bits {
-                Some(bits) => bits.parse().ok().filter(|bits| *bits <= most)?,
-                None => most,
-            };
-            Some(AddressRange { first, bits })
-        };
-        read().ok_or_else(|| {
+        let range = text.parse().or_else(|_| address());
+        range.map(AddressRange).map_err(|_| {
             "allowed is an address or a range of addresses, such as `10.0.0.0/8`, `192.0.2.7` or `fd00::/8`; names are not looked up"
                 .to_owned()
         })

@@ -147,7 +147,7 @@ impl ProblemKind {
 
 /// A failed request or job (RFC 9457).
 #[none_is_absent(nullable)]
-#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, ToSchema)]
 #[schema(as = Problem)]
 pub(crate) struct ProblemBody {
     /// Path of the kind of problem on this service, which returns an explanation.
@@ -268,12 +268,7 @@ impl ProblemBody {
             title: kind.title().to_owned(),
             status: kind.status(),
             detail: detail.into(),
-            instance: None,
-            errors: Vec::new(),
-            line: None,
-            column: None,
-            residual: None,
-            iterations: None,
+            ..ProblemBody::default()
         }
     }
 
@@ -660,18 +655,12 @@ pub(crate) async fn name_instance(request: Request, next: Next) -> Response {
 /// Returns the problem of a path without a resource.
 #[must_use]
 pub(crate) fn unknown_route(path: &str) -> ApiError {
-    if path.len() > 1 && path.ends_with('/') {
-        let detail = format!(
-            "there is nothing at `{path}`; the paths of this service do not end with a slash"
-        );
-        return ApiError::new(ProblemKind::UnknownRoute, detail);
-    }
-    ApiError::new(
-        ProblemKind::UnknownRoute,
-        format!(
-            "there is nothing at `{path}`; `/openapi.json` lists every resource, `/docs` shows them"
-        ),
-    )
+    let advice = match path.len() > 1 && path.ends_with('/') {
+        true => "the paths of this service do not end with a slash",
+        false => "`/openapi.json` lists every resource, `/docs` shows them",
+    };
+    let detail = format!("there is nothing at `{path}`; {advice}");
+    ApiError::new(ProblemKind::UnknownRoute, detail)
 }
 
 fn render(problem: &ProblemBody) -> Response {

@@ -2,8 +2,10 @@
 //!
 //! The first rows, at most [`ROWS`], decide the kind of each column: its first value makes it numbers or texts.
 
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::io::{self, BufRead, Chain, Cursor, Read};
+use std::rc::Rc;
 
 use serde_json::{Map, Value};
 
@@ -27,20 +29,23 @@ const EXACT_DIGITS: usize = 15;
 type Ended<R> = Chain<Chain<Cursor<Vec<u8>>, R>, &'static [u8]>;
 
 /// A source that fails when a record takes more than a number of bytes.
-struct Bounded<R> {
-    source: R,
+pub struct Bounded<R> {
+    /// The source of the bytes.
+    pub source: R,
     /// Most bytes of a record.
-    max: usize,
-    /// Bytes that the present record may still take.
-    left: usize,
+    pub max: usize,
+    /// Bytes that the present record may still take. The reader of the records sets it when a record begins.
+    pub left: Rc<Cell<usize>>,
 }
 
 impl<R: Read> Read for Bounded<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.source.read(buffer)?;
-        let left = self.left.checked_sub(read);
-        let too_long = || io::Error::other(format!("a row is longer than {} bytes", self.max));
-        self.left = left.ok_or_else(too_long)?;
+        let left = self.left.get().checked_sub(read).ok_or_else(|| {
+            let detail = format!("a row is longer than {} bytes", self.max);
+            io::Error::new(io::ErrorKind::FileTooLarge, detail)
+        })?;
+        self.left.set(left);
         Ok(read)
     }
 }
@@ -87,7 +92,7 @@ impl<R: BufRead> CsvRows<R> {
             // The last line ends as the others do.
             .from_reader(Bounded {
                 max: record_max,
-                left: record_max,
+                left: Rc::new(Cell::new(record_max)),
                 source: Cursor::new(first).chain(source).chain(&b"\n"[..]),
             });
         let mut rows = CsvRows {
@@ -210,8 +215,8 @@ impl<R: BufRead> CsvRows<R> {
     fn fetch(&mut self) -> Result<Option<(u64, StringRecord)>> {
         let mut record = StringRecord::new();
         loop {
-            let source = self.reader.get_mut();
-            source.left = source.max;
+            let source = self.reader.get_ref();
+            source.left.set(source.max);
             let more = self.reader.read_record(&mut record);
             if !more.map_err(|error| unread(&error))? {
                 return Ok(None);
@@ -226,7 +231,6 @@ impl<R: BufRead> CsvRows<R> {
     }
 }
 
-/// The refusal of a CSV table that cannot be read.
 /// Refuses a line whose number of fields is not that of the titles. Empty fields after the last title are ignored.
 ///
 /// # Errors

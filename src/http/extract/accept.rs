@@ -16,15 +16,11 @@ pub async fn require_json(request: Request, next: Next) -> Response {
         let detail = format!("`format` is `{other}`; this resource answers `json` only");
         return ApiError::new(ProblemKind::NotAcceptable, detail).into_response();
     }
-    if named.is_some() || accepts_json(request.headers()) {
-        return next.run(request).await;
+    let named = named.map(|_| Format::Json);
+    match choose(request.headers(), named, &[Format::Json]) {
+        Ok(_) => next.run(request).await,
+        Err(refusal) => refusal.into_response(),
     }
-    let given: Vec<&str> = accept_values(request.headers()).collect();
-    let detail = format!(
-        "`Accept` is `{}`; this resource answers `application/json` only",
-        given.join(", ")
-    );
-    ApiError::new(ProblemKind::NotAcceptable, detail).into_response()
 }
 
 /// Returns the reader of the name of one of these formats.
@@ -60,8 +56,9 @@ pub fn choose(headers: &HeaderMap, named: Option<Format>, offered: &[Format]) ->
             .map(|format| format!("`{}`", essence(*format)))
             .collect();
         let given: Vec<&str> = accept_values(headers).collect();
+        let only = if offered.len() == 1 { " only" } else { "" };
         let detail = format!(
-            "`Accept` is `{}`; this resource answers {}",
+            "`Accept` is `{}`; this resource answers {}{only}",
             given.join(", "),
             offered.join(", ")
         );
@@ -74,11 +71,6 @@ fn named_format(uri: &Uri) -> Option<String> {
     let Pairs(pairs) = Pairs::<Vec<(String, String)>>::try_from_uri(uri).ok()?;
     let format = pairs.into_iter().find(|(name, _)| name == "format");
     format.map(|(_, value)| value)
-}
-
-/// Whether `Accept` allows `application/json`.
-fn accepts_json(headers: &HeaderMap) -> bool {
-    quality(headers, "application/json") > 0.0
 }
 
 /// Returns the quality of a media type by `Accept` (RFC 9110, section 12.5.1), from 0 to 1. The most specific range decides; without the
@@ -128,7 +120,7 @@ mod tests {
         let accepts = |value: &str| {
             let mut headers = HeaderMap::new();
             headers.insert(header::ACCEPT, value.parse().unwrap());
-            accepts_json(&headers)
+            choose(&headers, None, &[Format::Json]).is_ok()
         };
         for value in [
             "*/*",
@@ -150,6 +142,6 @@ mod tests {
         ] {
             assert!(!accepts(value), "{value} excludes JSON");
         }
-        assert!(accepts_json(&HeaderMap::new()));
+        assert!(choose(&HeaderMap::new(), None, &[Format::Json]).is_ok());
     }
 }

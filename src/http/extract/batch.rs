@@ -1,10 +1,11 @@
 //! Reads the body of a batch: an array, lines or a table, which is spooled while it arrives and then split into cases.
 
-use std::cell::Cell as Shared;
+use std::cell::Cell;
 use std::collections::HashSet;
 use std::fmt::{self, Display};
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
+use std::rc::Rc;
 
 use axum::body::Body;
 use axum::extract::Request;
@@ -23,12 +24,14 @@ use crate::problem::{ApiError, ProblemKind, Result, faulty};
 use railhead_contact::error::Fault;
 use railhead_contact::evaluate::varied::{Values, members};
 use railhead_jobs::Jobs;
-use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell};
+use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell as FilledCell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
 use railhead_tables::read::{TableForm, TableRows, TableSource, require_exact};
 use railhead_tables::strict_json::without_position;
 use railhead_tables::table::{Chunk, Title};
-use railhead_tables::text::{CsvRows, Decimals, StringRecord, require_fields, without_mark};
+use railhead_tables::text::{
+    Bounded, CsvRows, Decimals, StringRecord, require_fields, without_mark,
+};
 use railhead_tables::titles::{Place, converted, is_text, place, question, short_names};
 
 /// Adds a case, with the number of its line in a body of lines.
@@ -62,10 +65,12 @@ pub fn read_lines(mut source: impl BufRead, most: usize, add: Add<'_>) -> Result
 /// # Errors
 /// `malformed-json`; `faulty-batch`: the body is not an array; `body-too-large`: an element is longer; or the error of `add`.
 pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()> {
-    let left = Shared::new(most + BETWEEN);
+    let max = most + BETWEEN;
+    let left = Rc::new(Cell::new(max));
     let source = Bounded {
         source,
-        left: &left,
+        max,
+        left: left.clone(),
     };
     let mut source = BufReader::new(source);
     let begin = source.fill_buf().map_err(ApiError::internal)?;
@@ -75,7 +80,7 @@ pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()>
     let mut json = Deserializer::from_reader(source);
     let mut elements = Elements {
         most,
-        left: &left,
+        left,
         number: 0,
         add,
         refusal: None,
@@ -85,7 +90,9 @@ pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()>
     match (read, elements.refusal.take()) {
         (_, Some(refusal)) => Err(refusal),
         (Ok(()), None) => Ok(()),
-        (Err(_), None) if left.get() == 0 => require_fitting(elements.place(), usize::MAX, most),
+        (Err(error), None) if error.io_error_kind() == Some(ErrorKind::FileTooLarge) => {
+            require_fitting(elements.place(), usize::MAX, most)
+        }
         (Err(error), None) => Err(match error.classify() {
             Category::Data => no_array(),
             Category::Io => ApiError::internal(&error),
@@ -97,28 +104,10 @@ pub fn read_elements(source: impl Read, most: usize, add: Add<'_>) -> Result<()>
 /// Bytes that are read ahead or separate two elements.
 const BETWEEN: usize = 16 << 10;
 
-/// A source that fails after the bytes that one element may take.
-struct Bounded<'a, R> {
-    source: R,
-    left: &'a Shared<usize>,
-}
-
-impl<R: Read> Read for Bounded<'_, R> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let most = buffer.len().min(self.left.get());
-        if most == 0 {
-            return Err(io::Error::other("an element is too long"));
-        }
-        let read = self.source.read(&mut buffer[..most])?;
-        self.left.set(self.left.get() - read);
-        Ok(read)
-    }
-}
-
 /// Reads the elements of an array one by one.
 struct Elements<'a> {
     most: usize,
-    left: &'a Shared<usize>,
+    left: Rc<Cell<usize>>,
     number: u64,
     add: Add<'a>,
     refusal: Option<ApiError>,
@@ -176,30 +165,19 @@ const OPTION_NAMES: [&str; 2] = ["priority", "deadline_s"];
 /// Every fault of its options.
 fn read_options(mut element: Value) -> Result<BatchCase, Vec<Fault>> {
     let members = element.as_object_mut();
-    let Some((members, case)) = members.and_then(|members| {
-        let case = members.remove("case")?;
-        Some((members, case))
-    }) else {
-        return Ok(BatchCase {
-            case: element,
-            wrapped: false,
-            own: CaseOptions::default(),
-        });
-    };
-    let mut own = CaseOptions::default();
-    let mut faults = Vec::new();
-    for (name, value) in members {
+    let inner = members.and_then(|members| members.remove("case"));
+    let (mut own, mut faults) = (CaseOptions::default(), Vec::new());
+    let options = element.as_object().filter(|_| inner.is_some());
+    for (name, value) in options.into_iter().flatten() {
         if let Err(detail) = set_option(&mut own, name, value) {
-            faults.push(Fault::new(
-                format!("/{}", name.replace('~', "~0").replace('/', "~1")),
-                detail,
-            ));
+            let member = name.replace('~', "~0").replace('/', "~1");
+            faults.push(Fault::new(format!("/{member}"), detail));
         }
     }
     match faults.is_empty() {
         true => Ok(BatchCase {
-            case,
-            wrapped: true,
+            wrapped: inner.is_some(),
+            case: inner.unwrap_or(element),
             own,
         }),
         false => Err(faults),
@@ -311,7 +289,7 @@ impl TemplateColumn {
             return set_option(&mut row.own, &self.title, &value)
                 .map_err(|detail| format!("the column `{}`: {detail}", self.title));
         }
-        row.cells.push(Cell(self.path.clone(), value));
+        row.cells.push(FilledCell(self.path.clone(), value));
         Ok(())
     }
 }

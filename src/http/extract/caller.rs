@@ -1,5 +1,6 @@
 //! The sender of a request and the ids in its path: the tenant whose jobs a handler can access, and the operator of the service.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -120,82 +121,51 @@ impl FromRequestParts<AppState> for Operator {
     }
 }
 
-/// Declares the id in the path of a resource. A text that is not an id is answered like an unknown id.
-macro_rules! id {
-    ($(#[doc = $doc:literal])* $name:ident: $kind:ident) => {
-        $(#[doc = $doc])*
-        #[derive(Debug, Clone, Copy)]
-        pub struct $name(pub Uuid);
+/// Every kind of work.
+pub(crate) const KINDS: [Kind; 4] = [Kind::Case, Kind::Cases, Kind::Evolution, Kind::Rows];
 
-        impl FromRequestParts<AppState> for $name {
-            type Rejection = ApiError;
-
-            async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
-                let text = path_text(parts, state, ProblemKind::not_found(Kind::$kind)).await?;
-                work_id(Kind::$kind, &text).map($name)
-            }
-        }
-    };
+/// The job, batch, run or evolution in the path `/v1/{kind}/{id}`.
+#[derive(Debug, Clone)]
+pub(crate) struct WorkPath {
+    /// The jobs of the tenant, of the kind in the path.
+    pub(crate) jobs: Jobs,
+    /// The id. A text that is not an id is answered like an unknown id.
+    pub(crate) id: Uuid,
 }
 
-id! {
-    /// The id of a job or an evolution.
-    JobId: Case
-}
-id! {
-    /// The id of a batch.
-    BatchId: Cases
-}
-id! {
-    /// The id of a run.
-    RunId: Rows
-}
-
-/// The id of a run in the path, and the index of one of its rows.
-#[derive(Debug, Clone, Copy)]
-pub struct RunRowId(pub Uuid, pub u64);
-
-impl FromRequestParts<AppState> for RunRowId {
+impl FromRequestParts<AppState> for WorkPath {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
-        let path = Path::<(String, String)>::from_request_parts(parts, state).await;
-        let Path((id, row)) = path
-            .map_err(|rejection| ApiError::new(ProblemKind::RunNotFound, rejection.body_text()))?;
-        let id = work_id(Kind::Rows, &id)?;
-        let number = row.parse().map_err(|_| {
-            let detail = format!("`{row}` is not the index of a row; rows are counted from 0");
-            ApiError::new(ProblemKind::RowNotFound, detail)
+        let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
+        let nouns = parts.uri.path().split('/').nth(2);
+        let kind = KINDS.into_iter().find(|kind| nouns == Some(kind.nouns()));
+        let kind = kind.unwrap_or(Kind::Case);
+        let unknown = ProblemKind::not_found(kind);
+        let text = path_text(parts, state, "id", unknown).await?;
+        let id = Uuid::try_parse(&text).map_err(|_| {
+            let detail = format!("`{text}` is not a {} id; ids are UUIDs", kind.noun());
+            ApiError::new(unknown, detail)
         })?;
-        Ok(RunRowId(id, number))
+        if unknown == ProblemKind::JobNotFound {
+            tracing::Span::current().record("job", tracing::field::display(id));
+        }
+        let jobs = jobs.of_kind(kind);
+        Ok(WorkPath { jobs, id })
     }
 }
 
-/// Returns the only parameter of the path.
+/// Returns a parameter of the path.
 ///
 /// # Errors
-/// A problem of the kind `unreadable`: the parameter is not UTF-8.
+/// A problem of the kind `unreadable`: a parameter is not UTF-8.
 pub(crate) async fn path_text(
     parts: &mut Parts,
     state: &AppState,
+    name: &str,
     unreadable: ProblemKind,
 ) -> Result<String> {
-    let path = Path::<String>::from_request_parts(parts, state).await;
-    let Path(text) = path.map_err(|rejection| ApiError::new(unreadable, rejection.body_text()))?;
-    Ok(text)
-}
-
-/// Parses the id of work of this kind.
-///
-/// # Errors
-/// The text is not an id.
-pub(crate) fn work_id(kind: Kind, text: &str) -> Result<Uuid> {
-    let id = Uuid::try_parse(text).map_err(|_| {
-        let detail = format!("`{text}` is not a {} id; ids are UUIDs", kind.noun());
-        ApiError::new(ProblemKind::not_found(kind), detail)
-    })?;
-    if ProblemKind::not_found(kind) == ProblemKind::JobNotFound {
-        tracing::Span::current().record("job", tracing::field::display(id));
-    }
-    Ok(id)
+    let path = Path::<HashMap<String, String>>::from_request_parts(parts, state).await;
+    let path = path.map_err(|rejection| ApiError::new(unreadable, rejection.body_text()));
+    Ok(path?.0.remove(name).unwrap_or_default())
 }

@@ -85,26 +85,15 @@ async fn weigh_in_turn(
 /// # Errors
 /// `body-too-large`: the memory or the number of members exceeds the limit of a case.
 pub fn weigh_case(text: &[u8], max_bytes: usize) -> Result<usize> {
-    let weight = weigh(text);
-    if weight.bytes > max_bytes {
-        return Err(ApiError::new(
-            ProblemKind::BodyTooLarge,
-            format!(
-                "the case would take about {} bytes in memory; allowed: {max_bytes}",
-                weight.bytes
-            ),
-        ));
-    }
-    if weight.members > MEMBERS_MAX {
-        return Err(ApiError::new(
-            ProblemKind::BodyTooLarge,
-            format!(
-                "the objects of the case have {} members; allowed: {MEMBERS_MAX}",
-                weight.members
-            ),
-        ));
-    }
-    Ok(weight.bytes)
+    let Weight { bytes, members } = weigh(text);
+    let detail = if bytes > max_bytes {
+        format!("the case would take about {bytes} bytes in memory; allowed: {max_bytes}")
+    } else if members > MEMBERS_MAX {
+        format!("the objects of the case have {members} members; allowed: {MEMBERS_MAX}")
+    } else {
+        return Ok(bytes);
+    };
+    Err(ApiError::new(ProblemKind::BodyTooLarge, detail))
 }
 
 /// Parses JSON text (RFC 8259). A repeated member and a number beyond the range of `f64` are errors.
@@ -178,18 +167,16 @@ pub fn require_utf8(headers: &HeaderMap) -> Result<()> {
 
 fn require_json(headers: &HeaderMap) -> Result<()> {
     require_utf8(headers)?;
-    let given = headers
-        .get(header::CONTENT_TYPE)
-        .map(|value| value.to_str().unwrap_or("?"));
     let subtype = essence(headers);
     if subtype == "application/json"
         || (subtype.starts_with("application/") && subtype.ends_with("+json"))
     {
         return Ok(());
     }
-    let given = given.map_or("no content type was given".to_owned(), |value| {
-        format!("`{value}` was given")
-    });
+    let given = match headers.get(header::CONTENT_TYPE) {
+        None => "no content type was given".to_owned(),
+        Some(value) => format!("`{}` was given", value.to_str().unwrap_or("?")),
+    };
     Err(ApiError::new(
         ProblemKind::UnsupportedMediaType,
         format!("{given}; send the case with `Content-Type: application/json`"),

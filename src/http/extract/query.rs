@@ -122,6 +122,14 @@ pub fn reader<T>(
     }
 }
 
+/// Returns the reader of a comma-separated list; `item` parses an entry.
+pub fn list<T>(
+    allowed: impl Into<Cow<'static, str>>,
+    item: impl Fn(&str) -> Option<T> + 'static,
+) -> Reader<Vec<T>> {
+    reader(allowed, move |text| text.split(',').map(&item).collect())
+}
+
 /// Returns the reader of the index of a motion or a patch.
 pub fn index() -> Reader<usize> {
     reader("a whole number, counted from 0", |text| {
@@ -211,7 +219,7 @@ macro_rules! query {
 pub(crate) use query;
 
 /// The parameters of one request, and the faults found in them so far.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Query {
     pairs: Vec<(String, String)>,
     faults: Vec<Fault>,
@@ -222,17 +230,12 @@ impl Query {
     /// Splits the query of a URI; `known` lists the parameters of the route.
     #[must_use]
     pub fn read(uri: &Uri, known: &[&str]) -> Self {
-        let mut query = Query {
-            pairs: Vec::new(),
-            faults: Vec::new(),
-            repeatable: Vec::new(),
-        };
+        let mut query = Query::default();
         let pairs = match Pairs::<Vec<(String, String)>>::try_from_uri(uri) {
             Ok(Pairs(pairs)) => pairs,
             Err(rejection) => {
-                query
-                    .faults
-                    .push(Fault::parameter("", rejection.body_text()));
+                let fault = Fault::parameter("", rejection.body_text());
+                query.faults.push(fault);
                 return query;
             }
         };
@@ -244,10 +247,10 @@ impl Query {
                 .iter()
                 .any(|fault| fault.parameter.as_deref() == Some(&name))
             {
-                let allowed = if known.is_empty() {
-                    "none".to_owned()
-                } else {
-                    quoted(known)
+                let quoted: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
+                let allowed = match quoted.is_empty() {
+                    true => "none".to_owned(),
+                    false => quoted.join(", "),
                 };
                 let detail = format!("`{name}` is not a parameter here; allowed: {allowed}");
                 query.faults.push(Fault {
@@ -344,11 +347,6 @@ pub fn require_index(name: &str, index: Option<usize>, count: usize) -> Result<(
 pub fn no_such_index(name: &str, index: usize, count: usize) -> ApiError {
     let last = count.saturating_sub(1);
     ApiError::bad_parameter(name, format!("`{name}` is `{index}`; allowed: 0 to {last}"))
-}
-
-fn quoted(names: &[&str]) -> String {
-    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
-    quoted.join(", ")
 }
 
 /// Most characters of a name, and of the key and the value of a label, as in a case.

@@ -9,11 +9,13 @@ use std::time::Duration;
 use axum::BoxError;
 use axum::body::{Body, Bytes};
 use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderValue, header};
+use axum::http::{HeaderValue, header};
 use futures_util::stream;
 use multer::{Field, Multipart};
 use serde::Deserialize;
-use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{
+    DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Unexpected, Visitor,
+};
 use serde_json::Value;
 use tokio::io::AsyncWriteExt;
 use tokio::time::timeout;
@@ -168,60 +170,32 @@ impl<'de> Visitor<'de> for RowValues<'_> {
                 A::Error::custom(format_args!("column `{}`, row {row}: {reason}", self.0))
             };
             match items.next_element().map_err(|error| at(&error))? {
-                Some(RowValue::Number(number)) if texts.is_empty() => numbers.push(number),
-                Some(RowValue::Text(text)) if numbers.is_empty() => texts.push(Some(text)),
-                Some(RowValue::Number(number)) => {
+                Some(Value::Number(number)) if texts.is_empty() => {
+                    numbers.push(number.as_f64().unwrap_or(f64::NAN));
+                }
+                Some(Value::String(text)) if numbers.is_empty() => texts.push(Some(text)),
+                Some(Value::Number(number)) => {
                     return Err(at(&format_args!(
                         "`{number}` is a number, row 0 has a text"
                     )));
                 }
-                Some(RowValue::Text(text)) => {
+                Some(Value::String(text)) => {
                     return Err(at(&format_args!("{text:?} is a text, row 0 has a number")));
+                }
+                Some(other) => {
+                    let found = match other {
+                        Value::Null => Unexpected::Unit,
+                        Value::Bool(value) => Unexpected::Bool(value),
+                        Value::Array(_) => Unexpected::Seq,
+                        _ => Unexpected::Map,
+                    };
+                    let expected = &"a number, or a text if the whole column has texts";
+                    return Err(at(&A::Error::invalid_type(found, expected)));
                 }
                 None if texts.is_empty() => return Ok(Values::Numbers(numbers)),
                 None => return Ok(Values::Texts(texts)),
             }
         }
-    }
-}
-
-/// A value of a column.
-enum RowValue {
-    Number(f64),
-    Text(String),
-}
-
-impl<'de> Deserialize<'de> for RowValue {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(RowValueVisitor)
-    }
-}
-
-struct RowValueVisitor;
-
-impl Visitor<'_> for RowValueVisitor {
-    type Value = RowValue;
-
-    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        formatter.write_str("a number, or a text if the whole column has texts")
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<RowValue, E> {
-        Ok(RowValue::Number(value))
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
-    fn visit_i64<E>(self, value: i64) -> Result<RowValue, E> {
-        Ok(RowValue::Number(value as f64))
-    }
-
-    #[expect(clippy::cast_precision_loss, reason = "as every number of a case")]
-    fn visit_u64<E>(self, value: u64) -> Result<RowValue, E> {
-        Ok(RowValue::Number(value as f64))
-    }
-
-    fn visit_str<E>(self, value: &str) -> Result<RowValue, E> {
-        Ok(RowValue::Text(value.to_owned()))
     }
 }
 
@@ -257,12 +231,10 @@ pub async fn separate_table(
     (json, lines): (&str, bool),
     request: Request,
 ) -> Result<(Request, Option<Table>)> {
+    let refused = |detail| Err(ApiError::bad_parameter(TEMPLATE, detail));
     let (request, part) = match essence(request.headers()) == "multipart/form-data" {
         true if job.is_some() => {
-            return Err(ApiError::bad_parameter(
-                TEMPLATE,
-                "the template is a part of the body; leave `?template=` out",
-            ));
+            return refused("the template is a part of the body; leave `?template=` out");
         }
         true => separate_parts(jobs, memory, options, request).await?,
         false => (request, None),
@@ -276,10 +248,9 @@ pub async fn separate_table(
         None if essence != "application/json" => return Err(unsupported(&essence, json)),
         None if alone => return Ok((request, None)),
         None => {
-            return Err(ApiError::bad_parameter(
-                TEMPLATE,
+            return refused(
                 "`template` belongs to a table, such as `text/csv`; leave it out with JSON",
-            ));
+            );
         }
     };
     let (template, share) = match (part, job) {
@@ -290,11 +261,10 @@ pub async fn separate_table(
             (read_json(&case)?, None)
         }
         (None, None) => {
-            return Err(ApiError::bad_parameter(
-                TEMPLATE,
+            return refused(
                 "a table needs a template, the case whose members its columns replace: send both as `multipart/form-data` with the parts `template` \
                  (JSON) and `table`, or name a job with `?template=`",
-            ));
+            );
         }
     };
     let table = Table {
@@ -393,28 +363,20 @@ async fn next_part(
 /// Returns the content type of a part. Clients that do not know the format of a file send no content type or `application/octet-stream`; the
 /// extension of the file name then determines it.
 fn content_type_of(part: &Field<'_>) -> HeaderValue {
-    let mut headers = HeaderMap::new();
-    if let Some(value) = part.headers().get(header::CONTENT_TYPE) {
-        headers.insert(header::CONTENT_TYPE, value.clone());
-    }
-    let declared = essence(&headers);
+    let declared = part.headers().get(header::CONTENT_TYPE);
     let name = part.file_name().unwrap_or_default();
     let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
     let found = match extension.to_ascii_lowercase().as_str() {
-        "csv" | "tsv" | "txt" => "text/csv",
         "ndjson" | "jsonl" => "application/x-ndjson",
         "arrow" | "arrows" | "feather" | "ipc" => "application/vnd.apache.arrow.stream",
         "parquet" => "application/vnd.apache.parquet",
         "npz" => "application/x-npz",
         _ => "text/csv",
     };
-    match declared.as_str() {
-        "" | "application/octet-stream" | "text/plain" | "application/vnd.ms-excel" => {
-            HeaderValue::from_static(found)
-        }
-        _ => headers
-            .remove(header::CONTENT_TYPE)
-            .unwrap_or(HeaderValue::from_static("text/csv")),
+    match (essence(part.headers()).as_str(), declared) {
+        ("" | "application/octet-stream" | "text/plain" | "application/vnd.ms-excel", _)
+        | (_, None) => HeaderValue::from_static(found),
+        (_, Some(declared)) => declared.clone(),
     }
 }
 

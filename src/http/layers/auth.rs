@@ -34,8 +34,7 @@ const QUESTIONS: [&str; 2] = ["/v1/cases/check", "/v1/evaluate"];
 pub struct Access {
     /// The jobs of all tenants.
     pub jobs: Jobs,
-    anonymous: bool,
-    guard: Guard,
+    options: HttpOptions,
     rate: RateLimit,
 }
 
@@ -45,8 +44,7 @@ impl Access {
     pub fn new(jobs: &Jobs, options: &HttpOptions) -> Access {
         Access {
             jobs: jobs.clone(),
-            anonymous: options.anonymous,
-            guard: Guard::new(options),
+            options: options.clone(),
             rate: RateLimit::new(options),
         }
     }
@@ -54,14 +52,14 @@ impl Access {
     /// Returns the key of a request; `None` for a request without a key, if these are allowed.
     ///
     /// # Errors
-    /// `unauthorized`, `too-many-requests`, or the error of [`Guard::require_direct`].
+    /// `unauthorized`, `too-many-requests`, or the error of [`require_direct`].
     pub async fn key(&self, parts: &Parts) -> Result<Option<Key>> {
         let mut given = parts.headers.get_all(header::AUTHORIZATION).iter();
         let peer = parts.extensions.get::<Peer>().copied();
         let left = parts.extensions.get::<RateLeft>();
         let text = match (given.next(), given.next()) {
-            (None, _) if self.anonymous => {
-                self.guard.require_direct(parts)?;
+            (None, _) if self.options.anonymous => {
+                require_direct(&self.options, parts)?;
                 if let Some(sender) = peer.and_then(RateKey::at) {
                     self.rate.require_turn(sender, "this address", left)?;
                 }
@@ -140,96 +138,79 @@ const FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 /// Routes that are answered even if every connection is busy, and not traced.
 pub(super) const PROBES: [&str; 3] = ["/healthz", "/readyz", "/metrics"];
 
-/// Conditions for requests without a key.
-#[derive(Debug, Clone)]
-pub(crate) struct Guard {
-    hosts: Arc<[String]>,
-    origins: Arc<[String]>,
-    proxied: bool,
-}
-
-impl Guard {
-    /// Creates the conditions of these options.
-    #[must_use]
-    pub(crate) fn new(options: &HttpOptions) -> Guard {
-        Guard {
-            hosts: options.allowed_hosts.clone(),
-            origins: options.origins.clone(),
-            proxied: options.anonymous_proxied,
-        }
-    }
-
-    /// Refuses requests without a key that do not meet the conditions.
-    ///
-    /// # Errors
-    /// `host-not-allowed`, `cross-site` or `unauthorized`, with advice.
-    pub(crate) fn require_direct(&self, parts: &Parts) -> Result<()> {
-        self.require_host(parts)?;
-        self.require_own_page(parts)?;
-        let mut names = FORWARDED.iter();
-        match names.find(|name| parts.headers.contains_key(*name)) {
-            Some(name) if !self.proxied => Err(ApiError::new(
-                ProblemKind::Unauthorized,
-                format!(
-                    "the request came through a proxy (`{name}`), so it needs an API key: send one with `Authorization: \
+/// Refuses requests without a key that do not come directly from a client or a page of this service.
+///
+/// # Errors
+/// `host-not-allowed`, `cross-site` or `unauthorized`, with advice.
+fn require_direct(options: &HttpOptions, parts: &Parts) -> Result<()> {
+    require_host(options, parts)?;
+    require_own_page(options, parts)?;
+    let mut names = FORWARDED.iter();
+    match names.find(|name| parts.headers.contains_key(*name)) {
+        Some(name) if !options.anonymous_proxied => Err(ApiError::new(
+            ProblemKind::Unauthorized,
+            format!(
+                "the request came through a proxy (`{name}`), so it needs an API key: send one with `Authorization: \
                      Bearer`. Without a key, only direct requests from this machine are answered (`--anonymous loopback`); \
                      `railhead keys create` creates keys"
-                ),
-            )),
-            _ => Ok(()),
-        }
-    }
-
-    /// Requires a name of the service in `Host`, or an address: a page can redirect a foreign name to this service, but not an address.
-    fn require_host(&self, parts: &Parts) -> Result<()> {
-        let Some(host) = host(parts) else {
-            return Ok(());
-        };
-        let name = host.trim_matches(['[', ']']);
-        let allowed = name.parse::<IpAddr>().is_ok()
-            || name.eq_ignore_ascii_case("localhost")
-            || self.hosts.iter().any(|own| own.eq_ignore_ascii_case(name));
-        if allowed {
-            return Ok(());
-        }
-        Err(ApiError::new(
-            ProblemKind::HostNotAllowed,
-            format!(
-                "the header `Host` is `{name}`; without a key it must be an IP address, `localhost` or a name given by `--allowed-host`"
             ),
-        ))
+        )),
+        _ => Ok(()),
     }
+}
 
-    /// Requires that a request that changes something comes from a page of this service, or not from a page.
-    fn require_own_page(&self, parts: &Parts) -> Result<()> {
-        if matches!(parts.method, Method::GET | Method::HEAD | Method::OPTIONS) {
-            return Ok(());
-        }
-        let text = |name: &HeaderName| single(&parts.headers, name);
-        let origin = text(&header::ORIGIN);
-        let known = |origin: &str| {
-            let own = origin.split_once("://").map(|(_, authority)| authority);
-            // HTTP/2 has the name in the URI of the request.
-            let host = parts.uri.authority().map(Authority::as_str);
-            let host = host.or_else(|| text(&header::HOST));
-            self.origins.iter().any(|allowed| allowed == origin) || (own.is_some() && own == host)
-        };
-        let foreign = match (origin, text(&FETCH_SITE)) {
-            (Some(origin), _) => !known(origin),
-            (None, Some(site)) => !matches!(site, "same-origin" | "none"),
-            (None, None) => false,
-        };
-        if !foreign {
-            return Ok(());
-        }
-        Err(ApiError::new(
-            ProblemKind::CrossSite,
-            format!(
-                "a page of another origin ({}) may not change anything without a key; `--cors-origin` lists the origins that may",
-                origin.unwrap_or("not named")
-            ),
-        ))
+/// Requires a name of the service in `Host`, or an address: a page can redirect a foreign name to this service, but not an address.
+fn require_host(options: &HttpOptions, parts: &Parts) -> Result<()> {
+    let Some(host) = host(parts) else {
+        return Ok(());
+    };
+    let name = host.trim_matches(['[', ']']);
+    let allowed = name.parse::<IpAddr>().is_ok()
+        || name.eq_ignore_ascii_case("localhost")
+        || options
+            .allowed_hosts
+            .iter()
+            .any(|own| own.eq_ignore_ascii_case(name));
+    if allowed {
+        return Ok(());
     }
+    Err(ApiError::new(
+        ProblemKind::HostNotAllowed,
+        format!(
+            "the header `Host` is `{name}`; without a key it must be an IP address, `localhost` or a name given by `--allowed-host`"
+        ),
+    ))
+}
+
+/// Requires that a request that changes something comes from a page of this service, or not from a page.
+fn require_own_page(options: &HttpOptions, parts: &Parts) -> Result<()> {
+    if matches!(parts.method, Method::GET | Method::HEAD | Method::OPTIONS) {
+        return Ok(());
+    }
+    let text = |name: &HeaderName| single(&parts.headers, name);
+    let origin = text(&header::ORIGIN);
+    let known = |origin: &str| {
+        let own = origin.split_once("://").map(|(_, authority)| authority);
+        // HTTP/2 has the name in the URI of the request.
+        let host = parts.uri.authority().map(Authority::as_str);
+        let host = host.or_else(|| text(&header::HOST));
+        options.origins.iter().any(|allowed| allowed == origin) || (own.is_some() && own == host)
+    };
+    let foreign = match (origin, text(&FETCH_SITE)) {
+        (Some(origin), _) => !known(origin),
+        (None, Some(site)) => !matches!(site, "same-origin" | "none"),
+        (None, None) => false,
+    };
+    if !foreign {
+        return Ok(());
+    }
+    Err(ApiError::new(
+        ProblemKind::CrossSite,
+        format!(
+            "a page of another origin ({}) may not change anything without a key; `--cors-origin` lists the origins that may",
+            origin.unwrap_or("not named")
+        ),
+    ))
 }
 
 /// Returns the host of a request without its port; `None` if an old client does not send it.
@@ -503,17 +484,17 @@ mod tests {
     }
 
     fn allowed(method: Method, headers: &[(&str, &str)]) -> bool {
-        let guard = Guard {
-            hosts: ["rail.example".to_owned()].into(),
+        let options = HttpOptions {
+            allowed_hosts: ["rail.example".to_owned()].into(),
             origins: ["https://dash.example".to_owned()].into(),
-            proxied: false,
+            ..HttpOptions::default()
         };
         let mut request = Request::builder().method(method).uri("/v1/jobs");
         for (name, value) in headers {
             request = request.header(*name, *value);
         }
         let (parts, ()) = request.body(()).unwrap().into_parts();
-        guard.require_direct(&parts).is_ok()
+        require_direct(&options, &parts).is_ok()
     }
 
     #[test]

@@ -150,7 +150,7 @@ mod tests {
         let mut answer = RowsAnswer::default();
         answer.numbers = numbers;
         answer.status = vec![RowStatus::Ok; rows];
-        answer.status[1] = RowStatus::NotCovered;
+        answer.status[1] = RowStatus::NotFinite;
         answer
     }
 
@@ -166,7 +166,7 @@ mod tests {
         let read: Value = serde_json::from_str(&text(json_body(given.clone())).await).unwrap();
         assert_eq!(read["rows"], json!(rows));
         assert_eq!(read["columns"]["stick_share"][1], Value::Null);
-        assert_eq!(read["columns"]["status"][1], json!("not_covered"));
+        assert_eq!(read["columns"]["status"][1], json!("not_finite"));
         let csv = text(table_body(Format::Csv, given.clone()).unwrap()).await;
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines.len(), rows + 1);

@@ -1,5 +1,6 @@
 //! `/v1/batches`: many cases in one request, and their results.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use axum::body::Bytes;
@@ -16,7 +17,7 @@ use uuid::Uuid;
 use crate::dto::{Cases, JobResult};
 use crate::extract::accept::{choose, one_of};
 use crate::extract::batch::read_draft;
-use crate::extract::caller::{BatchId, Caller, Credential};
+use crate::extract::caller::{Credential, WorkPath};
 use crate::extract::query::{Parameters, id, query, reader, repeated, word};
 use crate::extract::rows::{TableUpload, separate_table};
 use crate::layers::response::StreamedUnbuffered;
@@ -202,7 +203,7 @@ impl Source {
             }
             None => {
                 let mut text = Vec::new();
-                write_json(&mut text, &Front::of(&item, Some(error)))?;
+                write_json(&mut text, &BatchLine::new(&item, Some(error)))?;
                 text.push(b'\n');
                 Ok(one(Piece::Text(text.into())))
             }
@@ -315,7 +316,7 @@ fn write_ndjson(items: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
     let mut out = Vec::with_capacity(items.len() * 2048);
     for item in items {
         let Some(ItemResult::Solution(solution)) = &item.result else {
-            write_json(&mut out, &Front::of(item, failure(item)))?;
+            write_json(&mut out, &BatchLine::new(item, failure(item)))?;
             out.push(b'\n');
             continue;
         };
@@ -329,35 +330,9 @@ fn write_ndjson(items: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
     Ok(out)
 }
 
-/// The part of a line before the result.
-#[derive(Serialize)]
-struct Front<'a> {
-    index: u32,
-    id: String,
-    name: Option<&'a str>,
-    labels: &'a std::collections::BTreeMap<String, String>,
-    state: JobState,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<ProblemBody>,
-}
-
-impl Front<'_> {
-    fn of(item: &BatchItem, error: Option<ProblemBody>) -> Front<'_> {
-        let job = &item.job;
-        Front {
-            index: item.index,
-            id: job.id.to_string(),
-            name: job.name.as_deref(),
-            labels: &job.labels,
-            state: job.state,
-            error,
-        }
-    }
-}
-
 /// Writes the part of a line before a solution.
 fn open_line(out: &mut Vec<u8>, item: &BatchItem) -> Result<(), JobsError> {
-    write_json(out, &Front::of(item, None))?;
+    write_json(out, &BatchLine::new(item, None))?;
     // The object continues, so that its closing brace is removed.
     out.pop();
     out.extend_from_slice(b",\"result\":");
@@ -417,7 +392,7 @@ pub(crate) struct BatchLine {
     /// Name of the case.
     name: Option<String>,
     /// Labels of the case.
-    labels: std::collections::BTreeMap<String, String>,
+    labels: BTreeMap<String, String>,
     /// State of the job.
     state: JobState,
     /// The result, as `/v1/jobs/{id}/result` returns it; only for a succeeded job.
@@ -426,6 +401,22 @@ pub(crate) struct BatchLine {
     /// Why there is no result: the job failed, its result was removed while the lines were read, or the result cannot be read.
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<ProblemBody>,
+}
+
+impl BatchLine {
+    /// Creates the line of a job without its result.
+    fn new(item: &BatchItem, error: Option<ProblemBody>) -> BatchLine {
+        let job = &item.job;
+        BatchLine {
+            index: item.index,
+            id: job.id.to_string(),
+            name: job.name.clone(),
+            labels: job.labels.clone(),
+            state: job.state,
+            result: None,
+            error,
+        }
+    }
 }
 
 query! {
@@ -475,8 +466,7 @@ problems! {
     )), BatchResultProblems)
 )]
 pub(crate) async fn results(
-    Caller(jobs): Caller,
-    BatchId(id): BatchId,
+    WorkPath { jobs, id }: WorkPath,
     uri: Uri,
     wait: Wait,
     State(memory): State<Memory>,
@@ -492,7 +482,7 @@ pub(crate) async fn results(
         return Err(ApiError::bad_parameter("columns", detail));
     }
     // An unknown batch is a problem, which must be known before the stream begins.
-    jobs.of_kind(Kind::Cases).work(id).await?;
+    jobs.work(id).await?;
     let mut items = jobs.items(id);
     items.until = wait.at_most().map(|at_most| Instant::now() + at_most);
     items.after = query.after;
@@ -512,7 +502,7 @@ pub(crate) async fn results(
         .as_ref()
         .map_or_else(Vec::new, |columns| columns.kinds());
     let source = Source {
-        jobs: jobs.clone(),
+        jobs: jobs.of_kind(Kind::Case),
         memory,
         columns,
     };

@@ -2,6 +2,7 @@
 
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
+use std::fmt;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -203,19 +204,11 @@ pub(crate) async fn evaluate(
     if !packed && let Some(share) = &mut share {
         share.shrink_to(2 * text.len());
     }
-    let (limits, tenant) = (memory.clone(), jobs.tenant().to_owned());
-    let bytes_max = options.evaluate_max_bytes;
-    let evaluation = Evaluation {
-        jobs,
-        memory,
-        rows_max: options.evaluate_max_rows,
-        time: options.evaluate_time,
-    };
-    let work = limits.compute(&tenant, move |pace| {
+    let (slots, tenant) = (memory.clone(), jobs.tenant().to_owned());
+    let work = slots.compute(&tenant, move |pace| {
         let (template, rows, _held) = match table {
             Some(table) => {
-                let limits = (evaluation.rows_max, bytes_max);
-                let rows = read_rows(table.form, &text, limits, pace)?;
+                let rows = read_rows(table.form, &text, &options, pace)?;
                 if packed && let Some(share) = &mut share {
                     share.shrink_to(2 * (text.len() + rows.bytes()));
                 }
@@ -229,7 +222,7 @@ pub(crate) async fn evaluate(
             }
         };
         drop(text);
-        let answer = evaluation.answer(template, rows, pace)?;
+        let answer = answer((&jobs, &memory, &options), template, rows, pace)?;
         let (bytes, body) = match format {
             Format::Json => (answer.bytes(), json_body(answer)),
             Format::Npz => {
@@ -256,9 +249,10 @@ pub(crate) async fn evaluate(
 fn read_rows(
     form: TableForm,
     text: &Bytes,
-    (rows_max, bytes_max): (usize, usize),
+    options: &HttpOptions,
     pace: &mut Pace,
 ) -> Result<ReceivedRows> {
+    let (rows_max, bytes_max) = (options.evaluate_max_rows, options.evaluate_max_bytes);
     let source = TableSource::Memory(text.clone());
     let mut table = TableRows::new(form, source, bytes_max)?;
     let mut rows = varied_alone(table.named(&NamedColumns::default())?)?;
@@ -291,69 +285,60 @@ fn too_many(rows: usize, rows_max: usize) -> ApiError {
     CaseError(vec![Fault::new("/columns", detail)]).into()
 }
 
-/// The limits of an evaluation.
-struct Evaluation {
-    jobs: Jobs,
-    memory: Memory,
-    rows_max: usize,
-    time: Duration,
-}
-
-impl Evaluation {
-    fn answer(&self, template: Value, rows: ReceivedRows, pace: &mut Pace) -> Result<RowsAnswer> {
-        let (rows_max, held) = (self.rows_max, rows.held());
-        let (names, columns): (Vec<String>, Vec<VariedColumn>) = rows.into_varied().unzip();
-        let (rows, columns) = (held, &columns);
-        if rows == 0 || rows > rows_max {
-            return Err(too_many(rows, rows_max));
-        }
-        let template = Handle::current().block_on(self.jobs.with_profiles(template))?;
-        let profiles = self.jobs.profiles_of(columns)?;
-        let names = columns.iter().zip(&names);
-        let names: Vec<(&str, &str)> = names
-            .map(|(column, name)| (&*column.pointer, &**name))
-            .collect();
-        let first = self
-            .jobs
-            .first_row(&template, columns, &profiles, &names, |_| None);
-        let (case, checked) = first?;
-        // The solver is not used for more rows.
-        let solver_bytes = match rows <= SOLVED_ROWS_MAX {
-            true => usize::try_from(checked.cost().own_bytes()).unwrap_or(usize::MAX),
-            false => 0,
-        };
-        if !self.memory.has_room_for(solver_bytes) {
-            return Err(too_long(&format!(
-                "a row needs {solver_bytes} bytes of memory"
-            )));
-        }
-        let _solver = self.memory.ready_answer(self.jobs.tenant(), solver_bytes)?;
-        let pace = RefCell::new(pace);
-        let watch = Watch {
-            pace: &pace,
-            time: self.time,
-            begun: OnceCell::new(),
-            ended: RefCell::new(None),
-        };
-        let step = || pace.borrow_mut().step();
-        let jobs = &self.jobs;
-        let answered = jobs.evaluate((&case, &checked), columns, &profiles, &watch, step);
-        answered.map_err(|error| match error {
-            NotAtOnce::Step(error) => error,
-            NotAtOnce::TooManyRows(rows) => too_long(&format!(
-                "{rows} rows need the solver; at most {SOLVED_ROWS_MAX} are solved at once"
-            )),
-            NotAtOnce::Stopped => watch.ended.take().unwrap_or_else(|| {
-                let seconds = self.time.as_secs_f64();
-                too_long(&format!(
-                    "the solver took longer than {seconds} s (`--evaluate-time-s`)"
-                ))
-            }),
-        })
+/// Evaluates rows within the limits of the options.
+fn answer(
+    (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
+    template: Value,
+    rows: ReceivedRows,
+    pace: &mut Pace,
+) -> Result<RowsAnswer> {
+    let count = rows.held();
+    let (names, columns): (Vec<String>, Vec<VariedColumn>) = rows.into_varied().unzip();
+    if count == 0 || count > options.evaluate_max_rows {
+        return Err(too_many(count, options.evaluate_max_rows));
     }
+    let template = Handle::current().block_on(jobs.with_profiles(template))?;
+    let profiles = jobs.profiles_of(&columns)?;
+    let names = columns.iter().zip(&names);
+    let names: Vec<(&str, &str)> = names
+        .map(|(column, name)| (&*column.pointer, &**name))
+        .collect();
+    let first = jobs.first_row(&template, &columns, &profiles, &names, |_| None);
+    let (case, checked) = first?;
+    // The solver is not used for more rows.
+    let solver_bytes = match count <= SOLVED_ROWS_MAX {
+        true => usize::try_from(checked.cost().own_bytes()).unwrap_or(usize::MAX),
+        false => 0,
+    };
+    if !memory.has_room_for(solver_bytes) {
+        let reason = format_args!("a row needs {solver_bytes} bytes of memory");
+        return Err(too_long(reason));
+    }
+    let _solver = memory.ready_answer(jobs.tenant(), solver_bytes)?;
+    let pace = RefCell::new(pace);
+    let watch = Watch {
+        pace: &pace,
+        time: options.evaluate_time,
+        begun: OnceCell::new(),
+        ended: RefCell::new(None),
+    };
+    let step = || pace.borrow_mut().step();
+    let answered = jobs.evaluate((&case, &checked), &columns, &profiles, &watch, step);
+    answered.map_err(|error| match error {
+        NotAtOnce::Step(error) => error,
+        NotAtOnce::TooManyRows(rows) => too_long(format_args!(
+            "{rows} rows need the solver; at most {SOLVED_ROWS_MAX} are solved at once"
+        )),
+        NotAtOnce::Stopped => watch.ended.take().unwrap_or_else(|| {
+            let seconds = watch.time.as_secs_f64();
+            too_long(format_args!(
+                "the solver took longer than {seconds} s (`--evaluate-time-s`)"
+            ))
+        }),
+    })
 }
 
-fn too_long(reason: &str) -> ApiError {
+fn too_long(reason: fmt::Arguments<'_>) -> ApiError {
     let detail = format!("{reason}; submit the same body to `/v1/runs`");
     ApiError::new(ProblemKind::EvaluationTooLong, detail)
 }

@@ -4,10 +4,9 @@ use axum::extract::{Path, State};
 use axum::http::{HeaderMap, Uri, header};
 use axum::response::{IntoResponse, Response};
 use serde_json::{Map, Value};
-use uuid::Uuid;
 
 use crate::extract::accept::{choose, one_of};
-use crate::extract::caller::{Caller, JobId, work_id};
+use crate::extract::caller::WorkPath;
 use crate::extract::json::JsonBody;
 use crate::extract::query::{Parameters, count, query, word};
 use crate::limits::{Memory, hold_while_sent};
@@ -20,9 +19,9 @@ use railhead_contact::case::words::evolution::{EvolutionWords, WearLosses};
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::varied::column_pointer;
 use railhead_contact::solution::words::evolution::{EvolutionAnswer, EvolutionRecord, WornBody};
+use railhead_jobs::JobsError;
 use railhead_jobs::model::Kind;
 use railhead_jobs::sync::blocking;
-use railhead_jobs::{Jobs, JobsError};
 use railhead_tables::table::{RowTable, TableColumn};
 use railhead_tables::titles::{Place, place, question};
 use railhead_tables::write::RowWriter;
@@ -136,8 +135,8 @@ fn scale(values: &mut Value, factor: f64) {
     params(("id" = String, Path, description = "Id of the evolution", format = "uuid")),
     responses((status = 200, description = "Case, traffic and plan", body = EvolutionWords), GetProblems)
 )]
-pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response> {
-    jobs::case(Caller(jobs.of_kind(Kind::Evolution)), JobId(id)).await
+pub(crate) async fn request(evolution: WorkPath) -> Result<Response> {
+    jobs::case(evolution).await
 }
 
 /// Returns the result of a succeeded evolution.
@@ -150,11 +149,9 @@ pub(crate) async fn request(Caller(jobs): Caller, JobId(id): JobId) -> Result<Re
     responses((status = 200, description = "The result", body = EvolutionAnswer), ResultProblems)
 )]
 pub(crate) async fn result(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
+    WorkPath { jobs, id }: WorkPath,
     State(memory): State<Memory>,
 ) -> Result<Response> {
-    let jobs = jobs.of_kind(Kind::Evolution);
     let answer = jobs.open_answer(id).await?;
     let share = memory.ready_answer(jobs.tenant(), answer.bytes)?;
     let text = answer.text().await?;
@@ -194,15 +191,15 @@ const ROWS: [(&str, TableOf); 2] = [("records", records_table), ("points", point
     )), ResultProblems)
 )]
 pub(crate) async fn table(
-    Caller(jobs): Caller,
-    JobId(id): JobId,
+    evolution: WorkPath,
     uri: Uri,
     State(memory): State<Memory>,
     headers: HeaderMap,
 ) -> Result<Response> {
     let query = EvolutionTableQuery::read(&uri)?;
     let format = choose(&headers, query.format, TABLES)?;
-    let made = read(jobs, &memory, id, move |evolution| {
+    let id = evolution.id;
+    let made = read(evolution, &memory, move |evolution| {
         let table = query.of.unwrap_or(records_table)(evolution);
         let text = RowWriter::whole(format.table(), table).map_err(ApiError::internal)?;
         Ok(format.answer(&format!("evolution-{id}"), text))
@@ -251,19 +248,19 @@ const FORMS: [(&str, SectionForm); 3] = [
     responses((status = 200, description = "The file", content((String = "text/plain"))), ResultProblems)
 )]
 pub(crate) async fn section(
-    Caller(jobs): Caller,
-    Path((id, body)): Path<(String, String)>,
+    evolution: WorkPath,
+    Path((_id, body)): Path<(String, String)>,
     uri: Uri,
     State(memory): State<Memory>,
 ) -> Result<Response> {
     let query = SectionQuery::read(&uri)?;
-    let id = work_id(Kind::Evolution, &id)?;
+    let id = evolution.id;
     let Some(k) = BODIES.iter().position(|(name, _)| *name == body) else {
         let detail = format!("`{body}` is not a body; allowed: rail, wheel");
         return Err(ApiError::new(ProblemKind::JobNotFound, detail));
     };
     let (extensions, text) = query.format.unwrap_or(FORMS[0].1);
-    let made = read(jobs, &memory, id, move |evolution| {
+    let made = read(evolution, &memory, move |evolution| {
         let last = evolution.records.len().saturating_sub(1);
         let number = query.record.map_or(last, |number| number as usize);
         let record = evolution.records.get(number).ok_or_else(|| {
@@ -282,12 +279,10 @@ pub(crate) async fn section(
 
 /// Answers with the response that `make` creates from an evolution on a blocking thread.
 async fn read(
-    jobs: Jobs,
+    WorkPath { jobs, id }: WorkPath,
     memory: &Memory,
-    id: Uuid,
     make: impl FnOnce(&EvolutionAnswer) -> Result<Response> + Send + 'static,
 ) -> Result<Response> {
-    let jobs = jobs.of_kind(Kind::Evolution);
     // The text, and about as much for the parsed evolution.
     let answer = jobs.open_answer(id).await?;
     let share = memory.ready_answer(jobs.tenant(), 2 * answer.bytes)?;

@@ -23,7 +23,6 @@ use crate::routes::plots::{PlotOptions, View, WIDTH_DEFAULT, picture};
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::solution::words::answer::{PatchCells, PointFields};
 use railhead_jobs::Jobs;
-use railhead_tables::cells::CellTable;
 use railhead_tables::csv::Precision;
 use railhead_tables::{npz, vtk};
 
@@ -88,10 +87,8 @@ query! {
 /// The requested patch and motion, grid and format.
 #[derive(Debug, Clone, Copy)]
 struct Selection {
-    /// Index of the patch.
-    patch: usize,
-    /// Index of the motion.
-    point: usize,
+    /// Indices of the patch and of the motion.
+    place: [usize; 2],
     /// Samples along x and y, if the field is resampled.
     grid: Option<(usize, usize)>,
     /// The format of the response.
@@ -108,7 +105,6 @@ impl Selection {
         (place, values): (PlaceQuery, ValuesQuery),
         format: Format,
     ) -> Result<Selection> {
-        let [patch, point] = place.place();
         let samples_max = request.shared.options.grid_max_samples;
         if let Some((nx, ny)) = values.grid
             && nx * ny > samples_max
@@ -118,8 +114,7 @@ impl Selection {
             return Err(ApiError::bad_parameter("grid", detail));
         }
         Ok(Selection {
-            patch,
-            point,
+            place: place.place(),
             grid: values.grid,
             format,
             precision: values.precision.unwrap_or_default(),
@@ -135,16 +130,13 @@ impl Selection {
             return Ok(None);
         }
         if self.grid.is_some() {
-            return Err(ApiError::bad_parameter(
-                "grid",
-                "a picture shows the cells themselves; leave `grid` out",
-            ));
+            let detail = "a picture shows the cells themselves; leave `grid` out";
+            return Err(ApiError::bad_parameter("grid", detail));
         }
         let options = PlotOptions {
             view: View::Patch,
             shown,
-            patch: self.patch,
-            point: self.point,
+            place: self.place,
             width: WIDTH_DEFAULT,
             range: None,
         };
@@ -238,8 +230,8 @@ async fn write_parts(
     wanted: Vec<Output>,
     (members, name): (String, &'static str),
 ) -> Result<Response> {
-    let place = [selection.patch, selection.point];
-    let (cells, values) = stored(&request.jobs, request.id, place, &wanted).await?;
+    let [patch, point] = selection.place;
+    let (cells, values) = stored(&request.jobs, request.id, selection.place, &wanted).await?;
     let outputs = match wanted.is_empty() {
         true => PARTS
             .into_iter()
@@ -247,79 +239,48 @@ async fn write_parts(
             .collect(),
         false => wanted,
     };
-    let field = FieldValues {
-        outputs,
-        cells,
-        values,
-        members,
-    };
-    let written = rendering.run(move || field.write(selection, name), Written::bytes);
-    let (written, share) = written.await?;
-    let body = match written {
-        Written::Json(table, members) => json_body(table, &members),
-        Written::Csv(table) => csv_body(table),
-        Written::File(bytes) => Body::from(bytes),
-    };
-    let name = format!("{name}-{}-{}", selection.patch, selection.point);
+    let write = move || write(selection, &outputs, (cells, values), (&members, name));
+    let ((body, _), share) = rendering.run(write, |(_, bytes)| *bytes).await?;
+    let name = format!("{name}-{patch}-{point}");
     Ok(hold_while_sent(selection.format.answer(&name, body), share))
 }
 
-/// The values of a field, and further members of its JSON.
-struct FieldValues {
-    /// The outputs that are written.
-    outputs: Vec<Output>,
-    cells: PatchCells,
-    values: PointFields,
-    /// Members of the JSON before `outlines`, each preceded by a comma.
-    members: String,
-}
-
-/// A field in the requested format. JSON and CSV are written from the table while the client receives them.
-enum Written {
-    Json(CellTable, String),
-    Csv(CellTable),
-    File(Vec<u8>),
-}
-
-impl Written {
-    /// Size in memory in bytes.
-    fn bytes(&self) -> usize {
-        match self {
-            Written::Json(table, _) | Written::Csv(table) => table.bytes(),
-            Written::File(bytes) => bytes.len(),
+/// Returns a field in the requested format, and its size in memory in bytes. JSON and CSV are written from the table while the client receives
+/// them. `members` are further members of the JSON, each preceded by a comma.
+fn write(
+    selection: Selection,
+    outputs: &[Output],
+    (cells, values): (PatchCells, PointFields),
+    (members, name): (&str, &str),
+) -> Result<(Body, usize)> {
+    let [patch, point] = selection.place;
+    let outlines = Outlines::of(&cells, &values, outputs.contains(&Output::Zones));
+    let mut table = cell_table(outputs, selection.grid, cells, values);
+    table.precision = selection.precision;
+    let file = match selection.format {
+        Format::Npz => {
+            let mut named = vec![("patch", &outlines.patch)];
+            named.extend(outlines.stick.iter().map(|zone| ("stick", zone)));
+            named.extend(outlines.slip.iter().map(|zone| ("slip", zone)));
+            npz::write(&table, &named).map_err(ApiError::internal)?
         }
-    }
-}
-
-impl FieldValues {
-    fn write(self, selection: Selection, name: &str) -> Result<Written> {
-        let (patch, point) = (selection.patch, selection.point);
-        let with_zones = self.outputs.contains(&Output::Zones);
-        let outlines = Outlines::of(&self.cells, &self.values, with_zones);
-        let mut table = cell_table(&self.outputs, selection.grid, self.cells, self.values);
-        table.precision = selection.precision;
-        Ok(match selection.format {
-            Format::Csv => Written::Csv(table),
-            Format::Npz => {
-                let mut named = vec![("patch", &outlines.patch)];
-                named.extend(outlines.stick.iter().map(|zone| ("stick", zone)));
-                named.extend(outlines.slip.iter().map(|zone| ("slip", zone)));
-                let file = npz::write(&table, &named);
-                Written::File(file.map_err(ApiError::internal)?)
+        Format::Vtk => {
+            let title = format!("{name}, patch {patch}, motion {point}; mm, N, MPa");
+            vtk::write(&table, &title)
+        }
+        format => {
+            let bytes = table.bytes();
+            if format == Format::Csv {
+                return Ok((csv_body(table), bytes));
             }
-            Format::Vtk => {
-                let title = format!("{name}, patch {patch}, motion {point}; mm, N, MPa");
-                Written::File(vtk::write(&table, &title))
-            }
-            _ => {
-                let outlines = serde_json::to_string(&outlines).map_err(ApiError::internal)?;
-                let members = self.members;
-                let members =
-                    format!("\"patch\":{patch},\"point\":{point}{members},\"outlines\":{outlines}");
-                Written::Json(table, members)
-            }
-        })
-    }
+            let outlines = serde_json::to_string(&outlines).map_err(ApiError::internal)?;
+            let members =
+                format!("\"patch\":{patch},\"point\":{point}{members},\"outlines\":{outlines}");
+            return Ok((json_body(table, &members), bytes));
+        }
+    };
+    let bytes = file.len();
+    Ok((Body::from(file), bytes))
 }
 
 /// The formats of all fields together.
@@ -343,15 +304,10 @@ fn parts() -> Reader<Vec<Output>> {
     let allowed = format!("a comma-separated list of {}, each once", names.join(", "));
     reader(allowed, |text| {
         let part = |name: &str| PARTS.into_iter().find(|part| part.name() == name);
-        let mut parts = Vec::new();
-        for name in text.split(',') {
-            let part = part(name)?;
-            if parts.contains(&part) {
-                return None;
-            }
-            parts.push(part);
-        }
-        Some(parts)
+        let parts: Vec<Output> = text.split(',').map(part).collect::<Option<_>>()?;
+        let mut places = parts.iter().enumerate();
+        let once = places.all(|(place, part)| !parts[..place].contains(part));
+        once.then_some(parts)
     })
 }
 
@@ -424,7 +380,7 @@ pub(crate) struct ZoneCells {
 /// `output-not-asked` if the case does not request zones.
 async fn sizes_of_zones(jobs: &Jobs, id: Uuid, selection: Selection) -> Result<String> {
     let solution = jobs.solution(id).await?;
-    let (_, point) = motion_of(&solution, [selection.patch, selection.point])?;
+    let (_, point) = motion_of(&solution, selection.place)?;
     let sizes = || {
         Some([
             ("stick_area_mm2", json!(point.stick_area_mm2?)),

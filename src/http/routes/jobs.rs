@@ -4,7 +4,7 @@ use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
-use crate::extract::caller::{Caller, JobId};
+use crate::extract::caller::WorkPath;
 use crate::extract::json::JsonBody;
 use crate::limits::Memory;
 use crate::problem::{Result, problems};
@@ -62,7 +62,7 @@ problems! {
     params(("id" = String, Path, description = "Id of the job", format = "uuid")),
     responses((status = 200, description = "The case", body = Case), GetProblems)
 )]
-pub(crate) async fn case(Caller(jobs): Caller, JobId(id): JobId) -> Result<Response> {
+pub(crate) async fn case(WorkPath { jobs, id }: WorkPath) -> Result<Response> {
     let text = jobs.case(id).await?;
     Ok(([(header::CONTENT_TYPE, "application/json")], text).into_response())
 }

@@ -17,7 +17,8 @@ use uuid::Uuid;
 use crate::dto::JobAnswer;
 use crate::extract::caller::Caller;
 use crate::extract::query::{
-    Parameters, Query, Reader, count, label, name, query, reader, repeated, time,
+    Parameters, Query, Reader, count, label, list as list_reader, name, query, reader, repeated,
+    time,
 };
 use crate::problem::{ApiError, ProblemKind, Result, describe};
 use crate::routes::work::{WorkAnswer, answer_name, json_answer, route, schema, text_header};
@@ -101,15 +102,10 @@ fn member() -> Reader<Membership> {
 }
 
 fn fields() -> Reader<Vec<String>> {
-    reader(
-        format!("a comma-separated list of {}", MEMBERS.join(", ")),
-        |text| {
-            let names = text.split(',').map(str::to_owned);
-            let names: Vec<String> = names.collect();
-            let known = names.iter().all(|name| MEMBERS.contains(name));
-            known.then_some(names)
-        },
-    )
+    let allowed = format!("a comma-separated list of {}", MEMBERS.join(", "));
+    list_reader(allowed, |name| {
+        MEMBERS.iter().find(|known| *known == name).cloned()
+    })
 }
 
 /// Returns `GET` of the list of a kind.
@@ -120,15 +116,11 @@ pub(crate) fn list(kind: Kind) -> OpenApiRouter<AppState> {
     let nouns = kind.nouns();
     let link = text_header("The next page (`rel=next`); absent on the last page");
     let found = json_answer(&page_name(kind), &format!("A page of {nouns}")).header("Link", link);
-    let mut parameters = groups(kind).1;
-    parameters
-        .iter_mut()
-        .for_each(|parameter| parameter.parameter_in = ParameterIn::Query);
     let mut listing = OperationBuilder::new()
         .operation_id(Some(format!("list_{nouns}")))
         .tag(nouns)
         .summary(Some(format!("Lists {nouns}, newest first.")))
-        .parameters(Some(parameters))
+        .parameters(Some(groups(kind).1))
         .response("200", found.build());
     if has_states(kind) {
         listing = listing.description(Some(

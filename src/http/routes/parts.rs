@@ -5,7 +5,7 @@ use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use uuid::Uuid;
 
-use crate::extract::caller::{Caller, JobId};
+use crate::extract::caller::WorkPath;
 use crate::extract::query::{index, no_such_index, query, require_index};
 use crate::layers::etag::{tag_of, tagged};
 use crate::limits::Rendering;
@@ -37,8 +37,7 @@ impl FromRequestParts<AppState> for PartRequest {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, shared: &AppState) -> Result<Self> {
-        let Caller(jobs) = Caller::from_request_parts(parts, shared).await?;
-        let JobId(id) = JobId::from_request_parts(parts, shared).await?;
+        let WorkPath { jobs, id } = WorkPath::from_request_parts(parts, shared).await?;
         Ok(PartRequest {
             jobs,
             id,

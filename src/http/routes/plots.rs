@@ -22,7 +22,9 @@ use crate::render::picture::svg::Svg;
 use crate::render::table::File;
 use crate::routes::parts::{FieldProblems, PartRequest, PlaceQuery, motion_of, stored};
 use railhead_contact::case::words::solver::Output;
-use railhead_contact::solution::words::answer::{PatchCells, PointSolution, Solution, Total};
+use railhead_contact::solution::words::answer::{
+    ErrorEstimate, PatchCells, PointSolution, Solution, Total,
+};
 use railhead_jobs::Jobs;
 use railhead_jobs::error::JobsError;
 
@@ -47,10 +49,8 @@ pub(crate) struct PlotOptions {
     pub view: View,
     /// The field.
     pub shown: Output,
-    /// Index of the patch.
-    pub patch: usize,
-    /// Index of the motion.
-    pub point: usize,
+    /// Indices of the patch and of the motion.
+    pub place: [usize; 2],
     /// Width in pixels.
     pub width: u32,
     /// Requested ends of the scale.
@@ -58,15 +58,11 @@ pub(crate) struct PlotOptions {
 }
 
 /// Returns the indices of patch and motion, if there are several.
-fn counted(options: PlotOptions, patches: usize, points: usize) -> String {
-    let mut text = String::new();
-    if patches > 1 {
-        text += &format!(", patch {} of 0 to {}", options.patch, patches - 1);
-    }
-    if points > 1 {
-        text += &format!(", point {} of 0 to {}", options.point, points - 1);
-    }
-    text
+fn counted(place: [usize; 2], counts: [usize; 2]) -> String {
+    let several = (0..2).filter(|k| counts[*k] > 1);
+    let words = ["patch", "point"];
+    let text = several.map(|k| format!(", {} {} of 0 to {}", words[k], place[k], counts[k] - 1));
+    text.collect()
 }
 
 /// Returns motion and forces in two lines.
@@ -133,10 +129,10 @@ async fn drawing(request: &PartRequest, title: String, options: PlotOptions) -> 
         View::Profiles => return profiles_drawing(jobs, id, title, solution).await,
         View::Section | View::Patch => {}
     }
-    let place = [options.patch, options.point];
-    let (patch, point) = motion_of(&solution, place)?;
-    let (cells, values) = stored(jobs, id, place, &[options.shown]).await?;
-    let counted = counted(options, solution.patches.len(), patch.points.len());
+    let (patch, point) = motion_of(&solution, options.place)?;
+    let (cells, values) = stored(jobs, id, options.place, &[options.shown]).await?;
+    let counts = [solution.patches.len(), patch.points.len()];
+    let counted = counted(options.place, counts);
     let remarks = remarks(point, patch.normal_force_n, &counted);
     if options.view == View::Patch {
         let scene = Scene {
@@ -168,27 +164,22 @@ fn curve_drawing(title: String, solution: &Solution) -> Result<Drawing> {
         .first()
         .map_or(&[][..], |patch| &patch.points);
     if points.len() < 2 {
-        return Err(ApiError::bad_parameter(
-            "view",
-            "the case has one motion; a curve needs several, as of a sweep",
-        ));
+        let detail = "the case has one motion; a curve needs several, as of a sweep";
+        return Err(ApiError::bad_parameter("view", detail));
     }
     let (x_name, x) = varying(points);
-    let line = |name, force: fn(&Total) -> [Option<f64>; 2]| CurveLine {
+    let line = |name, force: fn(&Total) -> f64, error: fn(ErrorEstimate) -> f64| CurveLine {
         name,
-        y: solution
+        y: solution.total.iter().map(force).collect(),
+        error: solution
             .total
             .iter()
-            .filter_map(|total| force(total)[0])
+            .map(|total| total.error_estimate.map(error))
             .collect(),
-        error: solution.total.iter().map(|total| force(total)[1]).collect(),
     };
-    let bounds = solution.patches.iter().map(|patch| patch.friction_limit_n);
-    let normal: f64 = solution
-        .patches
-        .iter()
-        .map(|patch| patch.normal_force_n)
-        .sum();
+    let patches = solution.patches.iter();
+    let bounds = patches.clone().map(|patch| patch.friction_limit_n);
+    let normal: f64 = patches.map(|patch| patch.normal_force_n).sum();
     let curve = Curve {
         title,
         remarks: vec![format!(
@@ -199,18 +190,8 @@ fn curve_drawing(title: String, solution: &Solution) -> Result<Drawing> {
         x_name: x_name.to_owned(),
         x,
         lines: vec![
-            line("force x (along rolling)", |total| {
-                [
-                    Some(total.force_x_n),
-                    total.error_estimate.map(|error| error.force_x_n),
-                ]
-            }),
-            line("force y (across)", |total| {
-                [
-                    Some(total.force_y_n),
-                    total.error_estimate.map(|error| error.force_y_n),
-                ]
-            }),
+            line("force x (along rolling)", |t| t.force_x_n, |e| e.force_x_n),
+            line("force y (across)", |t| t.force_y_n, |e| e.force_y_n),
         ],
         bound: bounds.sum(),
     };
@@ -225,9 +206,8 @@ fn varying(points: &[PointSolution]) -> (&'static str, Vec<f64>) {
     if let Some(distances) = points.iter().map(distance).collect() {
         return ("distance rolled in mm", distances);
     }
-    let length = points
-        .first()
-        .map_or(1.0, |point| point.normalised.length_mm);
+    let first = points.first();
+    let length = first.map_or(1.0, |point| point.normalised.length_mm);
     let components: [(&str, f64, Component); 3] = [
         ("creepage x", 1.0, |point| point.motion.creepage_x),
         ("creepage y", 1.0, |point| point.motion.creepage_y),
@@ -255,10 +235,8 @@ async fn profiles_drawing(
     for (number, patch) in solution.patches.iter().enumerate() {
         // A wheelset has two wheels in every position.
         let Some(position) = patch.position.filter(|_| solution.wheelset.is_none()) else {
-            return Err(ApiError::bad_parameter(
-                "view",
-                "only contacts of the type `profiles` have one wheel and one rail",
-            ));
+            let detail = "only contacts of the type `profiles` have one wheel and one rail";
+            return Err(ApiError::bad_parameter("view", detail));
         };
         let cells = match jobs.patch_fields(id, number, Some(0)).await {
             Err(JobsError::NoSuchPatch(_)) => PatchCells::default(),
@@ -276,35 +254,23 @@ async fn profiles_drawing(
         let placed = understood
             .placement
             .ok_or_else(|| ApiError::internal("a case of profiles without a placement"))?;
-        let pressed = match patches
-            .iter()
-            .any(|patch| patch.cells.pressure_mpa.is_some())
-        {
+        let mut cells = patches.iter().map(|patch| &patch.cells);
+        let pressed = match cells.any(|cells| cells.pressure_mpa.is_some()) {
             true => "pressure stands on the rail",
             false => "without `pressure` among its outputs",
         };
-        let count = patches.len();
+        let count = match patches.len() {
+            1 => "1 patch".to_owned(),
+            count => format!("{count} patches"),
+        };
+        let loads = solution.patches.iter().enumerate().map(|(number, patch)| {
+            let (force, pressure) = (patch.normal_force_n, patch.pressure_max_mpa);
+            format!("{number}: {} N, {} MPa", short(force), short(pressure))
+        });
+        let loads: Vec<String> = loads.collect();
         let view = ProfileView {
             title,
-            remarks: vec![
-                format!(
-                    "{count} {}; {pressed}",
-                    if count == 1 { "patch" } else { "patches" }
-                ),
-                solution
-                    .patches
-                    .iter()
-                    .enumerate()
-                    .map(|(number, patch)| {
-                        format!(
-                            "{number}: {} N, {} MPa",
-                            short(patch.normal_force_n),
-                            short(patch.pressure_max_mpa)
-                        )
-                    })
-                    .collect::<Vec<_>>()
-                    .join("; "),
-            ],
+            remarks: vec![format!("{count}; {pressed}"), loads.join("; ")],
             placed,
             lowering: solution.wheel_lowering_mm.unwrap_or(0.0),
             patches,
@@ -364,13 +330,10 @@ fn range(text: &str) -> Option<[f64; 2]> {
 impl PlotOptions {
     fn read(uri: &Uri) -> Result<PlotOptions> {
         let (place, query) = <(PlaceQuery, PlotQuery)>::read(uri)?;
-        let [patch, point] = place.place();
         let shown = query.field.unwrap_or(Output::Tractions);
         if shown == Output::Zones && query.range.is_some() {
-            return Err(ApiError::bad_parameter(
-                "range",
-                "zones have no scale; leave `range` out",
-            ));
+            let detail = "zones have no scale; leave `range` out";
+            return Err(ApiError::bad_parameter("range", detail));
         }
         let view = query.view.unwrap_or(View::Patch);
         if view != View::Patch {
@@ -391,8 +354,7 @@ impl PlotOptions {
             view,
             shown,
             range: query.range,
-            patch,
-            point,
+            place: place.place(),
             width: query.width.unwrap_or(WIDTH_DEFAULT),
         })
     }

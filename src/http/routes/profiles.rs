@@ -28,7 +28,7 @@ impl FromRequestParts<AppState> for Digest {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
-        let text = path_text(parts, state, ProblemKind::ProfileNotFound).await?;
+        let text = path_text(parts, state, "digest", ProblemKind::ProfileNotFound).await?;
         Ok(Digest(text))
     }
 }

@@ -1,9 +1,10 @@
 //! `/v1/runs`: many rows that vary one case, their results and statistics.
 
 use std::collections::BTreeMap;
+use std::iter::repeat;
 use std::ops::Range;
 
-use axum::extract::{Request, State};
+use axum::extract::{Path, Request, State};
 use axum::http::{HeaderMap, Uri};
 use axum::response::Response;
 use axum::{Extension, Json};
@@ -16,8 +17,8 @@ use uuid::Uuid;
 
 use crate::dto::{AnswerColumn, RunRequest, answer_columns};
 use crate::extract::accept::{choose, one_of};
-use crate::extract::caller::{Caller, Credential, RunId, RunRowId};
-use crate::extract::query::{Parameters, Reader, id, query, reader, repeated};
+use crate::extract::caller::{Credential, WorkPath};
+use crate::extract::query::{Parameters, Reader, id, list, query, reader, repeated};
 use crate::extract::rows::{JSON, TableUpload, read_run, separate_table};
 use crate::limits::{Memory, hold_while_sent};
 use crate::options::HttpOptions;
@@ -127,10 +128,7 @@ query! {
 
 /// Returns the reader of a comma-separated list of names.
 fn names(allowed: &'static str) -> Reader<Vec<String>> {
-    reader(allowed, |text| {
-        let names = text.split(',').map(|name| name.trim().to_owned());
-        Some(names.collect())
-    })
+    list(allowed, |name| Some(name.trim().to_owned()))
 }
 
 fn row_range(text: &str) -> Option<Range<u64>> {
@@ -189,8 +187,7 @@ pub(crate) struct RunRow {
     )), RunResultProblems)
 )]
 pub(crate) async fn results(
-    Caller(jobs): Caller,
-    RunId(id): RunId,
+    WorkPath { jobs, id }: WorkPath,
     wait: Wait,
     uri: Uri,
     State(memory): State<Memory>,
@@ -199,7 +196,7 @@ pub(crate) async fn results(
 ) -> Result<Response> {
     let (query, _) = <(RunResultsQuery, WaitQuery)>::read(&uri)?;
     let format = choose(&headers, query.format, RESULT_FORMATS)?;
-    await_end(&jobs.of_kind(Kind::Rows), id, &wait).await?;
+    await_end(&jobs, id, &wait).await?;
     let run = jobs.run(id).await?;
     require_ended(&run)?;
     let columns = selected(&run, query.columns)?;
@@ -327,7 +324,7 @@ pub(crate) struct RunFile {
     params(("id" = String, Path, description = "Id of the run", format = "uuid")),
     responses((status = 200, description = "The files", body = RunManifest), RunResultProblems)
 )]
-pub(crate) async fn manifest(Caller(jobs): Caller, RunId(id): RunId) -> Result<Json<RunManifest>> {
+pub(crate) async fn manifest(WorkPath { jobs, id }: WorkPath) -> Result<Json<RunManifest>> {
     let run = jobs.run(id).await?;
     require_ended(&run)?;
     let (rows, columns) = (run.head.rows, answer_columns(&run));
@@ -385,15 +382,17 @@ pub(crate) struct RunRowAlone {
     responses((status = 200, description = "The row", body = RunRowAlone), RunRowProblems)
 )]
 pub(crate) async fn row(
-    Caller(jobs): Caller,
-    RunRowId(id, row): RunRowId,
+    WorkPath { jobs, id }: WorkPath,
+    Path((_id, row)): Path<(String, String)>,
 ) -> Result<Json<RunRowAlone>> {
+    let unknown = |detail| ApiError::new(ProblemKind::RowNotFound, detail);
+    let not_index = format!("`{row}` is not the index of a row; rows are counted from 0");
+    let row = row.parse().map_err(|_| unknown(not_index))?;
     let run = jobs.run(id).await?;
     if row >= run.head.rows {
-        return Err(ApiError::new(
-            ProblemKind::RowNotFound,
-            format!("the run has {} rows, counted from 0", run.head.rows),
-        ));
+        let rows = run.head.rows;
+        let detail = format!("the run has {rows} rows, counted from 0");
+        return Err(unknown(detail));
     }
     let (case, answer) = jobs.run_row(&run, row).await?;
     let answer = answer.map(members).transpose()?;
@@ -445,12 +444,7 @@ query! {
 }
 
 fn numbers(text: &str) -> Option<Vec<f64>> {
-    let number = |text: &str| {
-        text.trim()
-            .parse()
-            .ok()
-            .filter(|number: &f64| number.is_finite())
-    };
+    let number = |text: &str| text.trim().parse().ok().filter(|x: &f64| x.is_finite());
     let mut numbers = text.split(',').map(number).collect::<Option<Vec<f64>>>()?;
     numbers.sort_unstable_by(f64::total_cmp);
     numbers.dedup();
@@ -525,8 +519,7 @@ fn in_order<S: Serializer, V: Serialize>(
     responses((status = 200, description = "The statistics", body = RunTotals), RunResultProblems)
 )]
 pub(crate) async fn totals(
-    Caller(jobs): Caller,
-    RunId(id): RunId,
+    WorkPath { jobs, id }: WorkPath,
     uri: Uri,
     State(memory): State<Memory>,
 ) -> Result<Json<RunTotals>> {
@@ -580,37 +573,32 @@ fn section_of(
     by: Option<String>,
     width: Option<f64>,
 ) -> Result<Option<RowSection>> {
+    let refused = |parameter, detail| Err(ApiError::bad_parameter(parameter, detail));
     let Some(name) = by else {
         return match width {
             None => Ok(None),
-            Some(_) => Err(ApiError::bad_parameter("width", "`width` belongs to `by`")),
+            Some(_) => refused("width", "`width` belongs to `by`".to_owned()),
         };
     };
-    let kind = columns.iter().find(|(known, _)| *known == name);
-    match (kind, width) {
-        (None, _) => {
-            let detail = format!("`{name}` is not a column of this run");
-            Err(ApiError::bad_parameter("by", detail))
-        }
-        (Some((_, TableKind::Texts)), None) => Ok(Some(RowSection { name, width })),
-        (Some((_, TableKind::Texts)), Some(_)) => Err(ApiError::bad_parameter(
+    let known = columns.iter().find(|(known, _)| *known == name);
+    let Some((_, kind)) = known else {
+        return refused("by", format!("`{name}` is not a column of this run"));
+    };
+    match (*kind == TableKind::Texts, width) {
+        (true, Some(_)) => refused(
             "width",
             format!("`{name}` holds texts; `width` is for numbers only"),
-        )),
-        (Some(_), None) => Err(ApiError::bad_parameter(
+        ),
+        (false, None) => refused(
             "width",
             format!("`{name}` holds numbers; give `width`, the length of an interval"),
-        )),
-        (Some(_), Some(_)) => Ok(Some(RowSection { name, width })),
+        ),
+        _ => Ok(Some(RowSection { name, width })),
     }
 }
 
 /// Identifies a section: the index of its interval, or its text, if it has one.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-enum SectionKey {
-    Interval(i64),
-    Text(Option<String>),
-}
+type SectionKey = (Option<i64>, Option<String>);
 
 /// The numbers of all rows, and of each section.
 struct Gathered {
@@ -659,21 +647,18 @@ impl Gathered {
     fn totals(self, percentiles: &[f64], above: &[f64]) -> RunTotals {
         let names = &self.names;
         let width = self.section.as_ref().and_then(|section| section.width);
-        let sections = self.sections.into_iter().map(|(key, numbers)| {
-            let mut totals = totals_of(names, numbers, percentiles, above);
-            match key {
-                SectionKey::Text(text) => totals.value = text,
-                SectionKey::Interval(place) => {
-                    // 15 digits: -14 times 0.1 is -1.4.
-                    let start = width.map(|width| format!("{:.14e}", place as f64 * width));
-                    totals.from = start.and_then(|start| start.parse().ok());
-                }
+        let sections = self.sections.into_iter().map(|((place, value), numbers)| {
+            // 15 digits: -14 times 0.1 is -1.4.
+            let start = |place: i64| format!("{:.14e}", place as f64 * width?).parse().ok();
+            SectionTotals {
+                value,
+                from: place.and_then(start),
+                ..numbers.totals(names, percentiles, above)
             }
-            totals
         });
         RunTotals {
             sections: self.section.is_some().then(|| sections.collect()),
-            all: totals_of(names, self.all, percentiles, above),
+            all: self.all.totals(names, percentiles, above),
         }
     }
 }
@@ -682,7 +667,7 @@ impl RowSection {
     fn key(&self, table: &RowTable, row: usize) -> Option<SectionKey> {
         let number = match table.column(&self.name)? {
             TableColumn::Texts(texts) => {
-                return Some(SectionKey::Text(texts[row].clone()));
+                return Some((None, texts[row].clone()));
             }
             TableColumn::Numbers(numbers) => numbers[row],
             TableColumn::Integers(numbers) => numbers[row] as f64,
@@ -694,7 +679,7 @@ impl RowSection {
             true => nearest,
             false => quotient.floor(),
         };
-        (!place.is_nan()).then_some(SectionKey::Interval(place as i64))
+        (!place.is_nan()).then_some((Some(place as i64), None))
     }
 }
 
@@ -712,28 +697,20 @@ impl Numbers {
             }
         }
     }
-}
 
-fn totals_of(
-    names: &[String],
-    numbers: Numbers,
-    percentiles: &[f64],
-    above: &[f64],
-) -> SectionTotals {
-    // A section without rows has no columns.
-    let columns = numbers
-        .columns
-        .into_iter()
-        .chain(std::iter::repeat(Vec::new()));
-    let columns = names.iter().cloned().zip(columns);
-    SectionTotals {
-        value: None,
-        from: None,
-        rows: numbers.rows,
-        statuses: numbers.statuses,
-        columns: columns
-            .map(|(name, values)| (name, column_totals(values, percentiles, above)))
-            .collect(),
+    fn totals(self, names: &[String], percentiles: &[f64], above: &[f64]) -> SectionTotals {
+        // A section without rows has no columns.
+        let columns = self.columns.into_iter().chain(repeat(Vec::new()));
+        let columns = names.iter().cloned().zip(columns);
+        SectionTotals {
+            value: None,
+            from: None,
+            rows: self.rows,
+            statuses: self.statuses,
+            columns: columns
+                .map(|(name, values)| (name, column_totals(values, percentiles, above)))
+                .collect(),
+        }
     }
 }
 

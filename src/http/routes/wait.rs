@@ -12,7 +12,7 @@ use futures_util::{Stream, StreamExt};
 use serde::Serialize;
 
 use crate::extract::accept::choose;
-use crate::extract::caller::{Caller, Credential, Tenant, revoked, revoked_meanwhile};
+use crate::extract::caller::{Credential, Tenant, revoked, revoked_meanwhile};
 use crate::extract::query::{Parameters, Query, query, seconds};
 use crate::limits::{ConcurrencyLimits, HeldPermits, Permit, hold_while_sent};
 use crate::problem::{ApiError, Result};
@@ -36,7 +36,7 @@ query! {
     }
 }
 
-/// The requested wait, and the permit to wait. Handlers extract it after the [`Caller`].
+/// The requested wait, and the permit to wait. Handlers extract it after the caller.
 pub(crate) struct Wait {
     seconds: Option<u32>,
     preferred: bool,
@@ -148,10 +148,8 @@ const RETRY: Duration = Duration::from_secs(1);
 
 const LAST_EVENT_ID: HeaderName = HeaderName::from_static("last-event-id");
 
-/// A request for an event stream.
+/// A request for an event stream. Handlers extract it after the caller.
 pub(crate) struct EventRequest {
-    /// The jobs of the tenant.
-    pub jobs: Jobs,
     /// The id of the last event that the client received.
     pub seen: Option<String>,
     concurrency: ConcurrencyLimits,
@@ -163,10 +161,8 @@ impl FromRequestParts<AppState> for EventRequest {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self> {
-        let Caller(jobs) = Caller::from_request_parts(parts, state).await?;
         choose(&parts.headers, None, &[Format::Events])?;
         Ok(EventRequest {
-            jobs,
             seen: last_event_id(&parts.headers),
             concurrency: state.concurrency.clone(),
             held: parts.extensions.get().cloned().unwrap_or_default(),
@@ -182,11 +178,12 @@ impl EventRequest {
     /// The limit of event streams is reached.
     pub(crate) fn answer(
         self,
+        jobs: Jobs,
         events: impl Stream<Item = Result<Event, Infallible>> + Send + 'static,
     ) -> Result<Response> {
-        let place = self.concurrency.stream(self.jobs.tenant())?;
+        let place = self.concurrency.stream(jobs.tenant())?;
         self.held.release();
-        let events = events.take_until(revoked(self.jobs, self.key));
+        let events = events.take_until(revoked(jobs, self.key));
         let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
         Ok(hold_while_sent(events.into_response(), place))
     }

@@ -3,7 +3,6 @@
 use std::convert::Infallible;
 
 use axum::body::Body;
-use axum::extract::Path;
 use axum::http::StatusCode;
 use axum::response::sse::Event;
 use axum::response::{IntoResponse, Response};
@@ -12,7 +11,6 @@ use axum::{Extension, Json};
 use futures_util::stream::{Stream, StreamExt, once, unfold};
 use serde::Serialize;
 use serde_json::{Value, json};
-use utoipa::openapi::extensions::Extensions;
 use utoipa::openapi::path::{OperationBuilder, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::{SchemaFormat, Type};
 use utoipa::openapi::{
@@ -23,8 +21,8 @@ use utoipa::{IntoParams, PartialSchema, ToSchema};
 use utoipa_axum::router::{OpenApiRouter, UtoipaMethodRouter};
 use uuid::Uuid;
 
-use crate::dto::{BatchAnswer, BatchReceipt, JobAnswer, RunAnswer};
-use crate::extract::caller::{Caller, Credential, revoked, until_revoked, work_id};
+use crate::dto::{BatchAnswer, JobAnswer, RunAnswer};
+use crate::extract::caller::{Caller, Credential, WorkPath, revoked, until_revoked};
 use crate::problem::{ApiError, PlainProblems, ProblemKind, Result, describe};
 use crate::render::format::Format;
 use crate::render::row_tables::{Piece, stream};
@@ -36,9 +34,6 @@ use railhead_jobs::model::{Kind, State as JobState};
 use railhead_jobs::work::Work;
 use railhead_tables::table::TableKind;
 use railhead_tables::write::WriteError;
-
-/// Every kind of work.
-pub(crate) const KINDS: [Kind; 4] = [Kind::Case, Kind::Cases, Kind::Evolution, Kind::Rows];
 
 /// Data of an event of `/v1/events`, by the name of the event.
 #[derive(Debug, Serialize, ToSchema)]
@@ -77,15 +72,13 @@ pub(crate) struct JobEvent {
 
 /// Returns `GET` and `DELETE` of one piece of work.
 pub(crate) fn one(kind: Kind) -> OpenApiRouter<AppState> {
-    let read = move |Caller(jobs): Caller, Path(id): Path<String>, wait: Wait| async move {
-        let id = work_id(kind, &id)?;
-        let jobs = jobs.of_kind(kind);
+    let read = async |WorkPath { jobs, id }: WorkPath, wait: Wait| {
         await_end(&jobs, id, &wait).await?;
         let work = jobs.work(id).await?;
         Ok::<_, ApiError>(wait.tell_applied(Json(WorkAnswer::from(work)).into_response()))
     };
-    let remove = move |Caller(jobs): Caller, Path(id): Path<String>| async move {
-        jobs.of_kind(kind).delete(work_id(kind, &id)?).await?;
+    let remove = async |WorkPath { jobs, id }: WorkPath| {
+        jobs.delete(id).await?;
         Ok::<_, ApiError>(StatusCode::NO_CONTENT)
     };
     let noun = kind.noun();
@@ -138,8 +131,8 @@ pub(crate) fn table_answer(
 
 /// Returns `POST …/cancel`.
 pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
-    let stop = move |Caller(jobs): Caller, Path(id): Path<String>| async move {
-        let work = jobs.of_kind(kind).cancel(work_id(kind, &id)?).await?;
+    let stop = async |WorkPath { jobs, id }: WorkPath| {
+        let work = jobs.cancel(id).await?;
         let status = match work.ended() {
             true => StatusCode::OK,
             false => StatusCode::ACCEPTED,
@@ -165,9 +158,6 @@ pub(crate) fn cancel(kind: Kind) -> OpenApiRouter<AppState> {
 /// The service has no state per client: the next event is created when the connection is ready for it. The id of an event identifies the
 /// version that it reported, so that `Last-Event-ID` resumes after lost connections and after restarts of the service.
 pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
-    let follow = move |request: EventRequest, Path(id): Path<String>| async move {
-        follow(request, kind, work_id(kind, &id)?).await
-    };
     let noun = kind.noun();
     let about = match kind {
         Kind::Case => {
@@ -194,27 +184,28 @@ pub(crate) fn events(kind: Kind) -> OpenApiRouter<AppState> {
         .parameter(seen)
         .response("200", sent.build())
         .response("204", ResponseBuilder::new().description(over).build());
-    let route = route(
-        kind,
-        "/{id}/events",
-        HttpMethod::Get,
-        following,
-        get(follow),
-    );
-    OpenApiRouter::new().routes(route)
+    let get = get(follow);
+    let (mut schemas, paths, handler) =
+        route(kind, "/{id}/events", HttpMethod::Get, following, get);
+    let data = match kind {
+        Kind::Case | Kind::Evolution => "JobEvent",
+        _ => answer_name(kind),
+    };
+    schemas.push((event_name(kind), event_schema(data, "`state`")));
+    OpenApiRouter::new().routes((schemas, paths, handler))
 }
 
-async fn follow(request: EventRequest, kind: Kind, id: Uuid) -> Result<Response> {
-    let jobs = request.jobs.of_kind(kind);
+async fn follow(WorkPath { jobs, id }: WorkPath, request: EventRequest) -> Result<Response> {
     let work = jobs.work(id).await?;
     let seen = request.seen.clone();
     if work.ended() && seen.as_deref() == Some(&work.version()) {
         return Ok(StatusCode::NO_CONTENT.into_response());
     }
-    request.answer(unfold(Some(seen), move |seen| {
-        let jobs = jobs.clone();
-        async move { next_event(&jobs, id, seen?).await }
-    }))
+    let events = unfold((jobs.clone(), Some(seen)), move |(jobs, seen)| async move {
+        let (event, seen) = next_event(&jobs, id, seen?).await?;
+        Some((event, (jobs, seen)))
+    });
+    request.answer(jobs, events)
 }
 
 /// Returns the next event and the version that it reports; `None` after the final event.
@@ -261,48 +252,23 @@ fn event_name(kind: Kind) -> String {
     format!("{}EventSent", answer_name(kind))
 }
 
-/// Returns the schemas of the responses of these routes.
-pub(crate) fn schemas() -> Vec<(String, RefOr<Schema>)> {
-    fn add<T: ToSchema>(all: &mut Vec<(String, RefOr<Schema>)>) {
-        all.push((T::name().into_owned(), T::schema()));
-        T::schemas(all);
-    }
-    let mut all = Vec::new();
-    add::<JobAnswer>(&mut all);
-    add::<BatchAnswer>(&mut all);
-    add::<BatchReceipt>(&mut all);
-    add::<RunAnswer>(&mut all);
-    add::<JobEvent>(&mut all);
-    for (kind, data) in [
-        (Kind::Case, "JobEvent"),
-        (Kind::Cases, "Batch"),
-        (Kind::Rows, "Run"),
-    ] {
-        all.push((event_name(kind), event_schema(data, "`state`")));
-    }
-    all
-}
-
 /// Returns the schema of an event with these names, whose data has the schema `data`.
 pub(crate) fn event_schema(data: &str, names: &str) -> RefOr<Schema> {
-    let text = |what: &str| text().description(Some(what));
-    let holds = json!({ "$ref": format!("#/components/schemas/{data}") });
-    let data = text("Data of the event, as JSON")
-        .content_media_type("application/json")
-        .extensions(Some(Extensions::from_iter([("contentSchema", holds)])));
-    let retry = ObjectBuilder::new()
-        .schema_type(Type::Integer)
-        .description(Some("Milliseconds to wait before reconnecting"));
-    let event = ObjectBuilder::new()
-        .description(Some("Fields of one server-sent event"))
-        .property("event", text(names))
-        .required("event")
-        .property("id", text("Id to send as `Last-Event-ID`"))
-        .required("id")
-        .property("retry", retry)
-        .property("data", data)
-        .required("data");
-    event.into()
+    let holds = format!("#/components/schemas/{data}");
+    schema(json!({
+        "type": "object",
+        "description": "Fields of one server-sent event",
+        "required": ["event", "id", "data"],
+        "properties": {
+            "event": { "type": "string", "description": names },
+            "id": { "type": "string", "description": "Id to send as `Last-Event-ID`" },
+            "retry": { "type": "integer", "description": "Milliseconds to wait before reconnecting" },
+            "data": {
+                "type": "string", "description": "Data of the event, as JSON", "contentMediaType": "application/json",
+                "contentSchema": { "$ref": holds },
+            },
+        },
+    }))
 }
 
 /// Returns an operation on one piece of work.
@@ -380,7 +346,7 @@ pub(crate) fn route(
     let mut paths = Paths::new();
     let path = format!("/v1/{}{below}", kind.nouns());
     paths.add_path_operation(path, vec![method], operation.build());
-    (schemas(), paths, handler)
+    (Vec::new(), paths, handler)
 }
 
 /// An event of the stream of a tenant, in the contract.
@@ -395,12 +361,7 @@ impl PartialSchema for TenantEventSent {
     }
 }
 
-impl ToSchema for TenantEventSent {
-    fn schemas(schemas: &mut Vec<(String, RefOr<Schema>)>) {
-        schemas.push((WorkAnswer::name().into_owned(), WorkAnswer::schema()));
-        WorkAnswer::schemas(schemas);
-    }
-}
+impl ToSchema for TenantEventSent {}
 
 /// Follows all changes of the tenant: jobs that were submitted alone, evolutions, batches and runs.
 ///
@@ -415,13 +376,13 @@ impl ToSchema for TenantEventSent {
     params(("Last-Event-ID" = Option<String>, Header, description = "Id of the last event received: the stream continues from there")),
     responses((status = 200, description = "One event per change", content((TenantEventSent = "text/event-stream"))), PlainProblems)
 )]
-pub(crate) async fn follow_all(request: EventRequest) -> Result<Response> {
+pub(crate) async fn follow_all(Caller(jobs): Caller, request: EventRequest) -> Result<Response> {
     let seen = request.seen.as_ref().and_then(|text| text.parse().ok());
-    let follower = request.jobs.follow(seen);
+    let follower = jobs.follow(seen);
     let start = event("start", &follower.since().to_string(), &json!({}));
     let changes = unfold(follower, next);
     let events = once(std::future::ready(start)).filter_map(std::future::ready);
-    request.answer(events.map(Ok).chain(changes))
+    request.answer(jobs, events.map(Ok).chain(changes))
 }
 
 async fn next(mut follower: Follower) -> Option<(Result<Event, Infallible>, Follower)> {

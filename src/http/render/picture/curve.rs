@@ -88,7 +88,6 @@ pub(crate) fn draw(curve: &Curve, width: u32) -> Svg {
     }
     chart.axes(&mut svg, [&curve.x_name, "force in N"]);
     legend(&mut svg, curve);
-    svg.raw("</svg>\n");
     svg
 }
 

@@ -52,7 +52,6 @@ pub(crate) fn draw(scene: &Scene, width: u32) -> Svg {
     chart.axes(&mut svg, ["x in mm", "y in mm"]);
     layers::rolling(&mut svg, &chart);
     layers::legend(&mut svg, &chart, scene, drawn);
-    svg.raw("</svg>\n");
     svg
 }
 
@@ -71,6 +70,5 @@ fn draw_alone(scene: &Scene, width: u32) -> Svg {
         None => map.zones(&mut svg, &chart),
     }
     map.border_thin(&mut svg, &chart);
-    svg.raw("</svg>\n");
     svg
 }

@@ -2,6 +2,7 @@
 
 use crate::render::picture::chart::{Chart, WIDTH, open};
 use crate::render::picture::svg::{Anchor, Svg, polyline, px};
+use crate::render::shape::sheet::bounds;
 use railhead_contact::solution::words::answer::{PatchCells, PlacedProfiles, Position};
 
 /// Range of z relative to the top of the rail, in mm.
@@ -44,16 +45,8 @@ pub(crate) struct ProfileViewPatch {
 #[must_use]
 pub(crate) fn draw(view: &ProfileView, width: u32) -> Svg {
     let rail = &view.placed.rail_mm;
-    let ends = rail
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [y, _]| {
-            [low.min(*y), high.max(*y)]
-        });
-    let [right, left] = [ends[0] - BESIDE, ends[1] + BESIDE];
-    let top = rail
-        .iter()
-        .map(|[_, z]| *z)
-        .fold(f64::NEG_INFINITY, f64::max);
+    let [right, left, _, top] = bounds(rail.iter().copied());
+    let [right, left] = [right - BESIDE, left + BESIDE];
     let area_width = WIDTH - LEFT - 24.0;
     let scale = area_width / (left - right);
     let height = scale * (SHOWN_Z[1] - SHOWN_Z[0]);
@@ -90,22 +83,12 @@ pub(crate) fn draw(view: &ProfileView, width: u32) -> Svg {
     combs(&mut svg, &chart, &view.patches);
     svg.raw("</g>\n");
     chart.axes(&mut svg, ["y to the left in mm", "z up in mm"]);
-    let (wheel_at, rail_at) = (TOP + 20.0, TOP + height - 12.0);
-    svg.text(
-        (LEFT + 12.0, wheel_at),
-        13.0,
-        Anchor::Start,
-        "fill=\"#6b5632\"",
-        "wheel",
-    );
-    svg.text(
-        (LEFT + 12.0, rail_at),
-        13.0,
-        Anchor::Start,
-        "fill=\"#46535e\"",
-        "rail",
-    );
-    svg.raw("</svg>\n");
+    for (y, fill, word) in [
+        (TOP + 20.0, "fill=\"#6b5632\"", "wheel"),
+        (TOP + height - 12.0, "fill=\"#46535e\"", "rail"),
+    ] {
+        svg.text((LEFT + 12.0, y), 13.0, Anchor::Start, fill, word);
+    }
     svg
 }
 

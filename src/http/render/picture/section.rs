@@ -41,7 +41,7 @@ struct SectionLine {
 /// Draws sections as SVG, `width` pixels wide.
 #[must_use]
 pub(crate) fn draw(sections: &Sections, width: u32) -> Svg {
-    let both = [along(sections), across(sections)];
+    let both = [0, 1].map(|axis| section(sections, axis));
     let values = both.iter().flat_map(|section| &section.points);
     let largest = values
         .map(|[_, traction, bound]| traction.max(if bound.is_nan() { 0.0 } else { *bound }))
@@ -72,7 +72,6 @@ pub(crate) fn draw(sections: &Sections, width: u32) -> Svg {
         left += share * room + GAPS[1];
     }
     legend(&mut svg, sections.friction.is_some());
-    svg.raw("</svg>\n");
     svg
 }
 
@@ -136,56 +135,33 @@ impl Sections {
     }
 }
 
-/// Returns the section along rolling, through the strip with the largest traction.
-fn along(of: &Sections) -> SectionLine {
+/// Returns the section along rolling (axis 0), through the strip with the largest traction, or across (axis 1), through the cells of all strips
+/// at the x of the largest traction. Between the centres of cells the square of a value is linear, and zero at the border, as for the pressure
+/// of Hertz.
+fn section(of: &Sections, axis: usize) -> SectionLine {
     let (cells, peak) = (&of.cells, of.peak());
-    let strip = cells.strip.get(peak).copied();
-    let mut own: Vec<usize> = (0..cells.x_mm.len())
-        .filter(|cell| Some(cells.strip[*cell]) == strip)
-        .collect();
-    own.sort_by(|a, b| cells.x_mm[*a].total_cmp(&cells.x_mm[*b]));
-    let spans = own.iter().map(|cell| {
-        let (x, half) = (cells.x_mm[*cell], 0.5 * cells.dx_mm[*cell]);
-        (*cell, [x - half, x + half])
+    let centres = [&cells.x_mm, &cells.y_mm];
+    let widths = [&cells.dx_mm, &cells.dy_mm];
+    let at = centres[1 - axis].get(peak).copied().unwrap_or(0.0);
+    let is_cut = |cell: &usize| match axis {
+        0 => cells.strip[*cell] == cells.strip[peak],
+        _ => (cells.x_mm[*cell] - at).abs() <= 0.5 * cells.dx_mm[*cell],
+    };
+    let mut own: Vec<usize> = (0..cells.x_mm.len()).filter(is_cut).collect();
+    own.sort_by(|a, b| centres[axis][*a].total_cmp(&centres[axis][*b]));
+    if axis == 1 {
+        own.dedup_by_key(|cell| cells.strip[*cell]);
+    }
+    let spans = own.into_iter().map(|cell| {
+        let (middle, half) = (centres[axis][cell], 0.5 * widths[axis][cell]);
+        (cell, [middle - half, middle + half])
     });
-    let y = cells.y_mm.get(peak).copied().unwrap_or(0.0);
-    section(
-        of,
-        spans.collect(),
-        format!("along rolling at y = {} mm", short(y)),
-        "x in mm",
-    )
-}
-
-/// Returns the section across, through the cells of all strips at the x of the largest traction.
-fn across(of: &Sections) -> SectionLine {
-    let (cells, peak) = (&of.cells, of.peak());
-    let at = cells.x_mm.get(peak).copied().unwrap_or(0.0);
-    let mut own: Vec<usize> = (0..cells.x_mm.len())
-        .filter(|cell| (cells.x_mm[*cell] - at).abs() <= 0.5 * cells.dx_mm[*cell])
-        .collect();
-    own.sort_by(|a, b| cells.y_mm[*a].total_cmp(&cells.y_mm[*b]));
-    own.dedup_by_key(|cell| cells.strip[*cell]);
-    let spans = own.iter().map(|cell| {
-        let (y, half) = (cells.y_mm[*cell], 0.5 * cells.dy_mm[*cell]);
-        (*cell, [y - half, y + half])
-    });
-    section(
-        of,
-        spans.collect(),
-        format!("across at x = {} mm", short(at)),
-        "y in mm",
-    )
-}
-
-/// Returns the section through these cells, each with its span. Between the centres of cells the square of a value is linear, and zero at the
-/// border, as for the pressure of Hertz.
-fn section(
-    of: &Sections,
-    spans: Vec<(usize, [f64; 2])>,
-    name: String,
-    x_name: &'static str,
-) -> SectionLine {
+    let spans: Vec<(usize, [f64; 2])> = spans.collect();
+    let (place, x_name) = match axis {
+        0 => ("along rolling at y", "x in mm"),
+        _ => ("across at x", "y in mm"),
+    };
+    let at = format!("{at:.2}").replace('-', "−");
     let sticks = spans.iter().filter(|(cell, _)| of.sticks(*cell));
     let sticks = sticks.map(|(_, span)| *span).collect();
     let middle = |(cell, [from, to]): &(usize, [f64; 2])| {
@@ -214,13 +190,9 @@ fn section(
     SectionLine {
         points,
         sticks,
-        name,
+        name: format!("{place} = {at} mm"),
         x_name,
     }
-}
-
-fn short(value: f64) -> String {
-    format!("{value:.2}").replace('-', "−")
 }
 
 #[cfg(test)]
@@ -253,7 +225,7 @@ mod tests {
             },
             friction: Some(1.0),
         };
-        let section = along(&of);
+        let section = section(&of, 0);
         for [x, traction, bound] in &section.points {
             let exact = (1.0 - x * x).max(0.0).sqrt();
             assert!(

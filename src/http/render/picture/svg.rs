@@ -5,7 +5,7 @@ use std::fmt::Write;
 /// Fonts in order of preference; raster pictures use the first.
 pub(super) const FONTS: &str = "DejaVu Sans, Verdana, sans-serif";
 
-/// An SVG drawing.
+/// An SVG drawing. Its first markup opens the element `svg`.
 #[derive(Debug, Default)]
 pub(crate) struct Svg {
     /// Markup and lines of text, in order.
@@ -97,7 +97,8 @@ impl Svg {
             Part::Markup(text) => text.clone(),
             Part::Line(line) => element(line),
         };
-        self.parts.iter().map(text).collect()
+        let parts = self.parts.iter().map(text);
+        parts.chain(["</svg>\n".to_owned()]).collect()
     }
 }
 

@@ -139,14 +139,19 @@ pub(crate) struct StoredSegment {
     pub(crate) left: f64,
     /// Leading end in mm.
     pub(crate) right: f64,
-    /// The segment that continues it toward smaller y, if each is the only neighbour of the other on that side.
-    pub(crate) below: Option<usize>,
-    /// The segment that continues it toward larger y, if each is the only neighbour of the other on that side.
-    pub(crate) above: Option<usize>,
-    /// Whether it touches several segments below, or one that touches other segments above.
-    pub(crate) branches_below: bool,
-    /// Whether it touches several segments above, or one that touches other segments below.
-    pub(crate) branches_above: bool,
+    /// Its continuation toward smaller and toward larger y.
+    pub(crate) next: [Continuation; 2],
+}
+
+/// The continuation of a segment in the next strip.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Continuation {
+    /// It touches no segment.
+    None,
+    /// It touches this segment, and each is the only neighbour of the other on that side.
+    Segment(usize),
+    /// It touches several segments, or one that touches others too.
+    Branches,
 }
 
 /// A patch as strips, each a range of segments, in ascending y, then x.
@@ -194,10 +199,7 @@ impl Strips {
                 dy: fields.dy_mm[i],
                 left: x - half,
                 right: x + half,
-                below: None,
-                above: None,
-                branches_below: false,
-                branches_above: false,
+                next: [Continuation::None; 2],
             });
             if let Some(strip) = out.strips.last_mut() {
                 strip.end = out.segments.len();
@@ -213,7 +215,7 @@ impl Strips {
             && self.strips.iter().all(|strip| strip.len() == 1)
             && self.segments[1..]
                 .iter()
-                .all(|segment| segment.below.is_some())
+                .all(|segment| matches!(segment.next[0], Continuation::Segment(_)))
     }
 
     /// Returns the trailing and the leading end of a segment without continuation at the border of its strip; `upper` selects the border at
@@ -222,28 +224,17 @@ impl Strips {
     /// The squared half-length is extrapolated through up to three strips as a parabola in y, which is exact for an ellipse, and the centre as
     /// a line. The half-length is limited to that of the segment. If segments branch, the ends of the segment are returned unchanged.
     pub(crate) fn tip(&self, segment: usize, upper: bool) -> (f64, f64) {
-        let first = &self.segments[segment];
-        let branches = if upper {
-            first.branches_above
-        } else {
-            first.branches_below
-        };
-        if branches {
+        let (first, side) = (&self.segments[segment], usize::from(upper));
+        if first.next[side] == Continuation::Branches {
             return (first.left, first.right);
         }
         let mut chain = vec![first];
-        while chain.len() < 3 {
-            let last = chain[chain.len() - 1];
-            match if upper { last.below } else { last.above } {
-                Some(next) => chain.push(&self.segments[next]),
-                None => break,
-            }
+        while let Continuation::Segment(next) = chain[chain.len() - 1].next[1 - side]
+            && chain.len() < 3
+        {
+            chain.push(&self.segments[next]);
         }
-        let y = if upper {
-            first.y + 0.5 * first.dy
-        } else {
-            first.y - 0.5 * first.dy
-        };
+        let y = first.y + [-0.5, 0.5][side] * first.dy;
         let squared: Vec<(f64, f64)> = chain
             .iter()
             .map(|s| (s.y, (0.5 * (s.right - s.left)).powi(2)))
@@ -285,10 +276,12 @@ impl Strips {
                 .collect();
             for &(l, u) in &pairs {
                 let alone = pairs.iter().filter(|&&(l2, u2)| l2 == l || u2 == u).count() == 1;
-                self.segments[l].above = alone.then_some(u);
-                self.segments[u].below = alone.then_some(l);
-                self.segments[l].branches_above = !alone;
-                self.segments[u].branches_below = !alone;
+                let next = |segment| match alone {
+                    true => Continuation::Segment(segment),
+                    false => Continuation::Branches,
+                };
+                self.segments[l].next[1] = next(u);
+                self.segments[u].next[0] = next(l);
             }
         }
     }
@@ -572,8 +565,8 @@ mod strip_segments_tests {
         let strips = Strips::new(&fields);
         assert_eq!(strips.strips, vec![0..1, 1..3]);
         assert!(!strips.is_simple());
-        assert!(strips.segments[0].branches_above && strips.segments[2].branches_below);
-        assert_eq!(strips.segments[0].above, None);
+        assert_eq!(strips.segments[0].next[1], Continuation::Branches);
+        assert_eq!(strips.segments[2].next[0], Continuation::Branches);
         assert_eq!(strips.tip(0, true), (0.0, 3.0));
     }
 
@@ -583,7 +576,7 @@ mod strip_segments_tests {
         samples::push_segment(&mut fields, 0, 0.5, 1.0, &[0.0, 1.0]);
         samples::push_segment(&mut fields, 2, 2.5, 1.0, &[0.0, 1.0]);
         let strips = Strips::new(&fields);
-        assert_eq!(strips.segments[0].above, None);
+        assert_eq!(strips.segments[0].next[1], Continuation::None);
         assert!(!strips.is_simple());
     }
 }

@@ -1,6 +1,6 @@
 //! Interpolates cell values onto a regular grid, for pictures and for programs that read arrays.
 
-use super::outlines::{StoredSegment, Strips};
+use super::outlines::{Continuation, StoredSegment, Strips};
 use railhead_contact::solution::words::answer::{PatchCells, Zone};
 
 /// Values on a regular grid; `None` outside the patch.
@@ -177,18 +177,17 @@ fn chords(strips: &Strips, y: f64) -> Vec<ChordCut> {
         .clone()
         .map(|near| {
             let segment = &strips.segments[near];
-            let upper = y >= segment.y;
-            let far = if upper { segment.above } else { segment.below };
-            let (end_y, end_left, end_right) = if let Some(far) = far {
-                let far = &strips.segments[far];
-                (far.y, far.left, far.right)
-            } else {
-                let (left, right) = strips.tip(near, upper);
-                (
-                    segment.y + if upper { 0.5 } else { -0.5 } * segment.dy,
-                    left,
-                    right,
-                )
+            let side = usize::from(y >= segment.y);
+            let (far, [end_y, end_left, end_right]) = match segment.next[side] {
+                Continuation::Segment(far) => {
+                    let next = &strips.segments[far];
+                    (Some(far), [next.y, next.left, next.right])
+                }
+                _ => {
+                    let (left, right) = strips.tip(near, side == 1);
+                    let border = segment.y + [-0.5, 0.5][side] * segment.dy;
+                    (None, [border, left, right])
+                }
             };
             let weight = (y - segment.y) / (end_y - segment.y);
             let left = segment.left + weight * (end_left - segment.left);

@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::iter::once;
 
 use super::monotone::monotone;
 use super::outlines::{StoredSegment, Strips};
@@ -49,14 +50,11 @@ impl Sheet {
         }
         let segments = &found.segments;
         let last = segments.len() - 1;
-        let heights: Vec<f64> = std::iter::once(segments[0].y - 0.5 * segments[0].dy)
-            .chain(segments.iter().map(|segment| segment.y))
-            .chain([segments[last].y + 0.5 * segments[last].dy])
-            .collect();
-        let ends: Vec<(f64, f64)> = std::iter::once(found.tip(0, false))
-            .chain(segments.iter().map(|segment| (segment.left, segment.right)))
-            .chain([found.tip(last, true)])
-            .collect();
+        let [low, high] = [&segments[0], &segments[last]];
+        let middles = segments.iter().map(|segment| segment.y);
+        let heights = between(low.y - 0.5 * low.dy, middles, high.y + 0.5 * high.dy);
+        let chords = segments.iter().map(|segment| (segment.left, segment.right));
+        let ends = between(found.tip(0, false), chords, found.tip(last, true));
         let longest = segments.iter().map(|s| s.cells.len()).max().unwrap_or(0);
         let shares = chebyshev(longest);
         let (from, to) = (heights[0], heights[heights.len() - 1]);
@@ -123,14 +121,9 @@ impl Sheet {
                 AtBorder::Continues => values[cell],
             };
             let share = |cell: usize| (cells.x_mm[cell] - strip.left) / width;
-            let knots: Vec<f64> = std::iter::once(0.0)
-                .chain(inside.clone().map(share))
-                .chain([1.0])
-                .collect();
-            let heights: Vec<f64> = std::iter::once(of_end(inside.start))
-                .chain(inside.clone().map(power))
-                .chain([of_end(inside.end - 1)])
-                .collect();
+            let knots = between(0.0, inside.clone().map(share), 1.0);
+            let [first, last] = [inside.start, inside.end - 1].map(of_end);
+            let heights = between(first, inside.map(power), last);
             monotone(&knots, &heights, &self.shares)
         });
         let strips: Vec<Vec<f64>> = strips.collect();
@@ -152,10 +145,8 @@ impl Sheet {
                 AtBorder::Vanishes => 0.0,
                 AtBorder::Continues => strips[strip][column],
             };
-            let knots: Vec<f64> = std::iter::once(outer(0))
-                .chain(strips.iter().map(|strip| strip[column]))
-                .chain([outer(last)])
-                .collect();
+            let middles = strips.iter().map(|strip| strip[column]);
+            let knots = between(outer(0), middles, outer(last));
             let along = monotone(&self.heights, &knots, &self.rows);
             for (row, value) in along.into_iter().enumerate() {
                 nodes[row * columns + column] = value;
@@ -174,6 +165,11 @@ impl Sheet {
         };
         contours(&grid, level)
     }
+}
+
+/// Returns values with one before and one after them.
+fn between<T>(first: T, values: impl Iterator<Item = T>, last: T) -> Vec<T> {
+    once(first).chain(values).chain(once(last)).collect()
 }
 
 /// Returns the bounding box `[x_min, x_max, y_min, y_max]` of points; `[∞, -∞, ∞, -∞]` without points.
