@@ -337,6 +337,27 @@ fn the_worst_point_is_worse_than_all_of_a_scan() {
     }
 }
 
+/// Tests that the worst point is found where friction near the surface and pressure below it are nearly as severe as each other.
+#[test]
+fn no_point_under_a_flange_is_worse_than_the_worst_one() {
+    let example = include_str!("../../api/examples/wheel-rail.case.json");
+    let mut case: Value = serde_json::from_str(example).expect("a case");
+    case["contact"]["lateral_shift_mm"] = json!(-6.2);
+    case["load"] = json!({ "vertical_force_n": 100_000 });
+    case["solver"] = json!({ "target_error": 0.005 });
+    case["outputs"] = json!(["resultants", "subsurface"]);
+    case["subsurface"] = json!({ "plane": {
+        "x_mm": { "from": -4, "to": 4, "points": 33 },
+        "y_mm": { "from": -1.4, "to": 0.2, "points": 33 },
+        "depths_mm": [0.021, 0.05, 0.1, 0.3, 0.6, 0.9, 1.3],
+    } });
+    let (scan, worst) = stresses(&case);
+    let listed = scan.iter().map(|point| point.von_mises_mpa);
+    let most = listed.fold(0.0, f64::max);
+    let worst = worst.expect("asked for").von_mises_mpa;
+    assert!(worst > 0.995 * most, "{worst} of {most}");
+}
+
 /// Tests that the stress at a point does not depend on the other points, to the last bit, although points are evaluated together.
 #[test]
 fn a_stress_does_not_depend_on_what_is_asked_beside_it() {
