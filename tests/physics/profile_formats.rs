@@ -489,8 +489,10 @@ fn simpack_settings_are_applied() {
         points(" bound.y.min = 0.0\n bound.y.max = 2.0"),
         [[1.0, 2.0]]
     );
-    let turned = points(" rotate = 90\n units.ang.f = 57.29577951308232");
-    assert!((turned[0][0] + 2.0).abs() < 1e-12 && (turned[0][1] - 1.0).abs() < 1e-12);
+    for unit in ["units.ang.f = 57.29577951308232", "units.ang = 'deg'"] {
+        let turned = points(&format!(" rotate = 90\n {unit}"));
+        assert!((turned[0][0] + 2.0).abs() < 1e-12 && (turned[0][1] - 1.0).abs() < 1e-12);
+    }
     let contents = read(Format::Simpack, &simpack("")).unwrap();
     assert_eq!(
         (contents.wheel, contents.mirror_y, contents.mirror_z),

@@ -16,6 +16,7 @@ use crate::geometry::profile::Body;
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::footprint::NormalTask;
 use crate::numerics::quadrature::{PRIMES, samples};
+use crate::problem::checked_case;
 use crate::rolling::operator_store::OperatorStore;
 use crate::solution::words::damage::DamageFiguresUsed;
 use crate::solution::words::evolution::Progress;
@@ -350,6 +351,9 @@ fn events(plan: &mut EvolutionWords) -> Result<Vec<PlannedEvent>, CaseError> {
             }
             let found = profile_at(&pointer, body, section);
             let found = found.map_err(|fault| faults.push(fault)).ok()?;
+            if let Some(remark) = checked_case::other_body(&found, body) {
+                faults.push(Fault::new(pointer, remark.detail()));
+            }
             Some(sampled(&found))
         });
         (event, sections)

@@ -237,6 +237,12 @@ impl SimpackSettings {
             "mirror.z" => self.mirror[1] = flag()?,
             "units.len" => self.unit = LengthUnit::named(value),
             "units.len.f" => self.per_metre = Some(number().filter(|f| *f > 0.0)?),
+            "units.ang" if self.per_radian.is_none() => {
+                self.per_radian = value
+                    .to_ascii_lowercase()
+                    .contains("deg")
+                    .then_some(1_f64.to_degrees());
+            }
             "units.ang.f" => self.per_radian = Some(number().filter(|f| *f > 0.0)?),
             "file" if value != "-" && !value.is_empty() => self.file = Some(value.to_owned()),
             _ => {}

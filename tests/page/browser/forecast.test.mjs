@@ -109,4 +109,7 @@ test('a faulty traffic is refused with its place, and a table from a file is tak
   assert.match(read, /wheel load Q\s+58\.8 … 147 kN/);
   assert.match(read, /curve radius\s+−400 … 0 m/);
   await page.getByText('Not used: train.').waitFor();
+  // A file chosen as a table is not taken for a section.
+  await page.locator('#traffic').setInputFiles({ name: 'bad.csv', mimeType: 'text/csv', buffer: Buffer.from('passes;axle load [t]\n1;x\n') });
+  await page.getByText('own.ban, own.whl').waitFor();
 }));

@@ -294,6 +294,11 @@ export async function takeForecastFiles(app, files) {
   if (sections.length) await takeProfiles(app, sections);
 }
 
+/** Imports a file that was chosen as the table of the traffic. @param {App} app @param {File} file */
+export async function takeTraffic(app, file) {
+  takeTable(app, file.name, decoded(await file.arrayBuffer()));
+}
+
 /** Imports a table of the traffic. @param {App} app @param {string} name @param {string} text */
 function takeTable(app, name, text) {
   const parsed = parseTraffic(text);

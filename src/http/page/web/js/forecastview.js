@@ -8,7 +8,7 @@ import { drawChart } from './drawing/axes.js';
 import { drawWorn } from './drawing/worn.js';
 import { numberAt } from './document.js';
 import { fileName } from './downloads.js';
-import { chooseForecast, EVENTS, FACTORS, forecastSeen, nameOf, openForecast, playFilm, recordOf, repeatForecast, startForecast, takeForecastFiles, takeTarget, TARGETS, templateOf, writeForm } from './forecast.js';
+import { chooseForecast, EVENTS, FACTORS, forecastSeen, nameOf, openForecast, playFilm, recordOf, repeatForecast, startForecast, takeForecastFiles, takeTarget, takeTraffic, TARGETS, templateOf, writeForm } from './forecast.js';
 import { CURVES, decisionOf, deepest, distanceOf, distanceUnit, forecastChart, LOSSES, numericalOf, reachedOf, sectionOf, wears, worstDamage } from './forecastdata.js';
 import { count, fixed, number, plusMinus, seconds } from './format.js';
 import { inWords, remarkList } from './remarks.js';
@@ -67,7 +67,7 @@ function formPanel(app, forecast) {
     </div>
     <fieldset class="pad"><legend>Traffic</legend>${form.table ? tableOf(app, form.table) : rowsOf(app, form, document)}
       <label class="drop">${form.table ? 'Another table' : 'Or a table of the traffic'}<span class="quiet">CSV with titles such as passes; axle load [t]; speed [km/h]; radius [m]; shift [mm]; angle of attack [mrad]; friction. Up to 200 000 rows</span>
-        <input type="file" class="visually-hidden" id="traffic" @change=${chosen((file) => takeForecastFiles(app, [file]).catch(app.refused))}></label></fieldset></section>`;
+        <input type="file" class="visually-hidden" id="traffic" @change=${chosen((file) => takeTraffic(app, file).catch(app.refused))}></label></fieldset></section>`;
 }
 
 /** @param {Event} event */
