@@ -305,6 +305,18 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_target_of_an_event_is_a_section_of_its_body() {
+        let mut plan = request(&[0.0], &[1.0], 1);
+        let [rail, wheel] = ["rail", "wheel"].map(|body| plan["template"]["contact"][body].clone());
+        plan["events"] = json!([{ "at": 0, "grind": wheel }, { "at": 0, "reprofile": rail }]);
+        let refused = Evolution::check(&plan, &Limits::default()).err();
+        let error = refused.expect("sections of the other body").to_string();
+        for pointer in ["/events/0/grind", "/events/1/reprofile"] {
+            assert!(error.contains(pointer), "{error}");
+        }
+    }
+
     /// An evolution that is interrupted after any step and continued from its text by other threads gives the same bits.
     #[test]
     fn an_evolution_is_continued_to_the_same_bits() {
