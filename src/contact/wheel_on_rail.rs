@@ -14,7 +14,7 @@ use crate::geometry::contact_locus::ContactLocus;
 use crate::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
 use crate::half_space::bent_surface::{Influence, TURN_MAX};
 use crate::monitor::{Monitor, MonitorPart};
-use crate::normal::gap::grid::GridFineness;
+use crate::normal::gap::grid::{GridFineness, SHARE_MIN};
 use crate::normal::hertz::Patch;
 use crate::normal::on_curve::{CurveContact, CurveTask, Friction, STEEP, Workspace};
 use crate::normal::wheel::{ReferenceSurface, WheelContact, WheelLoad, WheelPatch, WheelTask};
@@ -36,8 +36,6 @@ mod tractions;
 /// Largest ratio of length to width of a patch. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide, a contact at the root of a
 /// flange 20 times. A single displaced point makes a ridge a hundred times as long as wide.
 const SLENDER_MAX: f64 = 40.0;
-/// Share of the load up to which a patch may have any shape.
-const SLENDER_SHARE: f64 = 0.02;
 /// Cosine of the contact angle below which the allowed length of a patch on a steep face no longer grows.
 const COSINE_LEAST: f64 = 0.01;
 
@@ -436,7 +434,7 @@ impl<'a> WheelSolve<'a> {
             } = on_rail.patch();
             let (length, width, most) =
                 (front - rear, high - low, slender_max(on_rail.place.angle));
-            let counts = normal_force > SLENDER_SHARE * contact.normal_force();
+            let counts = normal_force > SHARE_MIN * contact.normal_force();
             (counts && length > most * width).then_some([length, width, most])
         });
         if let Some([length, width, most]) = slender.filter(|_| !self.curve.is_flat()) {

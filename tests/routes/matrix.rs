@@ -8,6 +8,7 @@ use std::time::Duration;
 use railhead_contact as contact;
 use railhead_contact::case::rail_pair::KnownPair;
 use railhead_contact::case::solver::Limits;
+use railhead_contact::evaluate::answer::NUMBER_NAMES;
 use railhead_contact::evaluate::many::{ManyTask, evaluate_at_once, solve_many};
 use railhead_contact::evaluate::rows::Rows;
 use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
@@ -438,19 +439,14 @@ fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
     let answer = evaluate_at_once(&task, &checked, &solve, &Unmonitored, step);
     let answer = answer.map_err(|error| format!("{error:?}"))?;
     let columns: BTreeMap<_, _> = answer.columns().into_iter().collect();
-    // The table gives neither the normal force nor the error of the moment.
+    // The answer of the table has neither the normal force nor the error of the moment.
     let patches = match columns.contains_key("normal_force_n") {
         true => Vec::new(),
         false => {
             let columns = feature.varied_columns(true);
             let rows = Rows::new(&case, &checked, &columns);
             let rows = rows.ok_or("the rows are evaluated")?;
-            let mut patches = Vec::new();
-            let Ok(_) = rows.evaluate_to(|patch| {
-                patches.push(patch);
-                Ok::<_, std::convert::Infallible>(())
-            });
-            patches
+            rows.answers().map(|row| row.numbers).collect()
         }
     };
     let rows = (0..ROWS).map(|row| {
@@ -461,12 +457,13 @@ fn evaluated(feature: &Feature) -> Result<Vec<Option<Answer>>, String> {
         let of = |name: &str| columns.get(name).map(|column| column[row]);
         let number = |name: &str| of(name).unwrap_or(f64::NAN);
         let error = number("error_estimate");
-        let patch = patches.get(row);
-        let normal = patch.map_or_else(|| number("normal_force_n"), |[normal, _]| *normal);
-        let of_moment = patch.map_or_else(
-            || number("moment_error_estimate"),
-            |[_, length]| length * error,
-        );
+        let place = |name: &str| NUMBER_NAMES.iter().position(|known| *known == name);
+        let of_patch = |name: &str| match patches.get(row).zip(place(name)) {
+            Some((numbers, place)) => numbers[place],
+            None => number(name),
+        };
+        let normal = of_patch("normal_force_n");
+        let of_moment = of_patch("moment_error_estimate");
         let [x, y, z] = ["force_x_n", "force_y_n", "moment_z_n_mm"].map(number);
         Ok(Some(Answer {
             numbers: [x, y, z, normal],

@@ -1,7 +1,7 @@
 //! From the members of a case to the outputs that follow from the solved contact: stresses below the surface, damage and temperatures.
 
 use crate::case::solver::Limits;
-use crate::case::words::material::{Material, Thermal};
+use crate::case::words::material::Material;
 use crate::case::words::motion::Motions;
 use crate::case::words::solver::{Case, Output};
 use crate::case::words::subsurface::{
@@ -9,7 +9,6 @@ use crate::case::words::subsurface::{
 };
 use crate::error::Fault;
 use crate::post::damage::DamageTask;
-use crate::post::local_power::ThermalTask;
 use crate::post::subsurface::states::{StressPlaces, SubsurfaceTask};
 use crate::problem::physics::AfterTasks;
 
@@ -22,20 +21,7 @@ impl AfterTasks {
             damage: case.damage.as_ref().map(DamageTask::new),
             thermal: case
                 .thermal
-                .filter(|_| case.outputs.contains(&Output::Temperature))
-                .map(ThermalTask::from),
-        }
-    }
-}
-
-impl From<Thermal> for ThermalTask {
-    fn from(words: Thermal) -> ThermalTask {
-        match words {
-            Thermal::Same(both) => ThermalTask {
-                lower: both,
-                upper: both,
-            },
-            Thermal::Pair { lower, upper } => ThermalTask { lower, upper },
+                .filter(|_| case.outputs.contains(&Output::Temperature)),
         }
     }
 }

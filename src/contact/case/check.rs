@@ -12,6 +12,7 @@ use crate::case::rail_pair::KnownPair;
 use crate::case::solver::{Limits, resolution};
 use crate::case::wheel_task::profile_at;
 use crate::case::words::cross_section::CrossSection;
+use crate::case::words::material::Material;
 use crate::case::words::object::{Faults, Object};
 use crate::case::words::solver::Case;
 use crate::case::{units, wheel_task};
@@ -20,9 +21,9 @@ use crate::friction::law::FrictionLaw;
 use crate::geometry::orientation::SureBody;
 use crate::geometry::profile::Body;
 use crate::geometry::profile_quality::advised_smoothing;
+use crate::half_space::unlike_bodies::Elasticity;
 use crate::normal::footprint::NormalTask;
-use crate::problem::checked_case;
-use crate::problem::checked_case::{CheckedCase, Label};
+use crate::problem::checked_case::{self, CheckedCase, Label, PRESSURE_USUAL};
 use crate::problem::physics::{AfterTasks, MotionPart, Problem, Run};
 use crate::remark::entry::{RemarkEntry, merged};
 use crate::remark::list::Remark;
@@ -136,9 +137,6 @@ fn run(case: &Case, limits: &Limits) -> Run {
     }
 }
 
-/// Contact modulus G/(1 − ν) of steel on steel in MPa, for the suggested smoothing.
-const STEEL_MPA: f64 = 82_000.0 / (1.0 - 0.28);
-
 /// The result of checking a cross-section alone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SectionReport {
@@ -177,7 +175,8 @@ pub fn check_section(value: &Value) -> Result<SectionReport, CaseError> {
         [(_, Err(fault)), (_, Err(_))] => return Err(fault.into()),
     };
     let noise_level = checked_case::noise_level(&profile);
-    let advised = advised_smoothing([noise_level; 2], STEEL_MPA, checked_case::PRESSURE_USUAL);
+    let steel = Elasticity::combine(&Material::steel()).contact_modulus();
+    let advised = advised_smoothing([noise_level; 2], steel, PRESSURE_USUAL);
     Ok(SectionReport {
         body: body.name(),
         quality: checked_case::section(&profile, advised[0]),

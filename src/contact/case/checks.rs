@@ -112,13 +112,13 @@ fn normal_task(
         Ok((surface, remark)) => (surface, remark, None),
         Err(fault) => (ReferenceSurface::Planes, None, Some(fault)),
     };
-    let unusual = contact_task::unusual(contact);
+    let unusual = contact_task::unusual(&rails);
     let task = match contact {
         Contact::Wheelset { .. } => {
             let motion = draft.motion.as_ref();
             wheelsets::task(contact, load, motion, modulus, surface, (known, limits))
         }
-        _ => wheel_task::task(contact, load, modulus, surface, known),
+        _ => wheel_task::task(&rails, load, modulus, surface, known),
     };
     let task = task.map_err(|faults| contact_task::explained(faults, &unusual));
     match (task, fault) {

@@ -3,7 +3,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::case::words::contact::{Contact, FLANGE_BACKS, GAUGE, Load};
+use crate::case::words::contact::{Contact, FLANGE_BACKS, GAUGE, Load, OnRails};
 use crate::error::Fault;
 use crate::geometry::profile::{LengthUnit, Profile};
 use crate::geometry::wheel_rail::RailPlace;
@@ -262,20 +262,18 @@ pub(crate) fn unusual_height(wheel: &Profile, flange_back: f64) -> Option<Remark
 }
 
 /// Returns remarks on lengths of a contact with cross-sections that would be usual in another unit.
-pub(crate) fn unusual(contact: &Contact) -> Vec<RemarkEntry> {
-    let Some(rails) = contact.on_rails() else {
-        return Vec::new();
-    };
+pub(crate) fn unusual(rails: &OnRails) -> Vec<RemarkEntry> {
+    let placement = &rails.placement;
     // Usual values are those of standard gauge and of UIC wheels with a diameter of 920 mm.
-    let place = match rails.rail {
+    let place = match placement.rail {
         RailPlace::Gauge { gauge, .. } => ("gauge_mm", gauge, GAUGE),
         RailPlace::Origin(origin) => ("rail_origin_mm", origin, 752.5),
     };
-    let backs = rails.flange_back_distance_mm;
+    let backs = placement.flange_back_distance;
     let lengths = [
         place,
         ("flange_back_distance_mm", backs, FLANGE_BACKS),
-        ("rolling_radius_mm", rails.rolling_radius_mm, 460.0),
+        ("rolling_radius_mm", placement.rolling_radius, 460.0),
     ];
     let remark = |(name, length_mm, usual): (&str, f64, f64)| {
         let unit = LengthUnit::likely(length_mm, usual).filter(|unit| *unit != LengthUnit::Mm)?;

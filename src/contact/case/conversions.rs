@@ -8,7 +8,6 @@ use crate::friction::law::{AcrossLaw, AcrossPlace, FrictionLaw};
 use crate::friction::path_dependent::{HeatedLaw, Interface, LayerYield};
 use crate::friction::velocity_weakening::{FallingLaw, SofteningTerm};
 use crate::method::Method;
-use crate::post::local_power::ThermalTask;
 
 impl From<Method> for MethodName {
     fn from(method: Method) -> MethodName {
@@ -25,9 +24,8 @@ impl FrictionLaw {
     /// Returns the friction law of a case. A coefficient that falls with temperature needs `thermal`.
     pub(crate) fn new(words: &Friction, thermal: Option<&Thermal>) -> FrictionLaw {
         if let Some(law) = &words.by_temperature {
-            let task = thermal.map(|words| ThermalTask::from(*words));
             // Missing thermal constants are a fault of the case. Nothing is heated then.
-            let (base, rise) = task.map_or((0.0, 0.0), |t| (t.without_heat(), t.rise_of(1.0)));
+            let (base, rise) = thermal.map_or((0.0, 0.0), |t| (t.without_heat(), t.rise_of(1.0)));
             let heated = HeatedLaw::new(&law.temperature_c, &law.coefficient, base, rise);
             return FrictionLaw::Heated(heated);
         }

@@ -121,49 +121,39 @@ fn read(case: &mut Object) -> CaseDraft {
         "damage",
         "thermal",
     ]);
-    let name = case.line("name", NAME_LENGTH_MAX);
-    let labels = labels(case);
-    let material = material::read_material(case);
-    let friction = Friction::read(case, "friction");
-    let contact = contact::read(case);
-    let load = contact::read_load(case);
+    let mut draft = CaseDraft {
+        name: case.line("name", NAME_LENGTH_MAX),
+        labels: labels(case),
+        material: material::read_material(case),
+        friction: Friction::read(case, "friction"),
+        contact: contact::read(case),
+        load: contact::read_load(case),
+        motion: motion::read(case),
+        solver: solver::read(case),
+        ..CaseDraft::default()
+    };
     // Faults of a contact without its load would only repeat that the load is missing.
-    let contact = contact.filter(|contact| {
+    draft.contact = draft.contact.filter(|contact| {
         let has_load = matches!(contact, Contact::PressureGrid { .. }) || contact.has_profiles();
-        load.is_some() || has_load
+        draft.load.is_some() || has_load
     });
-    let motion = motion::read(case);
-    let solver = solver::read(case);
-    let method = solver.as_ref().map(|solver| solver.method);
+    let method = draft.method();
     let without_fields = method.filter(|method| !Method::from(*method).has_fields());
-    let outputs = solver::read_outputs(case, without_fields);
-    let asks = |output| outputs.as_ref().map(|outputs| outputs.contains(&output));
+    draft.outputs = solver::read_outputs(case, without_fields);
+    let asks = |output| Some(draft.outputs.as_ref()?.contains(&output));
     let wanted = |output| asks(output).unwrap_or(true);
-    let subsurface = subsurface::read_subsurface(case, wanted(Output::Subsurface)).flatten();
+    draft.subsurface = subsurface::read_subsurface(case, wanted(Output::Subsurface)).flatten();
     let damage = subsurface::read_damage(case, wanted(Output::Damage), without_fields.is_some());
-    let heated = friction
-        .as_ref()
-        .map(|friction| friction.by_temperature.is_some());
+    draft.damage = damage.flatten();
+    let friction = draft.friction.as_ref();
+    let heated = friction.map(|friction| friction.by_temperature.is_some());
     let thermal = match (heated, asks(Output::Temperature)) {
         (Some(true), _) | (_, Some(true)) => Some(true),
         (Some(false), Some(false)) => Some(false),
         _ => None,
     };
-    let thermal = material::read_thermal(case, thermal).flatten();
-    CaseDraft {
-        name,
-        labels,
-        material,
-        friction,
-        contact,
-        load,
-        motion,
-        solver,
-        outputs,
-        subsurface,
-        damage: damage.flatten(),
-        thermal,
-    }
+    draft.thermal = material::read_thermal(case, thermal).flatten();
+    draft
 }
 
 fn labels(case: &mut Object) -> BTreeMap<String, String> {

@@ -1,58 +1,15 @@
-//! The members of a case that describe a wheel over its rail, and a cache of the pairs that were read from them.
+//! A cache of the pairs of rail and wheel that were read from the members of a case.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::case::words::contact::OnRails;
 use crate::case::words::cross_section::{CrossSection, Smoothing};
 use crate::error::Fault;
-use crate::geometry::wheel_rail::{Placement, Side, WheelRail};
+use crate::geometry::wheel_rail::{Placement, WheelRail};
 use crate::normal::wheel::ProfileTrust;
 use crate::remark::list::Remark;
 
-/// The members of a case that describe a wheel over its rail.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PairWords<'a> {
-    /// Cross-sections of rail and wheel.
-    pub(crate) sections: [&'a CrossSection; 2],
-    /// JSON pointers to them.
-    pub(crate) pointers: [&'static str; 2],
-    /// JSON pointer to the rolling radius.
-    pub(crate) radius_pointer: &'static str,
-    /// y of the back of the flange in mm, if the case states it.
-    pub(crate) flange_back: Option<f64>,
-    /// Whether rough or exchanged profiles are accepted.
-    pub(crate) accept_rough: bool,
-    /// The placement, in which the position of the back of the flange is still 0.
-    pub(crate) placement: Placement,
-}
-
-impl<'a> PairWords<'a> {
-    /// The pair of one side, with the wheelset at a shift to the left in mm, a yaw and a roll in rad.
-    pub(crate) fn new(
-        rails: &OnRails<'a>,
-        side: Side,
-        [lateral_shift, yaw, roll]: [f64; 3],
-    ) -> PairWords<'a> {
-        PairWords {
-            sections: rails.sections,
-            pointers: ["/contact/rail", "/contact/wheel"],
-            radius_pointer: "/contact/rolling_radius_mm",
-            flange_back: rails.flange_back_position_mm,
-            accept_rough: rails.accept_rough_profiles,
-            placement: Placement {
-                side,
-                rolling_radius: rails.rolling_radius_mm,
-                rail: rails.rail,
-                cant: rails.cant_rad,
-                flange_back_distance: rails.flange_back_distance_mm,
-                flange_back_position: 0.0,
-                lateral_shift,
-                yaw,
-                roll,
-            },
-        }
-    }
-
+impl OnRails<'_> {
     /// Whether the smoothing of the profiles is automatic and rough profiles are accepted.
     pub(crate) fn trust(&self) -> ProfileTrust {
         let auto = |section: &CrossSection| matches!(section.smoothing_mm, Smoothing::ByNoise(_));
@@ -90,7 +47,7 @@ impl KnownPair {
     /// Returns the pair of rail and wheel in place: a known one with the pose of `words`, or the one that `read` returns.
     pub(crate) fn placed(
         &self,
-        words: &PairWords,
+        words: &OnRails,
         read: impl FnOnce() -> Result<Placed, Vec<Fault>>,
     ) -> Result<Placed, Vec<Fault>> {
         let Placement {

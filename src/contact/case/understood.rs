@@ -1,14 +1,13 @@
 //! The interpretation of a case without solving it: patches that are known beforehand, and wheel and rail in place.
 
 use crate::geometry::contact_locus::ContactLocus;
-use crate::geometry::profile::{NEEDED_BEYOND, POINT_SPACING};
+use crate::geometry::profile::{Body, POINT_SPACING};
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::footprint::{Footprint, NormalTask};
 use crate::normal::hertz::Patch;
 use crate::normal::wheel::{WheelLoad, WheelTask};
-use crate::problem::checked_case::CheckedCase;
+use crate::problem::checked_case::{CheckedCase, at_edge};
 use crate::remark::entry::{RemarkEntry, merged};
-use crate::remark::list::Remark;
 use crate::solution::words::answer::{FirstTouch, KnownPatch, PlacedProfiles, Understanding};
 
 impl CheckedCase {
@@ -50,29 +49,11 @@ fn touch_remarks(geometry: &WheelRail) -> Vec<RemarkEntry> {
     let Ok(locus) = ContactLocus::new(geometry) else {
         return Vec::new();
     };
-    let places = locus.first_touch();
-    let names = ["rail", "wheel"];
-    let judged = geometry.profiles().into_iter().zip(places).zip(names);
-    let judged = judged.filter_map(|((profile, s), name)| {
-        let y = profile.at(s).at[0];
-        let tip = profile.flange().and_then(|flange| flange.tip);
-        let [first, last] = profile.range();
-        let left_mm = (s - first).min(last - s).max(0.0);
-        let remark = if tip.is_some_and(|[from, to]| (from..=to).contains(&y)) {
-            Remark::ContactOnFlangeTip {
-                profile: name,
-                y_mm: [y; 2],
-            }
-        } else if left_mm < NEEDED_BEYOND {
-            Remark::ContactAtProfileEnd {
-                profile: name,
-                y_mm: [y; 2],
-                left_mm,
-            }
-        } else {
-            return None;
-        };
-        Some(remark.at_pointer(&format!("/contact/{name}")))
+    let bodies = [Body::Rail, Body::Wheel];
+    let places = geometry.profiles().into_iter().zip(locus.first_touch());
+    let judged = places.zip(bodies).filter_map(|((profile, s), body)| {
+        let remark = at_edge(profile, body, [s; 2])?;
+        Some(remark.at_pointer(&format!("/contact/{}", body.name())))
     });
     judged.collect()
 }

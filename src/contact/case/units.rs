@@ -4,7 +4,7 @@
 //! `contact_task`.
 
 use crate::case::words::contact::{Contact, Load};
-use crate::case::words::material::{Elastic, Material, Thermal};
+use crate::case::words::material::{Material, Thermal};
 use crate::case::words::motion::{AskedMotion, Course, Motions, Swept, Wheelset};
 use crate::case::words::solver::Case;
 use crate::case::words::subsurface::DamageParameterWords;
@@ -67,18 +67,20 @@ pub(crate) fn remarks(case: &Case, patches: &[Patch]) -> Vec<RemarkEntry> {
     suspects
 }
 
-fn bodies(material: &Material) -> Vec<(&'static str, &Elastic)> {
-    match material {
-        Material::Same(both) => vec![("/material", both)],
-        Material::Pair { lower, upper } => {
-            vec![("/material/lower", lower), ("/material/upper", upper)]
-        }
+/// Returns the constants of each body with their JSON pointers, those that both bodies share once.
+fn bodies<'a, T>(pointer: &str, [lower, upper]: [&'a T; 2]) -> Vec<(String, &'a T)> {
+    match std::ptr::eq(lower, upper) {
+        true => vec![(pointer.to_owned(), lower)],
+        false => vec![
+            (format!("{pointer}/lower"), lower),
+            (format!("{pointer}/upper"), upper),
+        ],
     }
 }
 
 fn of_material(material: &Material) -> Vec<RemarkEntry> {
     let mut suspects = Vec::new();
-    for (pointer, body) in bodies(material) {
+    for (pointer, body) in bodies("/material", material.bodies()) {
         let moduli = [
             ("shear_modulus_mpa", body.shear_modulus_mpa, SHEAR_GPA),
             (
@@ -100,10 +102,11 @@ fn of_material(material: &Material) -> Vec<RemarkEntry> {
 /// Whether both bodies are metals, with moduli in MPa or in GPa.
 fn is_metal(material: &Material) -> bool {
     let suspects = of_material(material);
-    bodies(material).into_iter().all(|(pointer, body)| {
+    let bodies = bodies("/material", material.bodies());
+    bodies.into_iter().all(|(pointer, body)| {
         let mut pointers = suspects.iter().filter_map(|one| one.pointer.as_deref());
         let shear = body.shear().unwrap_or(0.0);
-        shear >= 1e3 * SHEAR_GPA[0] || pointers.any(|own| own.starts_with(pointer))
+        shear >= 1e3 * SHEAR_GPA[0] || pointers.any(|own| own.starts_with(&pointer))
     })
 }
 
@@ -112,14 +115,9 @@ fn of_metal(case: &Case) -> Vec<RemarkEntry> {
     if !is_metal(&case.material) {
         return Vec::new();
     }
-    let bodies = match &case.thermal {
-        None => Vec::new(),
-        Some(Thermal::Same(both)) => vec![("/thermal", both)],
-        Some(Thermal::Pair { lower, upper }) => {
-            vec![("/thermal/lower", lower), ("/thermal/upper", upper)]
-        }
-    };
-    let thermal = bodies.into_iter().flat_map(|(pointer, body)| {
+    let thermal = case.thermal.as_ref().map(Thermal::bodies).into_iter();
+    let thermal = thermal.flat_map(|both| bodies("/thermal", both));
+    let thermal = thermal.flat_map(|(pointer, body)| {
         let values = [
             body.conductivity_w_per_mk,
             body.specific_heat_j_per_kgk,
@@ -128,7 +126,7 @@ fn of_metal(case: &Case) -> Vec<RemarkEntry> {
         LEAST_OF_METALS
             .iter()
             .zip(values)
-            .map(move |(usual, value)| (pointer, usual, value))
+            .map(move |(usual, value)| (pointer.clone(), usual, value))
     });
     let parameters = case
         .damage
@@ -141,7 +139,8 @@ fn of_metal(case: &Case) -> Vec<RemarkEntry> {
         _ => [None; 3],
     };
     let damage = LEAST_OF_METALS[2..].iter().zip(own);
-    let damage = damage.filter_map(|(usual, value)| Some(("/damage/parameters", usual, value?)));
+    let damage =
+        damage.filter_map(|(usual, value)| Some(("/damage/parameters".to_owned(), usual, value?)));
     thermal
         .chain(damage)
         .filter(|(_, (_, least, ..), value)| value < least)
@@ -173,7 +172,9 @@ fn of_load(
         Contact::Radii { rolling_mm, .. } | Contact::GapProfile { rolling_mm, .. } => {
             Some(rolling_mm)
         }
-        _ => contact.on_rails().map(|rails| rails.rolling_radius_mm),
+        _ => contact
+            .on_rails()
+            .map(|rails| rails.placement.rolling_radius),
     };
     let of_wheel = match contact {
         // The pressure of a given ellipse grows with its load.
@@ -215,18 +216,16 @@ fn of_place(contact: &Contact) -> Vec<RemarkEntry> {
     let Some(rails) = contact.on_rails() else {
         return Vec::new();
     };
-    let [yaw, roll] = match contact {
-        Contact::Profiles {
-            yaw_rad, roll_rad, ..
-        } => [*yaw_rad, *roll_rad],
-        Contact::Wheelset { yaw_rad, .. } => [largest_swept(yaw_rad), 0.0],
-        _ => [0.0; 2],
+    let placement = rails.placement;
+    let yaw = match contact {
+        Contact::Wheelset { yaw_rad, .. } => largest(&yaw_rad.values()),
+        _ => placement.yaw,
     };
     // Rails may be inclined by twice the usual angle.
     let angles = [
-        ("cant_rad", rails.cant_rad, 2.0 * ANGLE_MOST),
+        ("cant_rad", placement.cant, 2.0 * ANGLE_MOST),
         ("yaw_rad", yaw, ANGLE_MOST),
-        ("roll_rad", roll, ANGLE_MOST),
+        ("roll_rad", placement.roll, ANGLE_MOST),
     ];
     let large = angles
         .into_iter()
@@ -242,29 +241,13 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, larger)
 }
 
-fn largest_swept(swept: &Swept) -> f64 {
-    match swept {
-        Swept::Constant(value) => *value,
-        Swept::Range(range) => largest(&[range.from, range.to]),
-        Swept::List(list) => largest(&list.values),
-    }
-}
-
-fn largest_of_course(course: &Course) -> f64 {
-    match course {
-        Course::Constant(value) => *value,
-        Course::Range(range) => largest(&[range.from, range.to]),
-        Course::Values(values) => largest(values),
-    }
-}
-
 /// Longitudinal and lateral creepage and the speed, with the JSON pointer to their object.
 type MotionNumbers = (String, [Option<f64>; 3]);
 
 /// Returns the numbers of all motions; for a sweep and a history those with the largest magnitude.
 fn numbers_of(motion: &Motions) -> Vec<MotionNumbers> {
-    let swept = |swept: &Option<Swept>| swept.as_ref().map(largest_swept);
-    let course = |course: &Option<Course>| course.as_ref().map(largest_of_course);
+    let swept = |swept: &Option<Swept>| Some(largest(&swept.as_ref()?.values()));
+    let course = |course: &Option<Course>| Some(largest(&course.as_ref()?.values(1)));
     let asked = |one: &AskedMotion| [one.creepage_x, one.creepage_y, one.speed_mm_per_s];
     let rolling = |one: &Wheelset| [None, None, Some(one.speed_mm_per_s)];
     let alone = |of: &str, numbers| vec![(of.to_owned(), numbers)];

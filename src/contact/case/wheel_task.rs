@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::case::contact_task;
-use crate::case::rail_pair::{KnownPair, PairWords, Placed};
-use crate::case::words::contact::{Contact, Load};
+use crate::case::rail_pair::{KnownPair, Placed};
+use crate::case::words::contact::{Load, OnRails};
 use crate::case::words::cross_section::{CrossSection, Smoothing, SmoothingWord};
 use crate::case::words::motion::{Motions, Wheelset};
 use crate::error::Fault;
@@ -28,28 +28,13 @@ use crate::rolling::task::PrescribedForces;
 /// # Errors
 /// All faults of the two cross-sections, or the reason why they cannot meet.
 pub(crate) fn task(
-    contact: &Contact,
+    rails: &OnRails,
     load: Option<&Load>,
     contact_modulus: Option<f64>,
     surface: ReferenceSurface,
     known: &KnownPair,
 ) -> Result<Option<(NormalTask, Vec<RemarkEntry>)>, Vec<Fault>> {
-    let (
-        Some(rails),
-        Contact::Profiles {
-            side,
-            lateral_shift_mm,
-            yaw_rad,
-            roll_rad,
-            ..
-        },
-    ) = (contact.on_rails(), contact)
-    else {
-        return Ok(None);
-    };
-    let pose = [*lateral_shift_mm, *yaw_rad, *roll_rad];
-    let words = PairWords::new(&rails, *side, pose);
-    let (geometry, remarks) = placed(&words, known)?;
+    let (geometry, remarks) = placed(rails, known)?;
     let loading = load.and_then(loading);
     let (Some(loading), Some(contact_modulus)) = (loading, contact_modulus) else {
         return Ok(None);
@@ -58,7 +43,7 @@ pub(crate) fn task(
         geometry,
         loading,
         contact_modulus,
-        trust: words.trust(),
+        trust: rails.trust(),
         surface,
     };
     Ok(Some((NormalTask::Wheel(Arc::new(wheel)), remarks)))
@@ -69,7 +54,7 @@ pub(crate) fn task(
 /// # Errors
 /// All faults of the two cross-sections, or the reason why they cannot be placed or meet.
 pub(crate) fn placed(
-    words: &PairWords,
+    words: &OnRails,
     known: &KnownPair,
 ) -> Result<(WheelRail, Vec<RemarkEntry>), Vec<Fault>> {
     let (geometry, of_wheel) = known.placed(words, || place(words))?;
@@ -165,7 +150,7 @@ fn with_reasons(mut faults: Vec<Fault>, reasons: &str) -> Vec<Fault> {
 }
 
 /// Reads both profiles and places the wheel over the rail. Returns it with remarks on the position of the wheel's points.
-fn place(words: &PairWords) -> Result<Placed, Vec<Fault>> {
+fn place(words: &OnRails) -> Result<Placed, Vec<Fault>> {
     let [rail, wheel] = read_both(words)?;
     let reasons = reasons([&rail, &wheel]);
     let explained = |faults| with_reasons(faults, &reasons);
@@ -192,7 +177,7 @@ fn place(words: &PairWords) -> Result<Placed, Vec<Fault>> {
 }
 
 /// Reads both profiles. If only one can be read and it looks like the other body, the faults include that.
-fn read_both(words: &PairWords) -> Result<[Profile; 2], Vec<Fault>> {
+fn read_both(words: &OnRails) -> Result<[Profile; 2], Vec<Fault>> {
     let [rail, wheel] = words.pointers;
     let read = (
         profile_at(rail, Body::Rail, words.sections[0]),

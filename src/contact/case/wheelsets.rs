@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::case::rail_pair::{KnownPair, PairWords};
+use crate::case::rail_pair::KnownPair;
 use crate::case::solver::Limits;
 use crate::case::wheel_task::{moves, placed};
 use crate::case::words::contact::{Contact, Load, OnRails, RightSide};
@@ -44,7 +44,7 @@ pub(crate) fn task(
     let right = right.as_deref();
     let poses = poses(lateral_shift_mm, yaw_rad, *combine, limits)?;
     let (poses, moves) = moving(poses, motion, *combine, limits)?;
-    let pairs = sides(&rails, right, poses[0]);
+    let pairs = sides(rails, right, poses[0]);
     if kinematics.is_some() {
         refuse_guard_rails(&pairs)?;
     }
@@ -56,7 +56,7 @@ pub(crate) fn task(
         return Ok(None);
     };
     let left_share = load.and_then(|load| load.left_share).unwrap_or(0.5);
-    let wheel = |geometry, share: f64, pair: &PairWords| WheelTask {
+    let wheel = |geometry, share: f64, pair: &OnRails| WheelTask {
         geometry,
         loading: WheelLoad::Vertical(share * force),
         contact_modulus,
@@ -87,12 +87,13 @@ pub(crate) fn task(
 
 /// Returns the left and the right pair of rail and wheel, with the wheelset at a shift in mm and a yaw in rad without roll.
 fn sides<'a>(
-    rails: &OnRails<'a>,
+    mut left: OnRails<'a>,
     right: Option<&'a RightSide>,
     [lateral_shift, yaw]: [f64; 2],
-) -> [PairWords<'a>; 2] {
-    let pose = [lateral_shift, yaw, 0.0];
-    let [left, mut other] = [Side::Left, Side::Right].map(|side| PairWords::new(rails, side, pose));
+) -> [OnRails<'a>; 2] {
+    (left.placement.lateral_shift, left.placement.yaw) = (lateral_shift, yaw);
+    let mut other = left;
+    other.placement.side = Side::Right;
     if let Some(rail) = right.and_then(|right| right.rail.as_deref()) {
         (other.sections[0], other.pointers[0]) = (rail, "/contact/right/rail");
     }
@@ -107,7 +108,7 @@ fn sides<'a>(
 }
 
 /// Refuses guard rails together with kinematics.
-fn refuse_guard_rails(pairs: &[PairWords; 2]) -> Result<(), Vec<Fault>> {
+fn refuse_guard_rails(pairs: &[OnRails; 2]) -> Result<(), Vec<Fault>> {
     let guarded = pairs
         .iter()
         .filter(|pair| pair.sections[0].guard_rail_points_mm.is_some());

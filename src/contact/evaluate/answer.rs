@@ -74,14 +74,13 @@ impl RowStatus {
 }
 
 /// Names of the columns of numbers in every answer of [`RowsAnswer`].
-pub const ROW_NAMES: [&str; 6] = [
-    "force_x_n",
-    "force_y_n",
-    "moment_z_n_mm",
-    "error_estimate",
-    "friction_power_n",
-    "stick_share",
-];
+pub const ROW_NAMES: [&str; 6] = of_rows(NUMBER_NAMES);
+
+/// Chooses the columns of [`RowsAnswer`] from those of [`NUMBER_NAMES`].
+const fn of_rows<T: Copy>(all: [T; NUMBER_NAMES.len()]) -> [T; 6] {
+    let [_, x, y, moment, error, _, power, stick, ..] = all;
+    [x, y, moment, error, power, stick]
+}
 
 /// Answers to rows. A number is NaN for a row without it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -95,23 +94,30 @@ pub struct RowsAnswer {
     notes: BTreeMap<usize, [String; 2]>,
 }
 
-/// The answer to one row.
+/// The answer to one row without a mesh. A missing number is NaN.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct RowAnswer {
-    /// The numbers in the order of [`ROW_NAMES`].
-    pub(crate) numbers: [f64; ROW_NAMES.len()],
-    pub(crate) gradients: [f64; GRADIENT_NAMES.len()],
-    pub(crate) status: RowStatus,
+pub struct RowAnswer {
+    /// The numbers in the order of [`NUMBER_NAMES`].
+    pub numbers: RowNumbers,
+    /// The derivatives in the order of [`GRADIENT_NAMES`].
+    pub gradients: [f64; GRADIENT_NAMES.len()],
+    /// The status.
+    pub status: RowStatus,
 }
 
 impl RowAnswer {
     /// Returns a row without an answer.
     pub(crate) fn without(status: RowStatus) -> RowAnswer {
         RowAnswer {
-            numbers: [f64::NAN; ROW_NAMES.len()],
+            numbers: [f64::NAN; NUMBER_NAMES.len()],
             gradients: [f64::NAN; GRADIENT_NAMES.len()],
             status,
         }
+    }
+
+    /// Returns the numbers in the order of [`ROW_NAMES`] and [`GRADIENT_NAMES`].
+    pub(crate) fn of_columns(&self) -> impl Iterator<Item = f64> + use<> {
+        of_rows(self.numbers).into_iter().chain(self.gradients)
     }
 }
 
@@ -127,15 +133,9 @@ impl RowsAnswer {
         }
     }
 
-    /// Adds a row. A row with a number that is not finite becomes one without an answer.
+    /// Adds a row.
     pub(crate) fn push(&mut self, row: RowAnswer) {
-        let of = |row: RowAnswer| row.numbers.into_iter().chain(row.gradients);
-        let is_finite = of(row).take(self.numbers.len()).all(f64::is_finite);
-        let row = match row.status.has_answer() && !is_finite {
-            true => RowAnswer::without(RowStatus::NotFinite),
-            false => row,
-        };
-        for ((_, column), number) in self.numbers.iter_mut().zip(of(row)) {
+        for ((_, column), number) in self.numbers.iter_mut().zip(row.of_columns()) {
             column.push(number);
         }
         self.status.push(row.status);

@@ -5,7 +5,6 @@
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -18,7 +17,7 @@ use crate::case::solver::Limits;
 use crate::case::words::solver::{MethodName, Output};
 use crate::error::{CaseError, Fault, SolveError};
 use crate::evaluate::answer::{
-    ManyAnswer, NumberColumns, RowFailure, RowNumbers, RowStatus, RowsAnswer, SolvedRow,
+    ManyAnswer, NumberColumns, RowAnswer, RowFailure, RowStatus, RowsAnswer, SolvedRow,
 };
 use crate::evaluate::rows::Rows;
 use crate::evaluate::varied::{VariedColumn, case_of_row};
@@ -40,13 +39,14 @@ pub fn solve_many(
     let columns = checked.as_ref().map(NumberColumns::of).unwrap_or_default();
     let mut answer = ManyAnswer::new(task.rows(), columns);
     let mut open: Vec<usize> = (0..task.rows()).collect();
-    if let Some((evaluable, method)) = checked.and_then(|checked| evaluable(task, &checked)) {
-        let mut patches = Vec::with_capacity(task.rows());
-        let Ok(evaluated) = evaluable.evaluate_to(|patch| {
-            patches.push(patch);
-            Ok::<_, Infallible>(())
-        });
-        open.retain(|row| !take(&mut answer, *row, method, &evaluated, patches[*row]));
+    if let Some((rows, method)) = checked.and_then(|checked| evaluable(task, &checked)) {
+        open.clear();
+        for (row, found) in rows.answers().enumerate() {
+            match to_solve(found.status, method) {
+                true => open.push(row),
+                false => answer.set(row, evaluated(found, method)),
+            }
+        }
     }
     solve_each(task, open, None, (solve, monitor), &mut answer)?;
     Ok(answer)
@@ -104,8 +104,7 @@ pub fn evaluate_at_once<E>(
         }
         return solve_rows(task, checked, first, solve, monitor);
     };
-    let answered = rows.evaluate_to(|_| step());
-    let mut answer = answered.map_err(NotAtOnce::Step)?;
+    let mut answer = rows.evaluate_to(&mut step).map_err(NotAtOnce::Step)?;
     let mut open: Vec<usize> = (0..answer.status.len())
         .filter(|row| to_solve(answer.status[*row], method))
         .collect();
@@ -143,9 +142,8 @@ pub fn expected_seconds(task: &ManyTask) -> f64 {
     let Some((evaluable, method)) = evaluable(task, &checked) else {
         return rows * seconds;
     };
-    let evaluated = evaluable.evaluate();
-    let left = evaluated.status.iter();
-    let left = left.filter(|status| to_solve(**status, method)).count();
+    let left = evaluable.answers();
+    let left = left.filter(|row| to_solve(row.status, method)).count();
     let each = match method {
         MethodName::Fastsim => seconds,
         _ => TABLE_SECONDS,
@@ -168,53 +166,22 @@ fn to_solve(status: RowStatus, method: MethodName) -> bool {
     }
 }
 
-/// Copies an evaluated row with its normal force in N and √(ab) in mm to the answer. Returns `false` if the row must be solved.
-fn take(
-    answer: &mut ManyAnswer,
-    row: usize,
-    method: MethodName,
-    evaluated: &RowsAnswer,
-    [normal_force, c]: [f64; 2],
-) -> bool {
-    let status = evaluated.status[row];
-    if to_solve(status, method) {
-        return false;
-    }
+/// Returns the outcome of a row that was evaluated and is not left to the solver.
+fn evaluated(row: RowAnswer, method: MethodName) -> Result<SolvedRow, RowFailure> {
+    let status = row.status;
     if !status.has_answer() {
         let reason = status.reason();
-        answer.set(row, Err(RowFailure { status, reason }));
-        return true;
+        return Err(RowFailure { status, reason });
     }
-    let area = std::f64::consts::PI * c * c;
-    let mut numbers = evaluated.numbers.iter().map(|(_, column)| column[row]);
-    let mut next = || numbers.next().unwrap_or(f64::NAN);
-    let [x, y, moment, error, power, stick] = std::array::from_fn(|_| next());
-    let slopes: Vec<f64> = numbers.collect();
-    let numbers: RowNumbers = [
-        normal_force,
-        x,
-        y,
-        moment,
-        error,
-        error * c,
-        power,
-        stick,
-        area,
-        1.5 * normal_force / area,
-        1.0,
-        f64::NAN,
-    ];
-    let solved = SolvedRow {
+    Ok(SolvedRow {
         status,
         method: Some(match method {
             MethodName::Auto => MethodName::Table,
             asked => asked,
         }),
         remarks: String::new(),
-        numbers: numbers.into_iter().chain(slopes).collect(),
-    };
-    answer.set(row, Ok(solved));
-    true
+        numbers: row.numbers.into_iter().chain(row.gradients).collect(),
+    })
 }
 
 /// Orders rows by the columns of their shapes, then by those of their motions.

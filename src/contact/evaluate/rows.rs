@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::case::contact_task::plausible;
 use crate::case::words::friction::COEFFICIENT_LEAST;
 use crate::case::words::solver::{MethodName, Output};
-use crate::evaluate::answer::{RowAnswer, RowStatus, RowsAnswer};
+use crate::evaluate::answer::{RowAnswer, RowNumbers, RowStatus, RowsAnswer};
 use crate::evaluate::variable::{Row, Variable};
 use crate::evaluate::varied::{Values, VariedColumn};
 use crate::normal::hertz::{Ellipse, HertzShape};
@@ -102,34 +102,45 @@ impl<'a> Rows<'a> {
 
     /// Evaluates the rows.
     pub fn evaluate(&self) -> RowsAnswer {
-        let Ok(answer) = self.evaluate_to(|_| Ok::<_, Infallible>(()));
+        let Ok(answer) = self.evaluate_to(|| Ok::<_, Infallible>(()));
         answer
     }
 
-    /// Evaluates the rows. `note` is called with the normal force in N and √(ab) in mm of each row and may end the evaluation.
+    /// Evaluates the rows. `step` is called after each row and may end the evaluation.
     ///
     /// # Errors
-    /// The error that `note` returned.
-    pub fn evaluate_to<E>(
+    /// The error that `step` returned.
+    pub(crate) fn evaluate_to<E>(
         &self,
-        mut note: impl FnMut([f64; 2]) -> Result<(), E>,
+        mut step: impl FnMut() -> Result<(), E>,
     ) -> Result<RowsAnswer, E> {
         let mut answer = RowsAnswer::with_capacity(self.rows, self.gradients);
-        let mut state = Shapes::default();
-        for number in 0..self.rows {
-            let mut row = self.fixed;
-            for (variable, values) in &self.varied {
-                row[*variable as usize] = values[number];
-            }
-            let (row, patch) = self.answer_row(&row, &mut state);
+        for row in self.answers() {
             answer.push(row);
-            note(patch)?;
+            step()?;
         }
         Ok(answer)
     }
 
-    /// Returns the answer to a row, its normal force in N and √(ab) in mm.
-    fn answer_row(&self, row: &Row, shapes: &mut Shapes) -> (RowAnswer, [f64; 2]) {
+    /// Returns the answers to the rows in order. A row with a number that is not finite has no answer.
+    pub fn answers(&self) -> impl Iterator<Item = RowAnswer> {
+        let columns = RowsAnswer::with_capacity(0, self.gradients).numbers.len();
+        let mut shapes = Shapes::default();
+        (0..self.rows).map(move |number| {
+            let mut row = self.fixed;
+            for (variable, values) in &self.varied {
+                row[*variable as usize] = values[number];
+            }
+            let answer = self.answer_row(&row, &mut shapes);
+            let is_finite = answer.of_columns().take(columns).all(f64::is_finite);
+            match answer.status.has_answer() && !is_finite {
+                true => RowAnswer::without(RowStatus::NotFinite),
+                false => answer,
+            }
+        })
+    }
+
+    fn answer_row(&self, row: &Row, shapes: &mut Shapes) -> RowAnswer {
         let at = |variable: Variable| row[variable as usize];
         let [modulus, poisson] = self.material(row);
         let (force, friction) = (at(Variable::NormalForce), at(Variable::Friction));
@@ -141,13 +152,13 @@ impl<'a> Rows<'a> {
             [at(Variable::SemiAxisA), at(Variable::SemiAxisB)]
         };
         let patch = RowPatch {
+            force,
             limit: friction * force,
             c: (a * b).sqrt(),
             ratio: a / b,
             modulus: self.reduction * modulus,
             poisson,
         };
-        let place = [force, patch.c];
         let ellipse = Ellipse {
             a,
             b,
@@ -157,32 +168,40 @@ impl<'a> Rows<'a> {
         };
         let is_tiny = friction > 0.0 && friction < COEFFICIENT_LEAST;
         if is_tiny || plausible(&ellipse.patch(), "/load").is_err() {
-            return (RowAnswer::without(RowStatus::Refused), place);
+            return RowAnswer::without(RowStatus::Refused);
         }
         let motion = [
             at(Variable::CreepageX),
             at(Variable::CreepageY),
             at(Variable::Spin),
         ];
-        let mut found = self.creep(&patch, motion, shapes);
+        let Some((creep, slopes)) = self.creep(&patch, motion, shapes) else {
+            return RowAnswer::without(RowStatus::NotCovered);
+        };
         let of = match self.relative_to {
             RelativeTo::FrictionLimit => 1.0,
             RelativeTo::Force if patch.limit > 0.0 => {
-                let [x, y, _] = found.creep.force;
+                let [x, y, _] = creep.force;
                 (patch.limit * x).hypot(patch.limit * y) / patch.limit
             }
             RelativeTo::Force => 0.0,
         };
-        let missed = self
-            .target
-            .is_some_and(|target| found.creep.bound > target * of);
-        if missed {
-            found.status = RowStatus::TargetMissed;
-            if matches!(self.method, RowMethod::Table { auto: true }) {
-                found = RowCreep::none(RowStatus::NeedsSolver);
+        let missed = self.target.is_some_and(|target| creep.bound > target * of);
+        let status = match (missed, &self.method) {
+            (false, _) => RowStatus::Ok,
+            (true, RowMethod::Table { auto: true }) => {
+                return RowAnswer::without(RowStatus::NeedsSolver);
             }
+            (true, _) => RowStatus::TargetMissed,
+        };
+        RowAnswer {
+            numbers: patch.numbers(&creep, motion),
+            gradients: match self.gradients {
+                true => patch.gradients(slopes),
+                false => [f64::NAN; 9],
+            },
+            status,
         }
-        (found.of_patch(&patch, motion, self.gradients), place)
     }
 
     /// Returns shear modulus in MPa and Poisson's ratio of a row.
@@ -199,15 +218,21 @@ impl<'a> Rows<'a> {
         })
     }
 
-    /// Returns the creep forces of a patch by the method.
-    fn creep(&self, patch: &RowPatch, motion: [f64; 3], shapes: &mut Shapes) -> RowCreep {
+    /// Returns the creep forces of a patch relative to μN with their derivatives; `None` if the table does not cover the patch.
+    fn creep(
+        &self,
+        patch: &RowPatch,
+        motion: [f64; 3],
+        shapes: &mut Shapes,
+    ) -> Option<(Creep, Slopes)> {
         if patch.limit == 0.0 {
             let is_still = motion == [0.0; 3];
-            return RowCreep::ok(Creep {
+            let creep = Creep {
                 force: [0.0; 3],
                 stick: if is_still { 1.0 } else { 0.0 },
                 bound: 0.0,
-            });
+            };
+            return Some((creep, Slopes::default()));
         }
         let unit = patch.unit();
         let creepage = [
@@ -219,13 +244,13 @@ impl<'a> Rows<'a> {
             RowMethod::Fastsim(mesh, class) => {
                 let at = |creepage| mesh.creep(patch.ratio, patch.poisson, creepage);
                 let (force, stick) = at(creepage);
-                let found = RowCreep::ok(Creep {
+                let creep = Creep {
                     force,
                     stick,
                     bound: *class,
-                });
+                };
                 if !self.gradients {
-                    return found;
+                    return Some((creep, Slopes::default()));
                 }
                 let moved = |component: usize, times: f64| {
                     let mut moved = creepage;
@@ -233,33 +258,30 @@ impl<'a> Rows<'a> {
                     at(moved).0
                 };
                 let values = [0, 1, 2].map(|j| [-2.0, -1.0, 1.0, 2.0].map(|times| moved(j, times)));
-                RowCreep {
-                    slopes: [0, 1, 2].map(|k| {
-                        [0, 1, 2].map(|j| slope(values[j].map(|force: [f64; 3]| force[k]), STEP).0)
-                    }),
-                    ..found
-                }
+                let slopes = [0, 1, 2].map(|k| {
+                    [0, 1, 2].map(|j| slope(values[j].map(|force: [f64; 3]| force[k]), STEP).0)
+                });
+                Some((creep, slopes))
             }
-            RowMethod::Table { .. } if !RATIO_RANGE.contains(&patch.ratio) => {
-                RowCreep::none(RowStatus::NotCovered)
-            }
+            RowMethod::Table { .. } if !RATIO_RANGE.contains(&patch.ratio) => None,
             RowMethod::Table { .. } => {
                 let ellipse = shapes.table(patch.ratio, patch.poisson);
-                if !self.gradients {
-                    return RowCreep::ok(ellipse.creep(creepage));
-                }
-                let (creep, slopes) = ellipse.with_slopes(creepage);
-                RowCreep {
-                    slopes,
-                    ..RowCreep::ok(creep)
-                }
+                Some(match self.gradients {
+                    true => ellipse.with_slopes(creepage),
+                    false => (ellipse.creep(creepage), Slopes::default()),
+                })
             }
         }
     }
 }
 
+/// Derivatives of forces and moment relative to μN by dimensionless creepages and spin.
+type Slopes = [[f64; 3]; 3];
+
 /// The patch of a row.
 struct RowPatch {
+    /// Normal force in N.
+    force: f64,
     /// μN in N.
     limit: f64,
     /// √(ab) in mm.
@@ -276,72 +298,41 @@ impl RowPatch {
     fn unit(&self) -> f64 {
         self.modulus * self.c * self.c / self.limit
     }
-}
 
-/// The creep forces of a row relative to μN, with their derivatives.
-struct RowCreep {
-    creep: Creep,
-    slopes: [[f64; 3]; 3],
-    status: RowStatus,
-}
-
-impl RowCreep {
-    fn ok(creep: Creep) -> RowCreep {
-        RowCreep {
-            creep,
-            slopes: [[0.0; 3]; 3],
-            status: RowStatus::Ok,
-        }
+    /// Converts creep forces to the numbers of a row.
+    fn numbers(&self, creep: &Creep, motion: [f64; 3]) -> RowNumbers {
+        let (limit, c) = (self.limit, self.c);
+        let [x, y, moment] = creep.force;
+        let [x, y, moment] = [limit * x, limit * y, limit * c * moment];
+        let error = limit * creep.bound;
+        let area = PI * c * c;
+        [
+            self.force,
+            x,
+            y,
+            moment,
+            error,
+            error * c,
+            motion[0] * x + motion[1] * y + motion[2] * moment,
+            creep.stick,
+            area,
+            1.5 * self.force / area,
+            1.0,
+            f64::NAN,
+        ]
     }
 
-    fn none(status: RowStatus) -> RowCreep {
-        RowCreep {
-            creep: Creep {
-                force: [f64::NAN; 3],
-                stick: f64::NAN,
-                bound: f64::NAN,
-            },
-            slopes: [[f64::NAN; 3]; 3],
-            status,
-        }
-    }
-
-    /// Converts the numbers to N and mm, with derivatives if requested.
-    fn of_patch(&self, patch: &RowPatch, motion: [f64; 3], gradients: bool) -> RowAnswer {
-        let (limit, c) = (patch.limit, patch.c);
-        let creep = &self.creep;
-        let force = [
-            limit * creep.force[0],
-            limit * creep.force[1],
-            limit * c * creep.force[2],
-        ];
-        let power = motion[0] * force[0] + motion[1] * force[1] + motion[2] * force[2];
-        let mut slopes = [f64::NAN; 9];
-        if gradients {
-            // Without friction there are neither forces nor derivatives.
-            let unit = if limit > 0.0 {
-                limit * patch.unit()
-            } else {
-                0.0
-            };
-            let arm = |k: usize| if k == 2 { c } else { 1.0 };
-            slopes = std::array::from_fn(|place| {
-                let (force, creepage) = (place / 3, place % 3);
-                self.slopes[force][creepage] * unit * arm(force) * arm(creepage)
-            });
-        }
-        RowAnswer {
-            numbers: [
-                force[0],
-                force[1],
-                force[2],
-                limit * creep.bound,
-                power,
-                creep.stick,
-            ],
-            gradients: slopes,
-            status: self.status,
-        }
+    /// Converts derivatives to those by creepages and spin in 1/mm. Without friction there are none.
+    fn gradients(&self, slopes: Slopes) -> [f64; 9] {
+        let unit = match self.limit > 0.0 {
+            true => self.limit * self.unit(),
+            false => 0.0,
+        };
+        let arm = |k: usize| if k == 2 { self.c } else { 1.0 };
+        std::array::from_fn(|place| {
+            let (force, creepage) = (place / 3, place % 3);
+            slopes[force][creepage] * unit * arm(force) * arm(creepage)
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
+use crate::case::words::contact::GAUGE_HEIGHT;
 use crate::case::words::evolution::WearLosses;
 use crate::case::words::subsurface::DamageModel;
 use crate::error::SolveError;
@@ -22,8 +23,6 @@ use crate::solution::words::evolution::{
 };
 use crate::wheelset::kinematics::level_radii;
 
-/// Depth below the top of the rail in mm at which the loss of the gauge face (W2) is measured.
-const GAUGE_DEPTH: f64 = 14.0;
 /// Depth below the tread in mm at which the thickness of the flange is measured.
 const FLANGE_DEPTH: f64 = 10.0;
 /// Amplitude in mm for which EN 15302 defines the conicity.
@@ -104,7 +103,8 @@ fn losses(bodies: &[BodyState; 2]) -> WearLosses {
         Some(now? - distance(&body.start_mm, from, direction)?)
     };
     let [top, _] = bounds(rail.start_mm.iter().map(|at| at[1]));
-    let gauge = [-1e3, top + GAUGE_DEPTH];
+    // W2 is measured at the gauge face.
+    let gauge = [-1e3, top + GAUGE_HEIGHT];
     let face = distance(&rail.start_mm, gauge, [1.0, 0.0]);
     let below = [0.0, 1e3];
     let tread = distance(&wheel.start_mm, below, [0.0, -1.0]);

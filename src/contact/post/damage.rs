@@ -5,8 +5,7 @@ use crate::case::words::subsurface::{
     WlrmFigures,
 };
 use crate::normal::hertz::Patch;
-use crate::post::local_power::{METRES, NANOMETRES};
-use crate::rolling::strip_mesh::StripMesh;
+use crate::post::local_power::{CellPower, METRES, NANOMETRES, SolvedMotion};
 use crate::solution::words::answer::PointSolution;
 use crate::solution::words::damage::{
     ArchardWear, Damage, DamageFiguresUsed, RailFatigue, Ranged, ShakedownPlace, SurfaceFatigue,
@@ -351,21 +350,8 @@ fn shakedown(figures: &DamageFiguresUsed, of: DamagedPatch) -> ShakedownPlace {
     }
 }
 
-/// The power of every cell over the rolling speed in N, and the size of its slip.
-#[derive(Debug, Clone, Copy)]
-pub struct CellWear<'a> {
-    /// The mesh.
-    pub level: &'a StripMesh,
-    /// Tractions times slips and areas, in N.
-    pub power: &'a [f64],
-    /// Slips over the rolling speed.
-    pub slip: &'a [f64],
-    /// Rolling speed in mm/s, if it is known.
-    pub speed: Option<f64>,
-}
-
 /// Wear of the strips of a patch. The segments of a strip are added up.
-pub fn across(task: &DamageTask, of: CellWear, patch: usize) -> WearAcross {
+pub fn across(task: &DamageTask, of: SolvedMotion, cells: &CellPower, patch: usize) -> WearAcross {
     let figures = &task.figures;
     let mut found = WearAcross::default();
     let (mut usfd, mut archard): (Vec<[f64; 3]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
@@ -384,16 +370,17 @@ pub fn across(task: &DamageTask, of: CellWear, patch: usize) -> WearAcross {
         let place = found.y_mm.len() - 1;
         for i in segment.cells.clone() {
             let length = mesh.right[i] - mesh.left[i];
-            found.t_gamma_n_per_mm[place] += of.power[i] / chord.dy;
-            let over_area = of.power[i] / of.level.area[i];
+            found.t_gamma_n_per_mm[place] += cells.power[i] / chord.dy;
+            let over_area = cells.power[i] / of.level.area[i];
             let rate = usfd_rate(&figures.usfd, over_area);
             usfd[place][regime(usfd_regime(&figures.usfd, over_area))] +=
                 rate * length * METRES / figures.density_kg_per_m3 * NANOMETRES;
             let pressure = of.level.pressure[i] / figures.hardness_mpa;
-            let speed = of.slip[i] * of.speed.unwrap_or(0.0);
+            let slip = cells.slip[0][i].hypot(cells.slip[1][i]);
+            let speed = slip * of.speed.unwrap_or(0.0);
             let (of_archard, coefficient) = archard_coefficient(&figures.archard, speed, pressure);
             archard[place][regime(of_archard)] +=
-                coefficient.value * pressure * of.slip[i] * length * NANOMETRES;
+                coefficient.value * pressure * slip * length * NANOMETRES;
         }
     }
     let sums = |parts: &[[f64; 3]]| parts.iter().map(|parts| parts.iter().sum()).collect();

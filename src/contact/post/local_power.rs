@@ -13,21 +13,24 @@
 
 use std::ops::Range;
 
-use crate::case::words::material::ThermalBodyWords;
+use crate::case::words::material::{Thermal, ThermalBodyWords};
 use crate::half_space::strip_operator::assembly::{CellEdges, SegmentRows};
 use crate::half_space::strip_operator::kind::Precision;
 use crate::mesh::{Mesh, Segment};
 use crate::method::Method;
 use crate::monitor::{Monitor, Stop};
+use crate::normal::footprint::Footprint;
 use crate::numerics::simd;
 use crate::numerics::simd::Float;
 use crate::rolling::answer::{LevelAnswer, Skip};
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
-/// The data from which the power of the cells is computed.
+/// A motion that is solved on a mesh.
 #[derive(Debug, Clone, Copy)]
-pub struct PowerTask<'a> {
+pub struct SolvedMotion<'a> {
+    /// The loaded region.
+    pub footprint: &'a Footprint,
     /// The mesh.
     pub level: &'a StripMesh,
     /// Tractions, slips and zones on it.
@@ -36,16 +39,8 @@ pub struct PowerTask<'a> {
     pub motion: &'a Motion,
     /// The method of the tractions.
     pub method: Method,
-    /// Friction power of every patch over the rolling speed in N, to which the powers of its cells are scaled.
-    pub totals: &'a [f64],
-}
-
-impl PowerTask<'_> {
-    /// Returns whether the power of every patch is positive.
-    fn is_in_every_patch(&self, power: &[f64]) -> bool {
-        let of_patch = |patch| power[self.level.patch_cells(patch)].iter().sum::<f64>();
-        (0..self.totals.len()).all(|patch| of_patch(patch) > 0.0)
-    }
+    /// Rolling speed in mm/s, if it is known.
+    pub speed: Option<f64>,
 }
 
 /// Power and slip of every cell, over the rolling speed.
@@ -57,22 +52,27 @@ pub struct CellPower {
     pub slip: [Vec<f64>; 2],
 }
 
-/// Computes the power of every cell, and its slip in the direction of the traction that corresponds to the power.
+/// Computes the power of every cell, and its slip in the direction of the traction that corresponds to the power. The powers of a patch are
+/// scaled to its total, which is the friction power over the rolling speed in N.
 ///
 /// The power of a cell that sticks or whose power is negative is moved to the cell behind it, in the direction of the material. The last cell of a
 /// strip keeps it: even if it sticks, it slips at its trailing end. Cells without traction have the slip of the method.
 ///
 /// # Errors
 /// Returns an error if the monitor, which is called once per strip, stops the work.
-pub fn cell_power(task: &PowerTask, monitor: &dyn Monitor) -> Result<CellPower, Stop> {
-    let (level, answer) = (task.level, task.answer);
+pub fn cell_power(
+    of: SolvedMotion,
+    totals: &[f64],
+    monitor: &dyn Monitor,
+) -> Result<CellPower, Stop> {
+    let (level, answer) = (of.level, of.answer);
     let unit = level.scale.slip();
     let mut slip = [0, 1].map(|k| answer.slip[k].iter().map(|s| s * unit).collect::<Vec<_>>());
     if let Some(Skip::NoMotion | Skip::NoFriction) = answer.skip {
         let power = vec![0.0; level.area.len()];
         return Ok(CellPower { power, slip });
     }
-    let power = powers(task, monitor)?;
+    let power = powers(of, totals, monitor)?;
     for (i, power) in power.iter().enumerate() {
         let traction = [0, 1].map(|k| answer.traction[k][i] * level.scale.traction);
         let length = traction[0].hypot(traction[1]);
@@ -87,23 +87,25 @@ pub fn cell_power(task: &PowerTask, monitor: &dyn Monitor) -> Result<CellPower, 
 }
 
 /// Power of every cell over the rolling speed, in N.
-fn powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
-    let (level, answer) = (task.level, task.answer);
-    let mut power = match task.method {
+fn powers(of: SolvedMotion, totals: &[f64], monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
+    let (level, answer) = (of.level, of.answer);
+    let is_in_every_patch = |power: &[f64]| {
+        let of_patch = |patch| power[level.patch_cells(patch)].iter().sum::<f64>();
+        (0..totals.len()).all(|patch| of_patch(patch) > 0.0)
+    };
+    let mut power = match of.method {
         // The simplified theory has its own displacements and slips. If nothing slips, it does not determine the distribution of the power.
         Method::Fastsim => match own_powers(level, answer) {
-            own if task.is_in_every_patch(&own) => own,
-            _ => cell_mean_powers(task, monitor)?,
+            own if is_in_every_patch(&own) => own,
+            _ => cell_mean_powers(of, monitor)?,
         },
         // The table has no cells, so that it is never used here.
-        Method::BoundaryElement | Method::LiuHsu | Method::Table => {
-            cell_mean_powers(task, monitor)?
-        }
+        Method::BoundaryElement | Method::LiuHsu | Method::Table => cell_mean_powers(of, monitor)?,
     };
     for segment in &level.mesh.segments {
         carry(&mut power, &answer.slips, segment.cells.clone());
     }
-    for (patch, total) in task.totals.iter().enumerate() {
+    for (patch, total) in totals.iter().enumerate() {
         let power = &mut power[level.patch_cells(patch)];
         power.iter_mut().for_each(|power| *power = power.max(0.0));
         let sum: f64 = power.iter().sum();
@@ -124,17 +126,17 @@ fn own_powers(level: &StripMesh, answer: &LevelAnswer) -> Vec<f64> {
 }
 
 /// Traction times mean slip on a mesh, up to a common factor.
-fn cell_mean_powers(task: &PowerTask, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
-    let (level, traction) = (task.level, &task.answer.traction);
+fn cell_mean_powers(of: SolvedMotion, monitor: &dyn Monitor) -> Result<Vec<f64>, Stop> {
+    let (level, traction) = (of.level, &of.answer.traction);
     let (mesh, nu) = (&level.normalised, level.poisson_ratio);
-    let mut power = rigid_powers(mesh, &level.scale.motion(task.motion), traction);
+    let mut power = rigid_powers(mesh, &level.scale.motion(of.motion), traction);
     if let Some([x, y]) = &level.surface_slip {
         let areas = mesh.areas();
         for (i, power) in power.iter_mut().enumerate() {
             *power += areas[i] * (traction[0][i] * x[i] + traction[1][i] * y[i]);
         }
     }
-    if task.answer.skip != Some(Skip::RigidSlip) {
+    if of.answer.skip != Some(Skip::RigidSlip) {
         let differences = match level.precision {
             Precision::Single => Differences::of::<f32>(mesh, nu, traction, monitor)?,
             Precision::Double => Differences::of::<f64>(mesh, nu, traction, monitor)?,
@@ -311,33 +313,24 @@ impl ThermalBodyWords {
     }
 }
 
-/// The thermal properties of both bodies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ThermalTask {
-    /// The lower body.
-    pub lower: ThermalBodyWords,
-    /// The upper body.
-    pub upper: ThermalBodyWords,
-}
-
-impl ThermalTask {
+impl Thermal {
     /// Share of the friction heat that flows into the lower body while it is in contact.
     pub fn share_of_lower(&self) -> f64 {
-        let [lower, upper] = [self.lower, self.upper].map(|body| body.penetration());
+        let [lower, upper] = self.bodies().map(ThermalBodyWords::penetration);
         lower / (lower + upper)
     }
 
     /// Temperature of both surfaces in the contact without friction heat, in °C.
     pub fn without_heat(&self) -> f64 {
-        let share = self.share_of_lower();
-        share * self.lower.bulk_c + (1.0 - share) * self.upper.bulk_c
+        let (share, [lower, upper]) = (self.share_of_lower(), self.bodies());
+        share * lower.bulk_c + (1.0 - share) * upper.bulk_c
     }
 
     /// Temperature rise in K per unit of [`heating`], at a speed in mm/s: lengths in mm and heat in MPa mm/s give `1000 √0.001`.
     pub fn rise_of(&self, speed: f64) -> f64 {
-        let both = self.lower.penetration() + self.upper.penetration();
+        let [lower, upper] = self.bodies().map(ThermalBodyWords::penetration);
         // MPa mm/s are 1000 W/m².
-        1e3 * METRES.sqrt() / (both * (std::f64::consts::PI * speed * METRES).sqrt())
+        1e3 * METRES.sqrt() / ((lower + upper) * (std::f64::consts::PI * speed * METRES).sqrt())
     }
 }
 
@@ -518,7 +511,7 @@ mod heat_tests {
             specific_heat_j_per_kgk: 450.0,
             bulk_c,
         };
-        let task = ThermalTask {
+        let task = Thermal::Pair {
             lower: steel(120.0),
             upper: steel(20.0),
         };

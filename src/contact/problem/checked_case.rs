@@ -8,7 +8,7 @@ use std::ops::Range;
 use crate::case::words::contact::Contact;
 use crate::case::words::solver::MethodName;
 use crate::geometry::orientation::SureBody;
-use crate::geometry::profile::{Body, Profile};
+use crate::geometry::profile::{Body, NEEDED_BEYOND, Profile};
 use crate::geometry::profile_quality::{NoiseLevel, advised_smoothing, polygon};
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::footprint::Footprint;
@@ -160,6 +160,23 @@ pub(crate) fn other_body(profile: &Profile, body: Body) -> Option<Remark> {
     is_other.then(|| Remark::ProfileOfOtherBody {
         profile: body.name(),
         like,
+    })
+}
+
+/// Returns the remark on a contact on the tip of the flange or near the end of a profile. The contact is a range along the profile in mm.
+pub(crate) fn at_edge(profile: &Profile, body: Body, contact: [f64; 2]) -> Option<Remark> {
+    let y = |s: f64| profile.at(s).at[0];
+    let ([low, high], [first, last]) = (contact, profile.range());
+    let left_mm = (low - first).min(last - high).max(0.0);
+    let tip = profile.flange().and_then(|flange| flange.tip);
+    let (profile, y_mm) = (body.name(), contact.map(y));
+    if tip.is_some_and(|[from, to]| (from..=to).contains(&y(0.5 * (low + high)))) {
+        return Some(Remark::ContactOnFlangeTip { profile, y_mm });
+    }
+    (left_mm < NEEDED_BEYOND).then_some(Remark::ContactAtProfileEnd {
+        profile,
+        y_mm,
+        left_mm,
     })
 }
 

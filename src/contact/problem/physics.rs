@@ -5,6 +5,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::case::words::material::Thermal;
 use crate::case::words::solver::{MethodName, Output};
 use crate::friction::law::FrictionLaw;
 use crate::friction::path_dependent::Interface;
@@ -15,7 +16,6 @@ use crate::normal::footprint::NormalTask;
 use crate::normal::hertz::Ellipse;
 use crate::normal::wheel::{ReferenceSurface, WheelTask};
 use crate::post::damage::DamageTask;
-use crate::post::local_power::ThermalTask;
 use crate::post::subsurface::states::SubsurfaceTask;
 use crate::remark::list::Remark;
 use crate::rolling::answer::MotionAnswer;
@@ -276,7 +276,7 @@ pub struct AfterTasks {
     /// Damage.
     pub damage: Option<DamageTask>,
     /// Temperatures.
-    pub thermal: Option<ThermalTask>,
+    pub thermal: Option<Thermal>,
 }
 
 impl AfterTasks {

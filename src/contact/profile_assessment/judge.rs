@@ -3,13 +3,15 @@
 use std::mem::discriminant;
 
 use crate::geometry::holes::{LENGTH_MIN, WIDE};
-use crate::geometry::profile::{Body, NEEDED_BEYOND, Profile};
+use crate::geometry::profile::{Body, Profile};
 use crate::geometry::profile_quality::{
     LocalDefect, NoiseLevel, REFERENCE_MIN, UnderContact, advised_smoothing, under_contact,
 };
 use crate::geometry::wheel_rail::WheelRail;
+use crate::normal::gap::grid::SHARE_MIN;
 use crate::normal::wheel::WheelPatch;
 use crate::numerics::roots::bounds;
+use crate::problem::checked_case::at_edge;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 use crate::solution::words::damage::{PatchQuality, ProfileQuality};
@@ -29,9 +31,6 @@ const WAVES_BEYOND_SHAPE: f64 = 0.3;
 /// Length in mm from which a chord wider than the patch gets a remark, however certain the curve across it is. The arcs of heads and treads are
 /// 10 to 50 mm long, so that a longer chord may hide an arc that neither of the two curves through the points shows.
 const CHORD_HIDES_ARC: f64 = 10.0;
-/// Share of the load up to which a patch may lie entirely where two arcs meet. Its pressure does not show the quality of the profiles, and the
-/// forces do not depend on it.
-const LIGHT: f64 = 0.02;
 /// Pressure in MPa below which errors of a profile are harmless, so that no job fails because of them.
 const PRESSURE_LIGHT: f64 = 200.0;
 
@@ -246,7 +245,8 @@ pub fn judge(
             defects.push(roughness(own, share, pressure, more, patch));
         }
         defects.extend(spacing(own, patch));
-        defects.extend(place(own, patch));
+        let edge = at_edge(own.profile, own.body, own.contact);
+        defects.extend(edge.map(|remark| Defect::certain(own.body, patch.number, 0.0, remark)));
     }
     let quality = |own: &Under, advised: f64| ProfileQuality {
         y_mm: bounds(own.contact.map(|s| own.y(s))),
@@ -275,7 +275,8 @@ fn roughness(
     patch: FoundPatch,
 ) -> Defect {
     let remark = own.cause(share, more);
-    let loaded = patch.load_share > LIGHT;
+    // A light patch may lie entirely where two arcs meet. Its pressure does not show the quality of the profiles.
+    let loaded = patch.load_share > SHARE_MIN;
     // The shape of a sound profile, such as two arcs that meet, has some waviness and some ambiguity.
     let is_beyond_shape = match remark {
         _ if own.profile.smoothing() > 0.0 => true,
@@ -301,30 +302,7 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Defect> {
     let is_wide = length > LENGTH_MIN && found.over_width > 1.0;
     (is_wide && (is_open || length > CHORD_HIDES_ARC)).then(|| Defect {
         share: own.rough() / patch.pressure,
-        refused: patch.load_share > LIGHT && found.over_width > WIDE,
+        refused: patch.load_share > SHARE_MIN && found.over_width > WIDE,
         ..Defect::certain(own.body, patch.number, length, remark)
     })
-}
-
-/// A contact at the end of a profile, or on the tip of the flange.
-fn place(own: &Under, patch: FoundPatch) -> Option<Defect> {
-    let [first, last] = own.profile.range();
-    let [low, high] = own.contact;
-    let middle = own.y(0.5 * (low + high));
-    let left = (low - first).min(last - high);
-    let flange = own.profile.flange().filter(|_| own.body == Body::Wheel);
-    let tip = flange.and_then(|flange| flange.tip);
-    let (profile, y_mm) = (own.body.name(), own.contact.map(|s| own.y(s)));
-    let remark = if tip.is_some_and(|[from, to]| (from..=to).contains(&middle)) {
-        Remark::ContactOnFlangeTip { profile, y_mm }
-    } else if left < NEEDED_BEYOND {
-        Remark::ContactAtProfileEnd {
-            profile,
-            y_mm,
-            left_mm: left.max(0.0),
-        }
-    } else {
-        return None;
-    };
-    Some(Defect::certain(own.body, patch.number, 0.0, remark))
 }

@@ -7,6 +7,7 @@ use crate::monitor::{Monitor, Stop};
 use crate::normal::footprint::NormalTask;
 use crate::normal::hertz::Patch;
 use crate::normal_stage::SolvedFootprint;
+use crate::post::local_power::SolvedMotion;
 use crate::problem::checked_case::CheckedCase;
 use crate::remark::entry::{RemarkEntry, merged};
 use crate::remark::list::Remark;
@@ -18,7 +19,6 @@ use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Motion, RelativeTo};
 use crate::solution::finish::{patch_cells, point_fields, traction_max};
 use crate::solution::maintain;
-use crate::solution::maintain::SolvedMotion;
 use crate::solution::words::answer::{
     CombinedMaterial, ErrorEstimate, Fields, GradientErrors, Gradients, HistoryPoint, MeshReport,
     NormalisedMotion, Origin, PatchFields, PatchSolution, PointFields, PointSolution, Solution,
@@ -243,14 +243,16 @@ fn point_solution(
 ) -> PointSolution {
     let motion = &point.motion;
     let found = point.resultants[index];
-    let areas = on_level
+    let zones = on_level
         .filter(|_| case.run.wants(Output::Zones))
         .map(|(level, fields)| {
             let cells = level.patch_cells(index);
-            zone_areas(level, patch, cells, &fields.tangential.slips)
+            zones(level, patch, cells, &fields.tangential.slips)
         });
-    let stick = point.stick.as_ref().map(|stick| stick[index]);
-    let by_table = |share: fn(f64) -> f64| stick.map(|stick| share(stick) * patch.area);
+    let areas = zones.map(|(_, areas)| areas).or_else(|| {
+        let stick = point.stick.as_ref()?[index];
+        Some([stick, 1.0 - stick].map(|share| share * patch.area))
+    });
     let history = point.history.as_ref();
     let power_x = motion.creepage_x * found.force_x;
     let power_y = motion.creepage_y * found.force_y;
@@ -269,12 +271,8 @@ fn point_solution(
         profile_uncertainty: None,
         error_estimate: point.errors[index]
             .map(|e| absolute(std::slice::from_ref(patch), limit, e)),
-        stick_area_mm2: areas
-            .map(|a| a.stick_area)
-            .or_else(|| by_table(|stick| stick)),
-        slip_area_mm2: areas
-            .map(|a| a.slip_area)
-            .or_else(|| by_table(|stick| 1.0 - stick)),
+        stick_area_mm2: areas.map(|[stick, _]| stick),
+        slip_area_mm2: areas.map(|[_, slip]| slip),
         gradients: point
             .gradients
             .as_ref()
@@ -289,8 +287,8 @@ fn point_solution(
                     gradients[index],
                 ))
             }),
-        stick_cells: areas.map(|a| a.stick_cells),
-        slip_cells: areas.map(|a| a.slip_cells),
+        stick_cells: zones.map(|([stick, _], _)| stick),
+        slip_cells: zones.map(|([_, slip], _)| slip),
         traction_max_mpa: on_level.map(|(level, fields)| traction_max(level, fields, index)),
         friction_power_n: history.map_or_else(steady_power, |history| history.power[index]),
         friction_power_without_spin_n: power_x.abs() + power_y.abs(),
@@ -374,41 +372,21 @@ fn gradient_words(
     }
 }
 
-/// Cells and areas in mm² of the two zones.
-#[derive(Clone, Copy)]
-struct ZoneAreas {
-    stick_cells: u32,
-    slip_cells: u32,
-    stick_area: f64,
-    slip_area: f64,
-}
-
-/// Counts the cells of the zones and computes their areas, scaled so that they add up to the area of the patch.
-fn zone_areas(
+/// Counts the cells that stick and those that slip, and computes the areas of both zones in mm², scaled so that they add up to the area of the
+/// patch.
+fn zones(
     level: &StripMesh,
     patch: &Patch,
     cells: std::ops::Range<usize>,
     slips: &[bool],
-) -> ZoneAreas {
-    let mut zones = ZoneAreas {
-        stick_cells: 0,
-        slip_cells: 0,
-        stick_area: 0.0,
-        slip_area: 0.0,
-    };
+) -> ([u32; 2], [f64; 2]) {
+    let (mut counts, mut areas) = ([0; 2], [0.0; 2]);
     for i in cells {
-        if slips[i] {
-            zones.slip_cells += 1;
-            zones.slip_area += level.area[i];
-        } else {
-            zones.stick_cells += 1;
-            zones.stick_area += level.area[i];
-        }
+        counts[usize::from(slips[i])] += 1;
+        areas[usize::from(slips[i])] += level.area[i];
     }
-    let factor = patch.area / (zones.stick_area + zones.slip_area);
-    zones.stick_area *= factor;
-    zones.slip_area *= factor;
-    zones
+    let factor = patch.area / (areas[0] + areas[1]);
+    (counts, areas.map(|area| area * factor))
 }
 
 /// Returns the power of a patch in N from the slip that the pressure of unlike bodies causes. The moment that resists rolling supplies it.

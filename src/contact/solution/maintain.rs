@@ -1,37 +1,27 @@
 //! Results that follow from a solved motion: stresses below the surface, temperatures, slips and damage.
 
+use crate::case::words::material::Thermal;
 use crate::case::words::solver::Output;
 use crate::case::words::subsurface::BodyName;
-use crate::method::Method;
 use crate::monitor::{Monitor, Stop};
-use crate::normal::footprint::Footprint;
 use crate::normal::hertz::Patch;
-use crate::post::damage::{CellWear, DamageTask, DamagedPatch, across, damage};
-use crate::post::local_power::{CellPower, PowerTask, ThermalTask, cell_power, heating};
+use crate::post::damage::{DamagedPatch, across, damage};
+use crate::post::local_power::{CellPower, SolvedMotion, cell_power, heating};
 use crate::post::subsurface::load_parts::LoadResolution;
 use crate::post::subsurface::states::{
     STORED, StressPlaces, SubsurfaceTask, in_patch_axes, point, stored,
 };
 use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::post::subsurface::worst::{GAP, worst_place};
-use crate::post::subsurface::worst_passage::{PassagesOf, passage as passage_of};
+use crate::post::subsurface::worst::{BelowPatch, DEPTHS, GAP, worst_place};
+use crate::post::subsurface::worst_passage::passage as passage_of;
 use crate::problem::checked_case::CheckedCase;
 use crate::remark::list::Remark;
-use crate::rolling::answer::LevelAnswer;
 use crate::rolling::strip_mesh::StripMesh;
-use crate::rolling::task::Motion;
 use crate::solution::words::answer::{PointFields, PointSolution};
-use crate::solution::words::damage::WearAcross;
 use crate::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
-/// Smallest depth of stresses relative to the half-width of the patch. Closer to the surface, the steps of the traction between cells distort
-/// them. At this depth the largest error in the reference contacts is 0.3 % of the largest pressure
-/// (`cargo test --test physics -- stresses_are --nocapture`).
-const LEAST_DEPTH: f64 = 0.01;
 /// Smallest Péclet number at which heat flows only into the depth (Jaeger 1942). Below it, the computed temperatures are too high.
 const PECLET_LEAST: f64 = 10.0;
-/// Number of points between two calls of the monitor.
-const POINTS_PER_TICK: usize = 1024;
 
 /// Values per cell and remarks that follow from a solved motion.
 #[derive(Default)]
@@ -39,18 +29,6 @@ pub(crate) struct KeptValues {
     /// The values of each patch.
     pub(crate) fields: Vec<PointFields>,
     pub(crate) remarks: Vec<Remark>,
-}
-
-/// A motion that is solved on a mesh.
-#[derive(Clone, Copy)]
-pub(crate) struct SolvedMotion<'a> {
-    pub(crate) footprint: &'a Footprint,
-    pub(crate) level: &'a StripMesh,
-    pub(crate) answer: &'a LevelAnswer,
-    pub(crate) motion: &'a Motion,
-    pub(crate) method: Method,
-    /// Rolling speed in mm/s, if it is known.
-    pub(crate) speed: Option<f64>,
 }
 
 /// Computes the damage of each patch from its resultants and its friction limit in N.
@@ -93,19 +71,11 @@ pub(crate) fn add_rest(
         slips = Some(solved.answer.slip.each_ref().map(scaled));
     } else if run.after.needs_power(&run.outputs) {
         let totals: Vec<f64> = points.iter().map(|p| p.friction_power_n).collect();
-        let task = PowerTask {
-            level: solved.level,
-            answer: solved.answer,
-            motion: solved.motion,
-            method: solved.method,
-            totals: &totals,
-        };
-        let power = cell_power(&task, monitor)?;
+        let power = cell_power(solved, &totals, monitor)?;
         if let Some(task) = run.after.damage.as_ref().filter(|task| task.across) {
-            let found = wear_across(task, solved, &power);
-            for (point, found) in points.iter_mut().zip(found) {
+            for (patch, point) in points.iter_mut().enumerate() {
                 if let Some(damage) = &mut point.damage {
-                    damage.across = Some(found);
+                    damage.across = Some(across(task, solved, &power, patch));
                 }
             }
         }
@@ -176,9 +146,12 @@ struct PatchStresses {
     gap: f64,
 }
 
+/// Returns the smallest depth of stresses below a patch in mm. Closer to the surface, the steps of the traction between cells distort them. At
+/// this depth the largest error in the reference contacts is 0.3 % of the largest pressure
+/// (`cargo test --test physics -- stresses_are --nocapture`).
 fn least_depth(patch: &Patch) -> f64 {
     let [x_min, x_max, y_min, y_max] = patch.extent;
-    LEAST_DEPTH * 0.5 * (x_max - x_min).min(y_max - y_min)
+    DEPTHS[0] * 0.5 * (x_max - x_min).min(y_max - y_min)
 }
 
 /// Returns the load on the surface of the requested body.
@@ -188,7 +161,7 @@ fn loaded<'a>(task: &SubsurfaceTask, of: SolvedMotion<'a>) -> SurfaceLoad<'a> {
         BodyName::Lower => 1.0,
         BodyName::Upper => -1.0,
     };
-    SurfaceLoad::new(of.level, of.footprint, of.answer, sign, task.poisson_ratio)
+    SurfaceLoad::new(of, sign, task.poisson_ratio)
 }
 
 /// Computes the stresses below each patch. All patches of a frame load the same body, so each point has the stresses of all of them.
@@ -204,14 +177,11 @@ fn subsurface(
     let workspace = &mut load.workspace();
     let evaluate = |places: &[[f64; 3]], workspace: &mut LoadWorkspace| {
         let mut values = Vec::with_capacity(places.len() * STORED);
-        for places in places.chunks(POINTS_PER_TICK) {
+        for [x, y, depth] in places {
             monitor.go_on(0.0)?;
-            let deep = |[x, y, depth]: &[f64; 3]| [*x, *y, depth.max(least)];
-            let places: Vec<[f64; 3]> = places.iter().map(deep).collect();
-            let stresses = load.stresses(&places, LoadResolution::FINE, workspace);
-            for (at, stress) in places.into_iter().zip(stresses) {
-                values.extend(stored(at, in_patch_axes(stress, task.body)));
-            }
+            let at = [*x, *y, depth.max(least)];
+            let stress = load.stress(at, LoadResolution::FINE, workspace);
+            values.extend(stored(at, in_patch_axes(stress, task.body)));
         }
         Ok(values)
     };
@@ -220,14 +190,14 @@ fn subsurface(
     let mut shared: Option<([f64; 2], Vec<f64>)> = None;
     for (k, patch) in patches.iter().enumerate() {
         monitor.go_on(0.0)?;
-        let place = PassagesOf {
+        let below = BelowPatch {
             load: &load,
             footprint: of.footprint,
             patch: k,
             least: least_depth(patch),
         };
         let worst = match needs_worst || task.passage.is_some() {
-            true => worst_place(&load, of.footprint, k, place.least, workspace),
+            true => worst_place(below, workspace),
             false => None,
         };
         let points = match (&task.places, worst) {
@@ -253,7 +223,7 @@ fn subsurface(
             (StressPlaces::BelowWorst(_), None) => Vec::new(),
         };
         let passage = task.passage.zip(worst);
-        let passage = passage.map(|(words, worst)| passage_of(words, place, worst, monitor));
+        let passage = passage.map(|(words, worst)| passage_of(words, below, worst, monitor));
         let passage = passage.transpose()?;
         let worst = worst.filter(|_| needs_worst).map(|at| {
             let stress = load.stress(at, LoadResolution::FINE, workspace);
@@ -281,7 +251,7 @@ struct PatchTemperatures {
 }
 
 /// Computes the temperatures of each patch. All segments of a strip in the patch heat it.
-fn temperatures(task: &ThermalTask, of: SolvedMotion, power: &CellPower) -> Vec<PatchTemperatures> {
+fn temperatures(task: &Thermal, of: SolvedMotion, power: &CellPower) -> Vec<PatchTemperatures> {
     let speed = of.speed.unwrap_or(0.0);
     let unit = match speed > 0.0 {
         true => task.rise_of(speed),
@@ -302,7 +272,7 @@ fn temperatures(task: &ThermalTask, of: SolvedMotion, power: &CellPower) -> Vec<
         }
         let (rise_max_k, at_mm) = peak(&hottest);
         let half_length = 0.5 * (patch.extent[1] - patch.extent[0]);
-        let peclets = [task.lower, task.upper].map(|body| body.peclet(speed, half_length));
+        let peclets = task.bodies().map(|body| body.peclet(speed, half_length));
         let summary = TemperatureSummary {
             max_c: base + rise_max_k,
             rise_max_k,
@@ -385,21 +355,6 @@ fn heated_lines(level: &StripMesh, power: &CellPower, patch: usize) -> Vec<Heate
         line.points.extend_from_slice(&line.edges);
     }
     lines
-}
-
-/// Computes the wear of each strip of each patch.
-fn wear_across(task: &DamageTask, of: SolvedMotion, power: &CellPower) -> Vec<WearAcross> {
-    let slips = power.slip[0].iter().zip(&power.slip[1]);
-    let slip: Vec<f64> = slips.map(|(x, y)| x.hypot(*y)).collect();
-    let cells = CellWear {
-        level: of.level,
-        power: &power.power,
-        slip: &slip,
-        speed: of.speed,
-    };
-    (0..of.footprint.patches().len())
-        .map(|patch| across(task, cells, patch))
-        .collect()
 }
 
 #[cfg(test)]

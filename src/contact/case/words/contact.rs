@@ -9,7 +9,7 @@ use crate::case::words::cross_section::CrossSection;
 use crate::case::words::motion::{Combine, Swept, swept};
 use crate::case::words::object::{AllowedRange, Object, shown};
 use crate::case::words::samples;
-use crate::geometry::wheel_rail::{RailPlace, Side};
+use crate::geometry::wheel_rail::{Placement, RailPlace, Side};
 use crate::half_space::bent_surface::Influence;
 
 /// Where the bodies touch.
@@ -222,7 +222,7 @@ pub struct KinematicsWords {
     #[member(positive(5.0, "mm"), default = 0.1)]
     pub step_mm: f64,
     /// Amplitudes in mm for the equivalent conicity; default 1 to 7. Vehicle acceptance uses 3.
-    #[member(with = amplitudes, default = (1..=7).map(f64::from).collect())]
+    #[member(with = amplitudes, 1..=100, default = (1..=7).map(f64::from).collect())]
     pub amplitudes_mm: Vec<f64>,
 }
 
@@ -232,7 +232,7 @@ impl Contact {
         matches!(self, Contact::Profiles { .. } | Contact::Wheelset { .. })
     }
 
-    /// The members that `profiles` and `wheelset` share; `None` for other contacts.
+    /// Returns the wheel over its rail, for a wheelset that on the left without shift, yaw and roll; `None` for other contacts.
     pub(crate) fn on_rails(&self) -> Option<OnRails<'_>> {
         let (Contact::Profiles {
             rail,
@@ -267,38 +267,60 @@ impl Contact {
         else {
             return None;
         };
+        let (side, [lateral_shift, yaw, roll]) = match *self {
+            Contact::Profiles {
+                side,
+                lateral_shift_mm,
+                yaw_rad,
+                roll_rad,
+                ..
+            } => (side, [lateral_shift_mm, yaw_rad, roll_rad]),
+            _ => (Side::Left, [0.0; 3]),
+        };
         Some(OnRails {
             sections: [rail, wheel],
-            rolling_radius_mm: *rolling_radius_mm,
-            rail: match *rail_origin_mm {
-                Some(origin) => RailPlace::Origin(origin),
-                None => RailPlace::Gauge {
-                    gauge: gauge_mm.unwrap_or(GAUGE),
-                    height: gauge_height_mm.unwrap_or(GAUGE_HEIGHT),
+            pointers: ["/contact/rail", "/contact/wheel"],
+            radius_pointer: "/contact/rolling_radius_mm",
+            flange_back: *flange_back_position_mm,
+            accept_rough: *accept_rough_profiles,
+            placement: Placement {
+                side,
+                rolling_radius: *rolling_radius_mm,
+                rail: match *rail_origin_mm {
+                    Some(origin) => RailPlace::Origin(origin),
+                    None => RailPlace::Gauge {
+                        gauge: gauge_mm.unwrap_or(GAUGE),
+                        height: gauge_height_mm.unwrap_or(GAUGE_HEIGHT),
+                    },
                 },
+                cant: *cant_rad,
+                flange_back_distance: *flange_back_distance_mm,
+                flange_back_position: 0.0,
+                lateral_shift,
+                yaw,
+                roll,
             },
-            cant_rad: *cant_rad,
-            flange_back_distance_mm: *flange_back_distance_mm,
-            flange_back_position_mm: *flange_back_position_mm,
-            accept_rough_profiles: *accept_rough_profiles,
             reference_surface: *reference_surface,
             influence: *influence,
         })
     }
 }
 
-/// The members that the contacts `profiles` and `wheelset` share.
+/// The members of a case that describe a wheel over its rail.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OnRails<'a> {
-    /// Cross-sections of rail and wheel; of a wheelset those of the left side.
+    /// Cross-sections of rail and wheel.
     pub(crate) sections: [&'a CrossSection; 2],
-    pub(crate) rolling_radius_mm: f64,
-    /// Position of the rail by its gauge or its origin.
-    pub(crate) rail: RailPlace,
-    pub(crate) cant_rad: f64,
-    pub(crate) flange_back_distance_mm: f64,
-    pub(crate) flange_back_position_mm: Option<f64>,
-    pub(crate) accept_rough_profiles: bool,
+    /// JSON pointers to them.
+    pub(crate) pointers: [&'static str; 2],
+    /// JSON pointer to the rolling radius.
+    pub(crate) radius_pointer: &'static str,
+    /// y of the back of the flange in mm, if the case states it.
+    pub(crate) flange_back: Option<f64>,
+    /// Whether rough or exchanged profiles are accepted.
+    pub(crate) accept_rough: bool,
+    /// The placement, in which the position of the back of the flange is still 0.
+    pub(crate) placement: Placement,
     pub(crate) reference_surface: Option<SurfaceName>,
     pub(crate) influence: Option<Influence>,
 }
@@ -337,8 +359,8 @@ pub enum SurfaceName {
 
 /// Standard gauge in mm, the default.
 pub(crate) const GAUGE: f64 = 1435.0;
-/// Default depth in mm at which the gauge is measured.
-const GAUGE_HEIGHT: f64 = 14.0;
+/// Default depth in mm below the top of the rail at which the gauge is measured.
+pub(crate) const GAUGE_HEIGHT: f64 = 14.0;
 /// Default distance of the backs of the flanges in mm, that of standard gauge.
 pub(crate) const FLANGE_BACKS: f64 = 1360.0;
 
@@ -351,8 +373,6 @@ const LOADS: [&str; 3] = ["vertical_force_n", "normal_force_n", "approach_mm"];
 
 /// Maximum number of shifts to one side in the kinematics of a wheelset.
 const SHIFTS_MAX: f64 = 1000.0;
-/// Maximum number of amplitudes of the equivalent conicity.
-const AMPLITUDES_MAX: usize = 100;
 
 /// Reads the required member `contact` of a case.
 pub(crate) fn read(case: &mut Object) -> Option<Contact> {
@@ -535,8 +555,13 @@ pub(crate) fn faults_of_kinematics(
 }
 
 /// Reads the amplitudes of the equivalent conicity.
-pub(crate) fn amplitudes(asked: &mut Object, name: &str) -> Option<Vec<f64>> {
-    let what = format!("an array of 1 to {AMPLITUDES_MAX} amplitudes in mm");
+pub(crate) fn amplitudes(
+    asked: &mut Object,
+    name: &str,
+    least: usize,
+    most: usize,
+) -> Option<Vec<f64>> {
+    let what = format!("an array of {least} to {most} amplitudes in mm");
     let allowed = AllowedRange::positive(50.0, "mm");
-    asked.number_array(name, 1..=AMPLITUDES_MAX, &what, allowed)
+    asked.number_array(name, least..=most, &what, allowed)
 }

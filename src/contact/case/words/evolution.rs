@@ -48,7 +48,7 @@ pub struct EvolutionWords {
     pub limits: WearLosses,
     /// Maintenance, in any order.
     #[schema(required = false)]
-    #[member(with = events, default)]
+    #[member(with = events, 0..=100, default)]
     pub events: Vec<EvolutionEvent>,
     /// Uncertainty of a wear coefficient whose scatter is not published: with 90 % probability it lies between its value divided and
     /// multiplied by this factor; default 2.
@@ -237,8 +237,6 @@ const AMOUNT: AllowedRange = AllowedRange::positive(1e12, "");
 const NOT_NEGATIVE: AllowedRange = AllowedRange::closed(0.0, 1e12, "");
 const ANY: AllowedRange = AllowedRange::closed(-1e12, 1e12, "");
 const LOSS: AllowedRange = AllowedRange::positive(100.0, "mm");
-/// Maximum number of events.
-const EVENTS_MAX: usize = 100;
 /// Maximum number of rows of a traffic.
 const ROWS_MAX: u32 = 200_000;
 /// Default number of samples of a traffic whose columns are all distributions.
@@ -297,9 +295,14 @@ pub(crate) fn faults_of_extent(all: &mut Object, _: Option<&EvolutionWords>) -> 
 }
 
 /// Reads the events.
-pub(crate) fn events(all: &mut Object, name: &str) -> Option<Vec<EvolutionEvent>> {
-    let what = format!("an array of at most {EVENTS_MAX} events");
-    let elements = all.array(name, 0..=EVENTS_MAX, &what)?;
+pub(crate) fn events(
+    all: &mut Object,
+    name: &str,
+    least: usize,
+    most: usize,
+) -> Option<Vec<EvolutionEvent>> {
+    let what = format!("an array of at most {most} events");
+    let elements = all.array(name, least..=most, &what)?;
     all.each(name, elements, |element, pointer, faults| {
         EvolutionEvent::members(&mut Object::open(element, pointer, faults)?)
     })

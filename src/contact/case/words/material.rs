@@ -71,6 +71,16 @@ pub enum Thermal {
     },
 }
 
+impl Thermal {
+    /// Returns the constants of the lower and the upper body.
+    pub fn bodies(&self) -> [&ThermalBodyWords; 2] {
+        match self {
+            Thermal::Same(both) => [both; 2],
+            Thermal::Pair { lower, upper } => [lower, upper],
+        }
+    }
+}
+
 /// Thermal constants of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
 #[schema(as = ThermalBody)]

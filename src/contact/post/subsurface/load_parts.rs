@@ -8,8 +8,8 @@ use std::ops::Range;
 use crate::half_space::kernels::LoadPack;
 use crate::numerics::quadrature::RULES;
 
-/// Most cached parts, and most cached packs of point loads, with 45 MB together. Only memory depends on it.
-const KEPT_MAX: usize = 100_000;
+/// Most cached parts, most cached packs of point loads, and most cached chords, with 53 MB together. Only memory depends on it.
+pub(crate) const KEPT_MAX: usize = 100_000;
 
 /// Most lateral halvings of a region. A part of a patch that is a hundred times as wide as long is then a third of the least allowed depth wide.
 const HALVINGS_MAX: u32 = 16;
@@ -37,6 +37,11 @@ impl LoadPart {
         })
     }
 
+    /// Returns whether the part can only be halved longitudinally.
+    pub(crate) fn is_narrow(self) -> bool {
+        self.across.level >= HALVINGS_MAX
+    }
+
     /// The halves of the part, longitudinal or lateral ones.
     pub fn halves(self, along: bool) -> [LoadPart; 2] {
         if along {
@@ -53,9 +58,10 @@ const NONE: [u32; 2] = [u32::MAX; 2];
 
 /// A part with the values computed for it.
 #[derive(Debug)]
-struct Node {
-    part: LoadPart,
-    seen: PartBox,
+pub(crate) struct Node {
+    pub(crate) part: LoadPart,
+    /// Its bounds.
+    pub(crate) seen: PartBox,
     /// Range of its packs, by the longitudinal and the lateral rule; [`NONE`] if they were not computed yet.
     packs: [[[u32; 2]; ORDERS]; ORDERS],
     /// The number of its first half. The second half is the next node.
@@ -64,15 +70,17 @@ struct Node {
 
 /// The tree of the parts of all regions. The roots come first.
 #[derive(Debug)]
-pub struct LoadParts {
-    nodes: Vec<Node>,
-    first: usize,
-    packs: Vec<LoadPack>,
+pub(crate) struct LoadParts {
+    pub(crate) nodes: Vec<Node>,
+    /// Number of roots.
+    pub(crate) first: usize,
+    /// All packs.
+    pub(crate) packs: Vec<LoadPack>,
 }
 
 impl LoadParts {
     /// Makes a tree with these roots.
-    pub fn new(first: impl Iterator<Item = (LoadPart, PartBox)>) -> LoadParts {
+    pub(crate) fn new(first: impl Iterator<Item = (LoadPart, PartBox)>) -> LoadParts {
         let nodes: Vec<Node> = first.map(|(part, seen)| Node::new(part, seen)).collect();
         LoadParts {
             first: nodes.len(),
@@ -82,7 +90,7 @@ impl LoadParts {
     }
 
     /// Removes all parts except the roots, and all packs, if there are too many. It is called between points.
-    pub fn trim(&mut self) {
+    pub(crate) fn trim(&mut self) {
         if self.nodes.len() > KEPT_MAX.max(2 * self.first) || self.packs.len() > KEPT_MAX {
             self.nodes.truncate(self.first);
             for node in &mut self.nodes {
@@ -92,33 +100,8 @@ impl LoadParts {
         }
     }
 
-    /// Number of roots.
-    pub fn first(&self) -> usize {
-        self.first
-    }
-
-    /// A part.
-    pub fn part(&self, number: usize) -> LoadPart {
-        self.nodes[number].part
-    }
-
-    /// Bounds of a part.
-    pub fn seen(&self, number: usize) -> PartBox {
-        self.nodes[number].seen
-    }
-
-    /// Returns whether a part can only be halved longitudinally.
-    pub fn narrow(&self, number: usize) -> bool {
-        self.nodes[number].part.across.level >= HALVINGS_MAX
-    }
-
-    /// All packs.
-    pub fn packs(&self) -> &[LoadPack] {
-        &self.packs
-    }
-
     /// The halves of a part.
-    pub fn halves(
+    pub(crate) fn halves(
         &mut self,
         number: usize,
         mut make: impl FnMut(&LoadPart) -> PartBox,
@@ -127,7 +110,7 @@ impl LoadParts {
             first as usize
         } else {
             let Node { part, seen, .. } = self.nodes[number];
-            let along = seen.squares[0] >= seen.squares[1] || self.narrow(number);
+            let along = seen.squares[0] >= seen.squares[1] || part.is_narrow();
             let first = self.nodes.len();
             for half in part.halves(along) {
                 self.nodes.push(Node::new(half, make(&half)));
@@ -139,7 +122,7 @@ impl LoadParts {
     }
 
     /// The packs of a part for a longitudinal and a lateral rule.
-    pub fn quadrature(
+    pub(crate) fn quadrature(
         &mut self,
         number: usize,
         [along, across]: [usize; 2],

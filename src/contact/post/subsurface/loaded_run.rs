@@ -9,8 +9,8 @@ use crate::normal::footprint::Footprint;
 use crate::numerics::quadrature::RULES;
 use crate::numerics::roots::bounds;
 use crate::numerics::simd::LANES;
-use crate::post::subsurface::load_parts::{LoadPart, ORDERS, PartBox};
-use crate::rolling::answer::LevelAnswer;
+use crate::post::local_power::SolvedMotion;
+use crate::post::subsurface::load_parts::{KEPT_MAX, LoadPart, ORDERS, PartBox};
 use crate::rolling::strip_mesh::StripMesh;
 
 /// Number of points of the largest rule.
@@ -29,15 +29,23 @@ const STEEP: f64 = 0.4;
 /// The loads on a run of strips.
 #[derive(Debug)]
 pub(crate) struct LoadedRun<'a> {
-    outline: RunOutline<'a>,
+    footprint: &'a Footprint,
+    /// Number of the patch.
+    patch: usize,
+    /// Number of the run in the mesh.
+    number: usize,
+    /// Least y of the run in mm.
+    low: f64,
+    /// Width of the run in mm.
+    width: f64,
     /// Smallest and largest x of its chords.
     extent: [f64; 2],
     /// y of the mid-lines of the strips.
     lines: Vec<f64>,
     /// Angles of the nodes, which are the same in all strips.
     nodes: Vec<f64>,
-    /// See [`LoadedRun::halvings`].
-    halvings: [u32; 2],
+    /// Number of longitudinal and lateral halvings in any case.
+    pub(crate) halvings: [u32; 2],
     /// Tractions over pressure, node by node, strip by strip.
     ratios: Vec<[f32; 2]>,
 }
@@ -84,18 +92,14 @@ struct Turns {
     nodes: [Between; POINTS_MAX],
 }
 
-/// Longitudinal and lateral traction over pressure at the points of a rule on a strip.
-type StripRatios = [[f32; POINTS_MAX]; 2];
-
 impl<'a> LoadedRun<'a> {
     /// The run of these segments, the `number`-th of the mesh, with the tractions of an answer in units of `unit` MPa.
     pub(crate) fn new(
-        level: &StripMesh,
-        footprint: &'a Footprint,
-        answer: &LevelAnswer,
+        of: SolvedMotion<'a>,
         unit: f64,
         (segments, number): (&[Segment], usize),
     ) -> LoadedRun<'a> {
+        let (level, footprint, answer) = (of.level, of.footprint, of.answer);
         let [first, last] = [0, segments.len() - 1].map(|k| &segments[k].chord);
         let low = first.y - 0.5 * first.dy;
         let ratio = |i: usize| match level.pressure[i] {
@@ -110,13 +114,11 @@ impl<'a> LoadedRun<'a> {
         let nodes = &level.mesh.node[segments[0].cells.clone()];
         let chords = segments.iter().map(|segment| &segment.chord);
         LoadedRun {
-            outline: RunOutline {
-                footprint,
-                patch: first.patch,
-                number,
-                low,
-                width: last.y + 0.5 * last.dy - low,
-            },
+            footprint,
+            patch: first.patch,
+            number,
+            low,
+            width: last.y + 0.5 * last.dy - low,
             extent: bounds(chords.clone().flat_map(|chord| [chord.left, chord.right])),
             halvings: halvings(level, footprint, segments),
             lines: chords.map(|chord| chord.y).collect(),
@@ -127,11 +129,6 @@ impl<'a> LoadedRun<'a> {
                 .map(ratio)
                 .collect(),
         }
-    }
-
-    /// Number of longitudinal and lateral halvings in any case.
-    pub(crate) fn halvings(&self) -> [u32; 2] {
-        self.halvings
     }
 
     /// The least longitudinal rule of a part. The load on a chord is nearly proportional to sin² u, whose integral over all angles has an error of 0.1 %
@@ -152,9 +149,9 @@ impl<'a> LoadedRun<'a> {
         known: &mut KnownLines,
     ) -> PartBox {
         let cosines = [0.0, 1.0].map(|side| (PI * part.along.share(side)).cos());
-        let [y0, y1] = [0.0, 1.0].map(|side| self.outline.y(part.across.share(side)));
+        let [y0, y1] = [0.0, 1.0].map(|side| self.y(part.across.share(side)));
         let [low, middle, high] =
-            [0.0, 0.5, 1.0].map(|side| self.outline.chord(part.across.share(side), known));
+            [0.0, 0.5, 1.0].map(|side| self.chord(part.across.share(side), known));
         // Change of x over the part if it changed everywhere as in its middle, over the length of the chord.
         let slope = 0.5 * PI * part.along.width() * (PI * part.along.share(0.5)).sin();
         let (x, length, skew) = match middle {
@@ -208,18 +205,18 @@ impl<'a> LoadedRun<'a> {
             first + (count * rule.len()).div_ceil(LANES),
             LoadPack::default(),
         );
-        let mut passed = below(&self.lines, self.outline.y(part.across.share(0.0)));
-        let width = 0.5 * self.outline.width * part.across.width();
+        let mut passed = below(&self.lines, self.y(part.across.share(0.0)));
+        let width = 0.5 * self.width * part.across.width();
         let angles = (&turns.cosines, &turns.sines);
         let cosines = turns.cosines.map(|cosine| cosine as f32);
         for (k, (at, weight)) in rule.iter().enumerate() {
             let share = part.across.share(0.5 * (1.0 + at));
-            let Some(chord) = self.outline.chord(share, known) else {
+            let Some(chord) = self.chord(share, known) else {
                 continue;
             };
             let between = Between::new(&self.lines, chord.y, &mut passed);
             let [below, above] = between.pair.map(|strip| self.row(strip, &turns));
-            let pressures = self.outline.footprint.pressures(&chord, angles);
+            let pressures = self.footprint.pressures(&chord, angles);
             let half = 0.5 * (chord.right - chord.left);
             let reach = half * width * weight;
             let middle = (0.5 * (chord.right + chord.left) - origin[0]) as f32;
@@ -265,8 +262,8 @@ impl<'a> LoadedRun<'a> {
         turns
     }
 
-    /// Tractions over pressure on the mid-line of a strip.
-    fn row(&self, strip: usize, turns: &Turns) -> StripRatios {
+    /// Longitudinal and lateral traction over pressure at the points of a rule on the mid-line of a strip.
+    fn row(&self, strip: usize, turns: &Turns) -> [[f32; POINTS_MAX]; 2] {
         let nodes = self.nodes.len();
         let own = &self.ratios[strip * nodes..][..nodes];
         let mut row = [[0.0; POINTS_MAX]; 2];
@@ -277,6 +274,29 @@ impl<'a> LoadedRun<'a> {
             row[1][k] = low[1] + share * (high[1] - low[1]);
         }
         row
+    }
+
+    /// y in mm of a position in the run, from 0 to 1.
+    fn y(&self, share: f64) -> f64 {
+        self.low + self.width * share
+    }
+
+    /// The chord on the line at a position from 0 to 1, if there is exactly one.
+    fn chord(&self, share: f64, known: &mut KnownLines) -> Option<Chord> {
+        let look = || {
+            let line = (self.y(share), self.width);
+            self.footprint.single_chord(self.patch, line)
+        };
+        if self.footprint.is_closed_form() {
+            return look();
+        }
+        let KnownLines(known) = known;
+        if known.len() > KEPT_MAX {
+            known.clear();
+        }
+        *known
+            .entry((self.number, share.to_bits()))
+            .or_insert_with(look)
     }
 }
 
@@ -316,49 +336,6 @@ fn steepest(level: &StripMesh, segments: &[Segment]) -> f64 {
     steepest
 }
 
-/// Most cached lines, with 80 bytes each. Only memory depends on it.
-const LINES_MAX: usize = 200_000;
-
 /// Cache of the chords on lines across the runs of one mesh, by the run and the position in it. It is not used for Hertz's ellipse.
 #[derive(Debug, Default)]
 pub(crate) struct KnownLines(HashMap<(usize, u64), Option<Chord>>);
-
-/// Chords of the region on lines across a run of strips.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RunOutline<'a> {
-    /// The region.
-    pub footprint: &'a Footprint,
-    /// Number of the patch.
-    pub patch: usize,
-    /// Number of the run in the mesh.
-    pub number: usize,
-    /// Least y of the run in mm.
-    pub low: f64,
-    /// Width of the run in mm.
-    pub width: f64,
-}
-
-impl RunOutline<'_> {
-    /// y in mm of a position in the run, from 0 to 1.
-    pub(crate) fn y(&self, share: f64) -> f64 {
-        self.low + self.width * share
-    }
-
-    /// The chord on the line at a position from 0 to 1, if there is exactly one.
-    pub(crate) fn chord(&self, share: f64, known: &mut KnownLines) -> Option<Chord> {
-        let look = || {
-            let line = (self.y(share), self.width);
-            self.footprint.single_chord(self.patch, line)
-        };
-        if self.footprint.is_closed_form() {
-            return look();
-        }
-        let KnownLines(known) = known;
-        if known.len() > LINES_MAX {
-            known.clear();
-        }
-        *known
-            .entry((self.number, share.to_bits()))
-            .or_insert_with(look)
-    }
-}

@@ -12,13 +12,13 @@ use std::ops::Range;
 
 use crate::half_space::kernels::{LoadPack, Stress, stress};
 use crate::mesh::{Chord, Segment};
-use crate::normal::footprint::Footprint;
 use crate::numerics::quadrature::RULES;
 use crate::numerics::simd::LANES;
-use crate::post::subsurface::load_parts::{LoadPart, LoadParts, LoadResolution, ORDERS, PartBox};
+use crate::post::local_power::SolvedMotion;
+use crate::post::subsurface::load_parts::{
+    LoadPart, LoadParts, LoadResolution, Node, ORDERS, PartBox,
+};
 use crate::post::subsurface::loaded_run::{KnownLines, LoadedRun};
-use crate::rolling::answer::LevelAnswer;
-use crate::rolling::strip_mesh::StripMesh;
 
 /// The loads on one body.
 #[derive(Debug)]
@@ -48,13 +48,8 @@ pub struct LoadWorkspace {
 
 impl<'a> SurfaceLoad<'a> {
     /// The pressures and tractions of a mesh on a body. The tractions on it are those on the lower body times `sign`.
-    pub fn new(
-        level: &StripMesh,
-        footprint: &'a Footprint,
-        answer: &LevelAnswer,
-        sign: f64,
-        poisson_ratio: f64,
-    ) -> SurfaceLoad<'a> {
+    pub fn new(of: SolvedMotion<'a>, sign: f64, poisson_ratio: f64) -> SurfaceLoad<'a> {
+        let (level, footprint) = (of.level, of.footprint);
         let extents = footprint.patches().iter().map(|patch| patch.extent);
         let count = footprint.patches().len() as f64;
         let sum = extents.fold([0.0; 2], |sum, [x0, x1, y0, y1]| {
@@ -64,13 +59,13 @@ impl<'a> SurfaceLoad<'a> {
         let mut regions = Vec::new();
         for strips in runs(&level.mesh.segments) {
             if strips.len() == 1 || strips[0].chord.strip != strips[1].chord.strip {
-                let run = LoadedRun::new(level, footprint, answer, unit, (strips, regions.len()));
+                let run = LoadedRun::new(of, unit, (strips, regions.len()));
                 regions.push(LoadedRegion::Run(run));
                 continue;
             }
             for segment in strips {
                 let cells = segment.cells.clone();
-                let cell = |i| LoadedCell::new(level, answer, unit, (&segment.chord, i));
+                let cell = |i| LoadedCell::new(of, unit, (&segment.chord, i));
                 regions.extend(cells.map(cell).map(LoadedRegion::Cell));
             }
         }
@@ -84,7 +79,7 @@ impl<'a> SurfaceLoad<'a> {
         let mut first_parts = Vec::new();
         for (region, loaded) in load.regions.iter().enumerate() {
             let [along, across] = match loaded {
-                LoadedRegion::Run(run) => run.halvings(),
+                LoadedRegion::Run(run) => run.halvings,
                 LoadedRegion::Cell(_) => [0; 2],
             };
             for part in LoadPart::pieces(region, along, across) {
@@ -106,19 +101,6 @@ impl<'a> SurfaceLoad<'a> {
         }
     }
 
-    /// The stresses at some points; see [`SurfaceLoad::stress`].
-    pub fn stresses(
-        &self,
-        places: &[[f64; 3]],
-        resolution: LoadResolution,
-        workspace: &mut LoadWorkspace,
-    ) -> Vec<Stress> {
-        let places = places.iter();
-        places
-            .map(|at| self.stress(*at, resolution, workspace))
-            .collect()
-    }
-
     /// The stress at a point `[x, y, depth]` in mm, in axes with z into the body.
     pub fn stress(
         &self,
@@ -129,22 +111,23 @@ impl<'a> SurfaceLoad<'a> {
         parts.trim();
         felt.clear();
         let point = [x - self.origin[0], y - self.origin[1], depth].map(|at| at as f32);
-        let mut open: Vec<usize> = (0..parts.first()).collect();
+        let mut open: Vec<usize> = (0..parts.first).collect();
         while let Some(number) = open.pop() {
-            let [along, mut across] = resolution.orders(parts.seen(number), point);
-            if parts.narrow(number) {
+            let Node { part, seen, .. } = parts.nodes[number];
+            let [along, mut across] = resolution.orders(seen, point);
+            if part.is_narrow() {
                 across = across.min(ORDERS - 1);
             }
             if along == ORDERS || across == ORDERS {
                 open.extend(parts.halves(number, |part| self.seen(part, lines)));
                 continue;
             }
-            let along = along.max(self.least_rule(parts.part(number)));
+            let along = along.max(self.least_rule(part));
             felt.push(parts.quadrature(number, [along, across], |part, to| {
                 self.quadrature(part, [along, across], lines, to);
             }));
         }
-        stress(parts.packs(), felt, point, self.poisson_ratio)
+        stress(&parts.packs, felt, point, self.poisson_ratio)
     }
 
     /// The bounds of a part.
@@ -216,8 +199,7 @@ pub(crate) struct LoadedCell {
 impl LoadedCell {
     /// The cell `i` of a strip, with the traction of an answer in units of `unit` MPa.
     pub(crate) fn new(
-        level: &StripMesh,
-        answer: &LevelAnswer,
+        SolvedMotion { level, answer, .. }: SolvedMotion,
         unit: f64,
         (chord, i): (&Chord, usize),
     ) -> LoadedCell {

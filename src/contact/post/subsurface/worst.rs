@@ -11,6 +11,7 @@
 
 use std::convert::Infallible;
 
+use crate::mesh::Chord;
 use crate::normal::footprint::Footprint;
 use crate::post::subsurface::load_parts::LoadResolution;
 use crate::post::subsurface::states::von_mises;
@@ -21,7 +22,7 @@ use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 
 /// Numbers of columns along x and y, and the outermost of them relative to half chord and half width.
 const COLUMNS: [(usize, f64); 2] = [(13, 1.02), (9, 0.9)];
-/// Depths relative to the half-width of the patch.
+/// Depths relative to the half-width of the patch, from the least on.
 pub(crate) const DEPTHS: [f64; 8] = [0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.5, 0.8];
 /// First steps in `x/a`, `y/b` and `ln depth`.
 pub(crate) const STEPS: [f64; 3] = [0.12, 0.15, 0.2];
@@ -30,53 +31,49 @@ const NEAR_MOST: f64 = 0.9;
 /// Evaluations of a search.
 const EVALUATIONS: usize = 120;
 
-/// The coordinates of the search in one patch.
-struct PatchColumns<'a> {
-    footprint: &'a Footprint,
-    patch: usize,
-    /// y of the middle in mm.
-    middle: f64,
-    /// Half width in mm.
-    half: f64,
-    /// Half of the smaller extent in mm.
-    small: f64,
+/// A patch below which stresses are searched.
+#[derive(Debug, Clone, Copy)]
+pub struct BelowPatch<'a> {
+    /// The loads on the body.
+    pub load: &'a SurfaceLoad<'a>,
+    /// The loaded region.
+    pub footprint: &'a Footprint,
+    /// Number of the patch.
+    pub patch: usize,
     /// Least depth in mm.
-    least: f64,
+    pub least: f64,
 }
 
-impl PatchColumns<'_> {
-    /// Converts `[x/a, y/b, ln(depth/small)]` to `[x, y, depth]`. Returns `None` outside the patch.
-    fn place(&self, [s, t, depth]: [f64; 3]) -> Option<[f64; 3]> {
-        let y = self.middle + self.half * t;
-        let chords = self.footprint.chords(self.patch, &[(y, self.half)]);
-        let longest = chords
-            .iter()
-            .max_by(|a, b| (a.right - a.left).total_cmp(&(b.right - b.left)))?;
-        let x = 0.5 * (longest.left + longest.right) + 0.5 * s * (longest.right - longest.left);
-        let depth = (self.small * depth.exp()).max(self.least);
-        Some([x, y, depth])
+impl BelowPatch<'_> {
+    /// Half of the width of the patch in mm.
+    fn half_width(&self) -> f64 {
+        let [.., y_min, y_max] = self.footprint.patches()[self.patch].extent;
+        0.5 * (y_max - y_min)
+    }
+
+    /// Converts `[y/b, ln(depth/small)]` to `[y, depth]` in mm, where `small` is half of the smaller extent.
+    pub(crate) fn place(&self, [across, depth]: [f64; 2]) -> [f64; 2] {
+        let [x_min, x_max, y_min, y_max] = self.footprint.patches()[self.patch].extent;
+        let small = 0.5 * (x_max - x_min).min(y_max - y_min);
+        let y = 0.5 * (y_min + y_max) + self.half_width() * across;
+        [y, (small * depth.exp()).max(self.least)]
     }
 }
 
-/// `[x, y, depth]` in mm of the worst point of a patch, at least `least` deep.
-pub fn worst_place(
-    load: &SurfaceLoad,
-    footprint: &Footprint,
-    patch: usize,
-    least: f64,
-    workspace: &mut LoadWorkspace,
-) -> Option<[f64; 3]> {
-    let [x_min, x_max, y_min, y_max] = footprint.patches()[patch].extent;
-    let columns = PatchColumns {
-        footprint,
-        patch,
-        middle: 0.5 * (y_min + y_max),
-        half: 0.5 * (y_max - y_min),
-        small: 0.5 * (x_max - x_min).min(y_max - y_min),
-        least,
+/// `[x, y, depth]` in mm of the worst point below a patch.
+pub fn worst_place(of: BelowPatch, workspace: &mut LoadWorkspace) -> Option<[f64; 3]> {
+    let place = |[s, t, depth]: [f64; 3]| {
+        let [y, depth] = of.place([t, depth]);
+        let chords = of.footprint.chords(of.patch, &[(y, of.half_width())]);
+        let length = |chord: &Chord| chord.right - chord.left;
+        let longest = chords
+            .iter()
+            .max_by(|a, b| length(a).total_cmp(&length(b)))?;
+        let x = 0.5 * (longest.left + longest.right) + 0.5 * s * length(longest);
+        Some([x, y, depth])
     };
-    let mut badness = |at: [f64; 3], resolution| match columns.place(at) {
-        Some(place) => von_mises(load.stress(place, resolution, workspace)),
+    let mut badness = |at: [f64; 3], resolution| match place(at) {
+        Some(at) => von_mises(of.load.stress(at, resolution, workspace)),
         None => 0.0,
     };
     let spread = |(count, reach): (usize, f64)| {
@@ -104,7 +101,7 @@ pub fn worst_place(
         });
         worst = higher(worst, (found, at));
     }
-    columns.place(worst.1)
+    place(worst.1)
 }
 
 /// The one of two places with the larger value.

@@ -16,11 +16,11 @@ use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use crate::case::words::subsurface::PassageWords;
 use crate::half_space::kernels::Stress;
 use crate::monitor::{Monitor, Stop};
-use crate::normal::footprint::Footprint;
+use crate::numerics::roots::bounds;
 use crate::post::subsurface::load_parts::LoadResolution;
 use crate::post::subsurface::states::{principal, von_mises};
-use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
-use crate::post::subsurface::worst::{DEPTHS, Deviator, STEPS, climb, enclosing_ball};
+use crate::post::subsurface::surface_load::LoadWorkspace;
+use crate::post::subsurface::worst::{BelowPatch, DEPTHS, Deviator, STEPS, climb, enclosing_ball};
 use crate::solution::words::evolution::{PassagePlace, PassageSummary};
 
 // These constants are chosen by judgement. `cargo test --test physics -- shakes_down` compares the results with closed forms.
@@ -40,19 +40,6 @@ const EVALUATIONS: usize = 24;
 /// Lateral position of the outermost line, relative to the half width.
 const OUTERMOST: f64 = 0.95;
 
-/// The loads, and the patch below which passages are assessed.
-#[derive(Debug, Clone, Copy)]
-pub struct PassagesOf<'a> {
-    /// The loads on the body.
-    pub load: &'a SurfaceLoad<'a>,
-    /// The loaded region.
-    pub footprint: &'a Footprint,
-    /// Number of the patch.
-    pub patch: usize,
-    /// Smallest depth in mm.
-    pub least: f64,
-}
-
 /// The worst passages below a patch, and the accuracy of the enclosing balls.
 #[derive(Debug, Clone, Copy)]
 pub struct JudgedPassage {
@@ -69,7 +56,7 @@ pub struct JudgedPassage {
 /// Returns an error if the monitor stopped the work.
 pub fn passage(
     task: PassageWords,
-    of: PassagesOf,
+    of: BelowPatch,
     worst: [f64; 3],
     monitor: &dyn Monitor,
 ) -> Result<JudgedPassage, Stop> {
@@ -113,34 +100,22 @@ pub fn passage(
 
 /// The lines below a patch.
 struct Lines<'a> {
-    of: PassagesOf<'a>,
-    /// y of the middle in mm.
-    middle: f64,
-    /// Half width in mm.
-    half: f64,
-    /// Half of the smaller extent in mm.
-    small: f64,
+    of: BelowPatch<'a>,
     /// x of the states in mm.
     stations: Vec<f64>,
 }
 
 impl<'a> Lines<'a> {
-    fn new(of: PassagesOf<'a>) -> Lines<'a> {
-        let patches = of.footprint.patches();
-        let [x_min, x_max, y_min, y_max] = patches[of.patch].extent;
-        let all = patches.iter().map(|patch| patch.extent);
-        let [first, last] = all.fold([x_min, x_max], |[first, last], extent| {
-            [first.min(extent[0]), last.max(extent[1])]
-        });
+    fn new(of: BelowPatch<'a>) -> Lines<'a> {
+        let patches = of.footprint.patches().iter();
+        let ends = patches.flat_map(|patch| [patch.extent[0], patch.extent[1]]);
+        let [first, last] = bounds(ends);
         let (centre, reach) = (0.5 * (first + last), 0.5 * (last - first));
         let inner = (1..=NEAR).map(|k| NEAR_REACH * k as f64 / NEAR as f64);
         let one_side: Vec<f64> = inner.chain(FAR).collect();
         let behind = one_side.iter().rev().map(|s| -s);
         let all = behind.chain([0.0]).chain(one_side.iter().copied());
         Lines {
-            middle: 0.5 * (y_min + y_max),
-            half: 0.5 * (y_max - y_min),
-            small: 0.5 * (x_max - x_min).min(y_max - y_min),
             stations: all.map(|s| centre + reach * s).collect(),
             of,
         }
@@ -149,8 +124,7 @@ impl<'a> Lines<'a> {
     /// `[y, depth]` in mm.
     fn place(&self, [across, depth]: [f64; 2]) -> [f64; 2] {
         let across = across.clamp(-OUTERMOST, OUTERMOST);
-        let depth = (self.small * depth.exp()).max(self.of.least);
-        [self.middle + self.half * across, depth]
+        self.of.place([across, depth])
     }
 
     /// x and stress at some x in mm on a line.
@@ -162,9 +136,9 @@ impl<'a> Lines<'a> {
         workspace: &mut LoadWorkspace,
     ) -> Vec<(f64, Stress)> {
         let [y, depth] = self.place(at);
-        let places: Vec<[f64; 3]> = stations.iter().map(|x| [*x, y, depth]).collect();
-        let stresses = self.of.load.stresses(&places, resolution, workspace);
-        stations.iter().copied().zip(stresses).collect()
+        let load = self.of.load;
+        let state = |x: &f64| (*x, load.stress([*x, y, depth], resolution, workspace));
+        stations.iter().map(state).collect()
     }
 
     /// The measure of one line and the gap of its ball, with states added next to the decisive ones.
