@@ -139,6 +139,11 @@ pub struct Segment {
     pub cells: Range<usize>,
 }
 
+/// Whether two segments belong to the same strip of a patch.
+pub(crate) fn one_strip(a: &Segment, b: &Segment) -> bool {
+    a.chord.patch == b.chord.patch && a.chord.strip == b.chord.strip
+}
+
 /// Strips of cells over all patches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mesh {
@@ -185,6 +190,12 @@ impl Mesh {
     /// Number of cells.
     pub fn cells(&self) -> usize {
         self.node.len()
+    }
+
+    /// Returns the segments of each strip of a patch.
+    pub(crate) fn strips(&self, patch: usize) -> impl Iterator<Item = &[Segment]> {
+        let strips = self.segments.chunk_by(one_strip);
+        strips.filter(move |strip| strip[0].chord.patch == patch)
     }
 
     /// Area of every cell, in the square of the mesh's length unit.

@@ -152,7 +152,13 @@ impl ForceSearch<'_> {
             };
         }
         CheckedCase {
-            problem: problem.moving(motion, wheelset),
+            problem: Problem {
+                motions: vec![motion],
+                forces: vec![[None; 2]],
+                wheelset,
+                wheelset_forces: [None; 2],
+                ..problem.clone()
+            },
             run: run.clone(),
             ..self.case.clone()
         }

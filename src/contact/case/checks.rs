@@ -8,7 +8,7 @@ use crate::case::rail_pair::KnownPair;
 use crate::case::solver::{Limits, resolution};
 use crate::case::words::contact::{Contact, OnRails, SurfaceName};
 use crate::case::words::friction::Friction;
-use crate::case::words::material::{Material, Thermal};
+use crate::case::words::material::Material;
 use crate::case::words::motion::Motions;
 use crate::case::words::solver::MethodName;
 use crate::case::words::subsurface::DamageModel;
@@ -23,9 +23,7 @@ use crate::normal::wheel::ReferenceSurface;
 use crate::problem::memory::{SizeInput, length_over_width, segments, spinning};
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
-use crate::rolling::history::plan::HistoryStart;
 use crate::rolling::methods::table::solve as table;
-use crate::rolling::task::RelativeTo;
 
 /// Friction coefficient above which the answer carries a remark.
 const FRICTION_USUAL_MAX: f64 = 1.0;
@@ -66,24 +64,27 @@ impl CheckedParts {
         if let Some((motions, motion)) = motions.as_ref().zip(motion) {
             faults.extend(motion_faults(draft, motion, motions, &patches, limits));
         }
-        if let Some(motions) = &motions {
-            faults.extend(history_faults(draft, motions, &patches, limits));
+        if let Some(history) = motions.as_ref().and_then(|all| all.history.as_ref()) {
+            faults.extend(motions::history_faults(history, draft, &patches, limits));
         }
         faults.extend(size_faults(draft, region, motions.as_ref(), limits));
         let of_friction = friction_fault(draft).or_else(|| {
             let speeds = &motions.as_ref()?.speeds;
             region?;
-            too_fast_fault(
-                draft.friction.as_ref()?,
-                draft.thermal.as_ref(),
-                elasticity?,
-                &patches,
-                speeds,
-            )
+            // Friction may fall too fast on known patches.
+            let friction = draft.friction.as_ref()?;
+            let modulus = elasticity?.shear_modulus * friction.reduction.unwrap_or(1.0);
+            let law = FrictionLaw::new(friction, draft.thermal.as_ref());
+            let detail = law.too_fast(&patches, modulus, speeds)?;
+            Some(Fault::new("/friction", detail))
         });
         faults.extend(of_friction);
         if method == Some(Method::Table) {
-            faults.extend(table_faults(elasticity.as_ref(), region));
+            // The table covers some ellipses of like bodies. Other patches are not known yet.
+            let unlike = elasticity.as_ref().and_then(table::unlike);
+            faults.extend(unlike.map(|detail| Fault::new("/material", detail)));
+            let outside = region.and_then(length_over_width).and_then(table::outside);
+            faults.extend(outside.map(|detail| Fault::new("/contact", detail)));
         }
         let parts = CheckedParts {
             elasticity,
@@ -162,28 +163,7 @@ fn surface(
     Ok((surface, None))
 }
 
-/// Returns the faults of a history; none if the motions are not one.
-fn history_faults(
-    draft: &CaseDraft,
-    motions: &ExpandedMotions,
-    patches: &[Patch],
-    limits: &Limits,
-) -> Vec<Fault> {
-    let Some(history) = &motions.history else {
-        return Vec::new();
-    };
-    let mut faults = motions::history_faults(history, draft, patches, limits);
-    let relative_to = draft.solver.and_then(|solver| solver.relative_to);
-    if relative_to == Some(RelativeTo::Force) {
-        faults.push(Fault::new(
-            "/solver/relative_to",
-            "\"force\" given with a history, whose forces pass through 0; \"friction_limit\" is allowed",
-        ));
-    }
-    faults
-}
-
-/// Returns the faults of motions together with the contact, friction and outputs.
+/// Returns the faults of motions together with the contact, friction and the outputs that are computed from the solved contact.
 fn motion_faults(
     draft: &CaseDraft,
     motion: &Motions,
@@ -203,32 +183,16 @@ fn motion_faults(
         faults.push(Fault::new("/friction/along", detail));
     }
     if let Some(what) = friction.and_then(Friction::falls_with) {
-        // Temperatures need speeds in any case, see `after_faults`.
+        // Temperatures need speeds in any case, see below.
         if what == "slip" {
             faults.extend(expanded.speed_fault(motion, "friction that falls with slip"));
         }
         faults.extend(expanded.force_fault(motion, what));
         faults.extend(wheelset_force_fault(motion, what));
     }
-    faults.extend(after_faults(draft, motion, expanded, limits));
-    faults
-}
-
-/// Returns the faults of the outputs that are computed from the solved contact: stresses, damage and temperatures.
-fn after_faults(
-    draft: &CaseDraft,
-    motion: &Motions,
-    motions: &ExpandedMotions,
-    limits: &Limits,
-) -> Vec<Fault> {
-    let mut faults = Vec::new();
     if let Some(words) = &draft.subsurface {
-        faults.extend(after_tasks::faults(
-            words,
-            motion,
-            motions.motions.len(),
-            limits,
-        ));
+        let motions = expanded.motions.len();
+        faults.extend(after_tasks::faults(words, motion, motions, limits));
     }
     let damage = draft.damage.as_ref();
     let archard = damage.is_some_and(|damage| damage.models.contains(&DamageModel::ArchardWear));
@@ -237,7 +201,7 @@ fn after_faults(
         (None, true) => Some("archard_wear"),
         (None, false) => None,
     };
-    faults.extend(needed.and_then(|what| motions.speed_fault(motion, what)));
+    faults.extend(needed.and_then(|what| expanded.speed_fault(motion, what)));
     faults
 }
 
@@ -259,8 +223,7 @@ fn size_faults(
         segments: region.map_or_else(|| vec![1.0], segments),
         motions: motions.map_or(1, |motions| motions.motions.len()) * positions,
         spinning: motions.map_or(0, |motions| spinning(&motions.motions)) * positions,
-        history: history.is_some(),
-        pressed: history.is_some_and(|history| history.start == HistoryStart::Pressed),
+        history: history.map(|history| history.start),
         fields: draft.outputs().iter().any(|output| output.is_per_cell()),
         stress_points: draft.subsurface.as_ref().map_or(0, after_tasks::count),
         ellipse: region.and_then(length_over_width),
@@ -282,31 +245,6 @@ fn wheelset_force_fault(motion: &Motions, what: &str) -> Option<Fault> {
     );
     let pointer = format!("/motion/wheelset/{name}");
     Some(Fault::new(pointer, detail))
-}
-
-/// Returns the faults of a case that the table does not cover, as far as they are known before patches are found.
-fn table_faults(elasticity: Option<&Elasticity>, task: Option<&NormalTask>) -> Vec<Fault> {
-    let unlike = elasticity.and_then(table::unlike);
-    let ratio = task.and_then(length_over_width);
-    let outside = ratio.and_then(table::outside);
-    let faults = [("/material", unlike), ("/contact", outside)].into_iter();
-    faults
-        .filter_map(|(pointer, detail)| Some(Fault::new(pointer, detail?)))
-        .collect()
-}
-
-/// Returns the fault of friction that falls too fast on known patches.
-fn too_fast_fault(
-    friction: &Friction,
-    thermal: Option<&Thermal>,
-    elasticity: Elasticity,
-    patches: &[Patch],
-    speeds: &[Option<f64>],
-) -> Option<Fault> {
-    let modulus = elasticity.shear_modulus * friction.reduction.unwrap_or(1.0);
-    let law = FrictionLaw::new(friction, thermal);
-    let detail = law.too_fast(patches, modulus, speeds)?;
-    Some(Fault::new("/friction", detail))
 }
 
 /// Returns the fault of friction that the contact or the method does not support.

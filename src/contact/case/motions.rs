@@ -4,14 +4,14 @@ use crate::case::draft::CaseDraft;
 use crate::case::solver::Limits;
 use crate::case::words::contact::Contact;
 use crate::case::words::friction::Friction;
-use crate::case::words::motion::{AskedMotion, Course, History, Motions, Sweep, Swept, Wheelset};
+use crate::case::words::motion::{AskedMotion, History, Motions, Sweep, Swept, Wheelset};
 use crate::case::words::object::FAULTS_MAX;
 use crate::case::words::solver::Output;
 use crate::error::Fault;
 use crate::normal::hertz::Patch;
 use crate::rolling::history::plan::{HistoryStart, HistoryTask};
 use crate::rolling::history::solve::too_long;
-use crate::rolling::task::{Motion, PrescribedForces};
+use crate::rolling::task::{Motion, PrescribedForces, RelativeTo};
 
 /// The motions of a case in order, never empty.
 #[derive(Debug, Clone, PartialEq)]
@@ -167,52 +167,40 @@ fn placeholder(wheelset: &Wheelset) -> AskedMotion {
     }
 }
 
-/// Returns the value of a component at each point, if it is given.
-fn course(course: Option<&Course>, points: usize) -> Option<Vec<f64>> {
-    course.map(|course| course.values(points))
+/// Returns what `make` makes of the components at each point of a history: creepages, spin, forces and shifts.
+fn history_points<T>(history: &History, make: impl Fn([Option<f64>; 8]) -> T) -> Vec<T> {
+    let points = history.distance_mm.points();
+    let values = history
+        .courses()
+        .map(|(_, course)| Some(course?.values(points)));
+    let at = |k: usize| values.each_ref().map(|values| Some(values.as_ref()?[k]));
+    (0..points).map(|k| make(at(k))).collect()
 }
 
 /// Returns the motion at each point of a history.
 fn history_motions(history: &History) -> Vec<AskedMotion> {
-    let points = history.distance_mm.points();
-    let all = [
-        &history.creepage_x,
-        &history.creepage_y,
-        &history.spin_per_mm,
-        &history.force_x_n,
-        &history.force_y_n,
-    ];
-    let [x, y, spin, force_x, force_y] = all.map(|given| course(given.as_ref(), points));
-    let motion = |k: usize| {
-        let at = |values: &Option<Vec<f64>>| values.as_ref().map(|values| values[k]);
+    history_points(history, |[x, y, spin, force_x_n, force_y_n, ..]| {
         AskedMotion {
-            creepage_x: at(&x),
-            creepage_y: at(&y),
-            spin_per_mm: at(&spin).unwrap_or(0.0),
-            force_x_n: at(&force_x),
-            force_y_n: at(&force_y),
+            creepage_x: x,
+            creepage_y: y,
+            spin_per_mm: spin.unwrap_or(0.0),
+            force_x_n,
+            force_y_n,
             speed_mm_per_s: history.speed_mm_per_s,
         }
-    };
-    (0..points).map(motion).collect()
+    })
 }
 
 /// Returns distances and shifts of a history.
 fn history_task(history: &History, start: HistoryStart) -> HistoryTask {
-    let points = history.distance_mm.points();
-    let shifts = [&history.shift_x_mm, &history.shift_y_mm, &history.turn_rad];
-    let [x, y, turn] = shifts.map(|given| course(given.as_ref(), points));
-    let at = |values: &Option<Vec<f64>>, k: usize| values.as_ref().map_or(0.0, |values| values[k]);
     HistoryTask {
         start,
-        distances: history.distance_mm.values(points),
-        shifts: (0..points)
-            .map(|k| Motion {
-                creepage_x: at(&x, k),
-                creepage_y: at(&y, k),
-                spin_per_mm: at(&turn, k),
-            })
-            .collect(),
+        distances: history.distance_mm.values(1),
+        shifts: history_points(history, |[.., x, y, turn]| Motion {
+            creepage_x: x.unwrap_or(0.0),
+            creepage_y: y.unwrap_or(0.0),
+            spin_per_mm: turn.unwrap_or(0.0),
+        }),
     }
 }
 
@@ -324,6 +312,11 @@ pub(crate) fn history_faults(
     let extents: Vec<[f64; 4]> = patches.iter().map(|patch| patch.extent).collect();
     if let Some(detail) = too_long(history, &extents, limits.motions_max) {
         faults.push(Fault::new("/motion/history/distance_mm", detail));
+    }
+    let relative_to = draft.solver.and_then(|solver| solver.relative_to);
+    if relative_to == Some(RelativeTo::Force) {
+        let detail = "\"force\" given with a history, whose forces pass through 0; \"friction_limit\" is allowed";
+        faults.push(Fault::new("/solver/relative_to", detail));
     }
     faults
 }

@@ -355,33 +355,30 @@ pub fn across(task: &DamageTask, of: SolvedMotion, cells: &CellPower, patch: usi
     let figures = &task.figures;
     let mut found = WearAcross::default();
     let (mut usfd, mut archard): (Vec<[f64; 3]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
-    let mut last = None;
     let mesh = &of.level.mesh;
-    for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
-        let chord = &segment.chord;
-        if last != Some(chord.strip) {
-            found.y_mm.push(chord.y);
-            found.dy_mm.push(chord.dy);
-            found.t_gamma_n_per_mm.push(0.0);
-            usfd.push([0.0; 3]);
-            archard.push([0.0; 3]);
-            last = Some(chord.strip);
-        }
-        let place = found.y_mm.len() - 1;
-        for i in segment.cells.clone() {
+    for strip in mesh.strips(patch) {
+        let chord = &strip[0].chord;
+        let mut t_gamma = 0.0;
+        let mut depths = [[0.0; 3]; 2];
+        for i in strip.iter().flat_map(|segment| segment.cells.clone()) {
             let length = mesh.right[i] - mesh.left[i];
-            found.t_gamma_n_per_mm[place] += cells.power[i] / chord.dy;
+            t_gamma += cells.power[i] / chord.dy;
             let over_area = cells.power[i] / of.level.area[i];
             let rate = usfd_rate(&figures.usfd, over_area);
-            usfd[place][regime(usfd_regime(&figures.usfd, over_area))] +=
+            depths[0][regime(usfd_regime(&figures.usfd, over_area))] +=
                 rate * length * METRES / figures.density_kg_per_m3 * NANOMETRES;
             let pressure = of.level.pressure[i] / figures.hardness_mpa;
             let slip = cells.slip[0][i].hypot(cells.slip[1][i]);
             let speed = slip * of.speed.unwrap_or(0.0);
             let (of_archard, coefficient) = archard_coefficient(&figures.archard, speed, pressure);
-            archard[place][regime(of_archard)] +=
+            depths[1][regime(of_archard)] +=
                 coefficient.value * pressure * slip * length * NANOMETRES;
         }
+        found.y_mm.push(chord.y);
+        found.dy_mm.push(chord.dy);
+        found.t_gamma_n_per_mm.push(t_gamma);
+        usfd.push(depths[0]);
+        archard.push(depths[1]);
     }
     let sums = |parts: &[[f64; 3]]| parts.iter().map(|parts| parts.iter().sum()).collect();
     if task.wants(DamageModel::UsfdWear) {

@@ -46,10 +46,8 @@ pub(crate) struct SizeInput {
     pub(crate) stress_points: usize,
     /// Ratio of length to width of an ellipse; `None` for other regions.
     pub(crate) ellipse: Option<f64>,
-    /// Whether the motions are a history, which is kept on two levels.
-    pub(crate) history: bool,
-    /// Whether the history starts with bodies pressed together.
-    pub(crate) pressed: bool,
+    /// How the history begins, if the motions are one.
+    pub(crate) history: Option<HistoryStart>,
     /// Capacity of the operator store in bytes.
     pub(crate) store: u64,
 }
@@ -171,13 +169,11 @@ impl SizeInput {
 
     /// Returns the memory in bytes of a history on two levels, with that of pressing the bodies together.
     fn kept_of_history(&self, cells: f64) -> f64 {
-        if !self.history {
-            return 0.0;
-        }
-        let pressing = match (self.pressed, self.resolution) {
-            (false, _) => 0.0,
-            (true, Resolution::Mesh(_)) => pressed_bytes(cells),
-            (true, Resolution::Target(_)) => pressed_bytes(cells.min(pressed_cells_max())),
+        let pressing = match (self.history, self.resolution) {
+            (None, _) => return 0.0,
+            (Some(HistoryStart::Pressed), Resolution::Mesh(_)) => pressed_bytes(cells),
+            (Some(HistoryStart::Pressed), _) => pressed_bytes(cells.min(pressed_cells_max())),
+            (Some(_), _) => 0.0,
         };
         pressing + 2.0 * self.motions as f64 * cells * HISTORY_BYTES_PER_CELL
     }
@@ -230,8 +226,7 @@ impl CheckedCase {
             } else {
                 spinning(&self.problem.motions) * self.problem.task.positions()
             },
-            history: history.is_some(),
-            pressed: history.is_some_and(|history| history.start == HistoryStart::Pressed),
+            history: history.map(|history| history.start),
             fields: self.run.outputs.iter().any(|output| output.is_per_cell()),
             stress_points: self.run.after.subsurface.as_ref().map_or(0, places),
             ellipse: length_over_width(&self.problem.task),

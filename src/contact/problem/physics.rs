@@ -86,30 +86,11 @@ impl Problem {
         }
     }
 
-    /// Returns this problem with another motion of the wheelset.
-    pub(crate) fn of_move(&self, motion: WheelsetMotion, drive_torque: Option<f64>) -> Problem {
-        Problem {
-            wheelset: Some(motion),
-            drive_torque,
-            speeds: vec![Some(motion.speed)],
-            ..self.clone()
-        }
-    }
-
     /// Returns this problem with another wheel.
     pub(crate) fn with_wheel(&self, wheel: Arc<WheelTask>) -> Problem {
         Problem {
             task: NormalTask::Wheel(wheel),
             ..self.clone()
-        }
-    }
-
-    /// Returns the problem of one wheel of a wheelset.
-    pub(crate) fn of_wheel(&self, wheel: Arc<WheelTask>, wheelset: WheelsetMotion) -> Problem {
-        Problem {
-            wheelset: Some(wheelset),
-            drive_torque: None,
-            ..self.with_wheel(wheel)
         }
     }
 
@@ -147,10 +128,7 @@ impl Problem {
 
     /// Whether the table of creep forces covers the patch.
     pub(crate) fn is_in_table(&self) -> bool {
-        let inside = |plain: PlainContact| {
-            let Ellipse { a, b, .. } = plain.ellipse;
-            outside(a / b).is_none()
-        };
+        let inside = |plain: PlainContact| outside(plain.ellipse.a / plain.ellipse.b).is_none();
         self.plain().is_some_and(inside) && unlike(&self.elasticity).is_none()
     }
 
@@ -163,17 +141,6 @@ impl Problem {
         let given = *self.forces.first()?;
         let forces = [0, 1].map(|k| self.wheelset_forces[k].or(given[k]));
         (forces != [None; 2]).then_some(forces)
-    }
-
-    /// Returns this problem with one given motion of the wheel and without prescribed forces.
-    pub(crate) fn moving(&self, motion: Motion, wheelset: Option<WheelsetMotion>) -> Problem {
-        Problem {
-            motions: vec![motion],
-            forces: vec![[None; 2]],
-            wheelset,
-            wheelset_forces: [None; 2],
-            ..self.clone()
-        }
     }
 
     /// Returns the problem of one gap of a wheel, with friction in the axes of the gap and motions about its origin.

@@ -17,7 +17,7 @@ use crate::rolling::answer::{
 use crate::rolling::refinement::interpolate::Levels;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Motion, RelativeTo};
-use crate::solution::finish::{patch_cells, point_fields, traction_max};
+use crate::solution::finish::{patch_cells, traction_max, with_tractions};
 use crate::solution::maintain;
 use crate::solution::words::answer::{
     CombinedMaterial, ErrorEstimate, Fields, GradientErrors, Gradients, HistoryPoint, MeshReport,
@@ -124,12 +124,13 @@ impl<'a> Assembly<'a> {
                 speed,
             };
             let is_of_history = point.history.is_some();
-            let kept = maintain::add_rest(case, solved, is_of_history, &mut points, monitor)?;
+            let (kept, remarks) =
+                maintain::add_rest(case, solved, is_of_history, &mut points, monitor)?;
             let number = case.problem.part.before + index;
             self.remarks
-                .extend(kept.remarks.into_iter().map(|r| r.at_point(number)));
+                .extend(remarks.into_iter().map(|r| r.at_point(number)));
             if wants_fields(case) {
-                self.add_fields(level, fields, kept.fields);
+                self.add_fields(level, fields, kept);
             }
         }
         self.total.push(total(&self.patches, &self.limits, point));
@@ -155,16 +156,10 @@ impl<'a> Assembly<'a> {
             if known.is_none() {
                 fields.meshes.push(patch_cells(case, level, index));
             }
+            let kept = PointFields { mesh, ..kept };
             let cells = level.patch_cells(index);
-            let values = point_fields(case, level, cells, &found.tangential);
-            fields.points.push(PointFields {
-                mesh,
-                slip_x: kept.slip_x,
-                slip_y: kept.slip_y,
-                temperature_c: kept.temperature_c,
-                subsurface: kept.subsurface,
-                ..values
-            });
+            let values = with_tractions(case, level, cells, &found.tangential, kept);
+            fields.points.push(values);
         }
     }
 
@@ -179,10 +174,6 @@ impl<'a> Assembly<'a> {
             total: self.total,
             remarks: merged(self.remarks),
             normal: self.solved.report,
-            wheel_lowering_mm: None,
-            angular_velocity_rad_per_s: None,
-            lateral_velocity_mm_per_s: None,
-            wheelset: None,
             origin: Origin {
                 x_mm: 0.0,
                 y_mm: 0.0,
@@ -208,6 +199,7 @@ impl<'a> Assembly<'a> {
                 .damage
                 .as_ref()
                 .map(|task| Box::new(task.figures.clone())),
+            ..Solution::default()
         };
         (solution, self.fields)
     }
@@ -228,9 +220,8 @@ fn patch_solution(patch: &Patch, limit: f64, points: Vec<PointSolution>) -> Patc
         pressure_max_mpa: patch.pressure_max,
         semi_axes_mm: patch.semi_axes,
         extent_mm: patch.extent,
-        position: None,
-        quality: None,
         points,
+        ..PatchSolution::default()
     }
 }
 
@@ -267,8 +258,6 @@ fn point_solution(
         force_x_n: found.force_x,
         force_y_n: found.force_y,
         moment_z_n_mm: found.moment_z,
-        force_track_n: None,
-        profile_uncertainty: None,
         error_estimate: point.errors[index]
             .map(|e| absolute(std::slice::from_ref(patch), limit, e)),
         stick_area_mm2: areas.map(|[stick, _]| stick),
@@ -308,13 +297,9 @@ fn point_solution(
                 .collect(),
             seconds: point.seconds,
         },
-        target_met: None,
         saturated: point.saturated,
         history: history.map(|history| HistoryPoint::of(history, index)),
-        subsurface: None,
-        damage: None,
-        temperature: None,
-        region: None,
+        ..PointSolution::default()
     }
 }
 

@@ -167,12 +167,13 @@ pub(crate) fn patch_cells(case: &CheckedCase, level: &StripMesh, patch: usize) -
     fields
 }
 
-/// Returns zones and tractions of a patch for one motion, as far as they are requested.
-pub(crate) fn point_fields(
+/// Adds the requested zones and tractions of a patch to its values for one motion.
+pub(crate) fn with_tractions(
     case: &CheckedCase,
     level: &StripMesh,
     cells: std::ops::Range<usize>,
     answer: &LevelAnswer,
+    values: PointFields,
 ) -> PointFields {
     let run = &case.run;
     let traction = |k: usize| {
@@ -186,7 +187,7 @@ pub(crate) fn point_fields(
         zone: run.wants(Output::Zones).then(|| zones.collect()),
         traction_x_mpa: traction(0),
         traction_y_mpa: traction(1),
-        ..PointFields::default()
+        ..values
     }
 }
 

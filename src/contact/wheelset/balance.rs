@@ -12,6 +12,7 @@ use crate::monitor::{Monitor, MonitorPart};
 use crate::normal::wheel::{WheelTask, WheelsetTask};
 use crate::numerics::equilibrium::{Search, Trial};
 use crate::problem::checked_case::CheckedCase;
+use crate::problem::physics::Problem;
 use crate::profile_assessment::trust;
 use crate::remark::entry::{RemarkEntry, merged};
 use crate::rolling::force_control::PLACE_MAX;
@@ -221,10 +222,11 @@ impl WheelsetSolve<'_> {
         };
         let wheels = [wheel(0), wheel(1)];
         let case = |k: usize| CheckedCase {
-            problem: self
-                .case
-                .problem
-                .of_wheel(Arc::new(wheels[k].clone()), *motion),
+            problem: Problem {
+                wheelset: Some(*motion),
+                drive_torque: None,
+                ..self.case.problem.with_wheel(Arc::new(wheels[k].clone()))
+            },
             run: self.case.run.clone(),
             label: self.case.label.clone(),
             // The remarks of the case are reported once for the whole wheelset.
@@ -485,7 +487,12 @@ pub(crate) fn solve(
         let rigid = rigid.map_err(|reason| SolveError::NormalProblem { reason })?;
         roll = rigid.roll;
         let case = CheckedCase {
-            problem: case.problem.of_move(moving.motion, moving.drive_torque),
+            problem: Problem {
+                wheelset: Some(moving.motion),
+                drive_torque: moving.drive_torque,
+                speeds: vec![Some(moving.motion.speed)],
+                ..case.problem.clone()
+            },
             ..case.clone()
         };
         let solve = WheelsetSolve {

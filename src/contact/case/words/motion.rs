@@ -260,7 +260,7 @@ pub struct History {
 
 impl History {
     /// Returns the components with their names, the shifts last.
-    fn courses(&self) -> [(&'static str, Option<&Course>); 8] {
+    pub(crate) fn courses(&self) -> [(&'static str, Option<&Course>); 8] {
         [
             ("creepage_x", &self.creepage_x),
             ("creepage_y", &self.creepage_y),

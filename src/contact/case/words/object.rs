@@ -250,7 +250,7 @@ impl<'v, 'f> Object<'v, 'f> {
             _ => {
                 let detail = format!("{} given; {what} is needed", shown(value));
                 let allowed = AllowedRange::closed(low.into(), high.into(), "");
-                let code = code_of(value, Value::is_number);
+                let code = number_code(value);
                 self.fault_with(name, detail, allowed.figures(code, Some(value)));
                 None
             }
@@ -365,7 +365,7 @@ pub(crate) fn number(
     let read = allowed.read(value);
     if read.is_none() {
         let detail = format!("{} given; {allowed} is needed", shown(value));
-        let code = code_of(value, Value::is_number);
+        let code = number_code(value);
         faults.add_with(pointer, detail, allowed.figures(code, Some(value)));
     }
     read
@@ -628,9 +628,9 @@ pub(crate) fn figures(code: FaultCode, value: Option<&Value>) -> FaultFigures {
     }
 }
 
-/// Returns the code of a refused value: out of range if `right` accepts its type, wrong type otherwise.
-fn code_of(value: &Value, right: fn(&Value) -> bool) -> FaultCode {
-    match right(value) {
+/// Returns the code of a value that is not an allowed number.
+fn number_code(value: &Value) -> FaultCode {
+    match value.is_number() {
         true => FaultCode::OutOfRange,
         false => FaultCode::WrongType,
     }

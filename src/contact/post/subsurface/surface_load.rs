@@ -11,7 +11,7 @@
 use std::ops::Range;
 
 use crate::half_space::kernels::{LoadPack, Stress, stress};
-use crate::mesh::{Chord, Segment};
+use crate::mesh::{Chord, Segment, one_strip};
 use crate::numerics::quadrature::RULES;
 use crate::numerics::simd::LANES;
 use crate::post::local_power::SolvedMotion;
@@ -181,10 +181,6 @@ fn runs(segments: &[Segment]) -> Vec<&[Segment]> {
         first = end;
     }
     runs
-}
-
-fn one_strip(a: &Segment, b: &Segment) -> bool {
-    a.chord.patch == b.chord.patch && a.chord.strip == b.chord.strip
 }
 
 /// The loads on a rectangle.

@@ -16,7 +16,7 @@ use crate::solution::words::evolution::{SubsurfaceSummary, TemperatureSummary};
 
 /// The result of one case, without fields.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Solution {
     /// One entry per contact patch.
     pub patches: Vec<PatchSolution>,
@@ -116,7 +116,7 @@ impl NormalReport {
 }
 
 /// Reference point of moments and rigid slip.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct Origin {
     /// x in mm, in the coordinates of the answer.
     pub x_mm: f64,
@@ -127,7 +127,7 @@ pub struct Origin {
 }
 
 /// Elastic constants of the pair: 1/G = ½(1/G₁ + 1/G₂), ν/G = ½(ν₁/G₁ + ν₂/G₂), K as Kalker 1990, eq. 1.44.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct CombinedMaterial {
     /// Combined shear modulus G in MPa.
     pub shear_modulus_mpa: f64,
@@ -182,7 +182,7 @@ impl Solution {
 /// One contact patch with its results for every motion. Where motions change region and pressure, its values are those of the first motion;
 /// every point has its own in `region`.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PatchSolution {
     /// Normal force in N.
     pub normal_force_n: f64,
@@ -247,7 +247,7 @@ pub struct Position {
 
 /// Tangential solution of one patch for one motion.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PointSolution {
     /// The motion of this point.
     pub motion: Motion,
@@ -353,7 +353,7 @@ pub struct HistoryPoint {
 }
 
 /// Creepages and spin made dimensionless with c = √(A/π) of the patch (√(ab) for an ellipse).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct NormalisedMotion {
     /// E c² ν_x / (μN(1−ν²)); absent without friction.
     pub creepage_x: Option<f64>,
@@ -421,7 +421,7 @@ pub struct GradientErrors {
 
 /// How a point was computed.
 #[none_is_absent]
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, ToSchema, Finite)]
 pub struct SolverReport {
     /// The method that gave the resultants. With `auto` it may be `table`; values per cell are then computed by `boundary_element` on
     /// `mesh`.
