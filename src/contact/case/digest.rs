@@ -27,7 +27,7 @@ pub(crate) fn digest(
     let mut text = Vec::new();
     let mut writer = serde_json::Serializer::new(&mut text);
     let written = writer.serialize_map(None).and_then(|mut map| {
-        write_members(&mut map, case, (elasticity, motions, forces, speeds))?;
+        write_members(&mut map, case, elasticity, motions, forces, speeds)?;
         map.end()
     });
     // Writing into memory does not fail, and all keys are texts.
@@ -35,19 +35,14 @@ pub(crate) fn digest(
     blake3::hash(&text).to_hex().to_string()
 }
 
-/// Numbers of a checked case: elastic constants, motions, prescribed forces and rolling speeds.
-type Numbers<'a> = (
-    &'a Elasticity,
-    &'a [Motion],
-    &'a [PrescribedForces],
-    &'a [Option<f64>],
-);
-
 /// Writes the members in the order that digests are defined by.
 fn write_members<M: SerializeMap>(
     map: &mut M,
     case: &Case,
-    (elasticity, motions, forces, speeds): Numbers,
+    elasticity: &Elasticity,
+    motions: &[Motion],
+    forces: &[PrescribedForces],
+    speeds: &[Option<f64>],
 ) -> Result<(), M::Error> {
     let solver = &case.solver;
     map.serialize_entry("solver_version", env!("CARGO_PKG_VERSION"))?;

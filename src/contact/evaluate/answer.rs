@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use railhead_macros::{Named, Names};
+use railhead_macros::Named;
 
 use crate::case::words::solver::{MethodName, Output};
 use crate::error::{CaseError, SolveError};
@@ -56,20 +56,6 @@ impl RowStatus {
             RowStatus::NotFinite => "a number of the result is not finite".to_owned(),
             _ => String::new(),
         }
-    }
-
-    /// Returns the status of a row whose solve failed; `None` if the caller stopped the solve.
-    pub(crate) fn of(error: &SolveError) -> Option<RowStatus> {
-        Some(match error {
-            SolveError::Cancelled => return None,
-            SolveError::OutOfTime { .. } => RowStatus::OutOfTime,
-            SolveError::NotCovered { .. } => RowStatus::NotCovered,
-            SolveError::NotConverged { .. } => RowStatus::NotConverged,
-            SolveError::RoughProfile { .. }
-            | SolveError::Unmeshable { .. }
-            | SolveError::NormalProblem { .. }
-            | SolveError::NotFinite { .. } => RowStatus::Unsolvable,
-        })
     }
 }
 
@@ -225,10 +211,18 @@ pub(crate) struct RowFailure {
 impl RowFailure {
     /// Returns the failure of a solve; `None` if the caller stopped the solve.
     pub(crate) fn of(error: &SolveError) -> Option<RowFailure> {
-        Some(RowFailure {
-            status: RowStatus::of(error)?,
-            reason: error.to_string(),
-        })
+        let status = match error {
+            SolveError::Cancelled => return None,
+            SolveError::OutOfTime { .. } => RowStatus::OutOfTime,
+            SolveError::NotCovered { .. } => RowStatus::NotCovered,
+            SolveError::NotConverged { .. } => RowStatus::NotConverged,
+            SolveError::RoughProfile { .. }
+            | SolveError::Unmeshable { .. }
+            | SolveError::NormalProblem { .. }
+            | SolveError::NotFinite { .. } => RowStatus::Unsolvable,
+        };
+        let reason = error.to_string();
+        Some(RowFailure { status, reason })
     }
 
     /// Returns the failure of a case with faults.
@@ -274,69 +268,54 @@ const OPTIONAL_NUMBERS: [&str; 4] = [
 /// larger of the errors of both forces. A missing number is NaN.
 pub type RowNumbers = [f64; NUMBER_NAMES.len()];
 
-/// An unknown that the solver determines for a prescribed force or torque.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Names)]
-pub enum Found {
-    /// Longitudinal creepage.
-    CreepageX,
-    /// Lateral creepage.
-    CreepageY,
-    /// Angular velocity of the wheelset in rad/s.
-    #[serde(rename = "angular_velocity_rad_per_s")]
-    AngularVelocity,
-    /// Velocity of the wheelset to the left in mm/s.
-    #[serde(rename = "lateral_velocity_mm_per_s")]
-    LateralVelocity,
-}
+/// An unknown that the solver determines for a prescribed force or torque: its name, whether a case of one motion has it, and its value.
+type Unknown = (
+    &'static str,
+    fn(&Problem) -> bool,
+    fn(&Solution) -> Option<f64>,
+);
 
-impl Found {
-    /// Returns the unknowns of a case with one motion.
-    fn of(problem: &Problem) -> Vec<Found> {
-        let [creep_x, creep_y] = problem.forces.first().copied().unwrap_or_default();
-        let [along, across] = problem.wheelset_forces;
-        let angular = along.is_some() || problem.drive_torque.is_some();
-        [
-            (creep_x.is_some(), Found::CreepageX),
-            (creep_y.is_some(), Found::CreepageY),
-            (angular, Found::AngularVelocity),
-            (across.is_some(), Found::LateralVelocity),
-        ]
-        .into_iter()
-        .filter_map(|(sought, found)| sought.then_some(found))
-        .collect()
-    }
-
-    fn number(self, solution: &Solution) -> Option<f64> {
-        let creepages = || {
-            let patch = solution.patches.first()?;
-            Some(patch.points.first()?.motion)
-        };
-        match self {
-            Found::CreepageX => creepages().map(|motion| motion.creepage_x),
-            Found::CreepageY => creepages().map(|motion| motion.creepage_y),
-            Found::AngularVelocity => solution.angular_velocity_rad_per_s.or_else(|| {
-                let position = solution.wheelset.as_ref()?.positions.first()?;
-                Some(position.angular_velocity_rad_per_s)
-            }),
-            Found::LateralVelocity => solution.lateral_velocity_mm_per_s,
-        }
-    }
-}
+const UNKNOWNS: [Unknown; 4] = [
+    (
+        "creepage_x",
+        |problem| problem.forces[0][0].is_some(),
+        |solution| Some(points_of(solution).next()?.motion.creepage_x),
+    ),
+    (
+        "creepage_y",
+        |problem| problem.forces[0][1].is_some(),
+        |solution| Some(points_of(solution).next()?.motion.creepage_y),
+    ),
+    (
+        "angular_velocity_rad_per_s",
+        |problem| problem.wheelset_forces[0].is_some() || problem.drive_torque.is_some(),
+        |solution| {
+            let position = || solution.wheelset.as_ref()?.positions.first();
+            let of_wheelset = || Some(position()?.angular_velocity_rad_per_s);
+            solution.angular_velocity_rad_per_s.or_else(of_wheelset)
+        },
+    ),
+    (
+        "lateral_velocity_mm_per_s",
+        |problem| problem.wheelset_forces[1].is_some(),
+        |solution| solution.lateral_velocity_mm_per_s,
+    ),
+];
 
 /// The columns of numbers of an answer.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct NumberColumns {
-    /// The unknowns, one column each.
-    pub found: Vec<Found>,
+    /// Whether there is a column for each of [`UNKNOWNS`].
+    found: [bool; UNKNOWNS.len()],
     /// Whether there are derivatives.
-    pub gradients: bool,
+    gradients: bool,
 }
 
 impl NumberColumns {
     /// Returns the columns for a case with one motion.
     pub fn of(case: &CheckedCase) -> NumberColumns {
         NumberColumns {
-            found: Found::of(&case.problem),
+            found: UNKNOWNS.map(|(_, has, _)| has(&case.problem)),
             gradients: case.run.wants(Output::Gradients),
         }
     }
@@ -344,14 +323,19 @@ impl NumberColumns {
     /// Returns the columns that any case can have.
     pub fn all() -> NumberColumns {
         NumberColumns {
-            found: Found::ALL.to_vec(),
+            found: [true; UNKNOWNS.len()],
             gradients: true,
         }
     }
 
+    fn unknowns(&self) -> impl Iterator<Item = Unknown> {
+        let all = UNKNOWNS.into_iter().zip(self.found);
+        all.filter_map(|(unknown, found)| found.then_some(unknown))
+    }
+
     /// Returns their names: those of every answer, the unknowns, the derivatives.
     pub fn names(&self) -> Vec<&'static str> {
-        let found = self.found.iter().map(|found| found.name());
+        let found = self.unknowns().map(|(name, ..)| name);
         let gradients = GRADIENT_NAMES.into_iter().filter(|_| self.gradients);
         NUMBER_NAMES
             .into_iter()
@@ -384,18 +368,6 @@ pub(crate) struct SolvedRow {
     pub(crate) remarks: String,
     /// The numbers in the order of [`NumberColumns::names`].
     pub(crate) numbers: Vec<f64>,
-}
-
-impl SolvedRow {
-    /// Returns a row without an answer.
-    fn without(status: RowStatus) -> SolvedRow {
-        SolvedRow {
-            status,
-            method: None,
-            remarks: String::new(),
-            numbers: Vec::new(),
-        }
-    }
 }
 
 /// The answers to rows in their order.
@@ -433,7 +405,7 @@ impl ManyAnswer {
         self.status.iter().filter(|row| !row.has_answer()).count()
     }
 
-    /// Writes the outcome of a row. An answer with a number that is not finite becomes a failure.
+    /// Writes the outcome of a row that has none yet. An answer with a number that is not finite becomes a failure.
     pub(crate) fn set(&mut self, row: usize, outcome: Result<SolvedRow, RowFailure>) {
         let outcome = outcome.and_then(|solved| match self.columns.not_finite(&solved.numbers) {
             None => Ok(solved),
@@ -445,20 +417,20 @@ impl ManyAnswer {
                 })
             }
         });
-        let (solved, reason) = match outcome {
-            Ok(solved) => (solved, String::new()),
-            Err(RowFailure { status, reason }) => (SolvedRow::without(status), reason),
-        };
-        self.status[row] = solved.status;
-        self.method[row] = solved.method;
-        self.reason[row] = reason;
-        self.remarks[row] = solved.remarks;
-        let numbers = solved
-            .numbers
-            .into_iter()
-            .chain(std::iter::repeat(f64::NAN));
-        for (column, number) in self.numbers.iter_mut().zip(numbers) {
-            column[row] = number;
+        match outcome {
+            Ok(solved) => {
+                self.status[row] = solved.status;
+                self.method[row] = solved.method;
+                self.reason[row].clear();
+                self.remarks[row] = solved.remarks;
+                for (column, number) in self.numbers.iter_mut().zip(solved.numbers) {
+                    column[row] = number;
+                }
+            }
+            Err(RowFailure { status, reason }) => {
+                self.status[row] = status;
+                self.reason[row] = reason;
+            }
         }
     }
 
@@ -517,8 +489,8 @@ fn numbers_of(solution: &Solution, columns: &NumberColumns) -> Option<Vec<f64>> 
             f64::NAN
         },
     ];
-    let found = columns.found.iter();
-    let found = found.map(|found| found.number(solution).unwrap_or(f64::NAN));
+    let found = columns.unknowns();
+    let found = found.map(|(.., number)| number(solution).unwrap_or(f64::NAN));
     let only = points().next().filter(|_| solution.patches.len() == 1);
     let slopes = only.and_then(|point| point.gradients.as_deref());
     let slopes = slopes.map_or([[f64::NAN; 3]; 3], |slopes| {

@@ -91,10 +91,7 @@ impl<'a> Rows<'a> {
             reduction: checked.problem.interface.reduction,
             radii: given(Variable::Rolling),
             method,
-            target: match checked.run.resolution {
-                Resolution::Target(target) => Some(target),
-                Resolution::Mesh(_) => None,
-            },
+            target: checked.run.resolution.target(),
             relative_to: checked.run.relative_to,
             gradients: checked.run.wants(Output::Gradients),
         })

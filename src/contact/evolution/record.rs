@@ -58,14 +58,17 @@ pub(crate) fn record(
 fn with_uncertainty(task: &Evolution, state: &EvolutionState, k: usize) -> WornBody {
     let body = &state.bodies[k];
     let worn = body.worn.worn_area_mm2;
-    let error = Some(state.traffic.error[k]);
     let over = |area: f64| if worn > 0.0 { area / worn } else { 0.0 };
     let lengths = lengths(&body.worn.points_mm);
     let changed = body.step_change_mm.iter().zip(lengths);
     WornBody {
         uncertainty: WearUncertainty {
             steps: over(changed.map(|(depth, length)| depth.abs() * length).sum()),
-            states: error.filter(|_| worn > 0.0).unwrap_or(0.0),
+            states: if worn > 0.0 {
+                state.traffic.error[k]
+            } else {
+                0.0
+            },
             contact: over(body.contact_mm2),
             coefficients: coefficients(task, &body.regimes_mm2),
         },

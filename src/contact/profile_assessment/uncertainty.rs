@@ -62,11 +62,17 @@ pub(crate) fn add(
     let mut companions = Vec::new();
     let is_smoothed = contact.geometry.profiles().map(Profile::smoothing) != [0.0; 2];
     if suspicious || is_smoothed {
+        let companion = CheckedCase {
+            problem: case.problem.with_motions(&chosen),
+            run: case.run.for_resultants(TARGET),
+            label: case.label.clone(),
+            remarks: Vec::new(),
+        };
         for smoothing in readings(contact, solution) {
             let other = contact.smoothed(smoothing);
             match wheel_on_rail::solve(
                 operators,
-                &companion(case, &chosen),
+                &companion,
                 &other,
                 // The profiles of companions are not assessed.
                 &mut |_| Ok(()),
@@ -153,15 +159,6 @@ fn readings(contact: &WheelTask, solution: &Solution) -> Vec<[f64; 2]> {
         })
     };
     COMPANIONS.map(with).to_vec()
-}
-
-fn companion(case: &CheckedCase, chosen: &[usize]) -> CheckedCase {
-    CheckedCase {
-        problem: case.problem.with_motions(chosen),
-        run: case.run.for_resultants(TARGET),
-        label: case.label.clone(),
-        remarks: Vec::new(),
-    }
 }
 
 /// Changes of the forces along x and y in N and of the largest pressure in MPa.

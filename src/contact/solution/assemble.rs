@@ -430,10 +430,7 @@ fn total(patches: &[Patch], limits: &[f64], point: &MotionAnswer) -> Total {
         moment_z_n_mm: sum.moment_z,
         profile_uncertainty: None,
         error_estimate: point
-            .errors
-            .last()
-            .copied()
-            .flatten()
+            .error()
             .map(|e| absolute(patches, limits.iter().sum(), e)),
     }
 }

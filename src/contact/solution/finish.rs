@@ -16,8 +16,8 @@ use crate::remark::list::Remark;
 use crate::rolling::answer::{LevelAnswer, SolvedFields};
 use crate::rolling::strip_mesh::StripMesh;
 use crate::solution::words::answer::{
-    Fields, GradientErrors, Gradients, PatchCells, PatchFields, PatchSolution, PointFields,
-    PointSolution, Solution, Zone,
+    Fields, Gradients, PatchCells, PatchFields, PatchSolution, PointFields, PointSolution,
+    Solution, Zone,
 };
 use crate::solution::words::evolution::SubsurfaceSummary;
 
@@ -259,22 +259,20 @@ fn move_point(point: &mut PointSolution, [dx, dy]: [f64; 2]) {
 
 /// Moves the origin of derivatives: a spin about the new origin moves the old one sideways, and the moment includes the forces.
 fn move_gradients(gradients: &mut Gradients, [dx, dy]: [f64; 2]) {
-    let Gradients {
-        force_x_n: x,
-        force_y_n: y,
-        moment_z_n_mm: m,
-        error_estimate,
-        ..
-    } = gradients;
-    moved([x, y, m], [dy, -dx]);
-    if let Some(GradientErrors {
-        force_x_n: x,
-        force_y_n: y,
-        moment_z_n_mm: m,
-        ..
-    }) = error_estimate
-    {
-        moved([x, y, m], [dy.abs(), dx.abs()]);
+    let own = gradients;
+    let rows = [
+        &mut own.force_x_n,
+        &mut own.force_y_n,
+        &mut own.moment_z_n_mm,
+    ];
+    moved(rows, [dy, -dx]);
+    if let Some(own) = &mut own.error_estimate {
+        let rows = [
+            &mut own.force_x_n,
+            &mut own.force_y_n,
+            &mut own.moment_z_n_mm,
+        ];
+        moved(rows, [dy.abs(), dx.abs()]);
     }
 }
 

@@ -388,7 +388,12 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
         .and_then(Value::as_str);
     match kind {
         Some("wheelset") => return load_of_wheelset(case),
-        Some("pressure_grid") => return no_load(case),
+        Some("pressure_grid") => {
+            case.value("load")?;
+            let detail =
+                "given together with a pressure_grid, which carries its own load; leave it out";
+            return case.refuse("load", detail);
+        }
         _ => {}
     }
     let of_gap = matches!(kind, Some("gap_profile" | "gap_grid"));
@@ -428,13 +433,6 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
         left_share: None,
         approach_mm,
     })
-}
-
-/// Refuses the load of a given pressure.
-fn no_load(case: &mut Object) -> Option<Load> {
-    case.value("load")?;
-    let detail = "given together with a pressure_grid, which carries its own load; leave it out";
-    case.refuse("load", detail)
 }
 
 /// Reads the load of a wheelset: the vertical force of both wheels, and the share of the left one.
