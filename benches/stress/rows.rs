@@ -9,7 +9,7 @@ use std::time::Duration;
 use railhead_contact as contact;
 use railhead_contact::case::rail_pair::KnownPair;
 use railhead_contact::case::solver::Limits;
-use railhead_contact::evaluate::answer::{ManyAnswer, RowStatus, RowsAnswer};
+use railhead_contact::evaluate::answer::{RowStatus, RowsAnswer};
 use railhead_contact::evaluate::many::{ManyTask, solve_many};
 use railhead_contact::evaluate::rows::Rows;
 use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
@@ -339,11 +339,11 @@ fn runs(seed: u64) -> Class {
         for row in 0..RUNS[1] {
             let has = all.status[row].has_answer();
             class.answered += usize::from(has);
-            let bits = |answer: &ManyAnswer, row: usize| -> Vec<u64> {
+            let bits = |answer: &RowsAnswer, row: usize| -> Vec<u64> {
                 answer
                     .numbers
                     .iter()
-                    .map(|column| column[row].to_bits())
+                    .map(|(_, column)| column[row].to_bits())
                     .collect()
             };
             let image = RUNS[1] - 1 - row;
@@ -364,7 +364,7 @@ fn runs(seed: u64) -> Class {
     class
 }
 
-fn solved(template: &Value, columns: &[VariedColumn]) -> ManyAnswer {
+fn solved(template: &Value, columns: &[VariedColumn]) -> RowsAnswer {
     let operators = Arc::new(OperatorStore::default());
     let task = ManyTask {
         case: template,

@@ -12,7 +12,7 @@ use prometheus_client::registry::Registry;
 use crate::model::{FailureKind, State};
 use crate::store::Ending;
 use railhead_contact::case::words::solver::MethodName;
-use railhead_contact::evaluate::answer::ManyAnswer;
+use railhead_contact::evaluate::answer::RowsAnswer;
 use railhead_contact::solution::words::answer::Solution;
 
 /// Upper bounds of solve times in s.
@@ -135,7 +135,7 @@ impl Metrics {
     }
 
     /// Counts the rows of a chunk by status.
-    pub(crate) fn rows_ended(&self, answer: &ManyAnswer) {
+    pub(crate) fn rows_ended(&self, answer: &RowsAnswer) {
         for status in &answer.status {
             self.rows.get_or_create(&[("status", status.name())]).inc();
         }

@@ -204,7 +204,7 @@ fn alone_in_a_list_as_a_row_and_evaluated_the_resultants_are_the_same() {
             let known = slopes.moment_z_n_mm[2];
             assert_eq!(column(&run, name)[row], known, "{case}");
             assert_eq!(evaluated[name][row], known, "{case}");
-            assert_eq!(run.method[row], Some(point.solver.method), "{case}");
+            assert_eq!(run.method(row), Some(point.solver.method), "{case}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Tests of a target relative to the tangential force: every kind of motion meets it, or the answer says that it is missed. With a target relative
 //! to the friction limit, the answer remarks on small forces.
 
-use railhead_contact::evaluate::answer::{NUMBER_NAMES, RowStatus};
+use railhead_contact::evaluate::answer::RowStatus;
 use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
@@ -158,10 +158,7 @@ fn rows_by_the_table_count_their_bound_against_the_force() {
     let found = solved(&case, &columns);
     for (row, status) in found.status.iter().enumerate() {
         assert_eq!(*status, RowStatus::Ok, "{row}");
-        let of = |name: &str| {
-            let column = NUMBER_NAMES.iter().position(|known| *known == name);
-            found.numbers[column.expect("a column")][row]
-        };
+        let of = |name: &str| found.column(name)[row];
         assert!(
             of("error_estimate") <= 0.02 * of("force_x_n").abs(),
             "{row}"

@@ -398,15 +398,12 @@ fn run(feature: &Feature, with_columns: bool) -> Result<Vec<Option<Answer>>, Str
         contact::solve_with(&operators, checked, monitor).map(|(solution, _)| solution)
     };
     let answer = solve_many(&task, &solve, &Unmonitored).map_err(|error| error.to_string())?;
-    if let Some(why) = answer.reason.iter().find(|why| !why.is_empty()) {
-        return Err(why.clone());
+    let mut reasons = (0..ROWS).map(|row| answer.reason(row));
+    if let Some(why) = reasons.find(|why| !why.is_empty()) {
+        return Err(why);
     }
-    let names = answer.columns.names();
     let rows = (0..ROWS).map(|row| {
-        let of = |name: &str| {
-            let place = names.iter().position(|known| *known == name);
-            place.map(|place| answer.numbers[place][row])
-        };
+        let of = |name: &str| answer.column(name).get(row).copied();
         let number = |name: &str| of(name).unwrap_or(f64::NAN);
         let error = number("error_estimate");
         Some(Answer {

@@ -43,7 +43,7 @@ impl RowStatus {
         matches!(self, RowStatus::Ok | RowStatus::TargetMissed)
     }
 
-    /// Returns the reason of a row that was evaluated without the solver; empty for a row with resultants.
+    /// Returns the reason of a row that the solver did not answer; empty for a row with resultants.
     pub(crate) fn reason(self) -> String {
         match self {
             RowStatus::NotCovered => format!(
@@ -54,15 +54,18 @@ impl RowStatus {
             RowStatus::NeedsSolver => "too many rows need the solver; submit a run".to_owned(),
             RowStatus::Refused => "the case has faults; a check of it alone lists them".to_owned(),
             RowStatus::NotFinite => "a number of the result is not finite".to_owned(),
+            RowStatus::SolverFailed => {
+                "the row was not solved; submit its case as a job".to_owned()
+            }
             _ => String::new(),
         }
     }
 }
 
-/// Names of the columns of numbers in every answer of [`RowsAnswer`].
+/// Names of the first columns of numbers of rows that are evaluated at once.
 pub const ROW_NAMES: [&str; 6] = of_rows(NUMBER_NAMES);
 
-/// Chooses the columns of [`RowsAnswer`] from those of [`NUMBER_NAMES`].
+/// Chooses the columns of [`ROW_NAMES`] from those of [`NUMBER_NAMES`].
 const fn of_rows<T: Copy>(all: [T; NUMBER_NAMES.len()]) -> [T; 6] {
     let [_, x, y, moment, error, _, power, stick, ..] = all;
     [x, y, moment, error, power, stick]
@@ -71,13 +74,26 @@ const fn of_rows<T: Copy>(all: [T; NUMBER_NAMES.len()]) -> [T; 6] {
 /// Answers to rows. A number is NaN for a row without it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RowsAnswer {
-    /// The columns with their names: [`ROW_NAMES`], derivatives ([`GRADIENT_NAMES`]) if requested, and further ones if the rows need the
-    /// solver. The error estimate bounds the error of each force; that of the moment is this bound times √(ab).
+    /// The columns with their names: those of [`NumberColumns::names`]. If rows are evaluated at once, they begin with [`ROW_NAMES`] and the
+    /// derivatives, and those of the solver are absent unless it was needed. The error estimate bounds the error of each force; in rows without
+    /// a mesh, that of the moment is this bound times √(ab).
     pub numbers: Vec<(&'static str, Vec<f64>)>,
     /// The status of each row.
     pub status: Vec<RowStatus>,
-    /// The reason and the codes of the remarks of each row that the solver was given, by the index of the row.
-    notes: BTreeMap<usize, [String; 2]>,
+    solved: NumberColumns,
+    /// The notes on the rows that have one, by the index of the row.
+    notes: BTreeMap<usize, RowNote>,
+}
+
+/// The facts about a row that are no numbers.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct RowNote {
+    /// The method of a row with an answer.
+    pub(crate) method: Option<MethodName>,
+    /// The reason of a row without an answer.
+    pub(crate) reason: String,
+    /// Codes of the remarks of a row that the solver answered, each code once, separated by blanks.
+    pub(crate) remarks: String,
 }
 
 /// The answer to one row without a mesh. A missing number is NaN.
@@ -101,6 +117,16 @@ impl RowAnswer {
         }
     }
 
+    /// Returns the row without its answer if one of its numbers is not finite.
+    pub(crate) fn finite(self, gradients: bool) -> RowAnswer {
+        let derivatives = if gradients { GRADIENT_NAMES.len() } else { 0 };
+        let mut numbers = self.of_columns().take(ROW_NAMES.len() + derivatives);
+        match self.status.has_answer() && !numbers.all(f64::is_finite) {
+            true => RowAnswer::without(RowStatus::NotFinite),
+            false => self,
+        }
+    }
+
     /// Returns the numbers in the order of [`ROW_NAMES`] and [`GRADIENT_NAMES`].
     pub(crate) fn of_columns(&self) -> impl Iterator<Item = f64> + use<> {
         of_rows(self.numbers).into_iter().chain(self.gradients)
@@ -115,7 +141,18 @@ impl RowsAnswer {
         RowsAnswer {
             numbers: names.map(|name| (name, Vec::with_capacity(rows))).collect(),
             status: Vec::with_capacity(rows),
-            notes: BTreeMap::new(),
+            ..RowsAnswer::default()
+        }
+    }
+
+    /// Creates the answer to a number of rows before any of them is solved.
+    pub(crate) fn unsolved(rows: usize, columns: NumberColumns) -> RowsAnswer {
+        let names = columns.names().into_iter();
+        RowsAnswer {
+            numbers: names.map(|name| (name, vec![f64::NAN; rows])).collect(),
+            status: vec![RowStatus::SolverFailed; rows],
+            solved: columns,
+            ..RowsAnswer::default()
         }
     }
 
@@ -130,12 +167,22 @@ impl RowsAnswer {
     /// Returns why a row has no resultants; empty for a row with resultants.
     pub fn reason(&self, row: usize) -> String {
         let noted = self.notes.get(&row);
-        noted.map_or_else(|| self.status[row].reason(), |[reason, _]| reason.clone())
+        noted.map_or_else(|| self.status[row].reason(), |note| note.reason.clone())
     }
 
     /// Returns the codes of the remarks of a row, separated by blanks. Empty for rows by the table or FASTSIM.
     pub fn remarks(&self, row: usize) -> &str {
-        self.notes.get(&row).map_or("", |[_, remarks]| remarks)
+        self.notes.get(&row).map_or("", |note| &note.remarks)
+    }
+
+    /// Returns the method of a row with an answer; `None` if rows are evaluated at once without the solver.
+    pub fn method(&self, row: usize) -> Option<MethodName> {
+        self.notes.get(&row)?.method
+    }
+
+    /// The number of rows without an answer.
+    pub fn without_answer(&self) -> usize {
+        self.status.iter().filter(|row| !row.has_answer()).count()
     }
 
     /// The memory of the answer in bytes.
@@ -155,22 +202,14 @@ impl RowsAnswer {
         found.map_or(&[], |(_, numbers)| numbers)
     }
 
-    /// Converts answers of the solver: the columns of every answer and the derivatives come first, the further columns of the solver last.
-    pub(crate) fn of_solver(answer: ManyAnswer) -> RowsAnswer {
-        let names = answer.columns.names().into_iter();
-        let mut numbers: Vec<_> = names.zip(answer.numbers).collect();
+    /// Puts the columns of [`ROW_NAMES`] and the derivatives first.
+    pub(crate) fn for_rows(mut self) -> RowsAnswer {
         let place = |name: &str| {
             let mut first = ROW_NAMES.iter().chain(&GRADIENT_NAMES);
             first.position(|own| *own == name).unwrap_or(usize::MAX)
         };
-        numbers.sort_by_key(|(name, _)| place(name));
-        RowsAnswer {
-            numbers,
-            status: answer.status,
-            notes: (0..)
-                .zip(std::iter::zip(answer.reason, answer.remarks).map(Into::into))
-                .collect(),
-        }
+        self.numbers.sort_by_key(|(name, _)| place(name));
+        self
     }
 
     /// Replaces `rows` by answers of the solver in the same order.
@@ -185,6 +224,55 @@ impl RowsAnswer {
         }
         let notes = solved.notes.into_values();
         self.notes.extend(rows.iter().copied().zip(notes));
+    }
+
+    /// Writes the outcome of a row. An answer with a number that is not finite becomes a failure.
+    pub(crate) fn set(&mut self, row: usize, mut outcome: RowOutcome) {
+        if let Some(name) = self.not_finite(&outcome.numbers) {
+            let quantity = name.to_owned();
+            let reason = SolveError::NotFinite { quantity }.to_string();
+            outcome = RowOutcome::without(RowStatus::Unsolvable, reason);
+        }
+        let numbers = outcome.numbers.into_iter();
+        let numbers = numbers.chain(std::iter::repeat(f64::NAN));
+        for ((_, column), number) in self.numbers.iter_mut().zip(numbers) {
+            column[row] = number;
+        }
+        self.status[row] = outcome.status;
+        self.notes.insert(row, outcome.note);
+    }
+
+    /// Writes the answer to the one motion of a row.
+    pub(crate) fn set_solution(&mut self, row: usize, solution: &Solution) {
+        let Some(numbers) = numbers_of(solution, &self.solved) else {
+            return;
+        };
+        let mut points = points_of(solution);
+        let method = points_of(solution).next().map(|point| point.solver.method);
+        let outcome = RowOutcome {
+            status: match points.all(|point| point.target_met != Some(false)) {
+                true => RowStatus::Ok,
+                false => RowStatus::TargetMissed,
+            },
+            note: RowNote {
+                method,
+                remarks: RemarkEntry::codes(&solution.remarks),
+                ..RowNote::default()
+            },
+            numbers,
+        };
+        self.set(row, outcome);
+    }
+
+    /// Returns the name of the first number that is not finite, other than an optional one. Several patches have no derivatives.
+    fn not_finite(&self, numbers: &[f64]) -> Option<&'static str> {
+        let is_optional =
+            |name: &str| OPTIONAL_NUMBERS.contains(&name) || GRADIENT_NAMES.contains(&name);
+        let is_wrong = |(name, number): &(&str, &f64)| {
+            !(number.is_finite() || number.is_nan() && is_optional(name))
+        };
+        let mut named = self.numbers.iter().map(|(name, _)| *name).zip(numbers);
+        named.find(is_wrong).map(|(name, _)| name)
     }
 }
 
@@ -201,16 +289,31 @@ pub const GRADIENT_NAMES: [&str; 9] = [
     "moment_z_n_mm_by_spin_per_mm",
 ];
 
-/// The status of a row without an answer, and the reason.
+/// The outcome of a row that was solved, or evaluated for a run.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct RowFailure {
+pub(crate) struct RowOutcome {
     pub(crate) status: RowStatus,
-    pub(crate) reason: String,
+    pub(crate) note: RowNote,
+    /// The numbers in the order of [`NumberColumns::names`]; empty without an answer.
+    pub(crate) numbers: Vec<f64>,
 }
 
-impl RowFailure {
+impl RowOutcome {
+    /// Returns the outcome of a row without an answer.
+    pub(crate) fn without(status: RowStatus, reason: String) -> RowOutcome {
+        let note = RowNote {
+            reason,
+            ..RowNote::default()
+        };
+        RowOutcome {
+            status,
+            note,
+            numbers: Vec::new(),
+        }
+    }
+
     /// Returns the failure of a solve; `None` if the caller stopped the solve.
-    pub(crate) fn of(error: &SolveError) -> Option<RowFailure> {
+    pub(crate) fn of(error: &SolveError) -> Option<RowOutcome> {
         let status = match error {
             SolveError::Cancelled => return None,
             SolveError::OutOfTime { .. } => RowStatus::OutOfTime,
@@ -221,26 +324,22 @@ impl RowFailure {
             | SolveError::NormalProblem { .. }
             | SolveError::NotFinite { .. } => RowStatus::Unsolvable,
         };
-        let reason = error.to_string();
-        Some(RowFailure { status, reason })
+        Some(RowOutcome::without(status, error.to_string()))
     }
 
     /// Returns the failure of a case with faults.
-    pub(crate) fn refused(CaseError(faults): &CaseError) -> RowFailure {
+    pub(crate) fn refused(CaseError(faults): &CaseError) -> RowOutcome {
         let first = faults.first();
         let first = first.map(|fault| format!("{}: {}", fault.pointer, fault.detail));
         let mut reason = first.unwrap_or_default();
         if faults.len() > 1 {
             reason += &format!("; and {} more faults", faults.len() - 1);
         }
-        RowFailure {
-            status: RowStatus::Refused,
-            reason,
-        }
+        RowOutcome::without(RowStatus::Refused, reason)
     }
 }
 
-/// Names of the columns of numbers in every answer of [`ManyAnswer`], in the order of [`RowNumbers`].
+/// Names of the columns of numbers in every answer of the solver, in the order of [`RowNumbers`].
 pub const NUMBER_NAMES: [&str; 12] = [
     "normal_force_n",
     "force_x_n",
@@ -343,115 +442,6 @@ impl NumberColumns {
             .chain(gradients)
             .collect()
     }
-
-    /// Returns the name of the first number that is not finite, other than an optional one. Several patches have no derivatives.
-    fn not_finite(&self, numbers: &[f64]) -> Option<&'static str> {
-        let is_optional =
-            |name: &str| OPTIONAL_NUMBERS.contains(&name) || GRADIENT_NAMES.contains(&name);
-        let is_wrong = |(name, number): &(&str, &f64)| {
-            !(number.is_finite() || number.is_nan() && is_optional(name))
-        };
-        let mut named = self.names().into_iter().zip(numbers);
-        named.find(is_wrong).map(|(name, _)| name)
-    }
-}
-
-/// The reason of a row before it is solved.
-const NOT_SOLVED: &str = "the row was not solved; submit its case as a job";
-
-/// The answer to a solved row.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SolvedRow {
-    pub(crate) status: RowStatus,
-    pub(crate) method: Option<MethodName>,
-    /// Codes of its remarks, separated by blanks.
-    pub(crate) remarks: String,
-    /// The numbers in the order of [`NumberColumns::names`].
-    pub(crate) numbers: Vec<f64>,
-}
-
-/// The answers to rows in their order.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ManyAnswer {
-    /// The status of each row.
-    pub status: Vec<RowStatus>,
-    /// The method of each row with an answer.
-    pub method: Vec<Option<MethodName>>,
-    /// The reason why a row has no answer; empty for a row with one.
-    pub reason: Vec<String>,
-    /// Codes of the remarks of each row that the solver answered, each code once, separated by blanks. Empty for rows by the table or FASTSIM.
-    pub remarks: Vec<String>,
-    /// The columns.
-    pub columns: NumberColumns,
-    /// The numbers of each column, one for each row; NaN for a row without it.
-    pub numbers: Vec<Vec<f64>>,
-}
-
-impl ManyAnswer {
-    /// Creates the answer to a number of rows before any of them is solved.
-    pub(crate) fn new(rows: usize, columns: NumberColumns) -> ManyAnswer {
-        ManyAnswer {
-            status: vec![RowStatus::SolverFailed; rows],
-            method: vec![None; rows],
-            reason: vec![NOT_SOLVED.to_owned(); rows],
-            remarks: vec![String::new(); rows],
-            numbers: vec![vec![f64::NAN; rows]; columns.names().len()],
-            columns,
-        }
-    }
-
-    /// The number of rows without an answer.
-    pub fn without_answer(&self) -> usize {
-        self.status.iter().filter(|row| !row.has_answer()).count()
-    }
-
-    /// Writes the outcome of a row that has none yet. An answer with a number that is not finite becomes a failure.
-    pub(crate) fn set(&mut self, row: usize, outcome: Result<SolvedRow, RowFailure>) {
-        let outcome = outcome.and_then(|solved| match self.columns.not_finite(&solved.numbers) {
-            None => Ok(solved),
-            Some(name) => {
-                let quantity = name.to_owned();
-                Err(RowFailure {
-                    status: RowStatus::Unsolvable,
-                    reason: SolveError::NotFinite { quantity }.to_string(),
-                })
-            }
-        });
-        match outcome {
-            Ok(solved) => {
-                self.status[row] = solved.status;
-                self.method[row] = solved.method;
-                self.reason[row].clear();
-                self.remarks[row] = solved.remarks;
-                for (column, number) in self.numbers.iter_mut().zip(solved.numbers) {
-                    column[row] = number;
-                }
-            }
-            Err(RowFailure { status, reason }) => {
-                self.status[row] = status;
-                self.reason[row] = reason;
-            }
-        }
-    }
-
-    /// Writes the answer to the one motion of a row.
-    pub(crate) fn set_solution(&mut self, row: usize, solution: &Solution) {
-        let Some(numbers) = numbers_of(solution, &self.columns) else {
-            return;
-        };
-        let mut points = points_of(solution);
-        let method = points_of(solution).next().map(|point| point.solver.method);
-        let solved = SolvedRow {
-            status: match points.all(|point| point.target_met != Some(false)) {
-                true => RowStatus::Ok,
-                false => RowStatus::TargetMissed,
-            },
-            method,
-            remarks: RemarkEntry::codes(&solution.remarks),
-            numbers,
-        };
-        self.set(row, Ok(solved));
-    }
 }
 
 /// Returns the results of each patch under the only motion.
@@ -507,16 +497,16 @@ mod tests {
     #[test]
     fn a_row_whose_numbers_are_not_all_finite_has_no_answer() {
         let ok = RowAnswer {
-            numbers: [1.0, 2.0, 3.0, 0.1, 0.2, 0.3],
+            numbers: std::array::from_fn(|k| k as f64),
             gradients: [f64::NAN; 9],
             status: RowStatus::Ok,
         };
         let mut answer = RowsAnswer::with_capacity(9, false);
-        answer.push(ok);
-        for place in 0..6 {
+        answer.push(ok.finite(false));
+        for (k, place) in [1, 2, 3, 4, 6, 7].into_iter().enumerate() {
             let mut row = ok;
-            row.numbers[place] = [f64::NAN, f64::INFINITY][place % 2];
-            answer.push(row);
+            row.numbers[place] = [f64::NAN, f64::INFINITY][k % 2];
+            answer.push(row.finite(false));
         }
         assert_eq!(answer.status[0], RowStatus::Ok);
         assert_eq!(answer.status[1..], [RowStatus::NotFinite; 6]);
@@ -524,9 +514,11 @@ mod tests {
             assert!(column[0].is_finite(), "{name}");
             assert!(column[1..].iter().all(|number| number.is_nan()), "{name}");
         }
-        let mut answer = RowsAnswer::with_capacity(1, true);
-        answer.push(ok);
-        assert_eq!(answer.status, [RowStatus::NotFinite], "its derivatives");
+        assert_eq!(
+            ok.finite(true).status,
+            RowStatus::NotFinite,
+            "its derivatives"
+        );
     }
 }
 
@@ -534,11 +526,13 @@ mod tests {
 mod many_tests {
     use super::*;
 
-    fn solved() -> SolvedRow {
-        SolvedRow {
+    fn solved() -> RowOutcome {
+        RowOutcome {
             status: RowStatus::Ok,
-            method: Some(MethodName::BoundaryElement),
-            remarks: String::new(),
+            note: RowNote {
+                method: Some(MethodName::BoundaryElement),
+                ..RowNote::default()
+            },
             numbers: vec![1.0; NUMBER_NAMES.len()],
         }
     }
@@ -547,17 +541,18 @@ mod many_tests {
     fn an_answer_with_a_number_that_is_not_finite_is_a_failure_with_its_reason() {
         for (place, name) in NUMBER_NAMES.iter().enumerate() {
             for number in [f64::NAN, f64::INFINITY] {
-                let mut answer = ManyAnswer::new(1, NumberColumns::default());
+                let mut answer = RowsAnswer::unsolved(1, NumberColumns::default());
                 let mut row = solved();
                 row.numbers[place] = number;
-                answer.set(0, Ok(row));
+                answer.set(0, row);
                 let kept = OPTIONAL_NUMBERS.contains(name) && number.is_nan();
                 assert_eq!(answer.status[0] == RowStatus::Ok, kept, "{name} {number}");
                 if !kept {
                     assert_eq!(answer.status[0], RowStatus::Unsolvable);
-                    assert!(answer.reason[0].contains(name), "{:?}", answer.reason);
+                    assert!(answer.reason(0).contains(name), "{answer:?}");
                     let mut numbers = answer.numbers.iter();
-                    assert!(numbers.all(|column| column[0].is_nan()) && answer.method[0].is_none());
+                    assert!(numbers.all(|(_, column)| column[0].is_nan()));
+                    assert!(answer.method(0).is_none());
                 }
             }
         }
@@ -565,15 +560,15 @@ mod many_tests {
 
     #[test]
     fn a_failure_after_an_answer_leaves_no_number_of_it() {
-        let mut answer = ManyAnswer::new(1, NumberColumns::default());
-        answer.set(0, Ok(solved()));
-        assert!(answer.reason[0].is_empty() && answer.without_answer() == 0);
+        let mut answer = RowsAnswer::unsolved(1, NumberColumns::default());
+        answer.set(0, solved());
+        assert!(answer.reason(0).is_empty() && answer.without_answer() == 0);
         let error = SolveError::NotCovered {
             reason: "too slender".to_owned(),
         };
-        answer.set(0, Err(RowFailure::of(&error).expect("a failure")));
+        answer.set(0, RowOutcome::of(&error).expect("a failure"));
         assert_eq!(answer.status, [RowStatus::NotCovered]);
-        assert_eq!(answer.reason, ["too slender"]);
-        assert!(answer.numbers.iter().all(|column| column[0].is_nan()));
+        assert_eq!(answer.reason(0), "too slender");
+        assert!(answer.numbers.iter().all(|(_, column)| column[0].is_nan()));
     }
 }

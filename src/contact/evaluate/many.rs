@@ -17,7 +17,7 @@ use crate::case::solver::Limits;
 use crate::case::words::solver::{MethodName, Output};
 use crate::error::{CaseError, Fault, SolveError};
 use crate::evaluate::answer::{
-    ManyAnswer, NumberColumns, RowAnswer, RowFailure, RowStatus, RowsAnswer, SolvedRow,
+    NumberColumns, RowAnswer, RowNote, RowOutcome, RowStatus, RowsAnswer,
 };
 use crate::evaluate::rows::Rows;
 use crate::evaluate::varied::{VariedColumn, case_of_row};
@@ -34,10 +34,10 @@ pub fn solve_many(
     task: &ManyTask,
     solve: &RowSolver,
     monitor: &dyn Monitor,
-) -> Result<ManyAnswer, SolveError> {
+) -> Result<RowsAnswer, SolveError> {
     let checked = crate::check_with(task.known, task.case, task.limits).ok();
     let columns = checked.as_ref().map(NumberColumns::of).unwrap_or_default();
-    let mut answer = ManyAnswer::new(task.rows(), columns);
+    let mut answer = RowsAnswer::unsolved(task.rows(), columns);
     let mut open: Vec<usize> = (0..task.rows()).collect();
     if let Some((rows, method)) = checked.and_then(|checked| evaluable(task, &checked)) {
         open.clear();
@@ -60,11 +60,11 @@ fn solve_rows<E>(
     solve: &RowSolver,
     monitor: &dyn Monitor,
 ) -> Result<RowsAnswer, NotAtOnce<E>> {
-    let mut answer = ManyAnswer::new(task.rows(), NumberColumns::of(checked));
+    let mut answer = RowsAnswer::unsolved(task.rows(), NumberColumns::of(checked));
     let rows = (0..task.rows()).collect();
     let solved = solve_each(task, rows, first, (solve, monitor), &mut answer);
     solved.map_err(|_| NotAtOnce::Stopped)?;
-    Ok(RowsAnswer::of_solver(answer))
+    Ok(answer.for_rows())
 }
 
 /// Maximum number of rows of one evaluation that the solver answers. The table and FASTSIM answer any number.
@@ -167,21 +167,22 @@ fn to_solve(status: RowStatus, method: MethodName) -> bool {
 }
 
 /// Returns the outcome of a row that was evaluated and is not left to the solver.
-fn evaluated(row: RowAnswer, method: MethodName) -> Result<SolvedRow, RowFailure> {
+fn evaluated(row: RowAnswer, method: MethodName) -> RowOutcome {
     let status = row.status;
     if !status.has_answer() {
-        let reason = status.reason();
-        return Err(RowFailure { status, reason });
+        return RowOutcome::without(status, status.reason());
     }
-    Ok(SolvedRow {
+    RowOutcome {
         status,
-        method: Some(match method {
-            MethodName::Auto => MethodName::Table,
-            asked => asked,
-        }),
-        remarks: String::new(),
+        note: RowNote {
+            method: Some(match method {
+                MethodName::Auto => MethodName::Table,
+                asked => asked,
+            }),
+            ..RowNote::default()
+        },
         numbers: row.numbers.into_iter().chain(row.gradients).collect(),
-    })
+    }
 }
 
 /// Orders rows by the columns of their shapes, then by those of their motions.
@@ -205,7 +206,7 @@ fn solve_each(
     mut rows: Vec<usize>,
     first: Option<&CheckedCase>,
     (solve, monitor): (&RowSolver, &dyn Monitor),
-    answer: &mut ManyAnswer,
+    answer: &mut RowsAnswer,
 ) -> Result<(), SolveError> {
     rows.sort_by(|a, b| near(task.columns, *a, *b));
     let own = 1.0 / rows.len() as f64;
@@ -221,7 +222,7 @@ fn solve_each(
         let checked = match checked {
             Ok(checked) => checked,
             Err(error) => {
-                answer.set(row, Err(RowFailure::refused(&error)));
+                answer.set(row, RowOutcome::refused(&error));
                 continue;
             }
         };
@@ -236,13 +237,13 @@ fn solve_each(
                 answer.set_solution(row, &solution);
                 continue;
             }
-            Ok(Err(error)) => RowFailure::of(&error).ok_or(SolveError::Cancelled)?,
-            Err(_) => RowFailure {
-                status: RowStatus::SolverFailed,
-                reason: "the solver stopped on an internal error".to_owned(),
-            },
+            Ok(Err(error)) => RowOutcome::of(&error).ok_or(SolveError::Cancelled)?,
+            Err(_) => {
+                let reason = "the solver stopped on an internal error";
+                RowOutcome::without(RowStatus::SolverFailed, reason.to_owned())
+            }
         };
-        answer.set(row, Err(failure));
+        answer.set(row, failure);
     }
     Ok(())
 }

@@ -121,7 +121,6 @@ impl<'a> Rows<'a> {
 
     /// Returns the answers to the rows in order. A row with a number that is not finite has no answer.
     pub fn answers(&self) -> impl Iterator<Item = RowAnswer> {
-        let columns = RowsAnswer::with_capacity(0, self.gradients).numbers.len();
         let mut shapes = Shapes::default();
         (0..self.rows).map(move |number| {
             let mut row = self.fixed;
@@ -129,11 +128,7 @@ impl<'a> Rows<'a> {
                 row[*variable as usize] = values[number];
             }
             let answer = self.answer_row(&row, &mut shapes);
-            let is_finite = answer.of_columns().take(columns).all(f64::is_finite);
-            match answer.status.has_answer() && !is_finite {
-                true => RowAnswer::without(RowStatus::NotFinite),
-                false => answer,
-            }
+            answer.finite(self.gradients)
         })
     }
 

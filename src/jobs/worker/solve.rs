@@ -24,7 +24,7 @@ use crate::sync::lock;
 use crate::trace::JobTrace;
 use crate::worker::{evolution, heartbeat};
 use railhead_contact::error::SolveError;
-use railhead_contact::evaluate::answer::ManyAnswer;
+use railhead_contact::evaluate::answer::RowsAnswer;
 use railhead_contact::evaluate::many::{ManyTask, solve_many};
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
@@ -224,7 +224,7 @@ pub(crate) fn solve_chunk(shared: &Shared, control: &AttemptControl, stored: &St
     let rows = answer.status.len();
     let without = answer.without_answer();
     shared.metrics.rows_ended(&answer);
-    let file = parquet::encode(&table(&head, first_row, carried, answer));
+    let file = parquet::encode(&table(&head, first_row, carried, &answer));
     let file = file.map_err(|error| format!("a chunk of rows cannot be written: {error}"))?;
     Ok(Outcome::Solved(Solved {
         result: EncodedResult {
@@ -250,28 +250,31 @@ fn table(
     head: &RunHead,
     first_row: u64,
     carried: Vec<(String, TableColumn)>,
-    answer: ManyAnswer,
+    answer: &RowsAnswer,
 ) -> RowTable {
-    let rows = (first_row..).take(answer.status.len());
+    let count = answer.status.len();
+    let rows = (first_row..).take(count);
     let rows = TableColumn::Integers(rows.map(u64::cast_signed).collect());
-    let status = answer.status.iter();
-    let status = status.map(|status| Some(status.name().to_owned()));
-    let method = answer.method.iter();
-    let method = method.map(|method| method.map(|method| method.name().to_owned()));
+    let texts = |text: &dyn Fn(usize) -> Option<String>| {
+        let texts = (0..count).map(|row| text(row).filter(|text| !text.is_empty()));
+        TableColumn::Texts(texts.collect())
+    };
     let mut columns = vec![("row".to_owned(), rows)];
     columns.extend(carried);
-    columns.push(("status".to_owned(), TableColumn::Texts(status.collect())));
-    columns.push(("method".to_owned(), TableColumn::Texts(method.collect())));
-    let numbers = head.numbers.iter().cloned().zip(answer.numbers);
+    let status = texts(&|row| Some(answer.status[row].name().to_owned()));
+    columns.push(("status".to_owned(), status));
+    let method = texts(&|row| Some(answer.method(row)?.name().to_owned()));
+    columns.push(("method".to_owned(), method));
+    let numbers = answer.numbers.iter().map(|(_, numbers)| numbers.clone());
+    let numbers = head.numbers.iter().cloned().zip(numbers);
     columns.extend(numbers.map(|(name, values)| (name, TableColumn::Numbers(values))));
-    let texts = [
-        (head.with_reasons, REASON, answer.reason),
-        (head.with_remarks, REMARKS, answer.remarks),
-    ];
-    for (_, name, texts) in texts.into_iter().filter(|(is_there, ..)| *is_there) {
-        let texts = texts.into_iter();
-        let texts = texts.map(|text| Some(text).filter(|text| !text.is_empty()));
-        columns.push((name.to_owned(), TableColumn::Texts(texts.collect())));
+    if head.with_reasons {
+        let reasons = texts(&|row| Some(answer.reason(row)));
+        columns.push((REASON.to_owned(), reasons));
+    }
+    if head.with_remarks {
+        let remarks = texts(&|row| Some(answer.remarks(row).to_owned()));
+        columns.push((REMARKS.to_owned(), remarks));
     }
     RowTable { columns }
 }
