@@ -184,16 +184,6 @@ impl Footprint {
         matches!(&self.shape, FootprintShape::Sampled(field) if field.jump().is_some())
     }
 
-    /// Discontinuity of a given pressure, see [`PressureField::discontinuity`]; `None` for a pressure that was computed or is known in closed form.
-    pub fn discontinuity(&self) -> Option<f64> {
-        match &self.shape {
-            FootprintShape::Sampled(field) if self.uncertainty.is_none() => {
-                Some(field.discontinuity())
-            }
-            _ => None,
-        }
-    }
-
     /// Average number of segments of a strip, for each patch: more than 1 for hollow or bent patches.
     pub fn segments_per_strip(&self) -> Vec<f64> {
         match &self.shape {

@@ -87,6 +87,8 @@ pub struct StripMesh {
     pub mesh: Mesh,
     /// Pressure of every cell in MPa; the cells of a patch carry its normal force exactly.
     pub pressure: Vec<f64>,
+    /// Share of the load of every patch that the strips cannot place (see [`StripChord::unresolved`]); 0 for an ellipse, whose load is smooth.
+    pub unresolved: Vec<f64>,
     /// Area of every cell in mm².
     pub area: Vec<f64>,
     /// Units of the dimensionless problem.
@@ -185,6 +187,7 @@ impl StripMesh {
             plan,
             mesh,
             pressure,
+            unresolved: unresolved(footprint, &fitted),
             area,
             scale,
             normalised: Arc::new(normalised),
@@ -388,6 +391,24 @@ fn cell_pressures(
         }
     }
     pressure
+}
+
+/// The share of the load of every patch that its strips cannot place.
+fn unresolved(footprint: &Footprint, fitted: &[StripChord]) -> Vec<f64> {
+    let patches = footprint.patches().len();
+    if footprint.is_closed_form() {
+        return vec![0.0; patches];
+    }
+    let share = |patch: usize| {
+        let own = fitted.iter().filter(|strip| strip.line.patch == patch);
+        let (mut load, mut unresolved) = (0.0, 0.0);
+        for strip in own {
+            load += strip.load.unwrap_or(0.0) * strip.line.dy;
+            unresolved += strip.unresolved * strip.line.dy;
+        }
+        if load > 0.0 { unresolved / load } else { 0.0 }
+    };
+    (0..patches).map(share).collect()
 }
 
 fn scale(values: &mut [f64], factor: f64) {

@@ -20,6 +20,10 @@ const CELLS_MAX: usize = 200;
 /// `cargo bench --bench calibrate gap`, whose boxes are large enough.
 const GROWTH: f64 = 0.25;
 
+/// Largest length of a cell over the half-width of its patch along the other axis. On 80 random rollers with crowned ends the error of the resultants due to the
+/// grid is 0.001 in the median at 0.2 to 0.4, and 0.01 at 0.8 to 2.
+const STEP_OF_HALF_WIDTH: f64 = 0.4;
+
 /// The cells of a box. Cell (i, j) is stored at `j * cells[0] + i`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PressureGrid {
@@ -269,7 +273,10 @@ impl PressureGrid {
                 };
                 let chords = self.chords_of(patch);
                 for (k, step) in steps.iter_mut().enumerate() {
-                    *step = step.min(chords[k] * self.step[k] / wanted);
+                    // The pressure at an end of a slender patch changes over its half-width.
+                    let half_width = 0.5 * chords[1 - k] * self.step[1 - k];
+                    let resolved = chords[k] * self.step[k] / wanted;
+                    *step = step.min(resolved).min(STEP_OF_HALF_WIDTH * half_width);
                 }
             }
         }

@@ -77,12 +77,6 @@ impl PressureField {
         self.grids.iter().find_map(GridPressure::jump)
     }
 
-    /// The discontinuity of a given pressure, see [`GridPressure::discontinuity`].
-    pub fn discontinuity(&self) -> f64 {
-        let each = self.grids.iter().map(GridPressure::discontinuity);
-        each.fold(0.0, f64::max)
-    }
-
     /// Average number of segments per strip, for each patch.
     pub fn segments_per_strip(&self) -> Vec<f64> {
         let segments: Vec<Vec<f64>> = self

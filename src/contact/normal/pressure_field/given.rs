@@ -72,7 +72,7 @@ impl GridPressure {
         }
         let (mut field, samples) = GridPressure::from_squares(grid, q, pressure_max)?;
         let mut remarks = field.remarks(&samples, &field.shapes);
-        (field.discontinuity, field.jump) = field.find_jump();
+        field.jump = field.find_jump();
         if let Some(jump) = field.jump {
             let remark = Remark::PressureJumps {
                 x_mm: jump.at[0],
@@ -105,7 +105,6 @@ impl GridPressure {
             shapes: Vec::new(),
             images: Vec::new(),
             jump: None,
-            discontinuity: 0.0,
         };
         field.shapes = field.shapes_from_samples(&samples, count);
         field.find_loads();

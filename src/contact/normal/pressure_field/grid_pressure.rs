@@ -28,7 +28,6 @@ pub struct GridPressure {
     pub(crate) images: Vec<usize>,
     /// The largest jump between given samples.
     pub(crate) jump: Option<Jump>,
-    pub(crate) discontinuity: f64,
 }
 
 /// Largest number of patches of a contact.
@@ -81,9 +80,9 @@ impl GridPressure {
         self.patches().iter().map(across).collect()
     }
 
-    /// The largest excess fall between neighbouring samples (see [`JUMP`]), and the jump there if it is one. Must be called before edges are found, while squared pressures
+    /// The jump at the largest excess fall between neighbouring samples (see [`JUMP`]), if it is one. Must be called before edges are found, while squared pressures
     /// are 0 outside the contact.
-    pub(crate) fn find_jump(&self) -> (f64, Option<Jump>) {
+    pub(crate) fn find_jump(&self) -> Option<Jump> {
         let (nx, ny) = (self.grid.x.len(), self.grid.y.len());
         let mut largest: (f64, Option<Jump>) = (0.0, None);
         for j in PADDING..ny - PADDING {
@@ -109,17 +108,12 @@ impl GridPressure {
             }
         }
         let (discontinuity, jump) = largest;
-        (discontinuity, jump.filter(|_| discontinuity > JUMP))
+        jump.filter(|_| discontinuity > JUMP)
     }
 
     /// The largest jump of the pressure, if it has any.
     pub fn jump(&self) -> Option<Jump> {
         self.jump
-    }
-
-    /// The largest excess of the fall of the squared pressure over one interval, relative to the largest squared pressure (see [`JUMP`]): up to 0.2 for smooth pressures.
-    pub fn discontinuity(&self) -> f64 {
-        self.discontinuity
     }
 }
 
