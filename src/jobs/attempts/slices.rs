@@ -13,157 +13,120 @@ use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::evolution::EvolutionState;
 
-/// A checked case with its slices, the first `done` of which are stored.
+/// Work that is solved slice by slice.
 #[derive(Debug)]
-pub(crate) struct SlicedCase {
-    pub(crate) checked: CheckedCase,
-    pub(crate) slices: Vec<Range<usize>>,
-    pub(crate) done: usize,
-    /// Solver time of the stored slices.
-    pub(crate) spent: Duration,
-}
-
-impl SlicedCase {
-    /// A case with its stored slices. Slices with another division or of another solver revision are ignored.
-    pub(crate) fn new(
-        checked: CheckedCase,
-        slices: Vec<Range<usize>>,
-        stored: &[SliceRecord],
-    ) -> SlicedCase {
-        let fits = |(place, (note, slice)): (usize, (&SliceRecord, &Range<usize>))| {
-            note.number as usize == place
-                && note.motions as usize == slice.end
-                && note.digest == checked.label.digest
-        };
-        let pairs = stored.iter().zip(&slices).enumerate();
-        let done = pairs.take_while(|pair| fits(*pair)).count();
-        let last = done.checked_sub(1).and_then(|last| stored.get(last));
-        SlicedCase {
-            spent: last.map_or(Duration::ZERO, |note| note.spent),
-            checked,
-            slices,
-            done,
-        }
-    }
-
-    /// The next slice, if any is left.
-    pub(crate) fn next(&self) -> Option<Range<usize>> {
-        self.slices.get(self.done).cloned()
-    }
-
-    /// The record of the next slice; `spent` is the solver time of the job up to its end.
-    pub(crate) fn note(&self, spent: Duration) -> SliceRecord {
-        let motions = self.next().map_or(0, |slice| slice.end);
-        SliceRecord {
-            number: u32::try_from(self.done).unwrap_or(u32::MAX),
-            motions: u32::try_from(motions).unwrap_or(u32::MAX),
-            digest: self.checked.label.digest.clone(),
-            spent,
-        }
-    }
-
-    /// Fraction of the motions that are solved after the next slice.
-    pub(crate) fn done_after_next(&self) -> f64 {
-        let motions = self.next().map_or(0, |slice| slice.end);
-        motions as f64 / self.checked.problem.motions.len().max(1) as f64
-    }
-}
-
-/// An evolution between two slices.
-#[derive(Debug)]
-pub(crate) struct SlicedEvolution {
-    pub(crate) task: Evolution,
-    /// Current state; `None` if it has to be read from the stored slices.
-    pub(crate) state: Option<EvolutionState>,
+pub(crate) struct SlicedWork {
+    pub(crate) task: SlicedTask,
     /// Number of stored slices.
     pub(crate) done: u32,
     /// Solver time of the stored slices.
     pub(crate) spent: Duration,
 }
 
-impl SlicedEvolution {
-    /// An evolution with its stored slices. Slices of another solver revision are ignored.
-    pub(crate) fn new(task: Evolution, stored: &[SliceRecord]) -> SlicedEvolution {
-        let fit = stored.iter().all(|note| note.digest == task.digest);
-        let stored = if fit { stored } else { &[] };
-        SlicedEvolution {
-            state: stored.is_empty().then(|| task.begin()),
-            done: u32::try_from(stored.len()).unwrap_or(u32::MAX),
-            spent: stored.last().map_or(Duration::ZERO, |note| note.spent),
-            task,
-        }
-    }
-
-    /// Starts again, because the stored slices cannot be used.
-    pub(crate) fn begin_again(&mut self) {
-        self.done = 0;
-        self.state = Some(self.task.begin());
-    }
-}
-
-/// Work that is solved slice by slice.
+/// The kinds of work that is solved slice by slice.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "it is always boxed")]
-pub(crate) enum SlicedWork {
+pub(crate) enum SlicedTask {
     /// A case, cut by its motions.
-    Case(SlicedCase),
-    /// An evolution, cut by its steps.
-    Evolution(SlicedEvolution),
+    Case {
+        checked: CheckedCase,
+        slices: Vec<Range<usize>>,
+    },
+    /// An evolution, cut by its steps. Its current state is `None` if it has to be read from the stored slices.
+    Evolution {
+        task: Evolution,
+        state: Option<EvolutionState>,
+    },
 }
 
 impl SlicedWork {
+    /// A case with its stored slices. Slices with another division or of another solver revision are ignored.
+    pub(crate) fn case(
+        checked: CheckedCase,
+        slices: Vec<Range<usize>>,
+        stored: &[SliceRecord],
+    ) -> SlicedWork {
+        let fits = |(place, (record, slice)): (usize, (&SliceRecord, &Range<usize>))| {
+            record.number as usize == place
+                && record.motions as usize == slice.end
+                && record.digest == checked.label.digest
+        };
+        let pairs = stored.iter().zip(&slices).enumerate();
+        let done = pairs.take_while(|pair| fits(*pair)).count();
+        SlicedWork::begun(SlicedTask::Case { checked, slices }, &stored[..done])
+    }
+
+    /// An evolution with its stored slices. Slices of another solver revision are ignored.
+    pub(crate) fn evolution(task: Evolution, stored: &[SliceRecord]) -> SlicedWork {
+        let fit = stored.iter().all(|record| record.digest == task.digest);
+        let stored = if fit { stored } else { &[] };
+        let state = stored.is_empty().then(|| task.begin());
+        SlicedWork::begun(SlicedTask::Evolution { task, state }, stored)
+    }
+
+    fn begun(task: SlicedTask, stored: &[SliceRecord]) -> SlicedWork {
+        SlicedWork {
+            task,
+            done: u32::try_from(stored.len()).unwrap_or(u32::MAX),
+            spent: stored.last().map_or(Duration::ZERO, |last| last.spent),
+        }
+    }
+
     /// Whether the stored slices have to be read first: because all are solved, or because they contain the current state.
     pub(crate) fn waits_for_parts(&self) -> bool {
-        match self {
-            SlicedWork::Case(case) => case.next().is_none(),
-            SlicedWork::Evolution(evolution) => evolution.state.is_none(),
+        match &self.task {
+            SlicedTask::Case { slices, .. } => self.done as usize >= slices.len(),
+            SlicedTask::Evolution { task, state } => {
+                state.as_ref().is_none_or(|state| task.is_over(state))
+            }
         }
     }
 
     /// Remarks of the check.
     pub(crate) fn remarks(self) -> Vec<RemarkEntry> {
-        match self {
-            SlicedWork::Case(case) => case.checked.remarks,
-            SlicedWork::Evolution(_) => Vec::new(),
+        match self.task {
+            SlicedTask::Case { checked, .. } => checked.remarks,
+            SlicedTask::Evolution { .. } => Vec::new(),
         }
     }
 
-    /// Fraction of the work that is done once the last solved slice is stored.
-    pub(crate) fn done_after_next(&self) -> f64 {
-        match self {
-            SlicedWork::Case(case) => case.done_after_next(),
-            SlicedWork::Evolution(own) => own.state.as_ref().map_or(0.0, |state| state.share),
+    /// The record of the last solved slice, which is not stored yet. `motions` is the number of motions or steps up to its
+    /// end, and `spent` the solver time.
+    pub(crate) fn record(&self, motions: usize, spent: Duration) -> SliceRecord {
+        let digest = match &self.task {
+            SlicedTask::Case { checked, .. } => &checked.label.digest,
+            SlicedTask::Evolution { task, .. } => &task.digest,
+        };
+        SliceRecord {
+            number: self.done,
+            motions: u32::try_from(motions).unwrap_or(u32::MAX),
+            digest: digest.clone(),
+            spent,
         }
     }
 
-    /// Expected remaining solve time in s after the fraction `done`.
-    pub(crate) fn seconds_left(&self, done: f64) -> f64 {
-        (1.0 - done)
-            * match self {
-                SlicedWork::Case(case) => case.checked.cost().seconds,
-                SlicedWork::Evolution(evolution) => evolution.task.expected_seconds(),
+    /// Fraction of the work that is done with the last solved slice, which is not stored yet, and the expected solve time of
+    /// the rest in s.
+    pub(crate) fn progress(&self) -> (f64, f64) {
+        let (done, seconds) = match &self.task {
+            SlicedTask::Case { checked, slices } => {
+                let motions = slices.get(self.done as usize).map_or(0, |slice| slice.end);
+                let done = motions as f64 / checked.problem.motions.len().max(1) as f64;
+                (done, checked.cost().seconds)
             }
-    }
-
-    /// Records that the last solved slice is stored.
-    pub(crate) fn advance(&mut self, spent: Duration) {
-        match self {
-            SlicedWork::Case(case) => {
-                case.done += 1;
-                case.spent = spent;
+            SlicedTask::Evolution { task, state } => {
+                let done = state.as_ref().map_or(0.0, |state| state.share);
+                (done, task.expected_seconds())
             }
-            SlicedWork::Evolution(evolution) => {
-                evolution.done += 1;
-                evolution.spent = spent;
-            }
-        }
+        };
+        (done, (1.0 - done) * seconds)
     }
 
     /// Starts again, because the stored slices cannot be used.
     pub(crate) fn begin_again(&mut self) {
-        match self {
-            SlicedWork::Case(case) => case.done = 0,
-            SlicedWork::Evolution(evolution) => evolution.begin_again(),
+        self.done = 0;
+        if let SlicedTask::Evolution { task, state } = &mut self.task {
+            *state = Some(task.begin());
         }
     }
 }
@@ -278,27 +241,20 @@ pub(crate) mod tests {
     fn only_what_was_cut_here_and_solved_by_this_solver_counts_as_done() {
         let checked = checked_case();
         let cuts = || vec![0..3, 3..5, 5..7];
-        let sliced = |stored: &[SliceRecord]| SlicedCase::new(checked.clone(), cuts(), stored);
+        let sliced = |stored: &[SliceRecord]| SlicedWork::case(checked.clone(), cuts(), stored);
         let good = [note(0, 3, &checked), note(1, 5, &checked)];
         let going = sliced(&good);
-        assert_eq!(
-            (going.next(), going.spent),
-            (Some(5..7), Duration::from_secs(5))
-        );
-        assert_eq!(going.note(Duration::ZERO).motions, 7);
-        assert!((going.done_after_next() - 1.0).abs() < f64::EPSILON);
-        assert_eq!(sliced(&[]).next(), Some(0..3));
+        assert_eq!((going.done, going.spent), (2, Duration::from_secs(5)));
+        assert!((going.progress().0 - 1.0).abs() < f64::EPSILON);
+        assert_eq!(sliced(&[]).done, 0);
         // Cut elsewhere, a hole, another solver.
-        assert_eq!(sliced(&[note(0, 2, &checked)]).next(), Some(0..3));
-        assert_eq!(sliced(&good[1..]).next(), Some(0..3));
+        assert_eq!(sliced(&[note(0, 2, &checked)]).done, 0);
+        assert_eq!(sliced(&good[1..]).done, 0);
         let other = SliceRecord {
             digest: "of another revision".to_owned(),
             ..good[1].clone()
         };
         let half = sliced(&[good[0].clone(), other]);
-        assert_eq!(
-            (half.next(), half.spent),
-            (Some(3..5), Duration::from_secs(3))
-        );
+        assert_eq!((half.done, half.spent), (1, Duration::from_secs(3)));
     }
 }

@@ -1,15 +1,13 @@
 //! Tasks of a solver thread for an evolution: steps up to the next record, then the whole result.
 
-use std::error::Error;
 use std::sync::Arc;
-
-use serde_json::Value;
+use std::time::Duration;
 
 use crate::attempts::attempt::AttemptControl;
-use crate::attempts::slices::{Ended, Outcome, SlicedEvolution, SlicedWork, Solved};
+use crate::attempts::slices::{Outcome, Solved};
 use crate::codec::result::EncodedResult;
+use crate::error::{JobsError, Result};
 use crate::shared::Shared;
-use crate::store::SliceRecord;
 use railhead_contact::error::SolveError;
 use railhead_contact::evolution::task::{Evolution, SolveContext};
 use railhead_contact::solution::words::evolution::{EvolutionRecord, EvolutionState};
@@ -20,95 +18,57 @@ const STEPS: u32 = 16;
 /// Content of a slice: the record at its end, if any, and the state after it.
 type Part = (Option<EvolutionRecord>, EvolutionState);
 
-/// Checks an evolution with its stored slices, and takes the next steps.
-pub(crate) fn begin(
-    shared: &Shared,
-    control: &AttemptControl,
-    request: &Value,
-    notes: &[SliceRecord],
-) -> Ended {
-    let task = Evolution::check(request, &shared.options.limits)?;
-    advance(shared, control, SlicedEvolution::new(task, notes))
-}
-
-/// Takes the next steps. If there are none, or the state is unknown, the outcome requests the stored slices.
+/// Takes the next steps from `state`, which it updates, after a solver time of `spent`. Returns the number of steps so far,
+/// the solver time, and the slice.
 pub(crate) fn advance(
     shared: &Shared,
     control: &AttemptControl,
-    mut evolution: SlicedEvolution,
-) -> Ended {
-    let state = evolution.state.take();
-    let Some(state) = state.filter(|state| !evolution.task.is_over(state)) else {
-        let sliced = Box::new(SlicedWork::Evolution(evolution));
-        return Ok(Outcome::Slice { sliced, part: None });
+    task: &Evolution,
+    state: &mut Option<EvolutionState>,
+    spent: Duration,
+) -> Result<(usize, Duration, EncodedResult), Box<Outcome>> {
+    let limit = SolveError::OutOfTime {
+        limit_s: None,
+        motions: None,
     };
-    if evolution.spent >= shared.options.time_limit {
-        let limit = SolveError::OutOfTime {
-            limit_s: None,
-            motions: None,
-        };
-        return Err(limit.into());
-    }
+    let before = state.take().filter(|_| spent < shared.options.time_limit);
+    let before = before.ok_or(limit)?;
     let context = SolveContext {
         threads: shared.options.workers,
         operators: shared.engine.operators.clone(),
         known: Arc::clone(&shared.engine.known),
     };
-    control.begin(evolution.spent);
-    let solved = evolution.task.steps(&context, state, STEPS, control);
+    control.begin(spent);
+    let solved = task.steps(&context, before, STEPS, control);
     let spent = control.pause();
-    let (state, record) = solved?;
-    let note = SliceRecord {
-        number: evolution.done,
-        motions: state.steps,
-        digest: evolution.task.digest.clone(),
-        spent,
-    };
-    let part = Some((note, EncodedResult::as_json(&(record, &state))?));
-    evolution.state = Some(state);
-    let sliced = Box::new(SlicedWork::Evolution(evolution));
-    Ok(Outcome::Slice { sliced, part })
+    let (after, record) = solved?;
+    let part = EncodedResult::as_json(&(record, &after))?;
+    let steps = after.steps as usize;
+    *state = Some(after);
+    Ok((steps, spent, part))
 }
 
-/// Continues from the stored slices, or joins them if all are solved.
+/// Reads the current state from the stored slices. Returns the result if all are solved.
 pub(crate) fn join(
-    shared: &Shared,
-    control: &AttemptControl,
-    mut evolution: SlicedEvolution,
+    task: &Evolution,
+    state: &mut Option<EvolutionState>,
     parts: &[EncodedResult],
-) -> Ended {
-    match read(parts, evolution.done) {
-        Ok((state, records)) if evolution.task.is_over(&state) => {
-            let answer = evolution.task.answer(&state, records);
-            Ok(Outcome::Solved(Solved {
-                result: EncodedResult::as_json(&answer)?,
-                remarks: answer.remarks,
-                field_patches: 0,
-            }))
-        }
-        Ok((state, _)) => {
-            evolution.state = Some(state);
-            advance(shared, control, evolution)
-        }
-        Err(error) => {
-            tracing::error!(%error, "the slices of an evolution cannot be used; it is solved again");
-            evolution.begin_again();
-            advance(shared, control, evolution)
-        }
-    }
-}
-
-/// Reads `count` stored slices: the state after the last one, and all records.
-fn read(
-    parts: &[EncodedResult],
-    count: u32,
-) -> Result<(EvolutionState, Vec<EvolutionRecord>), Box<dyn Error>> {
-    let (mut last, mut records) = (None, Vec::new());
+) -> Result<Option<Solved>> {
+    let damaged = |reason: String| JobsError::Damaged(format!("a slice: {reason}"));
+    let mut records = Vec::new();
     for part in parts {
-        let (record, state): Part = serde_json::from_slice(&part.solution)?;
+        let read = serde_json::from_slice(&part.solution);
+        let (record, after): Part = read.map_err(|error| damaged(error.to_string()))?;
         records.extend(record);
-        last = Some(state);
+        *state = Some(after);
     }
-    let last = last.filter(|_| parts.len() == count as usize);
-    Ok((last.ok_or("slices are missing")?, records))
+    let Some(last) = state.as_ref().filter(|state| task.is_over(state)) else {
+        return Ok(None);
+    };
+    let answer = task.answer(last, records);
+    Ok(Some(Solved {
+        result: EncodedResult::as_json(&answer).map_err(damaged)?,
+        remarks: answer.remarks,
+        field_patches: 0,
+    }))
 }

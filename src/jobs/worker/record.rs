@@ -100,10 +100,10 @@ impl Worker {
         let member = &mut attempt.members[place];
         if let Some((note, part)) = part {
             let claim = &member.claim;
-            let (number, done) = (note.number, sliced.done_after_next());
+            let (number, (done, rest_s)) = (note.number, sliced.progress());
             let result = self.store_result(claim, Some(number), part).await?;
             let slice = NewSlice {
-                rest_us: u64::from(microseconds(sliced.seconds_left(done))),
+                rest_us: u64::from(microseconds(rest_s)),
                 note,
                 result,
                 done,
@@ -120,8 +120,9 @@ impl Worker {
                 return Ok(false);
             }
             tracing::debug!(job = %claim.id, number, done, "slice stored");
-            sliced.advance(slice.note.spent);
-            member.claim.slices = number + 1;
+            sliced.spent = slice.note.spent;
+            sliced.done += 1;
+            member.claim.slices = sliced.done;
         }
         member.sliced = Some(sliced);
         Ok(true)
@@ -136,7 +137,7 @@ impl Worker {
             Ok(parts) => Ok(Work::Join(sliced, parts)),
             Err(error) if error.storage_fault().is_some() => Err(error),
             Err(error) => {
-                tracing::error!(job = %id, %error, "slices cannot be read; the sweep is solved again");
+                tracing::error!(job = %id, %error, "the stored slices cannot be read; the job is solved again");
                 sliced.begin_again();
                 Ok(Work::Next(sliced))
             }
@@ -440,7 +441,6 @@ fn not_stored(error: &JobsError) -> Ending {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::attempts::slices::SlicedCase;
     use railhead_contact::error::CaseError;
 
     fn checked() -> railhead_contact::problem::checked_case::CheckedCase {
@@ -488,11 +488,7 @@ mod tests {
             })
         };
         let slice = || Outcome::Slice {
-            sliced: Box::new(SlicedWork::Case(SlicedCase::new(
-                checked(),
-                vec![0..1, 1..2],
-                &[],
-            ))),
+            sliced: Box::new(SlicedWork::case(checked(), vec![0..1, 1..2], &[])),
             part: None,
         };
         let broken = || Outcome::Broken(Failure::new(FailureKind::Panic, "boom"));

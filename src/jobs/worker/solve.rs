@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 use crate::attempts::attempt::{
     Attempt, AttemptControl, Member, Outcomes, Phase, Solver, SolverThread, Task,
 };
-use crate::attempts::slices::{Ended, Outcome, SlicedCase, SlicedWork, Solved, Work};
+use crate::attempts::slices::{Ended, Outcome, SlicedTask, SlicedWork, Solved, Work};
 use crate::codec::fields::encode;
 use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
@@ -26,6 +26,7 @@ use crate::worker::{evolution, heartbeat};
 use railhead_contact::error::SolveError;
 use railhead_contact::evaluate::answer::RowsAnswer;
 use railhead_contact::evaluate::many::{ManyTask, solve_many};
+use railhead_contact::evolution::task::Evolution;
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::solution::words::answer::{Fields, PatchFields, Solution};
@@ -36,14 +37,8 @@ use railhead_tables::table::{RowTable, TableColumn};
 pub(crate) fn solve_guarded(shared: &Shared, control: &AttemptControl, work: Work) -> Outcome {
     let done = catch_unwind(AssertUnwindSafe(|| match work {
         Work::New(stored, notes) => check_and_solve(shared, control, &stored, &notes),
-        Work::Next(sliced) => match *sliced {
-            SlicedWork::Case(case) => solve_next(shared, control, case),
-            SlicedWork::Evolution(own) => evolution::advance(shared, control, own),
-        },
-        Work::Join(sliced, parts) => match *sliced {
-            SlicedWork::Case(case) => join_parts(shared, control, case, &parts),
-            SlicedWork::Evolution(own) => evolution::join(shared, control, own, &parts),
-        },
+        Work::Next(sliced) => solve_next(shared, control, sliced),
+        Work::Join(sliced, parts) => join_parts(shared, control, sliced, &parts),
     }));
     let ended = done.unwrap_or_else(|payload| {
         // The message of a panic is for the log, not for clients.
@@ -64,75 +59,97 @@ fn check_and_solve(
         return solve_chunk(shared, control, stored);
     }
     let case = stored.value().map_err(|error| error.to_string())?;
+    let limits = &shared.options.limits;
     if stored.kind == Kind::Evolution {
-        return evolution::begin(shared, control, &case, notes);
+        let sliced = SlicedWork::evolution(Evolution::check(&case, limits)?, notes);
+        return solve_next(shared, control, Box::new(sliced));
     }
-    let mut checked = (shared.engine.check)(&shared.engine.known, &case, &shared.options.limits)?;
+    let mut checked = (shared.engine.check)(&shared.engine.known, &case, limits)?;
     let limit = shared.options.time_limit;
     checked.run.time_limit = Some(checked.run.time_limit.map_or(limit, |time| time.min(limit)));
     let slices = (shared.engine.slices)(&checked);
-    solve_next(shared, control, SlicedCase::new(checked, slices, notes))
+    let sliced = SlicedWork::case(checked, slices, notes);
+    solve_next(shared, control, Box::new(sliced))
 }
 
-fn solve_next(shared: &Shared, control: &AttemptControl, sliced: SlicedCase) -> Ended {
-    let Some(slice) = sliced.next() else {
-        let sliced = Box::new(SlicedWork::Case(sliced));
+/// Solves the next slice. If there is none, or the current state is unknown, the outcome requests the stored slices.
+fn solve_next(shared: &Shared, control: &AttemptControl, mut sliced: Box<SlicedWork>) -> Ended {
+    if sliced.waits_for_parts() {
         return Ok(Outcome::Slice { sliced, part: None });
-    };
-    control.begin(sliced.spent);
-    let solved = (shared.engine.solve)(&sliced.checked, slice, control);
-    let spent = control.pause();
-    let (solution, fields) = solved.map_err(|error| Outcome::Unsolved {
-        error,
-        remarks: sliced.checked.remarks.clone(),
-    })?;
-    if sliced.slices.len() <= 1 {
-        return whole(shared, &sliced, spent, solution, &fields);
     }
-    Ok(Outcome::Slice {
-        part: Some((sliced.note(spent), encoded(&solution, &fields)?)),
-        sliced: Box::new(SlicedWork::Case(sliced)),
-    })
+    let spent = sliced.spent;
+    let (motions, spent, part) = match &mut sliced.task {
+        SlicedTask::Case { checked, slices } => {
+            let slice = slices[sliced.done as usize].clone();
+            control.begin(spent);
+            let solved = (shared.engine.solve)(checked, slice.clone(), control);
+            let spent = control.pause();
+            let (solution, fields) = solved.map_err(|error| Outcome::Unsolved {
+                error,
+                remarks: checked.remarks.clone(),
+            })?;
+            if slices.len() <= 1 {
+                return whole(shared, checked, spent, solution, &fields);
+            }
+            (slice.end, spent, encoded(&solution, &fields)?)
+        }
+        SlicedTask::Evolution { task, state } => {
+            evolution::advance(shared, control, task, state, spent)?
+        }
+    };
+    let part = Some((sliced.record(motions, spent), part));
+    Ok(Outcome::Slice { sliced, part })
 }
 
+/// Joins the stored slices if all are solved, or else continues from them.
 fn join_parts(
     shared: &Shared,
     control: &AttemptControl,
-    mut sliced: SlicedCase,
+    mut sliced: Box<SlicedWork>,
     parts: &[EncodedResult],
 ) -> Ended {
-    let joined = match parts.len() == sliced.slices.len() {
-        true => join(parts, || control.tick(1.0).is_continue()),
-        false => Err(JobsError::Damaged(
-            "slices of a sweep are missing".to_owned(),
-        )),
+    let spent = sliced.spent;
+    let joined = match &mut sliced.task {
+        _ if parts.len() != sliced.done as usize => {
+            Err(JobsError::Damaged("slices are missing".to_owned()))
+        }
+        SlicedTask::Case { checked, .. } => match join(parts, || control.tick(1.0).is_continue()) {
+            Ok(Some((solution, fields))) => {
+                return whole(shared, checked, spent, solution, &fields);
+            }
+            Ok(None) => {
+                return Ok(Outcome::Unsolved {
+                    error: SolveError::Cancelled,
+                    remarks: sliced.remarks(),
+                });
+            }
+            Err(error) => Err(error),
+        },
+        SlicedTask::Evolution { task, state } => evolution::join(task, state, parts),
     };
     match joined {
-        Ok(Some((solution, fields))) => whole(shared, &sliced, sliced.spent, solution, &fields),
-        Ok(None) => Ok(Outcome::Unsolved {
-            error: SolveError::Cancelled,
-            remarks: sliced.checked.remarks,
-        }),
+        Ok(Some(solved)) => return Ok(Outcome::Solved(solved)),
+        Ok(None) => {}
         Err(error) => {
-            tracing::error!(%error, "the slices of a sweep cannot be used; it is solved again");
-            sliced.done = 0;
-            let sliced = Box::new(SlicedWork::Case(sliced));
-            Ok(Outcome::Slice { sliced, part: None })
+            tracing::error!(%error, "the stored slices cannot be used; the job is solved again");
+            sliced.begin_again();
         }
     }
+    solve_next(shared, control, sliced)
 }
 
 /// The outcome of a case that is solved completely.
 fn whole(
     shared: &Shared,
-    sliced: &SlicedCase,
+    checked: &CheckedCase,
     spent: Duration,
     solution: Solution,
     fields: &Fields,
 ) -> Ended {
-    let seconds = spent.as_secs_f64();
-    let method = sliced.checked.run.method_asked;
-    shared.metrics.solved(method, &solution, seconds);
+    let method = checked.run.method_asked;
+    shared
+        .metrics
+        .solved(method, &solution, spent.as_secs_f64());
     Ok(Outcome::Solved(Solved {
         result: encoded(&solution, fields)?,
         field_patches: u32::try_from(fields.patches.len()).unwrap_or(u32::MAX),
