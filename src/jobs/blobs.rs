@@ -16,7 +16,7 @@ use object_store::path::Path;
 use object_store::{GetOptions, ObjectStore, ObjectStoreExt, PutPayload};
 use uuid::Uuid;
 
-use crate::codec::fields::{Header, PREFIX_BYTES};
+use crate::codec::fields::Header;
 use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
 use crate::store::Claim;
@@ -209,24 +209,15 @@ impl Blobs {
         let path = Path::from(folder).join(FIELDS);
         let damaged = |error: String| JobsError::Damaged(format!("{path}: {error}"));
         let start = self.objects.get_range(&path, 0..FIELDS_AT_ONCE).await?;
-        let (header, body) = Header::of_file(&start).map_err(damaged)?;
-        let header = match header {
-            Some(header) => header,
-            None => {
-                let range = PREFIX_BYTES as u64..body as u64;
-                Header::read(&self.objects.get_range(&path, range).await?).map_err(damaged)?
+        let header = match Header::read(&start).map_err(damaged)? {
+            Ok(header) => header,
+            Err(end) => {
+                let whole = self.objects.get_range(&path, 0..end).await?;
+                let read = Header::read(&whole).map_err(damaged)?;
+                read.map_err(|_| damaged("cut short".to_owned()))?
             }
         };
-        let body = body as u64;
-        let points = header.points(patch);
-        if point.is_some_and(|point| point >= points) {
-            return Err(JobsError::NoSuchPoint(points));
-        }
-        let ranges: Vec<_> = header
-            .ranges(patch, point)
-            .into_iter()
-            .map(|range| range.start + body..range.end + body)
-            .collect();
+        let ranges = header.ranges(patch, point)?;
         let pieces = self.objects.get_ranges(&path, &ranges).await?;
         // Decompression takes CPU time, so it runs outside the request threads.
         let decoded = blocking(move || header.decode(patch, point, &pieces.concat()));

@@ -19,6 +19,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 use zstd::bulk::Compressor;
 
+use crate::error::JobsError;
 use railhead_contact::solution::words::answer::{
     Fields, PatchCells, PatchFields, PointFields, Zone,
 };
@@ -26,7 +27,7 @@ use railhead_contact::solution::words::answer::{
 const MAGIC: &[u8; 8] = b"RHFIELD2";
 
 /// Length of the part before the header in bytes.
-pub const PREFIX_BYTES: usize = 12;
+const PREFIX_BYTES: usize = 12;
 
 /// Index of a stored file of fields.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -34,6 +35,9 @@ pub struct Header {
     points: Vec<usize>,
     meshes: Vec<Vec<usize>>,
     blocks: Vec<Block>,
+    /// End of the header in the file.
+    #[serde(skip)]
+    end: u64,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,64 +60,48 @@ enum Kind {
     U8,
 }
 
-/// Length of the header in bytes, from the first [`PREFIX_BYTES`] of the file.
-///
-/// # Errors
-/// The file has another signature.
-pub fn header_length(prefix: &[u8]) -> Result<usize, String> {
-    match prefix.split_at_checked(8) {
-        Some((magic, length)) if magic == MAGIC && length.len() == 4 => {
-            let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]);
-            usize::try_from(length).map_err(|error| error.to_string())
-        }
-        _ => Err("a file of fields does not begin with its mark".to_owned()),
-    }
-}
-
 impl Header {
-    /// Reads the header.
-    ///
-    /// # Errors
-    /// The header cannot be parsed.
-    pub fn read(bytes: &[u8]) -> Result<Header, String> {
-        serde_json::from_slice(bytes)
-            .map_err(|error| format!("header of a file of fields: {error}"))
-    }
-
-    /// Parses the header at the beginning of a file and returns it with its end; `None` if `start` does not contain all of it.
+    /// Reads the header at the beginning of a file. If `start` does not contain all of it, the error is its length with the
+    /// part before it.
     ///
     /// # Errors
     /// The file has another signature, or the header cannot be parsed.
-    pub fn of_file(start: &[u8]) -> Result<(Option<Header>, usize), String> {
-        let prefix = start.get(..PREFIX_BYTES).unwrap_or(start);
-        let end = PREFIX_BYTES + header_length(prefix)?;
-        let header = start.get(PREFIX_BYTES..end).map(Header::read);
-        Ok((header.transpose()?, end))
-    }
-
-    /// Number of patches.
-    #[must_use]
-    pub fn patches(&self) -> usize {
-        self.points.len()
+    pub fn read(start: &[u8]) -> Result<Result<Header, u64>, String> {
+        let length = start.strip_prefix(MAGIC).and_then(<[u8]>::first_chunk);
+        let length = length.ok_or("a file of fields does not begin with its mark")?;
+        let end = PREFIX_BYTES as u64 + u64::from(u32::from_le_bytes(*length));
+        let place = usize::try_from(end).unwrap_or(usize::MAX);
+        let Some(text) = start.get(PREFIX_BYTES..place) else {
+            return Ok(Err(end));
+        };
+        let read = serde_json::from_slice(text);
+        let read: Header = read.map_err(|error| format!("header of a file of fields: {error}"))?;
+        Ok(Ok(Header { end, ..read }))
     }
 
     /// Number of motions of a patch; 0 if it does not exist.
-    #[must_use]
-    pub fn points(&self, patch: usize) -> usize {
+    fn points(&self, patch: usize) -> usize {
         self.points.get(patch).copied().unwrap_or(0)
     }
 
-    /// The byte ranges, counted from the end of the header, of the cells of a patch and the values of one motion or of all motions.
-    #[must_use]
-    pub fn ranges(&self, patch: usize, point: Option<usize>) -> Vec<Range<u64>> {
+    /// The byte ranges of the file with the cells of a patch and the values of one motion or of all motions.
+    ///
+    /// # Errors
+    /// The motion does not exist.
+    pub fn ranges(&self, patch: usize, point: Option<usize>) -> Result<Vec<Range<u64>>, JobsError> {
+        let points = self.points(patch);
+        if point.is_some_and(|point| point >= points) {
+            return Err(JobsError::NoSuchPoint(points));
+        }
         let mut ranges: Vec<Range<u64>> = Vec::new();
         for block in self.wanted(patch, point) {
+            let begin = self.end + block.offset;
             match ranges.last_mut() {
-                Some(last) if last.end == block.offset => last.end += block.bytes,
-                _ => ranges.push(block.offset..block.offset + block.bytes),
+                Some(last) if last.end == begin => last.end += block.bytes,
+                _ => ranges.push(begin..begin + block.bytes),
             }
         }
-        ranges
+        Ok(ranges)
     }
 
     /// Decodes the cells of a patch with one motion or all motions, from the concatenated bytes of [`Header::ranges`].
@@ -287,7 +275,7 @@ pub fn encode(fields: &Fields) -> io::Result<Vec<u8>> {
     };
     for (patch, all) in fields.patches.iter().enumerate() {
         for (mesh, cells) in all.meshes.iter().enumerate() {
-            let at = Place::cells(patch, mesh);
+            let at = (patch, None, mesh);
             blocks.push_f64(at, "x_mm", Some(&cells.x_mm))?;
             blocks.push_f64(at, "y_mm", Some(&cells.y_mm))?;
             blocks.push_f64(at, "dx_mm", Some(&cells.dx_mm))?;
@@ -301,7 +289,7 @@ pub fn encode(fields: &Fields) -> io::Result<Vec<u8>> {
             blocks.push_f64(at, "pressure_mpa", cells.pressure_mpa.as_ref())?;
         }
         for (point, values) in all.points.iter().enumerate() {
-            let at = Place::values(patch, point);
+            let at = (patch, Some(point), 0);
             if let Some(zones) = &values.zone {
                 let codes = zones
                     .iter()
@@ -329,6 +317,7 @@ pub fn encode(fields: &Fields) -> io::Result<Vec<u8>> {
             .map(|patch| patch.points.iter().map(|point| point.mesh).collect())
             .collect(),
         blocks: blocks.list,
+        end: 0,
     })?;
     let header_length = u32::try_from(header.len()).map_err(io::Error::other)?;
     let mut file = Vec::with_capacity(PREFIX_BYTES + header.len() + blocks.body.len());
@@ -339,27 +328,8 @@ pub fn encode(fields: &Fields) -> io::Result<Vec<u8>> {
     Ok(file)
 }
 
-/// Position of a block: cells of a mesh (`point` is `None`) or values of a motion.
-#[derive(Clone, Copy)]
-struct Place {
-    patch: usize,
-    point: Option<usize>,
-    mesh: usize,
-}
-
-impl Place {
-    /// The cells of a mesh.
-    fn cells(patch: usize, mesh: usize) -> Place {
-        let point = None;
-        Place { patch, point, mesh }
-    }
-
-    /// The values of a motion.
-    fn values(patch: usize, point: usize) -> Place {
-        let (point, mesh) = (Some(point), 0);
-        Place { patch, point, mesh }
-    }
-}
+/// Patch, motion and mesh of a block. The cells of a mesh have no motion; the values of a motion have mesh 0.
+type Place = (usize, Option<usize>, usize);
 
 /// Blocks that were encoded so far.
 struct Blocks {
@@ -381,7 +351,7 @@ impl Blocks {
 
     fn push(
         &mut self,
-        at: Place,
+        (patch, point, mesh): Place,
         name: &str,
         kind: Kind,
         values: &[u8],
@@ -391,9 +361,9 @@ impl Blocks {
         self.body
             .extend_from_slice(&self.compressor.compress(values)?);
         self.list.push(Block {
-            patch: at.patch,
-            point: at.point,
-            mesh: at.mesh,
+            patch,
+            point,
+            mesh,
             name: name.to_owned(),
             kind,
             count,
@@ -472,13 +442,12 @@ mod tests {
     }
 
     fn read(file: &[u8], patch: usize, point: Option<usize>) -> PatchFields {
-        let length = header_length(&file[..PREFIX_BYTES]).unwrap();
-        let body = PREFIX_BYTES + length;
-        let header = Header::read(&file[PREFIX_BYTES..body]).unwrap();
+        let header = Header::read(file).unwrap().unwrap();
         let bytes = header
             .ranges(patch, point)
+            .unwrap()
             .into_iter()
-            .flat_map(|range| &file[body + range.start as usize..body + range.end as usize])
+            .flat_map(|range| &file[range.start as usize..range.end as usize])
             .copied()
             .collect::<Vec<_>>();
         header.decode(patch, point, &bytes).unwrap()
@@ -547,37 +516,14 @@ mod tests {
             patches: vec![cells.clone(), cells],
         })
         .unwrap();
-        let length = header_length(&file).unwrap_or(0);
-        assert_eq!(length, 0, "a longer prefix is not a prefix");
-        let length = header_length(&file[..PREFIX_BYTES]).unwrap();
-        let header = Header::read(&file[PREFIX_BYTES..PREFIX_BYTES + length]).unwrap();
-        assert_eq!(header.patches(), 2);
+        let header = Header::read(&file).unwrap().unwrap();
+        assert_eq!(Header::read(&file[..20]).unwrap(), Err(header.end));
+        assert!(Header::read(&file[1..]).is_err());
         assert_eq!(header.points(1), 3);
-        assert_eq!(header.ranges(1, None).len(), 1);
-        assert_eq!(header.ranges(1, Some(2)).len(), 2);
-        let end = header.ranges(1, None)[0].end as usize;
-        assert_eq!(PREFIX_BYTES + length + end, file.len());
-    }
-
-    #[test]
-    fn a_damaged_block_is_noticed() {
-        let cells = PatchFields {
-            meshes: vec![PatchCells {
-                x_mm: (0..100).map(f64::from).collect(),
-                ..PatchCells::default()
-            }],
-            points: vec![PointFields::default()],
-        };
-        let mut file = encode(&Fields {
-            patches: vec![cells],
-        })
-        .unwrap();
-        let length = header_length(&file[..PREFIX_BYTES]).unwrap();
-        let body = PREFIX_BYTES + length;
-        let header = Header::read(&file[PREFIX_BYTES..body]).unwrap();
-        file[body + 40] ^= 1;
-        assert!(header.decode(0, None, &file[body..]).is_err());
-        assert!(header.decode(0, None, &file[body..body + 20]).is_err());
-        assert!(header_length(b"RHFIELD1....").is_err());
+        assert_eq!(header.ranges(1, Some(2)).unwrap().len(), 2);
+        assert!(header.ranges(1, Some(3)).is_err());
+        let ranges = header.ranges(1, None).unwrap();
+        assert_eq!(ranges.len(), 1);
+        assert_eq!(ranges[0].end as usize, file.len());
     }
 }

@@ -54,18 +54,13 @@ impl EncodedResult {
         let file = self.fields.as_deref().unwrap_or_default();
         let damaged = |error: String| JobsError::Damaged(format!("stored fields: {error}"));
         let cut = || damaged("cut short".to_owned());
-        let (header, body) = Header::of_file(file).map_err(damaged)?;
-        let header = header.ok_or_else(cut)?;
-        let points = header.points(patch);
-        if point.is_some_and(|point| point >= points) {
-            return Err(JobsError::NoSuchPoint(points));
-        }
+        let header = Header::read(file).map_err(damaged)?;
+        let header = header.map_err(|_| cut())?;
         let mut pieces = Vec::new();
-        for range in header.ranges(patch, point) {
+        for range in header.ranges(patch, point)? {
             let start = usize::try_from(range.start).unwrap_or(usize::MAX);
             let end = usize::try_from(range.end).unwrap_or(usize::MAX);
-            let piece = file[body..].get(start..end).ok_or_else(cut)?;
-            pieces.extend_from_slice(piece);
+            pieces.extend_from_slice(file.get(start..end).ok_or_else(cut)?);
         }
         header.decode(patch, point, &pieces).map_err(damaged)
     }
