@@ -213,6 +213,9 @@ struct RowTemplate {
     known: KnownPair,
 }
 
+/// A checked case: its options, its job, and the body that is stored.
+type Checked = (CaseOptions, NewJob, Vec<u8>);
+
 impl BatchUpload {
     /// Sets the template, which is stored once for all cases.
     pub(crate) fn set_template(&mut self, template: Bytes) {
@@ -247,21 +250,23 @@ impl BatchUpload {
         case: Result<BatchCase, Vec<Fault>>,
     ) -> Result<()> {
         self.count(text.len())?;
-        let Some(BatchCase { case, wrapped, own }) = self.good(line, text, case) else {
-            return Ok(());
-        };
-        let prefix = if wrapped { "/case" } else { "" };
+        let wrapped = case.as_ref().is_ok_and(|case| case.wrapped);
+        let checked = self.check_case(text, case);
+        self.keep(line, if wrapped { "/case" } else { "" }, checked)
+    }
+
+    fn check_case(&mut self, text: &[u8], case: Result<BatchCase, Vec<Fault>>) -> Result<Checked> {
+        let BatchCase { case, wrapped, own } = self.parsed(text, case)?;
         let named = !named_sections(&case).is_empty();
-        let Some(case) = self.with_profiles(line, case, prefix)? else {
-            return Ok(());
-        };
-        let kept = match wrapped || named {
+        let case = self.jobs.with_profiles_here(case, &mut self.profiles)?;
+        let body = match wrapped || named {
             true => case.to_string().into_bytes(),
             false => text.to_owned(),
         };
         self.digest.update(&idempotency::digest(&case));
-        let checked = self.jobs.check(&case);
-        self.keep(line, checked, prefix, (false, own), &kept)
+        self.digest_options(own);
+        let job = self.bound_job(self.jobs.check(&case)?)?;
+        Ok((own, job, body))
     }
 
     /// As [`BatchUpload::add`], for a row of a table.
@@ -276,52 +281,36 @@ impl BatchUpload {
     ) -> Result<()> {
         // The case is checked and solved with the template, although only the row is stored.
         self.count(text.len() + self.template.as_ref().map_or(0, Bytes::len))?;
-        let Some(BatchRow { cells, own }) = self.good(line, text, row) else {
-            return Ok(());
-        };
+        let checked = self.check_row(text, row);
+        self.keep(line, "", checked)
+    }
+
+    fn check_row(&mut self, text: &[u8], row: Result<BatchRow, Vec<Fault>>) -> Result<Checked> {
+        let BatchRow { cells, own } = self.parsed(text, row)?;
         let Some(template) = self.rows.clone() else {
             let detail = "a row of a table without a template";
             return Err(JobsError::Damaged(detail.to_owned()));
         };
         self.digest.update(&digest(&cells));
-        let RowTemplate { case, known } = &*template;
-        let case = match fill(case, &cells) {
-            Ok(case) => case,
-            Err((number, reason)) => {
-                let detail = format!("the column `{}` {reason}", cells[number].pointer());
-                self.reject(line, vec![Fault::new("", detail)]);
-                return Ok(());
-            }
+        let case = fill(&template.case, &cells).map_err(|(number, reason)| {
+            let detail = format!("the column `{}` {reason}", cells[number].pointer());
+            CaseError(vec![Fault::new("", detail)])
+        })?;
+        let whole = !named_sections(&case).is_empty();
+        let case = self.jobs.with_profiles_here(case, &mut self.profiles)?;
+        self.digest_options(own);
+        let checked = self.jobs.check_next(&template.known, &case)?;
+        let job = NewJob {
+            row: !whole,
+            ..self.bound_job(checked)?
         };
-        if named_sections(&case).is_empty() {
-            let checked = self.jobs.check_next(known, &case);
-            let kept = serde_json::to_vec(&cells);
-            let kept = kept.map_err(|error| JobsError::Damaged(error.to_string()))?;
-            return self.keep(line, checked, "", (true, own), &kept);
-        }
         // A row that refers to a profile is stored as a whole case, because it contains the profile.
-        let Some(case) = self.with_profiles(line, case, "")? else {
-            return Ok(());
+        let body = match whole {
+            true => Ok(case.to_string().into_bytes()),
+            false => serde_json::to_vec(&cells),
         };
-        let checked = self.jobs.check(&case);
-        self.keep(line, checked, "", (false, own), case.to_string().as_bytes())
-    }
-
-    /// Resolves references to stored profiles; `None` after the case was rejected because one does not exist.
-    fn with_profiles(
-        &mut self,
-        line: Option<u64>,
-        case: Value,
-        prefix: &str,
-    ) -> Result<Option<Value>> {
-        match self.jobs.with_profiles_here(case, &mut self.profiles) {
-            Ok(case) => Ok(Some(case)),
-            Err(JobsError::Case(CaseError(faults))) => {
-                self.reject_within(line, faults, prefix);
-                Ok(None)
-            }
-            Err(error) => Err(error),
-        }
+        let body = body.map_err(|error| JobsError::Damaged(error.to_string()))?;
+        Ok((own, job, body))
     }
 
     /// Adds a chunk of rows of a run. Blocks.
@@ -355,29 +344,27 @@ impl BatchUpload {
         written.map_err(|source| self.jobs.spool_failed(source))
     }
 
-    /// Returns a parsed case, or rejects it.
-    fn good<T>(
-        &mut self,
-        line: Option<u64>,
-        text: &[u8],
-        read: Result<T, Vec<Fault>>,
-    ) -> Option<T> {
-        match read {
-            Ok(good) => Some(good),
-            Err(faults) => {
-                self.digest.update(text);
-                self.reject(line, faults);
-                None
-            }
+    /// Returns a parsed case, or the faults of its text.
+    fn parsed<T>(&mut self, text: &[u8], read: Result<T, Vec<Fault>>) -> Result<T> {
+        read.map_err(|faults| {
+            self.digest.update(text);
+            CaseError(faults).into()
+        })
+    }
+
+    /// Adds the options of a case to the digest, unless they are the defaults.
+    fn digest_options(&mut self, own: CaseOptions) {
+        if own != CaseOptions::default() {
+            let own = SubmitOptions::default().of_case(own);
+            self.digest.update(&own.digest(&[0; 32]));
         }
     }
 
-    /// As `reject`, for a case whose pointers begin with `prefix`.
-    fn reject_within(&mut self, line: Option<u64>, mut faults: Vec<Fault>, prefix: &str) {
-        for fault in &mut faults {
-            fault.pointer.insert_str(0, prefix);
-        }
-        self.reject(line, faults);
+    /// The job of a checked case with the labels of the key.
+    fn bound_job(&self, mut checked: CheckedCase) -> Result<NewJob> {
+        let labels = &mut checked.label.labels;
+        self.jobs.bind(labels).map_err(CaseError)?;
+        Ok(self.jobs.new_job(checked))
     }
 
     /// Counts an invalid case and keeps its faults.
@@ -394,35 +381,19 @@ impl BatchUpload {
         }
     }
 
-    /// Stages the body `kept` of a checked case, or rejects the case with pointers that begin with `prefix`.
-    fn keep(
-        &mut self,
-        line: Option<u64>,
-        checked: Result<CheckedCase, CaseError>,
-        prefix: &str,
-        (row, own): (bool, CaseOptions),
-        kept: &[u8],
-    ) -> Result<()> {
-        if own != CaseOptions::default() {
-            let own = SubmitOptions::default().of_case(own);
-            self.digest.update(&own.digest(&[0; 32]));
-        }
-        let bound = checked.and_then(|mut checked| {
-            let bound = self.jobs.bind(&mut checked.label.labels);
-            bound.map(|()| checked).map_err(CaseError)
-        });
-        let checked = match bound {
-            Ok(checked) => checked,
-            Err(error) => {
-                self.reject_within(line, error.0, prefix);
-                return Ok(());
+    /// Stages a checked case, or rejects an invalid one with pointers that begin with `prefix`.
+    fn keep(&mut self, line: Option<u64>, prefix: &str, checked: Result<Checked>) -> Result<()> {
+        match checked {
+            Ok((own, job, body)) => self.stage(own, job, &body),
+            Err(JobsError::Case(CaseError(mut faults))) => {
+                for fault in &mut faults {
+                    fault.pointer.insert_str(0, prefix);
+                }
+                self.reject(line, faults);
+                Ok(())
             }
-        };
-        let job = NewJob {
-            row,
-            ..self.jobs.new_job(checked)
-        };
-        self.stage(own, job, kept)
+            Err(error) => Err(error),
+        }
     }
 
     fn count(&mut self, bytes: usize) -> Result<()> {
