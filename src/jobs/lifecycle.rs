@@ -118,6 +118,7 @@ impl Jobs {
             }
             recovered => {
                 recovered?;
+                jobs.shared.probe_disk().await;
                 data_dir::keep_reserve(&jobs.shared.options.data_dir);
             }
         }

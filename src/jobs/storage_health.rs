@@ -145,6 +145,14 @@ impl Shared {
     }
 
     /// Writes to a location and removes what was written.
+    /// Tests the disk, so that a service that starts on a full disk reports it before a submission fails.
+    pub(crate) async fn probe_disk(&self) {
+        for place in [StoragePlace::Table, StoragePlace::Spool] {
+            let written = self.try_write(place).await;
+            self.observe_storage(place, &written);
+        }
+    }
+
     async fn try_write(&self, place: StoragePlace) -> Result<()> {
         match place {
             StoragePlace::Table => Ok(self.store.ready(true).await?),

@@ -200,9 +200,9 @@ async fn starts_on_a_full_disk(killed: bool) {
     service.get(&format!("/v1/jobs/{solved}/result")).await;
     if killed {
         // After an orderly shutdown the service still has the space that was reserved for its start.
+        assert_problem(&ready(&service).await, 507, "storage-full", "");
         let answer = submit(&service, &case("refused")).await;
         assert_problem(&answer, 507, "storage-full", "");
-        assert_problem(&ready(&service).await, 507, "storage-full", "");
     }
     std::fs::remove_file(ballast).unwrap();
     service.until_ready().await;

@@ -23,24 +23,34 @@ pub(crate) fn start(shared: &Arc<Shared>) {
     let (longest, shortest) = SWEEP_EVERY;
     let retention = shared.options.retention.unwrap_or(longest);
     let sweep_every = (retention / 10).clamp(shortest, longest);
-    every(shared, SWEEP_RESULTS_EVERY, sweep_orphans);
-    every(shared, RECOVER_EVERY, recover);
-    every(shared, RESERVE_EVERY, keep_reserve);
-    every(shared, sweep_every, expire_jobs);
-    every(shared, DEADLINE_INTERVAL, watch_deadlines);
+    let sweep_results_every = match shared.store.cluster() {
+        Some(_) => SWEEP_RESULTS_EVERY.1,
+        None => SWEEP_RESULTS_EVERY.0,
+    };
+    let failed = "results without a job could not be swept";
+    every(shared, sweep_results_every, failed, sweep_orphans);
+    let failed = "jobs of a dead process cannot be returned to the queue yet";
+    every(shared, RECOVER_EVERY, failed, recover);
+    let failed = "the disk reserve could not be kept";
+    every(shared, RESERVE_EVERY, failed, keep_reserve);
+    let failed = "expired jobs could not be removed";
+    every(shared, sweep_every, failed, expire_jobs);
+    let failed = "deadlines could not be checked";
+    every(shared, DEADLINE_INTERVAL, failed, enforce_deadlines);
     shared.tasks.spawn(reap_expired(shared.clone()));
     if shared.store.cluster().is_some() {
         nodes::start(shared);
     }
 }
 
-/// Runs a task at once and then at each interval, until the service drains.
+/// Runs a task at once and then at each interval, until the service drains. A failure is logged with the text `failed`.
 fn every<F>(
     shared: &Arc<Shared>,
     interval: Duration,
+    failed: &'static str,
     work: impl Fn(Arc<Shared>) -> F + Send + Sync + 'static,
 ) where
-    F: Future<Output = ()> + Send,
+    F: Future<Output = Result<()>> + Send,
 {
     let mut beat = tokio::time::interval(interval);
     beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -50,7 +60,9 @@ fn every<F>(
         let working = async {
             loop {
                 beat.tick().await;
-                work(shared.clone()).await;
+                if let Err(error) = work(shared.clone()).await {
+                    tracing::warn!(%error, "{failed}");
+                }
             }
         };
         draining.run_until_cancelled(working).await
@@ -91,24 +103,25 @@ impl Shared {
     }
 }
 
-/// Interval of the sweep of orphans with an embedded table.
-const SWEEP_RESULTS_EVERY: Duration = Duration::from_secs(24 * 3600);
+/// Interval between two sweeps of orphaned results on one machine, and in a cluster.
+const SWEEP_RESULTS_EVERY: (Duration, Duration) =
+    (Duration::from_secs(24 * 3600), Duration::from_secs(3600));
 
 /// Removes results that no job refers to, which a process leaves that is killed between the write of a result and the end
-/// of its job. With a shared database, the nodes do this together.
-async fn sweep_orphans(shared: Arc<Shared>) {
-    if shared.store.cluster().is_none() {
-        note_swept(shared.sweep_results().await);
+/// of its job. Results in a shared database are swept each time; results in a shared store once a day, by one node.
+async fn sweep_orphans(shared: Arc<Shared>) -> Result<()> {
+    let removed = match (shared.store.cluster(), &shared.options.results) {
+        (None, _) => shared.sweep_results().await?,
+        (Some(cluster), None) => cluster.sweep_objects().await?,
+        (Some(cluster), Some(_)) if cluster.take_sweep().await? => {
+            shared.sweep_old_results().await?
+        }
+        _ => 0,
+    };
+    if removed > 0 {
+        tracing::info!(removed, "results without a job removed");
     }
-}
-
-/// Logs the outcome of a sweep of orphans.
-fn note_swept(removed: Result<u64>) {
-    match removed {
-        Ok(0) => {}
-        Ok(removed) => tracing::info!(removed, "results without a job removed"),
-        Err(error) => tracing::warn!(%error, "results without a job could not be swept"),
-    }
+    Ok(())
 }
 
 /// Minimum age in ms of a result without a job before it counts as an orphan: its job may be about to end.
@@ -151,7 +164,7 @@ impl Shared {
     }
 
     /// Removes orphans outside the database that are older than a day; returns their number. Several nodes may do so at once.
-    pub(crate) async fn sweep_old_results(&self) -> Result<u64> {
+    async fn sweep_old_results(&self) -> Result<u64> {
         let before = self.now_ms() - YOUNG;
         let mut listed = self.blobs.listed();
         let (mut some, mut removed) = (Vec::new(), 0);
@@ -179,13 +192,7 @@ impl Shared {
 const DEADLINE_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Ends jobs whose deadline has passed: queued ones at once, running ones at the next tick of their solvers.
-async fn watch_deadlines(shared: Arc<Shared>) {
-    if let Err(error) = enforce_deadlines(&shared).await {
-        tracing::warn!(%error, "deadlines could not be checked");
-    }
-}
-
-async fn enforce_deadlines(shared: &Shared) -> Result<()> {
+async fn enforce_deadlines(shared: Arc<Shared>) -> Result<()> {
     let (now, leap) = (shared.now_ms(), shared.clock_step());
     let moment = Moment {
         now,
@@ -246,23 +253,19 @@ async fn reap_expired(shared: Arc<Shared>) {
             Ok(taken) => {
                 for (id, state) in taken {
                     tracing::warn!(job = %id, state = state.name(), "lease expired, job returned to the queue");
-                    if state.ended() {
-                        count_taken(&shared, state);
-                        shared.announce(id);
-                    } else {
-                        shared.wake_workers();
+                    match state {
+                        State::Failed => shared.metrics.failed(FailureKind::WorkerLost),
+                        state if state.ended() => shared.metrics.ended(state, 1),
+                        _ => {
+                            shared.wake_workers();
+                            continue;
+                        }
                     }
+                    shared.announce(id);
                 }
             }
             Err(error) => tracing::warn!(%error, "expired leases could not be searched for"),
         }
-    }
-}
-
-fn count_taken(shared: &Shared, state: State) {
-    match state {
-        State::Failed => shared.metrics.failed(FailureKind::WorkerLost),
-        state => shared.metrics.ended(state, 1),
     }
 }
 
@@ -273,50 +276,35 @@ const RECOVER_EVERY: Duration = Duration::from_secs(1);
 const RESERVE_EVERY: Duration = Duration::from_secs(60);
 
 /// Returns the jobs of a crashed process to the queue, and removes abandoned batches, until storage permits it.
-async fn recover(shared: Arc<Shared>) {
-    if shared.recovered.get().is_none()
-        && let Err(error) = shared.recover().await
-    {
-        tracing::warn!(%error, "jobs of a dead process cannot be returned to the queue yet");
-    }
-    if !shared.unfinished_batches().abandoned.is_empty() {
-        shared.drop_abandoned().await;
-    }
+async fn recover(shared: Arc<Shared>) -> Result<()> {
     if shared.storage.any() {
         // The outcome is recorded; a failure is repeated at the next interval.
         let _ = shared.require_storage().await;
     }
+    shared.recover().await
 }
 
 /// Creates the disk reserve again if it is missing.
-async fn keep_reserve(shared: Arc<Shared>) {
-    if !shared.storage.any() {
-        let data_dir = shared.options.data_dir.clone();
-        // A failure is repeated at the next interval.
-        let _ = blocking(move || data_dir::keep_reserve(&data_dir)).await;
+async fn keep_reserve(shared: Arc<Shared>) -> Result<()> {
+    if shared.storage.any() {
+        return Ok(());
     }
+    let data_dir = shared.options.data_dir.clone();
+    blocking(move || data_dir::keep_reserve(&data_dir)).await
 }
 
 impl Shared {
-    /// Returns the jobs of a crashed process to the queue.
+    /// Returns the jobs of a crashed process to the queue, and removes abandoned batches. In a cluster, running jobs belong
+    /// to other processes while their leases last.
     pub(crate) async fn recover(&self) -> Result<()> {
-        if self.recovered.get().is_some() {
-            return Ok(());
-        }
-        if self.store.cluster().is_some() {
-            // Running jobs belong to other processes while their leases last.
-            let _ = self.recovered.set(());
-            return Ok(());
-        }
-        let attempts_max = self.options.attempts_max;
-        let taken = self
-            .store
-            .reap(Reap::Dead, self.now_ms(), attempts_max)
-            .await;
-        let taken = taken.map_err(JobsError::from);
-        self.observe_storage(StoragePlace::Table, &taken);
-        for (id, state) in taken? {
-            tracing::info!(job = %id, state = state.name(), "job of a dead process returned to the queue");
+        if self.recovered.get().is_none() && self.store.cluster().is_none() {
+            let attempts_max = self.options.attempts_max;
+            let taken = self.store.reap(Reap::Dead, self.now_ms(), attempts_max);
+            let taken = taken.await.map_err(JobsError::from);
+            self.observe_storage(StoragePlace::Table, &taken);
+            for (id, state) in taken? {
+                tracing::info!(job = %id, state = state.name(), "job of a dead process returned to the queue");
+            }
         }
         // An error means that it is set already.
         let _ = self.recovered.set(());
@@ -393,12 +381,12 @@ impl Shared {
     }
 }
 
-async fn expire_jobs(shared: Arc<Shared>) {
-    match shared.sweep_expired().await {
-        Ok(0) => {}
-        Ok(removed) => tracing::info!(removed, "expired jobs removed"),
-        Err(error) => tracing::warn!(%error, "expired jobs could not be removed"),
+async fn expire_jobs(shared: Arc<Shared>) -> Result<()> {
+    let removed = shared.sweep_expired().await?;
+    if removed > 0 {
+        tracing::info!(removed, "expired jobs removed");
     }
+    Ok(())
 }
 
 fn millis(duration: Duration) -> i64 {

@@ -9,10 +9,10 @@ use tokio::time::{MissedTickBehavior, interval, sleep};
 use uuid::Uuid;
 
 use crate::attempts::attempt::StopReason;
-use crate::error::JobsError;
-use crate::maintenance::{every, note_swept};
+use crate::error::Result;
+use crate::maintenance::every;
 use crate::shared::Shared;
-use crate::store::{Cluster, Notification, Result};
+use crate::store::{Cluster, Notification};
 
 /// Interval between two reports of a node; the store counts a node as dead after four missed ones.
 const BEAT_EVERY: Duration = Duration::from_secs(5);
@@ -22,9 +22,6 @@ const CANCEL_EVERY: Duration = Duration::from_millis(500);
 
 /// Interval at which the counters in the database are summed up.
 const FOLD_EVERY: Duration = Duration::from_secs(2);
-
-/// Interval between two sweeps of orphaned results.
-const SWEEP_EVERY: Duration = Duration::from_secs(3600);
 
 /// Pause after the connection for notifications has failed.
 const LISTEN_AGAIN: Duration = Duration::from_secs(1);
@@ -40,9 +37,13 @@ const OFFSET_TOLD: i64 = 1000;
 
 /// Starts the tasks of a node.
 pub(super) fn start(shared: &Arc<Shared>) {
-    every(shared, BEAT_EVERY, beat);
-    every(shared, FOLD_EVERY, fold);
-    every(shared, SWEEP_EVERY, sweep);
+    every(
+        shared,
+        BEAT_EVERY,
+        "the heartbeat of this node failed",
+        beat,
+    );
+    every(shared, FOLD_EVERY, "counts could not be added up", fold);
     shared.tasks.spawn(watch_cancellations(shared.clone()));
     shared.tasks.spawn(listen(shared.clone()));
 }
@@ -90,15 +91,12 @@ impl Shared {
     }
 }
 
-async fn beat(shared: Arc<Shared>) {
+async fn beat(shared: Arc<Shared>) -> Result<()> {
     let Some(cluster) = shared.store.cluster() else {
-        return;
+        return Ok(());
     };
-    if let Err(error) = shared.show_node(cluster).await {
-        tracing::warn!(%error, "the heartbeat of this node failed");
-    } else if let Err(error) = keep_batches(&shared, cluster).await {
-        tracing::warn!(%error, "batches that are being filled could not be kept");
-    }
+    shared.show_node(cluster).await?;
+    keep_batches(&shared, cluster).await
 }
 
 /// Keeps the batches that this node fills, and takes over those that no node fills, to remove them.
@@ -144,26 +142,10 @@ async fn watch_cancellations(shared: Arc<Shared>) {
     }
 }
 
-async fn fold(shared: Arc<Shared>) {
-    if let Some(cluster) = shared.store.cluster()
-        && let Err(error) = cluster.fold_counts().await
-    {
-        tracing::debug!(%error, "counts could not be added up");
-    }
-}
-
-async fn sweep(shared: Arc<Shared>) {
-    if let Some(cluster) = shared.store.cluster() {
-        note_swept(sweep_once(&shared, cluster).await);
-    }
-}
-
-/// Sweeps results in the database at any time; results elsewhere once a day, by one node.
-async fn sweep_once(shared: &Shared, cluster: &dyn Cluster) -> Result<u64, JobsError> {
-    match &shared.options.results {
-        None => Ok(cluster.sweep_objects().await?),
-        Some(_) if cluster.take_sweep().await? => shared.sweep_old_results().await,
-        Some(_) => Ok(0),
+async fn fold(shared: Arc<Shared>) -> Result<()> {
+    match shared.store.cluster() {
+        Some(cluster) => Ok(cluster.fold_counts().await?),
+        None => Ok(()),
     }
 }
 
