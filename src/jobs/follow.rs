@@ -13,7 +13,7 @@ use crate::handle::{BATCH_PAGE_MAX, Jobs, PAGE_MAX};
 use crate::model::{Job, Kind, QueuePlace, State};
 use crate::run::model::{Run, RunHead};
 use crate::shared::POLL_INTERVAL;
-use crate::store::{Deleted, Filter, Membership, Notification, Page};
+use crate::store::{Filter, Membership, Notification, Page};
 use crate::work::Work;
 
 /// Interval between two reads of work without an announcement. Within it, the read of another request is reused.
@@ -292,10 +292,8 @@ impl Jobs {
             return Err(JobsError::NotEnded(self.kind));
         }
         if let Work::Job(_) = work {
-            match shared.store.delete(tenant, id).await? {
-                Deleted::NotEnded(_) => return Err(JobsError::NotEnded(self.kind)),
-                Deleted::NotFound => return Err(JobsError::NotFound(self.kind)),
-                Deleted::Done => {}
+            if !shared.store.delete(tenant, id).await? {
+                return Err(JobsError::NotFound(self.kind));
             }
         } else {
             while !shared

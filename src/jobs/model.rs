@@ -380,33 +380,26 @@ impl Failure {
     /// The failure that corresponds to a solver error; `None` for a cancelled solve.
     #[must_use]
     pub fn of_solve(error: &SolveError) -> Option<Failure> {
+        let mut failure = Failure::new(FailureKind::Unsolvable, error.to_string());
         match error {
-            SolveError::Cancelled => None,
-            SolveError::OutOfTime { .. } => {
-                Some(Failure::new(FailureKind::OutOfTime, error.to_string()))
-            }
-            SolveError::RoughProfile { pointer, .. } => Some(Failure {
-                pointer: Some(pointer.clone()),
-                ..Failure::new(FailureKind::Unsolvable, error.to_string())
-            }),
-            SolveError::Unmeshable { .. }
-            | SolveError::NormalProblem { .. }
-            | SolveError::NotCovered { .. }
-            | SolveError::NotFinite { .. } => {
-                Some(Failure::new(FailureKind::Unsolvable, error.to_string()))
-            }
+            SolveError::Cancelled => return None,
+            SolveError::OutOfTime { .. } => failure.kind = FailureKind::OutOfTime,
+            SolveError::RoughProfile { pointer, .. } => failure.pointer = Some(pointer.clone()),
             SolveError::NotConverged {
                 residual,
                 iterations,
                 ..
-            } => Some(Failure {
-                kind: FailureKind::NotConverged,
-                detail: error.to_string(),
-                residual: Some(*residual),
-                iterations: Some(u32::try_from(*iterations).unwrap_or(u32::MAX)),
-                pointer: None,
-            }),
+            } => {
+                failure.kind = FailureKind::NotConverged;
+                failure.residual = Some(*residual);
+                failure.iterations = Some(u32::try_from(*iterations).unwrap_or(u32::MAX));
+            }
+            SolveError::Unmeshable { .. }
+            | SolveError::NormalProblem { .. }
+            | SolveError::NotCovered { .. }
+            | SolveError::NotFinite { .. } => {}
         }
+        Some(failure)
     }
 }
 
@@ -497,28 +490,10 @@ pub struct BatchItem {
     pub job: Job,
     /// The requested outputs as a JSON list of names.
     pub outputs: String,
-    /// The result; `None` unless the job has succeeded.
-    pub result: Option<ItemResult>,
-}
-
-impl BatchItem {
-    /// The key of a result outside the table.
-    #[must_use]
-    pub fn key(&self) -> Option<&str> {
-        match &self.result {
-            Some(ItemResult::Stored(key)) => Some(key),
-            _ => None,
-        }
-    }
-}
-
-/// The result of one job of a batch.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ItemResult {
-    /// The solution as JSON text, if it is small.
-    Solution(Bytes),
-    /// The key of a result outside the table, which `Jobs::open_item` reads.
-    Stored(String),
+    /// The solution as JSON text, if the job has succeeded and the result is small.
+    pub solution: Option<Bytes>,
+    /// The key of a large result, which `Jobs::open_item` reads.
+    pub key: Option<String>,
 }
 
 /// Why the result of a job of a batch cannot be read.

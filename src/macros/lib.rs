@@ -69,6 +69,11 @@ fn declare(field: &mut Field, null_too: bool) {
 #[proc_macro_attribute]
 pub fn repeat_conflicts(_: TokenStream, item: TokenStream) -> TokenStream {
     let mut item = parse_macro_input!(item as ItemImpl);
+    repeat(&mut item);
+    item.into_token_stream().into()
+}
+
+fn repeat(item: &mut ItemImpl) {
     for member in &mut item.items {
         let ImplItem::Fn(method) = member else {
             continue;
@@ -81,7 +86,40 @@ pub fn repeat_conflicts(_: TokenStream, item: TokenStream) -> TokenStream {
             method.block = parse_quote!({ engine::again(|| async move #body).await });
         }
     }
-    item.into_token_stream().into()
+}
+
+/// Declares the trait that this `impl` for a store implements, with the documentation and the calls of the `impl`, and
+/// repeats its calls as [`repeat_conflicts`] does. Both are passed to `async_trait`.
+///
+/// The shared statements are compiled once for each database, but a trait can be declared only once. The declaration is
+/// therefore passed to the macro `declare!` of the database: one database declares it, the others import it.
+#[proc_macro_attribute]
+pub fn store_trait(_: TokenStream, item: TokenStream) -> TokenStream {
+    let mut item = parse_macro_input!(item as ItemImpl);
+    let name = item.trait_.as_ref().map(|(path, _)| path);
+    let about = docs(&item.attrs);
+    let calls = item.items.iter().filter_map(|member| match member {
+        ImplItem::Fn(method) => Some((docs(&method.attrs), &method.sig)),
+        _ => None,
+    });
+    let calls = calls.map(|(docs, signature)| quote!(#(#docs)* #signature;));
+    let declaration = quote! {
+        declare! {
+            #name
+            #(#about)*
+            #[async_trait::async_trait]
+            pub trait #name: Send + Sync {
+                #(#calls)*
+            }
+        }
+    };
+    repeat(&mut item);
+    quote!(#declaration #[async_trait::async_trait] #item).into()
+}
+
+fn docs(attributes: &[Attribute]) -> Vec<&Attribute> {
+    let docs = attributes.iter().filter(|it| it.path().is_ident("doc"));
+    docs.collect()
 }
 
 /// Gives an enum of unit variants `WORDS`: the words of a request and what they mean, in the order of the variants. A word is the name of its

@@ -252,7 +252,7 @@ impl Model {
         let Some(row) = self.rows.get_mut(&id) else {
             return false;
         };
-        (row.blob, row.cached, row.cache_key) = (blob, true, None);
+        (row.blob, row.cached) = (blob, true);
         // A submission that is answered from the cache is never visible as queued.
         (row.state, row.ended_at) = (State::Succeeded, now);
         row.slices.clear();

@@ -12,8 +12,8 @@ use railhead::contact::remark::entry::RemarkEntry;
 use railhead::contact::remark::list::Remark;
 use railhead::jobs::model::{Kind, Queue, SubmitOptions};
 use railhead::jobs::store::{
-    BatchBegun, Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Filter, Lease, NewBatch,
-    NewJob, Page, QueueBounds, ReleaseReason, Store, StoredResult,
+    BatchBegun, Claim, ClaimKind, ClaimRequest, Ending, Enqueued, Filter, Lease, NewBatch, NewJob,
+    Page, QueueBounds, ReleaseReason, Store, StoredResult,
 };
 use railhead::jobs::{Failure, FailureKind, Job, State};
 use tempfile::TempDir;
@@ -129,7 +129,7 @@ impl Table {
         self.store.cancel("anonymous", id, now).await.unwrap()
     }
 
-    pub async fn delete(&self, id: Uuid) -> Deleted {
+    pub async fn delete(&self, id: Uuid) -> bool {
         self.store.delete("anonymous", id).await.unwrap()
     }
 

@@ -8,8 +8,8 @@ use bytes::Bytes;
 use railhead::jobs::codec::result::EncodedResult;
 use railhead::jobs::model::{Priority, SubmitOptions};
 use railhead::jobs::store::{
-    Claim, ClaimKind, ClaimRequest, Deleted, Ending, Enqueued, Lease, Moment, NewJob, NewSlice,
-    QueueBounds, Reap, ReleaseReason, Renewal, RetentionRule, SliceRecord, Store, StoredResult,
+    Claim, ClaimKind, ClaimRequest, Ending, Enqueued, Lease, Moment, NewJob, NewSlice, QueueBounds,
+    Reap, ReleaseReason, Renewal, RetentionRule, SliceRecord, Store, StoredResult,
 };
 use railhead::jobs::{Failure, FailureKind, State};
 use uuid::Uuid;
@@ -321,16 +321,12 @@ impl Pair {
 
     pub async fn delete(&mut self, id: Uuid) {
         let (tenant, expected) = match self.model.rows.get(&id) {
-            None => (TENANTS[0], Deleted::NotFound),
-            Some(row) if row.state.ended() => (row.tenant, Deleted::Done),
-            Some(row) => (row.tenant, Deleted::NotEnded(row.state)),
+            None => (TENANTS[0], false),
+            Some(row) => (row.tenant, row.state.ended()),
         };
-        assert_eq!(
-            self.store.delete("nobody", id).await.unwrap(),
-            Deleted::NotFound
-        );
+        assert!(!self.store.delete("nobody", id).await.unwrap());
         assert_eq!(self.store.delete(tenant, id).await.unwrap(), expected);
-        if expected == Deleted::Done {
+        if expected {
             self.model.rows.remove(&id);
         }
     }

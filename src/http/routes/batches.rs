@@ -36,7 +36,7 @@ use railhead_jobs::Jobs;
 use railhead_jobs::batch::control::{Items, OpenedItem, PAGE_BYTES};
 use railhead_jobs::batch::upload::BatchUpload;
 use railhead_jobs::error::JobsError;
-use railhead_jobs::model::{BatchItem, ItemFault, ItemResult, Kind, State as JobState};
+use railhead_jobs::model::{BatchItem, ItemFault, Kind, State as JobState};
 use railhead_jobs::sync::blocking;
 use railhead_tables::table::RowTable;
 
@@ -162,7 +162,7 @@ fn lines(source: Source, items: Items) -> impl Stream<Item = Result<Piece, BoxEr
         if !items.fill().await? {
             return Ok(None);
         }
-        let small = items.read.iter().take_while(|item| item.key().is_none());
+        let small = items.read.iter().take_while(|item| item.key.is_none());
         let pieces = match small.count() {
             0 => match items.read.pop_front() {
                 Some(item) => source.open_large(item).await?,
@@ -191,7 +191,7 @@ impl Source {
     /// Returns the lines of a job with a large result.
     async fn open_large(&self, item: BatchItem) -> Result<Pieces, BoxError> {
         let id = item.job.id;
-        let opened = match item.key() {
+        let opened = match &item.key {
             Some(key) => self.jobs.open_item(id, key).await,
             None => Err(ItemFault::Unreadable),
         };
@@ -293,16 +293,14 @@ fn table_of(
 fn table_of_small(columns: &Columns, items: &[BatchItem]) -> RowTable {
     let mut table = columns.empty();
     for item in items {
-        let solution = match &item.result {
-            Some(ItemResult::Solution(text)) => serde_json::from_slice::<Solution>(text).ok(),
-            _ => None,
-        };
-        if let Some(solution) = solution {
+        if let Some(text) = &item.solution
+            && let Ok(solution) = serde_json::from_slice::<Solution>(text)
+        {
             columns.add(&mut table, item, &solution, 0..solution.total.len());
             continue;
         }
         let error = failure(item).map(|problem| problem.detail);
-        let error = error.unwrap_or_else(|| match item.result {
+        let error = error.unwrap_or_else(|| match item.solution {
             Some(_) => UNREADABLE.to_owned(),
             None => String::new(),
         });
@@ -315,7 +313,7 @@ fn table_of_small(columns: &Columns, items: &[BatchItem]) -> RowTable {
 fn write_ndjson(items: &[BatchItem]) -> Result<Vec<u8>, JobsError> {
     let mut out = Vec::with_capacity(items.len() * 2048);
     for item in items {
-        let Some(ItemResult::Solution(solution)) = &item.result else {
+        let Some(solution) = &item.solution else {
             write_json(&mut out, &BatchLine::new(item, failure(item)))?;
             out.push(b'\n');
             continue;

@@ -339,7 +339,7 @@ pub(crate) async fn manifest(WorkPath { jobs, id }: WorkPath) -> Result<Json<Run
             ),
             first_row: rows.start,
             rows: rows.end - rows.start,
-            key: chunk.key().map(|folder| format!("{folder}/rows.parquet")),
+            key: chunk.key.map(|folder| format!("{folder}/rows.parquet")),
         });
     }
     Ok(Json(RunManifest {

@@ -160,14 +160,14 @@ async fn is_another(
     let written = objects
         .put(&path, PutPayload::from_static(b"railhead"))
         .await;
-    written.map_err(|error| unusable(&error))?;
+    written.map_err(unusable)?;
     let seen = there.head(&path).await;
     let removed = objects.delete(&path).await;
-    removed.map_err(|error| unusable(&error))?;
+    removed.map_err(unusable)?;
     match seen {
         Ok(_) => Ok(false),
         Err(Error::NotFound { .. }) => Ok(true),
-        Err(error) => Err(unusable(&error)),
+        Err(error) => Err(unusable(error)),
     }
 }
 
@@ -191,7 +191,7 @@ pub(super) async fn marker(objects: &dyn ObjectStore) -> Result<Option<Marker>> 
     let found = match objects.get(&Path::from(MARKER)).await {
         Ok(found) => found.bytes().await?,
         Err(Error::NotFound { .. }) => return Ok(None),
-        Err(error) => return Err(unusable(&error)),
+        Err(error) => return Err(unusable(error)),
     };
     let marker = serde_json::from_slice(&found);
     marker.map(Some).map_err(|error| {
@@ -210,7 +210,7 @@ pub(super) async fn mark(
     });
     let payload = PutPayload::from_bytes(Bytes::from(text.to_string()));
     let written = objects.put(&Path::from(MARKER), payload).await;
-    written.map_err(|error| unusable(&error))?;
+    written.map_err(unusable)?;
     // If two databases mark the same location at once, the last writer gets it.
     match marker(objects).await? {
         Some(marker) if marker.deployment == deployment.id => Ok(()),
@@ -220,7 +220,7 @@ pub(super) async fn mark(
     }
 }
 
-fn unusable(error: &Error) -> JobsError {
+fn unusable(error: Error) -> JobsError {
     JobsError::ResultPlace(error.to_string())
 }
 
@@ -285,13 +285,13 @@ async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<()> {
     let text = Bytes::from_static(b"railhead doctor");
     let payload = PutPayload::from_bytes(text.clone());
     let written = objects.put(&path, payload).await;
-    written.map_err(|error| unusable(&error))?;
+    written.map_err(unusable)?;
     let read = objects.get_range(&path, 9..15).await;
     let removed = objects.delete(&path).await;
-    removed.map_err(|error| unusable(&error))?;
+    removed.map_err(unusable)?;
     match read {
         Ok(read) if read == text.slice(9..15) => Ok(()),
         Ok(_) => wrong("the object read back differs from the object written".to_owned()),
-        Err(error) => Err(unusable(&error)),
+        Err(error) => Err(unusable(error)),
     }
 }

@@ -52,7 +52,7 @@ impl Jobs {
         chunk: &BatchItem,
         wanted: Option<Vec<String>>,
     ) -> Result<RowTable> {
-        let Some(key) = chunk.key() else {
+        let Some(key) = &chunk.key else {
             return self.without_answers(head, chunk, wanted.as_deref()).await;
         };
         let file = self.shared.blobs.chunk_answers(key).await?;

@@ -15,7 +15,7 @@
 //! - Errors are [`StoreError`], classified by what the caller can do.
 //!
 //! `tests/service/store*.rs` test these guarantees for every store.
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::sync::Arc;
 use std::time::Duration;
@@ -28,9 +28,7 @@ use uuid::Uuid;
 
 use crate::codec::result::EncodedResult;
 use crate::error::StoreError;
-use crate::model::{
-    Batch, BatchItem, Failure, Job, Key, Kind, Queue, RunRecord, State, SubmitOptions,
-};
+use crate::model::{Failure, Job, Kind, Queue, State, SubmitOptions};
 use railhead_contact::remark::entry::RemarkEntry;
 
 /// Runs a statement on a connection with a value for each parameter. The first argument is the method that fetches the
@@ -64,6 +62,11 @@ pub mod postgres;
 mod sql_errors;
 pub mod sqlite;
 
+pub use sqlite::sql::{
+    batches::Batches, blobs::ResultKeys, claim::Claims, finish::Ends, jobs::ClientJobs,
+    keys::KeyStore, keys::Profiles, submit::SubmitJobs, upkeep::Upkeep,
+};
+
 /// The result of a call of a store; a failed call changes nothing.
 pub type Result<T, E = StoreError> = std::result::Result<T, E>;
 
@@ -92,282 +95,6 @@ pub trait Store:
 
     /// Returns up to `step` free pages to the file system if there are more than `spare`; returns whether it did.
     async fn compact(&self, spare: i64, step: u32) -> Result<bool>;
-}
-
-/// Submission of single jobs.
-#[async_trait]
-pub trait SubmitJobs: Send + Sync {
-    /// Inserts a job if the bounds permit it, or finds the job of its idempotency key. A job with a cached result ends at
-    /// once and needs no place in the queue; if its source was removed in the meantime, the job is queued. Dropping the
-    /// future does not cancel the call.
-    async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued>;
-
-    /// Frees an idempotency key of a tenant.
-    async fn forget_key(&self, tenant: &str, key: &str) -> Result<()>;
-
-    /// Finds the job of an idempotency key, or the conflict if the key has another digest.
-    async fn job_by_key(
-        &self,
-        tenant: &str,
-        key: &str,
-        digest: &[u8; 32],
-    ) -> Result<Option<Enqueued>>;
-}
-
-/// Batches and runs: filled in portions, acknowledged once complete, read and removed as a whole.
-#[async_trait]
-pub trait Batches: Send + Sync {
-    /// Reserves up to `most` more places in the queue for a batch that is being received; returns the number.
-    async fn reserve(
-        &self,
-        batch: Uuid,
-        tenant: &str,
-        most: u32,
-        bounds: QueueBounds,
-    ) -> Result<Result<u32, Refusal>>;
-
-    /// The answer of [`Batches::begin_batch`] that follows from the idempotency key; `None` if the key is free.
-    async fn batch_by_key(
-        &self,
-        new: &NewBatch,
-        filled_here: FilledHere<'_>,
-    ) -> Result<Option<BatchBegun>>;
-
-    /// Begins to fill a batch, or finds the batch of its idempotency key. Afterwards exactly the places of its jobs are
-    /// reserved. The key of an unfinished batch that no process fills is free.
-    async fn begin_batch(
-        &self,
-        new: &NewBatch,
-        filled_here: FilledHere<'_>,
-        bounds: QueueBounds,
-    ) -> Result<BatchBegun>;
-
-    /// Inserts jobs of a batch, with their indices in it, on its reserved places. Returns the jobs that ended at once with
-    /// a cached result.
-    async fn fill_batch(&self, batch: Uuid, jobs: &[(u32, NewJob)]) -> Result<Vec<Uuid>>;
-
-    /// Acknowledges a batch: from now on it is visible and durable.
-    async fn complete_batch(&self, batch: Uuid) -> Result<()>;
-
-    /// Removes up to `limit` jobs of a batch that was never acknowledged, and the batch after the last of them; `true` once
-    /// nothing is left. The first call frees its places and its key.
-    async fn drop_batch(&self, batch: Uuid, limit: u32) -> Result<bool>;
-
-    /// The batches that are not acknowledged and that no process fills.
-    async fn unfinished_batches(&self) -> Result<Vec<Uuid>>;
-
-    /// Cancels up to `limit` jobs of a batch; returns the jobs that changed.
-    async fn cancel_batch(
-        &self,
-        tenant: &str,
-        id: Uuid,
-        limit: u32,
-        now: i64,
-    ) -> Result<Vec<(Uuid, State)>>;
-
-    /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
-    async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool>;
-
-    /// Up to `limit` jobs of a batch after the job `after`, in the order of submission, with their small solutions. The
-    /// list ends once the solutions reach `bytes`.
-    async fn batch_items(
-        &self,
-        tenant: &str,
-        id: Uuid,
-        after: Option<Uuid>,
-        limit: u32,
-        bytes: usize,
-    ) -> Result<Vec<BatchItem>>;
-
-    /// The keys of the labels of the jobs of a batch, sorted, at most `limit`.
-    async fn batch_label_keys(&self, tenant: &str, id: Uuid, limit: u32) -> Result<Vec<String>>;
-
-    /// One page of the acknowledged batches of a tenant with their counts, newest first, starting with the first one older
-    /// than `after`.
-    async fn batches(
-        &self,
-        tenant: &str,
-        filter: &Filter,
-        after: Option<Uuid>,
-        limit: u32,
-    ) -> Result<Page<Batch>>;
-
-    /// An acknowledged batch or run with its counts.
-    async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>>;
-
-    /// The stored record of an acknowledged run, with the progress of its chunks.
-    async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>>;
-}
-
-/// Calls of clients for single jobs.
-#[async_trait]
-pub trait ClientJobs: Send + Sync {
-    /// Cancels a queued job at once, and marks a running one for cancellation; an ended job does not change. Returns the
-    /// new state of the job.
-    async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>>;
-
-    /// Removes an ended job with everything that belongs to it; its blob is removed with the last reference.
-    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted>;
-
-    /// Reads a job.
-    async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>>;
-
-    /// Reads a job with its result, or with the key of its result if that is large.
-    async fn result(&self, tenant: &str, id: Uuid) -> Result<Option<(Job, Option<ResultRef>)>>;
-
-    /// Reads the case of a job as submitted.
-    async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>>;
-
-    /// One page of the jobs of a tenant, newest first, starting with the first one older than `after`. The number of rows
-    /// read is bounded.
-    async fn list(
-        &self,
-        tenant: &str,
-        filter: &Filter,
-        after: Option<Uuid>,
-        limit: u32,
-    ) -> Result<Page<Job>>;
-
-    /// Jobs of a tenant that changed after `since`, not counting progress, ordered by time of the change and id. Of the
-    /// jobs that changed at `since`, those after the job `after` are included.
-    async fn changes(
-        &self,
-        tenant: &str,
-        since: i64,
-        after: Option<Uuid>,
-        limit: u32,
-    ) -> Result<Vec<Change>>;
-}
-
-/// Stored profiles of tenants.
-#[async_trait]
-pub trait Profiles: Send + Sync {
-    /// Stores a profile of a tenant, unless it exists or the total size would exceed `max_bytes`.
-    async fn add_profile(
-        &self,
-        tenant: &str,
-        new: &StoredProfile,
-        max_bytes: u64,
-    ) -> Result<ProfileKept>;
-
-    /// Reads a profile by its digest.
-    async fn profile(&self, tenant: &str, digest: &str) -> Result<Option<StoredProfile>>;
-
-    /// One page of the profiles of a tenant, newest first.
-    async fn profiles(
-        &self,
-        tenant: &str,
-        after: Option<&ProfileCursor>,
-        limit: u32,
-    ) -> Result<Page<ProfileEntry>>;
-
-    /// Deletes a profile; `false` if it does not exist.
-    async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool>;
-}
-
-/// Claims of queued jobs, and calls of workers that hold a lease.
-#[async_trait]
-pub trait Claims: Send + Sync {
-    /// Queues that have jobs, with their number.
-    async fn queues(&self) -> Result<Vec<(Queue, u64)>>;
-
-    /// Claims the first job of a queue, by priority and age, with the jobs after it that fit the bounds of a group. A
-    /// suspect is claimed alone. Jobs of a batch that is not acknowledged are skipped.
-    async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>>;
-
-    /// Reads the cases of claimed jobs, with changes since the claim.
-    async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>>;
-
-    /// Extends leases and stores progress; the answers are in the order of the claims.
-    async fn renew(&self, claims: &[(&Claim, f64)], lease: Lease) -> Result<Vec<Renewal>>;
-
-    /// Returns claimed jobs to the queue without counting the attempt; jobs that were cancelled end. Returns the jobs that
-    /// were still held, with their new states.
-    async fn release(
-        &self,
-        claims: &[Claim],
-        why: ReleaseReason,
-        now: i64,
-    ) -> Result<Vec<(Uuid, State)>>;
-
-    /// Stores a solved slice and removes stored slices from its number on; `false` if the lease was lost. The count of
-    /// attempts starts again. A repeated call changes nothing.
-    async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool>;
-
-    /// The stored slices of a job in their order. They are removed when the job ends.
-    async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>>;
-
-    /// The results of the stored slices of a job, in their order.
-    async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>>;
-}
-
-/// Ends of claimed jobs.
-#[async_trait]
-pub trait Ends: Send + Sync {
-    /// Ends claimed jobs in one transaction; returns those that ended. Of the others the lease was lost, or the source of
-    /// their cached result was removed.
-    async fn finish(&self, ends: &[(Claim, Ending)], now: i64) -> Result<HashSet<Uuid>>;
-
-    /// Finds a succeeded job for each of these keys, if there is one.
-    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>>;
-}
-
-/// Maintenance: expired leases, deadlines, expired jobs, and statistics.
-#[async_trait]
-pub trait Upkeep: Send + Sync {
-    /// Takes running jobs from their workers: to `cancelled` if they were cancelled, to `failed` if `attempts_max` is
-    /// reached, else back to the queue. The attempt counts only for a job that was claimed alone; the others are claimed
-    /// alone next time. Returns them with their new states.
-    async fn reap(&self, which: Reap, now: i64, attempts_max: u32) -> Result<Vec<(Uuid, State)>>;
-
-    /// Ends some of the queued jobs whose deadline has passed, and finds the running ones. To be called until it ends none.
-    async fn pass_deadlines(&self, failure: &Failure, moment: Moment) -> Result<Overdue>;
-
-    /// Removes expired jobs and leaves tombstones; removes empty batches of the same age, and old tombstones. Returns the
-    /// number of jobs removed.
-    async fn expire(&self, rule: RetentionRule) -> Result<u64>;
-
-    /// Whether a job or batch of this tenant with this id has expired.
-    async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool>;
-
-    /// Usage of a tenant, without staged bytes.
-    async fn usage(&self, tenant: &str) -> Result<Usage>;
-
-    /// Counts and sizes, which are read from indices.
-    async fn stats(&self) -> Result<Stats>;
-
-    /// Counts the jobs of the same tenant before a queued job, at most `limit`.
-    async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead>;
-}
-
-/// Keys of results outside the table.
-#[async_trait]
-pub trait ResultKeys: Send + Sync {
-    /// Keys of large results without references, at most `limit`; the keys in `done` were removed and are forgotten first.
-    async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>>;
-
-    /// Registers a large result without a job for removal.
-    async fn abandon_blob(&self, key: &str) -> Result<()>;
-
-    /// Selects the results that no job refers to. Results of running jobs are excluded, because the current attempt may
-    /// have written them.
-    async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Vec<String>>;
-}
-
-/// API keys.
-#[async_trait]
-pub trait KeyStore: Send + Sync {
-    /// Stores a key. Fails if the id exists.
-    async fn add_key(&self, key: &Key) -> Result<()>;
-
-    /// A key by its id.
-    async fn key(&self, id: &str) -> Result<Option<Key>>;
-
-    /// All keys, oldest first, including revoked ones.
-    async fn keys(&self) -> Result<Vec<Key>>;
-
-    /// Revokes a key; `None` if it does not exist. The first time of revocation is kept.
-    async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>>;
 }
 
 /// A claimed job with the fencing token of its lease.
@@ -888,17 +615,6 @@ impl std::fmt::Display for ProfileCursor {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{:012x}{}", self.0, self.1)
     }
-}
-
-/// Result of [`ClientJobs::delete`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Deleted {
-    /// The job was removed.
-    Done,
-    /// The job has not ended.
-    NotEnded(State),
-    /// The job does not exist.
-    NotFound,
 }
 
 /// The current time, and the last jump of the wall clock.

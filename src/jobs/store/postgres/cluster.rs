@@ -31,6 +31,15 @@ const FILLED_WITHIN: i64 = 60_000;
 const SWEPT_AFTER: i64 = 24 * 3600 * 1000;
 
 /// The key of a result is the folder of its objects.
+const FOLDS: [&str; 2] = [
+    "WITH gone AS (DELETE FROM job_counts RETURNING state, tenant, kind, number) \
+     INSERT INTO job_counts (state, tenant, kind, number) \
+     SELECT state, tenant, kind, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant, kind HAVING SUM(number) <> 0",
+    "WITH gone AS (DELETE FROM stored_bytes RETURNING tenant, bytes) \
+     INSERT INTO stored_bytes (tenant, bytes) \
+     SELECT tenant, CAST(SUM(bytes) AS bigint) FROM gone GROUP BY tenant HAVING SUM(bytes) <> 0",
+];
+
 const SWEEP: &str = "DELETE FROM objects WHERE made_at < CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint) - $1 \
      AND NOT EXISTS (SELECT 1 FROM blobs WHERE blobs.key = regexp_replace(objects.path, '/[^/]+$', ''))";
 
@@ -93,20 +102,9 @@ impl Cluster for PostgresStore {
             LOCKS, FOLD
         )?;
         if free {
-            sql!(
-                execute,
-                &mut *transaction,
-                "WITH gone AS (DELETE FROM job_counts RETURNING state, tenant, kind, number) \
-                 INSERT INTO job_counts (state, tenant, kind, number) \
-                 SELECT state, tenant, kind, CAST(SUM(number) AS bigint) FROM gone GROUP BY state, tenant, kind HAVING SUM(number) <> 0"
-            )?;
-            sql!(
-                execute,
-                &mut *transaction,
-                "WITH gone AS (DELETE FROM stored_bytes RETURNING tenant, bytes) \
-                 INSERT INTO stored_bytes (tenant, bytes) \
-                 SELECT tenant, CAST(SUM(bytes) AS bigint) FROM gone GROUP BY tenant HAVING SUM(bytes) <> 0"
-            )?;
+            for statement in FOLDS {
+                sql!(execute, &mut *transaction, statement)?;
+            }
         }
         transaction.commit().await?;
         Ok(())

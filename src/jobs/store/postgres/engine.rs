@@ -24,12 +24,6 @@ pub(crate) type DbPool = PgPool;
 pub(crate) type DbRow = PgRow;
 pub(crate) type SqlStore = PostgresStore;
 
-/// Text before and after the parameter with the current time by which leases are judged; the database clock if it is NULL.
-pub(crate) const LEASE_NOW: (&str, &str) = (
-    "COALESCE(",
-    ", CAST(extract(epoch FROM clock_timestamp()) * 1000 AS bigint))",
-);
-
 /// Number of repetitions after a conflict before the error is returned.
 const REPEATED: u32 = 4;
 

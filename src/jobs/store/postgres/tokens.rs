@@ -26,11 +26,20 @@ macro_rules! bare {
     };
 }
 
-/// A column as an expression, so that its order is not used: the planner would scan all jobs from the oldest to find the
-/// first queued one.
-macro_rules! unordered {
-    ($column:literal) => {
-        concat!($column, " || ''")
+/// Restricts the value before it to a list of texts or, with a type, of numbers. The list is a parameter in JSON.
+macro_rules! in_list {
+    ($parameter:literal) => {
+        in_list!($parameter "text")
+    };
+    ($parameter:literal $kind:literal) => {
+        concat!(" = ANY(ARRAY(SELECT CAST(value AS ", $kind, ") FROM json_array_elements_text(CAST(", $parameter, " AS json))))")
+    };
+}
+
+/// The elements of a JSON array, in the column `value`. `value ->> 0` is the first member of an element as a text.
+macro_rules! json_rows {
+    ($parameter:literal) => {
+        concat!("json_array_elements(CAST(", $parameter, " AS json))")
     };
 }
 
@@ -38,5 +47,12 @@ macro_rules! unordered {
 macro_rules! lease_now {
     ($parameter:literal) => {
         concat!("COALESCE(", $parameter, ", ", clock!(), ")")
+    };
+}
+
+/// Imports a trait of the shared statements, which the embedded database declares.
+macro_rules! declare {
+    ($name:ident $declaration:item) => {
+        use crate::store::$name;
     };
 }

@@ -5,24 +5,29 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
-use async_trait::async_trait;
 use bytes::Bytes;
-use railhead_macros::repeat_conflicts;
+use railhead_macros::store_trait;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query, query_scalar};
 use super::rows::{
-    count, job_columns, push_list, push_name, read_blob_ids, read_bytes, read_count, read_flag,
-    read_id, read_job, read_json, read_kind, read_optional_bytes, read_small, read_state, to_json,
+    count, job_columns, push_name, read_blob_ids, read_bytes, read_count, read_flag, read_id,
+    read_job, read_json, read_kind, read_optional_bytes, read_small, read_state, to_json,
 };
 use super::submit::{Places, insert_jobs};
 use crate::error::StoreError;
-use crate::model::{Batch, BatchItem, ItemResult, Kind, RunRecord, State, created_at};
+use crate::model::{Batch, BatchItem, Kind, RunRecord, State, created_at};
 use crate::store::{
-    BatchBegun, Batches, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Refusal, Result,
-    Total, first_id_at,
+    BatchBegun, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Refusal, Result, Total,
+    first_id_at,
 };
+
+macro_rules! batch_columns {
+    () => {
+        "id, tenant, kind, created_at, count, rejected, name, labels, ended_at"
+    };
+}
 
 const CANCEL: &str = concat!(
     "WITH open AS MATERIALIZED (SELECT id FROM jobs \
@@ -36,9 +41,10 @@ const CANCEL: &str = concat!(
      WHERE id IN (SELECT id FROM open) RETURNING id, state, slices"
 );
 
-#[repeat_conflicts]
-#[async_trait]
+/// Batches and runs: filled in portions, acknowledged once complete, read and removed as a whole.
+#[store_trait]
 impl Batches for SqlStore {
+    /// Reserves up to `most` more places in the queue for a batch that is being received; returns the number.
     async fn reserve(
         &self,
         id: Uuid,
@@ -65,6 +71,7 @@ impl Batches for SqlStore {
         Ok(Ok(places))
     }
 
+    /// The answer of [`Batches::begin_batch`] that follows from the idempotency key; `None` if the key is free.
     async fn batch_by_key(
         &self,
         new: &NewBatch,
@@ -74,6 +81,8 @@ impl Batches for SqlStore {
         by_key(&mut connection, new, filled_here).await
     }
 
+    /// Begins to fill a batch, or finds the batch of its idempotency key. Afterwards exactly the places of its jobs are
+    /// reserved. The key of an unfinished batch that no process fills is free.
     async fn begin_batch(
         &self,
         new: &NewBatch,
@@ -102,20 +111,16 @@ impl Batches for SqlStore {
         }
         let template = new.template.as_ref();
         let template = template.map(|body| (blake3::hash(body).as_bytes().to_vec(), body));
-        let known = match &template {
-            Some((digest, _)) => has_template(&mut transaction, &new.tenant, digest).await?,
-            None => true,
-        };
-        let of_template = template.as_ref().filter(|_| !known);
-        let bytes = new.bytes + of_template.map_or(0, |(_, body)| body.len() as u64);
-        if let Err(refusal) = places.store(&new.tenant, bytes) {
-            return Ok(BatchBegun::Refused(refusal));
-        }
-        if let Some((digest, body)) = of_template {
-            sql!(execute, &mut *transaction,
+        let mut bytes = new.bytes;
+        if let Some((digest, body)) = &template {
+            let added = sql!(execute, &mut *transaction,
                 "INSERT INTO templates (tenant, digest, body) VALUES ($1, $2, $3) ON CONFLICT DO NOTHING";
                 &*new.tenant, digest, body.as_ref()
             )?;
+            bytes += added.rows_affected() * body.len() as u64;
+        }
+        if let Err(refusal) = places.store(&new.tenant, bytes) {
+            return Ok(BatchBegun::Refused(refusal));
         }
         sql!(execute, &mut *transaction,
             "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
@@ -125,11 +130,20 @@ impl Batches for SqlStore {
             i64::from(new.rejected), &new.name, to_json(&new.labels)?,
             template.as_ref().map(|(digest, _)| digest), new.head.as_deref(), new.kind.name()
         )?;
-        keep_key(&mut transaction, new).await?;
+        if let Some((key, digest)) = &new.idempotency {
+            // An existing key belongs to a batch that failed.
+            sql!(execute, &mut *transaction,
+                "INSERT INTO batch_keys (of_tenant, key, digest, batch_id, kind) VALUES ($1, $2, $3, $4, $5) \
+                 ON CONFLICT (of_tenant, kind, key) DO UPDATE SET digest = $3, batch_id = $4";
+                &*new.tenant, key, digest.as_slice(), new.id.to_string(), new.kind.name()
+            )?;
+        }
         transaction.commit().await?;
         Ok(BatchBegun::Created)
     }
 
+    /// Inserts jobs of a batch, with their indices in it, on its reserved places. Returns the jobs that ended at once with
+    /// a cached result.
     async fn fill_batch(&self, batch: Uuid, jobs: &[(u32, NewJob)]) -> Result<Vec<Uuid>> {
         let jobs: Vec<_> = jobs
             .iter()
@@ -150,6 +164,7 @@ impl Batches for SqlStore {
         Ok(ended)
     }
 
+    /// Acknowledges a batch: from now on it is visible and durable.
     async fn complete_batch(&self, id: Uuid) -> Result<()> {
         let complete = sql!(execute, &self.writer,
             "UPDATE batches SET complete = 1, reserved = 0 WHERE id = $1 AND dropped = 0";
@@ -158,6 +173,8 @@ impl Batches for SqlStore {
         require_batch(id, complete.rows_affected())
     }
 
+    /// Removes up to `limit` jobs of a batch that was never acknowledged, and the batch after the last of them; `true` once
+    /// nothing is left. The first call frees its places and its key.
     async fn drop_batch(&self, id: Uuid, limit: u32) -> Result<bool> {
         let mut transaction = engine::begin(&self.writer).await?;
         for statement in [
@@ -184,6 +201,7 @@ impl Batches for SqlStore {
         Ok(last)
     }
 
+    /// The batches that are not acknowledged and that no process fills.
     async fn unfinished_batches(&self) -> Result<Vec<Uuid>> {
         let rows = sql!(
             fetch_all,
@@ -197,6 +215,7 @@ impl Batches for SqlStore {
         rows.iter().map(read_id).collect()
     }
 
+    /// Cancels up to `limit` jobs of a batch; returns the jobs that changed.
     async fn cancel_batch(
         &self,
         tenant: &str,
@@ -216,6 +235,7 @@ impl Batches for SqlStore {
             .collect()
     }
 
+    /// Removes up to `limit` ended jobs of a batch, and the batch with its last job; `true` once no ended job is left.
     async fn delete_batch(&self, tenant: &str, id: Uuid, limit: u32) -> Result<bool> {
         let mut transaction = engine::begin(&self.writer).await?;
         let gone = sql!(fetch_all, &mut *transaction,
@@ -237,6 +257,8 @@ impl Batches for SqlStore {
         Ok(last)
     }
 
+    /// Up to `limit` jobs of a batch after the job `after`, in the order of submission, with their small solutions. The
+    /// list ends once the solutions reach `bytes`.
     async fn batch_items(
         &self,
         tenant: &str,
@@ -261,13 +283,12 @@ impl Batches for SqlStore {
         engine::for_each(rows, &self.readers, |row| {
             let solution = read_optional_bytes(row, "solution")?;
             read += solution.as_ref().map_or(0, Bytes::len);
-            let key: Option<String> = row.try_get("blob_key")?;
-            let inline = solution.map(ItemResult::Solution);
             items.push(BatchItem {
                 index: read_small(row, "batch_index")?,
                 job: read_job(row)?,
                 outputs: row.try_get("outputs")?,
-                result: key.map(ItemResult::Stored).or(inline),
+                solution,
+                key: row.try_get("blob_key")?,
             });
             Ok(read < bytes)
         })
@@ -275,6 +296,7 @@ impl Batches for SqlStore {
         Ok(items)
     }
 
+    /// The keys of the labels of the jobs of a batch, sorted, at most `limit`.
     async fn batch_label_keys(&self, tenant: &str, id: Uuid, limit: u32) -> Result<Vec<String>> {
         let keys = sql!(scalar fetch_all, &self.readers,
             concat!(
@@ -287,6 +309,8 @@ impl Batches for SqlStore {
         Ok(keys)
     }
 
+    /// One page of the acknowledged batches of a tenant with their counts, newest first, starting with the first one older
+    /// than `after`.
     async fn batches(
         &self,
         tenant: &str,
@@ -309,21 +333,16 @@ impl Batches for SqlStore {
         })
     }
 
+    /// An acknowledged batch or run with its counts.
     async fn batch(&self, tenant: &str, kind: Kind, id: Uuid) -> Result<Option<Batch>> {
-        let mut query = QueryBuilder::new("SELECT ");
-        query
-            .push(COLUMNS)
-            .push(" FROM batches WHERE complete = 1 AND id = ");
-        query
-            .push_bind(id.to_string())
-            .push(" AND tenant = ")
-            .push_bind(tenant)
-            .push(" AND kind = ")
-            .push_bind(kind.name());
-        let rows = query.build().fetch_all(&self.readers).await?;
+        let rows = sql!(fetch_all, &self.readers,
+            concat!("SELECT ", batch_columns!(), " FROM batches WHERE complete = 1 AND id = $1 AND tenant = $2 AND kind = $3");
+            id.to_string(), tenant, kind.name()
+        )?;
         Ok(self.with_counts(&rows).await?.pop())
     }
 
+    /// The stored record of an acknowledged run, with the progress of its chunks.
     async fn run(&self, tenant: &str, id: Uuid) -> Result<Option<RunRecord>> {
         let row = sql!(fetch_optional, &self.readers, GET_RUN; id.to_string(), tenant)?;
         let Some(row) = row else { return Ok(None) };
@@ -335,27 +354,6 @@ impl Batches for SqlStore {
             running: row.try_get("running")?,
         }))
     }
-}
-
-/// Stores the idempotency key of a batch. An existing key belongs to a batch that failed and is replaced.
-async fn keep_key(connection: &mut DbConnection, new: &NewBatch) -> Result<()> {
-    let Some((key, digest)) = &new.idempotency else {
-        return Ok(());
-    };
-    sql!(execute, connection,
-        "INSERT INTO batch_keys (of_tenant, key, digest, batch_id, kind) VALUES ($1, $2, $3, $4, $5) \
-         ON CONFLICT (of_tenant, kind, key) DO UPDATE SET digest = $3, batch_id = $4";
-        &*new.tenant, key, digest.as_slice(), new.id.to_string(), new.kind.name()
-    )?;
-    Ok(())
-}
-
-async fn has_template(connection: &mut DbConnection, tenant: &str, digest: &[u8]) -> Result<bool> {
-    let found = sql!(fetch_optional, connection,
-        "SELECT 1 FROM templates WHERE tenant = $1 AND digest = $2";
-        tenant, digest
-    )?;
-    Ok(found.is_some())
 }
 
 /// Fails if no row was found, because the batch was abandoned.
@@ -402,8 +400,6 @@ async fn by_key(
 const EXAMINED_MAX: i64 = 10_000;
 
 /// The columns of a [`Batch`].
-const COLUMNS: &str = "id, tenant, kind, created_at, count, rejected, name, labels, ended_at";
-
 impl SqlStore {
     async fn count_batches(&self, tenant: &str, filter: &Filter) -> Result<Total> {
         let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
@@ -423,13 +419,16 @@ impl SqlStore {
             return Ok(Vec::new());
         }
         let ids = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
-        let mut query = QueryBuilder::new(
-            "SELECT batch_id AS id, state, COUNT(*) AS jobs FROM jobs WHERE batch_id IN ",
-        );
-        push_list(&mut query, &ids);
-        query.push(" GROUP BY batch_id, state");
+        let counts = sql!(fetch_all, &self.readers,
+            concat!(
+                "SELECT batch_id AS id, state, COUNT(*) AS jobs FROM jobs WHERE batch_id",
+                in_list!("$1"),
+                " GROUP BY batch_id, state"
+            );
+            to_json(&ids)?
+        )?;
         let mut states: HashMap<Uuid, BTreeMap<State, u64>> = HashMap::new();
-        for row in &query.build().fetch_all(&self.readers).await? {
+        for row in &counts {
             let of_batch = states.entry(read_id(row)?).or_default();
             of_batch.insert(read_state(row)?, read_count(row, "jobs")?);
         }
@@ -458,7 +457,7 @@ impl SqlStore {
 
 pub(crate) fn page_query(tenant: &str, filter: &Filter, after: Option<Uuid>) -> QueryBuilder {
     let mut query = QueryBuilder::new("");
-    push_page(&mut query, COLUMNS, tenant, filter, after);
+    push_page(&mut query, batch_columns!(), tenant, filter, after);
     query
 }
 

@@ -4,16 +4,15 @@
 //! transaction that removes references calls [`release_blobs`], the only place that removes blobs.
 use std::collections::HashSet;
 
-use async_trait::async_trait;
-use railhead_macros::repeat_conflicts;
+use railhead_macros::store_trait;
 use uuid::Uuid;
 
-use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query_scalar};
-use super::rows::{count, fence, push_list, read_blob_ids, read_id, read_small, read_state};
-use crate::store::{Claim, Result, ResultKeys, StoredResult};
+use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query, query_scalar};
+use super::rows::{count, fence, read_blob_ids, read_id, read_small, read_state, to_json};
+use crate::store::{Claim, Result, StoredResult};
 
 /// Number of values bound in one statement; far below the limit of SQLite.
-pub(crate) const VALUES_PER_STATEMENT: usize = 250;
+const VALUES_PER_STATEMENT: usize = 250;
 
 impl SqlStore {
     /// Stores results of claimed jobs whose leases are held, within the caller's transaction; the ids of the blobs are in
@@ -43,13 +42,11 @@ impl SqlStore {
                     inside.and_then(|result| result.fields.as_deref())
                 );
             });
-            insert.push(concat!(
+            insert.push(
                 ") INSERT INTO blobs (id, key, bytes, solution, fields, tenant) \
                  SELECT made.id, made.key, made.bytes, made.solution, made.fields, jobs.tenant FROM made JOIN jobs \
-                 ON jobs.id = made.job AND jobs.lease_token = made.lease_token WHERE ",
-                unordered!("jobs.state"),
-                " = 'running'"
-            ));
+                 ON jobs.id = made.job AND jobs.lease_token = made.lease_token WHERE jobs.state || '' = 'running'",
+            );
             insert.build().execute(&mut *connection).await?;
         }
         Ok(ids)
@@ -60,28 +57,26 @@ impl SqlStore {
 pub(crate) async fn release_blobs(connection: &mut DbConnection, mut ids: Vec<i64>) -> Result<()> {
     ids.sort_unstable();
     ids.dedup();
-    for some in ids.chunks(VALUES_PER_STATEMENT) {
-        // Of two transactions that remove the last two references, the second has to see the effect of the first.
-        engine::lock_blobs(connection, some).await?;
-        let mut free = QueryBuilder::new("DELETE FROM blobs WHERE id IN (");
-        let mut list = free.separated(", ");
-        for id in some {
-            list.push_bind(*id);
-        }
-        free.push(
-            ") AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.blob_id = blobs.id) \
-             AND NOT EXISTS (SELECT 1 FROM job_slices WHERE job_slices.blob_id = blobs.id) RETURNING key",
-        );
-        let gone = free.build().fetch_all(&mut *connection).await?;
-        let keys = gone
-            .iter()
-            .map(|row| row.try_get::<Option<String>, _>("key"));
-        let keys = keys.collect::<Result<Vec<_>, _>>()?;
-        let keys: Vec<String> = keys.into_iter().flatten().collect();
-        leave_to_collector(connection, &keys).await?;
+    if ids.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    // Of two transactions that remove the last two references, the second has to see the effect of the first.
+    engine::lock_blobs(connection, &ids).await?;
+    let gone = sql!(fetch_all, &mut *connection, RELEASE; to_json(&ids)?)?;
+    let keys = gone
+        .iter()
+        .map(|row| row.try_get::<Option<String>, _>("key"));
+    let keys = keys.collect::<Result<Vec<_>, _>>()?;
+    let keys: Vec<String> = keys.into_iter().flatten().collect();
+    leave_to_collector(connection, &keys).await
 }
+
+pub(crate) const RELEASE: &str = concat!(
+    "DELETE FROM blobs WHERE id",
+    in_list!("$1" "bigint"),
+    " AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.blob_id = blobs.id) \
+     AND NOT EXISTS (SELECT 1 FROM job_slices WHERE job_slices.blob_id = blobs.id) RETURNING key"
+);
 
 /// Removes the slices of the jobs that have ended. The rows have the columns `id`, `state` and `slices`.
 pub(crate) async fn drop_slices_of_ended(
@@ -95,14 +90,14 @@ pub(crate) async fn drop_slices_of_ended(
             ids.push(read_id(row)?);
         }
     }
-    for some in ids.chunks(VALUES_PER_STATEMENT) {
-        let mut drop = QueryBuilder::new("DELETE FROM job_slices WHERE job_id IN ");
-        push_list(&mut drop, some);
-        drop.push(" RETURNING blob_id");
-        let gone = drop.build().fetch_all(&mut *connection).await?;
-        release_blobs(connection, read_blob_ids(&gone)?).await?;
+    if ids.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    let gone = sql!(fetch_all, &mut *connection,
+        concat!("DELETE FROM job_slices WHERE job_id", in_list!("$1"), " RETURNING blob_id");
+        to_json(&ids)?
+    )?;
+    release_blobs(connection, read_blob_ids(&gone)?).await
 }
 
 /// Adds keys to the outbox of the collector, except those that another blob has: a repeated call may pass the same key twice.
@@ -110,28 +105,31 @@ pub(crate) async fn leave_to_collector(
     connection: &mut DbConnection,
     keys: &[String],
 ) -> Result<()> {
-    for some in keys.chunks(VALUES_PER_STATEMENT) {
-        let mut leave = QueryBuilder::new("WITH gone (key) AS (");
-        leave.push_values(some, |mut row, key| {
-            row.push_bind(key);
-        });
-        leave.push(
-            ") INSERT INTO blob_outbox (key) SELECT key FROM gone \
-             WHERE NOT EXISTS (SELECT 1 FROM blobs WHERE blobs.key = gone.key) ON CONFLICT DO NOTHING",
-        );
-        leave.build().execute(&mut *connection).await?;
+    if keys.is_empty() {
+        return Ok(());
     }
+    sql!(execute, connection,
+        concat!(
+            "WITH gone AS (SELECT value ->> 0 AS key FROM ",
+            json_rows!("$1"),
+            ") INSERT INTO blob_outbox (key) SELECT key FROM gone \
+             WHERE NOT EXISTS (SELECT 1 FROM blobs WHERE blobs.key = gone.key) ON CONFLICT DO NOTHING"
+        );
+        to_json(&keys.iter().map(|key| [key]).collect::<Vec<_>>())?
+    )?;
     Ok(())
 }
 
-#[repeat_conflicts]
-#[async_trait]
+/// Keys of results outside the table.
+#[store_trait]
 impl ResultKeys for SqlStore {
+    /// Keys of large results without references, at most `limit`; the keys in `done` were removed and are forgotten first.
     async fn released_blobs(&self, done: &[String], limit: u32) -> Result<Vec<String>> {
-        for some in done.chunks(VALUES_PER_STATEMENT) {
-            let mut forget = QueryBuilder::new("DELETE FROM blob_outbox WHERE key IN ");
-            push_list(&mut forget, some);
-            forget.build().execute(&self.writer).await?;
+        if !done.is_empty() {
+            sql!(execute, &self.writer,
+                concat!("DELETE FROM blob_outbox WHERE key", in_list!("$1"));
+                to_json(done)?
+            )?;
         }
         let keys = sql!(scalar fetch_all, &self.readers,
             "SELECT key FROM blob_outbox ORDER BY key LIMIT $1";
@@ -140,35 +138,30 @@ impl ResultKeys for SqlStore {
         Ok(keys)
     }
 
+    /// Registers a large result without a job for removal.
     async fn abandon_blob(&self, key: &str) -> Result<()> {
         let mut connection = self.writer.acquire().await?;
         leave_to_collector(&mut connection, &[key.to_owned()]).await
     }
 
+    /// Selects the results that no job refers to. Results of running jobs are excluded, because the current attempt may
+    /// have written them.
     async fn orphans(&self, results: &[(Uuid, String)]) -> Result<Vec<String>> {
-        let mut orphans = Vec::new();
-        for some in results.chunks(VALUES_PER_STATEMENT) {
-            // In this order: a running job registers the keys of its results before it stops running.
-            let running = self.running(some).await?;
-            let mut query = QueryBuilder::new("SELECT key FROM blobs WHERE key IN ");
-            push_list(&mut query, some.iter().map(|(_, key)| key));
-            let known = query.build().fetch_all(&self.readers).await?;
-            let known = known.iter().map(|row| row.try_get("key"));
-            let known: HashSet<String> = known.collect::<Result<_, _>>()?;
-            let lost = some
-                .iter()
-                .filter(|(id, key)| !known.contains(key) && !running.contains(id));
-            orphans.extend(lost.map(|(_, key)| key.clone()));
-        }
-        Ok(orphans)
+        let ids: Vec<Uuid> = results.iter().map(|(id, _)| *id).collect();
+        let keys: Vec<&str> = results.iter().map(|(_, key)| key.as_str()).collect();
+        // In this order: a running job registers the keys of its results before it stops running.
+        let running: Vec<String> = sql!(scalar fetch_all, &self.readers,
+            concat!("SELECT id FROM jobs WHERE state = 'running' AND id", in_list!("$1"));
+            to_json(&ids)?
+        )?;
+        let known: Vec<String> = sql!(scalar fetch_all, &self.readers, KNOWN; to_json(&keys)?)?;
+        let (running, known): (HashSet<String>, HashSet<String>) =
+            (running.into_iter().collect(), known.into_iter().collect());
+        let lost = results
+            .iter()
+            .filter(|(id, key)| !known.contains(key) && !running.contains(&id.to_string()));
+        Ok(lost.map(|(_, key)| key.clone()).collect())
     }
 }
 
-impl SqlStore {
-    async fn running(&self, results: &[(Uuid, String)]) -> Result<HashSet<Uuid>> {
-        let mut query = QueryBuilder::new("SELECT id FROM jobs WHERE state = 'running' AND id IN ");
-        push_list(&mut query, results.iter().map(|(id, _)| id));
-        let rows = query.build().fetch_all(&self.readers).await?;
-        rows.iter().map(read_id).collect()
-    }
-}
+pub(crate) const KNOWN: &str = concat!("SELECT key FROM blobs WHERE key", in_list!("$1"));

@@ -1,24 +1,22 @@
 //! Claims of queued jobs, leases, and slices.
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use async_trait::async_trait;
-use bytes::Bytes;
-use railhead_macros::repeat_conflicts;
+use railhead_macros::store_trait;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query};
+use super::engine::{self, DbConnection, DbRow, Row, SqlStore, query};
 use super::rows::{
-    count, fence, push_list, read_blob_ids, read_bytes, read_cache_key, read_count, read_flag,
-    read_id, read_kind, read_move, read_optional_bytes, read_optional_id, read_result, read_small,
+    count, fence, read_blob_ids, read_bytes, read_cache_key, read_count, read_flag, read_id,
+    read_kind, read_move, read_optional_bytes, read_optional_id, read_result, read_small, to_json,
 };
 use crate::error::StoreError;
 use crate::model::{Queue, State};
 use crate::store::{
-    Claim, ClaimKind, ClaimRequest, ClaimedCase, Claims, Lease, NewSlice, ReleaseReason, Renewal,
-    Result, SliceRecord, StoredCase, StoredResult,
+    Claim, ClaimKind, ClaimRequest, ClaimedCase, Lease, NewSlice, ReleaseReason, Renewal, Result,
+    SliceRecord, StoredCase, StoredResult,
 };
 
 /// Selects the first jobs of the queue of tenant $1 and kind $5, at most $2; includes suspects if $6 is 1.
@@ -43,15 +41,23 @@ pub(crate) const PEEK: &str = peek!("slices = 0");
 pub(crate) const PEEK_BEGUN: &str = peek!("slices > 0");
 
 /// The columns of a [`Claim`].
-const CLAIMED: &str = "id, rank, attempt, lease_token, method, traceparent, suspect, slices, \
-     CASE WHEN bypass_cache = 1 THEN NULL ELSE cache_key END AS cache_key";
+pub(crate) const CLAIM: &str = concat!(
+    "UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = $1, lease_until = ",
+    lease_now!("$2"),
+    " + $3, worker = $4, started_at = $5, updated_at = $5, group_size = $6, progress = done, version = version + 1 WHERE ",
+    bare!("state"),
+    " = 'queued' AND id",
+    in_list!("$7"),
+    " RETURNING id, rank, attempt, lease_token, method, traceparent, suspect, slices, \
+     CASE WHEN bypass_cache = 1 THEN NULL ELSE cache_key END AS cache_key"
+);
 
-/// Queues that have jobs.
 pub(crate) const QUEUES: &str = "SELECT tenant, kind, CAST(SUM(number) AS bigint) AS waiting FROM job_counts WHERE state = 'queued' GROUP BY tenant, kind HAVING SUM(number) > 0 ORDER BY tenant, kind";
 
-#[repeat_conflicts]
-#[async_trait]
+/// Claims of queued jobs, and calls of workers that hold a lease.
+#[store_trait]
 impl Claims for SqlStore {
+    /// Queues that have jobs, with their number.
     async fn queues(&self) -> Result<Vec<(Queue, u64)>> {
         if let Some(known) = self.known_queues() {
             return Ok(known);
@@ -71,9 +77,26 @@ impl Claims for SqlStore {
         Ok(queues)
     }
 
+    /// Claims the first job of a queue, by priority and age, with the jobs after it that fit the bounds of a group. A
+    /// suspect is claimed alone. Jobs of a batch that is not acknowledged are skipped.
     async fn claim(&self, request: &ClaimRequest<'_>) -> Result<Vec<Claim>> {
-        let mut claims = Vec::with_capacity(request.jobs);
-        for row in &self.claim_next(request, new_token()?).await? {
+        let mut transaction = engine::begin_claim(&self.writer).await?;
+        let queued = match request.kind {
+            ClaimKind::New => self.first_new(&mut transaction, request).await?,
+            ClaimKind::Begun => first_queued(&mut transaction, PEEK_BEGUN, request, 1).await?,
+        };
+        if queued.is_empty() {
+            return Ok(Vec::new());
+        }
+        let ids = choose(&queued, request)?;
+        let rows = sql!(fetch_all, &mut *transaction,
+            CLAIM;
+            new_token()?, self.lease_now(request.lease.now), request.lease.ms, request.worker, request.now,
+            count(ids.len()), to_json(&ids)?
+        )?;
+        transaction.commit().await?;
+        let mut claims = Vec::with_capacity(rows.len());
+        for row in &rows {
             let rank: i64 = row.try_get("rank")?;
             claims.push((rank, read_claim(row)?));
         }
@@ -81,32 +104,45 @@ impl Claims for SqlStore {
         Ok(claims.into_iter().map(|(_, claim)| claim).collect())
     }
 
+    /// Reads the cases of claimed jobs, with changes since the claim.
     async fn claimed_cases(&self, ids: &[Uuid]) -> Result<HashMap<Uuid, ClaimedCase>> {
         if ids.is_empty() {
             return Ok(HashMap::new());
         }
-        let mut query = QueryBuilder::new(
-            "SELECT id, kind, cases.row, body, batch_id, cancel_requested, CASE WHEN bypass_cache = 0 AND jobs.cache_key IS NOT NULL THEN \
-             (SELECT source.id FROM jobs AS source WHERE source.cache_key = jobs.cache_key AND source.state = 'succeeded' LIMIT 1) END AS source \
-             FROM cases JOIN jobs ON jobs.id = cases.job_id \
-             WHERE job_id IN ",
-        );
-        push_list(&mut query, ids);
         let mut connection = self.readers.acquire().await?;
-        let rows = query.build().fetch_all(&mut *connection).await?;
+        let rows = sql!(fetch_all, &mut *connection,
+            concat!(
+                "SELECT id, kind, cases.row, body, batch_id, cancel_requested, CASE WHEN bypass_cache = 0 AND jobs.cache_key IS NOT NULL THEN \
+                 (SELECT source.id FROM jobs AS source WHERE source.cache_key = jobs.cache_key AND source.state = 'succeeded' LIMIT 1) END AS source \
+                 FROM cases JOIN jobs ON jobs.id = cases.job_id WHERE job_id",
+                in_list!("$1")
+            );
+            to_json(ids)?
+        )?;
+        let mut batches = HashSet::new();
+        for row in &rows {
+            if read_flag(row, "row")? {
+                batches.insert(row.try_get::<String, _>("batch_id")?);
+            }
+        }
+        let templates = match batches.is_empty() {
+            true => Vec::new(),
+            false => sql!(fetch_all, &mut *connection, TEMPLATES; to_json(&batches)?)?,
+        };
         drop(connection);
-        let mut templates: HashMap<String, (Bytes, Option<Bytes>)> = HashMap::new();
+        let read = |row: &DbRow| {
+            let body = read_bytes(row, "body")?;
+            Ok((read_id(row)?, (body, read_optional_bytes(row, "head")?)))
+        };
+        let templates = templates.iter().map(read);
+        let templates = templates.collect::<Result<HashMap<Uuid, _>>>()?;
         let mut cases = HashMap::with_capacity(rows.len());
         for row in &rows {
             let (mut template, mut head) = (None, None);
             if read_flag(row, "row")? {
-                let batch: String = row.try_get("batch_id")?;
-                if !templates.contains_key(&batch)
-                    && let Some(read) = self.template(&batch).await?
-                {
-                    templates.insert(batch.clone(), read);
-                }
-                let Some((of_batch, of_run)) = templates.get(&batch) else {
+                let batch = read_optional_id(row, "batch_id")?;
+                // The template is removed with the last job of its batch.
+                let Some((of_batch, of_run)) = batch.and_then(|id| templates.get(&id)) else {
                     continue;
                 };
                 template = Some(of_batch.clone());
@@ -128,26 +164,18 @@ impl Claims for SqlStore {
         Ok(cases)
     }
 
+    /// Extends leases and stores progress; the answers are in the order of the claims.
     async fn renew(&self, claims: &[(&Claim, f64)], lease: Lease) -> Result<Vec<Renewal>> {
         if claims.is_empty() {
             return Ok(Vec::new());
         }
-        let mut query = QueryBuilder::new("WITH held (id, lease_token, now_at) AS (");
-        query.push_values(claims, |mut row, (claim, progress)| {
-            values!(row; claim.id.to_string(), fence(claim), *progress);
-        });
-        query.push(") UPDATE jobs SET lease_until = ");
-        push_lease_until(&mut query, self, lease);
-        query.push(concat!(
-            ", progress = ",
-            greatest!(),
-            "(held.now_at, done), \
-         version = CASE WHEN progress = ",
-            greatest!(),
-            "(held.now_at, done) THEN version ELSE version + 1 END"
-        ));
-        query.push(OF_HELD).push("jobs.id AS id, cancel_requested");
-        let rows = query.build().fetch_all(&self.writer).await?;
+        let held = claims
+            .iter()
+            .map(|(claim, progress)| (claim.id, fence(claim), progress));
+        let rows = sql!(fetch_all, &self.writer,
+            RENEW;
+            to_json(&held.collect::<Vec<_>>())?, self.lease_now(lease.now), lease.ms
+        )?;
         let mut held = HashMap::with_capacity(rows.len());
         for row in &rows {
             held.insert(read_id(row)?, read_flag(row, "cancel_requested")?);
@@ -161,6 +189,8 @@ impl Claims for SqlStore {
         Ok(answers.collect())
     }
 
+    /// Returns claimed jobs to the queue without counting the attempt; jobs that were cancelled end. Returns the jobs that
+    /// were still held, with their new states.
     async fn release(
         &self,
         claims: &[Claim],
@@ -170,39 +200,20 @@ impl Claims for SqlStore {
         if claims.is_empty() {
             return Ok(Vec::new());
         }
-        let mut query = QueryBuilder::new("WITH held (id, lease_token) AS (");
-        query.push_values(claims, |mut row, claim| {
-            values!(row; claim.id.to_string(), fence(claim));
-        });
-        query.push(
-            ") UPDATE jobs SET state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
-             started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
-             attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, \
-             version = version + 1",
-        );
-        match why {
-            ReleaseReason::NotBegun => {}
-            ReleaseReason::SolveItself => drop(query.push(", bypass_cache = 1")),
-            ReleaseReason::Long { slice_us } => {
-                let slice_us = count(slice_us);
-                query
-                    .push(concat!(", slice_us = ", greatest!(), "(slice_us, "))
-                    .push_bind(slice_us);
-                query
-                    .push(concat!("), cost_us = ", greatest!(), "(cost_us, "))
-                    .push_bind(slice_us);
-                query.push(")");
-            }
-        }
-        query.push(", updated_at = ").push_bind(now);
-        query.push(", ended_at = CASE WHEN cancel_requested = 1 THEN ");
-        query.push_bind(now);
-        query
-            .push(" ELSE NULL END")
-            .push(OF_HELD)
-            .push("jobs.id AS id, state, slices");
+        let held: Vec<_> = claims
+            .iter()
+            .map(|claim| (claim.id, fence(claim)))
+            .collect();
+        let (slice_us, bypass_cache): (i64, i64) = match why {
+            ReleaseReason::NotBegun => (0, 0),
+            ReleaseReason::SolveItself => (0, 1),
+            ReleaseReason::Long { slice_us } => (count(slice_us), 0),
+        };
         let mut transaction = engine::begin(&self.writer).await?;
-        let rows = query.build().fetch_all(&mut *transaction).await?;
+        let rows = sql!(fetch_all, &mut *transaction,
+            RELEASE;
+            to_json(&held)?, now, slice_us, bypass_cache
+        )?;
         drop_slices_of_ended(&mut transaction, &rows).await?;
         transaction.commit().await?;
         self.requeued();
@@ -211,6 +222,8 @@ impl Claims for SqlStore {
             .collect()
     }
 
+    /// Stores a solved slice and removes stored slices from its number on; `false` if the lease was lost. The count of
+    /// attempts starts again. A repeated call changes nothing.
     async fn add_slice(&self, claim: &Claim, slice: &NewSlice) -> Result<bool> {
         let id = claim.id.to_string();
         let note = &slice.note;
@@ -249,6 +262,7 @@ impl Claims for SqlStore {
         Ok(true)
     }
 
+    /// The stored slices of a job in their order. They are removed when the job ends.
     async fn slices(&self, id: Uuid) -> Result<Vec<SliceRecord>> {
         let rows = sql!(fetch_all, &self.readers, NOTES; id.to_string())?;
         rows.iter()
@@ -263,6 +277,7 @@ impl Claims for SqlStore {
             .collect()
     }
 
+    /// The results of the stored slices of a job, in their order.
     async fn slice_results(&self, id: Uuid) -> Result<Vec<StoredResult>> {
         let rows = sql!(fetch_all, &self.readers, RESULTS; id.to_string())?;
         rows.iter().map(read_result).collect()
@@ -273,14 +288,6 @@ impl Claims for SqlStore {
 fn new_token() -> Result<i64> {
     let random = getrandom::u64().map_err(|error| StoreError::Failed(Arc::new(error)))?;
     Ok(count(random >> 1))
-}
-
-/// Adds the expression for the expiry of a lease that begins now.
-fn push_lease_until(query: &mut QueryBuilder, store: &SqlStore, lease: Lease) {
-    query.push(engine::LEASE_NOW.0);
-    query.push_bind(store.lease_now(lease.now));
-    query.push(engine::LEASE_NOW.1).push(" + ");
-    query.push_bind(lease.ms);
 }
 
 fn read_claim(row: &DbRow) -> Result<Claim> {
@@ -330,61 +337,43 @@ fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>> {
     Ok(ids)
 }
 
-impl SqlStore {
-    /// Claims the next jobs of a queue; the rows have the columns of `CLAIMED`.
-    async fn claim_next(&self, request: &ClaimRequest<'_>, token: i64) -> Result<Vec<DbRow>> {
-        let mut transaction = engine::begin_claim(&self.writer).await?;
-        let queued = match request.kind {
-            ClaimKind::New => self.first_new(&mut transaction, request).await?,
-            ClaimKind::Begun => first_queued(&mut transaction, PEEK_BEGUN, request, 1).await?,
-        };
-        if queued.is_empty() {
-            return Ok(Vec::new());
-        }
-        let ids = choose(&queued, request)?;
-        let mut update = QueryBuilder::new(
-            "UPDATE jobs SET state = 'running', attempt = attempt + 1, lease_token = ",
-        );
-        update.push_bind(token).push(", lease_until = ");
-        push_lease_until(&mut update, self, request.lease);
-        update.push(", worker = ").push_bind(request.worker);
-        update.push(", started_at = ").push_bind(request.now);
-        update.push(", updated_at = ").push_bind(request.now);
-        update.push(", group_size = ");
-        update.push_bind(count(ids.len()));
-        update.push(concat!(
-            ", progress = done, version = version + 1 WHERE ",
-            bare!("state"),
-            " = 'queued' AND id IN "
-        ));
-        push_list(&mut update, ids);
-        update.push(" RETURNING ").push(CLAIMED);
-        let rows = update.build().fetch_all(&mut *transaction).await?;
-        transaction.commit().await?;
-        Ok(rows)
-    }
-
-    /// Reads the template of a batch, and the head of a run.
-    async fn template(&self, batch: &str) -> Result<Option<(Bytes, Option<Bytes>)>> {
-        let row = sql!(fetch_optional, &self.readers,
-            "SELECT body, head FROM batches JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template \
-             WHERE batches.id = $1";
-            batch
-        )?;
-        // The template is removed with the last job of its batch.
-        let Some(row) = row else { return Ok(None) };
-        Ok(Some((
-            read_bytes(&row, "body")?,
-            read_optional_bytes(&row, "head")?,
-        )))
-    }
+/// An update of the jobs whose leases are held: the claims are `$1`, as a JSON array of ids and tokens, and of the progress
+/// for [`RENEW`].
+macro_rules! update_held {
+    ($($changes:expr),+; $returned:literal) => {
+        concat!(
+            "WITH held AS (SELECT value ->> 0 AS id, CAST(value ->> 1 AS bigint) AS lease_token, \
+             CAST(value ->> 2 AS double precision) AS now_at FROM ",
+            json_rows!("$1"),
+            ") UPDATE jobs SET ",
+            $($changes,)+
+            " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token \
+             AND jobs.state || '' = 'running' RETURNING jobs.id AS id, ",
+            $returned
+        )
+    };
 }
 
-/// The end of an update that is restricted to jobs whose leases are held.
-const OF_HELD: &str = concat!(
-    " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token AND ",
-    unordered!("jobs.state"),
-    " = 'running' RETURNING "
+pub(crate) const RENEW: &str = update_held!(
+    "lease_until = ", lease_now!("$2"), " + $3, progress = ", greatest!(), "(held.now_at, done), \
+     version = CASE WHEN progress = ", greatest!(), "(held.now_at, done) THEN version ELSE version + 1 END";
+    "cancel_requested"
+);
+
+pub(crate) const RELEASE: &str = update_held!(
+    "state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
+     started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
+     ended_at = CASE WHEN cancel_requested = 1 THEN $2 ELSE NULL END, updated_at = $2, \
+     attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, version = version + 1, \
+     slice_us = ", greatest!(), "(slice_us, $3), cost_us = ", greatest!(), "(cost_us, $3), \
+     bypass_cache = ", greatest!(), "(bypass_cache, $4)";
+    "state, slices"
+);
+
+const TEMPLATES: &str = concat!(
+    "SELECT batches.id, body, head FROM batches \
+     JOIN templates ON templates.tenant = batches.tenant AND templates.digest = batches.template WHERE batches.id",
+    in_list!("$1")
 );
 
 pub(crate) const NOTES: &str =

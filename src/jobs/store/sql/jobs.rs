@@ -1,24 +1,23 @@
 //! Calls of clients for single jobs, and lists of jobs.
 use std::cmp::Reverse;
 
-use async_trait::async_trait;
-use railhead_macros::repeat_conflicts;
+use railhead_macros::store_trait;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{
-    GET, job_columns, push_name, read_blob_id, read_bytes, read_count, read_flag, read_id,
-    read_job, read_kind, read_optional_bytes, read_optional_id, read_result, read_small,
+    GET, job_columns, push_name, read_blob_id, read_blob_ids, read_bytes, read_count, read_flag,
+    read_id, read_job, read_kind, read_optional_bytes, read_optional_id, read_result, read_small,
 };
 use crate::model::{Job, State};
-use crate::store::{
-    Change, ClientJobs, Deleted, Filter, Page, Result, ResultRef, StoredCase, Total,
-};
+use crate::store::{Change, Filter, Page, Result, ResultRef, StoredCase, Total};
 
-#[repeat_conflicts]
-#[async_trait]
+/// Calls of clients for single jobs.
+#[store_trait]
 impl ClientJobs for SqlStore {
+    /// Cancels a queued job at once, and marks a running one for cancellation; an ended job does not change. Returns the
+    /// new state of the job.
     async fn cancel(&self, tenant: &str, id: Uuid, now: i64) -> Result<Option<Job>> {
         let mut transaction = engine::begin(&self.writer).await?;
         let row = sql!(fetch_all, &mut *transaction,
@@ -40,27 +39,26 @@ impl ClientJobs for SqlStore {
         }
     }
 
-    async fn delete(&self, tenant: &str, id: Uuid) -> Result<Deleted> {
+    /// Removes an ended job with everything that belongs to it; its blob is removed with the last reference. `false` if the
+    /// job does not exist or has not ended.
+    async fn delete(&self, tenant: &str, id: Uuid) -> Result<bool> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let gone = sql!(fetch_optional, &mut *transaction,
+        let gone = sql!(fetch_all, &mut *transaction,
             "DELETE FROM jobs WHERE id = $1 AND tenant = $2 AND kind <> 'rows' AND state IN ('succeeded', 'failed', 'cancelled') RETURNING blob_id";
             id.to_string(), tenant
         )?;
-        if let Some(row) = gone {
-            release_blobs(&mut transaction, read_blob_id(&row)?.into_iter().collect()).await?;
-            transaction.commit().await?;
-            return Ok(Deleted::Done);
-        }
-        drop(transaction);
-        let job = self.job(tenant, id).await?;
-        Ok(job.map_or(Deleted::NotFound, |job| Deleted::NotEnded(job.state)))
+        release_blobs(&mut transaction, read_blob_ids(&gone)?).await?;
+        transaction.commit().await?;
+        Ok(!gone.is_empty())
     }
 
+    /// Reads a job.
     async fn job(&self, tenant: &str, id: Uuid) -> Result<Option<Job>> {
         let row = sql!(fetch_optional, &self.readers, GET; id.to_string(), tenant)?;
         row.as_ref().map(read_job).transpose()
     }
 
+    /// Reads a job with its result, or with the key of its result if that is large.
     async fn result(&self, tenant: &str, id: Uuid) -> Result<Option<(Job, Option<ResultRef>)>> {
         let row = sql!(fetch_optional, &self.readers,
             concat!(
@@ -86,6 +84,7 @@ impl ClientJobs for SqlStore {
         Ok(Some((job, Some(stored))))
     }
 
+    /// Reads the case of a job as submitted.
     async fn case(&self, tenant: &str, id: Uuid) -> Result<Option<StoredCase>> {
         let row = sql!(fetch_optional, &self.readers,
             "SELECT jobs.kind, cases.row, cases.body, head, templates.body AS template FROM jobs JOIN cases ON cases.job_id = jobs.id \
@@ -107,6 +106,8 @@ impl ClientJobs for SqlStore {
         }))
     }
 
+    /// One page of the jobs of a tenant, newest first, starting with the first one older than `after`. The number of rows
+    /// read is bounded.
     async fn list(
         &self,
         tenant: &str,
@@ -121,7 +122,8 @@ impl ClientJobs for SqlStore {
                 jobs.push(read_job(row)?);
             }
             if filter.reads_jobs() {
-                let mut query = end_query(tenant, filter, state, after);
+                let mut query = walk("", "id", tenant, filter, state, after);
+                query.push(" LIMIT 1 OFFSET ").push_bind(EXAMINED_MAX - 1);
                 let end = query.build().fetch_optional(&self.readers).await?;
                 looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
             }
@@ -147,6 +149,8 @@ impl ClientJobs for SqlStore {
         })
     }
 
+    /// Jobs of a tenant that changed after `since`, not counting progress, ordered by time of the change and id. Of the
+    /// jobs that changed at `since`, those after the job `after` are included.
     async fn changes(
         &self,
         tenant: &str,
@@ -182,12 +186,19 @@ impl SqlStore {
             || filter.created_after.or(filter.created_before).is_some();
         let (mut total, mut all) = (0, true);
         for state in walked(filter) {
-            let mut query = if restricted {
-                count_query(tenant, filter, state)
+            let row = if restricted {
+                let counted = "SELECT COUNT(*) AS number FROM (";
+                let mut query = walk(counted, "id", tenant, filter, state, None);
+                query.push(" LIMIT ").push_bind(COUNTED);
+                query.push(") AS counted");
+                query.build().fetch_one(&self.readers).await?
             } else {
-                kept_count_query(tenant, filter, state)
+                sql!(fetch_one, &self.readers,
+                    "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts \
+                     WHERE tenant = $1 AND kind = $2 AND ($3 IS NULL OR state = $3)";
+                    tenant, filter.kind.name(), state.map(State::name)
+                )?
             };
-            let row = query.build().fetch_one(&self.readers).await?;
             let number = read_count(&row, "number")?;
             all &= !restricted || number < COUNTED.unsigned_abs();
             total += number;
@@ -223,13 +234,12 @@ pub(crate) fn page_query(
 ) -> QueryBuilder {
     let most = i64::from(limit) + 1;
     if !filter.reads_jobs() {
-        let mut query = QueryBuilder::new("");
-        walk(&mut query, job_columns!(), tenant, filter, state, after);
+        let mut query = walk("", job_columns!(), tenant, filter, state, after);
         query.push(" LIMIT ").push_bind(most);
         return query;
     }
-    let mut query = QueryBuilder::new(concat!("SELECT ", job_columns!(), " FROM ("));
-    walk(&mut query, job_columns!(), tenant, filter, state, after);
+    let examined = concat!("SELECT ", job_columns!(), " FROM (");
+    let mut query = walk(examined, job_columns!(), tenant, filter, state, after);
     query.push(" LIMIT ").push_bind(EXAMINED_MAX);
     query.push(") AS examined WHERE TRUE");
     if filter.alone() {
@@ -250,50 +260,16 @@ pub(crate) fn page_query(
     query
 }
 
-/// The statement for the last of the jobs that are examined for one page, if more follow.
-fn end_query(
-    tenant: &str,
-    filter: &Filter,
-    state: Option<State>,
-    after: Option<Uuid>,
-) -> QueryBuilder {
-    let mut query = QueryBuilder::new("");
-    walk(&mut query, "id", tenant, filter, state, after);
-    query.push(" LIMIT 1 OFFSET ").push_bind(EXAMINED_MAX - 1);
-    query
-}
-
-fn count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder {
-    let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
-    walk(&mut query, "id", tenant, filter, state, None);
-    query.push(" LIMIT ").push_bind(COUNTED);
-    query.push(") AS counted");
-    query
-}
-
-/// The statement for the counters that the database maintains.
-fn kept_count_query(tenant: &str, filter: &Filter, state: Option<State>) -> QueryBuilder {
-    let mut query = QueryBuilder::new(
-        "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts WHERE tenant = ",
-    );
-    query.push_bind(tenant.to_owned());
-    query.push(" AND kind = ").push_bind(filter.kind.name());
-    if let Some(state) = state {
-        query.push(" AND state = ").push_bind(state.name());
-    }
-    query
-}
-
-/// Adds a scan of the jobs of a filter, from the newest, as far as an index covers the filter. Labels have a separate
+/// Scans the jobs of a filter, from the newest, as far as an index covers the filter. Labels have a separate
 /// table, sorted by job within each label, so that every list scans an index and stops at its limit.
 fn walk(
-    query: &mut QueryBuilder,
+    front: &str,
     columns: &str,
     tenant: &str,
     filter: &Filter,
     state: Option<State>,
     after: Option<Uuid>,
-) {
+) -> QueryBuilder {
     let label = filter.labels.first();
     let (source, id) = match label {
         Some(_) => (
@@ -302,6 +278,8 @@ fn walk(
         ),
         None => (" FROM jobs", "id"),
     };
+    let mut all = QueryBuilder::new(front);
+    let query = &mut all;
     query.push("SELECT ").push(columns).push(source);
     let mut joint = " WHERE ";
     let mut and = |query: &mut QueryBuilder, condition: &str, value: String| {
@@ -355,6 +333,7 @@ fn walk(
         }
     }
     query.push(format!(" ORDER BY {id} DESC"));
+    all
 }
 
 /// Adds bounds from the first and last id of the batch, so that only this part of the label's index is scanned.

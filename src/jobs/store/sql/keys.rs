@@ -1,17 +1,13 @@
 //! API keys and stored profiles.
 use std::sync::Arc;
 
-use async_trait::async_trait;
-use railhead_macros::repeat_conflicts;
+use railhead_macros::store_trait;
 
 use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
 use super::rows::{read_bytes, read_count, read_flag, read_json, to_json};
 use crate::error::StoreError;
 use crate::model::Key;
-use crate::store::{
-    KeyStore, Page, ProfileCursor, ProfileEntry, ProfileKept, Profiles, Result, StoredProfile,
-    Total,
-};
+use crate::store::{Page, ProfileCursor, ProfileEntry, ProfileKept, Result, StoredProfile, Total};
 
 /// Selects the columns of a [`Key`].
 macro_rules! select_keys {
@@ -23,9 +19,10 @@ macro_rules! select_keys {
     };
 }
 
-#[repeat_conflicts]
-#[async_trait]
+/// API keys.
+#[store_trait]
 impl KeyStore for SqlStore {
+    /// Stores a key. Fails if the id exists.
     async fn add_key(&self, key: &Key) -> Result<()> {
         sql!(execute, &self.writer,
             "INSERT INTO api_keys (id, hash, tenant, name, created_at, revoked_at, read_only, labels) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)";
@@ -35,11 +32,13 @@ impl KeyStore for SqlStore {
         Ok(())
     }
 
+    /// A key by its id.
     async fn key(&self, id: &str) -> Result<Option<Key>> {
         let row = sql!(fetch_optional, &self.readers, select_keys!(" WHERE id = $1"); id)?;
         row.as_ref().map(read_key).transpose()
     }
 
+    /// All keys, oldest first, including revoked ones.
     async fn keys(&self) -> Result<Vec<Key>> {
         let rows = sql!(fetch_all, &self.readers, select_keys!(""))?;
         let mut keys = rows.iter().map(read_key).collect::<Result<Vec<_>, _>>()?;
@@ -47,6 +46,7 @@ impl KeyStore for SqlStore {
         Ok(keys)
     }
 
+    /// Revokes a key; `None` if it does not exist. The first time of revocation is kept.
     async fn revoke_key(&self, id: &str, now: i64) -> Result<Option<Key>> {
         sql!(execute, &self.writer,
             "UPDATE api_keys SET revoked_at = $1 WHERE id = $2 AND revoked_at IS NULL";
@@ -72,9 +72,10 @@ fn read_key(row: &DbRow) -> Result<Key> {
     })
 }
 
-#[repeat_conflicts]
-#[async_trait]
+/// Stored profiles of tenants.
+#[store_trait]
 impl Profiles for SqlStore {
+    /// Stores a profile of a tenant, unless it exists or the total size would exceed `max_bytes`.
     async fn add_profile(
         &self,
         tenant: &str,
@@ -107,6 +108,7 @@ impl Profiles for SqlStore {
         Ok(ProfileKept::Added)
     }
 
+    /// Reads a profile by its digest.
     async fn profile(&self, tenant: &str, digest: &str) -> Result<Option<StoredProfile>> {
         let row = sql!(fetch_optional, &self.readers,
             "SELECT digest, body, created_at FROM profiles WHERE tenant = $1 AND digest = $2";
@@ -115,6 +117,7 @@ impl Profiles for SqlStore {
         row.as_ref().map(read_profile).transpose()
     }
 
+    /// One page of the profiles of a tenant, newest first.
     async fn profiles(
         &self,
         tenant: &str,
@@ -151,6 +154,7 @@ impl Profiles for SqlStore {
         })
     }
 
+    /// Deletes a profile; `false` if it does not exist.
     async fn delete_profile(&self, tenant: &str, digest: &str) -> Result<bool> {
         let gone = sql!(execute, &self.writer,
             "DELETE FROM profiles WHERE tenant = $1 AND digest = $2";

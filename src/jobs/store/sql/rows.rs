@@ -138,27 +138,13 @@ pub(crate) fn read_flag(row: &DbRow, column: &str) -> Result<bool> {
     Ok(row.try_get::<i64, _>(column)? != 0)
 }
 
-pub(crate) fn to_json<T: Serialize>(value: &T) -> Result<String> {
+pub(crate) fn to_json<T: Serialize + ?Sized>(value: &T) -> Result<String> {
     serde_json::to_string(value).map_err(|error| StoreError::Corrupt(error.to_string()))
 }
 
 pub(crate) fn read_json<T: DeserializeOwned>(row: &DbRow, column: &str) -> Result<T> {
     let text: String = row.try_get(column)?;
     serde_json::from_str(&text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
-}
-
-/// Adds values as the list of an `IN`.
-pub(crate) fn push_list<T: ToString>(
-    query: &mut QueryBuilder,
-    values: impl IntoIterator<Item = T>,
-) {
-    let mut separator = "(";
-    for value in values {
-        query.push(separator).push_bind(value.to_string());
-        separator = ", ";
-    }
-    // An empty list is a syntax error in some databases; nothing equals NULL.
-    query.push(if separator == "(" { "(NULL)" } else { ")" });
 }
 
 /// Restricts a list to entries whose `name` contains a text.

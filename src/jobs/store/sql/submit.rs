@@ -2,17 +2,16 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use async_trait::async_trait;
-use railhead_macros::repeat_conflicts;
+use railhead_macros::store_trait;
 use tokio::sync::{mpsc, oneshot};
 use uuid::Uuid;
 
-use super::engine::{self, DbConnection, DbPool, QueryBuilder, Row, SqlStore, query, query_scalar};
+use super::engine::{self, DbConnection, DbPool, QueryBuilder, Row, SqlStore, query};
 use super::finish::end_with_sources;
-use super::rows::{count, job_columns, push_list, read_count, read_id, read_job, to_json};
+use super::rows::{count, job_columns, read_count, read_id, read_job, to_json};
 use crate::error::StoreError;
 use crate::model::Job;
-use crate::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result, SubmitJobs};
+use crate::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result};
 
 /// Free places in the queue as read by one transaction, which takes some of them.
 pub(crate) struct Places {
@@ -30,24 +29,26 @@ impl Places {
         tenants: impl IntoIterator<Item = &'a str>,
         bounds: QueueBounds,
     ) -> Result<Places> {
-        let mut query = QueryBuilder::new("WITH asked (tenant) AS (");
-        query.push_values(tenants, |mut row, tenant| {
-            row.push_bind(tenant);
-        });
-        query.push(
-            ") SELECT tenant, \
-             (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued' AND job_counts.tenant = asked.tenant) + \
-             (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND batches.tenant = asked.tenant) AS taken, \
-             (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued') + \
-             (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0) AS taken_by_all, \
-             (SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE stored_bytes.tenant = asked.tenant) AS stored FROM asked",
-        );
+        let tenants: Vec<_> = tenants.into_iter().map(|tenant| [tenant]).collect();
+        let rows = sql!(fetch_all, connection,
+            concat!(
+                "WITH asked AS (SELECT value ->> 0 AS tenant FROM ",
+                json_rows!("$1"),
+                ") SELECT tenant, \
+                 (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued' AND job_counts.tenant = asked.tenant) + \
+                 (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND batches.tenant = asked.tenant) AS taken, \
+                 (SELECT CAST(COALESCE(SUM(number), 0) AS bigint) FROM job_counts WHERE state = 'queued') + \
+                 (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0) AS taken_by_all, \
+                 (SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE stored_bytes.tenant = asked.tenant) AS stored FROM asked"
+            );
+            to_json(&tenants)?
+        )?;
         let mut places = Places {
             bounds,
             all: 0,
             of_tenants: HashMap::new(),
         };
-        for row in &query.build().fetch_all(connection).await? {
+        for row in &rows {
             places.all = read_count(row, "taken_by_all")?;
             let of_tenant = (read_count(row, "taken")?, read_count(row, "stored")?);
             places.of_tenants.insert(row.try_get("tenant")?, of_tenant);
@@ -95,15 +96,6 @@ impl Places {
     }
 }
 
-/// Number of bytes of cases, templates and results that a tenant has stored.
-pub(crate) async fn stored(connection: &mut DbConnection, tenant: &str) -> Result<u64> {
-    let bytes: i64 = sql!(scalar fetch_one, connection,
-        "SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE tenant = $1";
-        tenant
-    )?;
-    Ok(bytes.max(0).unsigned_abs())
-}
-
 /// Selects the jobs that have succeeded.
 pub(crate) async fn succeeded(
     connection: &mut DbConnection,
@@ -112,13 +104,10 @@ pub(crate) async fn succeeded(
     if ids.is_empty() {
         return Ok(HashSet::new());
     }
-    let mut query = QueryBuilder::new(concat!(
-        "SELECT id FROM jobs WHERE ",
-        bare!("state"),
-        " = 'succeeded' AND id IN "
-    ));
-    push_list(&mut query, ids);
-    let rows = query.build().fetch_all(connection).await?;
+    let rows = sql!(fetch_all, connection,
+        concat!("SELECT id FROM jobs WHERE ", bare!("state"), " = 'succeeded' AND id", in_list!("$1"));
+        to_json(ids)?
+    )?;
     rows.iter().map(read_id).collect()
 }
 
@@ -163,23 +152,24 @@ pub(crate) async fn insert_jobs(
             values!(row; job.id.to_string(), i64::from(job.row), job.body.as_ref());
         });
         cases.build().execute(&mut *connection).await?;
-        let labels: Vec<_> = some
-            .iter()
-            .flat_map(|(_, job)| job.labels.iter().map(move |label| (job, label)))
-            .collect();
-        for some in labels.chunks(ROWS_PER_STATEMENT) {
-            let mut rows =
-                QueryBuilder::new("INSERT INTO job_labels (of_tenant, key, value, job_id, state) ");
-            rows.push_values(some, |mut row, (job, (key, value))| {
-                values!(row; &*job.tenant, *key, *value, job.id.to_string(), "queued");
-            });
-            rows.build().execute(&mut *connection).await?;
+        let labelled = some.iter().filter(|(_, job)| !job.labels.is_empty());
+        let labelled: Vec<Uuid> = labelled.map(|(_, job)| job.id).collect();
+        if !labelled.is_empty() {
+            sql!(execute, &mut *connection, INSERT_LABELS; to_json(&labelled)?)?;
         }
         let jobs = some.iter().map(|(_, job)| *job);
         ended.extend(end_with_sources(&mut *connection, jobs).await?);
     }
     Ok(ended)
 }
+
+const INSERT_LABELS: &str = concat!(
+    "INSERT INTO job_labels (of_tenant, key, value, job_id, state) \
+     SELECT jobs.tenant, label.key, label.value, jobs.id, jobs.state FROM jobs, ",
+    pairs_of_labels!(),
+    " AS label WHERE jobs.id",
+    in_list!("$1")
+);
 
 /// Maximum number of jobs stored in one transaction.
 const GROUP_MAX: usize = 256;
@@ -361,21 +351,28 @@ async fn read_back(
     added: &[(Option<u32>, &NewJob)],
 ) -> Result<Vec<Job>> {
     let tenants: HashSet<&str> = added.iter().map(|(_, job)| &*job.tenant).collect();
-    let mut query = QueryBuilder::new(concat!(
-        "SELECT ",
-        job_columns!(),
-        " FROM jobs WHERE id IN "
-    ));
-    push_list(&mut query, added.iter().map(|(_, job)| job.id));
-    query.push(concat!(" AND ", bare!("tenant"), " IN "));
-    push_list(&mut query, tenants);
-    let rows = query.build().fetch_all(connection).await?;
+    let ids: Vec<Uuid> = added.iter().map(|(_, job)| job.id).collect();
+    let rows = sql!(fetch_all, connection,
+        concat!(
+            "SELECT ",
+            job_columns!(),
+            " FROM jobs WHERE id",
+            in_list!("$1"),
+            " AND ",
+            bare!("tenant"),
+            in_list!("$2")
+        );
+        to_json(&ids)?, to_json(&tenants)?
+    )?;
     rows.iter().map(read_job).collect()
 }
 
-#[repeat_conflicts]
-#[async_trait]
+/// Submission of single jobs.
+#[store_trait]
 impl SubmitJobs for SqlStore {
+    /// Inserts a job if the bounds permit it, or finds the job of its idempotency key. A job with a cached result ends at
+    /// once and needs no place in the queue; if its source was removed in the meantime, the job is queued. Dropping the
+    /// future does not cancel the call.
     #[once]
     async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued> {
         let gone = || {
@@ -397,6 +394,7 @@ impl SubmitJobs for SqlStore {
         answer.await.map_err(|_| gone())?
     }
 
+    /// Frees an idempotency key of a tenant.
     async fn forget_key(&self, tenant: &str, key: &str) -> Result<()> {
         sql!(execute, &self.writer,
             "DELETE FROM idempotency_keys WHERE of_tenant = $1 AND key = $2";
@@ -405,6 +403,7 @@ impl SubmitJobs for SqlStore {
         Ok(())
     }
 
+    /// Finds the job of an idempotency key, or the conflict if the key has another digest.
     async fn job_by_key(
         &self,
         tenant: &str,

@@ -1,18 +1,15 @@
 //! Expired leases, deadlines, expired jobs, and statistics.
 use std::collections::{BTreeMap, HashSet};
 
-use async_trait::async_trait;
-use railhead_macros::repeat_conflicts;
+use railhead_macros::store_trait;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, QueryBuilder, SqlStore, query, query_scalar};
-use super::rows::{push_list, read_blob_ids, read_count, read_id, read_move, read_state, to_json};
-use super::submit::stored;
+use super::engine::{self, SqlStore, query, query_scalar};
+use super::rows::{read_blob_ids, read_count, read_id, read_move, read_state, to_json};
 use crate::model::{Failure, Job, State};
 use crate::store::{
-    Claims, Moment, Overdue, QueueAhead, Reap, Result, RetentionRule, Stats, Upkeep, Usage,
-    first_id_at,
+    Claims, Moment, Overdue, QueueAhead, Reap, Result, RetentionRule, Stats, Usage, first_id_at,
 };
 
 /// Takes jobs with expired leases from their workers. The attempt counts for a job that was claimed alone; jobs of a group are
@@ -44,9 +41,12 @@ pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
          OR (suspect = 0 AND (SELECT COUNT(*) FROM jobs AS other WHERE other.state = 'running') > 1)) \
      RETURNING id, state, slices";
 
-#[repeat_conflicts]
-#[async_trait]
+/// Maintenance: expired leases, deadlines, expired jobs, and statistics.
+#[store_trait]
 impl Upkeep for SqlStore {
+    /// Takes running jobs from their workers: to `cancelled` if they were cancelled, to `failed` if `attempts_max` is
+    /// reached, else back to the queue. The attempt counts only for a job that was claimed alone; the others are claimed
+    /// alone next time. Returns them with their new states.
     async fn reap(&self, which: Reap, now: i64, attempts_max: u32) -> Result<Vec<(Uuid, State)>> {
         let mut transaction = engine::begin(&self.writer).await?;
         let mut rows = Vec::new();
@@ -71,6 +71,7 @@ impl Upkeep for SqlStore {
             .collect()
     }
 
+    /// Ends some of the queued jobs whose deadline has passed, and finds the running ones. To be called until it ends none.
     async fn pass_deadlines(&self, failure: &Failure, moment: Moment) -> Result<Overdue> {
         // Late jobs are rare, and a read does not block writers.
         let rows = sql!(fetch_all, &self.readers, LATE; moment.now, moment.set_at, moment.unset)?;
@@ -82,11 +83,21 @@ impl Upkeep for SqlStore {
             }
         }
         if queued {
-            overdue.ended = self.fail_late(failure, moment).await?;
+            let mut transaction = engine::begin(&self.writer).await?;
+            let late = sql!(fetch_all, &mut *transaction,
+                FAIL_LATE;
+                moment.now, moment.set_at, moment.unset, to_json(failure)?, AT_ONCE
+            )?;
+            drop_slices_of_ended(&mut transaction, &late).await?;
+            transaction.commit().await?;
+            let ended = late.iter().map(|row| Ok(read_move(row, State::Queued)?.0));
+            overdue.ended = ended.collect::<Result<_>>()?;
         }
         Ok(overdue)
     }
 
+    /// Removes expired jobs and leaves tombstones; removes empty batches of the same age, and old tombstones. Returns the
+    /// number of jobs removed.
     async fn expire(&self, expiry: RetentionRule) -> Result<u64> {
         let mut transaction = engine::begin(&self.writer).await?;
         let young = first_id_at(expiry.ended_before.saturating_add(1)).to_string();
@@ -94,23 +105,21 @@ impl Upkeep for SqlStore {
             EXPIRED;
             &young, expiry.ended_before, i64::from(expiry.jobs)
         )?;
-        let mut blobs = Vec::with_capacity(rows.len());
-        for some in rows.chunks(250) {
-            let ids = some.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
-            blobs.extend(read_blob_ids(some)?);
-            let mut bury = QueryBuilder::new(
-                "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, ",
+        let ids = rows.iter().map(read_id).collect::<Result<Vec<_>, _>>()?;
+        let ids = to_json(&ids)?;
+        sql!(execute, &mut *transaction,
+            concat!(
+                "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, $1 FROM jobs WHERE id",
+                in_list!("$2"),
+                " ON CONFLICT (id) DO NOTHING"
             );
-            bury.push_bind(expiry.now);
-            bury.push(" FROM jobs WHERE id IN ");
-            push_list(&mut bury, &ids);
-            bury.push(" ON CONFLICT (id) DO NOTHING");
-            bury.build().execute(&mut *transaction).await?;
-            let mut delete = QueryBuilder::new("DELETE FROM jobs WHERE id IN ");
-            push_list(&mut delete, ids);
-            delete.build().execute(&mut *transaction).await?;
-        }
-        release_blobs(&mut transaction, blobs).await?;
+            expiry.now, &ids
+        )?;
+        sql!(execute, &mut *transaction,
+            concat!("DELETE FROM jobs WHERE id", in_list!("$1"));
+            &ids
+        )?;
+        release_blobs(&mut transaction, read_blob_ids(&rows)?).await?;
         sql!(execute, &mut *transaction,
             "INSERT INTO tombstones (id, tenant, gone_at) SELECT id, tenant, $1 FROM batches \
              WHERE id < $2 AND complete = 1 AND NOT EXISTS (SELECT 1 FROM jobs WHERE batch_id = batches.id) \
@@ -130,6 +139,7 @@ impl Upkeep for SqlStore {
         Ok(rows.len() as u64)
     }
 
+    /// Whether a job or batch of this tenant with this id has expired.
     async fn has_expired(&self, tenant: &str, id: Uuid) -> Result<bool> {
         let found = sql!(fetch_optional, &self.readers,
             "SELECT 1 FROM tombstones WHERE id = $1 AND tenant = $2";
@@ -138,6 +148,7 @@ impl Upkeep for SqlStore {
         Ok(found.is_some())
     }
 
+    /// Usage of a tenant, without staged bytes.
     async fn usage(&self, tenant: &str) -> Result<Usage> {
         let rows = sql!(fetch_all, &self.readers,
             "SELECT state, CAST(SUM(number) AS bigint) AS number FROM job_counts WHERE tenant = $1 GROUP BY state";
@@ -149,15 +160,17 @@ impl Upkeep for SqlStore {
                 .jobs
                 .insert(read_state(row)?, read_count(row, "number")?);
         }
-        let reserved: i64 = sql!(scalar fetch_one, &self.readers,
-            "SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND tenant = $1";
+        let row = sql!(fetch_one, &self.readers,
+            "SELECT (SELECT CAST(COALESCE(SUM(reserved), 0) AS bigint) FROM batches WHERE complete = 0 AND tenant = $1) AS reserved, \
+             (SELECT CAST(COALESCE(SUM(bytes), 0) AS bigint) FROM stored_bytes WHERE tenant = $1) AS stored";
             tenant
         )?;
-        usage.reserved = reserved.unsigned_abs();
-        usage.stored_bytes = stored(&mut *self.readers.acquire().await?, tenant).await?;
+        usage.reserved = read_count(&row, "reserved")?;
+        usage.stored_bytes = read_count(&row, "stored")?;
         Ok(usage)
     }
 
+    /// Counts and sizes, which are read from indices.
     async fn stats(&self) -> Result<Stats> {
         let rows = sql!(fetch_all, &self.readers, COUNT)?;
         let mut jobs: BTreeMap<State, u64> =
@@ -177,6 +190,7 @@ impl Upkeep for SqlStore {
         })
     }
 
+    /// Counts the jobs of the same tenant before a queued job, at most `limit`.
     async fn queued_before(&self, job: &Job, limit: u32) -> Result<QueueAhead> {
         let row = sql!(fetch_one, &self.readers,
             BEFORE;
@@ -209,21 +223,6 @@ pub(crate) const FAIL_LATE: &str = concat!(
 
 /// Number of jobs ended in one transaction, which locks their rows. Chosen by judgement: some tens of milliseconds.
 const AT_ONCE: i64 = 1000;
-
-impl SqlStore {
-    async fn fail_late(&self, failure: &Failure, moment: Moment) -> Result<Vec<Uuid>> {
-        let mut transaction = engine::begin(&self.writer).await?;
-        let rows = sql!(fetch_all, &mut *transaction,
-            FAIL_LATE;
-            moment.now, moment.set_at, moment.unset, to_json(failure)?, AT_ONCE
-        )?;
-        drop_slices_of_ended(&mut transaction, &rows).await?;
-        transaction.commit().await?;
-        rows.iter()
-            .map(|row| Ok(read_move(row, State::Queued)?.0))
-            .collect()
-    }
-}
 
 /// Expired jobs. Ids increase with the time of submission, so that only the oldest rows are read. Chunks of a run expire together
 /// after the last of them.

@@ -65,7 +65,7 @@ impl Pool {
             size,
         };
         let first = pool.connect()?;
-        pool.give_back(first);
+        lock(&pool.connections).push(first);
         Ok(Pool(Arc::new(pool)))
     }
 
@@ -86,17 +86,17 @@ impl Pool {
         })
     }
 
-    /// Begins a write transaction. A read transaction that is upgraded would fail if there is another writer.
-    pub(crate) async fn begin(&self) -> Result<Pooled> {
-        begin(self.acquire().await?).await
-    }
-
-    /// As [`Pool::begin`], but the commit does not wait for the disk: it survives the process, not a power cut.
-    pub(crate) async fn begin_relaxed(&self) -> Result<Pooled> {
+    /// Begins a write transaction. A read transaction that is upgraded would fail if there is another writer. The commit of
+    /// a `relaxed` one does not wait for the disk: it survives the process, not a power cut.
+    pub(crate) async fn begin(&self, relaxed: bool) -> Result<Pooled> {
         let mut connection = self.acquire().await?;
-        connection.batch(RELAX)?;
-        connection.relaxed = true;
-        begin(connection).await
+        if relaxed {
+            connection.batch(RELAX)?;
+            connection.relaxed = true;
+        }
+        let begin = |connection: &rusqlite::Connection| connection.execute_batch("BEGIN IMMEDIATE");
+        unlocked(&mut connection, begin).await?;
+        Ok(connection)
     }
 
     /// Closes every connection after its use.
@@ -108,23 +108,11 @@ impl Pool {
     }
 }
 
-async fn begin(mut connection: Pooled) -> Result<Pooled> {
-    unlocked(&mut connection, |connection| {
-        connection.execute_batch("BEGIN IMMEDIATE")
-    })
-    .await?;
-    Ok(connection)
-}
-
 impl Shared {
     fn connect(&self) -> Result<rusqlite::Connection> {
         let connection = blocking(|| (self.open)())?;
         connection.set_prepared_statement_cache_capacity(PREPARED);
         Ok(connection)
-    }
-
-    fn give_back(&self, connection: rusqlite::Connection) {
-        lock(&self.connections).push(connection);
     }
 }
 
@@ -176,7 +164,7 @@ impl Drop for Pooled {
             }
             let strict = !self.relaxed || connection.execute_batch(TIGHTEN).is_ok();
             if connection.is_autocommit() && strict {
-                self.pool.give_back(connection);
+                lock(&self.pool.connections).push(connection);
             }
         }
     }
@@ -347,34 +335,17 @@ impl Query {
         executor: impl Executor,
         mut row: impl FnMut(&SqliteRow) -> Result<bool> + Send,
     ) -> Result<()> {
-        executor
-            .run(true, |connection| self.walk(connection, &mut row))
-            .await?
-    }
-
-    /// As [`Query::for_each`], on a thread that may block.
-    #[cfg(feature = "cluster")]
-    pub(crate) fn for_each_now(
-        self,
-        connection: &mut Connection,
-        mut row: impl FnMut(&SqliteRow) -> Result<bool>,
-    ) -> Result<()> {
-        connection.with(|connection| self.walk(connection, &mut row))?
-    }
-
-    fn walk(
-        &self,
-        connection: &rusqlite::Connection,
-        row: &mut dyn FnMut(&SqliteRow) -> Result<bool>,
-    ) -> rusqlite::Result<Result<()>> {
-        let mut done = Ok(());
-        self.step(connection, &mut |next| {
-            row(&next).unwrap_or_else(|error| {
-                done = Err(error);
-                false
-            })
-        })?;
-        Ok(done)
+        let read = |connection: &rusqlite::Connection| {
+            let mut done = Ok(());
+            self.step(connection, &mut |next| {
+                row(&next).unwrap_or_else(|error| {
+                    done = Err(error);
+                    false
+                })
+            })?;
+            Ok(done)
+        };
+        executor.run(true, read).await?
     }
 
     fn step(
@@ -583,24 +554,24 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("jobs.db");
         let store = SqliteStore::open(&file).await.unwrap();
-        let mut kept = store.writer.begin().await.unwrap();
+        let mut kept = store.writer.begin(false).await.unwrap();
         assert_eq!(bury(&mut kept, "a").await.unwrap().rows_affected(), 1);
         bury(&mut kept, "b").await.unwrap();
         kept.commit().await.unwrap();
 
-        let mut dropped = store.writer.begin().await.unwrap();
+        let mut dropped = store.writer.begin(false).await.unwrap();
         bury(&mut dropped, "c").await.unwrap();
         drop(dropped);
-        let mut fails = store.writer.begin().await.unwrap();
+        let mut fails = store.writer.begin(false).await.unwrap();
         bury(&mut fails, "d").await.unwrap();
         assert!(bury(&mut fails, "a").await.is_err());
         drop(fails);
-        let mut last = store.writer.begin().await.unwrap();
+        let mut last = store.writer.begin(false).await.unwrap();
         bury(&mut last, "e").await.unwrap();
         last.commit().await.unwrap();
         assert_eq!(buried(&store).await, ["a", "b", "e"]);
         store.close().await;
-        assert!(store.writer.begin().await.is_err());
+        assert!(store.writer.begin(false).await.is_err());
     }
 
     #[tokio::test]
@@ -613,7 +584,7 @@ mod tests {
             mode.fetch_one::<i64>(connection).await.unwrap()
         };
         for commits in [true, false] {
-            let mut relaxed = store.writer.begin_relaxed().await.unwrap();
+            let mut relaxed = store.writer.begin(true).await.unwrap();
             let id = if commits { "a" } else { "b" };
             bury(&mut relaxed, id).await.unwrap();
             assert_eq!(mode(&mut relaxed).await, 1);
@@ -621,7 +592,7 @@ mod tests {
                 true => relaxed.commit().await.unwrap(),
                 false => drop(relaxed),
             }
-            let mut next = store.writer.begin().await.unwrap();
+            let mut next = store.writer.begin(false).await.unwrap();
             assert_eq!(mode(&mut next).await, 2, "FULL");
         }
         assert_eq!(buried(&store).await, ["a"]);
@@ -635,7 +606,7 @@ mod tests {
         let other = rusqlite::Connection::open(&file).unwrap();
         other.execute_batch("BEGIN IMMEDIATE").unwrap();
         let write = async {
-            let mut transaction = store.writer.begin().await.unwrap();
+            let mut transaction = store.writer.begin(false).await.unwrap();
             bury(&mut transaction, "a").await.unwrap();
             transaction.commit().await.unwrap();
         };

@@ -23,9 +23,6 @@ pub(crate) use crate::store::sqlite::connection::{
 
 pub(crate) type SqlStore = SqliteStore;
 
-/// Text before and after the parameter with the current time by which leases are judged.
-pub(crate) const LEASE_NOW: (&str, &str) = ("", "");
-
 /// Runs the task that stores submitted jobs on a separate thread, which may wait for the disk.
 pub(crate) fn spawn(task: impl Future<Output = ()> + Send + 'static) -> Result<()> {
     let runtime = Handle::current();
@@ -37,12 +34,12 @@ pub(crate) fn spawn(task: impl Future<Output = ()> + Send + 'static) -> Result<(
 
 /// Begins a write transaction.
 pub(crate) async fn begin(writer: &DbPool) -> Result<Pooled> {
-    writer.begin().await
+    writer.begin(false).await
 }
 
 /// Begins a transaction that claims. A power cut may undo a claim, which leaves its jobs in the queue.
 pub(crate) async fn begin_claim(writer: &DbPool) -> Result<Pooled> {
-    writer.begin_relaxed().await
+    writer.begin(true).await
 }
 
 /// Passes each row of a statement to `row` until that returns `false`.

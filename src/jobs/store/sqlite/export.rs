@@ -1,5 +1,6 @@
 //! Export of the rows of an embedded job table.
 
+use tokio::runtime::Handle;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
@@ -46,9 +47,10 @@ impl SqliteStore {
         ));
         let mut connection = self.readers.acquire().await?;
         let (sender, portions) = mpsc::channel(1);
+        let runtime = Handle::current();
         let reading = tokio::task::spawn_blocking(move || {
             let (mut rows, mut text) = (0, String::new());
-            all.for_each_now(&mut connection, |row| {
+            let read = all.for_each(&mut *connection, |row| {
                 text.push(if rows == 0 { '[' } else { ',' });
                 text.push_str(&row.try_get::<String, _>("line")?);
                 rows += 1;
@@ -57,7 +59,8 @@ impl SqliteStore {
                 }
                 let full = (std::mem::take(&mut rows), std::mem::take(&mut text) + "]");
                 Ok(sender.blocking_send(full).is_ok())
-            })?;
+            });
+            runtime.block_on(read)?;
             if rows > 0 {
                 // The receiver may be closed.
                 let _ = sender.blocking_send((rows, text + "]"));

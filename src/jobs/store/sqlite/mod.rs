@@ -22,8 +22,11 @@ mod plans {
     use crate::model::{Kind, State};
     use crate::store::sqlite::connection::{Row, query};
     use crate::store::sqlite::database::SqliteStore;
-    use crate::store::sqlite::sql::claim::{NOTES, PEEK, PEEK_BEGUN, QUEUES, RESULTS};
-    use crate::store::sqlite::sql::finish::SOURCE;
+    use crate::store::sqlite::sql::blobs::{self, KNOWN};
+    use crate::store::sqlite::sql::claim::{
+        self, CLAIM, NOTES, PEEK, PEEK_BEGUN, QUEUES, RENEW, RESULTS,
+    };
+    use crate::store::sqlite::sql::finish::{END_PAIRS, FINISH, SOURCE};
     use crate::store::sqlite::sql::upkeep::{
         BEFORE, COUNT, EXPIRED, FAIL_LATE, LATE, OLDEST, REAP, REAP_BYSTANDERS, RESULT_BYTES,
     };
@@ -82,15 +85,12 @@ mod plans {
     #[tokio::test]
     async fn references_to_a_blob_are_found_by_index() {
         let store = Opened::new().await;
-        let free = "DELETE FROM blobs WHERE id IN (1, 2) AND NOT EXISTS (SELECT 1 FROM jobs WHERE jobs.blob_id = blobs.id) \
-            AND NOT EXISTS (SELECT 1 FROM job_slices WHERE job_slices.blob_id = blobs.id)";
-        let known = "SELECT key FROM blobs WHERE key IN ('a', 'b')";
         for (statement, seek) in [
-            (free, "jobs_by_blob (blob_id=?"),
-            (known, "blobs_by_key (key=?"),
+            (blobs::RELEASE, "jobs_by_blob (blob_id=?"),
+            (KNOWN, "blobs_by_key (key=?"),
         ] {
             let steps = store.plan(statement).await;
-            assert_seeks(&steps, seek, &["SCAN"]);
+            assert_seeks(&steps, seek, &["SCAN jobs", "SCAN blobs"]);
         }
     }
 
@@ -132,6 +132,19 @@ mod plans {
         ] {
             let steps = store.plan(statement).await;
             assert_seeks(&steps, seek, &["SCAN j", "TEMP B-TREE"]);
+        }
+    }
+
+    #[tokio::test]
+    async fn claimed_jobs_are_found_by_their_ids() {
+        let store = Opened::new().await;
+        for statement in [CLAIM, RENEW, claim::RELEASE, FINISH, END_PAIRS] {
+            let steps = store.plan(statement).await;
+            assert_seeks(
+                &steps,
+                "PRIMARY KEY (id=?)",
+                &["SCAN jobs", "jobs_by_state"],
+            );
         }
     }
 

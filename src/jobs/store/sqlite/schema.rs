@@ -34,7 +34,7 @@ const SCHEMA_VERSION: i64 = STEPS[STEPS.len() - 1].0;
 /// [`JobsError::UnsupportedSchema`] if the file holds something else or is of a later version, or the database failed.
 pub(crate) async fn migrate(writer: &Pool) -> Result<(), JobsError> {
     loop {
-        let mut transaction = writer.begin().await?;
+        let mut transaction = writer.begin(false).await?;
         let tables: i64 = sql!(scalar fetch_one, &mut *transaction,
             "SELECT COUNT(*) FROM sqlite_schema"
         )?;

@@ -24,10 +24,17 @@ macro_rules! bare {
     };
 }
 
-/// A column.
-macro_rules! unordered {
-    ($column:literal) => {
-        $column
+/// Restricts the value before it to a list of texts or, with a type, of numbers. The list is a parameter in JSON.
+macro_rules! in_list {
+    ($parameter:literal $($kind:literal)?) => {
+        concat!(" IN (SELECT value FROM json_each(", $parameter, "))")
+    };
+}
+
+/// The elements of a JSON array, in the column `value`. `value ->> 0` is the first member of an element as a text.
+macro_rules! json_rows {
+    ($parameter:literal) => {
+        concat!("json_each(", $parameter, ")")
     };
 }
 
@@ -35,5 +42,12 @@ macro_rules! unordered {
 macro_rules! lease_now {
     ($parameter:literal) => {
         $parameter
+    };
+}
+
+/// Declares a trait of the shared statements. This database is part of every build.
+macro_rules! declare {
+    ($name:ident $declaration:item) => {
+        $declaration
     };
 }
