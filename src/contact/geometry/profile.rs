@@ -255,7 +255,7 @@ impl Profile {
         let passing = self.measured.points.windows(2).filter_map(|ends| {
             let [[y0, z0], [y1, z1]] = [ends[0], ends[1]];
             let part = (y - y0) / (y1 - y0);
-            (0.0..=1.0).contains(&part).then(|| z0 + part * (z1 - z0))
+            (0.0..=1.0).contains(&part).then_some(z0 + part * (z1 - z0))
         });
         passing.reduce(f64::min)
     }
