@@ -3,10 +3,11 @@
 use railhead_contact::rolling::linear_theory::coefficients_with_spin;
 use railhead_contact::rolling::methods::table::evaluate::{growth, linear, linear_part};
 use railhead_contact::rolling::methods::table::spline::{
-    DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, Shape, VALUES,
-    direction, pole, ratio, size,
+    DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, Shape, direction, pole,
+    ratio, size,
 };
 
+use crate::fit::VALUES;
 use crate::nodes::column_of;
 use crate::solver::Answer;
 
@@ -39,7 +40,7 @@ fn columns(node: [usize; 2]) -> Option<Vec<Vec<Answer>>> {
     Some(columns)
 }
 
-/// Returns the values at the nodes, as [`CreepTable`](railhead_contact::rolling::methods::table::evaluate::CreepTable) takes them.
+/// Returns the values at the nodes, as [`table`](crate::fit::table) takes them.
 pub fn values() -> Vec<f32> {
     let mut values = vec![f32::NAN; VALUES];
     for node_ratio in 0..RATIOS {

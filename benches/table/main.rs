@@ -8,13 +8,13 @@
 use std::path::Path;
 
 use railhead_contact::case::digest::SOLVER_REVISION;
-use railhead_contact::rolling::methods::table::evaluate::CreepTable;
-use railhead_contact::rolling::methods::table::file::{TableFile, table};
+use railhead_contact::rolling::methods::table::file::table;
 use railhead_contact::rolling::methods::table::spline::{CELLS, RATIOS};
 use serde_json::json;
 
 mod assemble;
 mod bound;
+mod fit;
 mod held_out;
 mod judge;
 mod nodes;
@@ -62,7 +62,7 @@ fn main() {
 fn write() {
     let values = assemble::values();
     let indicators = bound::indicators(&values);
-    let without = judge::all(&CreepTable::new(&values, &vec![0.0; CELLS]));
+    let without = judge::all(&fit::table(&values, &vec![0.0; CELLS]));
     let half: Vec<_> = without.iter().filter(|j| j.contact % 2 == 0).collect();
     let laws: Vec<judge::Law> = bound::PARTS
         .iter()
@@ -78,7 +78,7 @@ fn write() {
     let bounds: Vec<f32> = (indicators.iter().enumerate())
         .map(|(cell, indicator)| laws[bound::part_of(cell)].of(*indicator) as f32)
         .collect();
-    judge::print_bounds(&judge::all(&CreepTable::new(&values, &bounds)));
+    judge::print_bounds(&judge::all(&fit::table(&values, &bounds)));
     let about = json!({
         "solver_revision": SOLVER_REVISION,
         "targets": (0..RATIOS).map(nodes::target).collect::<Vec<f64>>(),
@@ -87,7 +87,7 @@ fn write() {
     });
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let file = root.join("src/contact/rolling/methods/table/table.bin");
-    std::fs::write(file, TableFile::write(&about, &values, &bounds)).expect("a file");
+    std::fs::write(file, fit::file(&about, &values, &bounds)).expect("a file");
     std::fs::write(
         root.join("tests/data/creep_held_out.json"),
         held_out::sample(),

@@ -22,16 +22,6 @@ pub fn solve(matrix: &Mat<f64>, rhs: MatMut<'_, f64>, monitor: &dyn Monitor) -> 
     Ok(())
 }
 
-/// The inverse of a small square matrix, both row by row. It is not finite if the matrix is singular.
-pub(crate) fn inverse(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let n = rows.len();
-    let matrix = Mat::from_fn(n, n, |i, j| rows[i][j]);
-    let unit = PartialPivLu::new(matrix.as_ref()).solve(Mat::<f64>::identity(n, n));
-    (0..n)
-        .map(|i| (0..n).map(|j| unit[(i, j)]).collect())
-        .collect()
-}
-
 /// Factors a square matrix, stored column by column, into `P A = L U`. The part below the diagonal is L, whose diagonal is 1, the rest is U. `order[i]` becomes the row of
 /// A that is row i of `P A`; its length is that of the sides. The factors of a singular matrix are not finite.
 pub(crate) fn factor(matrix: &mut [f64], order: &mut [usize]) {
@@ -145,19 +135,6 @@ mod tests {
             let error = (&b - &x).norm_max();
             assert!(error < 1e-8, "{n}: {error}");
         }
-    }
-
-    #[test]
-    fn a_matrix_times_its_inverse_is_one() {
-        let n = 25;
-        let a = wavy(n);
-        let rows: Vec<Vec<f64>> = (0..n)
-            .map(|i| (0..n).map(|j| a[(i, j)]).collect())
-            .collect();
-        let found = inverse(&rows);
-        let product = &a * Mat::from_fn(n, n, |i, j| found[i][j]);
-        let error = (product - Mat::<f64>::identity(n, n)).norm_max();
-        assert!(error < 1e-9, "{error}");
     }
 }
 

@@ -5,17 +5,13 @@ use pulp::{Simd, WithSimd};
 use crate::numerics::simd;
 use crate::rolling::linear_theory::coefficients_with_spin;
 use crate::rolling::methods::table::spline::{
-    Axis, DIRECTION_COEFFICIENTS, DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLE_COEFFICIENTS, POLES,
-    RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, Shape, Weights, cell, coefficients, ln_ratio_max, sigma,
-    spin_factor,
+    Axis, BESIDE_SPIN, DIRECTION_COEFFICIENTS, DIRECTIONS, OUTPUTS, POISSON_RATIOS,
+    POLE_COEFFICIENTS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, Shape, Weights, cell,
+    ln_ratio_max, sigma, spin_factor,
 };
 
 /// The size at which everything slips without spin: f(r) = 1 from there on (Vermeulen and Johnson 1964).
 const SIZE_FULL: f64 = 3.0;
-
-/// Ratio of creepages to spin, by size, below which derivatives by creepages are differences. From 0.02 to 0.05 those of long ellipses change by up to 0.02 of C;
-/// 0.01 is chosen by judgement, well above the rounding of values.
-const BESIDE_SPIN: f64 = 0.01;
 
 /// The table, ready to be evaluated.
 #[derive(Debug)]
@@ -86,28 +82,20 @@ pub fn linear([c11, c22, c23, c33]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 3] {
 }
 
 impl CreepTable {
-    /// The table with these values at its nodes, `[a/b][pole][direction][size][ν][function]`, and the error bounds of the cells between them. Values are `F/f(r)`
-    /// without the part of linear theory for forces and moment, and the share that sticks.
-    pub fn new(values: &[f32], bounds: &[f32]) -> CreepTable {
-        let exact = coefficients(values);
-        let mut largest = [f32::MIN_POSITIVE; OUTPUTS];
-        for (k, value) in exact.iter().enumerate() {
-            let largest = &mut largest[k % OUTPUTS];
-            *largest = largest.max(value.abs());
-        }
-        let unit = largest.map(|largest| largest / f32::from(i16::MAX));
-        let number = |(k, value): (usize, &f32)| (value / unit[k % OUTPUTS]).round() as i16;
+    /// The table with the coefficients of a spline, the unit of each function, and the error bounds of the cells between nodes. The functions are `F/f(r)` without
+    /// the part of linear theory for forces and moment, and the share that sticks.
+    pub fn new(spline: Vec<i16>, unit: [f32; OUTPUTS], bounds: Vec<f32>) -> CreepTable {
         let ratios: [u8; RATIOS] = std::array::from_fn(|k| k as u8);
         let ratio_step = 2.0 * ln_ratio_max() / (RATIOS - 1) as f64;
         let quarter = std::f64::consts::FRAC_PI_2;
         CreepTable {
-            spline: exact.iter().enumerate().map(number).collect(),
+            spline,
             unit,
             ratio: Axis::free(-ln_ratio_max(), ratio_step, &ratios),
             pole: Axis::mirrored(0.0..quarter, POLES),
             direction: Axis::mirrored(-quarter..quarter, DIRECTIONS),
             size: Axis::free(0.0, 1.0 / SIZE_STEPS, &SIZES),
-            bounds: bounds.to_vec(),
+            bounds,
         }
     }
 

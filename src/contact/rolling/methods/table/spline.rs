@@ -1,4 +1,4 @@
-//! The nodes of the table, the spline through its values, and the coordinates in which creep forces are smooth: the size of the creepage, the place of the spin
+//! The nodes of the table, the axes of its spline, and the coordinates in which creep forces are smooth: the size of the creepage, the place of the spin
 //! pole, and the direction.
 //!
 //! Creepages are dimensionless: `x = G c² ν_x/(μN)`, `y = G c² ν_y/(μN)`, `z = G c³ φ/(μN)` with c = √(ab), for x, z ≥ 0. With Kalker's coefficients C11 and C22,
@@ -13,9 +13,6 @@
 use std::f64::consts::{FRAC_PI_2, LN_10, PI};
 use std::ops::Range;
 
-use crate::numerics::lu::inverse;
-use crate::rolling::methods::table::spline::Mirror::{Even, Odd};
-
 /// Number of functions in the table: F_x, F_y, M_z and the share that sticks.
 pub const OUTPUTS: usize = 4;
 /// Number of coefficients in the pole: one more beyond each end.
@@ -24,118 +21,6 @@ pub const POLE_COEFFICIENTS: usize = POLES + 2;
 pub const DIRECTION_COEFFICIENTS: usize = DIRECTIONS + 2;
 /// Number of values of one a/b, pole and direction: sizes, Poisson's ratios, functions.
 pub const ROW: usize = SIZES.len() * POISSON_RATIOS.len() * OUTPUTS;
-
-/// Number of values at all nodes.
-pub const VALUES: usize = RATIOS * POLES * DIRECTIONS * ROW;
-
-/// The continuation of the functions beyond χ = ±π/2, where the creepage along rolling changes sign.
-const ACROSS_ROLLING: [Mirror; OUTPUTS] = [Odd, Even, Even, Even];
-
-/// The continuation of the part of a function that is even in χ beyond θ = 0 (the spin changes sign) and θ = π/2 (both creepages do). The part that is odd in χ
-/// continues with the opposite sign.
-///
-/// The forces satisfy `F_x(x, y, −z) = F_x(x, −y, z)` and `F_x(−x, −y, z) = −F_x(x, −y, z)`. Lateral force and moment have the opposite sign in the first
-/// relation and not in the second, the share that sticks in neither.
-const OF_SPIN: [[Mirror; 2]; OUTPUTS] = [[Even, Odd], [Odd, Even], [Odd, Even], [Even, Even]];
-
-/// Coefficients `[a/b][pole][direction][size][ν][function]` of the spline through values `[a/b][pole][direction][size][ν][function]`.
-pub fn coefficients(values: &[f32]) -> Vec<f32> {
-    let along = |matrix: &[Vec<f64>], before: usize, from: &[f32], inner: usize| {
-        transformed(matrix, before, from, inner)
-    };
-    let sizes = along(
-        &free_coefficients(&SIZES),
-        RATIOS * POLES * DIRECTIONS,
-        values,
-        POISSON_RATIOS.len() * OUTPUTS,
-    );
-    let ratio_places: [u8; RATIOS] = std::array::from_fn(|k| k as u8);
-    let ratios = along(
-        &free_coefficients(&ratio_places),
-        1,
-        &sizes,
-        POLES * DIRECTIONS * ROW,
-    );
-    let poles = over_poles(&ratios);
-    over_directions(&poles)
-}
-
-/// Applies a matrix to one index of an array `[before][nodes][inner]`.
-fn transformed(matrix: &[Vec<f64>], before: usize, from: &[f32], inner: usize) -> Vec<f32> {
-    let nodes = matrix[0].len();
-    let mut to = vec![0.0; before * matrix.len() * inner];
-    let blocks = from.chunks_exact(nodes * inner);
-    for (from, to) in blocks.zip(to.chunks_exact_mut(matrix.len() * inner)) {
-        for (row, to) in matrix.iter().zip(to.chunks_exact_mut(inner)) {
-            for (weight, from) in row.iter().zip(from.chunks_exact(inner)) {
-                let weight = *weight as f32;
-                to.iter_mut()
-                    .zip(from)
-                    .for_each(|(to, from)| *to += weight * from);
-            }
-        }
-    }
-    to
-}
-
-/// Adds the rows of an array, multiplied by the weight of each function.
-fn add(to: &mut [f32], from: &[f32], weights: [f32; OUTPUTS]) {
-    let (to, _) = to.as_chunks_mut::<OUTPUTS>();
-    let (from, _) = from.as_chunks::<OUTPUTS>();
-    for (to, from) in to.iter_mut().zip(from) {
-        for k in 0..OUTPUTS {
-            to[k] += weights[k] * from[k];
-        }
-    }
-}
-
-/// Splines over the poles of an array `[a/b][pole][direction][row]`, separately for the parts even and odd in the direction.
-fn over_poles(from: &[f32]) -> Vec<f32> {
-    let of_ends = |ends: [Mirror; 2]| mirrored_coefficients(POLES, ends);
-    let matrices = OF_SPIN.map(|ends| [of_ends(ends), of_ends(ends.map(Mirror::other))]);
-    let block = DIRECTIONS * ROW;
-    let mut to = vec![0.0; RATIOS * POLE_COEFFICIENTS * block];
-    let blocks = from.chunks_exact(POLES * block);
-    for (from, to) in blocks.zip(to.chunks_exact_mut(POLE_COEFFICIENTS * block)) {
-        for (pole, to) in to.chunks_exact_mut(block).enumerate() {
-            for (node, from) in from.chunks_exact(block).enumerate() {
-                // Half the sum and half the difference of the two weights apply to χ and −χ.
-                let half = |sign: f64| -> [f32; OUTPUTS] {
-                    std::array::from_fn(|k| {
-                        let [same, other] = &matrices[k];
-                        0.5 * (same[pole][node] + sign * other[pole][node]) as f32
-                    })
-                };
-                let (here, mirrored) = (half(1.0), half(-1.0));
-                for chi in 0..DIRECTIONS {
-                    let to = &mut to[chi * ROW..(chi + 1) * ROW];
-                    add(to, &from[chi * ROW..(chi + 1) * ROW], here);
-                    let image = DIRECTIONS - 1 - chi;
-                    add(to, &from[image * ROW..(image + 1) * ROW], mirrored);
-                }
-            }
-        }
-    }
-    to
-}
-
-/// Splines over the directions of an array `[a/b][pole][direction][row]`.
-fn over_directions(from: &[f32]) -> Vec<f32> {
-    let matrices = ACROSS_ROLLING.map(|end| mirrored_coefficients(DIRECTIONS, [end; 2]));
-    let mut to = vec![0.0; from.len() / DIRECTIONS * DIRECTION_COEFFICIENTS];
-    let blocks = from.chunks_exact(DIRECTIONS * ROW);
-    for (from, to) in blocks.zip(to.chunks_exact_mut(DIRECTION_COEFFICIENTS * ROW)) {
-        for (chi, to) in to.chunks_exact_mut(ROW).enumerate() {
-            for (node, from) in from.chunks_exact(ROW).enumerate() {
-                let weights: [f32; OUTPUTS] =
-                    std::array::from_fn(|k| matrices[k][chi][node] as f32);
-                add(to, from, weights);
-            }
-        }
-    }
-    to
-}
-
 /// Number of nodes in ln(a/b), uniform from 1/10 to 10.
 pub const RATIOS: usize = 10;
 /// Nodes in Poisson's ratio, between which values are parabolas.
@@ -236,26 +121,6 @@ pub struct Weights {
     pub slope: [f64; 4],
 }
 
-/// The continuation of a function beyond an end of an axis as its own mirror image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mirror {
-    /// Equal values.
-    Even,
-    /// Opposite values; 0 at the end.
-    Odd,
-}
-
-impl Mirror {
-    /// The opposite continuation.
-    #[must_use]
-    pub fn other(self) -> Mirror {
-        match self {
-            Even => Odd,
-            Odd => Even,
-        }
-    }
-}
-
 impl Axis {
     /// An axis of uniform nodes with one more coefficient before the first node and one after the last.
     pub fn mirrored(ends: Range<f64>, nodes: usize) -> Axis {
@@ -326,50 +191,6 @@ impl Axis {
     }
 }
 
-/// The matrix from values at uniform nodes to the coefficients of [`Axis::mirrored`], row by row.
-pub fn mirrored_coefficients(nodes: usize, ends: [Mirror; 2]) -> Vec<Vec<f64>> {
-    let mut system = vec![vec![0.0; nodes]; nodes];
-    for (node, row) in system.iter_mut().enumerate() {
-        for (other, weight) in [(-1, 1.0), (0, 4.0), (1, 1.0)] {
-            let (column, sign) = reflected(node as isize + other, nodes, ends);
-            row[column] += sign * weight / 6.0;
-        }
-    }
-    let inside = inverse(&system);
-    let mut all = Vec::with_capacity(nodes + 2);
-    for row in -1..=nodes as isize {
-        let (inner, sign) = reflected(row, nodes, ends);
-        all.push(inside[inner].iter().map(|v| sign * v).collect());
-    }
-    all
-}
-
-/// The matrix from values at the nodes of [`Axis::free`] to coefficients.
-pub fn free_coefficients(places: &[u8]) -> Vec<Vec<f64>> {
-    let axis = Axis::free(0.0, 1.0, places);
-    let mut system = vec![vec![0.0; places.len()]; places.len()];
-    for (row, place) in system.iter_mut().zip(places) {
-        let weights = axis.at(f64::from(*place));
-        for (k, weight) in weights.value.iter().enumerate() {
-            row[weights.first + k] = *weight;
-        }
-    }
-    inverse(&system)
-}
-
-/// The node whose value replaces one beyond the ends, and its sign.
-fn reflected(node: isize, nodes: usize, ends: [Mirror; 2]) -> (usize, f64) {
-    let last = nodes as isize - 1;
-    let sign = |mirror| if mirror == Odd { -1.0 } else { 1.0 };
-    if node < 0 {
-        ((-node) as usize, sign(ends[0]))
-    } else if node > last {
-        ((2 * last - node) as usize, sign(ends[1]))
-    } else {
-        (node as usize, 1.0)
-    }
-}
-
 /// Knots of a cubic spline through the places, without the second and the last but one.
 fn knots(places: &[u8]) -> Vec<f64> {
     let at = |k: usize| f64::from(places[k]);
@@ -422,66 +243,6 @@ fn cubic_through(v: [f64; 4]) -> [f64; 4] {
     ]
 }
 
-#[cfg(test)]
-mod axis_tests {
-    use super::*;
-    use std::f64::consts::PI;
-
-    fn value(axis: &Axis, coefficients: &[f64], at: f64) -> [f64; 2] {
-        let weights = axis.at(at);
-        let sum = |w: [f64; 4]| (0..4).map(|k| w[k] * coefficients[weights.first + k]).sum();
-        [sum(weights.value), sum(weights.slope)]
-    }
-
-    fn times(matrix: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
-        let row = |row: &Vec<f64>| row.iter().zip(values).map(|(m, v)| m * v).sum();
-        matrix.iter().map(row).collect()
-    }
-
-    #[test]
-    fn cubics_are_met_everywhere_on_uneven_nodes() {
-        let places = [0, 2, 4, 6, 8, 10, 11, 12, 13, 14, 16, 20, 24];
-        let cubic = |x: f64| {
-            [
-                0.3 - x + 0.2 * x * x - 0.01 * x * x * x,
-                -1.0 + 0.4 * x - 0.03 * x * x,
-            ]
-        };
-        let axis = Axis::free(0.0, 1.0, &places);
-        let nodes = places.map(|p| cubic(f64::from(p))[0]);
-        let coefficients = times(&free_coefficients(&places), &nodes);
-        for k in 0..=240 {
-            let x = 0.1 * f64::from(k);
-            let [v, s] = value(&axis, &coefficients, x);
-            assert!((v - cubic(x)[0]).abs() < 1e-10, "{x}: {v}");
-            assert!((s - cubic(x)[1]).abs() < 1e-10, "{x}: {s}");
-        }
-    }
-
-    #[test]
-    fn waves_that_mirror_at_the_ends_are_met_to_the_fourth_order_with_slopes_that_end_at_0() {
-        let axis = Axis::mirrored(0.0..PI, 17);
-        for (ends, wave) in [
-            ([Even, Even], f64::cos as fn(f64) -> f64),
-            ([Odd, Odd], f64::sin),
-        ] {
-            let nodes: Vec<f64> = (0..17).map(|k| wave(PI * f64::from(k) / 16.0)).collect();
-            let coefficients = times(&mirrored_coefficients(17, ends), &nodes);
-            for k in 0..=100 {
-                let x = PI * f64::from(k) / 100.0;
-                assert!((value(&axis, &coefficients, x)[0] - wave(x)).abs() < 2e-5);
-            }
-            let at_end = value(&axis, &coefficients, 0.0);
-            let zero = if ends[0] == Even {
-                at_end[1]
-            } else {
-                at_end[0]
-            };
-            assert!(zero.abs() < 1e-14, "{zero}");
-        }
-    }
-}
-
 /// The properties of the shape of an ellipse that determine the coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {
@@ -504,8 +265,9 @@ pub fn spin_factor(root: f64, [c11, c22]: [f64; 2]) -> f64 {
 const STEPS: usize = 4;
 /// Squares of creepages relative to that of the spin up to which the pole is at the centre. θ then differs from a right angle by about the square root of this.
 const SPIN_ALONE: f64 = 1e-20;
-/// Ratio of creepages to spin, by size, at which derivatives at pure spin are taken.
-const BESIDE_SPIN: f64 = 1e-3;
+/// Ratio of creepages to spin, by size, below which derivatives by creepages are differences, and those by spin are taken at this ratio. From 0.02 to 0.05 derivatives of
+/// long ellipses change by up to 0.02 of C; 0.01 is chosen by judgement, well above the rounding of values.
+pub(crate) const BESIDE_SPIN: f64 = 0.01;
 
 impl Shape {
     /// The shape with √(a/b) and `[C11, C22]` at ν = 1/4.
