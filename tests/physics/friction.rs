@@ -6,7 +6,7 @@ use railhead_contact::mesh::MeshSize;
 use railhead_contact::monitor::Unmonitored;
 use railhead_contact::normal_stage;
 use railhead_contact::rolling::methods::boundary_element::newton::Newton;
-use railhead_contact::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
+use railhead_contact::rolling::methods::boundary_element::task::NewtonTask;
 use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead_contact::rolling::slip_equations::SlipEquations;
 use railhead_contact::rolling::slip_rules::Rule;
@@ -78,7 +78,6 @@ fn one_rule(contact: &Ellipse, rule: Rule) -> Cells {
         scale: 1.0,
         // The trapezoidal rule passes the residual of a cell on to its neighbours.
         tolerance: 0.01 * TOLERANCE_LEAST,
-        steps_max: STEPS_MAX,
         accepts_start: true,
     };
     let mut t = vec![0.0; 2 * padded];

@@ -8,9 +8,7 @@ use railhead_contact::half_space::strip_operator::operator::StripOperator;
 use railhead_contact::mesh::{Chord, Grading, Mesh, equal_strips};
 use railhead_contact::monitor::Unmonitored;
 use railhead_contact::rolling::methods::boundary_element::newton::Newton;
-use railhead_contact::rolling::methods::boundary_element::task::{
-    Convergence, NewtonTask, STEPS_MAX,
-};
+use railhead_contact::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
 use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead_contact::rolling::methods::liu_hsu::solve::ZonesOutcome;
 use railhead_contact::rolling::methods::liu_hsu::stick_block::DenseTask;
@@ -148,7 +146,6 @@ impl Contact {
             area: &self.area,
             scale: self.scale(rigid),
             tolerance,
-            steps_max: STEPS_MAX,
             accepts_start: true,
         }
     }

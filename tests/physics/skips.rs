@@ -8,9 +8,7 @@ use railhead_contact::monitor::Unmonitored;
 use railhead_contact::normal_stage;
 use railhead_contact::rolling::methods::boundary_element::newton::Newton;
 use railhead_contact::rolling::methods::boundary_element::solve as boundary_element;
-use railhead_contact::rolling::methods::boundary_element::task::{
-    LevelTask, NewtonTask, STEPS_MAX,
-};
+use railhead_contact::rolling::methods::boundary_element::task::{LevelTask, NewtonTask};
 use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead_contact::rolling::methods::fastsim;
 use railhead_contact::rolling::slip_equations::SlipEquations;
@@ -94,7 +92,6 @@ fn distance_on(nu: f64, asked: LevelTask) -> f64 {
             area: &area,
             scale: 1.0,
             tolerance: 1e-9,
-            steps_max: STEPS_MAX,
             accepts_start: true,
         };
         let report = Newton::new(&equations)

@@ -667,17 +667,6 @@ remarks! {
     advice: "The forces are not affected. Without gradients, take differences between motions.",
     detail: "a solve for the gradients of this motion did not converge; they are missing".to_owned(),
 
-    /// Friction falls so fast with slip that the contact has a second state.
-    Warning SeveralSolutions {
-        /// Difference of the two forces relative to the friction limit.
-        force_change: @short f64 = 0.08,
-    }
-    advice: "The result is the state reached from small slip. Reduce the speed, the pressure or the fall of friction to see where the two states separate.",
-    detail: format!(
-        "friction falls so fast with slip that a second state exists, reached from sliding, whose force differs by {force_change} of \
-         the friction limit; the result is the one reached from rest"
-    ),
-
     /// The contact passes so slowly that heat also flows along the surface.
     Warning HeatSpreads {
         /// Péclet number.

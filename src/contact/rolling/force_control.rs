@@ -28,14 +28,12 @@ use crate::rolling::task::{
 
 /// Largest place: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement.
 pub(crate) const PLACE_MAX: f64 = 65.0;
-/// Tolerance of the table search for a start, relative to μN: about the error of the table. With the cubic law in place of the table, a single force takes
-/// 47 % more products, and those of sweeps 13 %.
-const TABLE_MISSED: f64 = 1e-3;
 /// Tolerance of a prescribed force over the target error. Chosen by judgement.
 const SHARE_OF_TARGET: f64 = 0.02;
-/// Tolerance of a force, relative to μN, of the first search, on the coarsest mesh. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of
-/// `cargo bench --bench stress -- --only times`. Without such a search the work is five times as large, mostly because of a few slender ellipses.
-const MISSED_ON_COARSEST: f64 = 0.01;
+/// Tolerance of a force, relative to μN, of the searches for a start: by the table, without which a single force takes 47 % more products, and on the coarsest
+/// mesh, without which the work is five times as large. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of
+/// `cargo bench --bench stress -- --only times`.
+const MISSED_AT_START: f64 = 0.01;
 /// Near μN the creepage depends on the small remainder `1 − force/μN`; the tolerance is at most this multiple of it. Chosen by judgement.
 const NEAR_LIMIT: f64 = 10.0;
 /// Least tolerance of a force, relative to μN or, if they are smaller, to the forces of the first motion tried. Where everything slips, elastic slip still turns
@@ -226,7 +224,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
         let scale = first.unwrap_or(1.0).max(wanted).min(1.0);
         let left = (NEAR_LIMIT * (1.0 - wanted)).max(0.0);
         let most = if roughly {
-            MISSED_ON_COARSEST.max(most)
+            MISSED_AT_START.max(most)
         } else {
             most
         };
@@ -257,7 +255,7 @@ impl<'a, 's, 'p> ForceSearch<'a, 's, 'p> {
             }
             Ok::<_, Infallible>(Trial {
                 residual,
-                tolerance: TABLE_MISSED,
+                tolerance: MISSED_AT_START,
                 value: (),
             })
         });

@@ -16,16 +16,12 @@ use crate::rolling::history::plan::{
     weights,
 };
 use crate::rolling::methods::boundary_element::newton::Newton;
-use crate::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
+use crate::rolling::methods::boundary_element::task::NewtonTask;
 use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::rolling::slip_rules::Rule;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Motion, PrescribedForces, RollingTask};
-
-/// Tangential stiffness of a circular patch over shear modulus and radius, for the first trial of a force: 4/(2 − ν) of both bodies together (Mindlin 1949).
-/// Later trials use the stiffness found.
-const STIFFNESS: f64 = 2.5;
 
 /// The solve of a history on one mesh.
 pub struct LevelRun<'a> {
@@ -191,7 +187,8 @@ impl<'a> LevelRun<'a> {
     fn search(&self, kind: StepKind) -> Search<2> {
         let limit = self.limit;
         let patch = self.task.footprint.patches()[0].extent;
-        let stiffness = STIFFNESS / limit;
+        // The tangential stiffness of a circular patch of both bodies over shear modulus and radius (Mindlin 1949). Later trials use the stiffness found.
+        let stiffness = 4.0 / (2.0 - self.level.poisson_ratio) / limit;
         let reach = match kind {
             StepKind::Shift | StepKind::Press => 1.0,
             StepKind::Roll { distance, growth } => {
@@ -318,7 +315,6 @@ impl<'a> LevelRun<'a> {
             area: &self.area,
             scale: 1.0,
             tolerance: self.tolerance[0],
-            steps_max: STEPS_MAX,
             accepts_start: true,
         };
         let mut tractions = self.state.guess.clone();

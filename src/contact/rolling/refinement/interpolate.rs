@@ -177,7 +177,7 @@ impl<'a> RefinementState<'a> {
             task,
             levels: Levels::new(task, store),
             predictor: Predictor::default(),
-            workspace: NewtonWorkspace::of_thread(),
+            workspace: NewtonWorkspace::default(),
             ellipses: OnceCell::new(),
         }
     }
@@ -195,12 +195,6 @@ impl<'a> RefinementState<'a> {
         for number in self.levels.trim() {
             self.predictor.forget(number);
         }
-    }
-}
-
-impl Drop for RefinementState<'_> {
-    fn drop(&mut self) {
-        std::mem::take(&mut self.workspace).give_back();
     }
 }
 

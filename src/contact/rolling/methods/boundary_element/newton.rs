@@ -12,7 +12,7 @@ use crate::numerics::simd::length;
 use crate::rolling::answer::Work;
 use crate::rolling::methods::boundary_element::linearisation::{FallingRow, Linearisation};
 use crate::rolling::methods::boundary_element::preconditioner::{OwnBlocks, StripFactors};
-use crate::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
+use crate::rolling::methods::boundary_element::task::{Convergence, NewtonTask, STEPS_MAX};
 use crate::rolling::methods::boundary_element::workspace::{NewtonWorkspace, StepVectors, zeroed};
 use crate::rolling::slip_equations::{SlipEquations, SlipScratch};
 use crate::rolling::slip_rules::Rule;
@@ -40,8 +40,6 @@ pub struct Newton<'a> {
     parameter: Vec<f64>,
     /// See [`Newton::compliance`].
     compliance: f64,
-    /// See [`Newton::stability`].
-    stability: f64,
 }
 
 impl<'a> Newton<'a> {
@@ -55,7 +53,6 @@ impl<'a> Newton<'a> {
             equations,
             compliance: sum / (PROJECTION * parameter.len().max(1) as f64),
             parameter,
-            stability: 0.0,
             own,
         }
     }
@@ -69,7 +66,6 @@ impl<'a> Newton<'a> {
         };
         let steepest = fall.steepest();
         for (r, bound) in self.parameter.iter_mut().zip(bound) {
-            self.stability = self.stability.max(steepest * bound * PROJECTION / *r);
             *r = r.max(2.0 * steepest * bound);
         }
         self
@@ -83,12 +79,6 @@ impl<'a> Newton<'a> {
             *r = PROJECTION / (PROJECTION / *r + gain.abs());
         }
         self
-    }
-
-    /// The largest `|g′| |M_ii|` of a cell: the weakening of the bound with slip over the decrease of slip with traction. Below 1 every cell alone has one
-    /// solution. 0 for bounds that do not weaken.
-    pub fn stability(&self) -> f64 {
-        self.stability
     }
 
     /// The rule in use.
@@ -140,7 +130,7 @@ impl<'a> Newton<'a> {
                 break;
             }
             // An iterate that is not a number cannot be improved.
-            if report.iterations == law.steps_max || report.residual.is_nan() {
+            if report.iterations == STEPS_MAX || report.residual.is_nan() {
                 break;
             }
             self.linearise(law, t, rhs, workspace, &mut report);

@@ -19,10 +19,6 @@ use crate::rolling::slip_rules::Rule;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
-/// Largest difference of the forces of equal solutions, relative to the friction limit: ten times the largest residual.
-const SAME_SOLUTION: f64 = 4e-3;
-/// Stability number (see [`Newton::stability`]) above which a second solution is sought. None was found below 1.5 in 360 random motions of a prototype.
-const SECOND_START_FROM: f64 = 0.5;
 /// If the change of the bounds in a round exceeds this part of the change before, the following steps are halved. Chosen by judgement.
 const PASSAGE_FALL: f64 = 0.7;
 
@@ -30,8 +26,6 @@ const PASSAGE_FALL: f64 = 0.7;
 pub(super) struct ThreePointAnswer {
     pub(super) slip: [Vec<f64>; 2],
     pub(super) slips: Vec<bool>,
-    /// See [`RuleSequence::other_solution`].
-    pub(super) other: Option<f64>,
 }
 
 /// The solve of one motion on one mesh.
@@ -136,14 +130,8 @@ impl<'a> RuleSequence<'a> {
         t
     }
 
-    /// Solves one rule from `t` in at most `steps_max` Newton steps.
-    fn rule(
-        &mut self,
-        newton: &Newton,
-        rigid: &[f64],
-        t: &mut [f64],
-        steps_max: u32,
-    ) -> Result<Convergence, Stop> {
+    /// Solves one rule from `t`.
+    fn rule(&mut self, newton: &Newton, rigid: &[f64], t: &mut [f64]) -> Result<Convergence, Stop> {
         let largest = rigid.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
         let falls = newton.rule() != Rule::Trapezoid;
         let law = NewtonTask {
@@ -157,7 +145,6 @@ impl<'a> RuleSequence<'a> {
             // Small motions cause small tractions, whose residual must not be relative to the bounds.
             scale: (largest * newton.compliance()).min(1.0),
             tolerance: self.tolerance,
-            steps_max,
             // Starts of the trapezoid rule come from other meshes or motions; one step makes the solution independent of them.
             accepts_start: falls,
         };
@@ -171,13 +158,13 @@ impl<'a> RuleSequence<'a> {
         let equations = self.equations(Rule::ThreePoint);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        let mut report = self.rule(&newton, &rigid, t, STEPS_MAX)?;
+        let mut report = self.rule(&newton, &rigid, t)?;
         // The start may prevent convergence.
         if !report.converged {
             t.fill(0.0);
             // The upwind rule is of first order but monotone. Its solution is only a start.
             self.upwind(t)?;
-            report = self.rule(&newton, &rigid, t, STEPS_MAX)?;
+            report = self.rule(&newton, &rigid, t)?;
         }
         if !report.converged {
             return Err(LevelFailure::NotConverged {
@@ -192,18 +179,11 @@ impl<'a> RuleSequence<'a> {
         let found = ThreePointAnswer {
             slip: self.own_slip(),
             slips: newton.zones(&self.bound, t, self.workspace.slip(), self.level),
-            other: None,
         };
-        let Some(fall) = self.fall else {
-            return Ok(found);
-        };
-        // A second start would overwrite the slips in the workspace.
-        self.slipping = Some(newton.bounds(&self.bound, &fall, t, self.workspace.slip()));
-        let other = match newton.stability() > SECOND_START_FROM {
-            true => self.other_solution(&newton, &rigid, t)?,
-            false => None,
-        };
-        Ok(ThreePointAnswer { other, ..found })
+        if let Some(fall) = self.fall {
+            self.slipping = Some(newton.bounds(&self.bound, &fall, t, self.workspace.slip()));
+        }
+        Ok(found)
     }
 
     /// Solves repeatedly with the bounds of the last slips until both agree. The trapezoid rule uses the same bounds.
@@ -243,7 +223,7 @@ impl<'a> RuleSequence<'a> {
             for (bound, found) in self.bound.iter_mut().zip(found) {
                 *bound += weight * (found - *bound);
             }
-            if !self.rule(newton, rigid, t, STEPS_MAX)?.converged {
+            if !self.rule(newton, rigid, t)?.converged {
                 break;
             }
         }
@@ -256,49 +236,20 @@ impl<'a> RuleSequence<'a> {
         })
     }
 
-    /// The difference of the force, relative to the friction limit, of the solution from a start in which every cell slips along the rigid slip. `None` if
-    /// that start leads to no solution or to the same one.
-    fn other_solution(
-        &mut self,
-        newton: &Newton,
-        rigid: &[f64],
-        t: &[f64],
-    ) -> Result<Option<f64>, Stop> {
-        let Some(fall) = self.fall else {
-            return Ok(None);
-        };
-        let cells = newton.cells();
-        let (bound, area) = (&self.bound[..cells], &self.area[..cells]);
-        let mut other = vec![0.0; t.len()];
-        slide_along(rigid, bound, Some(&fall), &mut other);
-        let limit: f64 = area.iter().zip(bound).map(|(a, g)| a * g).sum();
-        let report = self.rule(newton, rigid, &mut other, STEPS_MAX)?;
-        if !report.converged {
-            return Ok(None);
-        }
-        let change = force_change(&self.area[..cells], t, &other) / limit;
-        Ok((change > SAME_SOLUTION).then_some(change))
-    }
-
     fn upwind(&mut self, t: &mut [f64]) -> Result<bool, Stop> {
         let equations = self.equations(Rule::Upwind);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
-        Ok(self.rule(&newton, &rigid, t, STEPS_MAX)?.converged)
+        Ok(self.rule(&newton, &rigid, t)?.converged)
     }
 
-    /// Solves the trapezoid rule from `t` in at most `steps_max` Newton steps and returns the slip flags. Without convergence, `t` and its residual do not
-    /// change.
-    pub(super) fn trapezoid(
-        &mut self,
-        t: &mut [f64],
-        steps_max: u32,
-    ) -> Result<Option<Vec<bool>>, Stop> {
+    /// Solves the trapezoid rule from `t` and returns the slip flags. Without convergence, `t` and its residual do not change.
+    pub(super) fn trapezoid(&mut self, t: &mut [f64]) -> Result<Option<Vec<bool>>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
         let rigid = self.rigid(&equations);
         let newton = self.newton(&equations);
         let (mut found, residual) = (t.to_vec(), self.work.residual);
-        let report = self.rule(&newton, &rigid, &mut found, steps_max)?;
+        let report = self.rule(&newton, &rigid, &mut found)?;
         if !report.converged {
             self.work.residual = residual;
             return Ok(None);
@@ -317,26 +268,4 @@ impl<'a> RuleSequence<'a> {
     pub(super) fn expand(&self, values: &[f64]) -> [Vec<f64>; 2] {
         self.level.expand(self.parity, values)
     }
-}
-
-/// Sets the tractions to their bounds in the directions of the slips.
-fn slide_along(slip: &[f64], bound: &[f64], fall: Option<&Softening>, t: &mut [f64]) {
-    let padded = t.len() / 2;
-    for (i, rest) in bound.iter().enumerate() {
-        let size = length(slip[i], slip[padded + i]);
-        let bound = fall.map_or(*rest, |fall| rest * fall.at(size).0);
-        let factor = if size > 0.0 { bound / size } else { 0.0 };
-        t[i] = factor * slip[i];
-        t[padded + i] = factor * slip[padded + i];
-    }
-}
-
-/// Length of the difference of the forces of two sets of tractions on cells with given areas.
-fn force_change(area: &[f64], t: &[f64], other: &[f64]) -> f64 {
-    let padded = t.len() / 2;
-    let [x, y] = [0, padded].map(|from| {
-        let change = |(i, area): (usize, &f64)| area * (other[from + i] - t[from + i]);
-        area.iter().enumerate().map(change).sum::<f64>()
-    });
-    x.hypot(y)
 }

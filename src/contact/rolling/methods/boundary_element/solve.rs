@@ -10,7 +10,7 @@ use crate::remark::list::Remark;
 use crate::rolling::answer::Skip;
 use crate::rolling::answer::{LevelAnswer, LevelFailure, project_on_bound};
 use crate::rolling::methods::boundary_element::rule_sequence::RuleSequence;
-use crate::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask, STEPS_MAX};
+use crate::rolling::methods::boundary_element::task::LevelTask;
 use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::rolling::strip_mesh::StripMesh;
 
@@ -37,18 +37,15 @@ pub fn solve(
     let mut t = solve.start(start);
     let bounds_are_given = task.fall.is_none() && task.passage.is_none();
     let mut found = match bounds_are_given {
-        true => solve.trapezoid(&mut t, FEW_STEPS)?,
+        true => solve.trapezoid(&mut t)?,
         false => None,
     };
     let mut smooth = None;
     let mut failed_slips = None;
     if found.is_none() {
         let three_point = solve.three_point(&mut t)?;
-        if let Some(force_change) = three_point.other {
-            remarks.push(Remark::SeveralSolutions { force_change });
-        }
         smooth = Some((solve.expand(&t), three_point.slip));
-        found = solve.trapezoid(&mut t, STEPS_MAX)?;
+        found = solve.trapezoid(&mut t)?;
         if found.is_none() {
             remarks.push(Remark::SecondRuleFailed {});
             failed_slips = Some(three_point.slips);

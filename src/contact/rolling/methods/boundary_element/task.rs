@@ -50,15 +50,10 @@ pub struct NewtonTask<'a> {
     pub scale: f64,
     /// Residual to reach.
     pub tolerance: f64,
-    /// Largest number of steps; less than [`STEPS_MAX`] if another start can follow.
-    pub steps_max: u32,
     /// Whether a start with a sufficiently small residual is accepted. Otherwise at least one Newton step is taken.
     pub accepts_start: bool,
 }
 
-/// Newton steps of the trapezoid rule from its own start, after which the three-point rule is solved for a better one. 8 take 6 to 10 % more work on 25
-/// random ellipses, 40 are alike.
-pub(super) const FEW_STEPS: u32 = 16;
 /// Largest number of Newton steps. A case of the ellipses named in `newton.rs` takes 18 on average over all its meshes and rules.
 pub const STEPS_MAX: u32 = 60;
 

@@ -1,7 +1,5 @@
 //! Buffers of the Newton iteration, kept by the caller.
 
-use std::cell::Cell;
-
 use crate::numerics::gmres::Gmres;
 use crate::rolling::methods::boundary_element::linearisation::Linearisation;
 use crate::rolling::methods::boundary_element::preconditioner::StripFactors;
@@ -21,29 +19,6 @@ pub struct NewtonWorkspace {
     /// The unknowns of the linear system, expanded to tractions.
     pub(crate) expanded: Vec<f64>,
     pub(crate) vectors: StepVectors,
-}
-
-/// Largest workspace that is kept, in numbers of a vector: two for each of 640 cells, with which all buffers take about a megabyte. Most meshes of targets down to 0.001 are
-/// smaller. Chosen by judgement.
-const KEPT_LENGTH: usize = 1280;
-
-thread_local! {
-    /// The workspace of the last solve of this thread. No solution depends on it.
-    static LAST: Cell<Option<NewtonWorkspace>> = const { Cell::new(None) };
-}
-
-impl NewtonWorkspace {
-    /// The workspace that the last solve of this thread returned, or a new one.
-    pub fn of_thread() -> NewtonWorkspace {
-        LAST.take().unwrap_or_default()
-    }
-
-    /// Returns the workspace for the next solve of this thread, unless it is large.
-    pub fn give_back(self) {
-        if self.slip.capacity() <= KEPT_LENGTH {
-            LAST.set(Some(self));
-        }
-    }
 }
 
 /// Vectors of one Newton step.

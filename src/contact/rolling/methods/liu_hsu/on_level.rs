@@ -4,7 +4,7 @@ use crate::half_space::strip_operator::operator::StripOperator;
 use crate::monitor::{Monitor, Stop};
 use crate::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
 use crate::rolling::methods::boundary_element::newton::Newton;
-use crate::rolling::methods::boundary_element::task::{NewtonTask, STEPS_MAX};
+use crate::rolling::methods::boundary_element::task::NewtonTask;
 use crate::rolling::methods::full_slip;
 use crate::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
 use crate::rolling::methods::liu_hsu::stick_block::DenseTask;
@@ -131,7 +131,6 @@ impl<'a> DenseParts<'a> {
                 area: &self.area,
                 scale: self.scale,
                 tolerance,
-                steps_max: STEPS_MAX,
                 accepts_start: true,
             },
             nodes: (&self.level.normalised.node, &self.y),
