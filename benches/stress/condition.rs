@@ -20,7 +20,7 @@ fn condition(a_over_b: f64, strips: u32, cells: u32, rule: Rule) -> f64 {
         "contact": { "type": "ellipse", "a_mm": 5.0 * a_over_b.sqrt(), "b_mm": 5.0 / a_over_b.sqrt() },
         "load": { "normal_force_n": 60_000 },
         "motion": { "creepage_x": 0.001, "creepage_y": 0.0, "spin_per_mm": 0.0 },
-        "solver": { "mesh": { "strips": strips, "cells": cells } },
+        "solver": { "method": "liu_hsu", "mesh": { "strips": strips, "cells": cells } },
     });
     let problem = check(&case, &Limits::default()).expect("a valid case");
     let footprint = normal_stage::solve(&problem, &Unmonitored)

@@ -3,15 +3,12 @@
 //! Meshes are dimensionless, so patches of one shape share their operator whatever their size and load. The store affects only the time of a solve: an operator
 //! that is computed again is identical.
 
-use std::collections::HashMap;
-use std::collections::hash_map::DefaultHasher;
-use std::hash::{Hash, Hasher};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::half_space::strip_operator::kind::Precision;
 use crate::half_space::strip_operator::operator;
 use crate::half_space::strip_operator::operator::StripOperator;
-use crate::mesh::{Mesh, Segment};
+use crate::mesh::Mesh;
 use crate::monitor::{Monitor, Stop};
 
 /// Default size of a store in bytes: room for two of the largest operators of targets from 0.0005 on (52 MB each without mirror symmetry), or for some
@@ -47,43 +44,20 @@ impl OperatorKind {
 #[derive(Debug)]
 pub struct OperatorStore {
     bytes_max: u64,
-    kept: Mutex<Shelf>,
+    /// In the order of their last use.
+    kept: Mutex<Vec<Kept>>,
 }
 
-/// The stored operators, by digest.
-#[derive(Debug, Default)]
-struct Shelf {
-    operators: HashMap<u64, Kept>,
-    uses: u64,
-    bytes: u64,
-}
-
-/// An operator with the mesh that it belongs to.
+/// An operator with the digest of its mesh and its properties.
 #[derive(Debug, Clone)]
 struct Kept {
-    kind: OperatorKind,
-    mesh: Arc<Mesh>,
+    digest: blake3::Hash,
     operator: Arc<StripOperator>,
-    /// Number of the last use, counted over all uses of the store.
-    used: u64,
 }
 
 impl Kept {
-    fn new(kind: OperatorKind, mesh: &Arc<Mesh>, operator: &Arc<StripOperator>) -> Kept {
-        Kept {
-            kind,
-            mesh: Arc::clone(mesh),
-            operator: Arc::clone(operator),
-            used: 0,
-        }
-    }
-
     fn bytes(&self) -> u64 {
         self.operator.bytes() as u64
-    }
-
-    fn is_of(&self, mesh: &Mesh, kind: OperatorKind) -> bool {
-        self.kind == kind && alike(&self.mesh, mesh)
     }
 }
 
@@ -109,12 +83,12 @@ impl OperatorStore {
     /// The monitor may stop the work.
     pub fn get(
         &self,
-        mesh: &Arc<Mesh>,
+        mesh: &Mesh,
         kind: OperatorKind,
         monitor: &dyn Monitor,
     ) -> Result<Arc<StripOperator>, Stop> {
         let digest = digest(mesh, kind);
-        if let Some(found) = self.shelf().find(digest, mesh, kind) {
+        if let Some(found) = self.find(digest) {
             return Ok(found);
         }
         let OperatorKind {
@@ -125,52 +99,40 @@ impl OperatorStore {
         let operator = StripOperator::new(mesh, poisson_ratio, folded, precision, monitor)?;
         let operator = Arc::new(operator);
         if kept_bytes(operator.bytes() as u64, self.bytes_max) > 0 {
-            let kept = Kept::new(kind, mesh, &operator);
-            self.shelf().keep(digest, kept, self.bytes_max);
+            self.keep(Kept {
+                digest,
+                operator: Arc::clone(&operator),
+            });
         }
         Ok(operator)
     }
 
     /// Bytes of the stored operators.
     pub fn bytes(&self) -> u64 {
-        self.shelf().bytes
+        self.kept().iter().map(Kept::bytes).sum()
     }
 
-    fn shelf(&self) -> MutexGuard<'_, Shelf> {
+    fn kept(&self) -> MutexGuard<'_, Vec<Kept>> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
 
-impl Shelf {
-    fn find(&mut self, digest: u64, mesh: &Mesh, kind: OperatorKind) -> Option<Arc<StripOperator>> {
-        let found = self.operators.get_mut(&digest)?;
-        if !found.is_of(mesh, kind) {
-            return None;
-        }
-        self.uses += 1;
-        found.used = self.uses;
-        Some(Arc::clone(&found.operator))
+    fn find(&self, digest: blake3::Hash) -> Option<Arc<StripOperator>> {
+        let mut kept = self.kept();
+        let place = kept.iter().rposition(|kept| kept.digest == digest)?;
+        kept[place..].rotate_left(1);
+        kept.last().map(|kept| Arc::clone(&kept.operator))
     }
 
-    fn keep(&mut self, digest: u64, mut new: Kept, bytes_max: u64) {
-        self.drop_one(digest);
-        while self.bytes + new.bytes() > bytes_max {
-            let oldest = self.operators.iter().min_by_key(|(_, kept)| kept.used);
-            let Some((&oldest, _)) = oldest else {
-                break;
-            };
-            self.drop_one(oldest);
-        }
-        self.uses += 1;
-        new.used = self.uses;
-        self.bytes += new.bytes();
-        self.operators.insert(digest, new);
-    }
-
-    fn drop_one(&mut self, digest: u64) {
-        if let Some(gone) = self.operators.remove(&digest) {
-            self.bytes -= gone.bytes();
-        }
+    fn keep(&self, new: Kept) {
+        let mut kept = self.kept();
+        kept.retain(|known| known.digest != new.digest);
+        kept.push(new);
+        let mut bytes: u64 = kept.iter().map(Kept::bytes).sum();
+        kept.retain(|oldest| {
+            let stays = bytes <= self.bytes_max;
+            bytes -= if stays { 0 } else { oldest.bytes() };
+            stays
+        });
     }
 }
 
@@ -196,50 +158,44 @@ impl CaseOperators {
     /// The monitor may stop the work.
     pub fn get(
         &self,
-        mesh: &Arc<Mesh>,
+        mesh: &Mesh,
         kind: OperatorKind,
         monitor: &dyn Monitor,
     ) -> Result<Arc<StripOperator>, Stop> {
+        let digest = digest(mesh, kind);
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kept) = last.as_ref().filter(|kept| kept.is_of(mesh, kind)) {
+        if let Some(kept) = last.as_ref().filter(|kept| kept.digest == digest) {
             return Ok(Arc::clone(&kept.operator));
         }
         // A case needs one operator at a time, so the last one is dropped before the next is computed.
         *last = None;
         let operator = self.store.get(mesh, kind, monitor)?;
-        *last = Some(Kept::new(kind, mesh, &operator));
+        *last = Some(Kept {
+            digest,
+            operator: Arc::clone(&operator),
+        });
         Ok(operator)
     }
 }
 
-/// The place and width of a segment, on which the operator depends besides its cells.
-fn across(segment: &Segment) -> [f64; 2] {
-    [segment.chord.y, segment.chord.dy]
-}
-
-fn digest(mesh: &Mesh, kind: OperatorKind) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    (kind.poisson_ratio.to_bits(), kind.folded).hash(&mut hasher);
-    (kind.precision == Precision::Single).hash(&mut hasher);
-    for segment in &mesh.segments {
-        across(segment).map(f64::to_bits).hash(&mut hasher);
-        segment.cells.hash(&mut hasher);
-    }
-    let edges = mesh.left.iter().chain(&mesh.right);
-    for place in edges {
-        place.to_bits().hash(&mut hasher);
-    }
-    hasher.finish()
-}
-
-/// Whether two meshes have identical operators.
-fn alike(a: &Mesh, b: &Mesh) -> bool {
-    let segments = a.segments.iter().zip(&b.segments);
-    (a.segments.len(), a.cells()) == (b.segments.len(), b.cells())
-        && (&a.left, &a.right, &a.node) == (&b.left, &b.right, &b.node)
-        && segments
-            .into_iter()
-            .all(|(a, b)| across(a) == across(b) && a.cells == b.cells)
+/// The digest of all numbers on which an operator depends.
+fn digest(mesh: &Mesh, kind: OperatorKind) -> blake3::Hash {
+    let kinds = [kind.folded, kind.precision == Precision::Single].map(f64::from);
+    let counts = mesh
+        .segments
+        .iter()
+        .map(|segment| segment.cells.len() as f64);
+    let across = mesh.segments.iter().map(|segment| segment.chord);
+    let across = across.flat_map(|chord| [chord.y, chord.dy]);
+    let cells = [&mesh.left, &mesh.right, &mesh.node];
+    let numbers = [kind.poisson_ratio, mesh.segments.len() as f64]
+        .into_iter()
+        .chain(kinds)
+        .chain(counts)
+        .chain(across)
+        .chain(cells.into_iter().flatten().copied());
+    let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
+    blake3::hash(&bytes)
 }
 
 #[cfg(test)]
@@ -248,8 +204,8 @@ mod tests {
     use crate::mesh::samples::mesh_between;
     use crate::monitor::Unmonitored;
 
-    fn mesh(half_width: f64) -> Arc<Mesh> {
-        Arc::new(mesh_between(half_width, [4, 6], |_| [-1.0, 1.0]))
+    fn mesh(half_width: f64) -> Mesh {
+        mesh_between(half_width, [4, 6], |_| [-1.0, 1.0])
     }
 
     const KIND: OperatorKind = OperatorKind {

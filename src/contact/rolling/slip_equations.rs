@@ -300,7 +300,7 @@ impl<'a> SlipEquations<'a> {
         }
     }
 
-    /// The whole map `M` as a matrix over the cells without padding, column by column. In rows and in columns, the x components of all cells precede the y
+    /// The whole map `M` as a matrix over the cells without padding, for an operator that is not folded or a parity, column by column. In rows and in columns, the x components of all cells precede the y
     /// components. It has `(2 × cells)²` values, so it is meant for small meshes.
     ///
     /// # Errors
@@ -455,6 +455,9 @@ mod tests {
                 (Rule::Trapezoid, Some(Parity::Longitudinal)),
                 (Rule::Trapezoid, Some(Parity::Lateral)),
             ] {
+                if folded && parity.is_none() {
+                    continue;
+                }
                 let equations = SlipEquations::new(rule, &mesh, &differences, parity);
                 let (n, padded) = (equations.cells(), equations.padded());
                 let place = |i: usize| if i < n { i } else { padded + i - n };

@@ -94,7 +94,7 @@ pub struct StripMesh {
     /// Units of the dimensionless problem.
     pub scale: Scale,
     /// The dimensionless mesh.
-    pub normalised: Arc<Mesh>,
+    pub normalised: Mesh,
     /// Friction bound of every cell, dimensionless.
     pub bound: Vec<f64>,
     /// Flexibility of an elastic layer between the bodies, dimensionless.
@@ -190,7 +190,7 @@ impl StripMesh {
             unresolved: unresolved(footprint, &fitted),
             area,
             scale,
-            normalised: Arc::new(normalised),
+            normalised,
             bound,
             layer: task.interface.layer * scale.shear_modulus / scale.length,
             surface_slip: sum(of_pressure, own_slip)
@@ -198,7 +198,8 @@ impl StripMesh {
             slip_by_motion,
             poisson_ratio,
             precision,
-            mirrored: mirror.is_some(),
+            // Dense matrices need all entries.
+            mirrored: mirror.is_some() && task.method != Method::LiuHsu,
             operators,
         })
     }

@@ -189,34 +189,12 @@ impl StripOperator {
         (self.stored(row, xx, cell), self.stored(row, yy, cell))
     }
 
-    /// An entry of the matrix applied by [`apply`](Self::apply), as `[xx, xy, yx, yy]`: the change of u_x per T_x and per T_y, then that of u_y. Without parity, rows and cells
-    /// are counted over the whole mesh.
+    /// An entry of the matrix applied by [`apply`](Self::apply), as `[xx, xy, yx, yy]`: the change of u_x per T_x and per T_y, then that of u_y. A folded matrix has
+    /// entries only for a parity.
     pub fn entry(&self, parity: Option<Parity>, row: usize, cell: usize) -> [f64; 4] {
-        if self.is_folded() && parity.is_none() {
-            return self.unfolded_entry(row, cell);
-        }
+        debug_assert!(!self.folded || parity.is_some());
         self.roles(parity)
             .map(|block| self.stored(row, block, cell))
-    }
-
-    /// An entry of the whole mesh from the stored half. For a mirrored row, the cell is mirrored and `T_y` reversed.
-    fn unfolded_entry(&self, row: usize, cell: usize) -> [f64; 4] {
-        let (row, cell, side) = if row < self.row_count() {
-            (row, cell, 1.0)
-        } else {
-            let row = mirror_image(&self.first_row, row);
-            (row, mirror_image(&self.first_cell, cell), -1.0)
-        };
-        // Half the sum of the two stored values belongs to the cell, half their difference to its mirror image.
-        let (cell, sign) = if cell < self.first_cell[self.segments()] {
-            (cell, 0.5)
-        } else {
-            (mirror_image(&self.first_cell, cell), -0.5)
-        };
-        let part =
-            |k: usize| 0.5 * self.stored(row, k, cell) + sign * self.stored(row, k + 1, cell);
-        let cross = side * part(2);
-        [part(0), cross, cross, part(4)]
     }
 
     /// Displacement differences `out_x`, `out_y` (one value per row) caused by tractions `tx`, `ty`.
@@ -330,18 +308,6 @@ impl StripOperator {
                 out[image + k] = same[i] - opposite[i];
             }
         }
-    }
-}
-
-/// The place of `i` in the mirrored segment; `first` contains the starts of the first half of the segments, and the end of the last.
-fn mirror_image(first: &[usize], i: usize) -> usize {
-    let half = first[first.len() - 1];
-    if i < half {
-        let j = first.partition_point(|start| *start <= i) - 1;
-        2 * half - first[j + 1] + i - first[j]
-    } else {
-        let j = first.partition_point(|start| *start < 2 * half - i) - 1;
-        first[j] + first[j + 1] + i - 2 * half
     }
 }
 
