@@ -10,12 +10,10 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-use crate::numerics::roots::{bisect, bounds};
+use crate::numerics::roots::{HALVINGS, bisect, bounds};
 
 /// Number of points of the quadrature between the turning points, equally spaced in the angle. For a linear Δr it is exact.
 const QUADRATURE_POINTS: usize = 2000;
-/// Number of bisections of a bracket, enough for the last bit.
-const HALVINGS: u32 = 60;
 /// Difference in mm up to which two radii are equal. At an amplitude of 1 mm it is a conicity of 0.00005, a twentieth of the last digit of the
 /// standard. Conicities below that are 0.
 const EQUAL: f64 = 1e-4;

@@ -19,7 +19,7 @@ use utoipa::ToSchema;
 
 use crate::geometry::plane_curve::{chords, distance};
 use crate::geometry::profile::{LengthUnit, POINTS_MIN};
-use crate::geometry::profile_quality::median;
+use crate::geometry::profile_quality::{LONG_MEDIANS, median};
 
 /// A file format of cross-sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words, Named)]
@@ -739,9 +739,6 @@ fn cells<'a>(line: &'a Line<'_>) -> impl Iterator<Item = &'a str> {
         .filter(|cell| !cell.is_empty())
 }
 
-/// Least distance between a row of the header and the first point, in median chords. Neighbouring points are one or two chords apart.
-const CHORDS_APART: f64 = 10.0;
-
 /// A row of numbers.
 #[derive(Debug, Clone)]
 struct Row<'a> {
@@ -828,7 +825,7 @@ impl Scanned<'_> {
             return 0;
         }
         let usual = median(&mut chords(&points[count..]).collect::<Vec<f64>>());
-        let apart = distance(points[count - 1], points[count]) > CHORDS_APART * usual;
+        let apart = distance(points[count - 1], points[count]) > LONG_MEDIANS * usual;
         if apart { count } else { 0 }
     }
 

@@ -2,15 +2,13 @@
 
 use crate::geometry::contact_locus::ContactLocus;
 use crate::geometry::profile::Body;
+use crate::geometry::profile_quality::STEP;
 
 /// Length in mm up to which a chord is short enough for any patch. The direction of the profile at the end of a hole is taken over this length
 /// too.
 pub(crate) const LENGTH_MIN: f64 = 1.0;
 /// Length relative to the width of the contact above which a chord may contain the whole contact, so that a job fails.
 pub(crate) const WIDE: f64 = 1.5;
-/// Spacing in mm of the points of the other body that are compared with a chord.
-const STEP: f64 = 0.1;
-
 /// A chord over which the bodies may touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hole {

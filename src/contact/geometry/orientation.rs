@@ -167,8 +167,8 @@ const STEP: f64 = 0.5;
 const SIDE: usize = 3;
 /// Largest inclination in rad of treads and crowns (20°). Standard wheels stay below 0.2 up to the flange root, and flanges exceed 1.
 const FLAT: f64 = 0.35;
-/// Least inclination in rad of the back of a flange, a rim and the faces of a head (75°).
-const STEEP: f64 = 1.3;
+/// Least inclination in rad of the face of a rim and of the faces of a head (79°). Flange faces have 60 to 78°.
+const STEEP: f64 = 1.38;
 /// Height in mm of the piece that is taken as the tip of a flange.
 const TIP_DEPTH: f64 = 2.0;
 /// Range of the width in mm of the tip. Flanges of EN 13715 and AAR have 12 to 18 mm; the edge of a rim has less than 1 mm. The back of the
@@ -179,9 +179,7 @@ const TIP_WIDTH: [f64; 2] = [4.0, 25.0];
 const FLANGE_HEIGHT: [f64; 2] = [12.0, 45.0];
 /// Least length in mm of a tread.
 const TREAD: f64 = 20.0;
-/// Largest inclination in rad of a flange whose points end before its tip (79°). Flange faces have 60 to 78°; the face of a rim is steeper.
-const PART_SLOPE_MAX: f64 = 1.38;
-/// Least length in mm of the crown of a head. The nose of a crossing has 15 mm where wheels reach it.
+/// Least length in mm of the crown of a head. The nose of a crossing has 15 mm where wheels reach it. With twice this length it can only be a rail.
 const CROWN: f64 = 15.0;
 /// Least fall in mm at one side of a head, and least length of the steep part of a face.
 const FALL: f64 = 6.0;
@@ -192,12 +190,9 @@ const FALL_LEAST: f64 = 1.0;
 const CUT_SLOPE: f64 = 0.1;
 /// Least turn in rad of a crown that is measured without its sides. 35 mm with a radius of 300 mm turn by 0.12.
 const CROWN_TURN: f64 = 0.05;
-/// Least length in mm of the crown of a section that can only be a rail.
-const SURE_CROWN: f64 = 30.0;
-/// Least length in mm of the back of a flange, and distance between the three points from which the rounding of a back is continued.
+/// Least length in mm of the back of a flange, and distance between the three points from which the rounding of a back is continued, by half of
+/// this at most.
 const BACK: f64 = 3.0;
-/// Length in mm by which that rounding is continued at most.
-const CONTINUED_MAX: f64 = 1.5;
 
 /// The flange of a wheel, in the directions in which it was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -266,8 +261,7 @@ pub fn rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
 /// Returns whether z of points is positive up, if they can only be those of a rail with at least one of its faces.
 fn sure_rail_mirror_z(points: &[[f64; 2]]) -> Option<bool> {
     let mirror_z = rail_mirror_z(points)?;
-    let sure =
-        |head: &Head| head.crown >= SURE_CROWN && head.falls.iter().flatten().any(Fall::is_face);
+    let sure = |head: &Head| head.is_long() && head.falls.iter().flatten().any(Fall::is_face);
     let heads = heads(points, Senses::new(false, mirror_z));
     heads.iter().any(sure).then_some(mirror_z)
 }
@@ -328,11 +322,15 @@ struct Head {
 }
 
 impl Head {
+    fn is_long(&self) -> bool {
+        self.crown >= 2.0 * CROWN
+    }
+
     fn has_both_faces(&self) -> bool {
         let [Some(first), Some(last)] = self.falls else {
             return false;
         };
-        first.is_face() && last.is_face() && self.crown >= SURE_CROWN
+        first.is_face() && last.is_face() && self.is_long()
     }
 }
 
@@ -434,7 +432,7 @@ impl Section<'_> {
             .iter()
             .copied()
             .fold(0.0, f64::max);
-        let part = inner.lowest == 0 && steepest <= PART_SLOPE_MAX;
+        let part = inner.lowest == 0 && steepest <= STEEP;
         part.then_some(Flange {
             tip: None,
             back: None,
@@ -475,7 +473,7 @@ impl Section<'_> {
         }
         let (centre, radius) = circle(end, middle, inner)?;
         let leftmost = centre[0] - radius;
-        (0.0..=CONTINUED_MAX)
+        (0.0..=0.5 * BACK)
             .contains(&(end[0] - leftmost))
             .then_some(leftmost)
     }

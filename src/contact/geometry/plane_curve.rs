@@ -1,9 +1,8 @@
 //! Plane curves whose coordinates are cubics between common knots, prepared for many evaluations, and chains of points: their lengths,
 //! corners and crossings.
 
-use std::cell::Cell;
-
 use crate::numerics::interpolation::{Spline, akima_slopes};
+use crate::numerics::roots::bounds;
 
 /// A curve `[y, z]` in mm over a parameter in mm, twice continuously differentiable except at sharp corners, straight beyond its ends.
 #[derive(Debug, Clone, PartialEq)]
@@ -279,83 +278,28 @@ fn chord(points: &[[f64; 2]], k: usize) -> [f64; 2] {
 
 /// Finds two chords that cross and are not neighbours, and returns their first points.
 ///
-/// The chords are searched through a tree of bounding boxes, so that a long chain costs about as much as sorting its points.
+/// The chords are sorted along the axis on which they overlap less, and only those that overlap there are compared.
 pub fn crossing(points: &[[f64; 2]]) -> Option<[[f64; 2]; 2]> {
-    let chords = points.len().checked_sub(1).filter(|count| *count > 2)?;
-    let tree = Tree::new(points, chords);
-    let (i, j) = tree.within(points, 1, 0..tree.leaves)?;
-    Some([points[i], points[j]])
-}
-
-/// Ranges of y and z.
-type Box = [[f64; 2]; 2];
-
-/// Binary tree of the bounding boxes of the chords, stored as a heap: the children of node `k` are `2k` and `2k + 1`.
-struct Tree {
-    boxes: Vec<Box>,
-    /// Number of chords.
-    chords: usize,
-    /// Number of chords rounded up to a power of 2.
-    leaves: usize,
-    /// Number of pairs of boxes that were compared.
-    looks: Cell<usize>,
-}
-
-const EMPTY: Box = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
-
-impl Tree {
-    fn new(points: &[[f64; 2]], chords: usize) -> Tree {
-        let leaves = chords.next_power_of_two();
-        let mut boxes = vec![EMPTY; 2 * leaves];
-        for (pair, own) in points.windows(2).zip(&mut boxes[leaves..]) {
-            *own = [0, 1].map(|k| [pair[0][k].min(pair[1][k]), pair[0][k].max(pair[1][k])]);
-        }
-        for node in (1..leaves).rev() {
-            let (left, right) = (boxes[2 * node], boxes[2 * node + 1]);
-            boxes[node] =
-                [0, 1].map(|k| [left[k][0].min(right[k][0]), left[k][1].max(right[k][1])]);
-        }
-        Tree {
-            boxes,
-            chords,
-            leaves,
-            looks: Cell::new(0),
-        }
-    }
-
-    /// Two crossing chords below one node.
-    fn within(
-        &self,
-        points: &[[f64; 2]],
-        node: usize,
-        range: std::ops::Range<usize>,
-    ) -> Option<(usize, usize)> {
-        if range.len() < 2 || range.start >= self.chords {
-            return None;
-        }
-        let middle = range.start + range.len() / 2;
-        let (left, right) = (range.start..middle, middle..range.end);
-        self.within(points, 2 * node, left)
-            .or_else(|| self.within(points, 2 * node + 1, right))
-            .or_else(|| self.between(points, 2 * node, 2 * node + 1))
-    }
-
-    /// A chord below one node and a chord below a later node of the same level that cross.
-    fn between(&self, points: &[[f64; 2]], one: usize, other: usize) -> Option<(usize, usize)> {
-        self.looks.set(self.looks.get() + 1);
-        let (a, b) = (&self.boxes[one], &self.boxes[other]);
-        if (0..2).any(|k| a[k][1] < b[k][0] || b[k][1] < a[k][0]) {
-            return None;
-        }
-        if one >= self.leaves {
-            let (i, j) = (one - self.leaves, other - self.leaves);
-            return (j > i + 1 && cross(points, i, j)).then_some((i, j));
-        }
-        [0, 1].into_iter().find_map(|left| {
-            let lower = 2 * one + left;
-            (0..2).find_map(|right| self.between(points, lower, 2 * other + right))
-        })
-    }
+    let count = points.len().saturating_sub(1);
+    let range = |axis: usize, k: usize| bounds([points[k][axis], points[k + 1][axis]]);
+    let overlap = |axis: usize| {
+        let [low, high] = bounds(points.iter().map(|at| at[axis]));
+        let lengths = (0..count).map(|k| range(axis, k)[1] - range(axis, k)[0]);
+        lengths.sum::<f64>() / (high - low).max(f64::MIN_POSITIVE)
+    };
+    let axis = usize::from(overlap(1) < overlap(0));
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|a, b| range(axis, *a)[0].total_cmp(&range(axis, *b)[0]));
+    order.iter().enumerate().find_map(|(place, one)| {
+        let [_, end] = range(axis, *one);
+        let mut near = order[place + 1..]
+            .iter()
+            .take_while(|other| range(axis, **other)[0] <= end);
+        let other = near.find(|other| {
+            one.abs_diff(**other) > 1 && cross(points, *one.min(*other), *one.max(*other))
+        })?;
+        Some([points[*one.min(other)], points[*one.max(other)]])
+    })
 }
 
 /// Returns whether the chords that begin at two points cross.
@@ -370,6 +314,7 @@ fn cross(points: &[[f64; 2]], i: usize, j: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::roots::interval;
 
     /// Knots whose distances vary by a factor of 300.
     fn uneven() -> [Spline; 2] {
@@ -389,10 +334,19 @@ mod tests {
             let s = 0.1 * f64::from(k);
             let point = curve.at(s);
             for (part, spline) in [&y, &z].into_iter().enumerate() {
-                let jet = spline.at(s);
-                assert!((point.at[part] - jet.value).abs() < 1e-13, "{s}");
-                assert!((point.slope[part] - jet.slope).abs() < 1e-12, "{s}");
-                assert!((point.bend[part] - jet.bend).abs() < 1e-12, "{s}");
+                let knots = spline.knots();
+                let inside = s.clamp(knots[0], knots[knots.len() - 1]);
+                let i = interval(knots, inside);
+                let (d, [c0, c1, c2, c3]) = (inside - knots[i], spline.cubic(i));
+                let slope = c1 + d * (2.0 * c2 + 3.0 * d * c3);
+                let value = c0 + d * (c1 + d * (c2 + d * c3)) + slope * (s - inside);
+                let bend = match s == inside {
+                    true => 2.0 * c2 + 6.0 * d * c3,
+                    false => 0.0,
+                };
+                assert!((point.at[part] - value).abs() < 1e-13, "{s}");
+                assert!((point.slope[part] - slope).abs() < 1e-12, "{s}");
+                assert!((point.bend[part] - bend).abs() < 1e-12, "{s}");
             }
         }
     }
@@ -529,17 +483,13 @@ mod crossing_tests {
     }
 
     #[test]
-    fn a_long_chain_costs_little_more_than_its_points() {
-        // The boxes of the turns of a spiral overlap, which is the worst case.
+    fn a_long_chain_crosses_itself_only_if_a_chord_crosses_its_turns() {
         let spiral = |k: usize| {
             let turn = 0.01 * k as f64;
             [turn * turn.cos(), turn * turn.sin()]
         };
         let points: Vec<[f64; 2]> = (0..20_000).map(spiral).collect();
-        let tree = Tree::new(&points, points.len() - 1);
-        assert_eq!(tree.within(&points, 1, 0..tree.leaves), None);
-        let looks = tree.looks.get() / points.len();
-        assert!(looks < 60, "{looks} looks a point");
+        assert_eq!(crossing(&points), None);
         // One more chord crosses all turns.
         let mut crossed = points;
         crossed.push([0.0, 0.1]);

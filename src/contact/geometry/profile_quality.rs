@@ -303,8 +303,8 @@ pub fn median(values: &mut [f64]) -> f64 {
 
 /// Least length in mm of a long chord.
 const LONG: f64 = 10.0;
-/// Least length of a long chord relative to the median chord.
-const LONG_MEDIANS: f64 = 8.0;
+/// Least length of a long chord relative to the median chord. Neighbouring points are one or two chords apart.
+pub(crate) const LONG_MEDIANS: f64 = 8.0;
 /// Most points at an end beyond a long chord that are dropped.
 const STRAY_POINTS_MAX: usize = 2;
 
@@ -363,7 +363,7 @@ impl<'a> Points<'a> {
 }
 
 /// Spacing in mm at which curves are compared. It resolves a cubic between two points of usual profiles.
-const STEP: f64 = 0.1;
+pub(crate) const STEP: f64 = 0.1;
 /// Distance in mm by which the comparison and the noise estimate extend beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
 /// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
@@ -400,9 +400,14 @@ impl PointsRead<'_> {
     /// Standard deviation in mm of the noise along the normal in a range of points; see [`noise`]. Rounded heights have at least the noise of
     /// the rounding, because neighbours are equal where a profile is level.
     pub fn noise(&self, range: [usize; 2]) -> Option<f64> {
-        let least = ROUNDED * self.rounding.unwrap_or(0.0);
+        let least = rounding_error(self.rounding.unwrap_or(0.0));
         Some(noise(self.points, range)?.max(least))
     }
+}
+
+/// Standard deviation of the error by rounding to multiples of a step. Noise up to twice this is due to the rounding.
+fn rounding_error(step: f64) -> f64 {
+    step / 12.0_f64.sqrt()
 }
 
 /// Roughness at the contact `[low, high]`, in mm along the profile, from the curves there and next to it. The contact modulus is in MPa.
@@ -476,8 +481,6 @@ pub const SMOOTHING_ADVISED: [f64; 2] = [2.0, 8.0];
 const NOISE_LEFT: f64 = 0.07;
 /// Smoothing length, in chords, that turns a polygon into a smooth curve. A shorter one does not change coarse points.
 pub(crate) const CHORDS: f64 = 2.0;
-/// Standard deviation of the rounding error in steps: 1/√12. Noise up to twice this is due to the rounding.
-const ROUNDED: f64 = 0.289;
 /// Largest ratio of the waviness to the noise that explains it. Estimates from few points scatter by a factor of 2.
 const EXPLAINED: f64 = 3.0;
 
@@ -528,7 +531,8 @@ pub fn under_contact(reading: &PointsRead, contact: [f64; 2], modulus: f64) -> U
     let noise = (reading.noise(around)).or_else(|| reading.noise([0, points.at.len()]));
     let roughness = roughness(reading, contact, modulus);
     let rounding = reading.rounding;
-    let rounding = rounding.filter(|step| noise.is_some_and(|noise| noise <= 2.0 * ROUNDED * step));
+    let rounding =
+        rounding.filter(|step| noise.is_some_and(|noise| noise <= 2.0 * rounding_error(*step)));
     let cut = reading.smoothing.max(2.0 * spacing);
     let explained = noise_pressure(modulus, noise.unwrap_or(0.0), spacing, cut);
     UnderContact {

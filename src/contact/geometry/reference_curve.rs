@@ -12,15 +12,15 @@ use std::cell::Cell;
 use std::ops::Range;
 
 use crate::geometry::plane_curve::CurvePoint;
+use crate::geometry::profile::POINT_SPACING;
 use crate::geometry::wheel_rail::WheelRail;
 use crate::geometry::wheelset_pose::WheelsetMotion;
+use crate::numerics::ITERATIONS_MAX;
 use crate::numerics::quadrature::{GaussPoints, integral};
 use crate::numerics::roots::bounds;
 
 pub use crate::geometry::curve_place::CurvePlace;
 
-/// Largest spacing in mm of the tabulated points of the rail and of the wheel's circles.
-pub const SPACING: f64 = 0.25;
 /// Gap in mm below which the bodies may overlap between two tabulated points without overlapping at them.
 const BETWEEN: f64 = 3e-3;
 /// Number of intervals between neighbouring circles, or points of the rail, in one bounding circle.
@@ -44,8 +44,6 @@ const NODE_DISTANCE: f64 = 0.1;
 const SECTIONS: usize = 16;
 /// Number of circles searched near the last result before all are searched.
 const NEIGHBOURS: usize = 8;
-/// Most steps of Newton's method for the wheel's surface.
-const STEPS_MAX: usize = 25;
 /// Length in mm of a step that ends Newton's method.
 const STEP_LAST: f64 = 1e-10;
 /// Length in mm to which a step of Newton's method is limited.
@@ -159,7 +157,7 @@ pub struct WheelOver {
 impl<'g> ReferenceCurve<'g> {
     /// The curve of a rail, with the wheel in its position.
     pub fn new(geometry: &'g WheelRail) -> ReferenceCurve<'g> {
-        let [_, wheel] = geometry.parameters(SPACING);
+        let [_, wheel] = geometry.parameters(POINT_SPACING);
         let circles: Vec<LowestPoint> = wheel
             .into_iter()
             .map(|wheel| {
@@ -358,7 +356,7 @@ impl<'g> ReferenceCurve<'g> {
         Some((x, start))
     }
 
-    /// The parts of the rail in which the bodies overlap with the wheel's centre at a height in mm: points at most [`SPACING`] apart, by
+    /// The parts of the rail in which the bodies overlap with the wheel's centre at a height in mm: points at most [`POINT_SPACING`] apart, by
     /// increasing arc length. If the bodies overlap only between two tabulated points, the part has the single point at which they overlap most.
     pub fn overlaps(&self, centre: f64) -> Vec<Vec<Nearest>> {
         let seen = self.close_places(centre);
@@ -375,7 +373,7 @@ impl<'g> ReferenceCurve<'g> {
             };
             if here.wheel.gap >= 0.0 {
                 open = false;
-                let deepest = is_least(k).then(|| self.deepest_near(here, centre, SPACING));
+                let deepest = is_least(k).then(|| self.deepest_near(here, centre, POINT_SPACING));
                 let deepest = deepest.filter(|deepest| deepest.wheel.gap < 0.0);
                 stretches.extend(deepest.map(|deepest| vec![deepest]));
             } else if open && let Some(last) = stretches.last_mut() {
@@ -473,7 +471,7 @@ impl<'g> ReferenceCurve<'g> {
         let WheelOver {
             mut gap, mut wheel, ..
         } = *start;
-        for _ in 0..STEPS_MAX {
+        for _ in 0..ITERATIONS_MAX {
             let arm = [
                 from[0],
                 from[1] + gap * normal[0],
@@ -574,7 +572,7 @@ fn blocks(points: usize) -> impl Iterator<Item = Range<usize>> {
 
 /// Points along a rail's curve, from the first to the last.
 fn rail_places(geometry: &WheelRail) -> Vec<CurvePlace> {
-    let [parameters, _] = geometry.parameters(SPACING);
+    let [parameters, _] = geometry.parameters(POINT_SPACING);
     let sign = geometry.placement.side.sign();
     let mut s = 0.0;
     let mut places = vec![place(geometry, parameters[0], s)];

@@ -6,7 +6,8 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use crate::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve, SPACING};
+use crate::geometry::profile::POINT_SPACING;
+use crate::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve};
 use crate::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
 };
@@ -258,7 +259,7 @@ impl CurveTask<'_> {
         let of_overlap = |overlap: &Vec<Nearest>| {
             let flat = || overlap.iter().filter(|at| !is_steep(at));
             let lengths = flat().map(|at| 2.0 * self.curve.half_length(&at.wheel));
-            let area = 0.5 * SPACING * lengths.sum::<f64>();
+            let area = 0.5 * POINT_SPACING * lengths.sum::<f64>();
             let depth = flat().map(|at| -at.wheel.gap).fold(0.0, f64::max);
             4.0 / 3.0 * self.elasticity.contact_modulus() * depth * (area / PI).sqrt()
         };
@@ -384,13 +385,16 @@ impl CurveTask<'_> {
         overlaps: &[Vec<Nearest>],
     ) -> Result<CurveGrid, NormalError> {
         let mut along = [f64::INFINITY, f64::NEG_INFINITY];
-        let (mut widest, mut longest): (f64, f64) = (2.0 * SPACING, 0.0);
+        let (mut widest, mut longest): (f64, f64) = (2.0 * POINT_SPACING, 0.0);
         let mut windows = Vec::with_capacity(overlaps.len());
         let [first, last] = self.curve.range();
         for overlap in overlaps {
             let [low, high] = ends(overlap);
-            let window = [(low - SPACING).max(first), (high + SPACING).min(last)];
-            widest = widest.max(window[1] - window[0] - SPACING);
+            let window = [
+                (low - POINT_SPACING).max(first),
+                (high + POINT_SPACING).min(last),
+            ];
+            widest = widest.max(window[1] - window[0] - POINT_SPACING);
             windows.push(window);
             for Nearest { x, wheel, .. } in overlap {
                 let half = self.curve.half_length(wheel);

@@ -1,6 +1,6 @@
 //! Gauss–Legendre quadrature (Abramowitz and Stegun 1964, table 25.4), exact for polynomials of degree `2 n − 1` with n points; and evenly distributed samples.
 
-use crate::numerics::roots::bisect;
+use crate::numerics::roots::{HALVINGS, bisect};
 
 /// The four points on −1 … 1 with their weights.
 pub(crate) const FOUR_POINTS: [(f64, f64); 4] = [
@@ -105,7 +105,9 @@ fn normal_probability(x: f64) -> f64 {
 
 /// The value that a standard normal variable exceeds with the probability 1 - `probability`, within ±38, by bisection.
 fn normal_quantile(probability: f64) -> f64 {
-    let [low, high] = bisect([-38.0, 38.0], 64, |x| normal_probability(x) < probability);
+    let [low, high] = bisect([-38.0, 38.0], HALVINGS, |x| {
+        normal_probability(x) < probability
+    });
     0.5 * (low + high)
 }
 

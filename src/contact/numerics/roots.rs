@@ -75,8 +75,8 @@ pub(crate) fn maximum([mut low, mut high]: [f64; 2], f: impl Fn(f64) -> f64) -> 
     places[0].1
 }
 
-/// Number of evaluations after which the bracket is halved instead of taking Newton steps.
-const NEWTON_STEPS: usize = 60;
+/// Number of halvings that reduce a bracket to rounding error, and of evaluations after which a search halves instead of taking Newton steps.
+pub(crate) const HALVINGS: u32 = 60;
 
 /// Criteria for the end of a search: it ends when the value, the last step or the bracket is smaller; 0 disables a criterion.
 #[derive(Debug, Clone, Copy)]
@@ -109,7 +109,7 @@ pub(crate) fn find(
     } else {
         0.5 * (low + high)
     };
-    for step in 1..=2 * NEWTON_STEPS {
+    for step in 1..=2 * HALVINGS {
         let [value, slope] = f(at);
         if value.abs() < close.value {
             break;
@@ -120,7 +120,7 @@ pub(crate) fn find(
             low = at;
         }
         let newton = at - value / slope;
-        let next = if inside(newton, low, high) && step < NEWTON_STEPS {
+        let next = if inside(newton, low, high) && step < HALVINGS {
             newton
         } else {
             0.5 * (low + high)

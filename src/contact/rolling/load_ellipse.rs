@@ -33,45 +33,27 @@ struct EllipsePart {
 }
 
 impl LoadEllipse {
-    /// The ellipse of one patch of a footprint.
+    /// The ellipse of one patch of a footprint with its mismatch.
     pub fn of(footprint: &Footprint, patch: usize) -> LoadEllipse {
-        let known = &footprint.patches()[patch];
-        if let Some(semi_axes) = known.semi_axes {
-            return LoadEllipse {
-                centre: [0.0; 2],
-                semi_axes,
-                load_mismatch: 0.0,
-            };
-        }
-        let parts = parts(footprint, patch);
-        let load: f64 = parts.iter().map(|part| part.load).sum();
-        let mean = |of: &dyn Fn(&EllipsePart) -> f64| {
-            parts.iter().map(|part| part.load * of(part)).sum::<f64>() / load
-        };
-        let centre = [
-            mean(&|part| 0.5 * (part.x[0] + part.x[1])),
-            mean(&|part| part.y),
-        ];
-        let spread = [
-            mean(&|part| {
-                let [low, high] = part.x.map(|x| x - centre[0]);
-                (low * low + low * high + high * high) / 3.0
-            }),
-            mean(&|part| (part.y - centre[1]).powi(2) + part.dy * part.dy / 12.0),
-        ];
-        let semi_axes = spread.map(|spread| (5.0 * spread).sqrt());
+        let ellipse = LoadEllipse::rough(footprint, patch);
         LoadEllipse {
-            centre,
-            semi_axes,
-            load_mismatch: load_mismatch(&parts, load, centre, semi_axes),
+            load_mismatch: match footprint.field() {
+                None => 0.0,
+                Some(_) => load_mismatch(&parts(footprint, patch), &ellipse),
+            },
+            ..ellipse
         }
     }
 
-    /// The ellipse of one patch of a footprint, without the mismatch. For a sampled pressure it follows from the samples.
+    /// The ellipse of one patch of a footprint, without the mismatch.
     pub(crate) fn rough(footprint: &Footprint, patch: usize) -> LoadEllipse {
         match footprint.field() {
             Some(field) => LoadEllipse::of_samples(field, patch),
-            None => LoadEllipse::of(footprint, patch),
+            None => LoadEllipse {
+                centre: [0.0; 2],
+                semi_axes: footprint.patches()[patch].semi_axes.unwrap_or_default(),
+                load_mismatch: 0.0,
+            },
         }
     }
 
@@ -119,7 +101,13 @@ fn parts(footprint: &Footprint, patch: usize) -> Vec<EllipsePart> {
 }
 
 /// The share of the load that is placed differently by the ellipse.
-fn load_mismatch(parts: &[EllipsePart], load: f64, centre: [f64; 2], [a, b]: [f64; 2]) -> f64 {
+fn load_mismatch(parts: &[EllipsePart], ellipse: &LoadEllipse) -> f64 {
+    let LoadEllipse {
+        centre,
+        semi_axes: [a, b],
+        ..
+    } = *ellipse;
+    let load: f64 = parts.iter().map(|part| part.load).sum();
     let ellipse = Ellipse::of_semi_axes(a, b, NormalLoad::Force(load), 1.0);
     let (mut apart, mut inside) = (0.0, 0.0);
     for part in parts {

@@ -23,10 +23,9 @@ const TARGET_ROUGH: f64 = 0.2;
 const ROUNDS_MAX: u32 = 16;
 /// Relative error of the gap that tractions open if they are taken as proportional to the pressure.
 const OPENED_ERROR: f64 = 0.3;
-/// Change of the forces relative to μN that ends the rounds with coarse tractions. The step after it leaves about a fiftieth of this.
-const CHANGE_ROUGH: f64 = 0.05;
-/// Relative change of the vertical force that ends the rounds with the table.
-const CHANGE_TABLE: f64 = 0.02;
+/// Change that ends the rounds on the coarse grid: of the vertical force, and with tractions of the forces relative to μN. The step after it leaves about a fiftieth
+/// of this.
+const CHANGE_ROUGH: f64 = 0.02;
 /// Largest change of the forces, relative to μN, that is accepted with a remark after the last round. It is part of the error estimate. If a strip
 /// at the edge of a patch comes and goes with the tractions, these jump by the error of their mesh, and the rounds do not converge.
 const CHANGE_POOR: f64 = 0.03;
@@ -242,7 +241,7 @@ impl WheelSolve<'_> {
             };
             let [by_lift, by_gap] = coarse.change_by(&friction, &next, self.shared());
             friction = accelerated(&friction, next, &mut earlier);
-            if by_table && by_lift <= CHANGE_TABLE {
+            if by_table && by_lift <= CHANGE_ROUGH {
                 break;
             }
             coarse = task.again(coarse, &friction, workspace, self.watch)?;
