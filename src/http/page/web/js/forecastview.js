@@ -8,7 +8,7 @@ import { drawChart } from './drawing/axes.js';
 import { drawWorn } from './drawing/worn.js';
 import { numberAt } from './document.js';
 import { fileName } from './downloads.js';
-import { chooseForecast, EVENTS, FACTORS, forecastSeen, nameOf, openForecast, playFilm, recordOf, repeatForecast, startForecast, takeForecastFiles, takeTarget, takeTraffic, TARGETS, templateOf, writeForm } from './forecast.js';
+import { chooseForecast, EVENTS, FACTORS, forecastSeen, nameOf, openForecast, playFilm, recordOf, repeatForecast, startForecast, takeTarget, takeTraffic, TARGETS, templateOf, writeForm } from './forecast.js';
 import { CURVES, decisionOf, deepest, distanceOf, distanceUnit, forecastChart, LOSSES, numericalOf, reachedOf, sectionOf, wears, worstDamage } from './forecastdata.js';
 import { count, fixed, number, plusMinus, seconds } from './format.js';
 import { inWords, remarkList } from './remarks.js';
