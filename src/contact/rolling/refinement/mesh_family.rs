@@ -22,7 +22,7 @@ const LAST_OVER_FIRST: f64 = 4.0;
 /// meshes of a slender patch have 4 strips one after another, and agree although their strips are too wide.
 const SIDE_FIRST: f64 = 3.6;
 /// Largest width of a strip of the coarsest mesh over half the length of a patch whose pressure is sampled. The pressure at the ends of a wide patch changes over
-/// this length; wider strips miss it on two meshes in a row. On 80 random rollers with crowned ends, 0.71 to 1 of the estimates cover the error with wider
+/// this length, and several meshes with wider strips miss it. On 80 random rollers with crowned ends, 0.72 to 0.80 of the estimates cover the error with wider
 /// strips.
 const STRIP_OF_HALF_LENGTH: f64 = 0.8;
 /// Dimensionless spin `φ c G/(μ p_max)` from which meshes are refined about the pole of the rigid slip. Values from 1 to 4 change the work by 20 %.
