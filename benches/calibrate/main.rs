@@ -1,9 +1,9 @@
 //! Checks the error estimate: solves random contacts for three targets and compares them with much finer meshes.
 //!
 //! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for checking; every patch of
-//! wheels on rails counts). With names of classes (`ellipse smooth jump gap profiles curve`), it prints only these. The reference results are in
-//! `tests/data/finer_meshes.json`. `-- truths [classes]` computes missing ones, which takes some seconds each. `-- continuity` prints how the
-//! estimate changes along a sweep, `-- sweeps` the accuracy of the estimate along many sweeps, `-- case gap 42` one case as JSON.
+//! wheels on rails counts). With names of classes (`ellipse smooth jump gap profiles curve roller uneven`), it prints only these. The reference
+//! results are in `tests/data/finer_meshes.json`. `-- truths [classes]` computes missing ones, which takes some seconds each. `-- continuity` prints
+//! how the estimate changes along a sweep, `-- sweeps` the accuracy of the estimate along many sweeps, `-- case gap 42` one case as JSON.
 
 use cpu_time::ThreadTime;
 use judge::judged;
@@ -27,13 +27,15 @@ mod random;
 mod sweeps;
 mod truth;
 
-const CLASSES: [Class; 6] = [
+const CLASSES: [Class; 8] = [
     Class::Ellipse,
     Class::Smooth,
     Class::Jump,
     Class::Gap,
     Class::Profiles,
     Class::Curve,
+    Class::Roller,
+    Class::Uneven,
 ];
 const TARGETS: [f64; 3] = [0.02, 0.005, 0.001];
 

@@ -1,4 +1,4 @@
-//! Random contacts of six classes for checking the error estimate, the same on every machine.
+//! Random contacts of eight classes for checking the error estimate, the same on every machine.
 
 use std::f64::consts::PI;
 
@@ -22,6 +22,10 @@ pub enum Class {
     Profiles,
     /// New and worn wheels on new and worn rails, on the tread, at gauge corner and flange, on the curve of the rail.
     Curve,
+    /// Crowned rollers, much wider than long: rounded ends, logarithmic crowns and large crown radii, some of them tilted.
+    Roller,
+    /// Worn, flat-topped and kinked crowns.
+    Uneven,
 }
 
 impl Class {
@@ -34,6 +38,8 @@ impl Class {
             Class::Gap => "gap",
             Class::Profiles => "profiles",
             Class::Curve => "curve",
+            Class::Roller => "roller",
+            Class::Uneven => "uneven",
         }
     }
 
@@ -51,6 +57,7 @@ impl Class {
             Class::Gap => 200,
             Class::Profiles => 96,
             Class::Curve => 120,
+            Class::Roller | Class::Uneven => 80,
         }
     }
 }
@@ -66,6 +73,8 @@ pub fn case(class: Class, number: usize) -> Value {
         Class::Gap => gap(&setting, random),
         Class::Profiles => profiles(&setting, random),
         Class::Curve => curve(&setting, random),
+        Class::Roller => roller(&setting, random),
+        Class::Uneven => uneven(&setting, random),
     }
 }
 
@@ -255,6 +264,91 @@ fn gap(setting: &Setting, random: &mut Random) -> Value {
         json!({ "type": "gap_profile", "rolling_mm": rolling, "y_mm": places, "gap_mm": heights })
     };
     let mut case = setting.case(contact, motion);
+    case["load"] = json!({ "normal_force_n": force });
+    case
+}
+
+/// Returns a crowned roller on a plane.
+fn roller(setting: &Setting, random: &mut Random) -> Value {
+    let rolling = random.decades(6.0, 300.0);
+    let half = random.decades(1.5, 12.0);
+    let along = random.decades(0.03, 0.35) * half.min(0.4 * rolling);
+    let modulus = MODULUS / (1.0 - setting.poisson);
+    // The load per mm of a cylinder with this half-length of the contact.
+    let load = 0.25 * PI * modulus * along * along / rolling;
+    let force = 2.0 * half * load;
+    let straight = half * random.between(0.3, 1.1);
+    let ends = random.decades(0.4, 40.0) * half;
+    let crown = random.decades(30.0, 3000.0) * half;
+    let depth = load / (PI * modulus) * random.decades(0.4, 2.5);
+    let tilt = if random.below(3) == 0 {
+        random.between(-3e-5, 3e-5)
+    } else {
+        0.0
+    };
+    let kind = random.below(3);
+    let rounded = |y: f64| 0.5 * (y.abs() - straight).max(0.0).powi(2) / ends;
+    // Lundberg's profile, continued by its tangent before its pole.
+    let logarithmic = |y: f64| {
+        let (part, last) = ((y / (1.25 * half)).powi(2), 0.98);
+        let beyond = (part - last).max(0.0) / (1.0 - last);
+        depth * (beyond - (1.0 - part.min(last)).ln())
+    };
+    let places: Vec<f64> = (-180..=180).map(|k| f64::from(k) * half / 82.0).collect();
+    let height = |y: &f64| {
+        let shape = match kind {
+            0 => rounded(*y),
+            1 => logarithmic(*y),
+            _ => rounded(*y) + 0.5 * y * y / crown,
+        };
+        shape + tilt * y
+    };
+    let heights: Vec<f64> = places.iter().map(height).collect();
+    let contact = json!({
+        "type": "gap_profile", "rolling_mm": rolling, "y_mm": places, "gap_mm": heights,
+    });
+    let motion = setting.motion((along * half).sqrt(), force, random);
+    let mut case = setting.case(contact, motion);
+    case["load"] = json!({ "normal_force_n": force });
+    case
+}
+
+/// Returns a crown with waves of wear, with a flat top, or with kinks.
+fn uneven(setting: &Setting, random: &mut Random) -> Value {
+    let radii @ [rolling, across] = [0; 2].map(|_| random.decades(20.0, 900.0));
+    let c = random.decades(1.0, 7.0).min(0.15 * rolling.min(across));
+    let force = c.powi(3) * MODULUS / (0.75 * (1.0 - setting.poisson) * (rolling * across).sqrt());
+    let half = c * (across / rolling).powf(0.3);
+    let depth = c * c / (radii[0] * radii[1]).sqrt();
+    let places: Vec<f64> = (-160..=160)
+        .map(|k| f64::from(k) * 6.0 * half / 160.0)
+        .collect();
+    let kind = random.below(3);
+    let waves = [0; 3].map(|_| {
+        let length = random.decades(0.5, 5.0) * half;
+        let height = depth * random.decades(0.02, 0.25) * (0.5 * length / half).min(1.0);
+        (height, 2.0 * PI / length, random.between(0.0, 6.3))
+    });
+    let (power, top) = (random.between(2.5, 8.0), half * random.between(0.6, 1.3));
+    let (kink, slope) = (
+        half * random.between(0.2, 1.2),
+        depth / half * random.decades(0.1, 1.5),
+    );
+    let crown = across * random.decades(1.0, 10.0);
+    let height = |y: &f64| match kind {
+        0 => {
+            let worn =
+                |(height, number, phase): &(f64, f64, f64)| height * (number * y + phase).cos();
+            0.5 * y * y / across + waves.iter().map(worn).sum::<f64>()
+        }
+        1 => depth * ((y / top).abs().powf(power).min(30.0) + 1e-4 * (y / half).powi(2)),
+        _ => 0.5 * y * y / crown + slope * (y.abs() - kink).max(0.0),
+    };
+    let heights: Vec<f64> = places.iter().map(height).collect();
+    let contact = json!({
+        "type": "gap_profile", "rolling_mm": rolling, "y_mm": places, "gap_mm": heights,
+    });
+    let mut case = setting.case(contact, setting.motion(c, force, random));
     case["load"] = json!({ "normal_force_n": force });
     case
 }
