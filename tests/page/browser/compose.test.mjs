@@ -71,6 +71,72 @@ test('faults stand at their fields and in a list that leads to them', () => onPa
   assert.equal(chosen, '"creepage_z"');
 }));
 
+test('the fault of an emptied field is shown at this field', () => onPage('', async (page) => {
+  for (const name of ['wheel-rail', 'wheel-rail-flange', 'wheelset', 'hertz-steel', 'sweep', 'unlike-bodies']) {
+    await begin(page, name);
+    const ids = await page.locator('.form input[id^=field-]:not([type=file])').evaluateAll((all) => all.map(({ id }) => id));
+    for (const id of ids) {
+      const input = page.locator(`[id="${id}"]`);
+      await input.evaluate((element) => element.closest('details')?.setAttribute('open', ''));
+      const before = await input.inputValue();
+      if (!before) continue;
+      // An empty field with a placeholder is valid; another one is marked.
+      const optional = (await input.getAttribute('placeholder')) !== '' || id === 'field-name';
+      await input.fill('');
+      await page.locator(optional ? '.verdict .checked' : `[id="${id}-fault"]`).waitFor();
+      assert.equal(await input.getAttribute('aria-invalid'), `${!optional}`, `${name} ${id}`);
+      await input.fill(before);
+      await sound(page);
+    }
+  }
+}));
+
+test('files that cannot be cross-sections are refused with the reason, and a case as JSON is opened', () => onPage('', async (page) => {
+  await begin(page, 'wheel-rail');
+  const before = await json(page);
+  const { rail } = example('wheel-rail-flange').contact;
+  for (const [name, content, text] of /** @type {[string, string | number[], string][]} */ ([
+    ['photo.rail.png', [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a, 0, 0, 0, 0x0d], 'photo.rail.png is not a text file'],
+    ['cloud.csv', `${rail.text}\n`.repeat(6000), 'cloud.csv has 7.6 MiB; at most 4 MiB are read'],
+    ['other.json', '{ "a": 1 }', 'other.json is JSON, but not a case'],
+    ['half.json', '{ "contact": ', 'half.json is not valid JSON'],
+  ])) {
+    await dropFiles(page, 'main', { [name]: content });
+    await page.locator('.toast').filter({ hasText: text }).waitFor();
+    assert.deepEqual(await json(page), before, name);
+  }
+  const whole = example('hertz-steel');
+  await dropFiles(page, 'main', { 'own.json': JSON.stringify(whole) });
+  await page.waitForFunction((name) => document.querySelector('#h-drawing')?.textContent === name, whole.name);
+  assert.deepEqual(await json(page), whole);
+  await sound(page);
+}));
+
+test('a case that is too large to be kept in the tab is still edited', () => onPage('', async (page) => {
+  await begin(page, 'wheel-rail');
+  const long = { ...example('wheel-rail'), contact: { ...example('wheel-rail').contact, rail: { format: 'columns', text: '1 2 3 4\n'.repeat(800_000) } } };
+  await page.locator('.code summary').click();
+  await page.locator('.code textarea').evaluate((area, text) => {
+    /** @type {HTMLTextAreaElement} */ (area).value = text;
+    area.dispatchEvent(new Event('input', { bubbles: true }));
+  }, JSON.stringify(long));
+  await page.locator('.verdict').filter({ hasText: 'One fault' }).waitFor();
+}));
+
+test('the contents of files decide what they are, not their names', () => onPage('', async (page) => {
+  await sound(page);
+  const { rail, wheel } = example('wheel-rail-flange').contact;
+  await dropFiles(page, '.stage', { 'wheel.txt': rail.text, 'rail.txt': wheel.text });
+  await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'rail on wheel');
+  const { contact } = await json(page);
+  assert.deepEqual([contact.rail.text, contact.wheel.text], [rail.text, wheel.text]);
+  await sound(page);
+  // A single rail called a wheel, dropped on the wheel, replaces the rail.
+  await page.locator('#field-contact-wheel').setInputFiles({ name: 'wheel_12.csv', mimeType: 'text/csv', buffer: Buffer.from(rail.text.replace('\n', ' \n')) });
+  await page.getByText('wheel_12.csv is a rail, by its contents').waitFor();
+  assert.deepEqual((await json(page)).contact.wheel, contact.wheel);
+}));
+
 test('rolling that changes is written in the form, and its forces stand over the distance rolled', () => onPage('', async (page) => {
   await begin(page, 'hertz-steel');
   await page.locator('.seg').filter({ hasText: 'Over a distance' }).click();
@@ -146,7 +212,7 @@ test('files of profiles go where they belong, also when they are dropped anywher
   await sound(page);
   const files = { 'worn.ban': example('wheel-rail-flange').contact.rail.text, 'worn.whl': example('wheel-rail-flange').contact.wheel.text };
   await dropFiles(page, '.stage', files);
-  await page.locator('svg[aria-label^="Wheel on rail"] .rail').waitFor();
+  await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'worn on worn');
   const { contact } = await json(page);
   assert.equal(contact.type, 'profiles');
   assert.deepEqual([contact.rail.format, contact.rail.text], ['miniprof', files['worn.ban']]);
@@ -195,8 +261,8 @@ test('two files dropped together replace both, and one file of unknown body is a
   await page.waitForFunction((name) => document.querySelector('#h-drawing')?.textContent === name, example('wheel-rail').name);
   await dropFiles(page, '.form', { 'SUIC519A.dat': rows.rail, 'RUIC519A.dat': rows.wheel });
   await page.waitForFunction(() => document.querySelector('#h-drawing')?.textContent === 'RUIC519A on SUIC519A');
-  await dropFiles(page, '.form', { 'RUIC519A.dat': rows.wheel });
-  await page.getByText('RUIC519A.dat does not say whether it is a rail or a wheel').waitFor();
+  await dropFiles(page, '.form', { 'some.dat': '1 2\n3 4' });
+  await page.getByText('some.dat does not show whether it is a rail or a wheel').waitFor();
   assert.deepEqual((await json(page)).contact.rail, after.rail);
   assert.deepEqual((await json(page)).contact.wheel, after.wheel);
   await page.getByRole('button', { name: 'Exchange rail and wheel' }).click();

@@ -96,9 +96,32 @@ test('a planner forecasts the wear of own sections, and compares it with grindin
 
 test('a faulty traffic is refused with its place, and a table from a file is taken', () => onPage('#/forecast', async (page) => {
   await page.getByRole('button', { name: 'Compute', exact: true }).waitFor();
+  // Every fault is shown at its field and in the list, whose entries lead to the fields.
+  await page.getByLabel('Traffic over the rail').fill('');
+  await page.getByLabel('rail height, W1').fill('-2');
+  await page.getByLabel('speed, row 2').fill('fast');
+  await page.getByRole('button', { name: 'Add grinding' }).click();
+  await page.getByLabel('Time of maintenance 1').fill('-1');
+  await page.getByRole('button', { name: 'Compute' }).click();
+  for (const label of ['Traffic over the rail', 'rail height, W1', 'speed, row 2', 'Time of maintenance 1']) {
+    const input = page.getByLabel(label);
+    await until(async () => (await input.getAttribute('aria-invalid')) === 'true', label);
+    assert.match(await page.locator(`[id="${await input.getAttribute('aria-describedby')}"]`).innerText(), /needed/, label);
+  }
+  await page.locator('.faults').getByRole('button', { name: 'speed, row 2' }).click();
+  assert.equal(await page.evaluate(() => document.activeElement?.getAttribute('aria-label')), 'speed, row 2');
+  // A changed value has no fault until the form is sent again; an empty cell has the value of the case.
+  await page.getByLabel('speed, row 2').fill('');
+  assert.equal(await page.getByLabel('speed, row 2').getAttribute('aria-invalid'), 'false');
+  await page.getByLabel('Traffic over the rail').fill('4');
+  await page.getByLabel('rail height, W1').fill('');
+  await page.getByRole('button', { name: 'Remove event 1' }).click();
+  await page.getByLabel('speed, row 1').fill('60');
   await page.getByLabel('friction μ, row 1').fill('-1');
   await page.getByRole('button', { name: 'Compute' }).click();
-  await page.locator('.faults code').filter({ hasText: /traffic.*friction/ }).first().waitFor();
+  await page.locator('.faults').getByRole('button', { name: 'friction μ, row 1' }).waitFor();
+  assert.equal(await page.locator('.faults li').count(), 1);
+  assert.equal(await page.getByLabel('friction μ, row 1').getAttribute('aria-invalid'), 'true');
   await page.locator('#traffic').setInputFiles({ name: 'year.csv', mimeType: 'text/csv', buffer: Buffer.from('axle load [t];shift [mm];passes\n20;0;3\n22,5;-1;1\n') });
   await page.getByText('year.csv: 2 rows').waitFor();
   // Each dropped file goes to its place, and the columns that were read from the table are shown.
@@ -109,6 +132,9 @@ test('a faulty traffic is refused with its place, and a table from a file is tak
   assert.match(read, /wheel load Q\s+58\.8 … 147 kN/);
   assert.match(read, /curve radius\s+−400 … 0 m/);
   await page.getByText('Not used: train.').waitFor();
+  assert.equal(await page.getByText('Titles without a unit').count(), 0);
+  await page.locator('#traffic').setInputFiles({ name: 'plain.csv', mimeType: 'text/csv', buffer: Buffer.from('axle load;passes\n22;1\n') });
+  await page.getByText('“axle load” is read in kN (allowed: kN, N, t)').waitFor();
   // A file chosen as a table is not taken for a section.
   await page.locator('#traffic').setInputFiles({ name: 'bad.csv', mimeType: 'text/csv', buffer: Buffer.from('passes;axle load [t]\n1;x\n') });
   await page.getByText('own.ban, own.whl').waitFor();

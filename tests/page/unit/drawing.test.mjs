@@ -31,37 +31,45 @@ test('files of gaps and grids are read whatever separates their numbers', () => 
 test('contents and name of a file tell its format and body', () => {
   /** @param {string} name */
   const kind = (name, text = '1 2\n3 4') => profileKind({ name, text });
-  assert.deepEqual(kind('worn.BAN'), { format: 'miniprof', body: 'rail' });
-  assert.deepEqual(kind('left.whl'), { format: 'miniprof', body: 'wheel' });
-  assert.deepEqual(kind('a.prw'), { format: 'simpack', body: 'wheel' });
-  assert.deepEqual(kind('my-rail.csv'), { format: 'columns', body: 'rail' });
-  assert.deepEqual(kind('x.txt'), { format: 'columns', body: null });
-  assert.deepEqual(kind('x.txt', 'Date=1\nXYPoints=2\nColumnDef=X,Y\n\n1 2\n3 4'), { format: 'miniprof', body: null });
-  assert.deepEqual(kind('x.dat', '#MINIWHEELPROF\nMINIPROF 2020\n\n1 2'), { format: 'miniprof', body: 'wheel' });
-  assert.deepEqual(kind('x.dat', '! a\nheader.begin\n type = 1\nheader.end\nspline.begin\n type = 0\n'), { format: 'simpack', body: 'wheel' });
-  assert.deepEqual(kind('x.prr', 'HEADER.BEGIN\n TYPE = 0\nHEADER.END\nSPLINE.BEGIN'), { format: 'simpack', body: 'rail' });
+  assert.deepEqual(kind('worn.BAN'), { format: 'miniprof', contents: null, named: 'rail' });
+  assert.deepEqual(kind('left.whl'), { format: 'miniprof', contents: null, named: 'wheel' });
+  assert.deepEqual(kind('a.prw'), { format: 'simpack', contents: null, named: 'wheel' });
+  assert.deepEqual(kind('my-rail.csv'), { format: 'columns', contents: null, named: 'rail' });
+  assert.deepEqual(kind('x.txt'), { format: 'columns', contents: null, named: null });
+  assert.deepEqual(kind('x.txt', 'Date=1\nXYPoints=2\nColumnDef=X,Y\n\n1 2\n3 4'), { format: 'miniprof', contents: null, named: null });
+  assert.deepEqual(kind('x.dat', '#MINIWHEELPROF\nMINIPROF 2020\n\n1 2'), { format: 'miniprof', contents: 'wheel', named: null });
+  assert.deepEqual(kind('x.dat', '! a\nheader.begin\n type = 1\nheader.end\nspline.begin\n type = 0\n'), { format: 'simpack', contents: 'wheel', named: null });
+  assert.deepEqual(kind('x.prr', 'HEADER.BEGIN\n TYPE = 0\nHEADER.END\nSPLINE.BEGIN'), { format: 'simpack', contents: 'rail', named: 'rail' });
 });
 
-test('two files always become both bodies, and one file only a body that is certain', () => {
-  /** @param {string} name */
-  const file = (name) => ({ name, text: name });
+test('two files always become both bodies, and contents decide before names', () => {
+  /** @param {string} name @param {'rail' | 'wheel' | null} [contents] By the shape. */
+  const file = (name, contents = null) => ({ name, text: name, contents });
+  /** @param {ReturnType<typeof file>[]} files @param {('rail' | 'wheel')[]} missing @param {'rail' | 'wheel'} [onto] */
+  const bodies = (files, missing, onto) => bodiesOf(files, files.map(({ name, text, contents }) => ({ ...profileKind({ name, text }), contents })), missing, onto);
   const [rail, wheel] = [file('a.ban'), file('b.whl')];
   const [one, two] = [file('SUIC519A.dat'), file('RUIC519A.dat')];
+  const [misnamed, shaped] = [file('wheel.csv', 'rail'), file('c.dat', 'wheel')];
   for (const missing of [[], ['rail'], ['wheel'], ['rail', 'wheel']]) {
     const given = /** @type {('rail' | 'wheel')[]} */ (missing);
-    assert.deepEqual(bodiesOf([rail, wheel], given), { rail, wheel });
-    assert.deepEqual(bodiesOf([wheel, rail], given), { rail, wheel });
-    assert.deepEqual(bodiesOf([one, two], given), { rail: one, wheel: two });
-    assert.deepEqual(bodiesOf([one, rail], given), { rail, wheel: one });
-    assert.deepEqual(bodiesOf([wheel, one], given), { rail: one, wheel });
-    assert.match(String(bodiesOf([wheel, file('c.whl')], given)), /both a wheel/);
-    assert.match(String(bodiesOf([wheel, rail, one], given)), /3 files/);
-    assert.deepEqual(bodiesOf([wheel], given), { wheel });
-    assert.deepEqual(bodiesOf([wheel], given, 'rail'), { wheel });
-    assert.deepEqual(bodiesOf([one], given, 'rail'), { rail: one });
+    assert.deepEqual(bodies([rail, wheel], given), { rail, wheel });
+    assert.deepEqual(bodies([wheel, rail], given), { rail, wheel });
+    assert.deepEqual(bodies([one, two], given), { rail: one, wheel: two });
+    assert.deepEqual(bodies([one, rail], given), { rail, wheel: one });
+    assert.deepEqual(bodies([wheel, one], given), { rail: one, wheel });
+    assert.match(String(bodies([wheel, file('c.whl')], given)), /both a wheel/);
+    assert.match(String(bodies([wheel, rail, one], given)), /3 files/);
+    assert.deepEqual(bodies([wheel], given), { wheel });
+    assert.deepEqual(bodies([wheel], given, 'rail'), { wheel });
+    assert.deepEqual(bodies([one], given, 'rail'), { rail: one });
+    assert.deepEqual(bodies([misnamed], given, 'wheel'), { rail: misnamed });
+    assert.deepEqual(bodies([wheel, misnamed], given), { rail: misnamed, wheel });
+    assert.deepEqual(bodies([misnamed, rail], given), { rail: misnamed, wheel: rail });
+    assert.deepEqual(bodies([shaped, misnamed], given), { rail: misnamed, wheel: shaped });
+    assert.match(String(bodies([misnamed, file('rail.csv', 'rail')], given)), /both a rail/);
   }
-  assert.match(String(bodiesOf([one], [])), /SUIC519A.dat does not say/);
-  assert.deepEqual(bodiesOf([one], ['wheel']), { wheel: one });
+  assert.match(String(bodies([one], [])), /SUIC519A.dat does not show/);
+  assert.deepEqual(bodies([one], ['wheel']), { wheel: one });
 });
 
 test('files are read in the encodings of instruments and office programs', () => {

@@ -5,11 +5,12 @@ import { decisionOf, normalsInto } from '../../../src/http/page/web/js/forecastd
 import { isTraffic, parseTraffic, rowsOf, tableOf, trafficOf } from '../../../src/http/page/web/js/traffic.js';
 
 const SPEED = 20_000;
+const CASE = { contact: { lateral_shift_mm: -3 }, friction: { coefficient: 0.4 }, motion: { wheelset: { speed_mm_per_s: SPEED } } };
 /** @param {string} text */
 const read = (text) => {
   const table = parseTraffic(text);
   assert.ok(typeof table !== 'string', String(table));
-  return { table, ...trafficOf({ rows: [], table }, SPEED) };
+  return { table, ...trafficOf({ rows: [], table }, CASE) };
 };
 
 test('a table of a traffic has titles with units, in the signs and marks of its country', () => {
@@ -45,13 +46,33 @@ test('a dropped text is a traffic where it has two columns of one, not a cross-s
 
 test('written rows become columns in the units of the API, empty ones are left to the case, and they come back', () => {
   const row = { passes: '60', load: '75,5', speed: '', radius: '-400', shift: '-2', yaw: '', friction: '' };
-  const traffic = trafficOf({ rows: [row, { ...row, passes: '40', load: '80', radius: '' }], table: null }, SPEED);
+  const traffic = trafficOf({ rows: [row, { ...row, passes: '40', load: '80', radius: '' }], table: null }, CASE);
   assert.deepEqual(traffic, {
     columns: { '/load/vertical_force_n': [75500, 80000], '/motion/wheelset/yaw_rate_rad_per_s': [-0.05, 0], '/contact/lateral_shift_mm': [-2, -2] }, passes: [60, 40],
   });
   const again = tableOf(/** @type {Record<string, number[]>} */ (traffic.columns), [60, 40], SPEED);
   assert.deepEqual(rowsOf(again), [{ ...row, load: '75.5' }, { ...row, passes: '40', load: '80', radius: '' }]);
-  assert.deepEqual(trafficOf({ rows: [], table: again }, SPEED), traffic);
+  assert.deepEqual(trafficOf({ rows: [], table: again }, CASE), traffic);
+});
+
+test('an empty cell among written ones is the value of the case, and a row without a radius is straight', () => {
+  const row = { passes: '', load: '75', speed: '', radius: '', shift: '', yaw: '', friction: '' };
+  const rows = [row, { ...row, passes: '2', speed: '36', shift: '1', yaw: '2', friction: '0,3' }];
+  const traffic = trafficOf({ rows, table: null }, CASE);
+  assert.deepEqual(traffic.passes, [1, 2]);
+  assert.deepEqual(traffic.columns, {
+    '/load/vertical_force_n': [75000, 75000], '/motion/wheelset/speed_mm_per_s': [SPEED, 10000], '/contact/lateral_shift_mm': [-3, 1], '/contact/yaw_rad': [0, 0.002], '/friction/coefficient': [0.4, 0.3],
+  });
+  // In a curve, rows without a radius are straight too. The case has no load, so that an empty one is left to the service to refuse.
+  const curved = { motion: { wheelset: { speed_mm_per_s: SPEED, yaw_rate_rad_per_s: 0.05 } } };
+  const straight = trafficOf({ rows: [{ ...row, load: '' }, row], table: null }, curved).columns;
+  assert.deepEqual(straight, { '/load/vertical_force_n': [null, 75000], '/motion/wheelset/yaw_rate_rad_per_s': [0, 0] });
+});
+
+test('a title without a unit is reported with the assumed and the allowed units', () => {
+  const { table } = read('axle load;speed [m/s];shift_mm;friction;passes\n22;20;1;0.3;1');
+  assert.deepEqual(table.assumed, ['“axle load” is read in kN (allowed: kN, N, t)']);
+  assert.deepEqual([table.values.load, table.values.speed, table.values.shift], [[11], [72], [1]]);
 });
 
 test('of two plans the one whose first limit comes later goes on longer, if other coefficients say the same', () => {

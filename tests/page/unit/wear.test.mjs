@@ -33,6 +33,17 @@ test('a fit finds the shift of a rail whose whole gauge side is worn', () => {
   assert.ok(Math.abs(y + 1.3) < 0.1 && Math.abs(z - 0.7) < 0.03, `${y}, ${z}`);
 });
 
+test('the worn area of sections with the same unworn points is not changed by their alignment', () => {
+  // A head with corners of 13 mm radius, in points 0.34 mm apart, a worn gauge corner, a cosine wave of 10 mm length and 0.3 mm depth, and a top that
+  // is worn by 0.06 mm up to 13 mm on the field side, 28 % of it.
+  const corner = (/** @type {number} */ side) => Array.from({ length: 61 }, (_, at) => (at / 60) * (Math.PI / 2)).map((angle) => /** @type {[number, number]} */ ([side * (23 + 13 * Math.sin(angle)), 13 * Math.cos(angle) - 13]));
+  const top = Array.from({ length: 183 }, (_, at) => /** @type {[number, number]} */ ([-22.75 + at / 4, 0]));
+  const rail = [...corner(-1).reverse(), ...top, ...corner(1)];
+  const worn = rail.map(([y, z]) => /** @type {[number, number]} */ ([y, z - 0.06 * Math.max(0, Math.min(1, 7 - Math.abs(y) / 2)) - (Math.abs(y + 24) < 5 ? 0.15 * (1 + Math.cos((Math.PI * (y + 24)) / 5)) : 0)]));
+  const wear = wearBetween(rail, worn, 'rail', bestFit(rail, worn, 'rail'));
+  assert.ok(Math.abs(wear.area - 3.06) < 0.01 && wear.added < 0.01, `${wear.area} ${wear.added}`);
+});
+
 test('a fit finds the shift of a hollow wheel by the back of its flange, and of a wheel without a back by all of it', () => {
   // The back of a flange, its tip as half a circle, its flank, and a tread of 1:20.
   const tip = Array.from({ length: 31 }, (_, i) => (i / 30) * Math.PI).map((angle) => /** @type {[number, number]} */ ([-55 - 14 * Math.cos(angle), -14 - 14 * Math.sin(angle)]));

@@ -94,7 +94,7 @@ export const health = () => json('/readyz');
 
 /**
  * @param {string} text The case.
- * @param {AbortSignal} signal
+ * @param {AbortSignal} [signal]
  * @returns {Promise<CheckedCase>}
  */
 export const checkCase = (text, signal) => json('/v1/cases/check', { method: 'POST', body: text, signal });

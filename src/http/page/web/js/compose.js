@@ -9,7 +9,7 @@ import { drawGapCurve, drawGrid } from './drawing/gaps.js';
 import { drawGap, drawProfiles, drawSection } from './drawing/profiles.js';
 import { change, editDocument, editText, isUntouched, openExample, queue, solve, solveLive } from './editing.js';
 import { offered, rangeOf } from './field/quantities.js';
-import { fieldId } from './field.js';
+import { fieldId, sentenceOf } from './field.js';
 import { caseForm } from './form.js';
 import { count, fixed, number, seconds, withError } from './format.js';
 import { placed } from './placing.js';
@@ -120,7 +120,7 @@ export function verdict(app, state, timed = true) {
   if (wrong.length) {
     return html`${wanted}<p class="fault big">${wrong.length === 1 ? 'One fault' : `${wrong.length} faults`}</p>
       <ul class="faults">${wrong.map((fault) => html`<li>
-        <button class="link" @click=${() => lead(app, fault.pointer ?? '')}>${fault.pointer ? inWords(fault.pointer) : 'case'}</button> ${fault.detail}${excerpt(state, fault)}</li>`)}</ul>`;
+        <button class="link" @click=${() => lead(app, fault.pointer ?? '')}>${fault.pointer ? inWords(fault.pointer) : 'case'}</button> ${sentenceOf(fault)}${excerpt(state, fault)}</li>`)}</ul>`;
   }
   if (!checked) return html`<p class="quiet">Checking …</p>`;
   const motions = checked.motions > 1 ? `${count(checked.motions)} motions, about` : 'About';

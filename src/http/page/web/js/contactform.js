@@ -1,17 +1,19 @@
 // Form fields of the kinds of contact, and import of dropped files.
 
 import { html, nothing } from '../vendor/lit-html.js';
-import { at, isObject, numberAt, put } from './document.js';
-import { change, editDocument, isUntouched } from './editing.js';
+import { checkCase, Refused } from './api.js';
+import { at, isObject, numberAt, pretty, put } from './document.js';
+import { change, editDocument, editText, isUntouched } from './editing.js';
 import { hasSections, isBent, lacksSection, PROFILES, standardSection, withContact, withEverything, withoutNameOf } from './starts.js';
 import { choice, faultAt, field, fieldId } from './field.js';
 import { count, fixed, number } from './format.js';
-import { bodiesOf, decoded, profileKind } from './files.js';
+import { bodiesOf, profileKind, textOfFile } from './files.js';
 import { parseGapCurve, parseGrid } from './tables.js';
 import { inclinationText, parse, parseInclination } from './written.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./document.js').JsonObject} JsonObject */
+/** @typedef {import('./document.js').JsonValue} JsonValue */
 
 /** @typedef {import('./files.js').Body} Body */
 
@@ -28,11 +30,11 @@ export function contactFields(app, type) {
       return profileFields(app);
     case 'gap_profile':
       return html`<div class="pair">${field(app, '/contact/rolling_mm', 'Relative radius along', 'mm')}
-        ${dropZone('Gap', pointsOf(app, '/contact/gap_mm'), '/contact/gap_mm', app, (file) => takeGap(app, file))}</div>`;
+        ${dropZone('Gap', pointsOf(app, '/contact/gap_mm'), '/contact/gap_mm', app, (file) => void takeGap(app, file).catch(app.refused))}</div>`;
     case 'gap_grid':
     case 'pressure_grid': {
       const member = type === 'gap_grid' ? 'gap_mm' : 'pressure_mpa';
-      return dropZone(type === 'gap_grid' ? 'Gap on a grid' : 'Pressure on a grid', pointsOf(app, `/contact/${member}`), `/contact/${member}`, app, (file) => takeGrid(app, file, member));
+      return dropZone(type === 'gap_grid' ? 'Gap on a grid' : 'Pressure on a grid', pointsOf(app, `/contact/${member}`), `/contact/${member}`, app, (file) => void takeGrid(app, file, member).catch(app.refused));
     }
     case 'wheelset':
       return wheelsetFields(app);
@@ -239,7 +241,7 @@ function dropZone(title, what, pointer, app, take, wanted) {
 
 /** @param {App} app @param {File} file */
 async function takeGap(app, file) {
-  const curve = parseGapCurve(decoded(await file.arrayBuffer()));
+  const curve = parseGapCurve(await textOfFile(file));
   if (!curve) return app.say(`${file.name} does not have two columns of numbers, y and gap in mm.`);
   const document = app.store.get().compose.document ?? {};
   editDocument(app, put(put(document, '/contact/y_mm', curve.y_mm), '/contact/gap_mm', curve.gap_mm));
@@ -247,7 +249,7 @@ async function takeGap(app, file) {
 
 /** @param {App} app @param {File} file @param {string} member */
 async function takeGrid(app, file, member) {
-  const grid = parseGrid(decoded(await file.arrayBuffer()));
+  const grid = parseGrid(await textOfFile(file));
   if (!grid) return app.say(`${file.name} is not a grid with x in its first row and y in its first column.`);
   const document = app.store.get().compose.document ?? {};
   const { type } = /** @type {JsonObject} */ (document.contact);
@@ -261,31 +263,78 @@ function nameOf({ wheel, rail }) {
 }
 
 /**
- * Imports files of cross-sections into the case.
+ * Returns the body that the shape of a file shows: the only one that the service reads it as, with a standard section as its counterpart.
+ * @param {App} app
+ * @param {import('./files.js').DroppedFile} file
+ * @param {import('./files.js').ProfileFormat} format
+ * @returns {Promise<Body | null>} Null if it may be both, or neither.
+ */
+async function bodyByShape(app, { text }, format) {
+  const { examples } = app.store.get().compose;
+  const [rail, wheel] = BODIES.map((body) => standardSection(examples, body));
+  if (!rail || !wheel) return null;
+  const isRead = async (/** @type {Body} */ body) => {
+    const whole = { ...withContact(null, 'profiles'), contact: { ...PROFILES, rail, wheel, [body]: { format, text } } };
+    const pointer = `/contact/${body}`;
+    try {
+      const { remarks } = await checkCase(JSON.stringify(whole));
+      return !remarks.some((remark) => remark.code === 'profile-of-other-body' && remark.pointer === pointer);
+    } catch (error) {
+      return error instanceof Refused && error.faults.length > 0 && !error.faults.some((fault) => fault.pointer?.startsWith(pointer));
+    }
+  };
+  const [isRail, isWheel] = await Promise.all(BODIES.map(isRead));
+  return isRail === isWheel ? null : isRail ? 'rail' : 'wheel';
+}
+
+/** Opens a dropped case. @param {App} app @param {import('./files.js').DroppedFile} file */
+function takeCase(app, { name, text }) {
+  /** @type {JsonValue} */
+  let value;
+  try {
+    value = JSON.parse(text);
+  } catch (error) {
+    return app.say(`${name} is not valid JSON: ${error instanceof Error ? error.message : error}.`);
+  }
+  if (!isObject(value) || !isObject(value.contact)) return app.say(`${name} is JSON, but not a case: it has no contact.`);
+  app.compose({ example: '', files: {}, typing: null });
+  editText(app, pretty(value));
+}
+
+/**
+ * Imports files of cross-sections into the case, or a file with a whole case as JSON.
  * @param {App} app
  * @param {readonly File[]} files
  * @param {Body} [onto] The body on whose area they were dropped.
  */
 export async function takeProfiles(app, files, onto) {
-  const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: decoded(await file.arrayBuffer()) }))).catch(() => null);
-  if (!read) return app.say('A file cannot be read. Is it a folder?');
+  const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: await textOfFile(file) })));
+  const whole = read.find(({ text }) => /^\s*\{/.test(text));
+  if (whole && read.length > 1) return app.say(`${whole.name} is JSON. Drop a case alone.`);
+  if (whole) return takeCase(app, whole);
+  const kinds = await Promise.all(read.map(async (file) => {
+    const kind = profileKind(file);
+    return { ...kind, contents: kind.contents ?? await bodyByShape(app, file, kind.format) };
+  }));
   const state = app.store.get().compose;
   const { document: before, files: taken, example, examples } = state;
   const fresh = !before || !hasSections(at(before, '/contact/type')) || isUntouched(state);
   const shipped = /** @type {JsonObject | undefined} */ (/** @type {unknown} */ (examples.find(({ name }) => name === example)?.case));
   let document = fresh ? withEverything(put(put(put(withContact(isUntouched(state) ? null : before, 'profiles'), '/labels', undefined), '/name', undefined), '/contact', PROFILES)) : withoutNameOf(before, shipped);
   const missing = BODIES.filter((body) => !Object.keys(at(document, `/contact/${body}`) ?? {}).length);
-  const bodies = bodiesOf(read, missing, onto);
+  const bodies = bodiesOf(read, kinds, missing, onto);
   if (typeof bodies === 'string') return app.say(bodies);
   const known = { ...taken };
   for (const body of BODIES) {
     const file = bodies[body];
     if (!file) continue;
-    document = put(document, `/contact/${body}`, { format: profileKind(file).format, text: file.text });
+    const { format, contents, named } = kinds[read.indexOf(file)];
+    document = put(document, `/contact/${body}`, { format, text: file.text });
     // The right side of a wheelset uses the same file, unless it is changed in the JSON.
     if (at(document, `/contact/right/${body}`)) document = put(document, `/contact/right/${body}`, undefined);
     known[body] = file;
-    if (onto && body !== onto && files.length === 1) app.say(`${file.name} is a ${body}, by its contents or its name.`);
+    const elsewhere = files.length === 1 && onto && body !== onto;
+    if (elsewhere || (named && body !== named)) app.say(`${file.name} is a ${body}, by its ${contents ? 'contents' : 'name'}.`);
   }
   if (isObject(at(document, '/contact/right')) && !Object.keys(at(document, '/contact/right') ?? {}).length) document = put(document, '/contact/right', undefined);
   const name = at(document, '/name');

@@ -115,7 +115,12 @@ export const isUntouched = ({ example, text }) => example !== '' && text === ope
  */
 function take(app, document, text, unreadable) {
   app.compose({ document, text, unreadable, refusal: '', ...(unreadable ? { faults: [], checked: null } : {}) });
-  sessionStorage.setItem(KEPT, text);
+  try {
+    sessionStorage.setItem(KEPT, text);
+  } catch {
+    // The browser stores about 5 MB. A larger case is lost when the page is left.
+    sessionStorage.removeItem(KEPT);
+  }
   asking.abort();
   // The first change is checked at once; rapid changes, such as of a slider, at intervals.
   timer ||= window.setTimeout(() => check(app), Math.max(0, began + PAUSE_MS - performance.now()));

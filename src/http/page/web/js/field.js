@@ -14,7 +14,7 @@ import { parse, parseList, textOf } from './written.js';
  * @typedef {object} FieldLook
  * @property {number} [factor] Factor from the shown unit to the unit of the API.
  * @property {string} [hint]
- * @property {string} [empty] Placeholder of an empty field.
+ * @property {string} [empty] Placeholder of an empty field, whose value is optional. Without it an emptied field is null, so that its fault names it.
  * @property {boolean} [text] Accepts any text, not only numbers.
  * @property {boolean} [list] Accepts one number or several.
  * @property {(value: JsonValue | undefined) => string} [format] Formats a value without a unit.
@@ -51,7 +51,8 @@ export function field(app, pointer, label, unit, look = {}) {
     const { value } = /** @type {HTMLInputElement} */ (event.target);
     app.compose({ typing: { pointer, text: value } });
     const read = look.read ?? (look.text ? (text) => text || undefined : look.list ? (text) => parseList(text, look.factor) : (text) => parse(text, look.factor));
-    (look.take ?? ((taken) => change(app, pointer, taken)))(read(value));
+    const needed = look.empty === undefined && !look.text ? null : undefined;
+    (look.take ?? ((taken) => change(app, pointer, taken)))(read(value) ?? needed);
   };
   return html`<div class=${fault ? 'field bad' : 'field'}>
     <label for=${id}>${label}</label>
@@ -61,7 +62,7 @@ export function field(app, pointer, label, unit, look = {}) {
         @input=${write} @blur=${() => app.compose({ typing: null })}>
       ${unit ? html`<span class="unit">${unit}</span>` : nothing}
     </span>
-    ${fault ? html`<p class="fault" id=${`${id}-fault`}>${faultText(fault, look.factor, unit)}</p>`
+    ${fault ? html`<p class="fault" id=${`${id}-fault`}>${faultText(fault, look.read ? undefined : (look.factor ?? 1), unit)}</p>`
       : look.hint ? html`<p class="hint">${look.hint}</p>` : nothing}
   </div>`;
 }
@@ -85,15 +86,18 @@ export function choice(app, pointer, label, options, { hint, take = (value) => c
     ${fault ? html`<p class="fault">${fault.detail}</p>` : hint ? html`<p class="hint">${hint}</p>` : nothing}</div>`;
 }
 
+/** Returns the sentence of a fault. An emptied field is null in the case. @param {Fault} fault */
+export const sentenceOf = ({ detail }) => detail.replace(/^null given/, 'empty');
+
 /**
  * Describes a fault, in the unit of the field if its limits are known.
  * @param {Fault} fault
- * @param {number | undefined} factor
+ * @param {number | undefined} factor Undefined if the field shows another quantity than the member of the case.
  * @param {string} unit
  */
-function faultText(fault, factor, unit) {
+export function faultText(fault, factor, unit) {
   const { minimum, maximum, minimum_excluded: excluded } = fault;
-  if (!factor || (typeof minimum !== 'number' && typeof maximum !== 'number')) return fault.detail;
+  if (!factor || (typeof minimum !== 'number' && typeof maximum !== 'number')) return sentenceOf(fault);
   const low = typeof minimum === 'number' ? `${excluded ? 'more than' : 'at least'} ${number(minimum / factor)}` : '';
   const high = typeof maximum === 'number' ? `at most ${number(maximum / factor)}` : '';
   return `A number of ${[low, high].filter(Boolean).join(' and ')} ${unit} is needed.`;

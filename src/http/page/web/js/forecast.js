@@ -4,7 +4,7 @@ import { evolution as evolutionOf, evolutionRequest, evolutionResult, evolutions
 import { takeProfiles } from './contactform.js';
 import { at, isObject, numberAt } from './document.js';
 import { editDocument } from './editing.js';
-import { decoded, profileKind } from './files.js';
+import { profileKind, TABLE_MIB, textOfFile } from './files.js';
 import { LOSSES, wears } from './forecastdata.js';
 import { formatRoute } from './routes.js';
 import { inOrder, standardSection, withEverything } from './starts.js';
@@ -72,7 +72,7 @@ const firstForm = () => ({
  * @property {Form} form
  * @property {boolean} sending
  * @property {string} refusal
- * @property {readonly { pointer?: string, detail: string }[]} faults
+ * @property {readonly import('./api.js').Fault[]} faults
  * @property {Job | null} against Evolution that the next submitted one is compared with.
  * @property {readonly Job[] | null} listed
  * @property {Set<string>} ticked
@@ -104,8 +104,22 @@ export function chooseForecast(app, change) {
   app.redraw();
 }
 
-/** @param {App} app @param {Partial<Form>} change */
-export const writeForm = (app, change) => chooseForecast(app, { form: { ...forecast.form, ...change } });
+/**
+ * Changes the form. The fault of the written value no longer applies, and without its pointer none, because rows may have moved.
+ * @param {App} app
+ * @param {Partial<Form>} change
+ * @param {string} [pointer] Pointer of the value in the request.
+ */
+export function writeForm(app, change, pointer = '') {
+  const faults = forecast.faults.filter((fault) => pointer && !isWithin(fault.pointer, pointer));
+  chooseForecast(app, { form: { ...forecast.form, ...change }, faults, refusal: faults.length ? forecast.refusal : '' });
+}
+
+/** Returns whether a pointer is another one or below it. @param {string | null | undefined} pointer @param {string} parent */
+const isWithin = (pointer, parent) => pointer === parent || Boolean(pointer?.startsWith(`${parent}/`));
+
+/** Returns the fault of a value of the submitted form. @param {string} pointer */
+export const faultOf = (pointer) => forecast.faults.find((fault) => isWithin(fault.pointer, pointer));
 
 /** Opens the list, one evolution, or a comparison of two. @param {App} app @param {string[]} ids */
 export async function openForecast(app, ids) {
@@ -217,7 +231,7 @@ function requestOf(app, template) {
   };
   const events = form.events.map(eventOf);
   return {
-    template, traffic: trafficOf(form, speedOf(template)), wearing: form.wearing, wear_model: form.law, records: number(form.records),
+    template, traffic: trafficOf(form, template), wearing: form.wearing, wear_model: form.law, records: number(form.records),
     extent: { ...(form.wearing === 'wheel' ? {} : { mgt: number(form.mgt) }), ...(form.wearing === 'rail' ? {} : { wheel_distance_km: number(form.km) }) },
     ...(Object.keys(limits).length ? { limits } : {}), ...(events.length ? { events } : {}), ...(form.states ? { accuracy: { states_max: number(form.states) } } : {}),
   };
@@ -286,7 +300,7 @@ export async function repeatForecast(app, job) {
 
 /** Imports dropped or chosen files: a table of the traffic or cross-sections. @param {App} app @param {readonly File[]} files */
 export async function takeForecastFiles(app, files) {
-  const read = await Promise.all(files.map(async (file) => ({ file, text: decoded(await file.arrayBuffer()) })));
+  const read = await Promise.all(files.map(async (file) => ({ file, text: await textOfFile(file, TABLE_MIB) })));
   const tables = read.filter(({ file, text }) => profileKind({ name: file.name, text }).format === 'columns' && isTraffic(text));
   if (forecast.ids.length) app.go(formatRoute('forecast'));
   if (tables.length) takeTable(app, tables[0].file.name, tables[0].text);
@@ -296,7 +310,7 @@ export async function takeForecastFiles(app, files) {
 
 /** Imports a file that was chosen as the table of the traffic. @param {App} app @param {File} file */
 export async function takeTraffic(app, file) {
-  takeTable(app, file.name, decoded(await file.arrayBuffer()));
+  takeTable(app, file.name, await textOfFile(file, TABLE_MIB));
 }
 
 /** Imports a table of the traffic. @param {App} app @param {string} name @param {string} text */
@@ -308,7 +322,7 @@ function takeTable(app, name, text) {
 
 /** Imports the target section of grinding or turning. @param {App} app @param {number} place Index of the event. @param {File} file */
 export async function takeTarget(app, place, file) {
-  const text = decoded(await file.arrayBuffer());
+  const text = await textOfFile(file);
   const { format } = profileKind({ name: file.name, text });
   const { events } = forecast.form;
   writeForm(app, { events: events.map((event, other) => (other === place ? { ...event, target: { name: file.name, section: { format, text, smoothing_mm: 'auto' } } } : event)) });

@@ -6,15 +6,15 @@ import { drawing, verdict } from './compose.js';
 import { removeLater, isThere } from './deleting.js';
 import { drawChart } from './drawing/axes.js';
 import { drawWorn } from './drawing/worn.js';
-import { numberAt } from './document.js';
 import { fileName } from './downloads.js';
-import { chooseForecast, EVENTS, FACTORS, forecastSeen, nameOf, openForecast, playFilm, recordOf, repeatForecast, startForecast, takeTarget, takeTraffic, TARGETS, templateOf, writeForm } from './forecast.js';
+import { faultText, fieldId } from './field.js';
+import { chooseForecast, EVENTS, FACTORS, faultOf, forecastSeen, nameOf, openForecast, playFilm, recordOf, repeatForecast, startForecast, takeTarget, takeTraffic, TARGETS, templateOf, writeForm } from './forecast.js';
 import { CURVES, decisionOf, deepest, distanceOf, distanceUnit, forecastChart, LOSSES, numericalOf, reachedOf, sectionOf, wears, worstDamage } from './forecastdata.js';
 import { count, fixed, number, plusMinus, seconds } from './format.js';
 import { inWords, remarkList } from './remarks.js';
 import { formatRoute } from './routes.js';
 import { savable } from './savedrawing.js';
-import { COLUMNS, ROWS_MAX } from './traffic.js';
+import { columnPointer, COLUMNS, ROWS_MAX, usualOf } from './traffic.js';
 
 /** @typedef {import('./state.js').App} App */
 /** @typedef {import('./forecast.js').Forecast} Forecast */
@@ -39,16 +39,15 @@ function formPanel(app, forecast) {
   const template = templateOf(app);
   const state = app.store.get().compose;
   const { document, files } = state;
-  const write = (/** @type {keyof typeof form} */ member) => (/** @type {Event} */ event) => writeForm(app, { [member]: valueOf(event) });
-  const entry = (/** @type {'mgt' | 'km' | 'records' | 'name'} */ member, /** @type {string} */ label, /** @type {string} */ unit, empty = '') => html`<div class="field"><label for=${`f-${member}`}>${label}</label>
-    <span class="input"><input id=${`f-${member}`} autocomplete="off" placeholder=${empty} .value=${form[member]} @input=${write(member)}>${unit ? html`<span class="unit">${unit}</span>` : nothing}</span></div>`;
+  const write = (/** @type {keyof typeof form} */ member, pointer = `/${member}`) => (/** @type {Event} */ event) => writeForm(app, { [member]: valueOf(event) }, pointer);
+  const entry = (/** @type {'mgt' | 'km' | 'records'} */ member, /** @type {string} */ pointer) => fieldOf(pointer, form[member], write(member, pointer));
   const select = (/** @type {'wearing' | 'law' | 'states'} */ member, /** @type {string} */ label, /** @type {string[][]} */ options) => html`<div class="field"><label for=${`f-${member}`}>${label}</label>
     <select id=${`f-${member}`} @change=${write(member)}>${options.map(([value, name]) => html`<option value=${value} ?selected=${form[member] === value}>${name}</option>`)}</select></div>`;
   const names = [files.rail?.name, files.wheel?.name].filter(Boolean).join(', ');
   return html`<section class="panel" aria-labelledby="h-forecast"><header class="bar"><h1 id="h-forecast">${against ? 'Another plan' : 'Forecast: wear and fatigue under a traffic'}</h1>
       ${against ? html`<span class="hint">compared with <b>${against.name}</b></span><button class="small ghost" @click=${() => chooseForecast(app, { against: null })}>Do not compare</button>` : nothing}
       <button class="primary" ?disabled=${sending || typeof template === 'string'} @click=${() => startForecast(app)}>${sending ? 'Sending …' : against ? 'Compute and compare' : 'Compute'}</button></header>
-    ${refusal ? html`<div class="pad" role="alert"><p class="fault big">${refusal}</p><ul class="faults">${faults.map(({ pointer, detail }) => html`<li><b>${inWords(pointer ?? '')}</b> ${detail}</li>`)}</ul></div>` : nothing}
+    ${refusal ? html`<div class="pad" role="alert"><p class="fault big">${refusal}</p><ul class="faults">${faults.map((fault) => faultEntry(fault, form))}</ul></div>` : nothing}
     <div class="two pad">
       <fieldset><legend>Rail and wheel</legend>${typeof template === 'string' ? html`<p class="fault">${template}</p>`
         : html`<p>${String(document?.name ?? 'The pair of the view Contact')}${names ? html` <span class="quiet">(${names})</span>` : nothing}</p>
@@ -56,16 +55,18 @@ function formPanel(app, forecast) {
           <div class="verdict" role="status">${verdict(app, state, false)}</div>
           <p class="hint">Drop other files of a rail and a wheel, or a table of the traffic, anywhere here. Inclination, gauge and steel are those of the view <a href="#/compose">Contact</a>; loads, shifts and friction are those of the traffic below.</p>`}</fieldset>
       <div>
-        <fieldset><legend>How far</legend><div class="pair">${form.wearing === 'wheel' ? nothing : entry('mgt', 'Traffic over the rail', 'MGT')}${form.wearing === 'rail' ? nothing : entry('km', 'Distance of the wheel', 'km')}</div>
+        <fieldset><legend>How far</legend><div class="pair">${form.wearing === 'wheel' ? nothing : entry('mgt', '/extent/mgt')}${form.wearing === 'rail' ? nothing : entry('km', '/extent/wheel_distance_km')}</div>
           <div class="pair">${select('wearing', 'What wears', [['both', 'rail and wheel'], ['rail', 'the rail'], ['wheel', 'the wheel']])}${select('law', 'Law of wear', [['usfd_wear', 'Tγ/A (Sheffield)'], ['archard_wear', 'Archard']])}</div>
-          <div class="pair">${select('states', 'Traffic condensed to', [['24', 'quick look: 24 states'], ['', '100 states'], ['200', 'fine: 200 states']])}${entry('records', 'Steps shown', '')}</div>
-          ${entry('name', 'Name', '', nameOf(form))}</fieldset>
-        <fieldset><legend>Limits</legend><div class="triple">${LOSSES.filter(({ body }) => form.wearing === 'both' || form.wearing === body).map(({ key, label }) => html`<div class="field"><label for=${`f-${key}`}>${label}</label>
-          <span class="input"><input id=${`f-${key}`} inputmode="decimal" autocomplete="off" placeholder="none" .value=${form.limits[key] ?? ''} @input=${(/** @type {Event} */ event) => writeForm(app, { limits: { ...form.limits, [key]: valueOf(event) } })}><span class="unit">mm</span></span></div>`)}</div></fieldset>
+          <div class="pair">${select('states', 'Traffic condensed to', [['24', 'quick look: 24 states'], ['', '100 states'], ['200', 'fine: 200 states']])}${entry('records', '/records')}</div>
+          <div class="field"><label for="f-name">Name</label><span class="input"><input id="f-name" autocomplete="off" placeholder=${nameOf(form)} .value=${form.name} @input=${write('name')}></span></div></fieldset>
+        <fieldset><legend>Limits</legend><div class="triple">${LOSSES.filter(({ body }) => form.wearing === 'both' || form.wearing === body).map(({ key }) => {
+          const pointer = `/limits/${key}`;
+          return fieldOf(pointer, form.limits[key] ?? '', (event) => writeForm(app, { limits: { ...form.limits, [key]: valueOf(event) } }, pointer), 'none');
+        })}</div></fieldset>
         <fieldset><legend>Maintenance</legend>${eventsOf(app, form)}</fieldset>
       </div>
     </div>
-    <fieldset class="pad"><legend>Traffic</legend>${form.table ? tableOf(app, form.table) : rowsOf(app, form, document)}
+    <fieldset class="pad"><legend>Traffic</legend>${form.table ? tableOf(app, form.table) : rowsOf(app, form, typeof template === 'string' ? {} : template)}
       <label class="drop">${form.table ? 'Another table' : 'Or a table of the traffic'}<span class="quiet">CSV with titles such as passes; axle load [t]; speed [km/h]; radius [m]; shift [mm]; angle of attack [mrad]; friction. Up to 200 000 rows</span>
         <input type="file" class="visually-hidden" id="traffic" @change=${chosen((file) => takeTraffic(app, file).catch(app.refused))}></label></fieldset></section>`;
 }
@@ -81,43 +82,116 @@ const chosen = (take) => (/** @type {Event} */ { target }) => {
   input.value = '';
 };
 
-/** Placeholders of empty cells of a row. @type {Partial<Record<import('./traffic.js').ColumnKey, string>>} */
-const EMPTY = { passes: '1', radius: 'straight', shift: '0', yaw: '0' };
+/** Values of the form by their pointer in the request: name, unit, and factor from the unit to that of the API. @type {Record<string, readonly [string, string, number?]>} */
+const VALUES = {
+  '/extent/mgt': ['Traffic over the rail', 'MGT'], '/extent/wheel_distance_km': ['Distance of the wheel', 'km'], '/records': ['Steps shown', ''],
+  ...Object.fromEntries(LOSSES.map(({ key, label }) => [`/limits/${key}`, [label, 'mm']])),
+};
 
-/** Table for entering the rows of the traffic. @param {App} app @param {Forecast['form']} form @param {import('./document.js').JsonObject | null} document */
-function rowsOf(app, { rows }, document) {
-  const set = (/** @type {number} */ row, /** @type {import('./traffic.js').ColumnKey} */ key) => (/** @type {Event} */ event) =>
-    writeForm(app, { rows: rows.map((old, at) => (at === row ? { ...old, [key]: valueOf(event) } : old)) });
-  const empty = { ...EMPTY, speed: number(3.6e-3 * numberAt(document ?? undefined, '/motion/wheelset/speed_mm_per_s'), 3) };
+/** Returns name, unit and factor of a value of the request; undefined if the form has no such value. @param {string} pointer @returns {readonly [string, string, number?] | undefined} */
+function valueAt(pointer) {
+  const [, event] = /^\/events\/(\d+)/.exec(pointer) ?? [];
+  if (event) return [`maintenance ${Number(event) + 1}`, ''];
+  const column = COLUMNS.find((known) => pointer.startsWith(columnPointer(known)));
+  if (!column) return VALUES[pointer];
+  const row = /\/(\d+)$/.exec(pointer)?.[1];
+  // Limits of a yaw rate are not those of a radius.
+  const [unit, factor] = column.key === 'radius' ? ['', undefined] : [column.unit, column.factor];
+  return [row ? `${column.label}, row ${Number(row) + 1}` : column.label, unit, factor];
+}
+
+/** @param {import('./api.js').Fault} fault */
+function describeFault(fault) {
+  const [, unit = '', factor = 1] = valueAt(fault.pointer ?? '') ?? [];
+  return faultText(fault, factor, unit);
+}
+
+/** Moves the focus to the field of a fault, or to the part of the form that contains it. @param {string} pointer */
+function lead(pointer) {
+  const input = pointer && document.getElementById(fieldId(pointer));
+  if (input) input.focus();
+  else if (pointer) lead(pointer.slice(0, pointer.lastIndexOf('/')));
+}
+
+/** Entry of a fault in the list, with a button that leads to its field. @param {import('./api.js').Fault} fault @param {Forecast['form']} form */
+function faultEntry(fault, { table }) {
+  const pointer = fault.pointer ?? '';
+  const known = valueAt(pointer);
+  const hasField = known && !(table && pointer.startsWith('/traffic'));
+  const place = known ? known[0] : inWords(pointer.replace(/^\/template/, ''));
+  return html`<li>${hasField ? html`<button class="link" @click=${() => lead(pointer)}>${place}</button>` : html`<b>${place}</b>`} ${describeFault(fault)}</li>`;
+}
+
+/**
+ * An input of the form with the fault of its value.
+ * @param {string} pointer
+ * @param {string} value
+ * @param {(event: Event) => void} write
+ * @param {{ label?: string, unit?: string, empty?: string }} [look] The label is for inputs without a visible one.
+ */
+function inputOf(pointer, value, write, { label, unit = '', empty = '' } = {}) {
+  const fault = faultOf(pointer);
+  const id = fieldId(pointer);
+  return html`<span class="input"><input id=${id} inputmode="decimal" autocomplete="off" placeholder=${empty} aria-label=${label ?? nothing} .value=${value}
+      aria-invalid=${fault ? 'true' : 'false'} aria-describedby=${fault ? `${id}-fault` : nothing} @input=${write}>${unit ? html`<span class="unit">${unit}</span>` : nothing}</span>
+    ${fault ? html`<p class="fault" id=${`${id}-fault`}>${describeFault(fault)}</p>` : nothing}`;
+}
+
+/** A labelled input for a value of `VALUES`. @param {string} pointer @param {string} value @param {(event: Event) => void} write @param {string} [empty] */
+const fieldOf = (pointer, value, write, empty) => html`<div class=${faultOf(pointer) ? 'field bad' : 'field'}><label for=${fieldId(pointer)}>${VALUES[pointer][0]}</label>
+  ${inputOf(pointer, value, write, { unit: VALUES[pointer][1], empty })}</div>`;
+
+/** Table for entering the rows of the traffic. @param {App} app @param {Forecast['form']} form @param {import('./document.js').JsonObject} template */
+function rowsOf(app, { rows }, template) {
+  const usual = usualOf(template);
+  const cell = (/** @type {typeof COLUMNS[number]} */ column, /** @type {number} */ row) => {
+    const { key, label } = column;
+    const pointer = `${columnPointer(column)}/${row}`;
+    const write = (/** @type {Event} */ event) => writeForm(app, { rows: rows.map((old, at) => (at === row ? { ...old, [key]: valueOf(event) } : old)) }, pointer);
+    const empty = key === 'radius' ? 'straight' : usual[key] === undefined ? '' : number(usual[key], 4);
+    return html`<td class=${faultOf(pointer) ? 'field bad' : ''}>${inputOf(pointer, rows[row][key], write, { label: `${label}, row ${row + 1}`, empty })}</td>`;
+  };
   return html`<div class="scroll" tabindex="0" role="region" aria-label="Traffic"><table class="traffic"><thead><tr>${COLUMNS.map(({ label, unit }) => html`<th scope="col">${label}${unit ? ` / ${unit}` : ''}</th>`)}<td></td></tr></thead>
-    <tbody>${rows.map((row, at) => html`<tr>${COLUMNS.map(({ key, label }) => html`<td><input inputmode="decimal" placeholder=${empty[/** @type {keyof typeof empty} */ (key)] ?? ''} aria-label=${`${label}, row ${at + 1}`} .value=${row[key]} @input=${set(at, key)}></td>`)}
+    <tbody>${rows.map((_, at) => html`<tr>${COLUMNS.map((column) => cell(column, at))}
       <td><button class="icon" aria-label=${`Remove row ${at + 1}`} ?disabled=${rows.length < 2} @click=${() => writeForm(app, { rows: rows.filter((_, other) => other !== at) })}>×</button></td></tr>`)}</tbody></table></div>
-    <p><button class="small" ?disabled=${rows.length >= ROWS_MAX} @click=${() => writeForm(app, { rows: [...rows, { ...rows[rows.length - 1] }] })}>Add a row</button> <span class="hint">Passes are shares or numbers: only their ratios count. On the right rail a shift to the right, below 0, brings the flange to the gauge. Radii are positive to the left.</span></p>`;
+    <p><button class="small" ?disabled=${rows.length >= ROWS_MAX} @click=${() => writeForm(app, { rows: [...rows, { ...rows[rows.length - 1] }] })}>Add a row</button> <span class="hint">Passes are shares or numbers: only their ratios count. On the right rail a shift to the right, below 0, brings the flange to the gauge. Radii are positive to the left. An empty cell has the value in grey: straight track, or the value of the view Contact.</span></p>`;
 }
 
 /** Describes an imported table. @param {App} app @param {NonNullable<Forecast['form']['table']>} table */
-function tableOf(app, { name, rows, values, others, unused }) {
+function tableOf(app, { name, rows, values, others, unused, assumed }) {
   const range = (/** @type {readonly number[]} */ list) => list.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]).map((value) => number(value, 3)).join(' … ');
   const lacking = COLUMNS.filter(({ key }) => !values[key] && key !== 'passes').map(({ label }) => label);
   return html`<p><b>${name}</b>: ${count(rows)} rows <button class="small" @click=${() => writeForm(app, { table: null })}>Write rows instead</button></p>
     <div class="scroll columns" tabindex="0" role="region" aria-label="Columns of the table"><table><tbody>${COLUMNS.flatMap(({ key, label, unit }) => (values[key] ? [html`<tr><th scope="row">${label}</th><td>${range(values[key])} ${unit}</td></tr>`] : []))}
       ${Object.entries(others).map(([pointer, list]) => html`<tr><th scope="row"><code>${pointer}</code></th><td>${range(list)}</td></tr>`)}</tbody></table></div>
     ${lacking.length ? html`<p class="hint">As in the view Contact: ${lacking.join(', ')}.</p>` : nothing}
+    ${assumed.length ? html`<p class="hint warn">Titles without a unit: ${assumed.join('; ')}.</p>` : nothing}
     ${unused.length ? html`<p class="hint warn">Not used: ${unused.join(', ')}.</p>` : nothing}`;
+}
+
+/** Shows the fault of the target section of an event. @param {string} event Its pointer. */
+function sectionFault(event) {
+  const fault = faultOf(`${event}/grind`) ?? faultOf(`${event}/reprofile`);
+  return fault ? html`<span class="fault">${fault.detail}</span>` : nothing;
 }
 
 /** @param {App} app @param {Forecast['form']} form */
 function eventsOf(app, form) {
   const { events, wearing } = form;
   const unit = wearing === 'wheel' ? 'km' : 'MGT';
-  const set = (/** @type {number} */ place, /** @type {object} */ change) => writeForm(app, { events: events.map((event, at) => (at === place ? { ...event, ...change } : event)) });
-  return html`${events.map((event, at) => html`<div class="event" role="group" aria-label=${`Maintenance ${at + 1}`}>
-      <label>At <span class="input"><input inputmode="decimal" .value=${event.at} @input=${(/** @type {Event} */ input) => set(at, { at: valueOf(input) })}><span class="unit">${unit}</span></span></label>
+  const set = (/** @type {number} */ place, /** @type {object} */ change, pointer = `/events/${place}`) => writeForm(app, { events: events.map((event, at) => (at === place ? { ...event, ...change } : event)) }, pointer);
+  const entry = (/** @type {number} */ place, /** @type {'at' | 'value'} */ member, /** @type {string} */ name, /** @type {{ label: string, unit: string, empty?: string }} */ look) => {
+    const pointer = `/events/${place}/${name}`;
+    return html`<span class=${faultOf(pointer) ? 'field bad' : ''}>${inputOf(pointer, events[place][member], (event) => set(place, { [member]: valueOf(event) }, pointer), look)}</span>`;
+  };
+  return html`${events.map((event, at) => html`<div class="event" role="group" tabindex="-1" id=${fieldId(`/events/${at}`)} aria-label=${`Maintenance ${at + 1}`}>
+      At ${entry(at, 'at', 'at', { label: `Time of maintenance ${at + 1}`, unit })}
       <select aria-label=${`What is done, ${at + 1}`} @change=${(/** @type {Event} */ input) => set(at, { kind: valueOf(input), value: '', target: null })}>${EVENTS.map(([kind, label]) => html`<option value=${kind} ?selected=${kind === event.kind}>${label}</option>`)}</select>
       ${event.kind === 'friction' ? nothing : html`to ${event.target ? html`<b>${event.target.name}</b> <button class="small ghost" @click=${() => set(at, { target: null })}>${TARGETS[event.kind]} instead</button>` : TARGETS[event.kind]}
         <label class="button small">${event.target ? 'Another file' : 'Or a file'}<input type="file" class="visually-hidden" aria-label=${`Section of maintenance ${at + 1}`} @change=${chosen((file) => takeTarget(app, at, file).catch(app.refused))}></label>`}
-      <span class="input"><input inputmode="decimal" aria-label=${event.kind === 'friction' ? 'Coefficient of friction' : 'Depth beyond that, in mm'} placeholder=${event.kind === 'friction' ? '0.15' : '0'} .value=${event.value} @input=${(/** @type {Event} */ input) => set(at, { value: valueOf(input) })}>
-        <span class="unit">${event.kind === 'friction' ? 'μ' : 'mm more'}</span></span>
+      ${event.kind === 'friction' ? entry(at, 'value', 'friction_coefficient', { label: 'Coefficient of friction', unit: 'μ', empty: '0.15' })
+        : entry(at, 'value', 'depth_mm', { label: 'Depth beyond that, in mm', unit: 'mm more', empty: '0' })}
+      ${sectionFault(`/events/${at}`)}
       <button class="icon" aria-label=${`Remove event ${at + 1}`} @click=${() => writeForm(app, { events: events.filter((_, other) => other !== at) })}>×</button></div>`)}
     <p><button class="small" @click=${() => writeForm(app, { events: [...events, { kind: wearing === 'wheel' ? 'reprofile' : 'grind', at: String(Number(wearing === 'wheel' ? form.km : form.mgt) / 2 || ''), value: '', target: null }] })}>Add grinding, lubrication or turning</button></p>`;
 }
@@ -244,6 +318,8 @@ function limitsPanel(answers, sides) {
 function decisionText(answers, sides) {
   const { better, sure, ends } = decisionOf(reachedOf(answers));
   const unit = distanceUnit(answers[0]);
+  const short = answers.findIndex(({ remarks }) => remarks.some(({ code }) => code === 'steps-exhausted'));
+  if (short >= 0) return html`<b>${'AB'[short]}</b> (${sides[short].job.name}) ended at its largest number of steps, before its extent. The plans cannot be compared.`;
   const last = answers.map(({ records }) => records[records.length - 1]);
   const end = (/** @type {0 | 1} */ side) => (ends[side].label ? `${ends[side].label}, at ${number(ends[side].place, 3)} ${unit}` : `none within ${number(distanceOf(last[side].progress), 3)} ${unit}`);
   const name = (/** @type {0 | 1} */ side) => html`<b>${'AB'[side]}</b> (${sides[side].job.name})`;

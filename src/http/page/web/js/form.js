@@ -88,14 +88,17 @@ function loadField(app, type) {
 function motionFields(app, type) {
   const { motion } = app.store.get().compose.document ?? {};
   const kind = Array.isArray(motion) ? 'list' : isObject(motion) && 'sweep' in motion ? 'sweep' : isObject(motion) && 'wheelset' in motion ? 'wheelset' : isObject(motion) && 'history' in motion ? 'history' : 'one';
+  // A motion without any creepage.
+  const still = app.store.get().compose.faults.find(({ pointer }) => pointer === '/motion');
   const kinds = [...(hasSections(type) ? [['wheelset', 'Rolling wheel']] : []), ['one', 'Creepages'], ['sweep', 'Creep curve'], ...(type === 'wheelset' ? [] : [['history', 'Over a distance']])];
   return html`
     <div class="segs" role="group" aria-label="Kind of motion">${kinds.map(([key, label]) => html`<label class="seg">
       <input type="radio" name="motion" .checked=${key === kind} @change=${() => chooseMotion(app, key, type)}><span>${label}</span></label>`)}</div>
     ${kind === 'list' ? html`<p class="hint">${/** @type {JsonValue[]} */ (motion).length} motions on the same patch; change them in the JSON.</p>` : nothing}
     ${kind === 'history' ? historyFields(app, type) : nothing}
-    ${kind === 'one' ? html`<div class="triple">${COMPONENTS.map(({ key, label, unit, factor }) => field(app, `/motion/${key}`, label, unit, { factor }))}</div>
-      <div class="pair">${field(app, '/motion/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H })}</div>` : nothing}
+    ${kind === 'one' ? html`<div class="triple">${COMPONENTS.map(({ key, label, unit, factor }) => field(app, `/motion/${key}`, label, unit, { factor, empty: '0' }))}</div>
+      <div class="pair">${field(app, '/motion/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H, empty: 'none' })}</div>
+      ${still ? html`<p class="fault">${still.detail}</p>` : nothing}` : nothing}
     ${kind === 'wheelset' ? wheelFields(app, type) : nothing}
     ${kind === 'sweep' && isObject(motion) && isObject(motion.sweep) ? sweepFields(app, motion.sweep) : nothing}`;
 }
@@ -201,7 +204,7 @@ function turningNote(app, member, free, radius) {
 /** @param {App} app @param {JsonObject} sweep */
 function sweepFields(app, sweep) {
   return Object.entries(sweep).map(([key, range]) => {
-    if (key === 'speed_mm_per_s') return field(app, '/motion/sweep/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H });
+    if (key === 'speed_mm_per_s') return field(app, '/motion/sweep/speed_mm_per_s', 'Speed', 'km/h', { factor: KM_PER_H, empty: 'none' });
     const component = COMPONENTS.find((known) => known.key === key);
     if (!component || !isObject(range) || 'values' in range) return html`<p class="hint">${key} = ${JSON.stringify(range)}</p>`;
     const { label, unit, factor } = component;
@@ -254,5 +257,5 @@ function answerFields(app, document) {
       ${mesh ? field(app, '/solver/mesh/strips', 'Strips', '') : field(app, '/solver/target_error', 'Largest error', '% of μN', { factor: 0.01, empty: '0.5' })}
       ${mesh ? field(app, '/solver/mesh/cells', 'Cells of a strip', '') : field(app, '/name', 'Name', '', { text: true })}
     </div>
-    ${Number.isFinite(numberAt(document, '/solver/time_limit_s')) ? field(app, '/solver/time_limit_s', 'Time limit', 's') : nothing}`;
+    ${at(document, '/solver/time_limit_s') !== undefined ? field(app, '/solver/time_limit_s', 'Time limit', 's') : nothing}`;
 }

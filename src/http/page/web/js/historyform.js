@@ -30,9 +30,9 @@ export function historyFields(app, type) {
   const fault = faultAt(app, '/motion/start');
   return html`
     ${field(app, '/motion/history/distance_mm', 'Distances rolled', 'mm', { list: true, hint: 'One answer for each. Below, a number for all of them or one each.' })}
-    <div class="pair">${courses.map(({ key, label, unit, factor }) => field(app, `/motion/history/${key}`, label, unit, { factor, list: true }))}
-      ${field(app, '/motion/history/spin_per_mm', 'Spin', '1/m', { factor: 0.001, list: true })}
-      ${field(app, '/motion/history/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600 })}</div>
+    <div class="pair">${courses.map(({ key, label, unit, factor }) => field(app, `/motion/history/${key}`, label, unit, { factor, list: true, empty: 'none' }))}
+      ${field(app, '/motion/history/spin_per_mm', 'Spin', '1/m', { factor: 0.001, list: true, empty: 'none' })}
+      ${field(app, '/motion/history/speed_mm_per_s', 'Speed', 'km/h', { factor: 1e6 / 3600, empty: 'none' })}</div>
     <div class="segs" role="group" aria-label="Start of the history">${starts.map(([key, label]) => html`<label class="seg">
       <input type="radio" name="start" .checked=${key === start} @change=${() => change(app, '/motion/start', key)}><span>${label}</span></label>`)}</div>
     ${fault ? html`<p class="fault">${fault.detail}</p>` : ''}`;

@@ -6,6 +6,7 @@ import { takeProfiles } from './contactform.js';
 import { openKept, solve } from './editing.js';
 import './fieldmap.js';
 import { leaveForecast, openForecast, takeForecastFiles } from './forecast.js';
+import { Unusable } from './files.js';
 import { loadCurves } from './late.js';
 import { openLine } from './line.js';
 import { isGone, openJob } from './result.js';
@@ -20,6 +21,7 @@ import { createStore } from './store.js';
 
 const HEALTH_MS = 10_000;
 const TOAST_MS = 4000;
+const LONG_TOAST_MS = 12_000;
 const CURVES_MS = 2000;
 const ADDRESS_MS = 150;
 
@@ -39,6 +41,7 @@ const app = {
   },
   refused(error) {
     if (error instanceof DOMException && error.name === 'AbortError') return;
+    if (error instanceof Unusable) return app.say(error.message, undefined, LONG_TOAST_MS);
     if (!(error instanceof Refused)) throw error;
     if (error.status === 401) store.set({ keyLine: true });
     if (error.status === 0) store.set({ health: { ready: false, version: store.get().health?.version ?? '' } });

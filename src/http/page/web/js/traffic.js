@@ -1,7 +1,9 @@
 // The traffic of a forecast: rows entered by hand or a table from a file.
 
+import { escapeKey, numberAt } from './document.js';
 import { parse } from './written.js';
 
+/** @typedef {import('./document.js').JsonObject} JsonObject */
 /** @typedef {import('./document.js').JsonValue} JsonValue */
 /**
  * @typedef {object} Table
@@ -9,12 +11,13 @@ import { parse } from './written.js';
  * @property {Partial<Record<ColumnKey, number[]>>} values Known columns in the shown units.
  * @property {Record<string, number[]>} others Other columns by JSON pointer, in the units of the API.
  * @property {string[]} unused Titles of ignored columns.
+ * @property {string[]} assumed Titles without a unit, each with the assumed one and the allowed ones.
  */
 
 /** Columns of the traffic. `factor` converts the shown unit to that of the API; a radius is converted to a yaw rate. */
 export const COLUMNS = /** @type {const} */ ([
   { key: 'passes', label: 'passes', unit: '', pointer: '', factor: 1, title: /pass|axles|count|share|^n(umber)?\b/i, units: {} },
-  { key: 'load', label: 'wheel load Q', unit: 'kN', pointer: '/load/vertical_force_n', factor: 1000, title: /load|vertical_force|^q\b/i, units: { kn: 1, n: 0.001, t: 9.80665 } },
+  { key: 'load', label: 'wheel load Q', unit: 'kN', pointer: '/load/vertical_force_n', factor: 1000, title: /load|vertical_force|^q\b/i, units: { kN: 1, N: 0.001, t: 9.80665 } },
   { key: 'speed', label: 'speed', unit: 'km/h', pointer: '/motion/wheelset/speed_mm_per_s', factor: 1000 / 3.6, title: /speed|velocity|^v\b/i, units: { 'km/h': 1, 'm/s': 3.6, 'mm/s': 0.0036 } },
   { key: 'radius', label: 'curve radius', unit: 'm', pointer: '/motion/wheelset/yaw_rate_rad_per_s', factor: 1, title: /radius|^r\b/i, units: { m: 1, km: 1000 } },
   { key: 'shift', label: 'shift to the left', unit: 'mm', pointer: '/contact/lateral_shift_mm', factor: 1, title: /shift|displacement|^y\b/i, units: { mm: 1, cm: 10, m: 1000 } },
@@ -32,7 +35,7 @@ const rounded = (/** @type {number} */ value) => Number(value.toPrecision(DIGITS
 /** Returns the unit at the end of a title, such as `[kN]`, `/ kN` or `_kn`; undefined if there is none. @param {string} title @param {Record<string, number>} units */
 function unitOf(title, units) {
   const end = title.toLowerCase().replaceAll('_per_', '/').replace(/[\])\s]+$/, '');
-  return Object.keys(units).find((unit) => end.endsWith(unit) && !/[a-z]/.test(end.at(-1 - unit.length) ?? ' '));
+  return Object.keys(units).find((unit) => end.endsWith(unit.toLowerCase()) && !/[a-z]/.test(end.at(-1 - unit.length) ?? ' '));
 }
 
 /**
@@ -46,7 +49,7 @@ export function parseTraffic(text) {
   const [titles = [], ...rows] = lines.map((line) => line.split(mark).map((cell) => cell.trim().replace(/^"(.*)"$/, '$1')));
   if (!rows.length) return 'the table needs a row of titles and rows of numbers';
   /** @type {Table} */
-  const table = { rows: rows.length, values: {}, others: {}, unused: [] };
+  const table = { rows: rows.length, values: {}, others: {}, unused: [], assumed: [] };
   for (const [place, title] of titles.entries()) {
     const pointer = title.startsWith('/');
     const known = COLUMNS.find((column) => (pointer ? column.pointer === title : column.title.test(title)));
@@ -68,6 +71,7 @@ export function parseTraffic(text) {
     const unit = unitOf(title, known.units);
     const stated = /[[(]\s*([^\])]+?)\s*[\])]\s*$/.exec(title)?.[1];
     if (!unit && stated && stated !== '-') return `the unit ${stated} of “${title}” is not known`;
+    if (!unit && !stated && known.unit) table.assumed.push(`“${title}” is read in ${known.unit} (allowed: ${Object.keys(known.units).join(', ')})`);
     // A wheel carries half of an axle load.
     const factor = (unit ? /** @type {Record<string, number>} */ (known.units)[unit] : 1) * (known.key === 'load' && /axle/i.test(title) ? 0.5 : 1);
     table.values[known.key] = values.map((value) => value * factor);
@@ -82,15 +86,28 @@ export function isTraffic(text) {
   return typeof table === 'string' ? /^row \d|^the unit/.test(table) : Object.keys(table.values).length + Object.keys(table.others).length > 1;
 }
 
+/** Returns the JSON pointer of a column in a request. @param {{ pointer: string }} column */
+export const columnPointer = ({ pointer }) => (pointer ? `/traffic/columns/${escapeKey(pointer)}` : '/traffic/passes');
+
+/** Returns the values of empty cells, in the shown units: those of the case, and 0 on straight track. @param {JsonObject} template @returns {Partial<Record<ColumnKey, number>>} */
+export function usualOf(template) {
+  const given = COLUMNS.filter(({ key, pointer }) => pointer && key !== 'radius').map(({ key, pointer, factor }) => [key, rounded(numberAt(template, pointer) / factor)]);
+  return { passes: 1, shift: 0, yaw: 0, radius: 0, ...Object.fromEntries(given.filter(([, value]) => Number.isFinite(value))) };
+}
+
 /**
  * Returns the columns of the table or of the entered rows. Columns without values are omitted; the case supplies them.
  * @param {{ rows: readonly Row[], table: Table | null }} form
- * @param {number} speed Speed of the case in mm/s, for radii without a speed.
+ * @param {JsonObject} template The case.
  */
-export function trafficOf({ rows, table }, speed) {
+export function trafficOf({ rows, table }, template) {
+  const usual = usualOf(template);
+  const speed = numberAt(template, '/motion/wheelset/speed_mm_per_s');
+  // Without any radius the rows are straight, also if the case is in a curve.
+  const curved = Boolean(numberAt(template, '/motion/wheelset/yaw_rate_rad_per_s'));
   const written = (/** @type {ColumnKey} */ key) => {
-    const values = rows.map((row) => parse(row[key]) ?? null);
-    return values.every((value) => value === null) ? undefined : values;
+    const values = rows.map((row) => parse(row[key]));
+    return values.some((value) => value !== undefined) || (key === 'radius' && curved) ? values.map((value) => value ?? usual[key] ?? null) : undefined;
   };
   const valuesOf = (/** @type {ColumnKey} */ key) => /** @type {JsonValue[] | undefined} */ (table ? table.values[key] : written(key));
   const speeds = valuesOf('speed');
@@ -124,7 +141,7 @@ export function tableOf(columns, passes, speed) {
     else if (known.key !== 'radius') values[known.key] = column.map((value) => rounded(value / known.factor));
     else values.radius = column.map((rate, row) => (rate === 0 ? 0 : rounded((columns['/motion/wheelset/speed_mm_per_s']?.[row] ?? speed) / rate / 1000)));
   }
-  return { rows, values, others, unused: [] };
+  return { rows, values, others, unused: [], assumed: [] };
 }
 
 /** Converts a table to editable rows; null if it has too many rows or other columns. @param {Table} table @returns {Row[] | null} */
