@@ -309,6 +309,49 @@ fn friction_that_falls_too_fast_for_one_answer_is_refused_with_its_number() {
     );
 }
 
+/// Tests that a layer under friction that falls with slip limits the meshes: shorter cells alternate between stick and slip.
+#[test]
+fn a_layer_under_falling_friction_limits_the_cells_of_a_strip() {
+    let case = |layer: Value, solver: Value| {
+        let mut friction = falling("exponential", 0.1, 0.2, 300.0);
+        friction["layer"] = layer;
+        json!({
+            "material": { "shear_modulus_mpa": 82_000.0, "poisson_ratio": 0.28 },
+            "friction": friction,
+            "contact": { "type": "radii", "rolling_mm": 460.0, "lateral_mm": 300.0 },
+            "load": { "normal_force_n": 85_000.0 },
+            "motion": { "sweep": { "creepage_x": { "from": 0.003, "to": 0.012, "points": 10 }, "speed_mm_per_s": 15_000.0 } },
+            "solver": solver,
+            "outputs": ["resultants"],
+        })
+    };
+    let solve = |solver: Value| {
+        let thin = json!({ "shear_modulus_mpa": 1500.0, "thickness_mm": 0.02 });
+        let checked = contact::check(&case(thin, solver), &Limits::default()).expect("sound");
+        contact::solve(&checked, &Unmonitored).map(|found| found.0)
+    };
+    let forces = |target: f64| {
+        let found = solve(json!({ "target_error": target })).expect("an answer");
+        found.total.into_iter().map(|total| total.force_x_n)
+    };
+    // The friction limit is 25 500 N.
+    for (usual, fine) in forces(0.005).zip(forces(0.0005)) {
+        assert!(
+            (usual - fine).abs() < 0.005 * 25_500.0,
+            "{usual} and {fine}"
+        );
+    }
+    let refused = solve(json!({ "mesh": { "strips": 40, "cells": 52 } }));
+    let refused = refused.expect_err("the cells are too short").to_string();
+    assert!(refused.contains("52 cells in a strip"), "{refused}");
+    let soft = json!({ "shear_modulus_mpa": 500.0, "thickness_mm": 0.05 });
+    assert_fault(
+        &case(soft, json!({})),
+        "/friction",
+        &["falls too fast", "layer this soft"],
+    );
+}
+
 #[test]
 fn faults_of_friction_name_what_is_wrong() {
     let one = |friction: Value| good_with("/friction", friction);

@@ -15,6 +15,7 @@ use crate::case::words::subsurface::DamageModel;
 use crate::case::{after_tasks, contact_task, motions, wheel_task, wheelsets};
 use crate::error::Fault;
 use crate::friction::law::FrictionLaw;
+use crate::friction::path_dependent::Interface;
 use crate::half_space::unlike_bodies::Elasticity;
 use crate::method::Method;
 use crate::normal::footprint::NormalTask;
@@ -73,9 +74,10 @@ impl CheckedParts {
             region?;
             // Friction may fall too fast on known patches.
             let friction = draft.friction.as_ref()?;
-            let modulus = elasticity?.shear_modulus * friction.reduction.unwrap_or(1.0);
+            let interface = Interface::from(friction);
+            let modulus = elasticity?.shear_modulus * interface.reduction;
             let law = FrictionLaw::new(friction, draft.thermal.as_ref());
-            let detail = law.too_fast(&patches, modulus, speeds)?;
+            let detail = law.too_fast(&patches, (modulus, interface.layer), speeds)?;
             Some(Fault::new("/friction", detail))
         });
         faults.extend(of_friction);

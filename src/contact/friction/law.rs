@@ -10,6 +10,7 @@ use crate::friction::coefficient_table::CoefficientTable;
 use crate::friction::path_dependent::HeatedLaw;
 use crate::friction::velocity_weakening::{FallingLaw, STABILITY_MAX, Softening};
 use crate::geometry::wheel_rail::WheelRail;
+use crate::mesh::SIDE_GOOD;
 use crate::normal::footprint::{Footprint, LoadAcross};
 use crate::normal::hertz::Patch;
 use crate::numerics::roots::bounds;
@@ -61,12 +62,25 @@ impl FrictionLaw {
         matches!(self, FrictionLaw::Falling(_) | FrictionLaw::Heated(_))
     }
 
-    /// The reason if friction falls too fast for one reliable answer at these rolling speeds, by the largest stability number of the patches; see
-    /// [`FallingLaw::stability`] and [`HeatedLaw::stability`]. Returns `None` for other laws, without patches and without speeds.
+    /// The largest number of cells in a strip with a layer of a flexibility in mm/MPa at a rolling speed; see [`FallingLaw::cells_along_max`].
+    /// Infinite without a layer and for other laws.
+    pub fn cells_along_max(&self, patches: &[Patch], layer: f64, speed: Option<f64>) -> f64 {
+        let (FrictionLaw::Falling(law), Some(speed)) = (self, speed) else {
+            return f64::INFINITY;
+        };
+        let cells = patches
+            .iter()
+            .map(|patch| law.cells_along_max(speed, patch, layer));
+        cells.fold(f64::INFINITY, f64::min)
+    }
+
+    /// The reason if friction falls too fast for one reliable answer at these rolling speeds, by the largest stability number of the patches and
+    /// the number of cells that a layer of a flexibility in mm/MPa allows; see [`FallingLaw::stability`], [`FallingLaw::cells_along_max`] and
+    /// [`HeatedLaw::stability`]. Returns `None` for other laws, without patches and without speeds.
     pub fn too_fast(
         &self,
         patches: &[Patch],
-        shear_modulus: f64,
+        (shear_modulus, layer): (f64, f64),
         speeds: &[Option<f64>],
     ) -> Option<String> {
         let speed = speeds.iter().copied().flatten().reduce(f64::max)?;
@@ -80,6 +94,7 @@ impl FrictionLaw {
                     "slip",
                     "rolling speed, fall and largest pressure",
                 )
+                .or_else(|| self.too_fast_for_layer(patches, layer, speed))
             }
             FrictionLaw::Heated(law) => {
                 let of = |patch: &Patch| {
@@ -90,6 +105,17 @@ impl FrictionLaw {
                 too_fast(most(&of)?, "temperature", factors)
             }
         }
+    }
+
+    fn too_fast_for_layer(&self, patches: &[Patch], layer: f64, speed: f64) -> Option<String> {
+        let cells = self.cells_along_max(patches, layer, Some(speed));
+        (cells < f64::from(SIDE_GOOD)).then(|| {
+            format!(
+                "friction falls too fast with slip for a layer this soft: stick and slip alternate on meshes with more than {cells:.1} cells in a \
+                 strip, and at least {SIDE_GOOD} cells are needed; the number is inversely proportional to rolling speed, fall, largest pressure and \
+                 thickness over modulus of the layer"
+            )
+        })
     }
 
     /// The law by temperature, if the coefficient depends on it.

@@ -101,7 +101,16 @@ impl RollingTask<'_> {
     pub fn falls_too_fast(&self) -> Option<String> {
         let modulus = self.interface.reduction * self.elasticity.shear_modulus;
         let patches = self.footprint.patches();
-        self.friction.too_fast(patches, modulus, self.speeds)
+        let shear = (modulus, self.interface.layer);
+        self.friction.too_fast(patches, shear, self.speeds)
+    }
+
+    /// The largest number of cells in a strip for which motion `index` has a steady state; see [`FrictionLaw::cells_along_max`].
+    pub fn cells_along_max(&self, index: usize) -> f64 {
+        let speed = self.speeds.get(index).copied().flatten();
+        let patches = self.footprint.patches();
+        self.friction
+            .cells_along_max(patches, self.interface.layer, speed)
     }
 
     /// Whether the pressure causes slip because the bodies differ, and the method models it.

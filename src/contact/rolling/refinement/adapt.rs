@@ -1,6 +1,7 @@
 //! The adaptive solve of one motion on its family of meshes.
 
 use crate::error::SolveError;
+use crate::mesh::MeshSize;
 use crate::method::Method;
 use crate::monitor::Monitor;
 use crate::numerics::roots::ROUNDING;
@@ -49,12 +50,32 @@ pub(crate) fn solve_forces(
         (None, Some(target)) => run.meet_target(target)?,
         (sizes, _) => {
             let sizes = sizes.unwrap_or_default();
+            require_steady(task, asked.index, sizes.last())?;
             let plans: Vec<MeshPlan> = sizes.into_iter().map(MeshPlan::from).collect();
             run.on_meshes(&plans, false)?
         }
     };
     let plans = run.compared();
     Ok((run.finish(estimate), plans))
+}
+
+/// Refuses a mesh with so many cells in a strip that friction which falls with slip has no steady state under a layer.
+fn require_steady(
+    task: &RollingTask,
+    index: usize,
+    finest: Option<&MeshSize>,
+) -> Result<(), SolveError> {
+    let most = task.cells_along_max(index);
+    match finest {
+        Some(finest) if f64::from(finest.cells) > most => Err(SolveError::NotCovered {
+            reason: format!(
+                "`mesh` has {} cells in a strip; because friction falls with slip and the layer is soft, stick and slip alternate from cell to cell \
+                 with more than {most:.1}",
+                finest.cells
+            ),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Solves a motion on given meshes, coarse to fine. Value and estimate are smooth functions of the motion.
@@ -131,7 +152,8 @@ impl<'a, 's, 't> AdaptiveRun<'a, 's, 't> {
 
     /// Solves the meshes of the family until the estimate meets the target or the finest mesh is reached.
     fn meet_target(&mut self, target: f64) -> Result<Estimate, SolveError> {
-        let family = MeshFamily::of(self.task, &self.asked.motion);
+        let along = self.task.cells_along_max(self.asked.index);
+        let family = MeshFamily::of(self.task, &self.asked.motion).with_cells_along(along);
         let most = family.cells_max();
         let mut cells = family.cells_first();
         let mut before: Option<Estimate> = None;

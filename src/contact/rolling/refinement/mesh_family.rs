@@ -46,6 +46,8 @@ pub struct MeshFamily {
     patches: f64,
     /// Least number of strips.
     strips: f64,
+    /// Largest number of cells in a strip.
+    along: f64,
 }
 
 impl MeshFamily {
@@ -80,7 +82,13 @@ impl MeshFamily {
             } else {
                 0.0
             },
+            along: f64::INFINITY,
         }
+    }
+
+    /// The family with at most about this many cells in a strip.
+    pub fn with_cells_along(self, along: f64) -> MeshFamily {
+        MeshFamily { along, ..self }
     }
 
     /// The mesh with approximately `cells` cells per patch and an even number of strips.
@@ -106,7 +114,7 @@ impl MeshFamily {
 
     /// Cells per patch of the finest mesh.
     pub fn cells_max(&self) -> f64 {
-        cells_max(self.patches)
+        cells_max(self.patches).min(self.along.powi(2) / self.shape)
     }
 }
 
@@ -189,6 +197,7 @@ mod tests {
             pole: None,
             patches,
             strips: 0.0,
+            along: f64::INFINITY,
         }
     }
 
