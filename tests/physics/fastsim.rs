@@ -330,3 +330,48 @@ fn other_methods_have_no_choice_of_bounds() {
         &["elliptic", "parabolic"],
     );
 }
+
+/// Tests that a patch of one sample, one row or one column does not spoil the forces of the main patch.
+#[test]
+fn patches_of_single_rows_of_samples_have_forces() {
+    let axis: Vec<f64> = (-8..=8).map(f64::from).collect();
+    let forces = |others: &[[usize; 2]], pressure: f64| {
+        let lens = |x: &f64, y: &f64| 1.0 - (x / 4.0).powi(2) - ((y + 2.0) / 4.0).powi(2);
+        let row = |y: &f64| -> Vec<f64> {
+            let one = |x: &f64| 1000.0 * lens(x, y).max(0.0).sqrt();
+            axis.iter().map(one).collect()
+        };
+        let mut rows: Vec<Vec<f64>> = axis.iter().map(row).collect();
+        for [j, i] in others {
+            rows[*j][*i] = pressure;
+        }
+        let contact =
+            json!({ "type": "pressure_grid", "x_mm": axis, "y_mm": axis, "pressure_mpa": rows });
+        let case = json!({
+            "material": { "shear_modulus_mpa": 82_000.0, "poisson_ratio": 0.28 },
+            "friction": { "coefficient": 0.3 },
+            "contact": contact,
+            "motion": { "creepage_x": 0.001, "creepage_y": 0.0005, "spin_per_mm": 1e-4 },
+            "solver": { "method": "fastsim" },
+            "outputs": ["resultants"],
+        });
+        let total = &solve(&case).0.total[0];
+        [total.force_x_n, total.force_y_n]
+    };
+    let alone = forces(&[], 0.0);
+    for others in [
+        &[[14, 8]][..],
+        &[[14, 7], [14, 8], [14, 9]],
+        &[[13, 8], [14, 8], [15, 8]],
+    ] {
+        let light = forces(others, 1e-6);
+        let loaded = forces(others, 300.0);
+        for k in [0, 1] {
+            assert!(
+                (light[k] / alone[k] - 1.0).abs() < 1e-3,
+                "{light:?}, {alone:?}"
+            );
+            assert!(loaded[k].abs() > alone[k].abs(), "{loaded:?}, {alone:?}");
+        }
+    }
+}

@@ -69,8 +69,7 @@ impl GridPressure {
     /// Number of grid spacings across each patch, along the axis with fewer. It is smaller for patches oblique to the axes, which fill less of their box than an ellipse
     /// along them.
     pub fn cells_across(&self) -> Vec<f64> {
-        let axes = [&self.grid.x, &self.grid.y];
-        let spacing = axes.map(|axis| (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64);
+        let spacing = self.spacing();
         let across = |patch: &Patch| {
             let extent = patch.extent;
             let sides = [0, 1].map(|k| extent[2 * k + 1] - extent[2 * k]);
@@ -211,7 +210,15 @@ impl GridPressure {
                 ];
             }
         });
-        sum.map(|sum| sum / weight)
+        let spacing = self.spacing();
+        // The load of a single row of samples is spread evenly over its width.
+        [0, 1].map(|k| (sum[k] / weight).max(spacing[k].powi(2) / 12.0))
+    }
+
+    /// Mean distances of samples along x and y in mm.
+    fn spacing(&self) -> [f64; 2] {
+        let axes = [&self.grid.x, &self.grid.y];
+        axes.map(|axis| (axis[axis.len() - 1] - axis[0]) / (axis.len() - 1) as f64)
     }
 
     /// Passes patch, place and load of every sample to `tell`. Loads are relative to the largest pressure in MPa, times mm².
