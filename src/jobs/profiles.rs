@@ -17,8 +17,8 @@ use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::answer::RowsAnswer;
 use railhead_contact::evaluate::many::{ManyTask, NotAtOnce, evaluate_at_once, several_answers};
 use railhead_contact::evaluate::varied::{
-    Values, VariedColumn, case_of_row, column_pointer, named_and_given, named_sections,
-    of_first_row, put_section,
+    Values, VariedColumn, column_pointer, named_and_given, named_sections, of_first_row,
+    put_section, put_sections, row_of,
 };
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
@@ -233,11 +233,13 @@ impl Jobs {
         names: &[(&str, &str)],
         refused: impl FnOnce(&CheckedCase) -> Option<Fault>,
     ) -> Result<(Value, CheckedCase), CaseError> {
-        let case = case_of_row(template, columns, profiles, 0).map_err(|(pointer, reason)| {
+        let case = row_of(template, columns, 0).map_err(|(pointer, reason)| {
             let detail = format!("the column `{pointer}` {reason}");
             CaseError(vec![Fault::new(column_pointer(&pointer), detail)])
         })?;
-        let checked = self.check(&case);
+        let mut whole = case.clone();
+        put_sections(&mut whole, profiles);
+        let checked = self.check(&whole);
         let checked = checked.map_err(|error| of_first_row(error, names))?;
         let faults = several_answers(&checked).into_iter();
         let faults = faults.chain(refused(&checked)).map(|fault| Fault {

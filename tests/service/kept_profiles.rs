@@ -2,10 +2,12 @@
 
 use serde_json::{Value, json};
 
+use crate::batches::results;
 use crate::errors::assert_problem;
 use crate::runs::answers;
 use crate::server::{Server, Setup, count, example};
 use crate::table_forms::send_rows;
+use crate::uploads::upload;
 
 /// Returns the example of a wheel on a rail, its rail and its wheel.
 fn pair() -> (Value, Value, Value) {
@@ -115,6 +117,61 @@ async fn assert_run(server: &Server, named: &Value, rail: &Value) {
         "{}",
         refused.text
     );
+}
+
+/// Tests that the profile of a row is read as it was stored, whatever is stored with that of the template, by every route.
+#[tokio::test]
+async fn a_column_of_profiles_replaces_the_section_of_the_template() {
+    let server = Server::start().await;
+    let (mut case, plain, _) = pair();
+    let mut turned = plain.clone();
+    turned["mirror_y"] = json!(true);
+    let mut smooth = plain.clone();
+    smooth["smoothing_mm"] = json!(8.0);
+    let plain = keep(&server, &plain).await["digest"].clone();
+    let smooth = keep(&server, &smooth).await["digest"].clone();
+    case["outputs"] = json!(["resultants"]);
+    let named = |digest: &Value| {
+        let mut case = case.clone();
+        case["contact"]["rail"] = json!({ "profile": digest });
+        case
+    };
+    let mut expected = Vec::new();
+    for digest in [&smooth, &plain] {
+        let solved = server.solve(&named(digest)).await;
+        expected.push(forces(&solved["result"]).clone());
+    }
+    assert_ne!(expected[0], expected[1]);
+    let mut given = case.clone();
+    given["contact"]["rail"] = turned;
+    for template in [named(&smooth), named(&plain), given] {
+        let columns = json!({ "/contact/rail/profile": [smooth, plain] });
+        let rows = json!({ "template": template, "columns": columns });
+        let run = server.post("/v1/runs", &rows).await.is(202).location();
+        let found = answers(&server, &run).await;
+        let evaluated = server.post("/v1/evaluate", &rows).await.is(200);
+        for (k, expected) in expected.iter().enumerate() {
+            assert_eq!(&found[k]["force_y_n"], expected);
+            assert_eq!(&evaluated.json["columns"]["force_y_n"][k], expected);
+        }
+        let (template, table) = (
+            template.to_string(),
+            format!(
+                "/contact/rail/profile\n{}\n{}\n",
+                smooth.as_str().expect("a digest"),
+                plain.as_str().expect("a digest")
+            ),
+        );
+        let parts = [
+            ("name=\"template\"", &*template),
+            ("name=\"table\"", &*table),
+        ];
+        let batch = upload(&server, "/v1/batches", &parts).await.is(202);
+        let solved = results(&server, &batch.json, "?wait=60").await;
+        for (solved, expected) in solved.iter().zip(&expected) {
+            assert_eq!(forces(&solved["result"]), expected, "{solved}");
+        }
+    }
 }
 
 #[tokio::test]

@@ -19,7 +19,7 @@ fn body(parts: &[(&str, &str)]) -> String {
     parts.collect::<String>() + &format!("--{BOUNDARY}--\r\n")
 }
 
-async fn upload(server: &Server, path: &str, parts: &[(&str, &str)]) -> Answer {
+pub async fn upload(server: &Server, path: &str, parts: &[(&str, &str)]) -> Answer {
     let body = body(parts);
     let kind = format!("multipart/form-data; boundary={BOUNDARY}");
     server.post_as(path, &kind, body).await

@@ -3,6 +3,7 @@
 //! The answer to a row depends on its own case alone, to the last bit: not on other rows, their order or number, or the load of the machine.
 //! Rows share operators of patches of equal shape and the profiles that were read, so rows of equal shape are solved one after the other.
 
+use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -20,7 +21,7 @@ use crate::evaluate::answer::{
     NumberColumns, RowAnswer, RowNote, RowOutcome, RowStatus, RowsAnswer,
 };
 use crate::evaluate::rows::Rows;
-use crate::evaluate::varied::{VariedColumn, case_of_row};
+use crate::evaluate::varied::{VariedColumn, case_of_row, named_sections, put_sections};
 use crate::monitor::{Monitor, Stop};
 use crate::problem::checked_case::CheckedCase;
 use crate::solution::words::answer::Solution;
@@ -35,7 +36,7 @@ pub fn solve_many(
     solve: &RowSolver,
     monitor: &dyn Monitor,
 ) -> Result<RowsAnswer, SolveError> {
-    let checked = crate::check_with(task.known, task.case, task.limits).ok();
+    let checked = task.checked_case().ok();
     let columns = checked.as_ref().map(NumberColumns::of).unwrap_or_default();
     let mut answer = RowsAnswer::unsolved(task.rows(), columns);
     let mut open: Vec<usize> = (0..task.rows()).collect();
@@ -135,7 +136,7 @@ pub fn evaluate_at_once<E>(
 /// Returns the rough time of the rows in s, on one core of the machine on which the constants were measured. Equal rows have equal times.
 pub fn expected_seconds(task: &ManyTask) -> f64 {
     let rows = task.rows() as f64;
-    let Ok(checked) = crate::check_with(task.known, task.case, task.limits) else {
+    let Ok(checked) = task.checked_case() else {
         return rows * TABLE_SECONDS;
     };
     let seconds = checked.cost().seconds;
@@ -273,7 +274,7 @@ pub type RowSolver<'a> = dyn Fn(&CheckedCase, &dyn Monitor) -> Result<Solution, 
 /// Rows to solve.
 #[derive(Debug, Clone, Copy)]
 pub struct ManyTask<'a> {
-    /// A case of one motion without faults, such as that of the first row.
+    /// A case of one motion without faults, such as that of the first row. It may name cross-sections.
     pub case: &'a Value,
     /// The columns that replace members of the case, at least one; all have the same length.
     pub columns: &'a [VariedColumn],
@@ -291,6 +292,14 @@ impl ManyTask<'_> {
     /// The number of rows.
     pub(crate) fn rows(&self) -> usize {
         self.columns.first().map_or(1, |column| column.values.len())
+    }
+
+    fn checked_case(&self) -> Result<CheckedCase, CaseError> {
+        let mut case = Cow::Borrowed(self.case);
+        if !named_sections(&case).is_empty() {
+            put_sections(case.to_mut(), self.profiles);
+        }
+        crate::check_with(self.known, &case, self.limits)
     }
 
     /// Returns the checked case of a row.

@@ -87,11 +87,25 @@ impl Values {
 /// Returns the case of a row: the template with the values of the row, and with cross-sections instead of their names.
 ///
 /// # Errors
-/// The pointer of the first column that leads nowhere in the template, and the reason.
+/// See [`row_of`].
 pub fn case_of_row(
     template: &Value,
     columns: &[VariedColumn],
     profiles: &BTreeMap<String, Value>,
+    row: usize,
+) -> Result<Value, (String, String)> {
+    let mut case = row_of(template, columns, row)?;
+    put_sections(&mut case, profiles);
+    Ok(case)
+}
+
+/// Returns the template with the values of a row.
+///
+/// # Errors
+/// The pointer of the first column that leads nowhere in the template, and the reason.
+pub fn row_of(
+    template: &Value,
+    columns: &[VariedColumn],
     row: usize,
 ) -> Result<Value, (String, String)> {
     let mut case = template.clone();
@@ -103,12 +117,16 @@ pub fn case_of_row(
         )
         .map_err(|reason| (column.pointer.clone(), reason))?;
     }
-    for (place, name) in named_sections(&case) {
+    Ok(case)
+}
+
+/// Replaces names of cross-sections in a case by those among `profiles`.
+pub fn put_sections(case: &mut Value, profiles: &BTreeMap<String, Value>) {
+    for (place, name) in named_sections(case) {
         if let Some(section) = profiles.get(&name) {
-            put_section(&mut case, place, section);
+            put_section(case, place, section);
         }
     }
-    Ok(case)
 }
 
 /// JSON pointers to the cross-sections of a case.
@@ -141,6 +159,23 @@ pub fn named_and_given(case: &Value) -> Option<&'static str> {
         })
     };
     PLACES.iter().find(both).copied()
+}
+
+/// Removes cross-sections from a template whose columns, given by JSON pointers, name others.
+///
+/// A section with points is removed as a whole, because its other members describe these points. Of a section that only names another one, the
+/// members that override stored ones remain.
+pub fn make_room<'a>(template: &mut Value, columns: impl Iterator<Item = &'a str>) {
+    let places = columns.filter_map(|pointer| pointer.strip_suffix("/profile"));
+    for place in places.filter(|place| PLACES.contains(place)) {
+        let Some(Value::Object(own)) = template.pointer_mut(place) else {
+            continue;
+        };
+        own.remove(PROFILE);
+        if POINTS.iter().any(|name| own.contains_key(*name)) {
+            own.clear();
+        }
+    }
 }
 
 /// Replaces the name of a cross-section by the stored cross-section. Other members of the case's section, such as its smoothing, take
@@ -258,6 +293,26 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+
+    #[test]
+    fn a_section_makes_room_for_those_of_the_rows() {
+        let template = json!({ "contact": {
+            "rail": { "points_mm": [[0, 0]], "unit": "cm", "smoothing_mm": 8 }, "wheel": { "profile": "b", "smoothing_mm": 3 }
+        } });
+        let mut bare = template.clone();
+        let columns = [
+            "/contact/rail/profile",
+            "/contact/wheel/profile",
+            "/contact/lateral_shift_mm",
+            "/motion/profile",
+        ];
+        make_room(&mut bare, columns.into_iter());
+        let expected = json!({ "contact": { "rail": {}, "wheel": { "smoothing_mm": 3 } } });
+        assert_eq!(bare, expected);
+        let mut same = template.clone();
+        make_room(&mut same, columns[2..].iter().copied());
+        assert_eq!(same, template);
+    }
 
     #[test]
     fn a_named_section_takes_the_place_of_its_name_and_of_other_points() {

@@ -387,7 +387,8 @@ pub async fn read_draft(
     };
     let mut held = None;
     if let Some(table) = table {
-        draft.set_row_template(jobs.with_profiles(table.template).await?);
+        let whole = jobs.with_profiles(table.template.clone()).await?;
+        draft.set_row_template(whole, table.template);
         held = Some(table.share);
     }
     let options = options.clone();

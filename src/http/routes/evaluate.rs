@@ -31,7 +31,7 @@ use crate::render::row_tables::{json_body, table_body};
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::answer::RowsAnswer;
 use railhead_contact::evaluate::many::{NotAtOnce, SOLVED_ROWS_MAX};
-use railhead_contact::evaluate::varied::VariedColumn;
+use railhead_contact::evaluate::varied::{VariedColumn, make_room};
 use railhead_contact::monitor::{Monitor, Stop};
 use railhead_jobs::Jobs;
 use railhead_jobs::run::draft::ReceivedRows;
@@ -288,7 +288,7 @@ fn too_many(rows: usize, rows_max: usize) -> ApiError {
 /// Evaluates rows within the limits of the options.
 fn answer(
     (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
-    template: Value,
+    mut template: Value,
     rows: ReceivedRows,
     pace: &mut Pace,
 ) -> Result<RowsAnswer> {
@@ -297,6 +297,7 @@ fn answer(
     if count == 0 || count > options.evaluate_max_rows {
         return Err(too_many(count, options.evaluate_max_rows));
     }
+    make_room(&mut template, columns.iter().map(|column| &*column.pointer));
     let template = Handle::current().block_on(jobs.with_profiles(template))?;
     let profiles = jobs.profiles_of(&columns)?;
     let names = columns.iter().zip(&names);

@@ -1,4 +1,5 @@
 //! Upload of a batch: cases are checked while they arrive, and staged in a file.
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -20,7 +21,7 @@ use crate::store::{NewBatch, NewJob, StoredCase};
 use crate::submit::outputs_text;
 use railhead_contact::case::rail_pair::KnownPair;
 use railhead_contact::error::{CaseError, Fault};
-use railhead_contact::evaluate::varied::{named_sections, put};
+use railhead_contact::evaluate::varied::{make_room, named_sections, put};
 use railhead_contact::problem::checked_case::CheckedCase;
 
 /// A staged job: its index in the request, its own options, and the job without its body.
@@ -208,7 +209,10 @@ pub struct BatchUpload {
 /// The template of a table.
 #[derive(Debug)]
 struct RowTemplate {
+    /// The case with the points of its cross-sections.
     case: Value,
+    /// The case as given, for rows that name other cross-sections.
+    given: Value,
     /// Cache of the last profile pairs.
     known: KnownPair,
 }
@@ -223,11 +227,11 @@ impl BatchUpload {
         self.template = Some(template);
     }
 
-    /// Sets the template that the rows of [`BatchUpload::add_row`] fill.
-    pub fn set_row_template(&mut self, case: Value) {
+    /// Sets the template that the rows of [`BatchUpload::add_row`] fill: with the points of its cross-sections, and as given.
+    pub fn set_row_template(&mut self, case: Value, given: Value) {
         self.set_template(Bytes::from(case.to_string()));
         let known = KnownPair::default();
-        self.rows = Some(Arc::new(RowTemplate { case, known }));
+        self.rows = Some(Arc::new(RowTemplate { case, given, known }));
     }
 
     /// Sets the common part and the head of a run. `whole` is the text that identifies a submission.
@@ -292,7 +296,14 @@ impl BatchUpload {
             return Err(JobsError::Damaged(detail.to_owned()));
         };
         self.digest.update(&digest(&cells));
-        let case = fill(&template.case, &cells).map_err(|(number, reason)| {
+        let names = |Cell(path, _): &&Cell| path.last().is_some_and(|last| last == "profile");
+        let named: Vec<String> = cells.iter().filter(names).map(Cell::pointer).collect();
+        let mut base = Cow::Borrowed(&template.case);
+        if !named.is_empty() {
+            base = Cow::Owned(template.given.clone());
+            make_room(base.to_mut(), named.iter().map(String::as_str));
+        }
+        let case = fill(&base, &cells).map_err(|(number, reason)| {
             let detail = format!("the column `{}` {reason}", cells[number].pointer());
             CaseError(vec![Fault::new("", detail)])
         })?;

@@ -19,7 +19,9 @@ use railhead_contact::case::words::solver::Output;
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::answer::NumberColumns;
 use railhead_contact::evaluate::many::{ManyTask, expected_seconds};
-use railhead_contact::evaluate::varied::{Values, VariedColumn, column_pointer, of_values};
+use railhead_contact::evaluate::varied::{
+    Values, VariedColumn, column_pointer, make_room, of_values,
+};
 use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_tables::read::require_exact;
 use railhead_tables::table::COLUMNS_MAX;
@@ -69,10 +71,14 @@ impl Jobs {
     /// folder cannot be written.
     pub fn draft_run(
         &self,
-        template: Value,
+        mut template: Value,
         columns: Vec<TitledColumn>,
         rows_max: u64,
     ) -> Result<RunDraft> {
+        let varied = columns
+            .iter()
+            .filter_map(|column| column.pointer.as_deref());
+        make_room(&mut template, varied);
         let rows = ReceivedRows::new(columns)?;
         let mut profiles = KnownSections::new();
         let template = self.with_profiles_here(template, &mut profiles)?;

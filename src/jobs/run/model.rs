@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::error::{JobsError, Result};
 use crate::model::{Batch, RunRecord, State};
-use railhead_contact::evaluate::varied::{Values, VariedColumn, case_of_row};
+use railhead_contact::evaluate::varied::{Values, VariedColumn, row_of};
 use railhead_tables::table::{TableColumn, TableKind};
 use railhead_tables::titles::TitledColumn;
 
@@ -35,7 +35,7 @@ pub fn table_column(values: Values) -> TableColumn {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunHead {
     form: u32,
-    /// The case of the first row.
+    /// The case of the first row. It names the cross-sections that columns name.
     pub case: Value,
     /// The submitted columns in their order.
     pub columns: Vec<TitledColumn>,
@@ -154,7 +154,7 @@ impl RunHead {
                     },
                 })
                 .collect();
-            let case = case_of_row(&common.template, &first_row, &head.profiles, 0);
+            let case = row_of(&common.template, &first_row, 0);
             head.case =
                 case.map_err(|(pointer, reason)| damaged(format!("{pointer}: {reason}")))?;
         }
