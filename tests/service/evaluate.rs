@@ -5,10 +5,12 @@ use std::io::{Read, Write};
 use reqwest::Method;
 use serde_json::{Value, json};
 
+use crate::batches::results;
 use crate::caching::gzip;
 use crate::errors::assert_problem;
 use crate::runs::template;
 use crate::server::{Server, Setup, example};
+use crate::uploads::upload;
 
 fn columns() -> Value {
     json!({
@@ -169,7 +171,7 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
     }
     for (values, said) in [
         (json!([61000, null]), "row 1: invalid type: null"),
-        (json!([true]), "row 0: invalid type: boolean `true`"),
+        (json!([61000, true]), "row 1: invalid type: boolean `true`"),
         (json!(["a", 1]), "row 1: `1` is a number, row 0 has a text"),
         (json!([0, "a"]), "row 1: \"a\" is a text, row 0 has"),
     ] {
@@ -178,7 +180,7 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
         let answer = server.post("/v1/evaluate", &body).await;
         let said = format!("the JSON of the body cannot be read: column `normal_force_n`, {said}");
         assert_problem(&answer, 400, "malformed-json", &said);
-        let allowed = "expected a number, or a text if the whole column has texts";
+        let allowed = "a text or truth value if no value of the column is a number";
         assert!(answer.text.contains("row 0 has") || answer.text.contains(allowed));
     }
     let many: Vec<f64> = vec![0.001; 2000];
@@ -189,6 +191,25 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
     )
     .await;
     assert_problem(&answer, 413, "body-too-large", "evaluate-max-mib");
+}
+
+/// Tests that columns of truth values are those of a case, in JSON and as programs write them in CSV.
+#[tokio::test]
+async fn a_column_of_truth_values_varies_a_member() {
+    let server = Server::start().await;
+    let (case, _) = wheel_on_rail();
+    let place = "/contact/accept_rough_profiles";
+    let rows = evaluate(&server, case.clone(), json!({ place: [true, false] })).await;
+    let expected = &rows.is(200).json["columns"]["force_x_n"];
+    assert!(expected[0].is_number() && expected[0] == expected[1]);
+    let (case, table) = (case.to_string(), format!("{place}\nTrue\nFALSE\n"));
+    let parts = [("name=\"template\"", &*case), ("name=\"table\"", &*table)];
+    let found = upload(&server, "/v1/evaluate", &parts).await.is(200);
+    assert_eq!(&found.json["columns"]["force_x_n"], expected);
+    let batch = upload(&server, "/v1/batches", &parts).await.is(202);
+    for solved in results(&server, &batch.json, "?wait=60").await {
+        assert_eq!(solved["result"]["total"][0]["force_x_n"], expected[0]);
+    }
 }
 
 /// Returns the example of a wheel on a rail with a single motion, and columns with one row that repeats this motion.

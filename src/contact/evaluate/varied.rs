@@ -67,11 +67,11 @@ impl Values {
     pub fn value(&self, row: usize) -> Value {
         match self {
             Values::Numbers(numbers) => Value::from(numbers[row]),
-            Values::Texts(texts) => match texts[row].as_deref() {
-                Some("true") => Value::Bool(true),
-                Some("false") => Value::Bool(false),
-                text => Value::from(text),
-            },
+            Values::Texts(texts) => {
+                let text = texts[row].as_deref();
+                text.and_then(truth)
+                    .map_or_else(|| Value::from(text), Value::Bool)
+            }
         }
     }
 
@@ -82,6 +82,13 @@ impl Values {
             Values::Texts(texts) => texts[a].cmp(&texts[b]),
         }
     }
+}
+
+/// Returns the truth value that a text in a table stands for, in any case of letters.
+pub fn truth(text: &str) -> Option<bool> {
+    let names = [(true, "true"), (false, "false")].into_iter();
+    let mut named = names.filter(|(_, name)| text.eq_ignore_ascii_case(name));
+    named.next().map(|(value, _)| value)
 }
 
 /// Returns the case of a row: the template with the values of the row, and with cross-sections instead of their names.

@@ -22,7 +22,7 @@ use crate::limits::{Memory, Pace};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, ProblemKind, Result, faulty};
 use railhead_contact::error::Fault;
-use railhead_contact::evaluate::varied::{Values, members};
+use railhead_contact::evaluate::varied::{Values, members, truth};
 use railhead_jobs::Jobs;
 use railhead_jobs::batch::upload::{BatchCase, BatchRow, BatchUpload, Cell as FilledCell};
 use railhead_jobs::model::{CaseOptions, Kind, Priority};
@@ -356,9 +356,9 @@ fn read_value(field: &str, factor: f64, decimals: &mut Decimals) -> Result<Value
     // JSON numbers have no plus sign. Whole numbers remain integers.
     let text = number.map_or(field, |_| field.trim_start_matches('+'));
     let value = match (serde_json::from_str(text), number) {
-        (Ok(value @ (Value::Number(_) | Value::Bool(_) | Value::Null)), _) => value,
+        (Ok(value @ (Value::Number(_) | Value::Null)), _) => value,
         (_, Some(number)) => Value::from(number),
-        _ => Value::from(field),
+        _ => truth(field).map_or_else(|| Value::from(field), Value::Bool),
     };
     Ok(match value.as_f64() {
         Some(number) if factor != 1.0 => Value::from(converted(number, factor)),

@@ -174,6 +174,9 @@ impl<'de> Visitor<'de> for RowValues<'_> {
                     numbers.push(number.as_f64().unwrap_or(f64::NAN));
                 }
                 Some(Value::String(text)) if numbers.is_empty() => texts.push(Some(text)),
+                Some(Value::Bool(value)) if numbers.is_empty() => {
+                    texts.push(Some(value.to_string()));
+                }
                 Some(Value::Number(number)) => {
                     return Err(at(&format_args!(
                         "`{number}` is a number, row 0 has a text"
@@ -189,7 +192,8 @@ impl<'de> Visitor<'de> for RowValues<'_> {
                         Value::Array(_) => Unexpected::Seq,
                         _ => Unexpected::Map,
                     };
-                    let expected = &"a number, or a text if the whole column has texts";
+                    let expected =
+                        &"a number, or a text or truth value if no value of the column is a number";
                     return Err(at(&A::Error::invalid_type(found, expected)));
                 }
                 None if texts.is_empty() => return Ok(Values::Numbers(numbers)),
