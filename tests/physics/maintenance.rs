@@ -31,6 +31,36 @@ fn only_point(case: &Value) -> PointSolution {
     solve(case).0.patches[0].points[0].clone()
 }
 
+/// Tests that the power without spin and its damage do not depend on the place of y = 0 in a gap.
+#[test]
+fn power_without_spin_does_not_depend_on_the_origin_of_a_gap() {
+    let damage = |shift: f64| {
+        let y: Vec<f64> = (-40..=40).map(|k| 0.5 * f64::from(k)).collect();
+        let gap: Vec<f64> = y.iter().map(|y| y * y / 600.0).collect();
+        let y: Vec<f64> = y.iter().map(|y| y + shift).collect();
+        let mut case = asking(json!(["damage"]), json!({ "models": ["t_gamma", "wlrm"] }));
+        case["contact"] =
+            json!({ "type": "gap_profile", "rolling_mm": 460.0, "y_mm": y, "gap_mm": gap });
+        case["load"] = json!({ "normal_force_n": 80_000.0 });
+        let spin = 2.2e-4;
+        case["motion"] = json!({ "creepage_x": 0.002 + spin * shift, "creepage_y": 0.0005, "spin_per_mm": spin, "speed_mm_per_s": 30_000.0 });
+        let damage = *only_point(&case).damage.expect("asked for");
+        let t_gamma = damage.t_gamma.expect("asked for");
+        [
+            t_gamma.with_spin_n,
+            t_gamma.without_spin_n,
+            damage.wlrm.expect("asked for").damage_per_pass,
+        ]
+    };
+    let centred = damage(0.0);
+    for shift in [20.0, -20.0] {
+        for (found, expected) in damage(shift).iter().zip(centred) {
+            let relative = found.value / expected.value - 1.0;
+            assert!(relative.abs() < 0.002, "{shift}: {found:?}, {expected:?}");
+        }
+    }
+}
+
 #[test]
 fn damage_follows_from_the_resultants_and_carries_their_errors() {
     let case = asking(json!(["damage"]), json!({ "models": ALL_MODELS }));

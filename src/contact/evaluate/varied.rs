@@ -9,6 +9,7 @@ use serde_json::{Map, Value};
 use crate::case::words::object::{FAULTS_MAX, join};
 use crate::error::{CaseError, Fault, FaultCode};
 use crate::evaluate::variable::Variable;
+use crate::remark::kind::Rounded;
 
 /// The values of a column, one for each row.
 #[derive(Debug, Clone, PartialEq)]
@@ -228,28 +229,40 @@ pub fn in_template(
 }
 
 /// Returns the faults of some values of a column, the first of which belongs to the row `first`: numbers that are not finite, or outside the
-/// allowed range of the member if it is a [`Variable`].
-pub fn of_values(name: &str, pointer: &str, values: &Values, first: u64) -> Vec<Fault> {
+/// allowed range of the member if it is a [`Variable`]. The column has a name, a JSON pointer into the case, and the factor that converts its
+/// numbers to the unit of the case.
+pub fn of_values(
+    (name, pointer, factor): (&str, &str, f64),
+    values: &Values,
+    first: u64,
+) -> Vec<Fault> {
     let Values::Numbers(numbers) = values else {
         return Vec::new();
     };
     let allowed = Variable::at(pointer).map(Variable::allowed);
-    let good =
-        |number: f64| number.is_finite() && allowed.is_none_or(|range| range.contains(number));
+    let good = |number: f64| {
+        let number = factor * number;
+        number.is_finite() && allowed.is_none_or(|range| range.contains(number))
+    };
     let wrong = (first..).zip(numbers).filter(|(_, number)| !good(**number));
     let fault = |(row, number): (u64, &f64)| {
         let pointer = format!("{}/{row}", column_pointer(name));
         let Some(allowed) = allowed else {
             return Fault::new(pointer, "no number given; a finite number is needed");
         };
-        let given = match number.is_nan() {
-            true => "no number".to_owned(),
-            false => number.to_string(),
+        let in_case = factor * number;
+        let given = match (number.is_nan(), factor == 1.0) {
+            (true, _) => "no number given".to_owned(),
+            (false, true) => format!("{number} given"),
+            (false, false) => {
+                let in_case = Rounded(in_case, 9);
+                format!("{number} given, {in_case} in the unit of the case")
+            }
         };
-        let figures = allowed.figures(FaultCode::OutOfRange, Some(&Value::from(*number)));
+        let figures = allowed.figures(FaultCode::OutOfRange, Some(&Value::from(in_case)));
         Fault {
             figures: Box::new(figures),
-            ..Fault::new(pointer, format!("{given} given; {allowed} is needed"))
+            ..Fault::new(pointer, format!("{given}; {allowed} is needed"))
         }
     };
     wrong.take(FAULTS_MAX).map(fault).collect()
@@ -263,13 +276,21 @@ pub fn members(pointer: &str) -> Vec<String> {
         .collect()
 }
 
-/// Puts a value into a case at a path of members. Missing objects on the path are created.
+/// The place of the rolling speed, which in the motion of a wheelset is a member of `wheelset`.
+const SPEED: [&str; 2] = ["motion", "speed_mm_per_s"];
+
+/// Puts a value into a case at a path of members. Missing objects on the path are created. The rolling speed of a wheelset is put where it
+/// belongs.
 ///
 /// # Errors
 /// The reason, if the path leads nowhere; the case is then unchanged.
 pub fn put(case: &mut Value, path: &[String], value: Value) -> Result<(), String> {
     if path.is_empty() {
         return Ok(());
+    }
+    let mut path: Vec<&str> = path.iter().map(String::as_str).collect();
+    if path == SPEED && case.pointer("/motion/wheelset").is_some() {
+        path.insert(1, "wheelset");
     }
     let mut place = case;
     for member in path {
@@ -365,6 +386,17 @@ mod placing_tests {
             let mut changed = case.clone();
             put(&mut changed, &members(pointer), json!("v")).expect(pointer);
             assert_eq!(changed.pointer(pointer), Some(&json!("v")), "{pointer}");
+        }
+        let speed = members("/motion/speed_mm_per_s");
+        for motion in [
+            json!({ "creepage_x": 0.0 }),
+            json!({ "wheelset": { "yaw": 1 } }),
+        ] {
+            let mut changed = json!({ "motion": motion });
+            put(&mut changed, &speed, json!(7)).expect("a place");
+            let motion = &changed["motion"];
+            let own = motion.get("wheelset").unwrap_or(motion);
+            assert_eq!(own["speed_mm_per_s"], json!(7), "{changed}");
         }
         for pointer in ["/y/2", "/y/b", "/load/f/g"] {
             let mut changed = case.clone();

@@ -39,6 +39,8 @@ pub struct Assembly<'a> {
     patches: Vec<Patch>,
     /// Friction limits of the patches in N.
     limits: Vec<f64>,
+    /// Load centres `[x, y]` of the patches in mm.
+    centres: Vec<[f64; 2]>,
     /// The results of each patch under each motion.
     points: Vec<Vec<PointSolution>>,
     total: Vec<Total>,
@@ -54,11 +56,14 @@ impl<'a> Assembly<'a> {
         let patches = solved.footprint.patches().to_vec();
         let limit = |k| case.problem.friction.limit(&solved.footprint, k);
         let remarks = case.remarks.iter().chain(&solved.remarks);
+        let field = solved.footprint.field();
+        let centre = |k| field.map_or([0.0; 2], |field| field.load_centre(Some(k)));
         Assembly {
             case,
             solved,
             points: vec![Vec::new(); patches.len()],
             limits: (0..patches.len()).map(limit).collect(),
+            centres: (0..patches.len()).map(centre).collect(),
             patches,
             total: Vec::new(),
             remarks: remarks.cloned().collect(),
@@ -109,7 +114,7 @@ impl<'a> Assembly<'a> {
         let mut points: Vec<PointSolution> = patches
             .map(|(k, (patch, limit))| PointSolution {
                 target_met,
-                ..point_solution(case, on_level, (patch, *limit), k, point)
+                ..point_solution(case, on_level, (patch, *limit, self.centres[k]), k, point)
             })
             .collect();
         let speed = case.problem.speeds[index];
@@ -228,7 +233,7 @@ fn patch_solution(patch: &Patch, limit: f64, points: Vec<PointSolution>) -> Patc
 fn point_solution(
     case: &CheckedCase,
     on_level: Option<(&StripMesh, &SolvedFields)>,
-    (patch, limit): (&Patch, f64),
+    (patch, limit, [x, y]): (&Patch, f64, [f64; 2]),
     index: usize,
     point: &MotionAnswer,
 ) -> PointSolution {
@@ -247,6 +252,9 @@ fn point_solution(
     let history = point.history.as_ref();
     let power_x = motion.creepage_x * found.force_x;
     let power_y = motion.creepage_y * found.force_y;
+    // Spin about the origin moves the load centre of a distant patch.
+    let spin = motion.spin_per_mm;
+    let [centre_x, centre_y] = [-spin * y * found.force_x, spin * x * found.force_y];
     let of_pressure = |(level, fields)| pressure_power(level, fields, index);
     let steady_power = || {
         let of_motion = power_x + power_y + motion.spin_per_mm * found.moment_z;
@@ -280,7 +288,7 @@ fn point_solution(
         slip_cells: zones.map(|([_, slip], _)| slip),
         traction_max_mpa: on_level.map(|(level, fields)| traction_max(level, fields, index)),
         friction_power_n: history.map_or_else(steady_power, |history| history.power[index]),
-        friction_power_without_spin_n: power_x.abs() + power_y.abs(),
+        friction_power_without_spin_n: (power_x + centre_x).abs() + (power_y + centre_y).abs(),
         solver: SolverReport {
             method: point.method.into(),
             mesh: on_level.map(|(level, _)| MeshReport {

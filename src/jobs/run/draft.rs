@@ -377,7 +377,8 @@ impl ReceivedRows {
             } else if let Values::Texts(texts) = values {
                 faults.extend(faults_of_texts(&column.name, texts, self.received));
             } else if let Some(place) = &column.pointer {
-                faults.extend(of_values(&column.name, place, values, self.received));
+                let of = (&*column.name, &**place, column.factor);
+                faults.extend(of_values(of, values, self.received));
             } else if let Values::Numbers(numbers) = values {
                 faults.extend(fault_of_copied(&pointer, numbers, self.received));
             }

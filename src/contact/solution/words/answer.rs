@@ -289,7 +289,7 @@ pub struct PointSolution {
     /// Tγ: dissipated power divided by rolling speed, ν_x F_x + ν_y F_y + φ M_z, in N (J/m). For a history it is the sum over the cells at
     /// this point, because the elastic energy also changes; it is 0 for a shift.
     pub friction_power_n: f64,
-    /// |ν_x F_x| + |ν_y F_y| in N, the form that damage models use.
+    /// |ν_x F_x| + |ν_y F_y| in N with the creepages at the load centre, the form that damage models use.
     pub friction_power_without_spin_n: f64,
     /// How this point was computed.
     pub solver: SolverReport,
