@@ -216,3 +216,51 @@ async fn an_evolution_gives_the_same_bytes_although_the_process_is_killed() {
     assert_eq!(result(&service, &path).await, expected);
     service.kill();
 }
+
+/// The records up to the largest number of steps are readable, with a remark that names it. Warnings of states are remarks of the result and codes of
+/// the evolution.
+#[tokio::test]
+async fn an_evolution_ends_at_its_largest_number_of_steps_with_its_records() {
+    let server = Server::start().await;
+    let mut plan = request(2);
+    plan["traffic"] = json!({ "columns": { "lateral_shift_mm": [0, -30] }, "passes": [19, 1] });
+    plan["accuracy"] = json!({ "step_tolerance": 1.0, "steps_max": 1 });
+    let answer = server.post("/v1/evolutions", &plan).await.is(202);
+    let path = answer.location();
+    let done = ended(&server, &path).await;
+    assert_eq!(done["state"], "succeeded", "{done}");
+    let result = server.read(&format!("{path}/result")).await;
+    let share = |record: &Value| record["progress"]["share"].as_f64().unwrap();
+    let records: Vec<f64> = result["records"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(share)
+        .collect();
+    assert!(
+        records.len() == 2 && records[0] == 0.0 && records[1] > 0.0 && records[1] < 1.0,
+        "{records:?}"
+    );
+    let detail = |code: &str| {
+        let remarks = result["remarks"].as_array().unwrap();
+        let mut found = remarks.iter().filter(|remark| remark["code"] == code);
+        let first = found
+            .next()
+            .unwrap_or_else(|| panic!("{code}: {remarks:?}"));
+        assert!(found.next().is_none(), "{code} twice");
+        first["detail"].as_str().unwrap().to_owned()
+    };
+    assert!(detail("steps-exhausted").contains("steps_max = 1"));
+    let tip = detail("contact-on-flange-tip");
+    let of_row = "(lateral_shift_mm -30), 5 % of the traffic in all";
+    assert!(
+        tip.starts_with("record 0, state ") && tip.contains(of_row),
+        "{tip}"
+    );
+    let csv = server
+        .get(&format!("{path}/table?format=csv"))
+        .await
+        .is(200);
+    assert_eq!(csv.text.lines().count(), 3);
+    server.get(&format!("{path}/sections/rail")).await.is(200);
+}

@@ -124,6 +124,7 @@ mod tests {
         assert!((lost / worn - 1.0).abs() < 1e-3, "{lost} {worn}");
         assert!((lost / state.bodies[0].worn.worn_area_mm2 - 1.0).abs() < 1e-9);
         assert_eq!(state.bodies[1].worn.points_mm, state.bodies[1].start_mm);
+        assert_eq!(state.bodies[1].worn.worn_area_mm2, 0.0);
     }
 
     #[test]
@@ -193,12 +194,57 @@ mod tests {
             let task = checked(&request);
             let (state, records) = run(&task);
             assert_eq!(state.bodies[0].worn.points_mm, state.bodies[0].start_mm);
+            assert_eq!(state.bodies[0].worn.worn_area_mm2, 0.0);
             assert!(
                 records
                     .iter()
                     .all(|record| record.contact.unsolved_share == 0.0)
             );
         }
+    }
+
+    #[test]
+    fn an_evolution_that_reaches_its_largest_number_of_steps_keeps_its_records() {
+        let mut plan = symmetric(4, 2e5);
+        plan["accuracy"]["steps_max"] = json!(3);
+        plan["accuracy"]["step_depth_mm"] = json!(0.01);
+        plan["limits"] = json!({ "height_mm": 1.0 });
+        let task = checked(&plan);
+        let (state, records) = run(&task);
+        let last = records.last().expect("a record").clone();
+        assert_eq!((state.steps, last.progress.share), (3, state.share));
+        assert!(state.share > 0.0 && state.share < 1.0, "{}", state.share);
+        assert!(last.rail.worn_area_mm2 > 0.0 && last.rail == records[records.len() - 1].rail);
+        let answer = task.answer(&state, records);
+        let remark = answer.remarks.iter().find(|r| r.code == "steps-exhausted");
+        let detail = &remark.expect("a remark").detail;
+        assert!(detail.contains("steps_max = 3"), "{detail}");
+        assert_eq!(answer.limits[0].reached, None);
+    }
+
+    #[test]
+    fn warnings_of_states_are_in_the_answer() {
+        let mut plan = request(&[0.0, -30.0], &[19.0, 1.0], 1);
+        plan["extent"] = json!({ "axle_passes": 1e3, "wheel_distance_km": 1 });
+        plan["accuracy"] = json!({ "step_tolerance": 1.0 });
+        let task = checked(&plan);
+        let (state, records) = run(&task);
+        let answer = task.answer(&state, records);
+        let codes: Vec<&str> = answer.remarks.iter().map(|r| r.code.as_str()).collect();
+        let found = codes
+            .iter()
+            .filter(|code| **code == "contact-on-flange-tip");
+        assert_eq!(found.count(), 1, "{codes:?}");
+        let tip = answer
+            .remarks
+            .iter()
+            .find(|r| r.code == "contact-on-flange-tip");
+        let detail = &tip.expect("a remark").detail;
+        let of_row = "(lateral_shift_mm -30), 5 % of the traffic in all: the contact at y";
+        assert!(
+            detail.starts_with("record 0, state ") && detail.contains(of_row),
+            "{detail}"
+        );
     }
 
     #[test]

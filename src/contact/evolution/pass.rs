@@ -10,6 +10,7 @@ use crate::geometry::plane_curve::arc_lengths;
 use crate::monitor::Monitor;
 use crate::normal::footprint::NormalTask;
 use crate::post::local_power::NANOMETRES;
+use crate::remark::entry::RemarkEntry;
 use crate::solution::words::answer::PatchSolution;
 use crate::solution::words::evolution::{StateContact, StatePatch};
 
@@ -57,6 +58,8 @@ pub(crate) struct Pass {
     /// Rail and wheel.
     pub(crate) wear: [BodyWear; 2],
     pub(crate) contact: StateContact,
+    /// Remarks of the solution.
+    pub(crate) remarks: Vec<RemarkEntry>,
 }
 
 /// Solves a state. A state without an answer causes no wear and reports the reason.
@@ -76,6 +79,7 @@ pub(crate) fn pass(
             failure: Some(reason),
             ..StateContact::default()
         },
+        remarks: Vec::new(),
     };
     let case = task.case(on, values);
     let check = |case| crate::check_with(&context.known, &case, &task.limits);
@@ -123,6 +127,7 @@ pub(crate) fn pass(
             patches,
             ..StateContact::default()
         },
+        remarks: solution.remarks,
     })
 }
 

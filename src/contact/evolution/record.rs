@@ -1,11 +1,13 @@
 //! The answer of an evolution: records, losses, uncertainties and limits.
 
+use std::collections::BTreeSet;
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use crate::case::words::contact::GAUGE_HEIGHT;
 use crate::case::words::evolution::WearLosses;
 use crate::case::words::subsurface::DamageModel;
 use crate::error::SolveError;
+use crate::evolution::pass::Pass;
 use crate::evolution::section::{distance, lengths};
 use crate::evolution::task::Evolution;
 use crate::geometry::profile::{Body, Profile, Reading};
@@ -16,10 +18,11 @@ use crate::normal::wheel::KinematicsTask;
 use crate::numerics::quadrature::halton;
 use crate::numerics::roots::bounds;
 use crate::remark::entry::RemarkEntry;
+use crate::remark::kind::{Figure, Severity, percent, short};
 use crate::remark::list::Remark;
 use crate::solution::words::evolution::{
-    BodyState, ContactRange, EvolutionAnswer, EvolutionRecord, EvolutionState, LimitReached,
-    StateContact, WearUncertainty, WornBody,
+    BodyState, CondensedTraffic, ContactRange, EvolutionAnswer, EvolutionRecord, EvolutionState,
+    LimitReached, StateContact, WearUncertainty, WornBody,
 };
 use crate::wheelset::kinematics::level_radii;
 
@@ -40,6 +43,7 @@ pub(crate) fn record(
     task: &Evolution,
     state: &EvolutionState,
     states: Vec<StateContact>,
+    remarks: Vec<RemarkEntry>,
     monitor: &dyn Monitor,
 ) -> Result<EvolutionRecord, SolveError> {
     let [rail, wheel] = [0, 1].map(|k| with_uncertainty(task, state, k));
@@ -50,9 +54,52 @@ pub(crate) fn record(
         conicity: conicity(task, &state.bodies, monitor)?,
         contact: range(&states),
         states,
+        remarks,
         rail,
         wheel,
     })
+}
+
+/// Returns the warnings of the states of a traffic, each code once. The sentence and the figures name the first state with this warning, and the
+/// share of the traffic that has it.
+pub(crate) fn warnings(traffic: &CondensedTraffic, passes: &[Pass]) -> Vec<RemarkEntry> {
+    let mut found: Vec<(RemarkEntry, usize, f64)> = Vec::new();
+    for (k, pass) in passes.iter().enumerate() {
+        let (share, mut own) = (traffic.states[k].share, BTreeSet::new());
+        for remark in &pass.remarks {
+            if remark.severity != Severity::Warning || !own.insert(&remark.code) {
+                continue;
+            }
+            match found.iter_mut().find(|known| known.0.code == remark.code) {
+                Some(known) => known.2 += share,
+                None => found.push((remark.clone(), k, share)),
+            }
+        }
+    }
+    let of_traffic = |(mut remark, state, share): (RemarkEntry, usize, f64)| {
+        let names = traffic.pointers.iter().map(|pointer| {
+            let name = pointer.rsplit('/').next();
+            name.unwrap_or_default()
+        });
+        let values = names.zip(&traffic.states[state].values);
+        let values: Vec<String> = values
+            .map(|(name, v)| format!("{name} {}", short(v)))
+            .collect();
+        remark.detail = format!(
+            "state {state} ({}), {} % of the traffic in all: {}",
+            values.join(", "),
+            percent(share),
+            remark.detail
+        );
+        (remark.patch, remark.point) = (None, None);
+        remark.also_at_points.clear();
+        remark.pointer = remark.pointer.map(|pointer| format!("/template{pointer}"));
+        let figures = [("state", state as f64), ("traffic_share", share)];
+        let figures = figures.map(|(name, value)| (name.to_owned(), Figure::Number(value)));
+        remark.figures.extend(figures);
+        remark
+    };
+    found.into_iter().map(of_traffic).collect()
 }
 
 fn with_uncertainty(task: &Evolution, state: &EvolutionState, k: usize) -> WornBody {
@@ -215,6 +262,7 @@ impl Evolution {
         let traffic_error = state.traffic.error[0].max(state.traffic.error[1]);
         let tolerance_asked = self.plan.accuracy.states_tolerance;
         let factor = self.plan.coefficient_factor;
+        let exhausted = state.share < 1.0 && self.is_exhausted(state);
         let found = [
             (self.plan.wear_model != DamageModel::ArchardWear)
                 .then_some(Remark::CoefficientScatterStated { factor }),
@@ -227,8 +275,23 @@ impl Evolution {
                 tolerance_asked,
             }),
             (unsolved_share > 0.0).then_some(Remark::StatesUnsolved { unsolved_share }),
+            exhausted.then_some(Remark::StepsExhausted {
+                steps_max: state.steps as usize,
+                done_share: state.share,
+            }),
         ];
-        found.into_iter().flatten().map(RemarkEntry::from).collect()
+        let own = found.into_iter().flatten().map(RemarkEntry::from);
+        let mut all: Vec<RemarkEntry> = own.collect();
+        for (k, record) in records.iter().enumerate() {
+            for remark in &record.remarks {
+                if all.iter().all(|known| known.code != remark.code) {
+                    let mut remark = remark.clone();
+                    remark.detail = format!("record {k}, {}", remark.detail);
+                    all.push(remark);
+                }
+            }
+        }
+        all
     }
 
     fn limits_reached(&self, records: &[EvolutionRecord]) -> Vec<LimitReached> {

@@ -57,10 +57,12 @@ fn normals(body: Body, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 
 /// Area between a section and a later one with as many points, positive where material is gone.
 pub(crate) fn area_between(body: Body, before: &[[f64; 2]], after: &[[f64; 2]]) -> f64 {
-    let outline = before.iter().chain(after.iter().rev());
-    let next = outline.clone().skip(1).chain(before.first());
-    let parts = outline.zip(next).map(|(a, b)| a[0] * b[1] - b[0] * a[1]);
-    inward(body) * 0.5 * parts.sum::<f64>()
+    let cross = |a: &[f64; 2], b: &[f64; 2]| a[0] * b[1] - b[0] * a[1];
+    let last = before.len() - 1;
+    // Differences of parts are exactly 0 where the sections are equal.
+    let part = |k: usize| cross(&before[k], &before[k + 1]) - cross(&after[k], &after[k + 1]);
+    let ends = cross(&before[last], &after[last]) - cross(&before[0], &after[0]);
+    inward(body) * 0.5 * ((0..last).map(part).sum::<f64>() + ends)
 }
 
 /// Moves points along their normals so that the section loses the sum of `areas`, given in mm² for each point. Returns the points and the

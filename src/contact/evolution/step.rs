@@ -13,7 +13,7 @@ use rayon::iter::{IntoParallelRefIterator, ParallelIterator};
 
 use crate::error::SolveError;
 use crate::evolution::pass::{BodyWear, Pass, pass};
-use crate::evolution::record::record;
+use crate::evolution::record::{record, warnings};
 use crate::evolution::section::{
     add, area_between, depths, distance, lengths, machined, moved, smoothed,
 };
@@ -22,7 +22,7 @@ use crate::evolution::traffic::condensed;
 use crate::geometry::profile::Body;
 use crate::monitor::{Monitor, MonitorPart};
 use crate::numerics::roots::ROUNDING;
-use crate::remark::kind::short;
+use crate::remark::entry::RemarkEntry;
 use crate::solution::words::evolution::{
     BodyState, EvolutionRecord, EvolutionState, StateContact, WornBody,
 };
@@ -57,9 +57,15 @@ impl Evolution {
         }
     }
 
-    /// Returns whether the evolution is finished.
+    /// Returns whether the evolution is finished: the extent or the largest number of steps is done, and recorded.
     pub fn is_over(&self, state: &EvolutionState) -> bool {
-        state.share >= 1.0 && state.recorded && self.due(state).is_none()
+        let ended = state.share >= 1.0 || self.is_exhausted(state);
+        ended && state.recorded && self.due(state).is_none()
+    }
+
+    /// Returns whether the largest number of steps is done.
+    pub(crate) fn is_exhausted(&self, state: &EvolutionState) -> bool {
+        state.steps >= self.plan.accuracy.steps_max
     }
 
     /// The next event, if it is due.
@@ -73,7 +79,7 @@ impl Evolution {
     /// state before if one is due.
     ///
     /// # Errors
-    /// Returns an error if the monitor stopped the work, more than a tenth of the traffic has no answer, or there are too many steps.
+    /// Returns an error if the monitor stopped the work, or more than a tenth of the traffic has no answer.
     pub fn step(
         &self,
         context: &SolveContext,
@@ -95,10 +101,10 @@ impl Evolution {
             })?;
             return Ok((state, None));
         }
-        let (now, states) = solver.evaluate(before, &before.bodies)?;
+        let (now, states, remarks) = solver.evaluate(before, &before.bodies)?;
         state.solves += states.len() as u32;
         state.wheel_y = touched(&states, &before.wheel_y);
-        let found = (!before.recorded).then(|| record(self, before, states, monitor));
+        let found = (!before.recorded).then(|| record(self, before, states, remarks, monitor));
         let found = found.transpose()?;
         state.recorded = true;
         if self.due(&state).is_some() {
@@ -106,7 +112,7 @@ impl Evolution {
                 happen(event, &mut state);
             }
             state.recorded = false;
-        } else if state.share < 1.0 {
+        } else if state.share < 1.0 && !self.is_exhausted(&state) {
             self.advance(&solver, &now, &mut state)?;
         }
         Ok((state, found))
@@ -141,14 +147,6 @@ impl Evolution {
         state: &mut EvolutionState,
     ) -> Result<(), SolveError> {
         let (accuracy, begin) = (&self.plan.accuracy, state.share);
-        if state.steps >= accuracy.steps_max {
-            let reason = format!(
-                "after {} steps {} % of the extent are done; raise accuracy.steps_max or accuracy.step_depth_mm, or shorten the extent",
-                state.steps,
-                short(100.0 * begin)
-            );
-            return Err(SolveError::NormalProblem { reason });
-        }
         let bodies = state.bodies.clone();
         let depths = [0, 1].map(|k| depths(&bodies[k].worn.points_mm, &now[k].area));
         let deepest = depths.iter().flatten().copied().fold(0.0, f64::max);
@@ -166,7 +164,7 @@ impl Evolution {
                 length
             };
             let half = [0, 1].map(|k| moved_body(BODIES[k], &bodies[k], &now[k], 0.5 * step));
-            let (then, states) = solver.evaluate(state, &half)?;
+            let (then, states, _) = solver.evaluate(state, &half)?;
             state.solves += states.len() as u32;
             let changes = [0, 1].map(|k| change(&now[k].area, &then[k].area));
             let error = 0.5 * changes[0].max(changes[1]);
@@ -193,6 +191,7 @@ impl Evolution {
                 state.share = stop;
                 state.recorded = false;
             }
+            state.recorded &= !self.is_exhausted(state);
             break;
         }
         Ok(())
@@ -207,6 +206,9 @@ impl Evolution {
         events.fold((record / records).min(1.0), f64::min)
     }
 }
+
+/// Wear of rail and wheel, the contact of each state, and the warnings of the states.
+type Evaluated = ([BodyWear; 2], Vec<StateContact>, Vec<RemarkEntry>);
 
 /// Solves the states of a step.
 struct Solver<'a> {
@@ -223,18 +225,22 @@ impl Solver<'_> {
         &self,
         of: &EvolutionState,
         bodies: &[BodyState; 2],
-    ) -> Result<([BodyWear; 2], Vec<StateContact>), SolveError> {
+    ) -> Result<Evaluated, SolveError> {
         let on = sections(bodies, of.friction, radius_change(of, &bodies[1]));
         let mut wear = BodyWear::none(on);
         let mut states = Vec::with_capacity(of.traffic.states.len());
         let values: Vec<&[f64]> = of.traffic.states.iter().map(|s| &*s.values).collect();
         let passes = self.passes(on, &values)?;
-        for (state, Pass { wear: own, contact }) in of.traffic.states.iter().zip(passes) {
+        let warnings = warnings(&of.traffic, &passes);
+        for (state, pass) in of.traffic.states.iter().zip(passes) {
             let share = state.share;
-            for (k, own) in own.into_iter().enumerate() {
+            for (k, own) in pass.wear.into_iter().enumerate() {
                 wear[k].add(share, &own.spread(state.spread_mm[k]));
             }
-            states.push(StateContact { share, ..contact });
+            states.push(StateContact {
+                share,
+                ..pass.contact
+            });
         }
         let mut failed = states.iter().filter(|state| state.failure.is_some());
         let unsolved: f64 = failed.clone().map(|state| state.share).sum();
@@ -252,7 +258,7 @@ impl Solver<'_> {
             all.add(self.task.amounts[k], &wear[k]);
             all.area = smoothed(&all.area, self.task.plan.accuracy.smoothing_mm);
         }
-        Ok((all, states))
+        Ok((all, states, warnings))
     }
 
     /// Solves the states with these values independently, on the threads of the context.

@@ -786,6 +786,16 @@ remarks! {
     }
     advice: "`failure` in the states of the records says why.",
     detail: format!("up to {unsolved_share} % of the traffic could not be solved and causes no wear"),
+
+    /// An evolution ended at its largest number of steps, before its extent.
+    Warning StepsExhausted {
+        /// The largest number of steps.
+        steps_max: usize = 1000,
+        /// Share of the extent that is done.
+        done_share: @percent f64 = 0.4,
+    }
+    advice: "The last record is the end. Raise `accuracy.steps_max` or `accuracy.step_depth_mm`, or shorten the extent.",
+    detail: format!("the evolution ended after steps_max = {steps_max} steps, when {done_share} % of the extent was done"),
 }
 
 #[cfg(test)]

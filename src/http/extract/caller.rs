@@ -144,7 +144,10 @@ impl FromRequestParts<AppState> for WorkPath {
         let unknown = ProblemKind::not_found(kind);
         let text = path_text(parts, state, "id", unknown).await?;
         let id = Uuid::try_parse(&text).map_err(|_| {
-            let detail = format!("`{text}` is not a {} id; ids are UUIDs", kind.noun());
+            let detail = format!(
+                "`{text}` is not the id of any {}; ids are UUIDs",
+                kind.noun()
+            );
             ApiError::new(unknown, detail)
         })?;
         if unknown == ProblemKind::JobNotFound {

@@ -160,7 +160,7 @@ pub struct EvolutionAccuracy {
     /// Largest depth that one step removes, in mm; default 0.03.
     #[member(positive(1.0, "mm"), default = 0.03)]
     pub step_depth_mm: f64,
-    /// Largest number of steps; default 1000.
+    /// Number of steps after which the evolution ends; default 1000.
     #[schema(minimum = 1)]
     #[member(1..=100_000, default = 1000)]
     pub steps_max: u32,

@@ -65,6 +65,10 @@ pub struct EvolutionRecord {
     pub contact: ContactRange,
     /// The contact in each state.
     pub states: Vec<StateContact>,
+    /// Warnings of the states, each code once, with the first `state` and the `traffic_share` of all.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    #[schema(required = false)]
+    pub remarks: Vec<RemarkEntry>,
 }
 
 /// A worn section. Arrays have one entry per point.
@@ -76,7 +80,7 @@ pub struct WornBody {
     pub depth_mm: Vec<f64>,
     /// Damage by the Whole Life Rail Model: 1 is a visible crack; limited to 0 where wear outweighs fatigue.
     pub damage: Vec<f64>,
-    /// Area of the section removed by wear, in mm²; multiplied by the length, it is the worn volume.
+    /// Area of the section removed by wear, in mm².
     pub worn_area_mm2: f64,
     /// Area of the section removed by grinding or turning, in mm².
     pub machined_area_mm2: f64,
@@ -87,13 +91,13 @@ pub struct WornBody {
 /// Uncertainties of worn areas and depths by their source, relative to the worn area.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, ToSchema)]
 pub struct WearUncertainty {
-    /// Uncertainty due to the step length, from halving each step.
+    /// Uncertainty of the steps, from halving each step.
     pub steps: f64,
-    /// Uncertainty due to replacing the traffic by representative states, from halving each group of rows along each column.
+    /// Uncertainty of the representative states, from halving each group of rows along each column.
     pub states: f64,
-    /// Uncertainty due to the contact solutions, from the error estimates of their friction power.
+    /// Uncertainty of the contacts, from the error estimates of their friction power.
     pub contact: f64,
-    /// Uncertainty due to the wear coefficients: the factors on worn areas that bound 90 % of the sampled coefficients.
+    /// Factors on worn areas that bound 90 % of the sampled wear coefficients.
     pub coefficients: [f64; 2],
 }
 
@@ -178,11 +182,11 @@ pub struct LimitReached {
     pub loss: String,
     /// The limit in mm.
     pub limit_mm: f64,
-    /// Time at which the limit is reached; absent if the extent ends earlier.
+    /// Time at which the limit is reached; absent if it is not.
     pub reached: Option<Progress>,
     /// Earliest time within the uncertainty of the loss.
     pub earliest: Option<Progress>,
-    /// Latest time within the uncertainty of the loss; absent if the extent ends earlier.
+    /// Latest time within the uncertainty of the loss; absent if it is not reached then.
     pub latest: Option<Progress>,
 }
 
