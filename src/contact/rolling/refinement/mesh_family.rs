@@ -87,6 +87,7 @@ impl MeshFamily {
     }
 
     /// The family with at most about this many cells in a strip.
+    #[must_use]
     pub fn with_cells_along(self, along: f64) -> MeshFamily {
         MeshFamily { along, ..self }
     }
