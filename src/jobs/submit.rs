@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use serde_json::Value;
+use serde_json::{Value, json};
 use uuid::Uuid;
 
 use crate::error::{JobsError, Result};
@@ -72,6 +72,7 @@ impl Jobs {
                 error => error,
             })?;
         }
+        self.fill_events(&mut request).await?;
         let check = move |jobs: &Jobs, request: &Value| {
             let task = Evolution::check(request, &jobs.shared.options.limits)?;
             let seconds = task.expected_seconds();
@@ -87,6 +88,34 @@ impl Jobs {
             })
         };
         self.submit_work(request, false, check, options).await
+    }
+
+    /// Resolves the references to stored profiles in the events of an evolution.
+    async fn fill_events(&self, request: &mut Value) -> Result<()> {
+        let events = request.get("events").and_then(Value::as_array);
+        let places = (0..events.map_or(0, Vec::len))
+            .flat_map(|event| ["grind", "reprofile"].map(|kind| format!("/events/{event}/{kind}")));
+        for place in places {
+            let Some(section) = request.pointer_mut(&place) else {
+                continue;
+            };
+            // A case with this section has the same references and faults.
+            let case = json!({ "contact": { "rail": section.take() } });
+            let mut filled = self
+                .with_profiles(case)
+                .await
+                .map_err(|error| match error {
+                    JobsError::Case(CaseError(mut faults)) => {
+                        for fault in &mut faults {
+                            fault.pointer = fault.pointer.replacen("/contact/rail", &place, 1);
+                        }
+                        CaseError(faults).into()
+                    }
+                    error => error,
+                })?;
+            *section = filled["contact"]["rail"].take();
+        }
+        Ok(())
     }
 
     /// Checks work and queues it.

@@ -123,6 +123,30 @@ async fn an_evolution_is_answered_as_json_tables_and_sections() {
 }
 
 #[tokio::test]
+async fn events_can_name_stored_sections() {
+    let server = Server::idle().await;
+    let mut given = request(2);
+    let rail = given["template"]["contact"]["rail"].clone();
+    let stored = server.post("/v1/profiles", &rail).await.is(201);
+    let mut event = json!({ "at": 2e3, "grind": { "profile": stored.json["digest"] } });
+    given["events"] = json!([event]);
+    server.post("/v1/evolutions", &given).await.is(202);
+    event["grind"]["points_mm"] = rail["points_mm"].clone();
+    for (wrong, said) in [
+        (event, "given together with points"),
+        (
+            json!({ "at": 2e3, "grind": { "profile": "0" } }),
+            "not a profile",
+        ),
+    ] {
+        given["events"] = json!([wrong]);
+        let refused = server.post("/v1/evolutions", &given).await;
+        assert_problem(&refused, 422, "faulty-case", "/events/0/grind/profile");
+        assert!(refused.text.contains(said), "{}", refused.text);
+    }
+}
+
+#[tokio::test]
 async fn faults_are_named_with_their_place_and_what_is_allowed() {
     let server = Server::idle().await;
     for (place, value, pointer, words) in [
