@@ -48,21 +48,13 @@ impl StoreError {
         }
     }
 
-    /// The error after damage was found.
+    /// The error while storage rejects writes for this reason.
     #[must_use]
-    pub fn damaged() -> StoreError {
-        let cause = std::io::Error::new(
-            std::io::ErrorKind::InvalidData,
-            "the job table is damaged; stop the service and restore a backup",
-        );
-        StoreError::Away(StorageFault::Damaged, Arc::new(cause))
-    }
-
-    /// The error while a writer repeats its write.
-    #[must_use]
-    pub fn waited_for(fault: StorageFault) -> StoreError {
-        let cause = std::io::Error::other("a write to the storage is repeated until it succeeds");
-        StoreError::Away(fault, Arc::new(cause))
+    pub fn away(fault: StorageFault, reason: &'static str) -> StoreError {
+        StoreError::Away(
+            fault,
+            Arc::from(Box::<dyn Error + Send + Sync>::from(reason)),
+        )
     }
 
     /// The error for a store that did not answer in time.

@@ -132,10 +132,12 @@ impl Shared {
                 continue;
             };
             if fault == StorageFault::Damaged {
-                return Err(StoreError::damaged().into());
+                let reason = "the job table is damaged; stop the service and restore a backup";
+                return Err(StoreError::away(fault, reason).into());
             }
             if waited_for {
-                return Err(StoreError::waited_for(fault).into());
+                let reason = "a write to the storage is repeated until it succeeds";
+                return Err(StoreError::away(fault, reason).into());
             }
             let written = self.try_write(place).await;
             self.observe_storage(place, &written);
@@ -144,7 +146,6 @@ impl Shared {
         Ok(())
     }
 
-    /// Writes to a location and removes what was written.
     /// Tests the disk, so that a service that starts on a full disk reports it before a submission fails.
     pub(crate) async fn probe_disk(&self) {
         for place in [StoragePlace::Table, StoragePlace::Spool] {
@@ -153,6 +154,7 @@ impl Shared {
         }
     }
 
+    /// Writes to a location and removes what was written.
     async fn try_write(&self, place: StoragePlace) -> Result<()> {
         match place {
             StoragePlace::Table => Ok(self.store.ready(true).await?),

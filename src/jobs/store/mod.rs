@@ -32,20 +32,23 @@ use crate::model::{Failure, Job, Kind, Queue, State, SubmitOptions};
 use railhead_contact::remark::entry::RemarkEntry;
 
 /// Runs a statement on a connection with a value for each parameter. The first argument is the method that fetches the
-/// rows; `scalar` before it reads rows of one column.
+/// rows; `scalar` before it reads rows of one column, and `built` runs a statement that is a `String`.
 macro_rules! sql {
     ($take:ident, $connection:expr, $text:expr $(; $($value:expr),+)?) => {
         query($text)$($(.bind($value))+)?.$take($connection).await
+    };
+    (built $take:ident, $connection:expr, $text:expr $(; $($value:expr),+)?) => {
+        built($text)$($(.bind($value))+)?.$take($connection).await
     };
     (scalar $take:ident, $connection:expr, $text:expr $(; $($value:expr),+)?) => {
         query_scalar($text)$($(.bind($value))+)?.$take($connection).await
     };
 }
 
-/// Binds the values of a row of `VALUES`.
-macro_rules! values {
-    ($row:ident; $($value:expr),+) => {
-        $row$(.push_bind($value))+
+/// Binds the next parameters of a statement.
+macro_rules! bind {
+    ($query:ident; $($value:expr),+) => {
+        $query = $query$(.bind($value))+
     };
 }
 
@@ -531,14 +534,26 @@ impl Filter {
         }
     }
 
-    /// Smallest possible id of a job of the filter: UUIDv7 begins with 48 bits of milliseconds.
-    pub(crate) fn id_from(&self) -> Option<Uuid> {
-        self.created_after.map(first_id_at)
+    /// Smallest possible id of an entry: UUIDv7 begins with 48 bits of milliseconds.
+    pub(crate) fn first_id(&self) -> String {
+        first_id_at(self.created_after.unwrap_or(0)).to_string()
     }
 
-    /// Smallest id above the filter.
-    pub(crate) fn id_before(&self) -> Option<Uuid> {
-        self.created_before.map(first_id_at)
+    /// Greatest possible id of an entry that follows the entry `after` in the list.
+    pub(crate) fn last_id(&self, after: Option<Uuid>) -> String {
+        let before = self
+            .created_before
+            .map(first_id_at)
+            .into_iter()
+            .chain(after)
+            .min();
+        let last = |before: Uuid| Uuid::from_u128(before.as_u128().saturating_sub(1));
+        before.map_or(Uuid::max(), last).to_string()
+    }
+
+    /// The text that the name must contain, in lower case.
+    pub(crate) fn lower_name(&self) -> Option<String> {
+        self.name.as_ref().map(|name| name.to_ascii_lowercase())
     }
 
     /// Eight hexadecimal digits of a digest of the filter.
@@ -770,7 +785,7 @@ pub enum Refusal {
 }
 
 /// A batch to be filled.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct NewBatch {
     /// UUIDv7, which is also the id of its reservation.
     pub id: Uuid,

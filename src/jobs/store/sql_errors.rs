@@ -6,8 +6,10 @@ use std::sync::Arc;
 
 use rusqlite::ErrorCode;
 
-use crate::error::{JobsError, StorageFault, StoreError};
+use crate::error::{StorageFault, StoreError};
 
+#[cfg(feature = "cluster")]
+use crate::error::JobsError;
 #[cfg(feature = "cluster")]
 use crate::storage_fault::fault_of_io;
 
@@ -17,12 +19,6 @@ impl From<rusqlite::Error> for StoreError {
             Some(fault) => StoreError::Away(fault, Arc::new(error)),
             None => StoreError::Failed(Arc::new(error)),
         }
-    }
-}
-
-impl From<rusqlite::Error> for JobsError {
-    fn from(error: rusqlite::Error) -> Self {
-        StoreError::from(error).into()
     }
 }
 

@@ -5,7 +5,7 @@
 //! or were accepted by a node whose clock is behind, wait until the position expires.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use sqlx::Row;
@@ -71,13 +71,9 @@ struct Known {
 pub(crate) struct ClaimMemory(Arc<Mutex<Known>>);
 
 impl ClaimMemory {
-    fn known(&self) -> MutexGuard<'_, Known> {
-        lock(&self.0)
-    }
-
     /// Forgets the positions, because jobs returned to the queue.
     pub(crate) fn forget_places(&self) {
-        self.known().places.clear();
+        lock(&self.0).places.clear();
     }
 
     /// Selects and locks the first jobs of a queue, at most as many as requested.
@@ -86,7 +82,7 @@ impl ClaimMemory {
         connection: &mut PgConnection,
         request: &ClaimRequest<'_>,
     ) -> Result<Vec<PgRow>> {
-        let places = self.known().places.get(request.queue).cloned();
+        let places = lock(&self.0).places.get(request.queue).cloned();
         if let Some((since, [high, normal, low])) = places
             && since.elapsed() < PLACE_KEPT
         {
@@ -108,7 +104,7 @@ impl ClaimMemory {
 
     /// Stores the position of a full group of a long queue; after an incomplete group the next claim begins at the start.
     fn remember(&self, request: &ClaimRequest<'_>, found: &[PgRow], since: Instant) -> Result<()> {
-        let mut known = self.known();
+        let mut known = lock(&self.0);
         let Some((_, mut places)) = known.places.remove(request.queue).or_else(|| {
             let begin = (since, Default::default());
             (request.waiting >= LONG).then_some(begin)
@@ -132,7 +128,7 @@ impl ClaimMemory {
 
     /// The cached list of queues, if one of them is long.
     pub(crate) fn queues(&self) -> Option<Vec<(Queue, u64)>> {
-        let known = self.known();
+        let known = lock(&self.0);
         let (at, queues) = known.queues.as_ref()?;
         let long = queues.iter().any(|(_, waiting)| *waiting >= LONG);
         (long && at.elapsed() < QUEUES_KEPT).then(|| queues.clone())
@@ -140,6 +136,6 @@ impl ClaimMemory {
 
     /// Caches the list of queues.
     pub(crate) fn remember_queues(&self, queues: &[(Queue, u64)]) {
-        self.known().queues = Some((Instant::now(), queues.to_vec()));
+        lock(&self.0).queues = Some((Instant::now(), queues.to_vec()));
     }
 }

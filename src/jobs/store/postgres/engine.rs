@@ -3,9 +3,9 @@
 use async_trait::async_trait;
 use futures_util::TryStreamExt;
 use railhead_macros::repeat_conflicts;
-use sqlx::Transaction;
 use sqlx::postgres::{PgArguments, PgConnection, PgPool, PgRow, Postgres};
 use sqlx::query::Query;
+use sqlx::{AssertSqlSafe, Transaction};
 use uuid::Uuid;
 
 use crate::error::StoreError;
@@ -18,7 +18,6 @@ use crate::store::{ClaimRequest, Cluster, Result, Store};
 pub(crate) use sqlx::{Row, query, query_scalar};
 
 pub(crate) type Db = Postgres;
-pub(crate) type QueryBuilder = sqlx::QueryBuilder<Postgres>;
 pub(crate) type DbConnection = PgConnection;
 pub(crate) type DbPool = PgPool;
 pub(crate) type DbRow = PgRow;
@@ -41,6 +40,17 @@ pub(crate) async fn begin(pool: &DbPool) -> Result<Transaction<'static, Db>> {
 /// Begins a transaction that claims.
 pub(crate) async fn begin_claim(pool: &DbPool) -> Result<Transaction<'static, Db>> {
     begin(pool).await
+}
+
+/// A statement that was put together from literals.
+pub(crate) fn built<'q>(text: String) -> Query<'q, Db, PgArguments> {
+    query(AssertSqlSafe(text))
+}
+
+/// Appends the placeholder of a parameter.
+pub(crate) fn push_placeholder(text: &mut String, number: usize) {
+    text.push('$');
+    text.push_str(&number.to_string());
 }
 
 /// Passes each row of a statement to `row` until that returns `false`.

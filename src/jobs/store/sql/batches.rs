@@ -10,17 +10,16 @@ use railhead_macros::store_trait;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query, query_scalar};
+use super::engine::{self, DbConnection, DbRow, Row, SqlStore, built, query, query_scalar};
 use super::rows::{
-    count, job_columns, push_name, read_blob_ids, read_bytes, read_count, read_flag, read_id,
-    read_job, read_json, read_kind, read_optional_bytes, read_small, read_state, to_json,
+    and_labels, and_name, count, job_columns, read_blob_ids, read_bytes, read_count, read_flag,
+    read_id, read_job, read_json, read_kind, read_optional_bytes, read_small, read_state, to_json,
 };
 use super::submit::{Places, insert_jobs};
 use crate::error::StoreError;
 use crate::model::{Batch, BatchItem, Kind, RunRecord, State, created_at};
 use crate::store::{
     BatchBegun, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Refusal, Result, Total,
-    first_id_at,
 };
 
 macro_rules! batch_columns {
@@ -318,9 +317,9 @@ impl Batches for SqlStore {
         after: Option<Uuid>,
         limit: u32,
     ) -> Result<Page<Batch>> {
-        let mut query = page_query(tenant, filter, after);
-        query.push(" LIMIT ").push_bind(i64::from(limit) + 1);
-        let mut rows = query.build().fetch_all(&self.readers).await?;
+        let page = page_text(batch_columns!(), filter);
+        let most = i64::from(limit) + 1;
+        let mut rows = self.page(page, tenant, filter, after, most).await?;
         let more = rows.len() > limit as usize;
         rows.truncate(limit as usize);
         let batches = self.with_counts(&rows).await?;
@@ -401,13 +400,27 @@ const EXAMINED_MAX: i64 = 10_000;
 
 /// The columns of a [`Batch`].
 impl SqlStore {
+    /// Runs a statement with [`page_text`] and its parameters.
+    async fn page(
+        &self,
+        text: String,
+        tenant: &str,
+        filter: &Filter,
+        after: Option<Uuid>,
+        most: i64,
+    ) -> Result<Vec<DbRow>> {
+        Ok(sql!(built fetch_all, &self.readers,
+            text;
+            tenant, filter.kind.name(), filter.first_id(), filter.last_id(after), filter.lower_name(),
+            to_json(&filter.labels)?, most
+        )?)
+    }
+
     async fn count_batches(&self, tenant: &str, filter: &Filter) -> Result<Total> {
-        let mut query = QueryBuilder::new("SELECT COUNT(*) AS number FROM (");
-        push_page(&mut query, "id", tenant, filter, None);
-        query.push(" LIMIT ").push_bind(EXAMINED_MAX);
-        query.push(") AS counted");
-        let row = query.build().fetch_one(&self.readers).await?;
-        let number = read_count(&row, "number")?;
+        let counted = page_text("id", filter);
+        let text = format!("SELECT COUNT(*) AS number FROM ({counted}) AS counted");
+        let rows = self.page(text, tenant, filter, None, EXAMINED_MAX).await?;
+        let number = read_count(&rows[0], "number")?;
         Ok(match number < EXAMINED_MAX.unsigned_abs() {
             true => Total::Exactly(number),
             false => Total::AtLeast(number),
@@ -455,44 +468,25 @@ impl SqlStore {
     }
 }
 
-pub(crate) fn page_query(tenant: &str, filter: &Filter, after: Option<Uuid>) -> QueryBuilder {
-    let mut query = QueryBuilder::new("");
-    push_page(&mut query, batch_columns!(), tenant, filter, after);
-    query
-}
-
 /// The statement of a page. A tenant has far fewer batches than jobs, so its batches are scanned from the newest.
-fn push_page(
-    query: &mut QueryBuilder,
-    columns: &str,
-    tenant: &str,
-    filter: &Filter,
-    after: Option<Uuid>,
-) {
-    query.push("SELECT ").push(columns);
-    query.push(" FROM batches WHERE complete = 1 AND tenant = ");
-    query.push_bind(tenant.to_owned()).push(" AND kind = ");
-    query.push_bind(filter.kind.name());
-    if let Some(time) = filter.created_after {
-        query
-            .push(" AND id >= ")
-            .push_bind(first_id_at(time).to_string());
-    }
-    let before = filter.created_before.map(first_id_at);
-    if let Some(before) = [before, after].into_iter().flatten().min() {
-        query.push(" AND id < ").push_bind(before.to_string());
-    }
-    push_name(query, filter.name.as_ref());
-    for (key, value) in &filter.labels {
-        query.push(concat!(
-            " AND EXISTS (SELECT 1 FROM ",
+pub(crate) fn page_text(columns: &str, filter: &Filter) -> String {
+    let name = match filter.name {
+        Some(_) => and_name!("$5"),
+        None => "",
+    };
+    let labels = match filter.labels.is_empty() {
+        true => "",
+        false => and_labels!(
+            "$6",
+            "SELECT 1 FROM ",
             pairs_of_labels!(),
-            " AS label WHERE label.key = "
-        ));
-        query.push_bind(key.clone()).push(" AND label.value = ");
-        query.push_bind(value.clone()).push(")");
-    }
-    query.push(" ORDER BY id DESC");
+            " AS label WHERE label.key = wanted_key AND label.value = wanted_value"
+        ),
+    };
+    format!(
+        "SELECT {columns} FROM batches WHERE complete = 1 AND tenant = $1 AND kind = $2 \
+         AND id >= $3 AND id <= $4{name}{labels} ORDER BY id DESC LIMIT $7"
+    )
 }
 
 /// In rows of chunks, `field_patches` is the number of rows without an answer.

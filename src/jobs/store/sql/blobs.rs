@@ -7,8 +7,8 @@ use std::collections::HashSet;
 use railhead_macros::store_trait;
 use uuid::Uuid;
 
-use super::engine::{self, DbConnection, DbRow, QueryBuilder, Row, SqlStore, query, query_scalar};
-use super::rows::{count, fence, read_blob_ids, read_id, read_small, read_state, to_json};
+use super::engine::{self, DbConnection, DbRow, Row, SqlStore, built, query, query_scalar};
+use super::rows::{count, fence, read_blob_ids, read_id, read_small, read_state, to_json, values};
 use crate::store::{Claim, Result, StoredResult};
 
 /// Number of values bound in one statement; far below the limit of SQLite.
@@ -28,26 +28,25 @@ impl SqlStore {
         let ids = self.new_blob_ids(connection, results.len()).await?;
         let mut next = ids.iter();
         for some in results.chunks(VALUES_PER_STATEMENT) {
-            let mut insert = QueryBuilder::new(
-                "WITH made (id, job, lease_token, key, bytes, solution, fields) AS (",
-            );
-            insert.push_values(some, |mut row, (claim, result)| {
+            let mut insert = built(format!(
+                "WITH made (id, job, lease_token, key, bytes, solution, fields) AS ({}) \
+                 INSERT INTO blobs (id, key, bytes, solution, fields, tenant) \
+                 SELECT made.id, made.key, made.bytes, made.solution, made.fields, jobs.tenant FROM made JOIN jobs \
+                 ON jobs.id = made.job AND jobs.lease_token = made.lease_token WHERE jobs.state || '' = 'running'",
+                values(some.len(), 7)
+            ));
+            for (claim, result) in some {
                 let (key, inside) = match result {
                     StoredResult::Blob(key, _) => (Some(key.as_str()), None),
                     StoredResult::Inline(result) => (None, Some(result)),
                 };
-                values!(row;
+                bind!(insert;
                     next.next().copied(), claim.id.to_string(), fence(claim), key,
                     count(result.bytes()), inside.map(|result| result.solution.as_ref()),
                     inside.and_then(|result| result.fields.as_deref())
                 );
-            });
-            insert.push(
-                ") INSERT INTO blobs (id, key, bytes, solution, fields, tenant) \
-                 SELECT made.id, made.key, made.bytes, made.solution, made.fields, jobs.tenant FROM made JOIN jobs \
-                 ON jobs.id = made.job AND jobs.lease_token = made.lease_token WHERE jobs.state || '' = 'running'",
-            );
-            insert.build().execute(&mut *connection).await?;
+            }
+            insert.execute(&mut *connection).await?;
         }
         Ok(ids)
     }

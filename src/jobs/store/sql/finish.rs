@@ -5,8 +5,8 @@ use railhead_macros::store_trait;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, leave_to_collector, release_blobs};
-use super::engine::{self, DbConnection, QueryBuilder, SqlStore, query};
-use super::rows::{fence, read_cache_key, read_id, read_move, read_optional_id, to_json};
+use super::engine::{self, DbConnection, SqlStore, built, query};
+use super::rows::{fence, read_cache_key, read_id, read_move, read_optional_id, to_json, values};
 use crate::model::State;
 use crate::store::{CacheKey, Claim, Ending, NewJob, Result, StoredResult};
 
@@ -139,14 +139,15 @@ impl Ends for SqlStore {
         if keys.is_empty() {
             return Ok(HashMap::new());
         }
-        let mut query = QueryBuilder::new("WITH asked (cache_key) AS (");
-        query.push_values(keys, |mut row, key| {
-            row.push_bind(key.as_slice());
-        });
-        query.push(") SELECT cache_key, ").push(SOURCE);
-        query.push(" AS id FROM asked");
+        let mut query = built(format!(
+            "WITH asked (cache_key) AS ({}) SELECT cache_key, {SOURCE} AS id FROM asked",
+            values(keys.len(), 1)
+        ));
+        for key in keys {
+            bind!(query; key.as_slice());
+        }
         let mut connection = self.readers.acquire().await?;
-        let rows = query.build().fetch_all(&mut *connection).await?;
+        let rows = query.fetch_all(&mut *connection).await?;
         let mut sources = HashMap::new();
         for row in &rows {
             let id = read_optional_id(row, "id")?;

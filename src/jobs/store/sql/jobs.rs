@@ -5,10 +5,11 @@ use railhead_macros::store_trait;
 use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
-use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
+use super::engine::{self, DbRow, Row, SqlStore, built, query};
 use super::rows::{
-    GET, job_columns, push_name, read_blob_id, read_blob_ids, read_bytes, read_count, read_flag,
-    read_id, read_job, read_kind, read_optional_bytes, read_optional_id, read_result, read_small,
+    GET, and_labels, and_name, job_columns, read_blob_id, read_blob_ids, read_bytes, read_count,
+    read_flag, read_id, read_job, read_kind, read_optional_bytes, read_optional_id, read_result,
+    read_small, to_json,
 };
 use crate::model::{Job, State};
 use crate::store::{Change, Filter, Page, Result, ResultRef, StoredCase, Total};
@@ -117,21 +118,26 @@ impl ClientJobs for SqlStore {
     ) -> Result<Page<Job>> {
         let (mut jobs, mut looked_to) = (Vec::new(), None);
         for state in walked(filter) {
-            let mut query = page_query(tenant, filter, state, after, limit);
-            for row in &query.build().fetch_all(&self.readers).await? {
+            let walk = Walk {
+                tenant,
+                filter,
+                state,
+                after,
+            };
+            // One job more than requested is read, which shows whether there is a next page.
+            let rows = self.walk(&walk, walk.page(), i64::from(limit) + 1).await?;
+            for row in &rows {
                 jobs.push(read_job(row)?);
             }
             if filter.reads_jobs() {
-                let mut query = walk("", "id", tenant, filter, state, after);
-                query.push(" LIMIT 1 OFFSET ").push_bind(EXAMINED_MAX - 1);
-                let end = query.build().fetch_optional(&self.readers).await?;
-                looked_to = looked_to.max(end.as_ref().map(read_id).transpose()?);
+                let end = walk.text("id") + " LIMIT 1 OFFSET $9";
+                let end = self.walk(&walk, end, EXAMINED_MAX - 1).await?;
+                looked_to = looked_to.max(end.first().map(read_id).transpose()?);
             }
         }
         jobs.sort_unstable_by_key(|job| Reverse(job.id));
         // Below this id, not every state was examined.
         jobs.retain(|job| looked_to.is_none_or(|to| job.id >= to));
-        // One job more than requested was read, which shows whether there is a next page.
         let more = jobs.len() > limit as usize;
         jobs.truncate(limit as usize);
         let last = if more {
@@ -186,20 +192,21 @@ impl SqlStore {
             || filter.created_after.or(filter.created_before).is_some();
         let (mut total, mut all) = (0, true);
         for state in walked(filter) {
-            let row = if restricted {
-                let counted = "SELECT COUNT(*) AS number FROM (";
-                let mut query = walk(counted, "id", tenant, filter, state, None);
-                query.push(" LIMIT ").push_bind(COUNTED);
-                query.push(") AS counted");
-                query.build().fetch_one(&self.readers).await?
-            } else {
-                sql!(fetch_one, &self.readers,
-                    "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts \
-                     WHERE tenant = $1 AND kind = $2 AND ($3 IS NULL OR state = $3)";
-                    tenant, filter.kind.name(), state.map(State::name)
-                )?
+            let walk = Walk {
+                tenant,
+                filter,
+                state,
+                after: None,
             };
-            let number = read_count(&row, "number")?;
+            let counted = match restricted {
+                true => {
+                    let counted = walk.text("id");
+                    format!("SELECT COUNT(*) AS number FROM ({counted} LIMIT $9) AS counted")
+                }
+                false => COUNT.to_owned(),
+            };
+            let rows = self.walk(&walk, counted, COUNTED).await?;
+            let number = read_count(&rows[0], "number")?;
             all &= !restricted || number < COUNTED.unsigned_abs();
             total += number;
         }
@@ -208,7 +215,23 @@ impl SqlStore {
             false => Total::AtLeast(total),
         })
     }
+
+    /// Runs a statement with the parameters of [`Walk::text`]; $9 is `most`.
+    async fn walk(&self, walk: &Walk<'_>, text: String, most: i64) -> Result<Vec<DbRow>> {
+        let filter = walk.filter;
+        let label = filter.labels.first();
+        Ok(sql!(built fetch_all, &self.readers,
+            text;
+            walk.tenant, filter.kind.name(), label.map(|(key, _)| key), label.map(|(_, value)| value),
+            filter.batch().map(|id| id.to_string()), walk.state.map(State::name), filter.first_id(),
+            filter.last_id(walk.after), most, filter.updated_after, filter.lower_name(),
+            to_json(filter.labels.get(1..).unwrap_or_default())?
+        )?)
+    }
 }
+
+const COUNT: &str = "SELECT CAST(COALESCE(SUM(number), 0) AS bigint) AS number FROM job_counts \
+     WHERE tenant = $1 AND kind = $2 AND ($6 IS NULL OR state = $6)";
 
 const CHANGES: &str = "SELECT id, batch_id, kind, updated_at FROM jobs WHERE tenant = $1 AND (updated_at, id) > ($2, $3) \
      ORDER BY updated_at, id LIMIT $4";
@@ -224,130 +247,102 @@ fn walked(filter: &Filter) -> Vec<Option<State>> {
     }
 }
 
-/// The statement of one page of the jobs in one state, or in all states.
-pub(crate) fn page_query(
-    tenant: &str,
-    filter: &Filter,
-    state: Option<State>,
-    after: Option<Uuid>,
-    limit: u32,
-) -> QueryBuilder {
-    let most = i64::from(limit) + 1;
-    if !filter.reads_jobs() {
-        let mut query = walk("", job_columns!(), tenant, filter, state, after);
-        query.push(" LIMIT ").push_bind(most);
-        return query;
-    }
-    let examined = concat!("SELECT ", job_columns!(), " FROM (");
-    let mut query = walk(examined, job_columns!(), tenant, filter, state, after);
-    query.push(" LIMIT ").push_bind(EXAMINED_MAX);
-    query.push(") AS examined WHERE TRUE");
-    if filter.alone() {
-        query.push(" AND batch_id IS NULL");
-    }
-    if let Some(time) = filter.updated_after {
-        query.push(" AND updated_at >= ").push_bind(time);
-    }
-    push_name(&mut query, filter.name.as_ref());
-    for (key, value) in filter.labels.iter().skip(1) {
-        query.push(" AND EXISTS (SELECT 1 FROM job_labels WHERE of_tenant = ");
-        query.push_bind(tenant.to_owned()).push(" AND key = ");
-        query.push_bind(key.clone()).push(" AND value = ");
-        query.push_bind(value.clone());
-        query.push(" AND job_id = examined.id)");
-    }
-    query.push(" ORDER BY id DESC LIMIT ").push_bind(most);
-    query
+/// A scan of the jobs of a filter, from the newest, as far as an index covers the filter. Labels have a separate table, sorted
+/// by job within each label, so that every list scans an index and stops at its limit.
+pub(crate) struct Walk<'a> {
+    pub(crate) tenant: &'a str,
+    pub(crate) filter: &'a Filter,
+    /// The state of the jobs; `None` for all states.
+    pub(crate) state: Option<State>,
+    /// The last job of the page before.
+    pub(crate) after: Option<Uuid>,
 }
 
-/// Scans the jobs of a filter, from the newest, as far as an index covers the filter. Labels have a separate
-/// table, sorted by job within each label, so that every list scans an index and stops at its limit.
-fn walk(
-    front: &str,
-    columns: &str,
-    tenant: &str,
-    filter: &Filter,
-    state: Option<State>,
-    after: Option<Uuid>,
-) -> QueryBuilder {
-    let label = filter.labels.first();
-    let (source, id) = match label {
-        Some(_) => (
-            " FROM (SELECT of_tenant, key, value, job_id, state AS label_state FROM job_labels) AS job_labels JOIN jobs ON jobs.id = job_id",
-            "job_id",
-        ),
-        None => (" FROM jobs", "id"),
-    };
-    let mut all = QueryBuilder::new(front);
-    let query = &mut all;
-    query.push("SELECT ").push(columns).push(source);
-    let mut joint = " WHERE ";
-    let mut and = |query: &mut QueryBuilder, condition: &str, value: String| {
-        query.push(joint).push(condition).push_bind(value);
-        joint = " AND ";
-    };
-    // Within a batch an index of the batch is used: the expression excludes the index of the tenant.
-    let owner = match (label, filter.batch()) {
-        (Some(_), _) => "of_tenant = ",
-        (None, Some(_)) => concat!(bare!("tenant"), " = "),
-        (None, None) => "tenant = ",
-    };
-    and(query, owner, tenant.to_owned());
-    and(query, "kind = ", filter.kind.name().to_owned());
-    if let Some((key, value)) = label {
-        and(query, "key = ", key.clone());
-        and(query, "value = ", value.clone());
-    }
-    if let Some(batch) = filter.batch() {
-        // A batch of another tenant yields no rows.
-        let column = match label {
-            Some(_) => concat!(bare!("batch_id"), " = (SELECT id FROM batches WHERE id = "),
-            None => "batch_id = (SELECT id FROM batches WHERE id = ",
-        };
-        and(query, column, batch.to_string());
-        query
-            .push(" AND tenant = ")
-            .push_bind(tenant.to_owned())
-            .push(")");
-    }
-    if let Some(state) = state {
-        let column = match label {
-            Some(_) => "label_state = ",
-            None => "state = ",
-        };
-        and(query, column, state.name().to_owned());
-    }
-    // Of several upper bounds only the smallest is used, so that the index has one starting point.
-    let before = [after, filter.id_before()].into_iter().flatten().min();
-    if label.is_none() && filter.alone() {
-        query.push(" AND batch_id IS NULL");
-    }
-    if let (Some(_), Some(batch)) = (label, filter.batch()) {
-        within_batch(query, batch, filter.id_from(), before);
-    } else {
-        if let Some(first) = filter.id_from() {
-            and(query, &format!("{id} >= "), first.to_string());
+impl Walk<'_> {
+    /// The statement of one page.
+    pub(crate) fn page(&self) -> String {
+        let filter = self.filter;
+        let walked = self.text(job_columns!());
+        if !filter.reads_jobs() {
+            return walked + " LIMIT $9";
         }
-        if let Some(before) = before {
-            and(query, &format!("{id} < "), before.to_string());
-        }
+        let mut page = format!(
+            "SELECT {} FROM ({walked} LIMIT {EXAMINED_MAX}) AS examined WHERE TRUE",
+            job_columns!()
+        );
+        let conditions = [
+            (filter.alone(), " AND batch_id IS NULL"),
+            (filter.updated_after.is_some(), " AND updated_at >= $10"),
+            (filter.name.is_some(), and_name!("$11")),
+            (
+                filter.labels.len() > 1,
+                and_labels!(
+                    "$12",
+                    "SELECT 1 FROM job_labels WHERE of_tenant = $1 AND key = wanted_key \
+                     AND value = wanted_value AND job_id = examined.id"
+                ),
+            ),
+        ];
+        let conditions = conditions.iter().filter(|(given, _)| *given);
+        page.extend(conditions.map(|(_, condition)| *condition));
+        page + " ORDER BY id DESC LIMIT $9"
     }
-    query.push(format!(" ORDER BY {id} DESC"));
-    all
+
+    /// The statement that reads these columns of all jobs, without a limit.
+    pub(crate) fn text(&self, columns: &str) -> String {
+        let labelled = !self.filter.labels.is_empty();
+        let (source, id, owner) = match (labelled, self.filter.batch()) {
+            (true, Some(_)) => (LABELLED, "job_id", OF_LABEL_AND_BATCH),
+            (true, None) => (LABELLED, "job_id", OF_LABEL),
+            (false, Some(_)) => ("jobs", "id", OF_BATCH),
+            (false, None) => ("jobs", "id", "tenant = $1"),
+        };
+        let state = match self.state {
+            None => "",
+            Some(_) if labelled => " AND label_state = $6",
+            Some(_) => " AND state = $6",
+        };
+        let alone = match !labelled && self.filter.alone() {
+            true => " AND batch_id IS NULL",
+            false => "",
+        };
+        let within_batch = labelled && self.filter.batch().is_some();
+        let bounds = [
+            (self.filter.created_after.is_some(), ">= $7"),
+            (
+                self.after.is_some() || self.filter.created_before.is_some(),
+                "<= $8",
+            ),
+        ];
+        let bounds = bounds.iter().filter(|(given, _)| *given && !within_batch);
+        let bounds: String = bounds
+            .map(|(_, bound)| format!(" AND {id} {bound}"))
+            .collect();
+        format!(
+            "SELECT {columns} FROM {source} WHERE {owner} AND kind = $2{state}{alone}{bounds} ORDER BY {id} DESC"
+        )
+    }
 }
 
-/// Adds bounds from the first and last id of the batch, so that only this part of the label's index is scanned.
-fn within_batch(query: &mut QueryBuilder, batch: Uuid, from: Option<Uuid>, before: Option<Uuid>) {
-    let end = "(SELECT MAX(id) FROM jobs WHERE batch_id = ";
-    let last = before.map_or(Uuid::max(), |id| {
-        Uuid::from_u128(id.as_u128().saturating_sub(1))
-    });
-    query.push(concat!(" AND job_id >= ", greatest!(), "("));
-    query.push_bind(from.unwrap_or_default().to_string());
-    query.push(", ").push(end.replace("MAX", "MIN"));
-    query.push_bind(batch.to_string());
-    query.push(concat!(")) AND job_id <= ", least!(), "("));
-    query.push_bind(last.to_string());
-    query.push(", ").push(end).push_bind(batch.to_string());
-    query.push("))");
-}
+const LABELLED: &str = "(SELECT of_tenant, key, value, job_id, state AS label_state FROM job_labels) AS job_labels \
+     JOIN jobs ON jobs.id = job_id";
+
+const OF_LABEL: &str = "of_tenant = $1 AND key = $3 AND value = $4";
+
+/// Within a batch an index of the batch is used: the expression excludes the index of the tenant. A batch of another tenant
+/// yields no rows.
+const OF_BATCH: &str = concat!(
+    bare!("tenant"),
+    " = $1 AND batch_id = (SELECT id FROM batches WHERE id = $5 AND tenant = $1)"
+);
+
+/// The first and last id of the batch are bounds too, so that only this part of the index of the label is scanned.
+const OF_LABEL_AND_BATCH: &str = concat!(
+    "of_tenant = $1 AND key = $3 AND value = $4 AND ",
+    bare!("batch_id"),
+    " = (SELECT id FROM batches WHERE id = $5 AND tenant = $1) AND job_id >= ",
+    greatest!(),
+    "($7, (SELECT MIN(id) FROM jobs WHERE batch_id = $5)) AND job_id <= ",
+    least!(),
+    "($8, (SELECT MAX(id) FROM jobs WHERE batch_id = $5))"
+);

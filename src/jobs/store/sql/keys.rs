@@ -3,7 +3,7 @@ use std::sync::Arc;
 
 use railhead_macros::store_trait;
 
-use super::engine::{self, DbRow, QueryBuilder, Row, SqlStore, query};
+use super::engine::{self, DbRow, Row, SqlStore, query};
 use super::rows::{read_bytes, read_count, read_flag, read_json, to_json};
 use crate::error::StoreError;
 use crate::model::Key;
@@ -124,18 +124,16 @@ impl Profiles for SqlStore {
         after: Option<&ProfileCursor>,
         limit: u32,
     ) -> Result<Page<ProfileEntry>> {
-        let mut query =
-            QueryBuilder::new("SELECT digest, bytes, created_at FROM profiles WHERE tenant = ");
-        query.push_bind(tenant.to_owned());
-        if let Some(ProfileCursor(time, digest)) = after {
-            query.push(" AND (created_at < ").push_bind(*time);
-            query.push(" OR created_at = ").push_bind(*time);
-            query.push(" AND substr(digest, 1, 28) > ");
-            query.push_bind(digest.clone()).push(")");
-        }
-        query.push(" ORDER BY created_at DESC, digest LIMIT ");
-        query.push_bind(i64::from(limit) + 1);
-        let rows = query.build().fetch_all(&self.readers).await?;
+        let (time, digest) = match after {
+            Some(ProfileCursor(time, digest)) => (*time, digest.as_str()),
+            None => (i64::MAX, ""),
+        };
+        let rows = sql!(fetch_all, &self.readers,
+            "SELECT digest, bytes, created_at FROM profiles WHERE tenant = $1 \
+             AND (created_at < $2 OR created_at = $2 AND substr(digest, 1, 28) > $3) \
+             ORDER BY created_at DESC, digest LIMIT $4";
+            tenant, time, digest, i64::from(limit) + 1
+        )?;
         let read = |row: &DbRow| {
             Ok(ProfileEntry {
                 digest: row.try_get("digest")?,

@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use uuid::Uuid;
 
-use super::engine::{DbRow, QueryBuilder, Row};
+use super::engine::{self, DbRow, Row};
 use crate::codec::result::EncodedResult;
 use crate::error::StoreError;
 use crate::model::{Job, Kind, Priority, State};
@@ -147,15 +147,47 @@ pub(crate) fn read_json<T: DeserializeOwned>(row: &DbRow, column: &str) -> Resul
     serde_json::from_str(&text).map_err(|error| StoreError::Corrupt(format!("{text:.80}: {error}")))
 }
 
-/// Restricts a list to entries whose `name` contains a text.
-pub(crate) fn push_name(query: &mut QueryBuilder, name: Option<&String>) {
-    let Some(name) = name else { return };
-    query.push(concat!(
-        " AND ",
-        place_in!(),
-        "(lower(COALESCE(name, '')), "
-    ));
-    query.push_bind(name.to_ascii_lowercase()).push(") > 0");
+/// Restricts a list to entries whose `name` contains a text, which is a parameter in lower case.
+macro_rules! and_name {
+    ($parameter:literal) => {
+        concat!(
+            " AND ",
+            place_in!(),
+            "(lower(COALESCE(name, '')), ",
+            $parameter,
+            ") > 0"
+        )
+    };
+}
+pub(crate) use and_name;
+
+/// Restricts a list to entries that have all labels of a parameter, a JSON array of keys and values. `$has` selects a label
+/// of an entry that equals `wanted_key` and `wanted_value`.
+macro_rules! and_labels {
+    ($parameter:literal, $($has:expr),+) => {
+        concat!(
+            " AND NOT EXISTS (SELECT 1 FROM (SELECT value ->> 0 AS wanted_key, value ->> 1 AS wanted_value FROM ",
+            json_rows!($parameter),
+            ") AS wanted WHERE NOT EXISTS (",
+            $($has),+,
+            "))"
+        )
+    };
+}
+pub(crate) use and_labels;
+
+/// `VALUES` with this many rows of parameters.
+pub(crate) fn values(rows: usize, columns: usize) -> String {
+    let mut text = "VALUES ".to_owned();
+    for number in 0..rows * columns {
+        text.push_str(match (number, number % columns) {
+            (0, _) => "(",
+            (_, 0) => "), (",
+            _ => ", ",
+        });
+        engine::push_placeholder(&mut text, number + 1);
+    }
+    text + ")"
 }
 
 /// A count as a column value.

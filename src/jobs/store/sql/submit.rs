@@ -6,9 +6,9 @@ use railhead_macros::store_trait;
 use tokio::sync::{mpsc, oneshot};
 use uuid::Uuid;
 
-use super::engine::{self, DbConnection, DbPool, QueryBuilder, Row, SqlStore, query};
+use super::engine::{self, DbConnection, DbPool, Row, SqlStore, built, query};
 use super::finish::end_with_sources;
-use super::rows::{count, job_columns, read_count, read_id, read_job, to_json};
+use super::rows::{count, job_columns, read_count, read_id, read_job, to_json, values};
 use crate::error::StoreError;
 use crate::model::Job;
 use crate::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result};
@@ -124,34 +124,28 @@ pub(crate) async fn insert_jobs(
     let mut ended = Vec::new();
     let batch = batch.map(|id| id.to_string());
     for some in jobs.chunks(ROWS_PER_STATEMENT) {
-        let labels = some
-            .iter()
-            .map(|(_, job)| to_json(&job.labels))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut rows = QueryBuilder::new(
+        let mut rows = built(format!(
             "INSERT INTO jobs (id, state, name, labels, method, created_at, updated_at, batch_id, batch_index, cost_us, slice_us, outputs, \
-             cache_key, tenant, bypass_cache, rank, deadline, traceparent, case_bytes, kind) ",
-        );
-        rows.push_values(
-            some.iter().zip(labels),
-            |mut row, ((index, job), labels)| {
-                values!(row;
-                    job.id.to_string(), "queued", &job.name, labels, &job.method, job.created_at,
-                    job.created_at, &batch, index.map(i64::from), i64::from(job.cost_us),
-                    i64::from(job.slice_us), &job.outputs,
-                    job.cache_key.as_ref().map(CacheKey::as_slice), &*job.tenant,
-                    i64::from(job.options.bypass_cache), job.options.priority.rank(),
-                    job.deadline(), job.traceparent.as_deref(), count(job.body.len()),
-                    job.kind.name()
-                );
-            },
-        );
-        rows.build().execute(&mut *connection).await?;
-        let mut cases = QueryBuilder::new("INSERT INTO cases (job_id, row, body) ");
-        cases.push_values(some, |mut row, (_, job)| {
-            values!(row; job.id.to_string(), i64::from(job.row), job.body.as_ref());
-        });
-        cases.build().execute(&mut *connection).await?;
+             cache_key, tenant, bypass_cache, rank, deadline, traceparent, case_bytes, kind) {}",
+            values(some.len(), 20)
+        ));
+        let mut cases = built(format!(
+            "INSERT INTO cases (job_id, row, body) {}",
+            values(some.len(), 3)
+        ));
+        for (index, job) in some {
+            bind!(rows;
+                job.id.to_string(), "queued", &job.name, to_json(&job.labels)?, &job.method,
+                job.created_at, job.created_at, &batch, index.map(i64::from),
+                i64::from(job.cost_us), i64::from(job.slice_us), &job.outputs,
+                job.cache_key.as_ref().map(CacheKey::as_slice), &*job.tenant,
+                i64::from(job.options.bypass_cache), job.options.priority.rank(), job.deadline(),
+                job.traceparent.as_deref(), count(job.body.len()), job.kind.name()
+            );
+            bind!(cases; job.id.to_string(), i64::from(job.row), job.body.as_ref());
+        }
+        rows.execute(&mut *connection).await?;
+        cases.execute(&mut *connection).await?;
         let labelled = some.iter().filter(|(_, job)| !job.labels.is_empty());
         let labelled: Vec<Uuid> = labelled.map(|(_, job)| job.id).collect();
         if !labelled.is_empty() {

@@ -117,8 +117,7 @@ impl Shared {
 }
 
 fn closed() -> StoreError {
-    let cause = std::io::Error::other("the job table is closed");
-    StoreError::Away(StorageFault::Unwritable, Arc::new(cause))
+    StoreError::away(StorageFault::Unwritable, "the job table is closed")
 }
 
 /// A connection in use, or a write transaction on it. Dropped without a commit, the transaction changes nothing.
@@ -443,93 +442,6 @@ impl SqliteRow {
             let kind = std::any::type_name::<T>();
             StoreError::Corrupt(format!("column {column:?} is no {kind}"))
         })
-    }
-}
-
-/// Builds a statement in parts.
-pub(crate) struct QueryBuilder {
-    text: String,
-    values: Vec<Value>,
-}
-
-impl QueryBuilder {
-    pub(crate) fn new(text: impl Into<String>) -> QueryBuilder {
-        QueryBuilder {
-            text: text.into(),
-            values: Vec::new(),
-        }
-    }
-
-    /// Appends text.
-    pub(crate) fn push(&mut self, piece: impl AsRef<str>) -> &mut QueryBuilder {
-        self.text.push_str(piece.as_ref());
-        self
-    }
-
-    /// Appends a parameter.
-    pub(crate) fn push_bind(&mut self, parameter: impl ToSql) -> &mut QueryBuilder {
-        self.text.push('?');
-        self.values.push(value(parameter));
-        self
-    }
-
-    /// Appends `VALUES` with a row of parameters for each item.
-    pub(crate) fn push_values<I: IntoIterator>(
-        &mut self,
-        items: I,
-        mut row: impl FnMut(Separated<'_>, I::Item),
-    ) -> &mut QueryBuilder {
-        self.push("VALUES ");
-        for (number, item) in items.into_iter().enumerate() {
-            self.push(if number == 0 { "(" } else { ", (" });
-            row(self.separated(", "), item);
-            self.push(")");
-        }
-        self
-    }
-
-    /// Appends a list.
-    pub(crate) fn separated(&mut self, separator: &'static str) -> Separated<'_> {
-        Separated {
-            query: self,
-            separator,
-            first: true,
-        }
-    }
-
-    /// The statement; the builder is empty afterwards.
-    pub(crate) fn build(&mut self) -> Query {
-        Query {
-            text: std::mem::take(&mut self.text).into(),
-            values: std::mem::take(&mut self.values),
-        }
-    }
-
-    #[cfg(test)]
-    pub(crate) fn sql(&self) -> &str {
-        &self.text
-    }
-}
-
-/// A list in a statement that is being built.
-pub(crate) struct Separated<'b> {
-    query: &'b mut QueryBuilder,
-    separator: &'static str,
-    first: bool,
-}
-
-impl Separated<'_> {
-    fn next(&mut self) -> &mut QueryBuilder {
-        if !std::mem::replace(&mut self.first, false) {
-            self.query.push(self.separator);
-        }
-        self.query
-    }
-
-    /// Appends a parameter as an entry.
-    pub(crate) fn push_bind(&mut self, parameter: impl ToSql) -> &mut Self {
-        self.next().push_bind(parameter);
-        self
     }
 }
 

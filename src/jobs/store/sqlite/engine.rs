@@ -17,7 +17,7 @@ use crate::store::sqlite::sql::claim::{PEEK, first_queued};
 use crate::store::{ClaimRequest, Cluster, Result, Store};
 
 pub(crate) use crate::store::sqlite::connection::{
-    Connection as DbConnection, Pool as DbPool, QueryBuilder, Row, SqliteRow as DbRow, query,
+    Connection as DbConnection, Pool as DbPool, Row, SqliteRow as DbRow, query, query as built,
     query_scalar,
 };
 
@@ -40,6 +40,11 @@ pub(crate) async fn begin(writer: &DbPool) -> Result<Pooled> {
 /// Begins a transaction that claims. A power cut may undo a claim, which leaves its jobs in the queue.
 pub(crate) async fn begin_claim(writer: &DbPool) -> Result<Pooled> {
     writer.begin(true).await
+}
+
+/// Appends the placeholder of a parameter. SQLite searches the names of earlier parameters, so they have none.
+pub(crate) fn push_placeholder(text: &mut String, _: usize) {
+    text.push('?');
 }
 
 /// Passes each row of a statement to `row` until that returns `false`.

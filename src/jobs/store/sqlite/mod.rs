@@ -58,6 +58,16 @@ mod plans {
         }
     }
 
+    fn page(filter: &Filter, state: Option<State>, after: Option<Uuid>) -> String {
+        let walk = jobs::Walk {
+            tenant: "t",
+            filter,
+            state,
+            after,
+        };
+        walk.page()
+    }
+
     /// Asserts that some step contains `seek`, and that no step contains one of the others.
     fn assert_seeks(steps: &[String], seek: &str, others: &[&str]) {
         assert!(steps.iter().any(|step| step.contains(seek)), "{steps:?}");
@@ -68,18 +78,15 @@ mod plans {
     #[tokio::test]
     async fn the_list_of_batches_walks_its_index_without_sorting() {
         let store = Opened::new().await;
-        for after in [None, Some(Uuid::now_v7())] {
-            let filter = Filter {
-                labels: vec![("line".to_owned(), "A12".to_owned())],
-                name: Some("x".to_owned()),
-                ..Filter::of(Kind::Cases)
-            };
-            let query = batches::page_query("t", &filter, after);
-            let steps = store.plan(query.sql()).await;
-            let seek = "batches_by_tenant (tenant=? AND kind=?";
-            assert_seeks(&steps[..1], seek, &[]);
-            assert_seeks(&steps, seek, &["TEMP B-TREE"]);
-        }
+        let filter = Filter {
+            labels: vec![("line".to_owned(), "A12".to_owned())],
+            name: Some("x".to_owned()),
+            ..Filter::of(Kind::Cases)
+        };
+        let steps = store.plan(&batches::page_text("id, name", &filter)).await;
+        let seek = "batches_by_tenant (tenant=? AND kind=?";
+        assert_seeks(&steps[..1], seek, &[]);
+        assert_seeks(&steps, seek, &["TEMP B-TREE"]);
     }
 
     #[tokio::test]
@@ -182,8 +189,7 @@ mod plans {
                 member: Some(Membership::Batch(Uuid::now_v7())),
                 ..Filter::default()
             };
-            let query = jobs::page_query("t", &filter, state, after, 50);
-            let steps = store.plan(query.sql()).await;
+            let steps = store.plan(&page(&filter, state, after)).await;
             let seek = match state {
                 None => "jobs_by_batch (batch_id=?",
                 Some(_) => "jobs_by_batch_and_state (batch_id=? AND state=?",
@@ -207,8 +213,7 @@ mod plans {
                 labels: vec![("line".to_owned(), "A12".to_owned())],
                 ..Filter::default()
             };
-            let query = jobs::page_query("t", &filter, state, after, 50);
-            let steps = store.plan(query.sql()).await;
+            let steps = store.plan(&page(&filter, state, after)).await;
             assert_seeks(&steps[..1], "job_id>? AND job_id<?)", &[]);
             let ends = steps.iter().filter(|step| step.contains("(batch_id=?)"));
             assert_eq!(ends.count(), 2, "{steps:?}");
@@ -230,8 +235,7 @@ mod plans {
                             created_before: window.map(|time| time + 5),
                             ..Filter::default()
                         };
-                        let query = jobs::page_query("t", &filter, state, after, 50);
-                        let steps = store.plan(query.sql()).await;
+                        let steps = store.plan(&page(&filter, state, after)).await;
                         let seek = match (&label, state) {
                             (None, None) => "jobs_by_tenant (tenant=?",
                             (None, Some(_)) => "jobs_by_state (state=? AND tenant=?",
@@ -258,8 +262,7 @@ mod plans {
                     updated_after,
                     ..Filter::default()
                 };
-                let query = jobs::page_query("t", &filter, Some(State::Failed), after, 50);
-                let steps = store.plan(query.sql()).await;
+                let steps = store.plan(&page(&filter, Some(State::Failed), after)).await;
                 let seek = "jobs_alone (tenant=? AND kind=? AND state=?";
                 assert_seeks(&steps, seek, &["TEMP B-TREE"]);
             }
