@@ -3,8 +3,9 @@
 use std::fmt::Write;
 use std::time::Instant;
 
-use railhead::tables::arrow::ArrowWriter;
+use railhead::tables::read::TableForm;
 use railhead::tables::table::{RowTable, TableColumn};
+use railhead::tables::write::RowWriter;
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -100,15 +101,7 @@ fn arrow(columns: &[Vec<f64>]) -> Vec<u8> {
             .map(|(name, column)| ((*name).to_owned(), TableColumn::Numbers(column.clone())))
             .collect(),
     };
-    let kinds: Vec<_> = table
-        .columns
-        .iter()
-        .map(|(name, column)| (name.clone(), column.kind()))
-        .collect();
-    let mut writer = ArrowWriter::new(Vec::new(), &kinds).expect("a stream");
-    writer.write(table).expect("a batch");
-    writer.finish().expect("the end");
-    std::mem::take(writer.inner_mut())
+    RowWriter::whole(TableForm::Arrow, table).expect("a stream")
 }
 
 pub async fn run(workers: usize) -> Vec<Row> {

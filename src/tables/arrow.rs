@@ -1,6 +1,6 @@
 //! Reads and writes tables of rows as Arrow: writes streams, reads streams and files.
 
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{Read, Seek, SeekFrom};
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
@@ -20,17 +20,17 @@ use crate::{DAMAGED, guarded};
 const FILE_MAGIC: &[u8] = b"ARROW1";
 
 /// Writes tables with equal columns as a stream, with a record batch per table.
-pub struct ArrowWriter<W: Write> {
-    stream: StreamWriter<W>,
+pub struct ArrowWriter {
+    stream: StreamWriter<Vec<u8>>,
     schema: Arc<Schema>,
 }
 
-impl<W: Write> ArrowWriter<W> {
+impl ArrowWriter {
     /// Begins a stream of these columns.
     ///
     /// # Errors
     /// Writing fails.
-    pub fn new(stream: W, columns: &[(String, TableKind)]) -> Result<ArrowWriter<W>, ArrowError> {
+    pub fn new(columns: &[(String, TableKind)]) -> Result<ArrowWriter, ArrowError> {
         let fields = columns.iter().map(|(name, kind)| match kind {
             TableKind::Integers => Field::new(name, DataType::Int64, false),
             TableKind::Numbers => Field::new(name, DataType::Float64, true),
@@ -38,16 +38,16 @@ impl<W: Write> ArrowWriter<W> {
         });
         let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
         Ok(ArrowWriter {
-            stream: StreamWriter::try_new(stream, &schema)?,
+            stream: StreamWriter::try_new(Vec::new(), &schema)?,
             schema,
         })
     }
 
-    /// Appends a table as a record batch.
+    /// Returns the bytes of a table as a record batch; the first bytes of the stream precede those of the first table.
     ///
     /// # Errors
     /// The table has other columns, or writing fails.
-    pub fn write(&mut self, table: RowTable) -> Result<(), ArrowError> {
+    pub fn write(&mut self, table: RowTable) -> Result<Vec<u8>, ArrowError> {
         let columns = table.columns.into_iter().map(|(_, column)| match column {
             TableColumn::Integers(values) => Arc::new(Int64Array::from(values)) as ArrayRef,
             TableColumn::Numbers(values) => {
@@ -59,20 +59,17 @@ impl<W: Write> ArrowWriter<W> {
             }
         });
         let batch = RecordBatch::try_new(self.schema.clone(), columns.collect())?;
-        self.stream.write(&batch)
+        self.stream.write(&batch)?;
+        Ok(std::mem::take(self.stream.get_mut()))
     }
 
-    /// Returns the underlying writer.
-    pub fn inner_mut(&mut self) -> &mut W {
-        self.stream.get_mut()
-    }
-
-    /// Ends the stream.
+    /// Returns the end of the stream.
     ///
     /// # Errors
     /// Writing fails.
-    pub fn finish(&mut self) -> Result<(), ArrowError> {
-        self.stream.finish()
+    pub fn finish(&mut self) -> Result<Vec<u8>, ArrowError> {
+        self.stream.finish()?;
+        Ok(std::mem::take(self.stream.get_mut()))
     }
 }
 
@@ -212,12 +209,12 @@ mod tests {
                 ),
             ],
         };
-        let mut writer = ArrowWriter::new(Vec::new(), &table.kinds()).unwrap();
+        let mut writer = ArrowWriter::new(&table.kinds()).unwrap();
+        let mut stream = Vec::new();
         for _ in 0..2 {
-            writer.write(table.clone()).unwrap();
+            stream.extend(writer.write(table.clone()).unwrap());
         }
-        writer.finish().unwrap();
-        let stream = std::mem::take(writer.inner_mut());
+        stream.extend(writer.finish().unwrap());
         let tables: Vec<_> = read(Cursor::new(stream)).unwrap().collect();
         assert_eq!(tables.len(), 2);
         for read in tables {
@@ -233,10 +230,8 @@ mod tests {
         let table = RowTable {
             columns: vec![("a".to_owned(), numbers), ("b".to_owned(), texts)],
         };
-        let mut writer = ArrowWriter::new(Vec::new(), &table.kinds()).unwrap();
-        writer.write(table).unwrap();
-        writer.finish().unwrap();
-        let stream = std::mem::take(writer.inner_mut());
+        let mut writer = ArrowWriter::new(&table.kinds()).unwrap();
+        let stream = [writer.write(table).unwrap(), writer.finish().unwrap()].concat();
         let mut refused = 0;
         for place in 0..stream.len() {
             for wrong in [[0xff; 4], [0x7f; 4], [0, 0, 0, 0x80]] {

@@ -2,7 +2,6 @@
 //!
 //! Columns are flat. Missing numbers and texts are null.
 
-use std::io::Write;
 use std::sync::Arc;
 
 use parquet::basic::{
@@ -41,14 +40,14 @@ const CODECS: [CompressionCodec; 4] = [
 pub const MAGIC: &[u8] = b"PAR1";
 
 /// Writes tables with equal columns, with a row group per table.
-pub struct TableWriter<W: Write + Send>(SerializedFileWriter<W>);
+pub struct TableWriter(SerializedFileWriter<Vec<u8>>);
 
-impl<W: Write + Send> TableWriter<W> {
+impl TableWriter {
     /// Begins a file with these columns.
     ///
     /// # Errors
     /// Writing fails.
-    pub fn new(file: W, columns: &[(String, TableKind)]) -> Result<TableWriter<W>> {
+    pub fn new(columns: &[(String, TableKind)]) -> Result<TableWriter> {
         let fields = columns.iter().map(|(name, kind)| field(name, *kind));
         let schema = Type::group_type_builder("rows")
             .with_fields(fields.collect::<Result<_>>()?)
@@ -65,17 +64,17 @@ impl<W: Write + Send> TableWriter<W> {
         }
         let properties = Arc::new(properties.build());
         Ok(TableWriter(SerializedFileWriter::new(
-            file,
+            Vec::new(),
             Arc::new(schema),
             properties,
         )?))
     }
 
-    /// Appends a table as a row group.
+    /// Returns the bytes of a table as a row group; the first bytes of the file precede those of the first table.
     ///
     /// # Errors
     /// The table has other columns, or writing fails.
-    pub fn write(&mut self, table: &RowTable) -> Result<()> {
+    pub fn write(&mut self, table: &RowTable) -> Result<Vec<u8>> {
         let mut group = self.0.next_row_group()?;
         for (_, column) in &table.columns {
             let Some(mut writer) = group.next_column()? else {
@@ -106,20 +105,16 @@ impl<W: Write + Send> TableWriter<W> {
             writer.close()?;
         }
         group.close()?;
-        Ok(())
+        Ok(std::mem::take(self.0.inner_mut()))
     }
 
-    /// Returns the underlying writer.
-    pub fn inner_mut(&mut self) -> &mut W {
-        self.0.inner_mut()
-    }
-
-    /// Ends the file.
+    /// Returns the end of the file.
     ///
     /// # Errors
     /// Writing fails.
-    pub fn finish(&mut self) -> Result<()> {
-        self.0.finish().map(drop)
+    pub fn finish(&mut self) -> Result<Vec<u8>> {
+        self.0.finish()?;
+        Ok(std::mem::take(self.0.inner_mut()))
     }
 }
 
@@ -141,12 +136,8 @@ fn field(name: &str, kind: TableKind) -> Result<Arc<Type>> {
 /// # Errors
 /// Writing fails.
 pub fn encode(table: &RowTable) -> Result<Vec<u8>> {
-    let mut file = Vec::new();
-    let mut writer = TableWriter::new(&mut file, &table.kinds())?;
-    writer.write(table)?;
-    writer.finish()?;
-    drop(writer);
-    Ok(file)
+    let mut writer = TableWriter::new(&table.kinds())?;
+    Ok([writer.write(table)?, writer.finish()?].concat())
 }
 
 /// Reads a file with flat columns.
@@ -507,13 +498,12 @@ mod tests {
 
     #[test]
     fn several_tables_are_groups_of_one_file() {
+        let mut writer = TableWriter::new(&table().kinds()).unwrap();
         let mut file = Vec::new();
-        let mut writer = TableWriter::new(&mut file, &table().kinds()).unwrap();
         for _ in 0..2 {
-            writer.write(&table()).unwrap();
+            file.extend(writer.write(&table()).unwrap());
         }
-        writer.finish().unwrap();
-        drop(writer);
+        file.extend(writer.finish().unwrap());
         let reader = TableReader::new(Bytes::from(file)).unwrap();
         assert_eq!(reader.groups(), 2);
         let cut = reader.read(1, |_| true).unwrap().cut(&(2..3));

@@ -19,9 +19,9 @@ pub enum RowWriter {
     /// NDJSON: an object per row.
     Ndjson,
     /// An Arrow stream, with a record batch per table.
-    Arrow(Box<ArrowWriter<Vec<u8>>>),
+    Arrow(Box<ArrowWriter>),
     /// A Parquet file, with a row group per table.
-    Parquet(Box<TableWriter<Vec<u8>>>),
+    Parquet(Box<TableWriter>),
 }
 
 impl RowWriter {
@@ -34,10 +34,8 @@ impl RowWriter {
             TableForm::Csv => {
                 RowWriter::Csv(columns.iter().map(|(name, _)| name.clone()).collect())
             }
-            TableForm::Arrow => RowWriter::Arrow(Box::new(ArrowWriter::new(Vec::new(), columns)?)),
-            TableForm::Parquet => {
-                RowWriter::Parquet(Box::new(TableWriter::new(Vec::new(), columns)?))
-            }
+            TableForm::Arrow => RowWriter::Arrow(Box::new(ArrowWriter::new(columns)?)),
+            TableForm::Parquet => RowWriter::Parquet(Box::new(TableWriter::new(columns)?)),
             _ => RowWriter::Ndjson,
         })
     }
@@ -70,14 +68,8 @@ impl RowWriter {
         match self {
             RowWriter::Csv(_) => Ok(csv_lines(&table)?),
             RowWriter::Ndjson => Ok(json_lines(&table)?.into_bytes()),
-            RowWriter::Arrow(writer) => {
-                writer.write(table)?;
-                Ok(std::mem::take(writer.inner_mut()))
-            }
-            RowWriter::Parquet(writer) => {
-                writer.write(&table)?;
-                Ok(std::mem::take(writer.inner_mut()))
-            }
+            RowWriter::Arrow(writer) => Ok(writer.write(table)?),
+            RowWriter::Parquet(writer) => Ok(writer.write(&table)?),
         }
     }
 
@@ -88,14 +80,8 @@ impl RowWriter {
     pub fn finish(&mut self) -> Result<Vec<u8>, WriteError> {
         match self {
             RowWriter::Csv(_) | RowWriter::Ndjson => Ok(Vec::new()),
-            RowWriter::Arrow(writer) => {
-                writer.finish()?;
-                Ok(std::mem::take(writer.inner_mut()))
-            }
-            RowWriter::Parquet(writer) => {
-                writer.finish()?;
-                Ok(std::mem::take(writer.inner_mut()))
-            }
+            RowWriter::Arrow(writer) => Ok(writer.finish()?),
+            RowWriter::Parquet(writer) => Ok(writer.finish()?),
         }
     }
 }

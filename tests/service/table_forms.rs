@@ -3,9 +3,11 @@
 use std::io::Cursor;
 
 use axum::body::Bytes;
-use railhead::tables::arrow::{ArrowWriter, read};
+use railhead::tables::arrow::read;
 use railhead::tables::parquet::{TableReader, encode};
+use railhead::tables::read::TableForm;
 use railhead::tables::table::{RowTable, TableColumn};
+use railhead::tables::write::RowWriter;
 use reqwest::Body;
 use serde_json::{Value, json};
 
@@ -49,9 +51,7 @@ fn rows(texts: Option<&str>) -> RowTable {
 
 /// Returns the table in every request format, with its media type. NPZ holds numbers only.
 pub fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
-    let mut arrow = ArrowWriter::new(Vec::new(), &table.kinds()).expect("a stream");
-    arrow.write(table.clone()).expect("a batch");
-    arrow.finish().expect("the end");
+    let arrow = RowWriter::whole(TableForm::Arrow, table.clone()).expect("a stream");
     let value = |column: &TableColumn, row: usize| match column {
         TableColumn::Numbers(numbers) => json!(numbers[row]),
         TableColumn::Texts(texts) => json!(texts[row]),
@@ -77,7 +77,7 @@ pub fn forms(table: &RowTable) -> Vec<(&'static str, Vec<u8>)> {
     let mut forms = vec![
         ("text/csv", csv.into_bytes()),
         ("application/x-ndjson", ndjson.into_bytes()),
-        (ARROW, std::mem::take(arrow.inner_mut())),
+        (ARROW, arrow),
         (PARQUET, encode(table).expect("a file")),
     ];
     let numbers: Option<Vec<(&str, Vec<f64>)>> = table
