@@ -11,32 +11,9 @@ use crate::contact::rolling::operator_store::{BYTES_DEFAULT, OperatorStore};
 use crate::http::extract::query;
 use crate::http::{AddressRange, HttpOptions};
 use crate::jobs::Options;
-use crate::jobs::options::{Database, NotifyMode};
+use crate::jobs::options::{DATA_DIR_DEFAULT, Database, NotifyMode, seconds};
 use crate::jobs::result_place::url::{ResultsPlace, ResultsUrl};
 use crate::telemetry::{Endpoint, LogFormat};
-
-/// How long ended jobs are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Retention(pub Option<Duration>);
-
-/// Reads a time such as `30d`, `1w` or `90m`, or `forever`.
-pub(super) fn retention(text: &str) -> Result<Retention, String> {
-    if text == "forever" {
-        return Ok(Retention(None));
-    }
-    let wrong = "allowed are `forever` or a time of at least 1 s such as `12h`, `30d`, `8w`";
-    let span: jiff::Span = text.parse().map_err(|_| wrong.to_owned())?;
-    let seconds = span
-        .total((
-            jiff::Unit::Second,
-            jiff::SpanRelativeTo::days_are_24_hours(),
-        ))
-        .map_err(|_| wrong.to_owned())?;
-    match Duration::try_from_secs_f64(seconds) {
-        Ok(time) if time >= Duration::from_secs(1) => Ok(Retention(Some(time))),
-        _ => Err(wrong.to_owned()),
-    }
-}
 
 /// When requests without an API key are answered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -125,9 +102,6 @@ impl CaseArgs {
         OperatorStore::new(self.operator_store_mb << 20)
     }
 }
-
-/// Default data folder.
-pub(super) const DATA_DIR_DEFAULT: &str = "./railhead-data";
 
 /// The data folder of a command that runs at the same time as the service.
 #[derive(Debug, Clone, Args)]
@@ -237,10 +211,6 @@ pub(super) struct ServeArgs {
         value_parser = address
     )]
     pub listen: SocketAddr,
-    /// Folder of the job table and the results; with a database, only of batches that are being received. It is created if it does not
-    /// exist. Only one process can use it at a time.
-    #[arg(long, help_heading = "Service", default_value = DATA_DIR_DEFAULT, value_name = "FOLDER")]
-    pub data_dir: PathBuf,
     #[command(flatten)]
     pub database: DatabaseArgs,
     /// Number of jobs solved at the same time, each on its own thread. 0: other nodes solve the jobs, which requires a database
@@ -249,26 +219,13 @@ pub(super) struct ServeArgs {
     pub workers: Option<u16>,
     #[command(flatten)]
     pub case: CaseArgs,
-    /// Time for which ended jobs and their results are kept, such as `30d`, `30days` or `12h`; `forever`: until they are deleted.
-    #[arg(long, help_heading = "Jobs", default_value = "forever", value_name = "TIME", value_parser = retention)]
-    pub retention: Retention,
     /// Seconds for which running jobs may continue after a stop signal; after that they return to the queue.
-    #[arg(
-        long,
-        help_heading = "Service",
-        default_value_t = 10,
-        value_name = "SECONDS"
-    )]
-    pub shutdown_grace_s: u32,
+    #[arg(long = "shutdown-grace-s", help_heading = "Service", default_value = "10", value_name = "SECONDS", value_parser = seconds(..))]
+    pub shutdown_grace: Duration,
     /// Seconds between SIGTERM, when `/readyz` changes to 503, and the closing of the port; connections are still accepted during this
     /// time. After SIGINT the port closes at once.
-    #[arg(
-        long,
-        help_heading = "Service",
-        default_value_t = 2,
-        value_name = "SECONDS"
-    )]
-    pub drain_delay_s: u32,
+    #[arg(long = "drain-delay-s", help_heading = "Service", default_value = "2", value_name = "SECONDS", value_parser = seconds(..))]
+    pub drain_delay: Duration,
     /// When requests without an API key are answered. The service does not start if there are no keys and anonymous requests are not
     /// answered.
     #[arg(long, help_heading = "Access", value_enum, default_value = "loopback")]
@@ -337,17 +294,11 @@ impl ServeArgs {
         )
     }
 
-    /// How long running jobs may continue after a stop signal.
-    #[must_use]
-    pub(super) fn shutdown_grace(&self) -> Duration {
-        Duration::from_secs(u64::from(self.shutdown_grace_s))
-    }
-
     /// How long connections are accepted after a signal. A stop from a terminal does not wait for load balancers.
     #[must_use]
     pub(super) fn drain_delay(&self, signal: &str) -> Duration {
         match signal {
-            "SIGTERM" => Duration::from_secs(u64::from(self.drain_delay_s)),
+            "SIGTERM" => self.drain_delay,
             _ => Duration::ZERO,
         }
     }
@@ -547,18 +498,6 @@ mod tests {
     use clap::Parser;
 
     use super::*;
-
-    #[test]
-    fn a_retention_is_a_time_with_its_unit_or_forever() {
-        let days = |days: u64| Ok(Retention(Some(Duration::from_secs(days * 24 * 3600))));
-        assert_eq!(retention("forever"), Ok(Retention(None)));
-        assert_eq!(retention("30d"), days(30));
-        assert_eq!(retention("2w"), days(14));
-        assert_eq!(retention("24h"), days(1));
-        for wrong in ["", "30", "0s", "-1d", "1 month", "soon"] {
-            assert!(retention(wrong).is_err(), "{wrong:?}");
-        }
-    }
 
     #[derive(Parser)]
     struct Line {

@@ -75,14 +75,6 @@ fn bound_labels(given: &[(String, String)]) -> anyhow::Result<Labels> {
     Ok(labels)
 }
 
-fn labels_text(labels: &Labels) -> String {
-    if labels.is_empty() {
-        return "-".to_owned();
-    }
-    let words = labels.iter().map(|(key, value)| format!("{key}:{value}"));
-    words.collect::<Vec<_>>().join(",")
-}
-
 /// One line per key, columns separated by tabs.
 fn table(keys: &[Key]) -> String {
     let time = |epoch_ms: i64| {
@@ -91,6 +83,11 @@ fn table(keys: &[Key]) -> String {
     };
     let mut lines = vec!["id\ttenant\tcreated\trevoked\tmay\tlabels\tname".to_owned()];
     lines.extend(keys.iter().map(|key| {
+        let labels = key
+            .labels
+            .iter()
+            .map(|(key, value)| format!("{key}:{value}"));
+        let labels = labels.collect::<Vec<_>>().join(",");
         format!(
             "{}\t{}\t{}\t{}\t{}\t{}\t{}",
             key.id,
@@ -98,7 +95,7 @@ fn table(keys: &[Key]) -> String {
             time(key.created_at),
             key.revoked_at.map_or_else(|| "-".to_owned(), time),
             if key.read_only { "read" } else { "all" },
-            labels_text(&key.labels),
+            if labels.is_empty() { "-" } else { &labels },
             // Escaped, so that a name cannot send control sequences to the terminal.
             key.name.as_deref().unwrap_or("-").escape_debug()
         )

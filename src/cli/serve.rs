@@ -1,6 +1,7 @@
 //! `railhead serve` and `railhead worker`: start and stop of a service.
 use std::net::SocketAddr;
 use std::process::{ExitCode, exit};
+use std::thread::available_parallelism;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -114,7 +115,7 @@ impl Signals {
     }
 }
 
-/// Minimum number of request threads.
+/// Minimum number of request threads, so that a blocked one does not delay all others; otherwise there is one per core.
 const REQUEST_THREADS_MIN: usize = 4;
 /// Number of files that the process opens besides connections: job table, results, logs.
 const OTHER_FILES: u64 = 256;
@@ -166,7 +167,11 @@ pub(super) fn run(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
         );
     }
     let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(request_threads())
+        .worker_threads(
+            available_parallelism()
+                .map_or(1, usize::from)
+                .max(REQUEST_THREADS_MIN),
+        )
         .enable_all()
         .thread_name("railhead-async")
         .build()
@@ -177,12 +182,6 @@ pub(super) fn run(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
     // Writes the last log lines.
     drop(log);
     served
-}
-
-/// Number of request threads: one per core, but at least four, so that a blocked one does not delay all others.
-fn request_threads() -> usize {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    cores.max(REQUEST_THREADS_MIN)
 }
 
 /// Refuses names that no request can have in `Host`.
@@ -217,7 +216,7 @@ async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
             "no client could use a service on {address}: there is no API key, and requests without one are {answered}; \
              create a key with `railhead keys create --tenant NAME --data-dir {}`, or answer everyone who can reach the port \
              with `--anonymous always`",
-            args.data_dir.display()
+            args.jobs.data_dir.display()
         );
     }
     jobs.start()?;
@@ -234,20 +233,20 @@ async fn serve(args: &ServeArgs, role: Role) -> anyhow::Result<ExitCode> {
         );
     }
     let workers = args.worker_count();
-    tracing::info!(%address, workers, data_dir = %args.data_dir.display(), "listening");
+    tracing::info!(%address, workers, data_dir = %args.jobs.data_dir.display(), "listening");
 
     let name = tokio::select! {
         name = signals.next() => name,
         () = jobs.broken().cancelled() => "too many solver threads that do not stop",
         ended = &mut server => {
             // The listener never ends by itself; if it fails, the jobs still return to the queue.
-            jobs.shutdown(args.shutdown_grace()).await;
+            jobs.shutdown(args.shutdown_grace).await;
             ended.context("the listener failed")?;
             return Ok(ExitCode::SUCCESS);
         }
     };
     tracing::info!(signal = name, "stopping");
-    let schedule = Schedule::new(args.drain_delay(name), args.shutdown_grace());
+    let schedule = Schedule::new(args.drain_delay(name), args.shutdown_grace);
     let code = exit_code(&jobs);
     schedule.enforce(code);
     signals.end_at_next();
@@ -270,10 +269,8 @@ fn exit_code(jobs: &Jobs) -> u8 {
 /// Opens the data folder.
 async fn open_jobs(args: &ServeArgs, traces: Option<&Traces>) -> anyhow::Result<Jobs> {
     let options = Options {
-        data_dir: args.data_dir.clone(),
         workers: args.worker_count(),
         limits: args.case.limits(),
-        retention: args.retention.0,
         tracer: traces.map(Traces::tracer),
         database: args.database.database(),
         results: args.database.results.place(),

@@ -33,12 +33,16 @@ impl fmt::Debug for Database {
     }
 }
 
+/// Default data folder.
+pub const DATA_DIR_DEFAULT: &str = "./railhead-data";
+
 /// Options of the job service. Most of them are flags of `serve`, which are declared here.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Jobs")]
 pub struct Options {
-    /// Folder of the job table and the results; created if it does not exist.
-    #[arg(skip)]
+    /// Folder of the job table and the results; with a database, only of batches that are being received. It is created if it does not
+    /// exist. Only one process can use it at a time.
+    #[arg(long, help_heading = "Service", default_value = DATA_DIR_DEFAULT, value_name = "FOLDER")]
     pub data_dir: PathBuf,
     /// The database that stores jobs and results, if several processes share them; otherwise they are in the data folder.
     #[arg(skip)]
@@ -64,9 +68,10 @@ pub struct Options {
     /// Return the stored result for a case that is identical to one solved before, instead of solving it again.
     #[arg(long, default_value_t = true, value_name = "BOOL", action = ArgAction::Set)]
     pub cache: bool,
-    /// How long ended jobs are kept; `None`: until they are deleted.
-    #[arg(skip)]
-    pub retention: Option<Duration>,
+    /// Time for which ended jobs and their results are kept, such as `30d`, `30days` or `12h`; `forever`: until they are deleted.
+    // The path keeps clap from taking the value for an optional one.
+    #[arg(long, default_value = "forever", value_name = "TIME", value_parser = retention)]
+    pub retention: std::option::Option<Duration>,
     /// Maximum size in MB of the stored profiles of one tenant; beyond it: 429.
     #[arg(long = "tenant-profiles-mb", default_value = "64", value_name = "MB", value_parser = mib(1..=65536))]
     pub tenant_profiles_max_bytes: u64,
@@ -150,6 +155,24 @@ pub fn seconds(allowed: impl RangeBounds<i64>) -> impl TypedValueParser<Value = 
     number.map(|number| Duration::from_secs(number.into()))
 }
 
+/// Parses a time such as `30d`, `1w` or `90m`, or `forever`.
+fn retention(text: &str) -> Result<Option<Duration>, String> {
+    if text == "forever" {
+        return Ok(None);
+    }
+    let wrong =
+        || "allowed are `forever` or a time of at least 1 s such as `12h`, `30d`, `8w`".to_owned();
+    let span: jiff::Span = text.parse().map_err(|_| wrong())?;
+    let days = jiff::SpanRelativeTo::days_are_24_hours();
+    let seconds = span.total((jiff::Unit::Second, days));
+    let time = seconds
+        .ok()
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    time.filter(|time| time.as_secs() > 0)
+        .map(Some)
+        .ok_or_else(wrong)
+}
+
 /// Parses a time from 1 ms to one day, in seconds.
 fn part_of_a_day(text: &str) -> Result<Duration, String> {
     match text.parse() {
@@ -157,5 +180,23 @@ fn part_of_a_day(text: &str) -> Result<Duration, String> {
             Ok(Duration::from_secs_f64(seconds))
         }
         _ => Err("a number of seconds from 0.001 to 86400".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_retention_is_a_time_with_its_unit_or_forever() {
+        let days = |days: u64| Ok(Some(Duration::from_secs(days * 24 * 3600)));
+        assert_eq!(retention("forever"), Ok(None));
+        assert_eq!(retention("30d"), days(30));
+        assert_eq!(retention("2w"), days(14));
+        assert_eq!(retention("24h"), days(1));
+        for wrong in ["", "30", "0s", "-1d", "1 month", "soon"] {
+            assert!(retention(wrong).is_err(), "{wrong:?}");
+        }
+        assert_eq!(Options::new("folder").retention, None);
     }
 }
