@@ -16,6 +16,7 @@ use crate::runtime_probe::{ProbedTime, probe};
 use crate::shared::Shared;
 use crate::storage_fault::StoragePlace;
 use crate::store::Usage;
+use crate::sync::lock;
 use crate::trace::Tracer;
 use railhead_contact::case::rail_pair::KnownPair;
 use railhead_contact::error::{CaseError, Fault, FaultCode};
@@ -79,7 +80,7 @@ impl Jobs {
     /// # Errors
     /// Every fault of the case.
     pub fn check(&self, case: &Value) -> Result<CheckedCase, CaseError> {
-        self.check_next(self.known_pairs(), case)
+        self.check_next(&self.shared.engine.known, case)
     }
 
     /// As [`Jobs::check`], with cached profile pairs.
@@ -92,11 +93,6 @@ impl Jobs {
         case: &Value,
     ) -> Result<CheckedCase, CaseError> {
         (self.shared.engine.check)(known, case, &self.shared.options.limits)
-    }
-
-    /// Cache of parsed profile pairs.
-    pub(crate) fn known_pairs(&self) -> &KnownPair {
-        &self.shared.engine.known
     }
 
     /// Estimates the solve time of a case on this machine by solving it for at most about `limit`.
@@ -228,7 +224,7 @@ impl Jobs {
     pub(crate) fn unexpired(&self, job: Job) -> Result<Job> {
         let job = self.dated(job);
         if let Some(batch) = &job.batch_id
-            && self.shared.unfinished_batches().abandoned.contains(batch)
+            && lock(&self.shared.batches).abandoned.contains(batch)
         {
             return Err(JobsError::NotFound(self.kind));
         }

@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use uuid::{ContextV7, Uuid};
 
-use crate::attempts::attempt::AllLeases;
+use crate::attempts::attempt::{AllLeases, SolverThread};
 use crate::attempts::fair_scheduler::FairScheduler;
 use crate::blobs::Blobs;
 use crate::clock::ClockSteps;
@@ -100,7 +100,7 @@ impl Jobs {
                 recent: RecentReads::default(),
                 leaps: ClockSteps::default(),
                 suspect: Arc::default(),
-                long_solves: AtomicUsize::new(0),
+                long_solves: Arc::default(),
                 wake_spare: Notify::new(),
                 abandoned: Arc::default(),
                 broken: CancellationToken::new(),
@@ -153,7 +153,12 @@ impl Jobs {
     /// # Errors
     /// Its thread could not be started.
     pub fn worker(&self, name: &str) -> Result<Worker> {
-        Worker::new(self.shared.clone(), name)
+        Ok(Worker {
+            thread: Some(SolverThread::start(name)?),
+            shared: self.shared.clone(),
+            name: name.to_owned(),
+            spare: false,
+        })
     }
 
     /// Cancelled when the process should shut down because too many solver threads were abandoned.

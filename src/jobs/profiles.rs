@@ -15,7 +15,7 @@ use crate::sync::blocking;
 use railhead_contact::case::check::{SectionReport, check_section};
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::answer::RowsAnswer;
-use railhead_contact::evaluate::many::{ManyTask, NotAtOnce, evaluate_at_once, several_answers};
+use railhead_contact::evaluate::many::{NotAtOnce, evaluate_at_once, several_answers};
 use railhead_contact::evaluate::varied::{
     Values, VariedColumn, column_pointer, named_and_given, named_sections, of_first_row,
     put_section, put_sections, row_of,
@@ -266,15 +266,7 @@ impl Jobs {
         monitor: &dyn Monitor,
         step: impl FnMut() -> Result<(), E>,
     ) -> Result<RowsAnswer, NotAtOnce<E>> {
-        let options = &self.shared.options;
-        let task = ManyTask {
-            case,
-            columns,
-            profiles,
-            known: self.known_pairs(),
-            limits: &options.limits,
-            time_limit: options.time_limit,
-        };
+        let task = self.shared.rows_task(case, columns, profiles);
         let solve = |checked: &CheckedCase, monitor: &dyn Monitor| {
             self.shared.engine.solve_whole(checked, monitor)
         };

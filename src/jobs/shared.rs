@@ -1,12 +1,13 @@
 //! State that all handles and workers of a process share.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Duration;
 
 use prometheus_client::registry::Registry;
+use serde_json::Value;
 use tokio::sync::{Notify, Semaphore, SetOnce, broadcast};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
@@ -25,6 +26,8 @@ use crate::storage_fault::StorageFaults;
 use crate::store::{Lease, Node, Notification, Store};
 use crate::sync::lock;
 use crate::work::{RecentReads, Work};
+use railhead_contact::evaluate::many::ManyTask;
+use railhead_contact::evaluate::varied::VariedColumn;
 
 /// Interval at which a waiting caller reads again without an announcement.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_secs(1);
@@ -76,7 +79,7 @@ pub(crate) struct Shared {
     /// Held while a job runs that may have crashed a process.
     pub(crate) suspect: Arc<tokio::sync::Mutex<()>>,
     /// Number of solves that have exceeded a slice while other work waits.
-    pub(crate) long_solves: AtomicUsize,
+    pub(crate) long_solves: Arc<AtomicUsize>,
     /// Wakes the spare worker.
     pub(crate) wake_spare: Notify,
     /// Number of abandoned solver threads that still run.
@@ -161,6 +164,23 @@ impl Shared {
         self.leaps.measure(&self.options.clock)
     }
 
+    /// Rows to solve with the limits of this service.
+    pub(crate) fn rows_task<'a>(
+        &'a self,
+        case: &'a Value,
+        columns: &'a [VariedColumn],
+        profiles: &'a BTreeMap<String, Value>,
+    ) -> ManyTask<'a> {
+        ManyTask {
+            case,
+            columns,
+            profiles,
+            known: &self.engine.known,
+            limits: &self.options.limits,
+            time_limit: self.options.time_limit,
+        }
+    }
+
     /// A lease that begins now.
     pub(crate) fn lease(&self) -> Lease {
         Lease {
@@ -190,11 +210,6 @@ impl Shared {
     pub(crate) fn all_workers(&self) -> usize {
         let others = self.cluster_workers.load(Ordering::Relaxed);
         self.options.workers.max(others)
-    }
-
-    /// Whether every worker runs a solve that has exceeded a slice while other work waits.
-    pub(crate) fn all_workers_are_long(&self) -> bool {
-        self.long_solves.load(Ordering::Acquire) >= self.options.workers
     }
 
     /// Wakes one worker of each node.
@@ -232,10 +247,6 @@ impl Shared {
     pub(crate) fn announce_here(&self, id: Uuid) {
         // An error means that nobody waits.
         let _ = self.ended.send(id);
-    }
-    /// Locks the batches that are not acknowledged.
-    pub(crate) fn unfinished_batches(&self) -> MutexGuard<'_, UnfinishedBatches> {
-        lock(&self.batches)
     }
 }
 

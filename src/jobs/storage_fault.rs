@@ -2,7 +2,7 @@
 
 use std::error::Error;
 use std::io;
-use std::sync::{Mutex, MutexGuard};
+use std::sync::Mutex;
 
 use crate::error::{JobsError, StorageFault};
 use crate::sync::lock;
@@ -99,7 +99,7 @@ pub(crate) struct WaitingWriter<'a>(&'a StorageFaults, StoragePlace);
 impl StorageFaults {
     /// Records the outcome of a write. Damage remains until the next start, which checks the whole table.
     pub(crate) fn note(&self, place: StoragePlace, fault: Option<StorageFault>) -> FaultChange {
-        let mut places = self.places();
+        let mut places = lock(&self.0);
         let fails = |places: &[PlaceState]| places.iter().any(|state| state.fault.is_some());
         let before = fails(&*places);
         let state = &mut places[place as usize];
@@ -118,13 +118,13 @@ impl StorageFaults {
 
     /// The fault of a location, and whether a writer repeats its write there.
     pub(crate) fn fault(&self, place: StoragePlace) -> Option<(StorageFault, bool)> {
-        let state = self.places()[place as usize];
+        let state = lock(&self.0)[place as usize];
         state.fault.map(|fault| (fault, state.waiting > 0))
     }
 
     /// Whether any location fails.
     pub(crate) fn any(&self) -> bool {
-        self.places().iter().any(|state| state.fault.is_some())
+        lock(&self.0).iter().any(|state| state.fault.is_some())
     }
 
     /// Whether the table is damaged.
@@ -135,18 +135,14 @@ impl StorageFaults {
 
     /// Counts a writer that repeats its write to a location.
     pub(crate) fn wait(&self, place: StoragePlace) -> WaitingWriter<'_> {
-        self.places()[place as usize].waiting += 1;
+        lock(&self.0)[place as usize].waiting += 1;
         WaitingWriter(self, place)
-    }
-
-    fn places(&self) -> MutexGuard<'_, [PlaceState; StoragePlace::ALL.len()]> {
-        lock(&self.0)
     }
 }
 
 impl Drop for WaitingWriter<'_> {
     fn drop(&mut self) {
-        self.0.places()[self.1 as usize].waiting -= 1;
+        lock(&self.0.0)[self.1 as usize].waiting -= 1;
     }
 }
 

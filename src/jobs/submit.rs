@@ -206,7 +206,7 @@ impl Jobs {
         NewJob {
             method: checked.run.method.name().to_owned(),
             outputs: outputs_text(&checked.run.outputs),
-            cost_us: cost_us(&checked),
+            cost_us: microseconds(checked.cost().seconds),
             slice_us: self.slice_us(&checked),
             cache_key: self.cache_key(&checked.label.digest),
             name: checked.label.name,
@@ -338,11 +338,6 @@ fn is_small(case: &Value) -> bool {
 /// The names of outputs as a JSON list.
 pub(crate) fn outputs_text(outputs: &[Output]) -> String {
     serde_json::to_string(outputs).unwrap_or_default()
-}
-
-/// Expected solve time in µs.
-pub(crate) fn cost_us(checked: &CheckedCase) -> u32 {
-    microseconds(checked.cost().seconds)
 }
 
 /// Converts a time in s to µs, at least 1.

@@ -1,7 +1,6 @@
 //! [`Work`], the common type of jobs, batches, runs and evolutions, and a cache of recent reads.
 
 use std::collections::HashMap;
-use std::fmt;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -105,19 +104,8 @@ type OwnedId = (Arc<str>, Kind, Uuid);
 type SharedRead<T> = Arc<tokio::sync::Mutex<Option<(Instant, T)>>>;
 
 /// Recent reads of work, which are shared among callers: however many clients follow a batch, the store is queried once.
+#[derive(Debug, Default)]
 pub(crate) struct RecentReads<T>(Mutex<HashMap<OwnedId, SharedRead<T>>>);
-
-impl<T> Default for RecentReads<T> {
-    fn default() -> Self {
-        RecentReads(Mutex::default())
-    }
-}
-
-impl<T> fmt::Debug for RecentReads<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("RecentReads")
-    }
-}
 
 impl<T: Clone> RecentReads<T> {
     /// Returns the result of `read`, or that of a read at most `age` ago. Concurrent callers wait for one read.

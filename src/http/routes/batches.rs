@@ -98,7 +98,9 @@ pub(crate) async fn submit(
     let json = "an array with `application/json`, one case per line with `application/x-ndjson`";
     let (request, table) = separate_table(state, own.template, (json, true), request).await?;
     let draft = read_draft(state, table, request).await?;
-    if draft.cases == draft.rejected || (draft.rejected > 0 && !own.on_invalid.unwrap_or(false)) {
+    if draft.cases == draft.new.rejected
+        || (draft.new.rejected > 0 && !own.on_invalid.unwrap_or(false))
+    {
         return Err(refusal(&draft));
     }
     let errors = faults(&draft);
@@ -115,7 +117,7 @@ fn refusal(draft: &BatchUpload) -> ApiError {
         return ApiError::new(ProblemKind::FaultyBatch, "the batch has no case");
     }
     let kept = draft.faulty.len();
-    let more = match draft.rejected as usize - kept {
+    let more = match draft.new.rejected as usize - kept {
         0 => String::new(),
         _ => format!("; the faults of the first {kept} of them are listed"),
     };
@@ -123,7 +125,7 @@ fn refusal(draft: &BatchUpload) -> ApiError {
         ProblemKind::FaultyBatch,
         format!(
             "{} of {} cases have faults, so nothing was stored{more}",
-            draft.rejected, draft.cases
+            draft.new.rejected, draft.cases
         ),
         faults(draft),
     )

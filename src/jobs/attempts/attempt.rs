@@ -90,7 +90,15 @@ pub(crate) struct SolverThread {
 
 /// Counts one in a shared counter until it is dropped.
 #[derive(Debug)]
-pub(crate) struct Counted(pub(crate) Arc<AtomicUsize>);
+pub(crate) struct Counted(Arc<AtomicUsize>);
+
+impl Counted {
+    /// Counts one in this counter.
+    pub(crate) fn new(counter: &Arc<AtomicUsize>) -> Counted {
+        counter.fetch_add(1, Ordering::AcqRel);
+        Counted(counter.clone())
+    }
+}
 
 impl Drop for Counted {
     fn drop(&mut self) {
@@ -181,7 +189,7 @@ impl AttemptControl {
     /// Starts the clock of the solve at the time spent before. `contact` compares it with the time limit of the case. No
     /// effect while the clock runs.
     pub fn begin(&self, spent: Duration) {
-        let mut clock = self.clock();
+        let mut clock = lock(&self.clock);
         if clock.since.is_none() {
             *clock = SolveClock {
                 spent,
@@ -193,12 +201,8 @@ impl AttemptControl {
     /// Stops the clock and returns the total time spent.
     pub fn pause(&self) -> Duration {
         let spent = self.elapsed();
-        *self.clock() = SolveClock { spent, since: None };
+        *lock(&self.clock) = SolveClock { spent, since: None };
         spent
-    }
-
-    fn clock(&self) -> MutexGuard<'_, SolveClock> {
-        lock(&self.clock)
     }
 
     /// Stops the solver at its next tick.
@@ -240,7 +244,7 @@ impl Monitor for AttemptControl {
     }
 
     fn elapsed(&self) -> Duration {
-        let clock = self.clock();
+        let clock = lock(&self.clock);
         clock.spent + clock.since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 }
@@ -249,13 +253,13 @@ impl Monitor for AttemptControl {
 #[derive(Debug)]
 pub(crate) struct GroupLease(pub(crate) Arc<HeldLeases>);
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct HeldLeases {
-    leases: Mutex<Vec<(Claim, Arc<AttemptControl>)>>,
+    pub(crate) leases: Mutex<Vec<(Claim, Arc<AttemptControl>)>>,
     /// Whether a solver runs, which has to tick.
     pub(crate) solving: AtomicBool,
     /// Number of solves that ended; each counts as a tick.
-    solved: AtomicU64,
+    pub(crate) solved: AtomicU64,
     /// Number of ticks at the last renewal.
     pub(crate) seen: AtomicU64,
     /// Expiry of the leases, by the steady clock in ms.
@@ -271,12 +275,12 @@ pub(crate) struct AllLeases(Mutex<Vec<Weak<HeldLeases>>>);
 impl AllLeases {
     /// Adds the leases of an attempt.
     pub(crate) fn add(&self, held: &Arc<HeldLeases>) {
-        self.lock().push(Arc::downgrade(held));
+        lock(&self.0).push(Arc::downgrade(held));
     }
 
     /// The leases of current attempts.
     pub(crate) fn held(&self) -> Vec<Arc<HeldLeases>> {
-        let mut all = self.lock();
+        let mut all = lock(&self.0);
         all.retain(|held| held.strong_count() > 0);
         all.iter().filter_map(Weak::upgrade).collect()
     }
@@ -302,28 +306,12 @@ impl AllLeases {
         }
         found
     }
-
-    fn lock(&self) -> MutexGuard<'_, Vec<Weak<HeldLeases>>> {
-        lock(&self.0)
-    }
 }
 
 impl GroupLease {
     /// Sets whether a solver runs, which has to tick.
     pub(crate) fn solving(&self, solving: bool) {
         self.0.solving.store(solving, Ordering::Release);
-    }
-
-    /// Removes jobs that ended or were released.
-    pub(crate) fn let_go(&self, ids: &[Uuid]) {
-        self.0
-            .leases()
-            .retain(|(claim, _)| !ids.contains(&claim.id));
-    }
-
-    /// Cancelled when the leases expire because the solver makes no progress.
-    pub(crate) fn lost(&self) -> &CancellationToken {
-        &self.0.lost
     }
 }
 
@@ -335,23 +323,6 @@ impl Drop for GroupLease {
 }
 
 impl HeldLeases {
-    /// Leases of newly claimed jobs.
-    pub(crate) fn new(leases: Vec<(Claim, Arc<AttemptControl>)>, until: i64) -> HeldLeases {
-        HeldLeases {
-            leases: Mutex::new(leases),
-            solving: AtomicBool::new(false),
-            solved: AtomicU64::new(0),
-            seen: AtomicU64::new(0),
-            until: AtomicI64::new(until),
-            lost: CancellationToken::new(),
-        }
-    }
-
-    /// Counts a solve that has ended.
-    pub(crate) fn alive(&self) {
-        self.solved.fetch_add(1, Ordering::AcqRel);
-    }
-
     pub(crate) fn leases(&self) -> MutexGuard<'_, Vec<(Claim, Arc<AttemptControl>)>> {
         lock(&self.leases)
     }
@@ -425,11 +396,6 @@ pub(crate) struct Solver {
 }
 
 impl Attempt {
-    /// Whether the attempt has a solver thread.
-    pub(crate) fn begun(&self) -> bool {
-        self.solver.is_some()
-    }
-
     /// The indices of the members that are to be solved.
     pub(crate) fn to_solve(&self) -> Vec<usize> {
         let members = self.members.iter().enumerate();
@@ -518,9 +484,11 @@ impl Attempt {
         members.map(|member| member.claim.clone()).collect()
     }
 
-    /// Marks members as done.
+    /// Marks members as done, whose leases are not renewed any more.
     pub(crate) fn done(&mut self, ids: &[Uuid]) {
-        self.lease.let_go(ids);
+        let mut leases = self.lease.0.leases();
+        leases.retain(|(claim, _)| !ids.contains(&claim.id));
+        drop(leases);
         for member in &mut self.members {
             if ids.contains(&member.claim.id) {
                 member.phase = Phase::Done;
@@ -611,7 +579,7 @@ mod tests {
                 kind: Kind::Case,
             },
             members: (0..jobs).map(|_| member(claim())).collect(),
-            lease: GroupLease(Arc::new(HeldLeases::new(Vec::new(), 0))),
+            lease: GroupLease(Arc::default()),
             _suspect: None,
             was_begun: false,
             turn_began: Instant::now(),

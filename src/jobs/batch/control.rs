@@ -15,7 +15,7 @@ use crate::model::{BatchItem, ItemFault, Kind, State, SubmitOptions, WorkOptions
 use crate::shared::Shared;
 use crate::storage_fault::StoragePlace;
 use crate::store::{BatchBegun, NewBatch, NewJob};
-use crate::sync::blocking;
+use crate::sync::{blocking, lock};
 use crate::trace::{KeyValue, SubmitSpan};
 
 /// Number of jobs removed in one transaction.
@@ -24,25 +24,20 @@ pub(crate) const DELETED_AT_ONCE: u32 = 500;
 impl Shared {
     /// Abandons a batch: it is no longer filled, and its jobs are neither shown nor solved.
     pub(crate) fn abandon(&self, id: Uuid) {
-        let mut batches = self.unfinished_batches();
+        let mut batches = lock(&self.batches);
         batches.living.remove(&id);
         batches.abandoned.insert(id);
     }
 
     /// Removes the jobs of abandoned batches. Failed removals are repeated later.
     pub(crate) async fn drop_abandoned(&self) {
-        let abandoned: Vec<Uuid> = self
-            .unfinished_batches()
-            .abandoned
-            .iter()
-            .copied()
-            .collect();
+        let abandoned: Vec<Uuid> = lock(&self.batches).abandoned.iter().copied().collect();
         for id in abandoned {
             let dropped = self.drop_batch(id).await;
             self.observe_storage(StoragePlace::Table, &dropped);
             match dropped {
                 Ok(()) => {
-                    self.unfinished_batches().abandoned.remove(&id);
+                    lock(&self.batches).abandoned.remove(&id);
                     tracing::info!(batch = %id, "batch that was never acknowledged removed");
                 }
                 Err(error) => {
@@ -82,7 +77,7 @@ impl Jobs {
         options: WorkOptions,
     ) -> Result<(Uuid, bool)> {
         let span = SubmitSpan::begin(self.tracer());
-        let jobs = draft.cases - draft.rejected;
+        let jobs = draft.cases - draft.new.rejected;
         let submitted = self.store_batch(draft, options, span.traceparent());
         span.end(submitted.await, |(id, _)| {
             vec![
@@ -98,9 +93,9 @@ impl Jobs {
         options: WorkOptions,
         traceparent: Option<Arc<str>>,
     ) -> Result<(Uuid, bool)> {
-        let (id, submit) = (draft.id, options.submit);
+        let (id, submit) = (draft.new.id, options.submit);
         let new = draft.as_new(options);
-        let filled_here = |id| self.shared.unfinished_batches().living.contains(&id);
+        let filled_here = |id| lock(&self.shared.batches).living.contains(&id);
         let mut pause = FILLING_PAUSE.0;
         loop {
             if self.shared.draining.is_cancelled() {
@@ -209,7 +204,7 @@ impl Jobs {
     /// Removes the jobs of a failed upload.
     async fn give_up(&self, mut draft: BatchUpload) {
         if draft.in_table {
-            self.shared.abandon(draft.id);
+            self.shared.abandon(draft.new.id);
             draft.settle();
             self.shared.drop_abandoned().await;
         }

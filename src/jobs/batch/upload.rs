@@ -9,7 +9,6 @@ use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tokio::runtime::Handle;
-use uuid::Uuid;
 
 use crate::data_dir::nameless;
 use crate::error::{JobsError, Result};
@@ -19,6 +18,7 @@ use crate::model::{CaseOptions, Kind, SubmitOptions, WorkOptions, created_at};
 use crate::profiles::KnownSections;
 use crate::store::{NewBatch, NewJob, StoredCase};
 use crate::submit::outputs_text;
+use crate::sync::lock;
 use railhead_contact::case::rail_pair::KnownPair;
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::varied::{make_room, named_sections, put};
@@ -180,20 +180,14 @@ pub struct BatchRow {
 #[derive(Debug)]
 pub struct BatchUpload {
     jobs: Jobs,
-    pub(crate) kind: Kind,
-    pub(crate) id: Uuid,
+    /// The batch as it will be stored, except for data that are known at the end of the upload.
+    pub new: NewBatch,
     pub(crate) staging: Option<Staging>,
-    pub(crate) template: Option<Bytes>,
     /// The template that rows fill.
     rows: Option<Arc<RowTemplate>>,
-    head: Option<Bytes>,
-    /// Number of bytes of the valid cases as stored.
-    kept: u64,
     digest: blake3::Hasher,
     /// Number of cases so far.
     pub cases: u32,
-    /// Number of invalid cases among them.
-    pub rejected: u32,
     /// The first invalid cases.
     pub faulty: Vec<FaultyCase>,
     /// Number of places in the queue that are reserved.
@@ -221,15 +215,12 @@ struct RowTemplate {
 type Checked = (CaseOptions, NewJob, Vec<u8>);
 
 impl BatchUpload {
-    /// Sets the template, which is stored once for all cases.
-    pub(crate) fn set_template(&mut self, template: Bytes) {
-        self.digest.update(&template);
-        self.template = Some(template);
-    }
-
-    /// Sets the template that the rows of [`BatchUpload::add_row`] fill: with the points of its cross-sections, and as given.
+    /// Sets the template that the rows of [`BatchUpload::add_row`] fill: with the points of its cross-sections, and as given. It is stored
+    /// once for all of them.
     pub fn set_row_template(&mut self, case: Value, given: Value) {
-        self.set_template(Bytes::from(case.to_string()));
+        let template = Bytes::from(case.to_string());
+        self.digest.update(&template);
+        self.new.template = Some(template);
         let known = KnownPair::default();
         self.rows = Some(Arc::new(RowTemplate { case, given, known }));
     }
@@ -237,8 +228,8 @@ impl BatchUpload {
     /// Sets the common part and the head of a run. `whole` is the text that identifies a submission.
     pub(crate) fn set_head(&mut self, template: Bytes, head: Bytes, whole: &[u8]) {
         self.digest.update(whole);
-        self.template = Some(template);
-        self.head = Some(head);
+        self.new.template = Some(template);
+        self.new.head = Some(head);
     }
 
     /// Checks a case and stages it if it is valid. `case` is the parsed `text`, or the faults of parsing. Blocks; not for
@@ -284,7 +275,7 @@ impl BatchUpload {
         row: Result<BatchRow, Vec<Fault>>,
     ) -> Result<()> {
         // The case is checked and solved with the template, although only the row is stored.
-        self.count(text.len() + self.template.as_ref().map_or(0, Bytes::len))?;
+        self.count(text.len() + self.new.template.as_ref().map_or(0, Bytes::len))?;
         let checked = self.check_row(text, row);
         self.keep(line, "", checked)
     }
@@ -350,7 +341,7 @@ impl BatchUpload {
         let Some(staging) = &mut self.staging else {
             return Ok(());
         };
-        self.kept += kept.len() as u64;
+        self.new.bytes += kept.len() as u64;
         let written = staging.push(&staged, kept);
         written.map_err(|source| self.jobs.spool_failed(source))
     }
@@ -382,7 +373,7 @@ impl BatchUpload {
     fn reject(&mut self, line: Option<u64>, faults: Vec<Fault>) {
         let index = self.cases;
         self.cases += 1;
-        self.rejected += 1;
+        self.new.rejected += 1;
         if self.faulty.len() < FAULTY_KEPT {
             self.faulty.push(FaultyCase {
                 index,
@@ -417,7 +408,7 @@ impl BatchUpload {
 
     /// Reserves places as the batch grows, twice as many each time, so that few writes are needed.
     fn require_place(&mut self) -> Result<()> {
-        let good = self.cases - self.rejected;
+        let good = self.cases - self.new.rejected;
         if good <= UNRESERVED_MAX || good <= self.reserved {
             return Ok(());
         }
@@ -426,7 +417,7 @@ impl BatchUpload {
         let store = &self.jobs.shared.store;
         let bounds = self.jobs.queue_bounds();
         let reserved =
-            Handle::current().block_on(store.reserve(self.id, &self.jobs.tenant, most, bounds));
+            Handle::current().block_on(store.reserve(self.new.id, &self.jobs.tenant, most, bounds));
         self.reserved += match self.jobs.observe_write(reserved)? {
             Ok(places) => places,
             Err(refusal) => return Err(self.jobs.refused(refusal)),
@@ -448,18 +439,11 @@ impl BatchUpload {
         }
         let digest = options.submit.digest(self.digest.finalize().as_bytes());
         NewBatch {
-            id: self.id,
-            tenant: self.jobs.tenant.clone(),
-            kind: self.kind,
-            created_at: created_at(self.id),
-            count: self.cases - self.rejected,
-            rejected: self.rejected,
+            count: self.cases - self.new.rejected,
             name,
             labels,
-            template: self.template.clone(),
-            head: self.head.clone(),
-            bytes: self.kept,
             idempotency: options.idempotency_key.map(|key| (key, digest)),
+            ..self.new.clone()
         }
     }
 
@@ -474,14 +458,14 @@ impl Drop for BatchUpload {
         let shared = &self.jobs.shared;
         shared.staged.give_back(&self.jobs.tenant, self.staged);
         if self.in_table {
-            shared.abandon(self.id);
+            shared.abandon(self.new.id);
             if let Ok(runtime) = Handle::try_current() {
                 let shared = shared.clone();
                 let tasks = shared.tasks.clone();
                 tasks.spawn_on(async move { shared.drop_abandoned().await }, &runtime);
             }
         } else {
-            shared.unfinished_batches().living.remove(&self.id);
+            lock(&shared.batches).living.remove(&self.new.id);
         }
     }
 }
@@ -498,19 +482,20 @@ impl Jobs {
         let staging = Staging::new(&self.shared.options.data_dir);
         let staging = staging.map_err(|source| self.spool_failed(source))?;
         let id = self.shared.new_id();
-        self.shared.unfinished_batches().living.insert(id);
+        lock(&self.shared.batches).living.insert(id);
         Ok(BatchUpload {
             jobs: self.clone(),
-            kind,
-            id,
+            new: NewBatch {
+                id,
+                tenant: self.tenant.clone(),
+                kind,
+                created_at: created_at(id),
+                ..NewBatch::default()
+            },
             staging: Some(staging),
-            template: None,
             rows: None,
-            head: None,
-            kept: 0,
             digest: blake3::Hasher::new(),
             cases: 0,
-            rejected: 0,
             faulty: Vec::new(),
             reserved: 0,
             staged: 0,

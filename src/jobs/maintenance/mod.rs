@@ -14,7 +14,7 @@ use crate::model::{FailureKind, Job, State, too_late};
 use crate::shared::{Shared, heartbeat};
 use crate::storage_fault::StoragePlace;
 use crate::store::{Moment, Reap, RetentionRule};
-use crate::sync::blocking;
+use crate::sync::{blocking, lock};
 
 pub mod nodes;
 
@@ -308,7 +308,7 @@ impl Shared {
         }
         // An error means that it is set already.
         let _ = self.recovered.set(());
-        if !self.unfinished_batches().abandoned.is_empty() {
+        if !lock(&self.batches).abandoned.is_empty() {
             self.drop_abandoned().await;
         }
         Ok(())

@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::maintenance::every;
 use crate::shared::Shared;
 use crate::store::{Cluster, Notification};
+use crate::sync::lock;
 
 /// Interval between two reports of a node; the store counts a node as dead after four missed ones.
 const BEAT_EVERY: Duration = Duration::from_secs(5);
@@ -102,14 +103,14 @@ async fn beat(shared: Arc<Shared>) -> Result<()> {
 /// Keeps the batches that this node fills, and takes over those that no node fills, to remove them.
 async fn keep_batches(shared: &Shared, cluster: &dyn Cluster) -> Result<()> {
     let living: Vec<Uuid> = {
-        let batches = shared.unfinished_batches();
+        let batches = lock(&shared.batches);
         batches.living.iter().copied().collect()
     };
     if !living.is_empty() {
         cluster.keep_batches(&living).await?;
     }
     let left = shared.store.unfinished_batches().await?;
-    let mut batches = shared.unfinished_batches();
+    let mut batches = lock(&shared.batches);
     let left = left.into_iter().filter(|id| !living.contains(id));
     batches.abandoned.extend(left);
     Ok(())

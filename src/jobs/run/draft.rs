@@ -18,7 +18,7 @@ use crate::sync::blocking;
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::answer::NumberColumns;
-use railhead_contact::evaluate::many::{ManyTask, expected_seconds};
+use railhead_contact::evaluate::many::expected_seconds;
 use railhead_contact::evaluate::varied::{
     Values, VariedColumn, column_pointer, make_room, of_values,
 };
@@ -209,16 +209,8 @@ impl RunDraft {
             self.jobs
                 .first_row(&self.template, &varied, &profiles, &names, fields_asked_for);
         let (case, checked) = first?;
-        let options = self.jobs.options();
         let rows = varied.first().map_or(1, |column| column.values.len());
-        let task = ManyTask {
-            case: &case,
-            columns: &varied,
-            profiles: &profiles,
-            known: self.jobs.known_pairs(),
-            limits: &options.limits,
-            time_limit: options.time_limit,
-        };
+        let task = self.jobs.shared.rows_task(&case, &varied, &profiles);
         let row_seconds = expected_seconds(&task) / rows as f64;
         let wanted = CHUNK_SECONDS / row_seconds;
         #[expect(

@@ -1,7 +1,7 @@
 //! Heartbeat: renews the leases of this process while its solvers tick.
 
-use std::sync::atomic::Ordering;
-use std::sync::{Arc, Weak};
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::sync::{Arc, Mutex, Weak};
 
 use futures_util::future::join_all;
 use tokio::time::sleep;
@@ -12,7 +12,11 @@ use crate::store::{Claim, Renewal};
 
 /// Holds the leases of newly claimed jobs and renews them.
 pub(crate) fn keep(shared: &Arc<Shared>, leases: Vec<(Claim, Arc<AttemptControl>)>) -> GroupLease {
-    let held = Arc::new(HeldLeases::new(leases, shared.lease_until()));
+    let held = Arc::new(HeldLeases {
+        leases: Mutex::new(leases),
+        until: AtomicI64::new(shared.lease_until()),
+        ..HeldLeases::default()
+    });
     shared.leases.add(&held);
     shared.heartbeat.get_or_init(|| {
         tokio::spawn(beat(Arc::downgrade(shared)));

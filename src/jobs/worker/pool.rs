@@ -1,5 +1,6 @@
 //! The worker pool: each worker takes one turn after the other until the service drains.
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use tokio::time::sleep;
@@ -38,15 +39,6 @@ pub struct StepReport {
 }
 
 impl Worker {
-    pub(crate) fn new(shared: Arc<Shared>, name: &str) -> Result<Worker> {
-        Ok(Worker {
-            thread: Some(SolverThread::start(name)?),
-            shared,
-            name: name.to_owned(),
-            spare: false,
-        })
-    }
-
     /// Takes turns until the service drains.
     pub(crate) async fn run(mut self) {
         let shared = self.shared.clone();
@@ -97,7 +89,8 @@ impl Worker {
     /// Claims the next attempt, in the order of the fair scheduler. Within a queue, new jobs and begun sweeps alternate.
     pub(crate) async fn next_turn(&self) -> Result<Option<Attempt>> {
         let shared = &self.shared;
-        if shared.draining.is_cancelled() || (self.spare && !shared.all_workers_are_long()) {
+        let long = shared.long_solves.load(Ordering::Acquire);
+        if shared.draining.is_cancelled() || (self.spare && long < shared.options.workers) {
             return Ok(None);
         }
         let queues = shared.store.queues().await?;

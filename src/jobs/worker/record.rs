@@ -8,7 +8,7 @@ use crate::attempts::attempt::{Attempt, Phase, StopReason};
 use crate::attempts::slices::{Outcome, SlicedWork, Solved, Work, internal_failure};
 use crate::codec::result::EncodedResult;
 use crate::error::{JobsError, Result};
-use crate::model::{Failure, FailureKind, State, too_late};
+use crate::model::{Failure, FailureKind, too_late};
 use crate::storage_fault::StoragePlace;
 use crate::store::{Claim, Ending, NewSlice, ReleaseReason, SliceRecord, StoredResult};
 use crate::submit::microseconds;
@@ -188,34 +188,11 @@ impl Worker {
         pairs: Vec<(Claim, Uuid)>,
         step: &mut StepReport,
     ) -> Result<()> {
-        if pairs.is_empty() {
-            return Ok(());
-        }
-        let shared = &self.shared;
-        let from = SystemTime::now();
-        let ends: Vec<_> = pairs
-            .iter()
-            .map(|(claim, source)| (claim.clone(), Ending::Cached { source: *source }))
-            .collect();
-        let ended = shared
-            .write_with_retries(StoragePlace::Table, || {
-                shared.store.finish(&ends, shared.now_ms())
-            })
+        let ends = pairs.into_iter();
+        let ends = ends.map(|(claim, source)| (claim, Ending::Cached { source }));
+        let back = self
+            .finish(attempt, ends.collect(), SystemTime::now(), step)
             .await?;
-        let ids: Vec<_> = ended.iter().copied().collect();
-        shared.metrics.cache_lookup(ids.len() as u64, 0);
-        for (claim, _) in pairs.iter().filter(|(claim, _)| ended.contains(&claim.id)) {
-            if let Some(traced) = JobTrace::of(shared.options.tracer.as_ref(), claim) {
-                traced.waited_until(from);
-                traced.stored(from, State::Succeeded.name());
-            }
-        }
-        shared.ended_cached(&ids);
-        attempt.done(&ids);
-        step.ended
-            .extend(ids.into_iter().map(|id| (id, State::Succeeded)));
-        let back = pairs.into_iter().map(|(claim, _)| claim);
-        let back: Vec<_> = back.filter(|claim| !ended.contains(&claim.id)).collect();
         self.release(attempt, &back, ReleaseReason::SolveItself, step)
             .await
     }
@@ -300,15 +277,17 @@ impl Worker {
         }
     }
 
+    /// Ends claimed jobs. Returns those that were to get a result that has been removed; they are still held.
     async fn finish(
         &self,
         attempt: &mut Attempt,
         ends: Vec<(Claim, Ending)>,
         from: SystemTime,
         step: &mut StepReport,
-    ) -> Result<()> {
+    ) -> Result<Vec<Claim>> {
+        let mut back = Vec::new();
         if ends.is_empty() {
-            return Ok(());
+            return Ok(back);
         }
         let shared = &self.shared;
         // Results survive a temporary failure of the database.
@@ -319,26 +298,35 @@ impl Worker {
             .await?;
         for (claim, ending) in &ends {
             if ended.contains(&claim.id) {
+                let cached = matches!(ending, Ending::Cached { .. });
                 if let Some(traced) = JobTrace::of(shared.options.tracer.as_ref(), claim) {
+                    if cached {
+                        traced.waited_until(from);
+                    }
                     traced.stored(from, ending.state().name());
                 }
+                shared.metrics.cache_lookup(u64::from(cached), 0);
                 shared.metrics.ending(ending);
                 shared.announce(claim.id);
                 step.ended.push((claim.id, ending.state()));
-            } else if let Ending::Succeeded {
-                result: StoredResult::Blob(key, _),
-                ..
-            } = ending
-            {
-                self.abandon_blob(key).await;
+            } else {
+                match ending {
+                    Ending::Cached { .. } => back.push(claim.clone()),
+                    Ending::Succeeded {
+                        result: StoredResult::Blob(key, _),
+                        ..
+                    } => self.abandon_blob(key).await,
+                    _ => {}
+                }
             }
         }
-        let ids: Vec<_> = ends.iter().map(|(claim, _)| claim.id).collect();
-        attempt.done(&ids);
+        let ids = ends.iter().map(|(claim, _)| claim.id);
+        let ids = ids.filter(|id| back.iter().all(|claim| claim.id != *id));
+        attempt.done(&ids.collect::<Vec<_>>());
         if ends.iter().any(|(claim, _)| claim.slices > 0) {
             shared.collect_blobs().await;
         }
-        Ok(())
+        Ok(back)
     }
 
     /// Registers a result without a job for removal.

@@ -1,6 +1,7 @@
 //! Tasks of a solver thread for one job: check, solve, encode.
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -25,7 +26,7 @@ use crate::trace::JobTrace;
 use crate::worker::{evolution, heartbeat};
 use railhead_contact::error::SolveError;
 use railhead_contact::evaluate::answer::RowsAnswer;
-use railhead_contact::evaluate::many::{ManyTask, solve_many};
+use railhead_contact::evaluate::many::solve_many;
 use railhead_contact::evolution::task::Evolution;
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
@@ -223,15 +224,7 @@ pub(crate) fn solve_chunk(shared: &Shared, control: &AttemptControl, stored: &St
     let (head, chunk) = read_rows(stored).map_err(|error| error.to_string())?;
     let first_row = chunk.first_row;
     let (varied, carried) = parted(&head, chunk);
-    let limits = &shared.options.limits;
-    let task = ManyTask {
-        case: &head.case,
-        columns: &varied,
-        profiles: &head.profiles,
-        known: &shared.engine.known,
-        limits,
-        time_limit: shared.options.time_limit,
-    };
+    let task = shared.rows_task(&head.case, &varied, &head.profiles);
     control.begin(Duration::ZERO);
     let solve =
         |checked: &CheckedCase, monitor: &dyn Monitor| shared.engine.solve_whole(checked, monitor);
@@ -373,7 +366,7 @@ pub(crate) fn begin(
                 let outcome = JobTrace::solving(traced.as_ref(), from_queue, solve);
                 let mut outcomes = lock(&outcomes);
                 outcomes.push((place, outcome));
-                lease.alive();
+                lease.solved.fetch_add(1, Ordering::AcqRel);
             }
         })
     };

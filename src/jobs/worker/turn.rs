@@ -5,7 +5,6 @@
 //! continues; once all workers run such solves, the spare worker serves jobs that are expected to be short. A solver that
 //! ignores a stop request is abandoned with its thread, and the worker continues with a new thread.
 
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -14,7 +13,6 @@ use tokio::time::{MissedTickBehavior, interval_at};
 use crate::attempts::attempt::{Attempt, Counted, Phase, SolverThread, StopReason};
 use crate::attempts::slices::Work;
 use crate::error::Result;
-use crate::shared::Shared;
 use crate::store::{ClaimedCase, ReleaseReason};
 use crate::worker::pool::{StepReport, Worker};
 use crate::worker::solve;
@@ -110,8 +108,8 @@ impl Worker {
         let mut told: Option<Instant> = None;
         // A stopped member whose solver continues, and since when.
         let mut unwanted: Option<(usize, Instant)> = None;
-        let mut long: Option<LongSolve> = None;
-        let lost = attempt.lease.lost().clone();
+        let mut long: Option<Counted> = None;
+        let lost = attempt.lease.0.lost.clone();
         let over = attempt.over();
         loop {
             tokio::select! {
@@ -143,7 +141,9 @@ impl Worker {
                         if self.spare {
                             attempt.stop(StopReason::TooLong);
                         }
-                        long = Some(LongSolve::new(shared));
+                        // Once all workers run such solves, the spare worker begins.
+                        long = Some(Counted::new(&shared.long_solves));
+                        shared.wake_spare.notify_one();
                     }
                 }
             }
@@ -174,10 +174,10 @@ impl Worker {
     fn abandon_thread(&self, thread: Option<SolverThread>) {
         let Some(thread) = thread else { return };
         let shared = &self.shared;
-        let left = shared.abandoned.fetch_add(1, Ordering::AcqRel) + 1;
         // The thread drops its reference when it ends.
-        let _ = thread.left.set(Counted(shared.abandoned.clone()));
+        let _ = thread.left.set(Counted::new(&shared.abandoned));
         drop(thread);
+        let left = shared.abandoned.load(Ordering::Acquire);
         let most = shared.options.abandoned_max;
         tracing::error!(left, most, "a solver thread was abandoned");
         if left > most {
@@ -188,7 +188,7 @@ impl Worker {
     /// Releases the jobs of an attempt after the store has failed.
     pub(crate) async fn give_up(&mut self, attempt: &mut Attempt) {
         attempt.stop(StopReason::Shutdown);
-        if attempt.begun() {
+        if attempt.solver.is_some() {
             let over = attempt.over();
             let ended = tokio::time::timeout(STOP_TIMEOUT, over.cancelled()).await;
             if ended.is_err() {
@@ -204,22 +204,5 @@ impl Worker {
         if let Err(error) = released.await {
             tracing::warn!(%error, "claimed jobs could not be returned; their leases will expire");
         }
-    }
-}
-
-/// Counts a solve that has exceeded a time slice while other work waits. Once all workers run such solves, the spare worker begins.
-struct LongSolve(Arc<Shared>);
-
-impl LongSolve {
-    fn new(shared: &Arc<Shared>) -> LongSolve {
-        shared.long_solves.fetch_add(1, Ordering::AcqRel);
-        shared.wake_spare.notify_one();
-        LongSolve(shared.clone())
-    }
-}
-
-impl Drop for LongSolve {
-    fn drop(&mut self) {
-        self.0.long_solves.fetch_sub(1, Ordering::AcqRel);
     }
 }
