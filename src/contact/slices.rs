@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use crate::half_space::strip_operator::kind::Precision;
 use crate::problem::checked_case::CheckedCase;
 use crate::remark::entry::merged;
 use crate::rolling::task::Resolution;
@@ -15,8 +16,6 @@ use crate::solution::words::answer::{Fields, Solution};
 const MOTIONS_MAX: usize = 100;
 /// Maximum number of slow motions of a slice: those on fine meshes, and those of unlike bodies, which each have a separate pressure.
 const MOTIONS_MAX_LONG: usize = 10;
-/// Target below which meshes are fine.
-const TARGET_FINE: f64 = 0.002;
 /// Smallest number of cells of a fine explicit mesh.
 const CELLS_FINE: u32 = 1000;
 
@@ -27,8 +26,9 @@ pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
     if case.problem.history.is_some() || motions == 1 {
         return std::iter::once(0..motions).collect();
     }
-    let is_fine = match case.run.least_resolution() {
-        Resolution::Target(target) => target < TARGET_FINE,
+    let resolution = case.run.least_resolution();
+    let is_fine = match resolution {
+        Resolution::Target(_) => resolution.precision() == Precision::Double,
         Resolution::Mesh(size) => size.strips * size.cells >= CELLS_FINE,
     };
     let most = match is_fine || case.problem.is_coupled(&case.run) {

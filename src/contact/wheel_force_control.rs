@@ -27,9 +27,9 @@ use crate::solution::words::answer::{Fields, PatchSolution, Solution};
 use crate::vertical_equilibrium::tolerance;
 use crate::wheel_on_rail::SolvedWheel;
 
-/// Least tolerance of a force relative to μN, because the error of the normal problem is noise to the search. Chosen by judgement; its influence
-/// was not measured.
-const MISSED_LEAST: f64 = 5e-5;
+/// Least tolerance of a force or torque relative to the friction limit, because the error of the normal problem is noise to the search. Chosen by judgement; its
+/// influence was not measured.
+pub(crate) const MISSED_LEAST: f64 = 5e-5;
 /// Target error of the resultants in the first estimate, which gives patches, loads and radii. Chosen by judgement; its influence was not
 /// measured.
 const TARGET_FIRST: f64 = 0.05;

@@ -9,30 +9,22 @@ use crate::normal::footprint::NormalTask;
 use crate::normal::wheel::WheelTask;
 use crate::post::subsurface::states::StressPlaces;
 use crate::problem::checked_case::{self, CheckedCase, PRESSURE_USUAL};
-use crate::problem::memory::segments;
+use crate::problem::memory::{segments, usual_cells};
 use crate::rolling::history::solve::usual_work;
-use crate::rolling::task::{Resolution, TARGET_LEAST, TARGET_USUAL};
+use crate::rolling::task::{Resolution, TARGET_USUAL};
 
-/// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`].
+/// Time in s of a motion without spin on one patch at the target [`TARGET_USUAL`]. It grows with the square of the usual number of cells.
 const MOTION_SECONDS: f64 = 3e-4;
-/// Negative exponent of the target in the time of a motion.
-const TARGET_POWER: f64 = 1.4;
 /// Factor on the time for each property that makes a case slow: for a motion spin, a prescribed force or friction that depends on slip; for a
 /// wheel other smoothings of its profiles or prescribed forces; for a wheelset the search for its pose.
 const HARD_TIMES: f64 = 3.0;
 /// Time in s of a motion by the table: twice the measured time of a row (`cargo bench --bench load -- rows`).
 pub(crate) const TABLE_SECONDS: f64 = 5e-6;
-/// Time in s of the normal problem of a gap with one patch. It grows with the square of the number of patches.
+/// Time in s of the normal problem of a gap with one patch, which grows with the square of the number of patches. The rigid wheelset at one shift and the search for
+/// the worst point below a patch take about as long.
 const GAP_SECONDS: f64 = 2.5e-3;
-/// Time in s of the vertical equilibrium of a wheel on its rail.
-const WHEEL_SECONDS: f64 = 9e-3;
-/// Time in s to place the rigid wheelset at one shift, with two interpolations of its profiles.
-const PLACEMENT_SECONDS: f64 = 2.5e-3;
-/// Time in s of the normal problem of a gap for each motion of unlike bodies (12 contacts of `tests/physics/unlike.rs`).
-const COUPLED_SECONDS: f64 = 0.04;
-/// Time in s to find the worst point below a patch (`cargo bench --bench stress -- --only after`).
-const WORST_POINT_SECONDS: f64 = 3e-3;
-/// Time in s to find the worst passage below a patch by one criterion (`cargo bench --bench stress -- --only after`).
+/// Time in s to find the worst passage below a patch by one criterion (`cargo bench --bench stress -- --only after`). The normal problem of a motion of unlike bodies
+/// takes about as long (12 contacts of `tests/physics/unlike.rs`).
 const PASSAGE_SECONDS: f64 = 0.04;
 
 /// Returns the time in s of the normal problem.
@@ -52,7 +44,8 @@ fn at_rest(task: &WheelTask) -> f64 {
     let read_again = task.trust.auto.contains(&true)
         || profiles.iter().any(|profile| profile.smoothing() > 0.0)
         || advised_smoothing(levels, task.contact_modulus, PRESSURE_USUAL) != [0.0; 2];
-    WHEEL_SECONDS * if read_again { HARD_TIMES } else { 1.0 }
+    // The equilibrium of a wheel on its rail takes several gaps.
+    GAP_SECONDS * HARD_TIMES * if read_again { HARD_TIMES } else { 1.0 }
 }
 
 impl CheckedCase {
@@ -69,7 +62,7 @@ impl CheckedCase {
         };
         let motions = self.problem.motions.len() as f64;
         let coupled = if self.problem.is_coupled(&self.run) {
-            motions * COUPLED_SECONDS
+            motions * PASSAGE_SECONDS
         } else {
             0.0
         };
@@ -79,7 +72,7 @@ impl CheckedCase {
             return once * self.problem.pull().map_or(1.0, |_| HARD_TIMES);
         };
         let kinematics = task.kinematics.as_ref().map_or(0.0, |asked| {
-            PLACEMENT_SECONDS * (1.0 + 2.0 * asked.reach / asked.step)
+            GAP_SECONDS * (1.0 + 2.0 * asked.reach / asked.step)
         });
         once * HARD_TIMES * task.moves.len() as f64 + kinematics
     }
@@ -120,7 +113,7 @@ impl CheckedCase {
     fn to_target(&self, patches: usize, target: f64) -> f64 {
         // From this target on, the error bound of the table usually meets it.
         let by_table = target >= TARGET_USUAL && !self.run.needs_cells();
-        let finer = (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_POWER);
+        let finer = (usual_cells(target) / usual_cells(TARGET_USUAL)).powi(2);
         let motions = 0..self.problem.motions.len();
         let seconds = motions.map(|k| match by_table && self.may_take_table(k) {
             true => TABLE_SECONDS,
@@ -153,7 +146,7 @@ impl CheckedCase {
         };
         let mut seconds = 4e-7 * count;
         if task.worst || below_worst || task.passage.is_some() {
-            seconds += WORST_POINT_SECONDS * patches;
+            seconds += GAP_SECONDS * patches;
         }
         if let Some(passage) = task.passage {
             let criteria = 1 + u8::from(passage.dang_van_slope.is_some());

@@ -1,5 +1,6 @@
 //! The numbers of a case that columns of rows can replace without a check of each row.
 
+use crate::case::words::contact::FORCE;
 use crate::case::words::object::AllowedRange;
 
 /// A number of a case that a column can replace.
@@ -39,7 +40,6 @@ const RATIO: AllowedRange = AllowedRange::closed(0.0, 0.5, "");
 const COEFFICIENT: AllowedRange = AllowedRange::closed(0.0, 100.0, "");
 const RADIUS: AllowedRange = AllowedRange::positive(1e9, "mm");
 const AXIS: AllowedRange = AllowedRange::positive(1e6, "mm");
-const FORCE: AllowedRange = AllowedRange::positive(1e12, "N");
 const CREEPAGE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "");
 const SPIN: AllowedRange = AllowedRange::closed(-1e6, 1e6, "1/mm");
 

@@ -11,10 +11,10 @@ use crate::rolling::history::solve::{pressed_bytes, pressed_cells_max};
 use crate::rolling::operator_store::{OperatorKind, kept_bytes};
 use crate::rolling::refinement::interpolate::LEVELS_KEPT;
 use crate::rolling::refinement::mesh_family::{CELLS_MAX, PATCH_CELLS_MAX_LEAST, fixed_meshes};
-use crate::rolling::task::{Motion, Resolution};
+use crate::rolling::task::{Motion, Resolution, TARGET_LEAST, TARGET_USUAL};
 
-/// Average number of cells of the finest mesh for a target of 0.02.
-const TARGET_CELLS: f64 = 128.0;
+/// Average number of cells of the finest mesh for the target [`TARGET_USUAL`].
+const TARGET_CELLS: f64 = 315.0;
 /// Negative exponent of the target in the number of cells.
 const TARGET_GROWTH: f64 = 0.65;
 /// Bytes per cell of the finest mesh for an iteration: the Krylov space, iterates and buffers.
@@ -27,8 +27,6 @@ const LEVELS_PER_MOTION: f64 = 4.0;
 const MOTION_BYTES: f64 = 2000.0;
 /// Bytes of a stress, or of the fields of a cell for one motion, in the answer and in their stored form.
 const STORED_BYTES: f64 = 160.0;
-/// Bytes per cell and point of a history on a level: tractions, slips and slip flags.
-const HISTORY_BYTES_PER_CELL: f64 = 33.0;
 
 /// The quantities that determine the memory of a solve.
 #[derive(Debug, Clone)]
@@ -61,6 +59,11 @@ pub(crate) fn segments(task: &NormalTask) -> Vec<f64> {
         // Both wheels of one position. The positions are solved one after the other.
         NormalTask::Wheelset(_) => vec![1.0; 2],
     }
+}
+
+/// Returns the average number of cells of the finest mesh for a target.
+pub(crate) fn usual_cells(target: f64) -> f64 {
+    TARGET_CELLS * (TARGET_USUAL / target.max(TARGET_LEAST)).powf(TARGET_GROWTH)
 }
 
 /// Returns the number of motions with spin.
@@ -175,7 +178,9 @@ impl SizeInput {
             (Some(HistoryStart::Pressed), _) => pressed_bytes(cells.min(pressed_cells_max())),
             (Some(_), _) => 0.0,
         };
-        pressing + 2.0 * self.motions as f64 * cells * HISTORY_BYTES_PER_CELL
+        // Tractions, slips and slip flags.
+        let per_cell = size_of::<[f64; 4]>() + size_of::<bool>();
+        pressing + 2.0 * self.motions as f64 * cells * per_cell as f64
     }
 
     /// Returns the numbers of cells and segments of the finest mesh over all patches.
@@ -203,7 +208,7 @@ impl SizeInput {
     fn usual_cells(&self, finest: f64) -> f64 {
         match (self.resolution, self.method) {
             (Resolution::Target(target), Method::BoundaryElement) => {
-                finest.min(TARGET_CELLS * (0.02 / target).powf(TARGET_GROWTH))
+                finest.min(usual_cells(target))
             }
             _ => finest,
         }

@@ -23,13 +23,11 @@ use crate::rolling::refinement::interpolate::RefinementState;
 use crate::rolling::refinement::mesh_family::MeshFamily;
 use crate::rolling::refinement::on_mesh::MotionTask;
 use crate::rolling::task::{
-    MeshPlan, Motion, PrescribedForces, Resolution, RollingTask, TOLERANCE_LEAST,
+    MeshPlan, Motion, PrescribedForces, Resolution, RollingTask, SHARE_OF_TARGET, TOLERANCE_LEAST,
 };
 
 /// Largest place: a hundred times the creepage at which the cubic law predicts full slip. Chosen by judgement.
 pub(crate) const PLACE_MAX: f64 = 65.0;
-/// Tolerance of a prescribed force over the target error. Chosen by judgement.
-const SHARE_OF_TARGET: f64 = 0.02;
 /// Tolerance of a force, relative to μN, of the searches for a start: by the table, without which a single force takes 47 % more products, and on the coarsest
 /// mesh, without which the work is five times as large. 0.003 and 0.03 take 1 % more work on the 118 prescribed forces of
 /// `cargo bench --bench stress -- --only times`.

@@ -18,9 +18,8 @@ const SINGLE_PRECISION_FROM: f64 = 5e-4;
 
 /// Residual to reach over the target error. Chosen by judgement.
 const RESIDUAL_OF_TARGET: f64 = 0.04;
-/// Residual to reach over the target error where forces are prescribed or differences are taken. A search for a force sees the residual as noise, which must be
-/// less than a tenth of its tolerance (`SHARE_OF_TARGET`). Chosen by judgement.
-const RESIDUAL_FOR_FORCES: f64 = 0.0015;
+/// Tolerance of a prescribed force over the target error. Chosen by judgement.
+pub(crate) const SHARE_OF_TARGET: f64 = 0.02;
 /// Largest residual that a target allows, relative to the traction scale. Chosen by judgement.
 const TOLERANCE_LARGEST: f64 = 4e-4;
 
@@ -71,7 +70,8 @@ impl RollingTask<'_> {
         match self.resolution {
             Resolution::Target(target) => {
                 let part = if is_prescribed {
-                    RESIDUAL_FOR_FORCES
+                    // The search for a force sees the residual as noise.
+                    NEGLIGIBLE_OF_TARGET * SHARE_OF_TARGET
                 } else {
                     RESIDUAL_OF_TARGET
                 };

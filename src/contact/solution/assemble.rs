@@ -25,8 +25,6 @@ use crate::solution::words::answer::{
     SolverReport, Total,
 };
 
-/// Number of remarks beyond which repetitions are merged.
-const REMARKS_AT_ONCE: usize = 1000;
 /// The description of axes and signs in an answer.
 const FRAME: &str = "x along rolling (leading edge at larger x), y to the left, z up out of the lower body; forces, moments \
                      and tractions act on the lower body, slip is that of the upper body relative to the lower one";
@@ -106,10 +104,6 @@ impl<'a> Assembly<'a> {
         let allowed = case.run.allowed_error(point, limit);
         let target_met = allowed.map(|allowed| point.error().is_some_and(|error| error <= allowed));
         self.remarks.extend(remarks(case, index, point, limit));
-        // A sweep may repeat remarks for each motion. Merging them here limits the memory.
-        if self.remarks.len() > REMARKS_AT_ONCE {
-            self.remarks = merged(std::mem::take(&mut self.remarks));
-        }
         let patches = self.patches.iter().zip(&self.limits).enumerate();
         let mut points: Vec<PointSolution> = patches
             .map(|(k, (patch, limit))| PointSolution {

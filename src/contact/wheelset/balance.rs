@@ -17,13 +17,14 @@ use crate::profile_assessment::trust;
 use crate::remark::entry::{RemarkEntry, merged};
 use crate::rolling::force_control::PLACE_MAX;
 use crate::rolling::operator_store::OperatorStore;
+use crate::rolling::task::NEGLIGIBLE_OF_TARGET;
 use crate::solution::words::answer::{
     ErrorEstimate, Fields, Kinematics, Origin, PatchSolution, Solution, Total, WheelOnRail,
     WheelsetAnswer, WheelsetPosition,
 };
 use crate::solution::words::damage::ProfileUncertainty;
 use crate::surface_fallback;
-use crate::wheel_force_control::limit_and_law;
+use crate::wheel_force_control::{MISSED_LEAST, limit_and_law};
 use crate::wheel_on_rail::SolvedWheel;
 use crate::wheelset::kinematics;
 
@@ -31,10 +32,6 @@ use crate::wheelset::kinematics;
 const LEVEL: f64 = 3e-4;
 /// Largest difference in mm that is accepted with a remark. It moves a contact by 5e-3 mm.
 const LEVEL_POOR: f64 = 1e-2;
-/// Tolerance of a torque relative to the target error of forces.
-const TORQUE_OF_TARGET: f64 = 0.2;
-/// Least tolerance of a torque relative to the friction limit.
-const TORQUE_LEAST: f64 = 1e-4;
 
 /// A wheelset to solve in one position.
 pub(crate) struct WheelsetSolve<'a> {
@@ -156,7 +153,7 @@ impl WheelsetSolve<'_> {
     ) -> Result<Both, SolveError> {
         let radius = 0.5 * (rigid.touches[0].radius + rigid.touches[1].radius);
         let target = self.case.run.resolution.target_or_usual();
-        let tolerance = (TORQUE_OF_TARGET * target).max(TORQUE_LEAST);
+        let tolerance = (NEGLIGIBLE_OF_TARGET * target).max(MISSED_LEAST);
         let per_mm = tolerance / LEVEL;
         // The unit of slip in the search: the slip at which linear theory reaches the friction limit.
         let mut unit = None;

@@ -9,6 +9,7 @@ use crate::case::words::cross_section::CrossSection;
 use crate::case::words::motion::{Combine, Swept, swept};
 use crate::case::words::object::{AllowedRange, Object, shown};
 use crate::case::words::samples;
+use crate::case::words::samples::COORDINATE;
 use crate::geometry::wheel_rail::{Placement, RailPlace, Side};
 use crate::half_space::bent_surface::Influence;
 
@@ -364,9 +365,9 @@ pub(crate) const GAUGE_HEIGHT: f64 = 14.0;
 /// Default distance of the backs of the flanges in mm, that of standard gauge.
 pub(crate) const FLANGE_BACKS: f64 = 1360.0;
 
-const FORCE: AllowedRange = AllowedRange::positive(1e12, "N");
+/// The allowed normal and vertical forces.
+pub(crate) const FORCE: AllowedRange = AllowedRange::positive(1e12, "N");
 const APPROACH: AllowedRange = AllowedRange::positive(1e6, "mm");
-const APPROACH_OF_GAP: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const LEFT_SHARE: AllowedRange = AllowedRange::closed(0.01, 0.99, "");
 /// Members of a load; the first is for cross-sections only.
 const LOADS: [&str; 3] = ["vertical_force_n", "normal_force_n", "approach_mm"];
@@ -413,10 +414,7 @@ pub(crate) fn read_load(case: &mut Object) -> Option<Load> {
     }
     let vertical_force_n = block.number("vertical_force_n", FORCE);
     let normal_force_n = block.number("normal_force_n", FORCE);
-    let approach_mm = block.number(
-        "approach_mm",
-        if of_gap { APPROACH_OF_GAP } else { APPROACH },
-    );
+    let approach_mm = block.number("approach_mm", if of_gap { COORDINATE } else { APPROACH });
     let all = names.join(", ");
     match block.given(names)[..] {
         [] => return block.refuse_object(format!("empty; exactly one of {all} is needed")),

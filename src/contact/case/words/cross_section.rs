@@ -8,6 +8,7 @@ use utoipa::ToSchema;
 use crate::case::words::object::{
     AllowedRange, Faults, LISTED_MAX, Object, elements_of, join, names, number, shown,
 };
+use crate::case::words::samples::COORDINATE;
 use crate::geometry::formats::Format;
 use crate::geometry::profile::LengthUnit;
 use crate::geometry::profile::{POINTS_MAX, POINTS_MIN};
@@ -73,7 +74,6 @@ pub enum SmoothingWord {
     Auto,
 }
 
-const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const SMOOTHING: AllowedRange = AllowedRange::closed(0.0, 50.0, "mm");
 /// Maximum number of characters of a file.
 const TEXT_MAX: usize = 4_000_000;

@@ -4,7 +4,8 @@ use serde_json::Value;
 
 use crate::case::words::object::{AllowedRange, Object, count_rest, join, numbers};
 
-const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+/// The allowed coordinates.
+pub(crate) const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Allowed number of points of a grid axis and of a table of friction coefficients.
 pub(crate) const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
 /// Smallest spacing of an axis relative to its length. Floating-point arithmetic does not resolve smaller ones.
@@ -44,7 +45,7 @@ pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
     Some(axis)
 }
 
-const GAP: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
+/// The allowed pressures.
 const PRESSURE: AllowedRange = AllowedRange::closed(0.0, 1e12, "MPa");
 
 /// Returns the length of an array, whose elements may be faulty.
@@ -62,12 +63,12 @@ pub(crate) fn gap_line(block: &mut Object, member: &str) -> Option<Vec<f64>> {
         let detail = format!("{count} values given; {what} is needed, which are {n}");
         return block.refuse(member, detail);
     }
-    block.numbers(member, elements, GAP)
+    block.numbers(member, elements, COORDINATE)
 }
 
 /// Reads a gap for every point of a grid.
 pub(crate) fn gap_grid(block: &mut Object, member: &str) -> Option<Vec<Vec<f64>>> {
-    grid(block, member, "gap", GAP)
+    grid(block, member, "gap", COORDINATE)
 }
 
 /// Reads a pressure for every point of a grid.

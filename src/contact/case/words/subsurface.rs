@@ -9,6 +9,7 @@ use crate::case::words::motion::POINTS_MAX;
 use crate::case::words::object::{
     AllowedRange, Faults, Member, Object, join, names, number, shown, word,
 };
+use crate::case::words::samples::COORDINATE;
 
 /// Points for stresses below the surface, in the axes of the patch: x along rolling, y to the left, depth positive into the body. At most
 /// one of `points_mm`, `along_depth_at_mm` and `plane`; without them only the worst point is found.
@@ -355,7 +356,6 @@ fn in_order(block: &mut Object, name: &str, [before, after]: [f64; 2]) -> Option
     block.refuse(name, format!("{after} given; more than {before} is needed"))
 }
 
-const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 const DEPTH: AllowedRange = AllowedRange::closed(0.0, 1e6, "mm");
 const PLACES: [&str; 3] = ["points_mm", "along_depth_at_mm", "plane"];
 

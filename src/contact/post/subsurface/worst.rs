@@ -1,6 +1,6 @@
 //! The worst point of a patch, and the smallest enclosing ball of stress deviators.
 //!
-//! **Worst point**: the point with the largest von Mises stress. For each of several depths, columns are scanned, and a search in
+//! **Worst point**: the point with the largest von Mises stress. At each of several depths, columns are scanned, and a search in
 //! `(x/a, y/b, ln depth)` begins at the worst of them: friction has its worst points near the surface, pressure below it, and the patch of worn
 //! profiles has several of both. The worst of the points found is the result.
 //!
@@ -21,15 +21,13 @@ use crate::post::subsurface::surface_load::{LoadWorkspace, SurfaceLoad};
 // from 0.2 to 6 from no slip to full slip (`cargo test --test physics -- the_worst_point --nocapture`). Their individual influence was not measured.
 
 /// Numbers of columns along x and y, and the outermost of them relative to half chord and half width.
-const COLUMNS: [(usize, f64); 2] = [(13, 1.02), (9, 0.9)];
+pub(crate) const COLUMNS: [(u32, f64); 2] = [(13, 1.02), (7, 0.9)];
 /// Depths relative to the half-width of the patch, from the least on.
 pub(crate) const DEPTHS: [f64; 8] = [0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.5, 0.8];
 /// First steps in `x/a`, `y/b` and `ln depth`.
 pub(crate) const STEPS: [f64; 3] = [0.12, 0.15, 0.2];
-/// Stress at the start of a search relative to the largest one, at least.
-const NEAR_MOST: f64 = 0.9;
-/// Evaluations of a search.
-const EVALUATIONS: usize = 120;
+/// Number of times that the steps of a search, or the intervals next to decisive states of a passage, are halved.
+pub(crate) const HALVINGS: u32 = 4;
 
 /// A patch below which stresses are searched.
 #[derive(Debug, Clone, Copy)]
@@ -76,9 +74,6 @@ pub fn worst_place(of: BelowPatch, workspace: &mut LoadWorkspace) -> Option<[f64
         Some(at) => von_mises(of.load.stress(at, resolution, workspace)),
         None => 0.0,
     };
-    let spread = |(count, reach): (usize, f64)| {
-        (0..count).map(move |k| reach * (2.0 * k as f64 / (count - 1) as f64 - 1.0))
-    };
     let none = (f64::NEG_INFINITY, [0.0; 3]);
     let starts = DEPTHS.map(|depth| {
         let mut start = none;
@@ -90,18 +85,19 @@ pub fn worst_place(of: BelowPatch, workspace: &mut LoadWorkspace) -> Option<[f64
         }
         start
     });
-    let (most, _) = starts.into_iter().fold(none, higher);
     let mut worst = none;
-    for (found, start) in starts {
-        if found < NEAR_MOST * most {
-            continue;
-        }
-        let Ok((at, (found, ()))) = climb(start, STEPS, EVALUATIONS, |at| {
+    for (_, start) in starts {
+        let Ok((at, (found, ()))) = climb(start, STEPS, |at| {
             Ok::<_, Infallible>((badness(at, LoadResolution::FINE), ()))
         });
         worst = higher(worst, (found, at));
     }
     place(worst.1)
+}
+
+/// Evenly spaced positions from minus the outermost to the outermost.
+pub(crate) fn spread((count, outermost): (u32, f64)) -> impl Iterator<Item = f64> {
+    (0..count).map(move |k| outermost * (f64::from(2 * k) / f64::from(count - 1) - 1.0))
 }
 
 /// The one of two places with the larger value.
@@ -110,26 +106,24 @@ fn higher(a: (f64, [f64; 3]), b: (f64, [f64; 3])) -> (f64, [f64; 3]) {
 }
 
 /// Searches for the maximum of a function by steps along the axes. Returns the argument, the value and the additional result of the function there.
-/// Steps are halved if none leads higher. The search ends with the round in which the evaluations reach their limit.
+/// Steps are halved if none leads higher. The search ends with the last of the [`HALVINGS`].
 ///
 /// # Errors
 /// Returns the errors of `height`.
 pub(crate) fn climb<const N: usize, T: Copy, E>(
     start: [f64; N],
     mut steps: [f64; N],
-    evaluations: usize,
     mut height: impl FnMut([f64; N]) -> Result<(f64, T), E>,
 ) -> Result<([f64; N], (f64, T)), E> {
     let (mut at, mut best) = (start, height(start)?);
-    let mut used = 1;
-    while used < evaluations {
+    let mut halvings = 0;
+    while halvings < HALVINGS {
         let before = best.0;
         for axis in 0..N {
             for sign in [1.0, -1.0] {
                 let mut tried = at;
                 tried[axis] += sign * steps[axis];
                 let found = height(tried)?;
-                used += 1;
                 if found.0 > best.0 {
                     (at, best) = (tried, found);
                     break;
@@ -138,6 +132,7 @@ pub(crate) fn climb<const N: usize, T: Copy, E>(
         }
         if best.0 <= before {
             steps = steps.map(|step| 0.5 * step);
+            halvings += 1;
         }
     }
     Ok((at, best))
@@ -242,7 +237,7 @@ mod tests {
             let off: f64 = (0..3).map(|k| (at[k] - top[k]).powi(2)).sum();
             5.0 - off
         };
-        let Ok((at, (found, ()))) = climb([0.2, 0.0, -0.7], STEPS, EVALUATIONS, |at| {
+        let Ok((at, (found, ()))) = climb([0.2, 0.0, -0.7], STEPS, |at| {
             Ok::<_, Infallible>((height(at), ()))
         });
         assert!(found > 5.0 - 1e-3, "{found} at {at:?}");

@@ -20,25 +20,19 @@ use crate::numerics::roots::bounds;
 use crate::post::subsurface::load_parts::LoadResolution;
 use crate::post::subsurface::states::{principal, von_mises};
 use crate::post::subsurface::surface_load::LoadWorkspace;
-use crate::post::subsurface::worst::{BelowPatch, DEPTHS, Deviator, STEPS, climb, enclosing_ball};
+use crate::post::subsurface::worst::{
+    BelowPatch, COLUMNS, DEPTHS, Deviator, HALVINGS, STEPS, climb, enclosing_ball, spread,
+};
 use crate::solution::words::evolution::{PassagePlace, PassageSummary};
 
 // These constants are chosen by judgement. `cargo test --test physics -- shakes_down` compares the results with closed forms.
 
-/// Lateral positions of the scanned lines, relative to the half width.
-const ACROSS: [f64; 7] = [-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9];
 /// Number of equally spaced states on each side of the middle.
 const NEAR: usize = 16;
 /// Position of the outermost of these, relative to the half-length.
 const NEAR_REACH: f64 = 1.5;
 /// Positions of the states farther out, relative to the half-length.
 const FAR: [f64; 4] = [1.8, 2.3, 3.2, 5.0];
-/// Number of times that the intervals next to decisive states are halved.
-const HALVINGS: usize = 4;
-/// Evaluations of the search.
-const EVALUATIONS: usize = 24;
-/// Lateral position of the outermost line, relative to the half width.
-const OUTERMOST: f64 = 0.95;
 
 /// The worst passages below a patch, and the accuracy of the enclosing balls.
 #[derive(Debug, Clone, Copy)]
@@ -65,7 +59,7 @@ pub fn passage(
     let lines = Lines::new(of);
     let workspace = &mut of.load.workspace();
     let mut starts = vec![(f64::NEG_INFINITY, [0.0; 2]); measures.len()];
-    for across in ACROSS {
+    for across in spread(COLUMNS[1]) {
         for depth in DEPTHS {
             monitor.go_on(0.0)?;
             let at = [across, depth.ln()];
@@ -121,12 +115,6 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// `[y, depth]` in mm.
-    fn place(&self, [across, depth]: [f64; 2]) -> [f64; 2] {
-        let across = across.clamp(-OUTERMOST, OUTERMOST);
-        self.of.place([across, depth])
-    }
-
     /// x and stress at some x in mm on a line.
     fn states(
         &self,
@@ -135,7 +123,7 @@ impl<'a> Lines<'a> {
         resolution: LoadResolution,
         workspace: &mut LoadWorkspace,
     ) -> Vec<(f64, Stress)> {
-        let [y, depth] = self.place(at);
+        let [y, depth] = self.of.place(at);
         let load = self.of.load;
         let state = |x: &f64| (*x, load.stress([*x, y, depth], resolution, workspace));
         stations.iter().map(state).collect()
@@ -179,12 +167,12 @@ impl<'a> Lines<'a> {
         workspace: &mut LoadWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<(PassagePlace, f64), Stop> {
-        let (at, (best, gap)) = climb(start, [STEPS[1], STEPS[2]], EVALUATIONS, |at| {
+        let (at, (best, gap)) = climb(start, [STEPS[1], STEPS[2]], |at| {
             monitor.go_on(0.0)?;
             Ok(self.value(measure, at, workspace))
         })?;
         let place = PassagePlace {
-            at_mm: self.place(at),
+            at_mm: self.of.place(at),
             stress_mpa: best,
         };
         Ok((place, gap))

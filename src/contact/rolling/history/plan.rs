@@ -20,9 +20,6 @@ use crate::rolling::task::Motion;
 /// Largest ratio of a step to the one before; BDF2 is stable up to 1 + √2.
 const GROWTH_MAX: f64 = 2.0;
 
-/// Weights in the slip of a step of pressing: of the displacements at its end and, with negative sign, of those one and two steps before.
-pub(super) const PRESS_WEIGHTS: [f64; 3] = [1.5, 2.0, -0.5];
-
 /// The motion of the bodies in a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StepKind {
@@ -217,7 +214,7 @@ pub(super) fn memory(kind: StepKind, edges: &LeadingEdges, unit: f64) -> Displac
     let (factor, rolls) = match kind {
         StepKind::Steady => (0.0, true),
         StepKind::Shift => (1.0, false),
-        StepKind::Press => (PRESS_WEIGHTS[0], false),
+        StepKind::Press => (weights(1.0)[0], false),
         StepKind::Roll { distance, growth } => (weights(growth)[0] * unit / distance, true),
     };
     DisplacementMemory {

@@ -15,7 +15,7 @@ use crate::mesh::Mesh;
 use crate::numerics::interpolation;
 use crate::rolling::answer::LevelFailure;
 use crate::rolling::history::level_run::LevelRun;
-use crate::rolling::history::plan::{PRESS_WEIGHTS, StepEquations};
+use crate::rolling::history::plan::{StepEquations, weights};
 use crate::rolling::slip_equations::SlipScratch;
 use crate::rolling::task::Motion;
 
@@ -235,7 +235,7 @@ const GROWTH: f64 = 1.05;
 /// Largest number of steps; 100 steps reduce the influence of the initial state by 130.
 const STEPS_MAX: usize = 300;
 /// Step from which the mean of two states is used as the past: single cells at the edge of the stick zone may alternate for ever where nearly all sticks.
-const STEPS_FREE: usize = 60;
+pub(super) const STEPS_FREE: usize = 60;
 /// Mean change of the tractions in a step, relative to the friction limit, at which they count as self-similar. 1e-6 gives the same forces and areas.
 const CHANGE: f64 = 2e-5;
 
@@ -270,12 +270,11 @@ impl LevelRun<'_> {
         let mut change = f64::INFINITY;
         for step in 0..STEPS_MAX {
             self.monitor.go_on(0.0)?;
-            let mut source =
-                [0, 1].map(|k| given.iter().map(|u| -PRESS_WEIGHTS[0] * u[k]).collect());
+            let [now, last, earlier] = weights(1.0);
+            let mut source = [0, 1].map(|k| given.iter().map(|u| -now * u[k]).collect());
             if let Some(past) = &past {
-                for ((state, smaller), weight) in past.iter().zip(&smaller).zip(&PRESS_WEIGHTS[1..])
-                {
-                    add(&mut source, &smaller.displacements(state), *weight);
+                for ((state, smaller), weight) in past.iter().zip(&smaller).zip([last, -earlier]) {
+                    add(&mut source, &smaller.displacements(state), weight);
                 }
             }
             let tractions = self.solve(of, &Motion::default(), &source)?;

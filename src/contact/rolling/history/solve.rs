@@ -4,13 +4,12 @@ use crate::error::SolveError;
 use crate::mesh::MeshSize;
 use crate::monitor::{Monitor, MonitorPart};
 use crate::remark::kind::short;
-use crate::rolling::answer::{
-    HistoryAnswer, LevelAnswer, MotionAnswer, Resultants, SolvedFields, Work,
-};
+use crate::rolling::answer::{HistoryAnswer, LevelAnswer, MotionAnswer, SolvedFields, Work};
 use crate::rolling::history::level_run::LevelRun;
 use crate::rolling::history::plan;
 use crate::rolling::history::plan::{HistoryStart, HistoryTask, Pace, PointRecord};
-use crate::rolling::history::self_similar::SelfSimilarState;
+use crate::rolling::history::self_similar::{STEPS_FREE, SelfSimilarState};
+use crate::rolling::refinement::error_estimate::distances;
 use crate::rolling::refinement::interpolate::RefinementState;
 use crate::rolling::refinement::on_mesh::named;
 use crate::rolling::task::{Motion, Resolution, RollingTask, TOLERANCE_LEAST};
@@ -28,8 +27,6 @@ const LEVELS_MAX: i32 = 4;
 /// smoothed over two cells, so cells count for more than strips; with 3 creepages are as accurate, moments under spin half as accurate. In pressing,
 /// tractions change as much across as along.
 const SHAPES: [f64; 2] = [2.0, 1.0];
-/// Usual number of steps of a pressing.
-const STEPS_PRESSED: f64 = 100.0;
 /// Steps per half-length of the patch and cell along x. With twice as many the errors of creepages are up to twice as large, because shorter steps smooth less in
 /// time; forces change by at most 0.002 of the limit.
 const STEPS_PER_CELL: f64 = 1.0 / 3.0;
@@ -44,10 +41,8 @@ const CREEPAGE_ERROR_OVER_CHANGE: f64 = 1.4;
 /// Least change of a shift that is found, in cells along x and relative to the shift, because the changes of single shifts cross zero by chance. Chosen so that
 /// the errors cover 57 shifts, alone and within histories, of which the changes alone covered 31. The closed form of Cattaneo (1938) is among them.
 const SHIFT_CHANGE_LEAST: f64 = 0.18;
-/// The error at a point is at least this part of the largest error of the history, because earlier errors persist.
-const REMEMBERED: f64 = 0.7;
-/// Tolerance of prescribed forces relative to the friction limit, with a margin.
-const MISSED: f64 = 2e-5;
+/// Tolerance of prescribed forces relative to the friction limit. The residual of a force causes an error of the creepage in one step.
+const FORCE_TOLERANCE: f64 = 1e-5;
 /// Target of the creepages and shifts that are found, relative to their largest value, over the target of the resultants.
 const CREEPAGE_SHARE: f64 = 10.0;
 
@@ -67,19 +62,16 @@ struct SolvedHistory {
     seconds: f64,
 }
 
-/// The changes between two meshes at a point.
-#[derive(Debug, Clone, Default)]
-struct Change {
+/// The largest changes between two meshes at the points of a history. They count for all points: earlier errors persist, and the same event may occur slightly
+/// earlier or later on another mesh.
+#[derive(Debug, Clone)]
+struct Changes {
     /// Changes of the resultants relative to μN, patch by patch, then of their sum.
     resultants: Vec<f64>,
     /// Changes of the creepages found.
     creepage: [f64; 2],
-    /// Changes of the shifts found, in mm.
-    shift: [f64; 2],
-    /// Resultants on the coarser mesh.
-    coarser: Vec<Resultants>,
-    /// Shift on the coarser mesh.
-    coarser_shift: Motion,
+    /// Changes of the shifts found, in mm, at each point.
+    shift: Vec<[f64; 2]>,
 }
 
 /// The reason why a history takes more steps than are allowed, if it does; `extents` are those of the patches.
@@ -104,7 +96,7 @@ pub fn usual_work(history: &HistoryTask, extents: &[[f64; 4]], along: Option<f64
     let cells = along.unwrap_or(CELLS_FIRST * FINER * FINER);
     let level = if along.is_some() { 1 } else { 2 };
     let pressing = match history.start {
-        HistoryStart::Pressed => STEPS_PRESSED,
+        HistoryStart::Pressed => STEPS_FREE as f64,
         HistoryStart::Rest | HistoryStart::Steady => 0.0,
     };
     let steps = plan::count(history, pace(half, cells, level));
@@ -185,18 +177,25 @@ pub fn solve(
         if presses {
             // Forces balance in a pressing, so its error shows in the sum of the lengths of the tractions.
             let grown = (found.points[0].carried - coarser.points[0].carried).abs();
-            let of_all = changes[0].resultants.iter_mut();
+            let of_all = changes.resultants.iter_mut();
             of_all.for_each(|change| *change = change.max(grown));
         }
         let least = SHIFT_CHANGE_LEAST / f64::from(plan.size.cells);
-        for (k, (change, point)) in changes.iter_mut().zip(&found.points).enumerate() {
+        for (k, (change, point)) in changes.shift.iter_mut().zip(&found.points).enumerate() {
             let shift = [point.shift.creepage_x, point.shift.creepage_y];
             for i in (0..2).filter(|i| task.forces[k][*i].is_some()) {
-                change.shift[i] = change.shift[i].max(least * shift[i].abs());
+                change[i] = change[i].max(least * shift[i].abs());
             }
         }
         if last || is_met(task, &found.points, &changes) {
-            return Ok(answers(task, history, found, &changes, work));
+            return Ok(answers(
+                task,
+                history,
+                found,
+                &coarser.points,
+                &changes,
+                work,
+            ));
         }
         before = Some(found);
     }
@@ -247,8 +246,8 @@ fn on_level(
     let number = state.levels.level(plan.size.into())?;
     let level = state.levels.get(number);
     // A step of rolling changes little, so the tractions before it leave a small residual. With a tolerance of 1e-4 they were kept, and under small creepages
-    // forces stayed up to 0.012 of the limit from steady rolling, with estimates of 0.002. The residual of a force causes an error of the creepage in one step.
-    let tolerance = [TOLERANCE_LEAST, 1e-5];
+    // forces stayed up to 0.012 of the limit from steady rolling, with estimates of 0.002.
+    let tolerance = [TOLERANCE_LEAST, FORCE_TOLERANCE];
     let workspace = &mut state.workspace;
     let run = LevelRun::new(task, history, &level, tolerance, workspace, monitor)?;
     let points = run
@@ -261,85 +260,49 @@ fn on_level(
     })
 }
 
-/// The changes from one mesh to the next. At every point they are at least those of its neighbours, because the same event may occur slightly earlier or later on
-/// another mesh, and at least a part of the largest change.
-fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> Vec<Change> {
+/// The changes from one mesh to the next.
+fn changes(task: &RollingTask, coarse: &[PointRecord], fine: &[PointRecord]) -> Changes {
     let patches = task.footprint.patches();
-    let area: f64 = patches.iter().map(|patch| patch.area).sum();
-    let limit = task.friction.limit_of_all(task.footprint);
-    let length = |area: f64| (area / std::f64::consts::PI).sqrt();
-    let own: Vec<Change> = coarse
-        .iter()
-        .zip(fine)
-        .map(|(a, b)| {
-            let each = patches.iter().enumerate().map(|(k, patch)| {
-                let [x0, x1, y0, y1] = patch.extent;
-                let middle = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
-                let [a, b] = [a, b].map(|point| point.resultants[k].about(middle));
-                a.distance(
-                    &b,
-                    task.friction.limit(task.footprint, k),
-                    length(patch.area),
-                )
-            });
-            let [one, other] = [a, b].map(|point| point.resultants.iter().sum::<Resultants>());
-            let all = one.distance(&other, limit, length(area));
-            let apart = |of: fn(&PointRecord) -> [f64; 2]| {
-                let (a, b) = (of(a), of(b));
-                [0, 1].map(|k| (a[k] - b[k]).abs())
-            };
-            Change {
-                resultants: each.chain([all]).collect(),
-                creepage: apart(|p| [p.motion.creepage_x, p.motion.creepage_y]),
-                shift: apart(|p| [p.shift.creepage_x, p.shift.creepage_y]),
-                coarser: a.resultants.clone(),
-                coarser_shift: a.shift,
-            }
-        })
-        .collect();
-    (0..own.len())
-        .map(|k| {
-            let near = k.saturating_sub(1)..(k + 2).min(own.len());
-            let largest = |of: &dyn Fn(&Change) -> f64| {
-                let most = |some: &[Change]| some.iter().map(of).fold(0.0, f64::max);
-                most(&own[near.clone()]).max(REMEMBERED * most(&own))
-            };
-            Change {
-                resultants: (0..own[k].resultants.len())
-                    .map(|i| largest(&|change| change.resultants[i]))
-                    .collect(),
-                creepage: [0, 1].map(|i| largest(&|change| change.creepage[i])),
-                shift: own[k].shift,
-                coarser: own[k].coarser.clone(),
-                coarser_shift: own[k].coarser_shift,
-            }
-        })
-        .collect()
+    let mut found = Changes {
+        resultants: vec![0.0; patches.len() + 1],
+        creepage: [0.0; 2],
+        shift: Vec::with_capacity(fine.len()),
+    };
+    for (a, b) in coarse.iter().zip(fine) {
+        let apart = distances(task, patches, &a.resultants, &b.resultants);
+        for (most, apart) in found.resultants.iter_mut().zip(apart) {
+            *most = most.max(apart);
+        }
+        let creepage = between(&a.motion, &b.motion);
+        found.creepage = [0, 1].map(|k| found.creepage[k].max(creepage[k]));
+        found.shift.push(between(&a.shift, &b.shift));
+    }
+    found
+}
+
+/// Distances of both creepages of two motions.
+fn between(a: &Motion, b: &Motion) -> [f64; 2] {
+    [a.creepage_x - b.creepage_x, a.creepage_y - b.creepage_y].map(f64::abs)
 }
 
 /// Whether resultants and creepages meet the target.
-fn is_met(task: &RollingTask, points: &[PointRecord], changes: &[Change]) -> bool {
+fn is_met(task: &RollingTask, points: &[PointRecord], changes: &Changes) -> bool {
     let Some(target) = task.target() else {
         return true;
     };
-    let forces = changes.iter().filter_map(|change| change.resultants.last());
-    let worst = forces.fold(0.0_f64, |worst, change| worst.max(*change));
+    let worst = changes.resultants.last().copied().unwrap_or(0.0);
     if ERROR_OVER_CHANGE * worst > target {
         return false;
     }
-    let small = |of: fn(&Motion) -> [f64; 2],
-                 motion: fn(&PointRecord) -> &Motion,
-                 change: fn(&Change) -> [f64; 2]| {
-        (0..2).all(|k| {
-            let peak = points.iter().map(|point| of(motion(point))[k].abs());
-            let worst = changes.iter().map(|own| change(own)[k]);
-            CREEPAGE_ERROR_OVER_CHANGE * worst.fold(0.0, f64::max)
-                <= CREEPAGE_SHARE * target * peak.fold(0.0, f64::max)
-        })
+    let is_small = |of: fn(&PointRecord) -> &Motion, k: usize, change: f64| {
+        let peak = points.iter().map(|point| of(point).components()[k].abs());
+        CREEPAGE_ERROR_OVER_CHANGE * change <= CREEPAGE_SHARE * target * peak.fold(0.0, f64::max)
     };
-    let of = |motion: &Motion| [motion.creepage_x, motion.creepage_y];
-    small(of, |point| &point.motion, |change| change.creepage)
-        && small(of, |point| &point.shift, |change| change.shift)
+    (0..2).all(|k| {
+        let shift = changes.shift.iter().map(|change| change[k]);
+        is_small(|point| &point.motion, k, changes.creepage[k])
+            && is_small(|point| &point.shift, k, shift.fold(0.0, f64::max))
+    })
 }
 
 /// Extrapolates a shift like the resultants; a given shift is equal on both meshes.
@@ -353,26 +316,27 @@ fn answers(
     task: &RollingTask,
     history: &HistoryTask,
     solved: SolvedHistory,
-    changes: &[Change],
-    coarse: Work,
+    coarser: &[PointRecord],
+    changes: &Changes,
+    lost: Work,
 ) -> Vec<MotionAnswer> {
     let seconds = solved.seconds / solved.points.len() as f64;
-    let points = solved.points.into_iter().zip(changes).enumerate();
+    let points = solved.points.into_iter().zip(coarser).enumerate();
     points
-        .map(|(k, (point, change))| {
+        .map(|(k, (point, coarser))| {
             let mut work = point.work;
             if k == 0 {
                 let residual = work.residual;
-                work.add(coarse);
+                work.add(lost);
                 work.residual = residual;
             }
-            let error =
-                |change: &f64| Some(ERROR_OVER_CHANGE * change + task.tolerance(k).max(MISSED));
+            let missed = task.tolerance(k).max(2.0 * FORCE_TOLERANCE);
+            let error = |change: &f64| Some(ERROR_OVER_CHANGE * change + missed);
             let forces = task.forces[k];
             let found = |changes: [f64; 2]| {
                 [0, 1].map(|k| forces[k].map(|_| CREEPAGE_ERROR_OVER_CHANGE * changes[k]))
             };
-            let resultants = point.resultants.iter().zip(&change.coarser).enumerate();
+            let resultants = point.resultants.iter().zip(&coarser.resultants).enumerate();
             let extrapolated = resultants.map(|(patch, (fine, coarse))| {
                 let limit = task.friction.limit(task.footprint, patch);
                 fine.beyond(*coarse, EXTRAPOLATED, limit)
@@ -380,15 +344,14 @@ fn answers(
             MotionAnswer {
                 motion: point.motion,
                 saturated: point.saturated,
-                errors: change.resultants.iter().map(error).collect(),
+                errors: changes.resultants.iter().map(error).collect(),
                 history: Some(HistoryAnswer {
                     distance: history.distances[k],
-                    shift: (history.rolled(k) == 0.0)
-                        .then(|| beyond(&point.shift, &change.coarser_shift)),
+                    shift: (history.rolled(k) == 0.0).then(|| beyond(&point.shift, &coarser.shift)),
                     power: point.power,
                     dissipated: point.dissipated,
-                    creepage_errors: found(change.creepage),
-                    shift_errors: found(change.shift),
+                    creepage_errors: found(changes.creepage),
+                    shift_errors: found(changes.shift[k]),
                 }),
                 fields: Some(SolvedFields {
                     level: solved.level,

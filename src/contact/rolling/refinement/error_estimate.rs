@@ -150,7 +150,7 @@ pub(crate) fn coarser(solved: &[DiscreteSolution], fine: usize) -> Option<usize>
 }
 
 /// Distances of two sets of resultants in their largest component: for every patch relative to its own μN, with moments about its middle, then for the sums.
-fn distances(
+pub(crate) fn distances(
     task: &RollingTask,
     patches: &[Patch],
     found: &[Resultants],
