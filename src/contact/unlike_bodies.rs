@@ -14,7 +14,7 @@ use crate::mesh::MeshSize;
 use crate::monitor::Monitor;
 use crate::normal::footprint::NormalTask;
 use crate::normal::gap::grid::GridFineness;
-use crate::normal::gap::surface::GapSurface;
+use crate::normal::gap::surface::{GapSurface, around};
 use crate::normal::gap::task::GapTask;
 use crate::normal::hertz::{Ellipse, NormalLoad};
 use crate::normal_stage::SolvedFootprint;
@@ -49,10 +49,8 @@ const PART_OF_TARGET: f64 = 0.3;
 /// Samples of the opening along each axis, over and around the patches; beyond them the opening is constant. It is smooth except at the edges of the cells. On the 12
 /// contacts of `tests/physics/unlike.rs` 81 samples change forces by at most 0.0014 of μN; 25 take half the time, but the estimate of one contact no longer covers its error.
 const SAMPLES: usize = 41;
-/// Width of the sampled margin around the patches over their size. Chosen by judgement.
-const AROUND: f64 = 0.25;
-/// Number of samples on either side of the parabola across for an ellipse, and their reach over its semi-axis. Parabolas are reproduced exactly.
-const PARABOLA: (i32, f64) = (8, 6.0);
+/// Reach of the parabola across for an ellipse over its semi-axis, which is the distance of its samples. Parabolas are reproduced exactly.
+const REACH: i32 = 6;
 
 /// A gap between bodies that differ, and its contact without tractions.
 #[derive(Debug)]
@@ -190,9 +188,7 @@ fn gap_task(case: &CheckedCase) -> GapTask {
 /// The gap of a Hertzian ellipse.
 fn paraboloid(ellipse: &Ellipse, modulus: f64) -> GapSurface {
     let [along, across] = ellipse.curvatures(modulus);
-    let (count, reach) = PARABOLA;
-    let y = (-count..=count).map(|k| reach * ellipse.b * f64::from(k) / f64::from(count));
-    let y: Vec<f64> = y.collect();
+    let y: Vec<f64> = (-REACH..=REACH).map(|k| ellipse.b * f64::from(k)).collect();
     let gap: Vec<f64> = y.iter().map(|y| across * y * y).collect();
     GapSurface::profile(0.5 / along, &y, &gap)
 }
@@ -251,7 +247,7 @@ fn opened(
         }
     }
     let limits = task.gap.window();
-    let [x, y] = [0, 1].map(|k| axis([extent[2 * k], extent[2 * k + 1]], limits[k]));
+    let [x, y] = [0, 1].map(|k| around([extent[2 * k], extent[2 * k + 1]], limits[k], SAMPLES));
     let mut rows = Vec::with_capacity(y.len());
     for y in &y {
         if let ControlFlow::Break(stop) = watch.tick(0.0) {
@@ -270,14 +266,6 @@ fn pressed_out(level: &StripMesh, traction: &[Vec<f64>; 2], limit: f64) -> [f64;
         let cells = level.area.iter().zip(&traction[k]);
         unit * cells.map(|(area, t)| area * t.abs()).sum::<f64>()
     })
-}
-
-/// Sample points over and around an extent, within the limits of the data.
-fn axis([low, high]: [f64; 2], [least, most]: [f64; 2]) -> Vec<f64> {
-    let (count, around) = (SAMPLES, AROUND * (high - low));
-    let (low, high) = ((low - around).max(least), (high + around).min(most));
-    let step = (high - low) / (count - 1) as f64;
-    (0..count).map(|k| low + k as f64 * step).collect()
 }
 
 fn distance([a, b]: [f64; 2], [c, d]: [f64; 2]) -> f64 {

@@ -36,8 +36,6 @@ mod tractions;
 /// Largest ratio of length to width of a patch. Hertz's patch of a gauge corner of 13 mm is 11 times as long as wide, a contact at the root of a
 /// flange 20 times. A single displaced point makes a ridge a hundred times as long as wide.
 const SLENDER_MAX: f64 = 40.0;
-/// Cosine of the contact angle below which the allowed length of a patch on a steep face no longer grows.
-const COSINE_LEAST: f64 = 0.01;
 
 /// The wheel in equilibrium, with the answer for all its patches.
 pub(crate) struct SolvedWheel {
@@ -423,7 +421,7 @@ impl<'a> WheelSolve<'a> {
         self.check_ends(contact)?;
         // On a steep face, the wheel's curvature along x decreases with the cosine of the angle.
         let slender_max = |angle: f64| {
-            let steep = STEEP / angle.cos().clamp(COSINE_LEAST, STEEP);
+            let steep = STEEP / angle.cos().clamp(f64::MIN_POSITIVE, STEEP);
             SLENDER_MAX * steep.powf(2.0 / 3.0)
         };
         let slender = patches.iter().find_map(|on_rail| {

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::geometry::envelope::{Envelope, envelope};
 use crate::geometry::locus_lines::{LocusLines, LocusPoint};
 use crate::geometry::wheel_rail::{WheelCircle, WheelRail};
+use crate::numerics::ITERATIONS_MAX;
 use crate::numerics::roots::bounds;
 
 /// Lateral spacing of the lines in mm, half of that of the points along the curves. The height of first touch is exact as far as the rail is
@@ -18,10 +19,7 @@ pub(crate) const STEP: f64 = 0.04;
 const LOWERING_MAX: f64 = 16.0;
 /// Lowering in mm at which the estimate starts, usual under a light load.
 const LOWERING_FIRST: f64 = 0.032;
-/// Most evaluations of an estimate. If one patch carries the force, two or three suffice. The estimate only decides at which height the solver
-/// starts.
-const EVALUATIONS_MAX: usize = 10;
-/// Relative tolerance of the force to the power 2/3. Chosen by judgement: the estimate itself is some per cent off.
+/// Relative tolerance of the force to the power 2/3. Chosen by judgement: the estimate itself is some per cent off, and it only decides at which height the solver starts.
 const TOLERANCE: f64 = 2e-3;
 
 /// The lines along x on which the wheel lies above the rail.
@@ -142,7 +140,7 @@ impl<'g> ContactLocus<'g> {
         // The estimate jumps when one more line overlaps, so that the bracket is kept.
         let (mut low, mut high) = ([0.0_f64; 2], None::<[f64; 2]>);
         let mut lowering = LOWERING_FIRST;
-        for _ in 0..EVALUATIONS_MAX {
+        for _ in 0..ITERATIONS_MAX {
             let found = power(lowering);
             if (found / wanted - 1.0).abs() < TOLERANCE {
                 break;

@@ -177,9 +177,7 @@ const TIP_WIDTH: [f64; 2] = [4.0, 25.0];
 /// Range of the height in mm of a flange above its tread. Trams have 18 mm, worn wheels up to 40 mm; points that end before the tip show
 /// less.
 const FLANGE_HEIGHT: [f64; 2] = [12.0, 45.0];
-/// Least length in mm of a tread.
-const TREAD: f64 = 20.0;
-/// Least length in mm of the crown of a head. The nose of a crossing has 15 mm where wheels reach it. With twice this length it can only be a rail.
+/// Least length in mm of a tread, and of the crown of a head. The nose of a crossing has 15 mm where wheels reach it. With twice this length it can only be a rail.
 const CROWN: f64 = 15.0;
 /// Least fall in mm at one side of a head, and least length of the steep part of a face.
 const FALL: f64 = 6.0;
@@ -284,7 +282,7 @@ pub fn sure_body(points: &[[f64; 2]], z_up: bool) -> Option<SureBody> {
 /// The flange of a wheel whose points are in order from the track centre to the field side, with z up.
 pub fn flange(points: &[[f64; 2]]) -> Option<Flange> {
     let section = Section::new(points);
-    let mut treads = section.flat_runs(TREAD);
+    let mut treads = section.flat_runs(CROWN);
     treads.sort_by_key(|[first, last]| first.abs_diff(*last));
     treads.iter().rev().find_map(|tread| section.flange(*tread))
 }

@@ -31,10 +31,8 @@ pub const POINTS_MAX: usize = 20_000;
 pub(crate) const POINT_SPACING: f64 = 0.25;
 /// Length in mm of the profile needed beyond a contact. With less there is a remark.
 pub(crate) const NEEDED_BEYOND: f64 = 5.0;
-/// Least depth in mm of the groove next to a guard rail, below the highest point of the running rail: twice the height of a flange.
-const GROOVE_DEPTH: f64 = 60.0;
-/// Least depth in mm of the groove below the points at its sides.
-const GROOVE_WALL: f64 = 5.0;
+/// Depth in mm of the groove next to a guard rail below the points at its sides: twice the height of a flange.
+pub(crate) const GROOVE_DEPTH: f64 = 60.0;
 /// Least step in mm of heights that counts as rounding. Finer steps are below the noise of all instruments.
 const ROUNDING_MIN: f64 = 1e-3;
 /// Distance in mm below which two points are merged.
@@ -187,9 +185,8 @@ impl Profile {
                  guard rail lies beside the running rail, on the side of the track centre"
             ));
         }
-        let [_, top] = bounds(own.points.iter().map(|at| at[1]));
         let [from, to] = [joined[joined.len() - 1], own.points[0]];
-        let bottom = from[1].min(to[1]).min(top - GROOVE_DEPTH) - GROOVE_WALL;
+        let bottom = from[1].min(to[1]) - GROOVE_DEPTH;
         joined.extend([[from[0], bottom], [to[0], bottom]]);
         let beside = joined.len();
         joined.extend(&own.points);

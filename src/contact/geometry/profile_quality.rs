@@ -301,8 +301,8 @@ pub fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Least length in mm of a long chord.
-const LONG: f64 = 10.0;
+/// Least length in mm of a long chord. The arcs of heads and treads are 10 to 50 mm long.
+pub(crate) const LONG: f64 = 10.0;
 /// Least length of a long chord relative to the median chord. Neighbouring points are one or two chords apart.
 pub(crate) const LONG_MEDIANS: f64 = 8.0;
 /// Most points at an end beyond a long chord that are dropped.
@@ -337,23 +337,12 @@ pub struct Points<'a> {
     pub along: &'a [f64],
 }
 
-impl<'a> Points<'a> {
+impl Points<'_> {
     /// Indices of the points in a range of the length: the first one, and one past the last one.
     pub fn numbers(&self, range: [f64; 2]) -> [usize; 2] {
         let first = self.along.partition_point(|s| *s < range[0]);
         let last = self.along.partition_point(|s| *s <= range[1]);
         [first, last.max(first)]
-    }
-
-    /// The points in a range of the length, with two more on either side if there are any.
-    #[must_use]
-    pub fn within(&self, range: [f64; 2]) -> Points<'a> {
-        let [first, last] = self.numbers(range);
-        let (first, last) = (first.saturating_sub(2), (last + 2).min(self.at.len()));
-        Points {
-            at: &self.at[first..last],
-            along: &self.along[first..last],
-        }
     }
 
     /// Length of the chord from a point to the next.
@@ -366,8 +355,6 @@ impl<'a> Points<'a> {
 pub(crate) const STEP: f64 = 0.1;
 /// Distance in mm by which the comparison and the noise estimate extend beyond twice the half width of the contact.
 const BEYOND: f64 = 10.0;
-/// Distance, in cut wavelengths, beyond which points do not affect a smoothed curve.
-const SUPPORT: f64 = 3.0;
 /// Least smoothing of the reference curve in mm. Otherwise it is twice the smoothing in use. A point affects the reference up to this
 /// distance.
 pub const REFERENCE_MIN: f64 = 3.0;
@@ -422,7 +409,6 @@ fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Rough
     let first = (low - beyond).max(points.along[0]);
     let last = (high + beyond).min(points.along[points.along.len() - 1]);
     let reference = REFERENCE_MIN.max(2.0 * smoothing);
-    let part = points.within([first - SUPPORT * reference, last + SUPPORT * reference]);
     let count = ((last - first) / STEP).floor() as usize + 1;
     let places: Vec<f64> = (0..count).map(|k| first + STEP * k as f64).collect();
     let used: Vec<CurvePoint> = places.iter().map(|s| curve.at(*s)).collect();
@@ -436,10 +422,10 @@ fn roughness(reading: &PointsRead, [low, high]: [f64; 2], modulus: f64) -> Rough
         modulus * (squares.sum::<f64>() / inside.len().max(1) as f64).sqrt()
     };
     Roughness {
-        waviness: pressure(&PlaneCurve::through(part.at, part.along, reference)),
+        waviness: pressure(&PlaneCurve::through(points.at, points.along, reference)),
         ambiguity: match smoothing > 0.0 {
             true => 0.0,
-            false => pressure(&PlaneCurve::akima(part.at, part.along)),
+            false => pressure(&PlaneCurve::akima(points.at, points.along)),
         },
     }
 }

@@ -17,15 +17,14 @@ use crate::geometry::wheel_rail::WheelRail;
 use crate::geometry::wheelset_pose::WheelsetMotion;
 use crate::numerics::ITERATIONS_MAX;
 use crate::numerics::quadrature::{GaussPoints, integral};
-use crate::numerics::roots::bounds;
+use crate::numerics::roots::{bounds, maximum};
 
 pub use crate::geometry::curve_place::CurvePlace;
 
-/// Gap in mm below which the bodies may overlap between two tabulated points without overlapping at them.
-const BETWEEN: f64 = 3e-3;
-/// Number of intervals between neighbouring circles, or points of the rail, in one bounding circle.
+/// Number of intervals between neighbouring circles, or points of the rail, in one bounding circle. So many circles near the last result are searched before all others.
 const BLOCK: usize = 16;
-/// Gap in mm between the rail and the polygon of the wheel below which the gap is computed exactly.
+/// Gap in mm between the rail and the polygon of the wheel below which the gap is computed exactly. The bodies may then overlap between two tabulated points without
+/// overlapping at them.
 const POLYGON_GAP_MAX: f64 = 0.02;
 /// Largest distance in mm between the polygons of both bodies where the bodies may overlap.
 const DEEPEST: f64 = 2.0;
@@ -33,17 +32,11 @@ const DEEPEST: f64 = 2.0;
 const FAR: f64 = 8.0;
 /// Least cosine of the angle between surfaces that face each other: between the outward normal of the wheel and the inward normal of the rail,
 /// and between the rail and a plane of contact, which ends where the rail turns away from it.
-const FACING_LEAST: f64 = 0.1;
+pub(crate) const FACING_LEAST: f64 = 0.1;
 /// Number of intervals between the points along x at which the gap is computed, for a wheel without yaw.
 const INTERVALS: usize = 4;
-/// Largest number of these intervals.
-const INTERVALS_MAX: usize = 15;
 /// Distance in mm across the wheel's profile that adds one interval.
 const NODE_DISTANCE: f64 = 0.1;
-/// Number of golden sections in the search for the least gap between two points.
-const SECTIONS: usize = 16;
-/// Number of circles searched near the last result before all are searched.
-const NEIGHBOURS: usize = 8;
 /// Length in mm of a step that ends Newton's method.
 const STEP_LAST: f64 = 1e-10;
 /// Length in mm to which a step of Newton's method is limited.
@@ -326,7 +319,7 @@ impl<'g> ReferenceCurve<'g> {
         let last = self.circles.len() - 1;
         let mut next = self.after.get();
         let mut found = None;
-        for _ in 0..NEIGHBOURS {
+        for _ in 0..BLOCK {
             found = between(next);
             if found.is_some() {
                 break;
@@ -367,7 +360,7 @@ impl<'g> ReferenceCurve<'g> {
         let mut stretches: Vec<Vec<Nearest>> = Vec::new();
         let mut open = false;
         for (k, here) in seen.iter().enumerate() {
-            let Some(here) = here.filter(|here| here.wheel.gap < BETWEEN) else {
+            let Some(here) = *here else {
                 open = false;
                 continue;
             };
@@ -394,9 +387,10 @@ impl<'g> ReferenceCurve<'g> {
         }
     }
 
-    fn nearest_at(&self, s: f64, centre: f64) -> Option<Nearest> {
-        let place = self.at(s);
-        let (x, start) = self.about(&place, centre, DEEPEST)?;
+    /// The wheel above a point of the curve that it may overlap.
+    fn nearest_at(&self, place: CurvePlace, centre: f64) -> Option<Nearest> {
+        let about = self.about(&place, centre, DEEPEST);
+        let (x, start) = about.filter(|(_, wheel)| wheel.gap < POLYGON_GAP_MAX)?;
         let wheel = self.over(&place, x, centre, &start)?;
         Some(Nearest { place, x, wheel })
     }
@@ -415,40 +409,26 @@ impl<'g> ReferenceCurve<'g> {
                 continue;
             }
             for k in block {
-                let place = *self.ordered(k);
-                let about = self.about(&place, centre, DEEPEST);
-                let about = about.filter(|(_, wheel)| wheel.gap < POLYGON_GAP_MAX);
-                close[k] = about.and_then(|(x, start)| {
-                    let wheel = self.over(&place, x, centre, &start)?;
-                    Some(Nearest { place, x, wheel })
-                });
+                close[k] = self.nearest_at(*self.ordered(k), centre);
             }
         }
         close
     }
 
-    /// The point with the least gap within a distance of another point, by golden sections.
+    /// The point with the least gap within a distance of another point.
     fn deepest_near(&self, start: Nearest, centre: f64, distance: f64) -> Nearest {
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let (mut low, mut high) = (start.place.s - distance, start.place.s + distance);
-        let mut best = start;
-        for _ in 0..SECTIONS {
-            let part = golden * (high - low);
-            let [left, right] = [high - part, low + part].map(|s| self.nearest_at(s, centre));
-            let gap =
-                |found: &Option<Nearest>| found.map_or(f64::INFINITY, |found| found.wheel.gap);
-            let left_is_less = gap(&left) < gap(&right);
-            (low, high) = if left_is_less {
-                (low, low + part)
-            } else {
-                (high - part, high)
+        let best = Cell::new(start);
+        let around = [start.place.s - distance, start.place.s + distance];
+        maximum(around, |s| {
+            let Some(found) = self.nearest_at(self.at(s), centre) else {
+                return f64::NEG_INFINITY;
             };
-            let found = if left_is_less { left } else { right };
-            best = found
-                .filter(|found| found.wheel.gap < best.wheel.gap)
-                .unwrap_or(best);
-        }
-        best
+            if found.wheel.gap < best.get().wheel.gap {
+                best.set(found);
+            }
+            -found.wheel.gap
+        });
+        best.get()
     }
 
     /// The wheel above a point of the rail's surface at x, with its centre at a height in mm, by Newton's method from a start nearby. Returns
@@ -515,7 +495,7 @@ impl<'g> ReferenceCurve<'g> {
     /// yaw moves the contact across the wheel's profile.
     pub fn nodes(&self, [first, last]: [f64; 2]) -> Vec<f64> {
         let across = self.geometry.axle()[0].abs() * (last - first);
-        let intervals = (INTERVALS + (across / NODE_DISTANCE) as usize).min(INTERVALS_MAX);
+        let intervals = INTERVALS + (across / NODE_DISTANCE) as usize;
         let (middle, half) = (0.5 * (first + last), 0.5 * (last - first));
         let angle = |k: usize| std::f64::consts::PI * k as f64 / intervals as f64;
         (0..=intervals)
@@ -559,7 +539,7 @@ impl<'g> ReferenceCurve<'g> {
     /// Half of the length in mm on which the bodies overlap along x, given the wheel where it is nearest.
     pub fn half_length(&self, wheel: &WheelOver) -> f64 {
         let radius = self.geometry.meridian(wheel.wheel).radius;
-        (2.0 * radius * (-wheel.gap).max(0.0) / wheel.lift.abs().max(0.1)).sqrt()
+        (2.0 * radius * (-wheel.gap).max(0.0) / wheel.lift.abs().max(FACING_LEAST)).sqrt()
     }
 }
 

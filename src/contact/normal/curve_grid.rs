@@ -1,6 +1,7 @@
 //! Grids over the unfolded surface of a rail, and the wheel over their cells.
 
 use crate::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
+use crate::normal::gap::grid::{bilinear, continued};
 
 /// Least gap of a strip in mm above which it is not part of the contact.
 pub(super) const APART: f64 = 0.3;
@@ -253,76 +254,37 @@ impl CurveGrid {
     /// Interpolates pressures of another grid. Squares of pressures, which fall linearly to the edge of the contact and continue beyond it, are interpolated
     /// bilinearly.
     pub(super) fn pressures(&self, other: &CurveGrid, pressure: &[f64]) -> Vec<f64> {
-        let [nx, ny] = other.cells();
-        let square = |k: usize| pressure[k] * pressure[k];
-        // The continuation of a line through the next two cells in a direction in which there are `left` cells.
-        let from = |k: usize, left: usize, stride: isize| {
-            let at = |steps: isize| square(k.wrapping_add_signed(steps * stride));
-            match left {
-                0 => 0.0,
-                1 => -at(1),
-                _ => (2.0 * at(1) - at(2)).min(0.0),
-            }
-        };
-        let continued = |k: usize| {
-            let ([i, j], row) = ([k % nx, k / nx], nx as isize);
-            let along = from(k, i, -1).min(from(k, nx - 1 - i, 1));
-            let across = from(k, j, -row).min(from(k, ny - 1 - j, row));
-            along.min(across)
-        };
-        let squares: Vec<f64> = (0..pressure.len())
-            .map(|k| match pressure[k] > 0.0 {
-                true => square(k),
-                false => continued(k),
-            })
-            .collect();
-        let mut found = self.interpolated(other, &squares, false);
+        let squares = pressure.iter().map(|p| p * p).collect();
+        let width = other.x.len();
+        let squares = continued(width, squares);
+        let mut found = bilinear(&self.places_on(other), width, |number| {
+            Some(&squares[other.strip(number)? * width..])
+        });
         found.iter_mut().for_each(|p| *p = p.max(0.0).sqrt());
         found
     }
 
     /// Interpolates gaps of another grid bilinearly; beyond its cells those of the nearest cells apply.
     pub(super) fn gaps(&self, other: &CurveGrid, gap: &[f64]) -> Vec<f64> {
-        self.interpolated(other, gap, true)
-    }
-
-    fn interpolated(&self, other: &CurveGrid, values: &[f64], goes_on: bool) -> Vec<f64> {
         let width = other.x.len();
         let far = |number: i64, j: usize| (other.numbers[j] as i64 - number).abs();
-        let strip_at = |number: i64| match other.strip(number) {
-            None if goes_on => (0..other.numbers.len()).min_by_key(|j| far(number, *j)),
-            own => own,
-        };
-        let place = |at: f64, first: f64, step: f64| {
-            let at = (at - first) / step;
-            (at.floor() as i64, at - at.floor())
-        };
-        // A row has one additional value at both ends.
-        let beyond = |i: i64| (i.clamp(-1, width as i64) + 1) as usize;
-        let columns: Vec<([usize; 2], f64)> = (self.x.iter())
-            .map(|x| place(*x, other.x[0], other.step[0]))
-            .map(|(i, u)| ([i, i + 1].map(beyond), u))
-            .collect();
-        let mut row = vec![0.0; width + 2];
-        let mut out = Vec::with_capacity(self.x.len() * self.places.len());
-        for strip in &self.places {
-            let (j, v) = place(strip.s, other.places[0].s, other.step[1]);
-            row.fill(0.0);
-            for (number, share) in [(j, 1.0 - v), (j + 1, v)] {
-                let Some(strip) = strip_at(number) else {
-                    continue;
-                };
-                let values = &values[strip * width..][..width];
-                (row[1..].iter_mut().zip(values)).for_each(|(sum, value)| *sum += share * value);
-            }
-            if goes_on {
-                (row[0], row[width + 1]) = (row[1], row[width]);
-            }
-            out.extend(
-                (columns.iter()).map(|([low, high], u)| (1.0 - u) * row[*low] + u * row[*high]),
-            );
-        }
-        out
+        let nearest = |number: i64| (0..other.numbers.len()).min_by_key(|j| far(number, *j));
+        let [mut x, s] = self.places_on(other);
+        x.iter_mut()
+            .for_each(|x| *x = x.clamp(0.0, (width - 1) as f64));
+        bilinear(&[x, s], width, |number| {
+            let strip = other.strip(number).or_else(|| nearest(number))?;
+            Some(&gap[strip * width..])
+        })
+    }
+
+    /// The places of the cells along x and s, in cells from the first ones of another grid.
+    fn places_on(&self, other: &CurveGrid) -> [Vec<f64>; 2] {
+        let x = self.x.iter().map(|x| (x - other.x[0]) / other.step[0]);
+        let first = other.places[0].s;
+        let s = self.places.iter();
+        let s = s.map(|place| (place.s - first) / other.step[1]);
+        [x.collect(), s.collect()]
     }
 
     /// The strip at a place in widths of a strip from that of the first one.

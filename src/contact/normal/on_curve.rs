@@ -6,8 +6,8 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use crate::geometry::profile::POINT_SPACING;
-use crate::geometry::reference_curve::{CurvePlace, Nearest, ReferenceCurve};
+use crate::geometry::profile::{GROOVE_DEPTH, POINT_SPACING};
+use crate::geometry::reference_curve::{CurvePlace, FACING_LEAST, Nearest, ReferenceCurve};
 use crate::half_space::bent_surface::{
     BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
 };
@@ -18,7 +18,7 @@ use crate::normal::curve_grid::{CurveGrid, FREE, WheelOverGrid, extent_of};
 
 use crate::normal::gap::conjugate_gradients::{PressureInfluence, PressureTask, solve_pressure};
 use crate::normal::gap::grid::{
-    GRIDS_MAX, GridFineness, NEAR, NormalError, NormalWork, SHARE_MIN, no_touch, squares,
+    GridFineness, NEAR, NormalError, NormalWork, SHARE_MIN, first_pressure, no_touch, squares,
 };
 use crate::normal::hertz::NormalLoad;
 use crate::normal::pressure_field::field::PressureField;
@@ -26,21 +26,20 @@ use crate::normal::pressure_field::grid_pressure::GridPressure;
 use crate::normal::wheel::WheelLoad;
 use crate::numerics::ITERATIONS_MAX;
 use crate::numerics::flood_fill::groups;
+use crate::numerics::roots::{HALVINGS, bisect};
 use crate::numerics::simd::LANES;
 
 /// Cells across the largest overlap on the coarse grid.
 const FIRST: f64 = 24.0;
-/// Largest number of cells along x or s.
-const CELLS_MAX: usize = 600;
 /// A grid is fine enough if its cells have at most the wanted size over this part.
 const FINE_ENOUGH: f64 = 0.9;
-/// An intermediate grid is solved if the wanted cells are smaller by more than this factor. Chosen on contacts at gauge corners and flanges.
-const FINER_MAX: f64 = 4.0;
-
 /// Tolerance of the contact conditions on the coarse grid, relative to the deepest overlap.
 const FIRST_TOLERANCE: f64 = 5e-3;
-/// Least number of cells across a light patch, over that of the smallest patch that counts.
-const OF_LIGHT: f64 = 0.5;
+/// Largest number of cells along x or s of a grid before it is enlarged.
+const CELLS_MAX: usize = 600;
+
+/// Least number of cells across a light patch, over that of the whole contact.
+const LIGHT: f64 = 0.27;
 /// Relative tolerance of the force.
 const FORCE: f64 = 2e-5;
 /// Relative error of the force above which there is no solution.
@@ -55,12 +54,6 @@ const LINEAR: f64 = 0.05;
 pub(crate) const STEEP: f64 = 0.26;
 /// Step in mm of the search for a lowering below steep faces.
 const SLIDE_STEP: f64 = 0.5;
-/// Largest number of these steps.
-const SLIDE_STEPS: u32 = 120;
-/// Tolerance of this lowering in mm.
-const SLIDE_EXACT: f64 = 2e-3;
-/// Least cosine of the angle of a strip in the search for the height.
-const COSINE_LEAST: f64 = 0.1;
 
 /// A wheel pressed on the reference curve of a rail.
 #[derive(Debug, Clone, Copy)]
@@ -97,8 +90,6 @@ pub(crate) struct CurveContact {
     /// The gap in mm opened by tractions at each cell, if there is any.
     pub(crate) opened: Option<Vec<f64>>,
     over: WheelOverGrid,
-    /// A height of the wheel's centre in mm, and the intervals of arc length in mm in which the bodies overlap at that height. Only set on the coarse grid.
-    overlaps: (f64, Vec<[f64; 2]>),
     /// Whether the deformed surfaces of each strip nearly touch.
     near: Vec<bool>,
     /// The pressures of the patches with their first strips.
@@ -189,7 +180,7 @@ impl CurveTask<'_> {
             overlaps = self.curve.overlaps(deepest(lowering));
         }
         let mut last = None;
-        for _ in 0..GRIDS_MAX {
+        for _ in 0..ITERATIONS_MAX {
             let grid = self.over_overlaps(lowering, &overlaps)?;
             let centre = self.touch - lowering;
             let over = grid.over(self.curve, centre);
@@ -215,8 +206,6 @@ impl CurveTask<'_> {
             let next = self.touch - found.centre;
             let close = (next / lowering - 1.0).abs() < 0.1;
             let found = last.insert(found);
-            let ends = overlaps.iter().map(|overlap| ends(overlap)).collect();
-            found.overlaps = (deepest(lowering), ends);
             lowering = next.max(LOWERING_LEAST);
             if self.influence == Influence::HalfSpace {
                 found.runs = found.grid.joined(found.grid.runs(&found.pressure));
@@ -242,16 +231,15 @@ impl CurveTask<'_> {
         };
         let overlaps = |lowering: f64| self.curve.overlaps(self.touch - lowering);
         let carries = |lowering: f64| self.carried_apart_from_steep(&overlaps(lowering)) >= wanted;
-        let lowerings = (1..SLIDE_STEPS).map(|k| expected + SLIDE_STEP * f64::from(k));
-        let Some(carrying) = lowerings.into_iter().find(|lowering| carries(*lowering)) else {
-            return Ok(None);
-        };
-        let (mut low, mut width) = (carrying - SLIDE_STEP, SLIDE_STEP);
-        while width > SLIDE_EXACT {
-            width *= 0.5;
-            low += if carries(low + width) { 0.0 } else { width };
-        }
-        Ok(Some(low + width))
+        let slides = (1..).map(|k| SLIDE_STEP * f64::from(k));
+        let mut lowerings = slides
+            .take_while(|slide| *slide < GROOVE_DEPTH)
+            .map(|slide| expected + slide);
+        let carrying = lowerings.find(|lowering| carries(*lowering));
+        Ok(carrying.map(|carrying| {
+            let bracket = [carrying, carrying - SLIDE_STEP];
+            bisect(bracket, HALVINGS, carries)[0]
+        }))
     }
 
     /// Estimates the force in N of the overlaps outside steep faces. Each counts as a circle with half of its area, pressed by a sphere.
@@ -277,42 +265,7 @@ impl CurveTask<'_> {
         workspace: &mut Workspace,
         monitor: &dyn Monitor,
     ) -> Result<CurveContact, NormalError> {
-        self.finer(coarse, self.wanted(coarse), friction, workspace, monitor)
-    }
-
-    /// Finds the contact without friction on cells of an intermediate size if the wanted cells are much smaller than those of the coarse grid, for example for a
-    /// narrow patch next to a wide one. `None` otherwise, and on planes.
-    ///
-    /// # Errors
-    /// See [`coarse`](Self::coarse).
-    pub(crate) fn between(
-        &self,
-        coarse: &CurveContact,
-        workspace: &mut Workspace,
-        monitor: &dyn Monitor,
-    ) -> Result<Option<CurveContact>, NormalError> {
-        let (wanted, present) = (self.wanted(coarse), coarse.grid.step);
-        if self.curve.is_flat() || (0..2).all(|axis| present[axis] < FINER_MAX * wanted[axis]) {
-            return Ok(None);
-        }
-        let step = [0, 1].map(|axis| (present[axis] * wanted[axis]).sqrt());
-        let none = Friction::default();
-        let mut found = self
-            .roughly()
-            .finer(coarse, step, &none, workspace, monitor)?;
-        found.overlaps.clone_from(&coarse.overlaps);
-        Ok(Some(found))
-    }
-
-    /// Brings the wheel to rest on a grid with cells of a given size in mm around the contact on another grid.
-    fn finer(
-        &self,
-        coarse: &CurveContact,
-        step: [f64; 2],
-        friction: &Friction,
-        workspace: &mut Workspace,
-        monitor: &dyn Monitor,
-    ) -> Result<CurveContact, NormalError> {
+        let step = self.wanted(coarse);
         let [first, last] = extent(coarse, 0);
         let margin = coarse.grid.step[0] + (FREE as f64 + 0.5) * step[0];
         let beside = 0.5 * coarse.grid.step[1] + (FREE as f64 + 0.5) * step[1];
@@ -321,16 +274,13 @@ impl CurveTask<'_> {
             .filter(|(_, near)| **near)
             .map(|(place, _)| [place.s - beside, place.s + beside])
             .collect();
-        // Overlaps narrower than a cell of the coarse grid. A higher wheel has no other overlaps than a lower one.
+        // Overlaps narrower than a cell of the coarse grid.
         let missed = |windows: &[[f64; 2]], [low, high]: [f64; 2]| {
             windows.iter().all(|[from, to]| *to < low || *from > high)
         };
-        let (deepest, overlaps) = &coarse.overlaps;
-        if coarse.centre < *deepest || overlaps.iter().any(|of| missed(&windows, *of)) {
-            for [low, high] in self.curve.overlaps(coarse.centre).iter().map(|o| ends(o)) {
-                if missed(&windows, [low, high]) {
-                    windows.push([low - beside, high + beside]);
-                }
+        for [low, high] in self.curve.overlaps(coarse.centre).iter().map(|o| ends(o)) {
+            if missed(&windows, [low, high]) {
+                windows.push([low - beside, high + beside]);
             }
         }
         let grid = CurveGrid::new(self.curve, [first - margin, last + margin], &windows, step);
@@ -373,9 +323,7 @@ impl CurveTask<'_> {
             over: Some(before.over),
             iterations: before.work.iterations,
         };
-        let mut found = self.settled(start, friction, workspace, monitor)?;
-        found.overlaps = before.overlaps;
-        Ok(found)
+        self.settled(start, friction, workspace, monitor)
     }
 
     /// A coarse grid over all overlaps at a lowering in mm.
@@ -428,9 +376,8 @@ impl CurveTask<'_> {
             if share < SHARE_MIN {
                 continue;
             }
-            // The error of a patch falls with the power 3/2 of its cells and counts in proportion to its load.
-            let cells = self.fineness.contact * share.powf(2.0 / 3.0);
-            let cells = cells.max(OF_LIGHT * self.fineness.patch);
+            let cells = self.fineness.across(share);
+            let cells = cells.max(LIGHT * self.fineness.contact);
             for axis in [0, 1] {
                 step[axis] = step[axis].min(length(extent_of(grid, &patch, axis)) / cells);
             }
@@ -454,7 +401,7 @@ impl CurveTask<'_> {
         monitor: &dyn Monitor,
     ) -> Result<CurveContact, NormalError> {
         let mut friction = friction.clone();
-        for _ in 0..GRIDS_MAX {
+        for _ in 0..ITERATIONS_MAX {
             let mut found = self.on_grid(start, &friction, workspace, monitor)?;
             let opened = friction.opened.take();
             let Some(grid) = found.grid.enlarged(self.curve, &found.pressure) else {
@@ -468,6 +415,9 @@ impl CurveTask<'_> {
                      on them, as next to a face that is nearly vertical"
                         .to_owned(),
                 ));
+            }
+            if grid.cells().iter().any(|cells| *cells > 2 * CELLS_MAX) {
+                break;
             }
             friction.opened = opened.map(|opened| grid.gaps(&found.grid, &opened));
             start = Start {
@@ -546,7 +496,7 @@ impl CurveTask<'_> {
         let operator = operator.unwrap_or_else(|| self.operator(&grid, &over, &runs, workspace));
         let wanted = self.wanted_force(friction)?;
         let weight = |place: &CurvePlace| match wanted {
-            Some(_) => place.angle.cos().max(COSINE_LEAST),
+            Some(_) => place.angle.cos().max(FACING_LEAST),
             None => 1.0,
         };
         let weights: Vec<f64> = grid.places.iter().map(weight).collect();
@@ -573,7 +523,8 @@ impl CurveTask<'_> {
             each_row(&mut pressure, &weights, |p, weight| p * weight);
             if pressure.iter().all(|p| *p == 0.0) {
                 let depth = (-least).max(self.expected);
-                pressure = first_pressure(&weighted, depth, grid.area(), self.elasticity);
+                let modulus = self.elasticity.contact_modulus();
+                pressure = first_pressure(&weighted, depth, grid.area(), modulus);
             }
             let task = PressureTask {
                 gap: &weighted,
@@ -602,7 +553,6 @@ impl CurveTask<'_> {
                 return Ok(CurveContact {
                     patches: LazyField::default(),
                     opened: None,
-                    overlaps: (f64::INFINITY, Vec::new()),
                     near: near.collect(),
                     gap: over.at(centre),
                     work: NormalWork {
@@ -683,16 +633,6 @@ struct Start {
     operator: Option<BentOperator>,
     over: Option<WheelOverGrid>,
     iterations: u32,
-}
-
-/// A first pressure: Hertz's law over the part that overlaps by more than half of the given deepest overlap.
-fn first_pressure(gap: &[f64], depth: f64, cell: f64, elasticity: &Elasticity) -> Vec<f64> {
-    let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
-    let part = |gap: &f64| (1.0 - 2.0 * (gap - least) / depth).max(0.0);
-    let inside = gap.iter().filter(|gap| part(gap) > 0.0).count();
-    let radius = (inside as f64 * cell / PI).sqrt();
-    let largest = elasticity.contact_modulus() * depth / (PI * radius);
-    gap.iter().map(|gap| largest * part(gap).sqrt()).collect()
 }
 
 /// The force of pressures that corresponds to the load: the vertical one, or the sum of the normal ones.

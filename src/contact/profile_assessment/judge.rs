@@ -5,7 +5,7 @@ use std::mem::discriminant;
 use crate::geometry::holes::{LENGTH_MIN, WIDE};
 use crate::geometry::profile::{Body, Profile};
 use crate::geometry::profile_quality::{
-    LocalDefect, NoiseLevel, REFERENCE_MIN, UnderContact, advised_smoothing, under_contact,
+    LONG, LocalDefect, NoiseLevel, REFERENCE_MIN, UnderContact, advised_smoothing, under_contact,
 };
 use crate::geometry::wheel_rail::WheelRail;
 use crate::normal::gap::grid::SHARE_MIN;
@@ -28,9 +28,6 @@ const AMBIGUOUS_MAX: f64 = 0.5;
 /// Waviness relative to the largest pressure from which it is a defect without noise, outlier or step. Two arcs that meet have some too: an
 /// unworn 60E1 reaches 0.12 at its gauge corner.
 const WAVES_BEYOND_SHAPE: f64 = 0.3;
-/// Length in mm from which a chord wider than the patch gets a remark, however certain the curve across it is. The arcs of heads and treads are
-/// 10 to 50 mm long, so that a longer chord may hide an arc that neither of the two curves through the points shows.
-const CHORD_HIDES_ARC: f64 = 10.0;
 /// Pressure in MPa below which errors of a profile are harmless, so that no job fails because of them.
 const PRESSURE_LIGHT: f64 = 200.0;
 
@@ -300,7 +297,8 @@ fn spacing(own: &Under, patch: FoundPatch) -> Option<Defect> {
     let is_open = found.roughness.ambiguity > ROUGH * patch.pressure;
     // Chords up to the least length are too long only for the patch of a lightly loaded flange, which touches over some tenths of a mm.
     let is_wide = length > LENGTH_MIN && found.over_width > 1.0;
-    (is_wide && (is_open || length > CHORD_HIDES_ARC)).then(|| Defect {
+    // A long chord may hide an arc that neither of the two curves through the points shows.
+    (is_wide && (is_open || length > LONG)).then(|| Defect {
         share: own.rough() / patch.pressure,
         refused: patch.load_share > SHARE_MIN && found.over_width > WIDE,
         ..Defect::certain(own.body, patch.number, length, remark)

@@ -215,9 +215,6 @@ impl WheelSolve<'_> {
         if !coupled {
             return Ok((friction, coarse));
         }
-        if let Some(between) = task.between(&coarse, workspace, self.watch)? {
-            coarse = between;
-        }
         let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
         let negligible = NEGLIGIBLE_OF_TARGET * run.resolution.target_or_usual();
         let limit = problem.friction.largest();

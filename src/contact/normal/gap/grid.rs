@@ -9,7 +9,6 @@ use crate::monitor::Stop;
 use crate::normal::gap::conjugate_gradients;
 use crate::normal::gap::conjugate_gradients::PressureAnswer;
 use crate::normal::gap::surface::{GapSurface, Window};
-use crate::normal::gap::task::SearchBox;
 use crate::normal::pressure_field::field::PressureField;
 use crate::numerics::flood_fill::groups;
 use crate::remark::entry::RemarkEntry;
@@ -56,16 +55,11 @@ pub(crate) struct NextGrid {
     pub(crate) capped: bool,
 }
 
-/// Required numbers of cells across the contact and its patches.
+/// Required number of cells across the contact, and when a grid is good enough.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct GridFineness {
-    /// Cells of the first grid along either axis; it locates the contact.
-    pub(crate) first: usize,
     /// Cells across the whole contact.
     pub(crate) contact: f64,
-    /// Cells across the smallest patch that counts.
-    pub(crate) patch: f64,
-
     /// Whether the result is compared with that of the previous grid.
     pub(crate) settles: bool,
     /// Violation of the contact conditions, relative to the deepest overlap, that ends the iteration on all grids but the first.
@@ -151,17 +145,6 @@ impl PressureGrid {
         about_x.chain(about_y)
     }
 
-    /// A first pressure: Hertz's law over the region that overlaps by more than half of the approach.
-    pub(crate) fn first_pressure(&self, gap: &[f64], reach: &SearchBox, modulus: f64) -> Vec<f64> {
-        let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
-        let depth = (reach.level - least).max(1e-3 * (reach.level - reach.least));
-        let part = |h: &f64| (1.0 - 2.0 * (h - least) / depth).max(0.0);
-        let inside = gap.iter().filter(|h| part(h) > 0.0).count();
-        let radius = (inside as f64 * self.step[0] * self.step[1] / PI).sqrt();
-        let largest = 2.0 * modulus * depth / (PI * radius);
-        gap.iter().map(|h| largest * part(h).sqrt()).collect()
-    }
-
     /// Interpolates pressures of another grid. Their squares, which fall linearly to 0 at the edge and are continued beyond it, are interpolated bilinearly. If all
     /// results are 0, the deepest cell gets the largest pressure.
     pub(crate) fn interpolate(
@@ -171,32 +154,16 @@ impl PressureGrid {
         gap: &[f64],
     ) -> Vec<f64> {
         let squares = continued(other.cells[0], squares(other.cells[0], pressure));
-        let places = [0, 1].map(|axis| -> Vec<(isize, f64)> {
+        let places = [0, 1].map(|axis| {
             let first = other.range(axis)[0] + 0.5 * other.step[axis];
-            self.centres(axis)
-                .into_iter()
-                .map(|x| {
-                    let at = (x - first) / other.step[axis];
-                    (at.floor() as isize, at - at.floor())
-                })
-                .collect()
+            let at = move |x: f64| (x - first) / other.step[axis];
+            self.centres(axis).into_iter().map(at).collect::<Vec<f64>>()
         });
-        let value = |i: isize, j: isize| {
-            let inside = |k: isize, axis: usize| (0..other.cells[axis] as isize).contains(&k);
-            if inside(i, 0) && inside(j, 1) {
-                squares[j as usize * other.cells[0] + i as usize]
-            } else {
-                0.0
-            }
-        };
-        let mut out = Vec::with_capacity(self.cells[0] * self.cells[1]);
-        for &(j, v) in &places[1] {
-            for &(i, u) in &places[0] {
-                let row = |j: isize| (1.0 - u) * value(i, j) + u * value(i + 1, j);
-                let square = (1.0 - v) * row(j) + v * row(j + 1);
-                out.push(square.max(0.0).sqrt());
-            }
-        }
+        let width = other.cells[0];
+        let mut out = bilinear(&places, width, |j| {
+            squares.get(usize::try_from(j).ok()? * width..)
+        });
+        out.iter_mut().for_each(|p| *p = p.max(0.0).sqrt());
         if out.iter().all(|p| *p == 0.0) {
             let deepest = (0..gap.len()).min_by(|a, b| gap[*a].total_cmp(&gap[*b]));
             out[deepest.unwrap_or(0)] = pressure.iter().copied().fold(0.0, f64::max);
@@ -267,10 +234,8 @@ impl PressureGrid {
             contact.join(self.extent(patch));
             let load: f64 = patch.iter().map(|k| pressed.pressure[*k]).sum();
             if load >= SHARE_MIN * total {
-                let wanted = match patches.len() {
-                    1 => resolution.contact,
-                    _ => resolution.patch,
-                };
+                let wanted = resolution.across(load / total);
+                let wanted = wanted.max(resolution.resolving());
                 let chords = self.chords_of(patch);
                 for (k, step) in steps.iter_mut().enumerate() {
                     // The pressure at an end of a slender patch changes over its half-width.
@@ -389,32 +354,43 @@ pub(crate) fn within(window: Window, limits: Window) -> Window {
     })
 }
 
+/// A first pressure: Hertz's law over the part of a gap that overlaps by more than half of a depth in mm. `cell` is the area of a cell in mm², `modulus` the contact
+/// modulus in MPa.
+pub(crate) fn first_pressure(gap: &[f64], depth: f64, cell: f64, modulus: f64) -> Vec<f64> {
+    let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
+    let part = |gap: &f64| (1.0 - 2.0 * (gap - least) / depth).max(0.0);
+    let inside = gap.iter().filter(|gap| part(gap) > 0.0).count();
+    let radius = (inside as f64 * cell / PI).sqrt();
+    let largest = 2.0 * modulus * depth / (PI * radius);
+    gap.iter().map(|gap| largest * part(gap).sqrt()).collect()
+}
+
 /// Part of the load below which a patch need not be resolved.
 pub(crate) const SHARE_MIN: f64 = 0.02;
+
+/// Least number of cells across a resolved patch. The width and pressure of Hertz's contact are then accurate to 1 %.
+pub(crate) const CELLS_ACROSS_MIN: f64 = 11.0;
+
+/// Cells along either axis of a first grid over the box in which the contact is sought.
+pub(crate) const FIRST: usize = 32;
 
 /// Resolution of the last grid. With 44 cells across the contact the error of the resultants is below 0.0007 for nine of ten gaps (see `REGION` of
 /// `error_estimate.rs`).
 pub(crate) const RESOLUTION: GridFineness = GridFineness {
-    first: 32,
     contact: 44.0,
-    patch: 24.0,
-
     settles: true,
     tolerance: 2e-4,
 };
 
-/// Target of the error of the resultants, relative to μN, below which grids are finer.
-pub(crate) const TARGET_USUAL: f64 = 0.002;
+/// Targets of the error of the resultants, relative to μN, between which a contact has the cells of [`RESOLUTION`].
+pub(crate) const TARGETS: [f64; 2] = [0.002, 0.005];
 
-/// Power of the target over [`TARGET_USUAL`] with which cells grow: the error falls with the power 3/2 of their size.
-pub(crate) const TARGET_POWER: f64 = -2.0 / 3.0;
+/// Largest ratio of a looser target to the upper one of [`TARGETS`] that reduces the number of cells, to 25. Gaps then take two thirds of the time
+/// (`cargo bench --bench calibrate gap profiles`).
+pub(crate) const LOOSER_MAX: f64 = 2.3;
 
-/// Targets between which patches have fewer cells, the looser the target. The default target has all cells.
-pub(crate) const TARGETS_LOOSE: [f64; 2] = [0.005, 0.02];
-
-/// Power of the target with which the number of cells then falls, to 25 cells at 0.02. At that target gaps take two thirds of the time; .97 and .95 of them are
-/// covered, instead of .985 and .99 with all cells (`cargo bench --bench calibrate gap profiles`).
-pub(crate) const LOOSE_POWER: f64 = -0.4;
+/// Power of the allowed error with which the number of cells falls: the error falls with the power 3/2 of their number.
+pub(crate) const CELLS_BY_ERROR: f64 = -2.0 / 3.0;
 
 /// Ratio of the wanted to the present size of cells from which a grid is fine enough.
 pub(crate) const COARSER_MAX: f64 = 0.8;
@@ -430,13 +406,6 @@ pub(crate) const REFINEMENT: f64 = 1.6;
 
 /// Violation of the contact conditions, relative to the deepest overlap, that ends the iteration on the first grid.
 pub(crate) const TOLERANCE_FIRST: f64 = 2e-3;
-
-/// Largest number of grids.
-pub(crate) const GRIDS_MAX: usize = 12;
-
-/// If the approach exceeds the level of a box, the next box is made for the approach plus this part of the depth of overlap. Chosen by judgement; the box grows again
-/// if it is not enough.
-pub(crate) const LEVEL_BEYOND: f64 = 0.2;
 
 /// Gap of a deformed surface over the deepest overlap below which a cell is part of the next grid.
 pub(crate) const NEAR: f64 = 0.03;
@@ -534,32 +503,14 @@ impl PatchGrid {
     }
 }
 
-/// The end of the refinement of the grids of a gap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum GridsExit {
-    /// Finer grids no longer change the result.
-    Settled,
-    /// The result still changes on the finest grid.
-    Rough,
-    /// The largest number of grids was reached.
-    GridsUsedUp,
-}
-
-impl GridsExit {
-    /// Whether the result is independent of the grid.
-    pub(crate) fn settled(self) -> bool {
-        self == GridsExit::Settled
-    }
-}
-
 /// The solution on the last grids.
 pub(crate) struct GapOutcome {
     /// The grids with their pressures: one, or one per patch.
     pub(crate) patch_grids: Vec<PatchGrid>,
     /// Iterations over all grids.
     pub(crate) iterations: u32,
-    /// The end of the refinement.
-    pub(crate) exit: GridsExit,
+    /// Whether finer grids no longer change the result.
+    pub(crate) settled: bool,
     /// See [`NormalWork`].
     pub(crate) pressure_change: f64,
     /// The least gap in mm.
@@ -643,6 +594,35 @@ fn displacement(distance: f64) -> f64 {
     let next = DISPLACEMENT.partition_point(|(at, _)| *at <= distance);
     let ((x0, y0), (x1, y1)) = (DISPLACEMENT[next - 1], DISPLACEMENT[next]);
     y0 + (y1 - y0) * (distance - x0) / (x1 - x0)
+}
+
+/// Interpolates values bilinearly at places `[x, y]` in cells from the first centre. `row` returns the `width` values of a row; values outside are 0.
+pub(crate) fn bilinear<'v>(
+    [x, y]: &[Vec<f64>; 2],
+    width: usize,
+    row: impl Fn(i64) -> Option<&'v [f64]>,
+) -> Vec<f64> {
+    let place = |at: &f64| (at.floor() as i64, at - at.floor());
+    // A row has one additional value at both ends.
+    let beyond = |i: i64| (i.clamp(-1, width as i64) + 1) as usize;
+    let columns: Vec<([usize; 2], f64)> = x
+        .iter()
+        .map(place)
+        .map(|(i, u)| ([i, i + 1].map(beyond), u))
+        .collect();
+    let mut sums = vec![0.0; width + 2];
+    let mut out = Vec::with_capacity(x.len() * y.len());
+    for (j, v) in y.iter().map(place) {
+        sums.fill(0.0);
+        for (j, share) in [(j, 1.0 - v), (j + 1, v)] {
+            let values = row(j).into_iter().flatten();
+            let sums = sums[1..=width].iter_mut().zip(values);
+            sums.for_each(|(sum, value)| *sum += share * value);
+        }
+        let at = |([low, high], u): &([usize; 2], f64)| (1.0 - u) * sums[*low] + u * sums[*high];
+        out.extend(columns.iter().map(at));
+    }
+    out
 }
 
 /// Continues the squares below 0 in the cells next to the contact: the mean over all eight directions of the extrapolation from two cells inside in a row, or the negative

@@ -1,7 +1,8 @@
 //! The solution of a gap: a pressure field from the last grids, and remarks.
 
 use crate::normal::gap::grid::{
-    GapOutcome, NormalAnswer, NormalError, NormalWork, PatchGrid, SHARE_MIN, squares,
+    CELLS_ACROSS_MIN, GapOutcome, NormalAnswer, NormalError, NormalWork, PatchGrid, SHARE_MIN,
+    squares,
 };
 use crate::normal::gap::task::GapTask;
 use crate::normal::pressure_field::field::PressureField;
@@ -13,9 +14,6 @@ use crate::remark::list::Remark;
 pub(crate) const HALF_WIDTH_USUAL_MAX: f64 = 0.3;
 /// Ratio of the approach to the smaller half-width above which strains are too large for linear elasticity. Chosen by judgement.
 pub(crate) const APPROACH_USUAL_MAX: f64 = 0.15;
-
-/// Least number of cells across a resolved patch. The width and pressure of Hertz's contact are then accurate to 1 %.
-const CELLS_ACROSS_MIN: f64 = 11.0;
 
 /// An unresolved patch.
 struct Coarse {
@@ -63,7 +61,7 @@ impl GapTask {
                 None => remark.into(),
             });
         }
-        if !outcome.exit.settled() && coarse.is_empty() {
+        if !outcome.settled && coarse.is_empty() {
             remarks.push(Remark::GapRough {}.into());
         }
         remarks.extend(self.remarks(&field, pressed.approach - outcome.least));

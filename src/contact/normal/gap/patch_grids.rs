@@ -6,21 +6,17 @@
 use crate::half_space::grid_operator::GridWorkspace;
 use crate::monitor::Monitor;
 use crate::normal::gap::grid::{
-    GRIDS_MAX, GapOutcome, GridFineness, GridsExit, NEAR, NormalError, PatchGrid, PressureGrid,
-    within,
+    FIRST, GapOutcome, GridFineness, NEAR, NormalError, PatchGrid, PressureGrid, within,
 };
-use crate::normal::gap::surface::{GapSurface, Window};
+use crate::normal::gap::surface::{GapSurface, Window, around};
 use crate::normal::gap::task::{GapTask, SearchBox};
 use crate::normal::hertz::NormalLoad;
+use crate::numerics::ITERATIONS_MAX;
 
 /// Largest number of patches with their own grids; a gap with more patches is rough.
 const PATCHES_MAX: usize = 6;
-/// Change of the load of a patch per round, relative to the total load, that ends the iteration.
-const LOAD_CHANGE: f64 = 1e-4;
 /// Number of samples along either axis of the gap opened by the loads of other patches.
 const SAMPLES: usize = 12;
-/// Number of cells along either axis of a grid around a patch that was not found before.
-const CELLS_UNSEEN: usize = 24;
 
 /// A force `[x, y, N]`.
 type PointLoad = [f64; 3];
@@ -43,12 +39,12 @@ impl GapTask {
         let mut found = GapOutcome {
             patch_grids: vec![whole.clone()],
             iterations: 0,
-            exit: GridsExit::GridsUsedUp,
+            settled: false,
             pressure_change: 0.0,
             least,
         };
-        let mut rough = GridsExit::Settled;
-        for _ in 0..GRIDS_MAX {
+        let mut settled = true;
+        for _ in 0..ITERATIONS_MAX {
             let loads: Vec<PointLoad> = found.patch_grids.iter().flat_map(point_loads).collect();
             let mut patch_grids = Vec::with_capacity(grids.len());
             let (mut stiffness, mut change) = (0.0, 0.0_f64);
@@ -79,9 +75,7 @@ impl GapTask {
                     task.refined(grid, start, reach, fineness, workspace, monitor)?;
                 found.iterations += refined.iterations;
                 found.pressure_change = refined.pressure_change;
-                if !refined.exit.settled() {
-                    rough = refined.exit;
-                }
+                settled &= refined.settled;
                 patch_grids.extend(refined.patch_grids);
                 let load = patch_grids[patch_grids.len() - 1].load();
                 let before: f64 = own.iter().map(|[.., force]| force).sum();
@@ -103,10 +97,10 @@ impl GapTask {
                     pressure.for_each(|p| *p *= scale);
                 }
             }
-            if change.max(missed.abs()) <= LOAD_CHANGE * total {
+            if change.max(missed.abs()) <= fineness.tolerance * total {
                 let unseen = self.unseen(&found.patch_grids, approach - least);
                 if unseen.is_empty() {
-                    found.exit = rough;
+                    found.settled = settled;
                     break;
                 }
                 grids.extend(unseen);
@@ -123,17 +117,7 @@ impl GapTask {
     /// The gap over and around a grid, including the gap opened by point loads elsewhere.
     fn opened(&self, grid: &PressureGrid, loads: &[&PointLoad]) -> GapSurface {
         let limits = self.gap.window();
-        let axis = |k: usize| -> Vec<f64> {
-            let [low, high] = grid.range(k);
-            let around = 0.25 * (high - low);
-            let (low, high) = (
-                (low - around).max(limits[k][0]),
-                (high + around).min(limits[k][1]),
-            );
-            let step = (high - low) / (SAMPLES - 1) as f64;
-            (0..SAMPLES).map(|i| low + i as f64 * step).collect()
-        };
-        let (x, y) = (axis(0), axis(1));
+        let [x, y] = [0, 1].map(|k| around(grid.range(k), limits[k], SAMPLES));
         let rows = y.iter().map(|y| {
             let at = |x: &f64| self.displaced([*x, *y], loads.iter().copied());
             x.iter().map(at).collect()
@@ -180,7 +164,7 @@ impl GapTask {
             let mirrored = [self.gap.is_mirrored()[0] && samples[0].is_empty(), false];
             found.push(PressureGrid::new(
                 within(window, limits),
-                [CELLS_UNSEEN; 2],
+                [FIRST; 2],
                 mirrored,
             ));
         }

@@ -8,13 +8,14 @@ use crate::half_space::grid_operator::{GridOperator, GridWorkspace};
 use crate::monitor::Monitor;
 use crate::normal::gap::conjugate_gradients::{PressureAnswer, PressureTask, solve_pressure};
 use crate::normal::gap::grid::{
-    APPROACH_CHANGE, COARSER_MAX, GRIDS_MAX, GapOutcome, GridFineness, GridSide, GridsExit,
-    LEVEL_BEYOND, LOOSE_POWER, NEAR, NormalAnswer, NormalError, PRESSURE_CHANGE, PatchGrid,
-    PressureGrid, REFINEMENT, RESOLUTION, TARGET_POWER, TARGET_USUAL, TARGETS_LOOSE,
-    TOLERANCE_FIRST, edge_reached, no_touch,
+    APPROACH_CHANGE, CELLS_ACROSS_MIN, CELLS_BY_ERROR, COARSER_MAX, FIRST, GapOutcome,
+    GridFineness, GridSide, LOOSER_MAX, NEAR, NormalAnswer, NormalError, PRESSURE_CHANGE,
+    PatchGrid, PressureGrid, REFINEMENT, RESOLUTION, TARGETS, TOLERANCE_FIRST, edge_reached,
+    first_pressure, no_touch,
 };
-use crate::normal::gap::task::{GapTask, SearchBox, reach_of_level};
+use crate::normal::gap::task::{GapTask, MARGIN, SearchBox, reach_of_level};
 use crate::normal::hertz::NormalLoad;
+use crate::numerics::ITERATIONS_MAX;
 
 impl GapTask {
     /// Checks the gap by its samples, without solving.
@@ -56,7 +57,7 @@ impl GapTask {
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
         let reach = self.touching_reach()?;
-        let grid = self.first_grid(&reach, resolution);
+        let grid = self.first_grid(&reach);
         let (whole, capped) = self.refined(grid, None, reach, resolution, workspace, monitor)?;
         if capped
             && let Some(found) = self.patch_by_patch(
@@ -75,9 +76,8 @@ impl GapTask {
         self.found(whole)
     }
 
-    fn first_grid(&self, reach: &SearchBox, resolution: GridFineness) -> PressureGrid {
-        let cells = [resolution.first; 2];
-        PressureGrid::new(reach.window, cells, self.gap.is_mirrored())
+    fn first_grid(&self, reach: &SearchBox) -> PressureGrid {
+        PressureGrid::new(reach.window, [FIRST; 2], self.gap.is_mirrored())
     }
 
     /// Refines the grid until it is fine enough, starting from a solution on another grid if there is one. Also returns whether a patch needs more cells than the last
@@ -92,8 +92,8 @@ impl GapTask {
         monitor: &dyn Monitor,
     ) -> Result<(GapOutcome, bool), NormalError> {
         let (mut iterations, mut pressure_change) = (0, 0.0);
-        let (mut exit, mut capped) = (GridsExit::GridsUsedUp, false);
-        for _ in 0..GRIDS_MAX {
+        let (mut settled, mut capped) = (false, false);
+        for _ in 0..ITERATIONS_MAX {
             let pressed = {
                 let start = GridStart {
                     before: solved.as_ref(),
@@ -106,20 +106,19 @@ impl GapTask {
             if let Some((_, before)) = &solved {
                 pressure_change = before.largest() / pressed.largest() - 1.0;
             }
+            let depth = pressed.approach - reach.least;
             let next = if pressed.approach > reach.level {
                 // The estimate was too small, so parts of the gap beyond the box may touch as well.
-                let depth = pressed.approach - reach.least;
-                reach = reach_of_level(&self.gap, pressed.approach + LEVEL_BEYOND * depth);
-                NextStep::PressureGrid(self.first_grid(&reach, resolution))
+                reach = reach_of_level(&self.gap, reach.least + MARGIN * depth);
+                NextStep::PressureGrid(self.first_grid(&reach))
             } else {
-                let depth = pressed.approach - reach.least;
                 self.next_grid(&grid, &pressed, solved.as_ref(), depth, resolution)?
             };
             solved = Some((grid, pressed));
             match next {
                 NextStep::PressureGrid(next) => grid = next,
-                NextStep::End(reason, last_capped) => {
-                    (exit, capped) = (reason, last_capped);
+                NextStep::End(end) => {
+                    (settled, capped) = (end.settled, end.capped);
                     break;
                 }
             }
@@ -130,7 +129,7 @@ impl GapTask {
         let outcome = GapOutcome {
             patch_grids: vec![PatchGrid { grid, pressed }],
             iterations,
-            exit,
+            settled,
             pressure_change,
             least: reach.least,
         };
@@ -160,19 +159,22 @@ impl GapTask {
         monitor: &dyn Monitor,
     ) -> Result<PressureAnswer, NormalError> {
         let gap = grid.gap(&self.gap);
+        let cell = grid.step[0] * grid.step[1];
         let (start, tolerance) = match before {
             Some((coarse, pressed)) => {
                 (grid.interpolate(coarse, &pressed.pressure, &gap), tolerance)
             }
-            None => (
-                grid.first_pressure(&gap, reach, self.contact_modulus),
-                TOLERANCE_FIRST,
-            ),
+            None => {
+                let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
+                let depth = (reach.level - least).max(1e-3 * (reach.level - reach.least));
+                let pressure = first_pressure(&gap, depth, cell, self.contact_modulus);
+                (pressure, TOLERANCE_FIRST)
+            }
         };
         let influence = GridOperator::new(grid.cells, grid.step, self.contact_modulus, workspace);
         let task = PressureTask {
             gap: &gap,
-            cell: grid.step[0] * grid.step[1],
+            cell,
             loading: self.loading,
             tolerance,
         };
@@ -207,8 +209,9 @@ impl GapTask {
             return Err(edge_reached(*side, limits));
         }
         let capped = wanted.capped;
+        let end = |settled: bool| Ok(NextStep::End(GridsEnd { settled, capped }));
         if !resolution.settles {
-            return Ok(NextStep::End(GridsExit::Settled, capped));
+            return end(true);
         }
         let Some((coarse, before)) = before else {
             // The first grid is solved roughly and has nothing to compare with.
@@ -218,12 +221,12 @@ impl GapTask {
         if (pressed.approach - before.approach).abs() <= APPROACH_CHANGE * ratio * depth
             && (before.largest() / pressed.largest() - 1.0).abs() <= PRESSURE_CHANGE * ratio
         {
-            return Ok(NextStep::End(GridsExit::Settled, capped));
+            return end(true);
         }
         let cells = grid.cells.map(|n| (n as f64 * REFINEMENT) as usize);
         let finer = PressureGrid::new(wanted.window, cells, grid.mirrored);
         if (0..2).all(|k| finer.step[k] > COARSER_MAX * grid.step[k]) {
-            return Ok(NextStep::End(GridsExit::Rough, capped));
+            return end(false);
         }
         Ok(NextStep::PressureGrid(finer))
     }
@@ -243,8 +246,15 @@ struct GridStart<'a> {
 /// The step after a grid.
 enum NextStep {
     PressureGrid(PressureGrid),
-    /// The grid is the last one; the flag says whether a patch needs more cells than a grid may have.
-    End(GridsExit, bool),
+    End(GridsEnd),
+}
+
+/// The end of the refinement.
+struct GridsEnd {
+    /// See [`GapOutcome::settled`].
+    settled: bool,
+    /// Whether a patch needs more cells than a grid may have.
+    capped: bool,
 }
 
 impl GridFineness {
@@ -258,18 +268,26 @@ impl GridFineness {
 
     /// The resolution for a target of the error of the resultants relative to μN: finer below 0.002 and coarser above 0.005.
     pub(crate) fn for_answer(target: f64) -> GridFineness {
-        let mut cells = (target.min(TARGET_USUAL) / TARGET_USUAL).powf(TARGET_POWER);
-        let mut looser = 1.0;
-        if target.is_finite() {
-            let [least, most] = TARGETS_LOOSE;
-            looser = target.clamp(least, most) / least;
+        if !target.is_finite() {
+            return RESOLUTION;
         }
-        cells *= looser.powf(LOOSE_POWER);
+        let [least, most] = TARGETS;
+        let looser = (target / target.clamp(least, most)).min(LOOSER_MAX);
         GridFineness {
-            contact: cells * RESOLUTION.contact,
-            patch: cells * RESOLUTION.patch,
-            tolerance: looser * RESOLUTION.tolerance,
+            contact: looser.powf(CELLS_BY_ERROR) * RESOLUTION.contact,
+            tolerance: looser.max(1.0) * RESOLUTION.tolerance,
             ..RESOLUTION
         }
+    }
+
+    /// Cells across a patch with a part of the load. The error of a patch counts in proportion to its load.
+    pub(crate) fn across(self, share: f64) -> f64 {
+        self.contact / share.powf(CELLS_BY_ERROR)
+    }
+
+    /// Least number of cells across a patch of a gap, so that it is resolved.
+    pub(crate) fn resolving(self) -> f64 {
+        let finer = (self.contact / RESOLUTION.contact).max(1.0);
+        finer * CELLS_ACROSS_MIN / COARSER_MAX
     }
 }

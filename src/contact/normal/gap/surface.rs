@@ -45,6 +45,17 @@ pub struct SampledSurface {
 /// Where the gap is known, `[low, high]` in mm along x and y; infinite where it is given by a formula.
 pub type Window = [[f64; 2]; 2];
 
+/// Width of the margin of [`around`] over the extent. Chosen by judgement.
+const AROUND: f64 = 0.25;
+
+/// Sample points over an extent and a margin around it, within the limits of the data.
+pub(crate) fn around([low, high]: [f64; 2], [least, most]: [f64; 2], samples: usize) -> Vec<f64> {
+    let margin = AROUND * (high - low);
+    let (low, high) = ((low - margin).max(least), (high + margin).min(most));
+    let step = (high - low) / (samples - 1) as f64;
+    (0..samples).map(|k| low + k as f64 * step).collect()
+}
+
 impl GapSurface {
     /// The gap of a cross-section `(y, gap)` that rolls on a circle; at least 2 samples, y increasing.
     pub fn profile(rolling: f64, y: &[f64], gap: &[f64]) -> GapSurface {

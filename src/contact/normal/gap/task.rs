@@ -78,7 +78,7 @@ const SAMPLES_MAX: usize = 400;
 /// Part of a box along both axes that the region must fill. Chosen by judgement.
 const FILLED: f64 = 0.5;
 /// Safety factor on the estimated approach. On smooth gaps it was never too small; otherwise the solution shows it and the box grows.
-const MARGIN: f64 = 1.3;
+pub(super) const MARGIN: f64 = 1.3;
 
 /// A box of the contact plane with the level it was made for.
 #[derive(Debug, Clone, Copy, PartialEq)]

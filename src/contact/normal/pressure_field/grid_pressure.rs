@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use crate::normal::hertz::Patch;
 use crate::numerics::flood_fill::groups;
-use crate::numerics::roots::{bisect, maximum};
+use crate::numerics::roots::{HALVINGS, bisect, maximum};
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 
@@ -284,8 +284,6 @@ pub(crate) struct SampledLoad {
 /// Least number of samples along and across a resolved patch. With fewer, its edge is uncertain and its force is wrong by more than about 2 %: for Hertz's pressure, the
 /// sum of the samples is wrong by up to 2 % with 9 samples, and 0.5 % with 18.
 const SAMPLES_ACROSS_MIN: usize = 8;
-/// Number of halvings of the line between two samples on which a patch ends. They leave 1e-11 of it, which makes mirror images equal to 1e-9; 1e-9 was not enough.
-const HALVINGS: u32 = 37;
 
 /// The ends of a patch along x, each with its line.
 struct FarthestLines {
