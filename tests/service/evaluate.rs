@@ -193,30 +193,15 @@ async fn faults_of_rows_name_row_and_column_and_limits_hold() {
     assert_problem(&answer, 413, "body-too-large", "evaluate-max-mib");
 }
 
-/// Tests that the range of a column is that of its values in the unit of the case.
+/// Tests that columns of a speed and of truth values vary the motion of a wheelset and the contact, in rows and in a batch.
 #[tokio::test]
-async fn numbers_are_compared_with_the_allowed_range_in_the_unit_of_the_case() {
-    let server = Server::start().await;
-    let forces = async |columns: Value| {
-        let answer = evaluate(&server, template("table"), columns).await.is(200);
-        answer.json["columns"]["force_x_n"].clone()
-    };
-    assert_eq!(
-        forces(json!({ "mue [‰]": [250] })).await,
-        forces(json!({ "friction_coefficient": [0.25] })).await
-    );
-    let answer = evaluate(&server, template("table"), json!({ "mue [‰]": [250_000] })).await;
-    assert_problem(&answer, 422, "faulty-case", "");
-    let said = "250000 given, 250 in the unit of the case; a number from 0 to 100 is needed";
-    assert!(answer.text.contains(said), "{}", answer.text);
-}
-
-/// Tests that a column of the speed varies that of a wheelset's motion, in rows and in a batch.
-#[tokio::test]
-async fn a_column_of_the_speed_varies_the_motion_of_a_wheelset() {
+async fn columns_of_speeds_and_truth_values_vary_a_wheel_on_a_rail() {
     let server = Server::start().await;
     let (mut case, _) = wheel_on_rail();
-    case["motion"] = json!({ "wheelset": { "speed_mm_per_s": 20_000, "free_rolling_radius_mm": 460, "yaw_rate_rad_per_s": 0.5 } });
+    case["motion"] = json!({ "wheelset": {
+        "speed_mm_per_s": 20_000, "free_rolling_radius_mm": 460, "yaw_rate_rad_per_s": 0.5
+    } });
+    let place = "/contact/accept_rough_profiles";
     let mut expected = Vec::new();
     for speed in [10_000.0, 30_000.0] {
         let mut single = case.clone();
@@ -225,35 +210,20 @@ async fn a_column_of_the_speed_varies_the_motion_of_a_wheelset() {
         expected.push(solved["result"]["total"][0]["force_y_n"].clone());
     }
     assert_ne!(expected[0], expected[1]);
-    let rows = evaluate(&server, case.clone(), json!({ "V [km/h]": [36, 108] })).await;
-    assert_eq!(rows.is(200).json["columns"]["force_y_n"], json!(expected));
-    let (case, table) = (case.to_string(), "V [km/h]\n36\n108\n");
-    let parts = [("name=\"template\"", &*case), ("name=\"table\"", table)];
+    let columns = json!({ "V [km/h]": [36, 108], place: [true, false] });
+    let rows = evaluate(&server, case.clone(), columns).await.is(200);
+    assert_eq!(rows.json["columns"]["force_y_n"], json!(expected));
+    let (case, table) = (
+        case.to_string(),
+        format!("V [km/h],{place}\n36,True\n108,FALSE\n"),
+    );
+    let parts = [("name=\"template\"", &*case), ("name=\"table\"", &*table)];
     let batch = upload(&server, "/v1/batches", &parts).await.is(202);
     let solved = results(&server, &batch.json, "?wait=60").await;
     let solved = solved
         .iter()
         .map(|one| &one["result"]["total"][0]["force_y_n"]);
     assert!(solved.eq(&expected));
-}
-
-/// Tests that columns of truth values are those of a case, in JSON and as programs write them in CSV.
-#[tokio::test]
-async fn a_column_of_truth_values_varies_a_member() {
-    let server = Server::start().await;
-    let (case, _) = wheel_on_rail();
-    let place = "/contact/accept_rough_profiles";
-    let rows = evaluate(&server, case.clone(), json!({ place: [true, false] })).await;
-    let expected = &rows.is(200).json["columns"]["force_x_n"];
-    assert!(expected[0].is_number() && expected[0] == expected[1]);
-    let (case, table) = (case.to_string(), format!("{place}\nTrue\nFALSE\n"));
-    let parts = [("name=\"template\"", &*case), ("name=\"table\"", &*table)];
-    let found = upload(&server, "/v1/evaluate", &parts).await.is(200);
-    assert_eq!(&found.json["columns"]["force_x_n"], expected);
-    let batch = upload(&server, "/v1/batches", &parts).await.is(202);
-    for solved in results(&server, &batch.json, "?wait=60").await {
-        assert_eq!(solved["result"]["total"][0]["force_x_n"], expected[0]);
-    }
 }
 
 /// Returns the example of a wheel on a rail with a single motion, and columns with one row that repeats this motion.

@@ -323,6 +323,19 @@ mod tests {
     use super::*;
 
     #[test]
+    fn numbers_are_compared_with_the_allowed_range_in_the_unit_of_the_case() {
+        let values = Values::Numbers(vec![250.0, 250_000.0]);
+        let pointer = "/friction/coefficient";
+        let faults = of_values(("mue [‰]", pointer, 1e-3), &values, 7);
+        let [fault] = &faults[..] else {
+            panic!("{faults:?}")
+        };
+        assert_eq!(fault.pointer, "/columns/mue [‰]/8");
+        let said = "250000 given, 250 in the unit of the case; a number from 0 to 100 is needed";
+        assert_eq!(fault.detail, said);
+    }
+
+    #[test]
     fn a_section_makes_room_for_those_of_the_rows() {
         let template = json!({ "contact": {
             "rail": { "points_mm": [[0, 0]], "unit": "cm", "smoothing_mm": 8 }, "wheel": { "profile": "b", "smoothing_mm": 3 }
