@@ -85,7 +85,7 @@ impl Values {
     }
 }
 
-/// Returns the truth value that a text in a table stands for, in any case of letters.
+/// Returns the truth value of a text in a table, `true` or `false` in any case of letters.
 pub fn truth(text: &str) -> Option<bool> {
     let names = [(true, "true"), (false, "false")].into_iter();
     let mut named = names.filter(|(_, name)| text.eq_ignore_ascii_case(name));
