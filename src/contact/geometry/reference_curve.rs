@@ -21,7 +21,7 @@ use crate::numerics::roots::{bounds, maximum};
 
 pub use crate::geometry::curve_place::CurvePlace;
 
-/// Number of intervals between neighbouring circles, or points of the rail, in one bounding circle. So many circles near the last result are searched before all others.
+/// Number of intervals between neighbouring circles, or points of the rail, in one bounding circle. The search tries this many circles near the last result before all others.
 const BLOCK: usize = 16;
 /// Gap in mm between the rail and the polygon of the wheel below which the gap is computed exactly. The bodies may then overlap between two tabulated points without
 /// overlapping at them.

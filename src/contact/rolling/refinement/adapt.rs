@@ -59,7 +59,7 @@ pub(crate) fn solve_forces(
     Ok((run.finish(estimate), plans))
 }
 
-/// Refuses a mesh with so many cells in a strip that friction which falls with slip has no steady state under a layer.
+/// Refuses a mesh with more cells in a strip than the motion allows; see [`RollingTask::cells_along_max`].
 fn require_steady(
     task: &RollingTask,
     index: usize,
