@@ -25,7 +25,7 @@ import { flangeAngle, nadal, wheelLoads } from './wheelloads.js';
 /** @param {App} app */
 export function compose(app) {
   const state = app.store.get().compose;
-  const busy = state.solving || state.unreadable !== '' || !state.document;
+  const busy = state.solving || state.reading || state.unreadable !== '' || !state.document;
   return html`${intro(app, state)}
     <div class="compose">
       <section class="panel form" aria-labelledby="h-form">
@@ -110,7 +110,8 @@ const BODIES = /** @type {const} */ (['rail', 'wheel']);
 
 /** Reports whether a case can be solved, with its faults and remarks. @param {App} app @param {Compose} state @param {boolean} [timed] Whether the estimated time is shown. */
 export function verdict(app, state, timed = true) {
-  const { unreadable, faults, refusal, checked, document } = state;
+  const { reading, unreadable, faults, refusal, checked, document } = state;
+  if (reading) return html`<p class="quiet">Reading the files …</p>`;
   if (unreadable) return html`<p class="fault big">${unreadable}</p>`;
   if (refusal) return html`<p class="fault big">${refusal}</p>`;
   const lacking = BODIES.filter((body) => document && lacksSection(document, body));

@@ -308,6 +308,16 @@ function takeCase(app, { name, text }) {
  * @param {Body} [onto] The body on whose area they were dropped.
  */
 export async function takeProfiles(app, files, onto) {
+  app.compose({ reading: true });
+  try {
+    await assign(app, files, onto);
+  } finally {
+    app.compose({ reading: false });
+  }
+}
+
+/** @param {App} app @param {readonly File[]} files @param {Body} [onto] */
+async function assign(app, files, onto) {
   const read = await Promise.all(files.map(async (file) => ({ name: file.name, text: await textOfFile(file) })));
   const whole = read.find(({ text }) => /^\s*\{/.test(text));
   if (whole && read.length > 1) return app.say(`${whole.name} is JSON. Drop a case alone.`);

@@ -253,8 +253,8 @@ export function solveLive(app, live) {
 
 /** Solves the case and shows its result. @param {App} app */
 export async function solve(app) {
-  const { text, solving, unreadable } = app.store.get().compose;
-  if (solving || unreadable) return;
+  const { text, solving, reading, unreadable } = app.store.get().compose;
+  if (solving || reading || unreadable) return;
   performance.mark('solve');
   app.compose({ solving: true });
   try {

@@ -35,6 +35,7 @@
  * @property {string} example Chosen example; empty for none.
  * @property {Partial<Record<'rail' | 'wheel', { name: string, text: string }>>} files Files of the cross-sections.
  * @property {boolean} solving
+ * @property {boolean} reading Whether files are being read and assigned to bodies.
  * @property {boolean} live Whether fast cases are solved while typing.
  * @property {Preview | null} preview
  * @property {boolean} code Whether the JSON is unfolded.
@@ -76,7 +77,7 @@ export const initialState = () => ({
   action: null,
   turn: 0,
   compose: {
-    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, lone: null, faults: [], refusal: '', examples: [], example: '', files: {}, solving: false,
+    document: null, text: '', unreadable: '', typing: null, checked: null, understood: null, lone: null, faults: [], refusal: '', examples: [], example: '', files: {}, solving: false, reading: false,
     live: true, preview: null, code: false,
   },
 });
