@@ -48,14 +48,19 @@ pub struct OperatorStore {
     kept: Mutex<Vec<Kept>>,
 }
 
-/// An operator with the digest of its mesh and its properties.
+/// An operator with its mesh and properties.
 #[derive(Debug, Clone)]
 struct Kept {
-    digest: blake3::Hash,
+    mesh: Arc<Mesh>,
+    kind: OperatorKind,
     operator: Arc<StripOperator>,
 }
 
 impl Kept {
+    fn is_of(&self, mesh: &Arc<Mesh>, kind: OperatorKind) -> bool {
+        self.kind == kind && (Arc::ptr_eq(&self.mesh, mesh) || self.mesh == *mesh)
+    }
+
     fn bytes(&self) -> u64 {
         self.operator.bytes() as u64
     }
@@ -83,12 +88,11 @@ impl OperatorStore {
     /// The monitor may stop the work.
     pub fn get(
         &self,
-        mesh: &Mesh,
+        mesh: &Arc<Mesh>,
         kind: OperatorKind,
         monitor: &dyn Monitor,
     ) -> Result<Arc<StripOperator>, Stop> {
-        let digest = digest(mesh, kind);
-        if let Some(found) = self.find(digest) {
+        if let Some(found) = self.find(mesh, kind) {
             return Ok(found);
         }
         let OperatorKind {
@@ -100,7 +104,8 @@ impl OperatorStore {
         let operator = Arc::new(operator);
         if kept_bytes(operator.bytes() as u64, self.bytes_max) > 0 {
             self.keep(Kept {
-                digest,
+                mesh: Arc::clone(mesh),
+                kind,
                 operator: Arc::clone(&operator),
             });
         }
@@ -116,16 +121,16 @@ impl OperatorStore {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn find(&self, digest: blake3::Hash) -> Option<Arc<StripOperator>> {
+    fn find(&self, mesh: &Arc<Mesh>, kind: OperatorKind) -> Option<Arc<StripOperator>> {
         let mut kept = self.kept();
-        let place = kept.iter().rposition(|kept| kept.digest == digest)?;
+        let place = kept.iter().rposition(|kept| kept.is_of(mesh, kind))?;
         kept[place..].rotate_left(1);
         kept.last().map(|kept| Arc::clone(&kept.operator))
     }
 
     fn keep(&self, new: Kept) {
         let mut kept = self.kept();
-        kept.retain(|known| known.digest != new.digest);
+        kept.retain(|known| !known.is_of(&new.mesh, new.kind));
         kept.push(new);
         let mut bytes: u64 = kept.iter().map(Kept::bytes).sum();
         kept.retain(|oldest| {
@@ -158,44 +163,24 @@ impl CaseOperators {
     /// The monitor may stop the work.
     pub fn get(
         &self,
-        mesh: &Mesh,
+        mesh: &Arc<Mesh>,
         kind: OperatorKind,
         monitor: &dyn Monitor,
     ) -> Result<Arc<StripOperator>, Stop> {
-        let digest = digest(mesh, kind);
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kept) = last.as_ref().filter(|kept| kept.digest == digest) {
+        if let Some(kept) = last.as_ref().filter(|kept| kept.is_of(mesh, kind)) {
             return Ok(Arc::clone(&kept.operator));
         }
         // A case needs one operator at a time, so the last one is dropped before the next is computed.
         *last = None;
         let operator = self.store.get(mesh, kind, monitor)?;
         *last = Some(Kept {
-            digest,
+            mesh: Arc::clone(mesh),
+            kind,
             operator: Arc::clone(&operator),
         });
         Ok(operator)
     }
-}
-
-/// The digest of all numbers on which an operator depends.
-fn digest(mesh: &Mesh, kind: OperatorKind) -> blake3::Hash {
-    let kinds = [kind.folded, kind.precision == Precision::Single].map(f64::from);
-    let counts = mesh
-        .segments
-        .iter()
-        .map(|segment| segment.cells.len() as f64);
-    let across = mesh.segments.iter().map(|segment| segment.chord);
-    let across = across.flat_map(|chord| [chord.y, chord.dy]);
-    let cells = [&mesh.left, &mesh.right, &mesh.node];
-    let numbers = [kind.poisson_ratio, mesh.segments.len() as f64]
-        .into_iter()
-        .chain(kinds)
-        .chain(counts)
-        .chain(across)
-        .chain(cells.into_iter().flatten().copied());
-    let bytes: Vec<u8> = numbers.flat_map(f64::to_le_bytes).collect();
-    blake3::hash(&bytes)
 }
 
 #[cfg(test)]
@@ -204,8 +189,8 @@ mod tests {
     use crate::mesh::samples::mesh_between;
     use crate::monitor::Unmonitored;
 
-    fn mesh(half_width: f64) -> Mesh {
-        mesh_between(half_width, [4, 6], |_| [-1.0, 1.0])
+    fn mesh(half_width: f64) -> Arc<Mesh> {
+        Arc::new(mesh_between(half_width, [4, 6], |_| [-1.0, 1.0]))
     }
 
     const KIND: OperatorKind = OperatorKind {

@@ -94,7 +94,7 @@ pub struct StripMesh {
     /// Units of the dimensionless problem.
     pub scale: Scale,
     /// The dimensionless mesh.
-    pub normalised: Mesh,
+    pub normalised: Arc<Mesh>,
     /// Friction bound of every cell, dimensionless.
     pub bound: Vec<f64>,
     /// Flexibility of an elastic layer between the bodies, dimensionless.
@@ -190,7 +190,7 @@ impl StripMesh {
             unresolved: unresolved(footprint, &fitted),
             area,
             scale,
-            normalised,
+            normalised: Arc::new(normalised),
             bound,
             layer: task.interface.layer * scale.shear_modulus / scale.length,
             surface_slip: sum(of_pressure, own_slip)

@@ -40,6 +40,7 @@ pub struct Newton<'a> {
     parameter: Vec<f64>,
     /// See [`Newton::compliance`].
     compliance: f64,
+    steps_max: u32,
 }
 
 impl<'a> Newton<'a> {
@@ -54,7 +55,14 @@ impl<'a> Newton<'a> {
             compliance: sum / (PROJECTION * parameter.len().max(1) as f64),
             parameter,
             own,
+            steps_max: STEPS_MAX,
         }
+    }
+
+    /// The solver with at most `steps_max` steps in place of [`STEPS_MAX`].
+    #[must_use]
+    pub(super) fn with_steps_max(self, steps_max: u32) -> Newton<'a> {
+        Newton { steps_max, ..self }
     }
 
     /// Returns this solver for bounds that weaken with slip from `bound`. r is at least twice the steepest weakening of each cell, which makes its resolvent
@@ -130,7 +138,7 @@ impl<'a> Newton<'a> {
                 break;
             }
             // An iterate that is not a number cannot be improved.
-            if report.iterations == STEPS_MAX || report.residual.is_nan() {
+            if report.iterations == self.steps_max || report.residual.is_nan() {
                 break;
             }
             self.linearise(law, t, rhs, workspace, &mut report);

@@ -243,11 +243,16 @@ impl<'a> RuleSequence<'a> {
         Ok(self.rule(&newton, &rigid, t)?.converged)
     }
 
-    /// Solves the trapezoid rule from `t` and returns the slip flags. Without convergence, `t` and its residual do not change.
-    pub(super) fn trapezoid(&mut self, t: &mut [f64]) -> Result<Option<Vec<bool>>, Stop> {
+    /// Solves the trapezoid rule from `t` in at most `steps_max` Newton steps and returns the slip flags. Without convergence, `t` and its residual do not
+    /// change.
+    pub(super) fn trapezoid(
+        &mut self,
+        t: &mut [f64],
+        steps_max: u32,
+    ) -> Result<Option<Vec<bool>>, Stop> {
         let equations = self.equations(Rule::Trapezoid);
         let rigid = self.rigid(&equations);
-        let newton = self.newton(&equations);
+        let newton = self.newton(&equations).with_steps_max(steps_max);
         let (mut found, residual) = (t.to_vec(), self.work.residual);
         let report = self.rule(&newton, &rigid, &mut found)?;
         if !report.converged {

@@ -10,7 +10,7 @@ use crate::remark::list::Remark;
 use crate::rolling::answer::Skip;
 use crate::rolling::answer::{LevelAnswer, LevelFailure, project_on_bound};
 use crate::rolling::methods::boundary_element::rule_sequence::RuleSequence;
-use crate::rolling::methods::boundary_element::task::LevelTask;
+use crate::rolling::methods::boundary_element::task::{FEW_STEPS, LevelTask, STEPS_MAX};
 use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::rolling::strip_mesh::StripMesh;
 
@@ -37,7 +37,7 @@ pub fn solve(
     let mut t = solve.start(start);
     let bounds_are_given = task.fall.is_none() && task.passage.is_none();
     let mut found = match bounds_are_given {
-        true => solve.trapezoid(&mut t)?,
+        true => solve.trapezoid(&mut t, FEW_STEPS)?,
         false => None,
     };
     let mut smooth = None;
@@ -45,7 +45,7 @@ pub fn solve(
     if found.is_none() {
         let three_point = solve.three_point(&mut t)?;
         smooth = Some((solve.expand(&t), three_point.slip));
-        found = solve.trapezoid(&mut t)?;
+        found = solve.trapezoid(&mut t, STEPS_MAX)?;
         if found.is_none() {
             remarks.push(Remark::SecondRuleFailed {});
             failed_slips = Some(three_point.slips);
