@@ -274,7 +274,7 @@ async fn an_evolution_ends_at_its_largest_number_of_steps_with_its_records() {
         assert!(found.next().is_none(), "{code} twice");
         first["detail"].as_str().unwrap().to_owned()
     };
-    assert!(detail("steps-exhausted").contains("steps_max = 1"));
+    assert!(detail("evolution-ended-early").contains("steps_max = 1"));
     let tip = detail("contact-on-flange-tip");
     let of_row = "(lateral_shift_mm -30), 5 % of the traffic in all";
     assert!(

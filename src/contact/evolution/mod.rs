@@ -18,6 +18,9 @@ pub mod traffic;
 mod tests {
     //! Laws of an evolution.
 
+    use std::ops::ControlFlow;
+    use std::time::Duration;
+
     use serde_json::{Value, json};
 
     use crate::case::solver::Limits;
@@ -25,7 +28,7 @@ mod tests {
     use crate::evolution::section::{area_between, distance};
     use crate::evolution::task::{Evolution, Sections, SolveContext};
     use crate::geometry::profile::Body;
-    use crate::monitor::Unmonitored;
+    use crate::monitor::{Monitor, Stop, Unmonitored};
     use crate::solution::words::evolution::{EvolutionRecord, EvolutionState};
 
     /// The shipped example of a wheel on a rail.
@@ -216,9 +219,47 @@ mod tests {
         assert!(state.share > 0.0 && state.share < 1.0, "{}", state.share);
         assert!(last.rail.worn_area_mm2 > 0.0 && last.rail == records[records.len() - 1].rail);
         let answer = task.answer(&state, records);
-        let remark = answer.remarks.iter().find(|r| r.code == "steps-exhausted");
+        let remark = answer
+            .remarks
+            .iter()
+            .find(|r| r.code == "evolution-ended-early");
         let detail = &remark.expect("a remark").detail;
         assert!(detail.contains("steps_max = 3"), "{detail}");
+        assert_eq!(answer.limits[0].reached, None);
+    }
+
+    #[test]
+    fn an_evolution_without_time_keeps_its_records() {
+        struct NoTime;
+        impl Monitor for NoTime {
+            fn tick(&self, _progress: f64) -> ControlFlow<Stop> {
+                ControlFlow::Break(Stop::OutOfTime)
+            }
+
+            fn elapsed(&self) -> Duration {
+                Duration::ZERO
+            }
+        }
+        let mut plan = symmetric(4, 2e5);
+        plan["limits"] = json!({ "height_mm": 1.0 });
+        let task = checked(&plan);
+        let context = SolveContext::default();
+        let mut state = task.begin();
+        let mut records = Vec::new();
+        while state.share == 0.0 {
+            assert!(task.step(&context, &state, &NoTime).is_err());
+            let (next, record) = task.step(&context, &state, &Unmonitored).expect("a step");
+            records.extend(record);
+            state = next;
+        }
+        let (ended, record) = task.step(&context, &state, &NoTime).expect("an end");
+        assert!(task.is_over(&ended) && record.is_none() && ended.share == state.share);
+        let answer = task.answer(&ended, records);
+        let remarks = answer.remarks.iter();
+        let mut own = remarks.filter(|remark| remark.code == "evolution-ended-early");
+        let detail = &own.next().expect("a remark").detail;
+        assert!(detail.contains("ran out of time"), "{detail}");
+        assert_eq!(answer.records.len(), 1);
         assert_eq!(answer.limits[0].reached, None);
     }
 

@@ -262,7 +262,7 @@ impl Evolution {
         let traffic_error = state.traffic.error[0].max(state.traffic.error[1]);
         let tolerance_asked = self.plan.accuracy.states_tolerance;
         let factor = self.plan.coefficient_factor;
-        let exhausted = state.share < 1.0 && self.is_exhausted(state);
+        let ended_early = state.ended_early.clone();
         let found = [
             (self.plan.wear_model != DamageModel::ArchardWear)
                 .then_some(Remark::CoefficientScatterStated { factor }),
@@ -275,8 +275,8 @@ impl Evolution {
                 tolerance_asked,
             }),
             (unsolved_share > 0.0).then_some(Remark::StatesUnsolved { unsolved_share }),
-            exhausted.then_some(Remark::StepsExhausted {
-                steps_max: state.steps as usize,
+            ended_early.map(|reason| Remark::EvolutionEndedEarly {
+                reason,
                 done_share: state.share,
             }),
         ];

@@ -57,15 +57,10 @@ impl Evolution {
         }
     }
 
-    /// Returns whether the evolution is finished: the extent or the largest number of steps is done, and recorded.
+    /// Returns whether the evolution is finished.
     pub fn is_over(&self, state: &EvolutionState) -> bool {
-        let ended = state.share >= 1.0 || self.is_exhausted(state);
-        ended && state.recorded && self.due(state).is_none()
-    }
-
-    /// Returns whether the largest number of steps is done.
-    pub(crate) fn is_exhausted(&self, state: &EvolutionState) -> bool {
-        state.steps >= self.plan.accuracy.steps_max
+        let is_done = state.share >= 1.0 && self.due(state).is_none();
+        state.recorded && (is_done || state.ended_early.is_some())
     }
 
     /// The next event, if it is due.
@@ -76,11 +71,39 @@ impl Evolution {
     }
 
     /// Does one step: condenses the traffic, applies the events that are due, or advances the sections. Returns the new state, and the record of the
-    /// state before if one is due.
+    /// state before if one is due. An evolution that cannot be continued, or not within its time limit, ends early after its first step.
     ///
     /// # Errors
-    /// Returns an error if the monitor stopped the work, or more than a tenth of the traffic has no answer.
+    /// Returns an error if the work is cancelled, or if the first step fails: more than a tenth of the traffic has no answer, or the time is over.
     pub fn step(
+        &self,
+        context: &SolveContext,
+        before: &EvolutionState,
+        monitor: &(dyn Monitor + Sync),
+    ) -> Result<(EvolutionState, Option<EvolutionRecord>), SolveError> {
+        let found = self.try_step(context, before, monitor);
+        found.or_else(|error| Ok((Evolution::end_early(before, error)?, None)))
+    }
+
+    /// The state of an evolution that ends because of an error, with the records that it has.
+    ///
+    /// # Errors
+    /// Returns the error if no step is done, or if the work is cancelled.
+    pub fn end_early(
+        state: &EvolutionState,
+        error: SolveError,
+    ) -> Result<EvolutionState, SolveError> {
+        if state.share == 0.0 || matches!(error, SolveError::Cancelled) {
+            return Err(error);
+        }
+        Ok(EvolutionState {
+            ended_early: Some(error.to_string()),
+            recorded: true,
+            ..state.clone()
+        })
+    }
+
+    fn try_step(
         &self,
         context: &SolveContext,
         before: &EvolutionState,
@@ -112,7 +135,7 @@ impl Evolution {
                 happen(event, &mut state);
             }
             state.recorded = false;
-        } else if state.share < 1.0 && !self.is_exhausted(&state) {
+        } else if state.share < 1.0 && state.ended_early.is_none() {
             self.advance(&solver, &now, &mut state)?;
         }
         Ok((state, found))
@@ -191,7 +214,11 @@ impl Evolution {
                 state.share = stop;
                 state.recorded = false;
             }
-            state.recorded &= !self.is_exhausted(state);
+            let most = accuracy.steps_max;
+            if state.share < 1.0 && state.steps >= most {
+                state.ended_early = Some(format!("steps_max = {most} steps are done"));
+                state.recorded = false;
+            }
             break;
         }
         Ok(())

@@ -787,15 +787,15 @@ remarks! {
     advice: "`failure` in the states of the records says why.",
     detail: format!("up to {unsolved_share} % of the traffic could not be solved and causes no wear"),
 
-    /// An evolution ended at its largest number of steps, before its extent.
-    Warning StepsExhausted {
-        /// The largest number of steps.
-        steps_max: usize = 1000,
+    /// An evolution ended before its extent.
+    Warning EvolutionEndedEarly {
+        /// The reason.
+        reason: String = "the largest number of steps, 1000, is done".to_owned(),
         /// Share of the extent that is done.
         done_share: @percent f64 = 0.4,
     }
-    advice: "The last record is the end. Raise `accuracy.steps_max` or `accuracy.step_depth_mm`, or shorten the extent.",
-    detail: format!("the evolution ended after steps_max = {steps_max} steps, when {done_share} % of the extent was done"),
+    advice: "The records are those up to the end. Raise `accuracy.steps_max` or `accuracy.step_depth_mm`, or shorten the extent.",
+    detail: format!("the evolution ended when {done_share} % of its extent was done: {reason}"),
 }
 
 #[cfg(test)]

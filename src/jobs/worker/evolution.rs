@@ -27,19 +27,23 @@ pub(crate) fn advance(
     state: &mut Option<EvolutionState>,
     spent: Duration,
 ) -> Result<(usize, Duration, EncodedResult), Box<Outcome>> {
-    let limit = SolveError::OutOfTime {
-        limit_s: None,
-        motions: None,
-    };
-    let before = state.take().filter(|_| spent < shared.options.time_limit);
-    let before = before.ok_or(limit)?;
+    let limit = shared.options.time_limit;
+    let before = state.take().unwrap_or_else(|| task.begin());
     let context = SolveContext {
         threads: shared.options.workers,
         operators: shared.engine.operators.clone(),
         known: Arc::clone(&shared.engine.known),
     };
     control.begin(spent);
-    let solved = task.steps(&context, before, STEPS, control);
+    let solved = if spent < limit {
+        task.steps(&context, before, STEPS, control)
+    } else {
+        let out_of_time = SolveError::OutOfTime {
+            limit_s: Some(limit.as_secs_f64()),
+            motions: None,
+        };
+        Evolution::end_early(&before, out_of_time).map(|state| (state, None))
+    };
     let spent = control.pause();
     let (after, record) = solved?;
     let part = EncodedResult::as_json(&(record, &after))?;

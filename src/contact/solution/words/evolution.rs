@@ -215,6 +215,9 @@ pub struct EvolutionState {
     pub rejected: u32,
     /// Number of contacts solved.
     pub solves: u32,
+    /// Why the evolution ends before its extent, if it does.
+    #[serde(default)]
+    pub ended_early: Option<String>,
 }
 
 /// A body between two steps.

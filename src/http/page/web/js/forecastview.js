@@ -318,8 +318,8 @@ function limitsPanel(answers, sides) {
 function decisionText(answers, sides) {
   const { better, sure, ends } = decisionOf(reachedOf(answers));
   const unit = distanceUnit(answers[0]);
-  const short = answers.findIndex(({ remarks }) => remarks.some(({ code }) => code === 'steps-exhausted'));
-  if (short >= 0) return html`<b>${'AB'[short]}</b> (${sides[short].job.name}) ended at its largest number of steps, before its extent. The plans cannot be compared.`;
+  const short = answers.findIndex(({ remarks }) => remarks.some(({ code }) => code === 'evolution-ended-early'));
+  if (short >= 0) return html`<b>${'AB'[short]}</b> (${sides[short].job.name}) ended before its extent. The plans cannot be compared.`;
   const last = answers.map(({ records }) => records[records.length - 1]);
   const end = (/** @type {0 | 1} */ side) => (ends[side].label ? `${ends[side].label}, at ${number(ends[side].place, 3)} ${unit}` : `none within ${number(distanceOf(last[side].progress), 3)} ${unit}`);
   const name = (/** @type {0 | 1} */ side) => html`<b>${'AB'[side]}</b> (${sides[side].job.name})`;
