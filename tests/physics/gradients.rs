@@ -7,6 +7,7 @@ use railhead_contact::solution::words::answer::{Gradients, PointSolution};
 use serde_json::{Value, json};
 
 use crate::cases::{assert_fault, good_with};
+use crate::random::Random;
 use crate::reference::{Ellipse, assert_none, solve};
 
 /// Targets of the answers. `FINE` is the target of the answers that give the secants.
@@ -134,6 +135,39 @@ fn gradients_are_secants_of_finer_answers_within_their_errors() {
         }
     }
     assert!(failures.len() * 20 <= compared, "{compared}: {failures:#?}");
+}
+
+/// Half of the ellipses move, a quarter nearly rest, and a quarter rests.
+#[test]
+fn errors_of_gradients_cover_the_changes_to_a_finer_target() {
+    let mut random = Random(7);
+    let (mut compared, mut beyond, mut far) = (0, 0, 0);
+    for k in 0..48 {
+        let ratio = 10_f64.powf(random.between(-0.9, 0.9));
+        let contact = Ellipse::steel(ratio, random.between(0.0, 0.45));
+        let size = [0.0, 0.1, 2.0, 2.0][k % 4];
+        let [x, y, spin] = [0, 1, 2].map(|_| size * random.between(-1.0, 1.0));
+        let contact = contact.normalised(x, y, spin);
+        let gradients = |target: f64| {
+            let found = only(&case(&contact, to(target))).gradients;
+            found.expect("gradients")
+        };
+        let unit = units(&contact);
+        let fine = gradients(0.001);
+        for target in TARGETS {
+            let found = gradients(target);
+            let (values, errors) = (rows(&found), errors(&found));
+            for (k, j) in (0..9).map(|n| (n / 3, n % 3)) {
+                let off = (values[k][j] - rows(&fine)[k][j]).abs();
+                let off = (off - 1e-6 * unit[k][j]).max(0.0);
+                compared += 1;
+                beyond += u32::from(off > errors[k][j]);
+                far += u32::from(off > 2.0 * errors[k][j]);
+            }
+        }
+    }
+    assert!(20 * beyond <= compared, "{beyond} of {compared}");
+    assert!(100 * far <= compared, "{far} of {compared}");
 }
 
 #[test]

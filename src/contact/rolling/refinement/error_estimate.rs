@@ -1,6 +1,6 @@
 //! The error of the resultants, estimated from the last two changes between nested meshes, and their extrapolation.
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, SQRT_2};
 
 use crate::mesh::SIDE_GOOD;
 use crate::method::Method;
@@ -32,6 +32,11 @@ const SIDE_FEW: u32 = 3;
 const REGION: f64 = 0.45;
 /// Power of the number of cells with which that error falls.
 const REGION_POWER: f64 = 1.75;
+
+/// The error of a number that is extrapolated like the resultants, from its value on the finest mesh, if both changes between meshes are equal.
+pub(crate) fn error_by_extrapolation(extrapolated: f64, finest: f64) -> f64 {
+    SAFETY * SQRT_2 / EXTRAPOLATED * (extrapolated - finest).abs()
+}
 
 /// Resultants with their relative errors.
 #[derive(Debug, Clone)]

@@ -7,6 +7,7 @@ use crate::error::SolveError;
 use crate::monitor::Monitor;
 use crate::rolling::answer::{MotionAnswer, PatchGradients, Resultants};
 use crate::rolling::refinement::adapt::{solve_forces, solve_on_meshes};
+use crate::rolling::refinement::error_estimate::error_by_extrapolation;
 use crate::rolling::refinement::interpolate::RefinementState;
 use crate::rolling::refinement::on_mesh::MotionTask;
 use crate::rolling::task::{Motion, RollingTask};
@@ -14,6 +15,10 @@ use crate::rolling::task::{Motion, RollingTask};
 /// The smaller step over μN/(G c²), with c² = A/π. A creepage of that unit makes nearly everything slip, so the force changes by about 0.02 μN, and the noise
 /// of a solve, 1e-5 μN, is far below the error of the mesh.
 pub(crate) const STEP: f64 = 0.005;
+
+/// The meshes are those of a motion of at least this size, over the same unit. Those of a slower motion meet the target of its small forces, but not that of
+/// their slopes.
+const LEAST: f64 = 0.3;
 
 /// Adds the gradients to an answer.
 ///
@@ -39,12 +44,17 @@ pub(crate) fn add_gradients(
         ..*task
     };
     let motion = found.motion;
-    let (_, meshes) = solve_forces(task, state, MotionTask { index, motion }, monitor)?;
     let area: f64 = patches.iter().map(|patch| patch.area).sum();
     let length = (area / std::f64::consts::PI).sqrt();
     let modulus = task.interface.reduction * task.elasticity.shear_modulus;
-    let creepage = STEP * limit / (modulus * length * length);
-    let steps = [creepage, creepage, creepage / length];
+    let creepage = limit / (modulus * length * length);
+    let units = [creepage, creepage, creepage / length];
+    let asked = MotionTask {
+        index,
+        motion: at_least(LEAST, motion, units),
+    };
+    let (_, meshes) = solve_forces(task, state, asked, monitor)?;
+    let steps = units.map(|unit| STEP * unit);
     // On a client mesh, resultants are not extrapolated.
     let kind = usize::from(task.target().is_none());
     let mut all = vec![PatchGradients::default(); patches.len()];
@@ -86,7 +96,7 @@ pub(crate) fn add_gradients(
                 let (other, _) = of(1 - kind, row);
                 slopes[row][component] = value;
                 let noise = task.tolerance(index) * [limit, limit, limit * length][row] / step;
-                errors[row][component] = by_step + (value - other).abs() + noise;
+                errors[row][component] = by_step + error_by_extrapolation(value, other) + noise;
             }
         }
     }
@@ -101,6 +111,22 @@ pub(crate) fn slope(values: [f64; 4], step: f64) -> (f64, f64) {
     let small = (values[2] - values[1]) / (2.0 * step);
     let large = (values[3] - values[0]) / (4.0 * step);
     (small + (small - large) / 3.0, 2.0 * (small - large).abs())
+}
+
+/// A motion of the same direction with at least `size` units. At rest, all components are equal.
+fn at_least(size: f64, motion: Motion, units: [f64; 3]) -> Motion {
+    let parts = motion.components();
+    let relative = [0, 1, 2].map(|k| parts[k] / units[k]);
+    let own = relative.iter().fold(0.0_f64, |sum, part| sum.hypot(*part));
+    if own >= size {
+        return motion;
+    }
+    let direction = if own > 0.0 {
+        relative.map(|part| part / own)
+    } else {
+        [1.0 / 3.0_f64.sqrt(); 3]
+    };
+    Motion::of([0, 1, 2].map(|k| size * direction[k] * units[k]))
 }
 
 fn moved(motion: Motion, component: usize, step: f64) -> Motion {
