@@ -124,6 +124,18 @@ fn extended_forms() -> Vec<(&'static str, String)> {
         ("titles in another order", format!("No;Z;Y\n{reversed}")),
         ("titles of MiniProf", format!("X,Y\n{separated}")),
         (
+            "a first column without a title",
+            rows(|k, y, z| format!("{}{},{y},{z}\n", if k == 0 { ",y,z\n" } else { "" }, 3 * k)),
+        ),
+        (
+            "a count of rows without a title",
+            rows(|k, y, z| format!("{}{k}\t{y}\t{z}\n", if k == 0 { "\ty\tz\n" } else { "" })),
+        ),
+        (
+            "a title that begins with another one",
+            rows(|k, y, z| format!("{}9.5;{y};{z}\n", if k == 0 { "z raw;y;z\n" } else { "" })),
+        ),
+        (
             "a header of words, a date and a count",
             header.to_owned() + &plain(),
         ),

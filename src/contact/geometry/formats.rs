@@ -686,8 +686,9 @@ fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
     let Some(mut line) = lines.next() else {
         return (None, None);
     };
-    let units = cells(line).map(LengthUnit::named);
+    let units = cells(line).into_iter().filter(|cell| !cell.is_empty());
     let mut unit = units
+        .map(LengthUnit::named)
         .collect::<Option<Vec<_>>>()
         .and_then(|units| units.first().copied());
     if unit.is_some() {
@@ -696,8 +697,14 @@ fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
             None => return (None, unit),
         }
     }
+    let width = table.rows[0].numbers.len();
+    let mut titles = cells(line);
+    // Empty cells are the titles of columns, or a part of the separator.
+    if titles.len() != width {
+        titles.retain(|title| !title.is_empty());
+    }
     let mut names: Vec<(char, Option<LengthUnit>)> = Vec::new();
-    for cell in cells(line) {
+    for cell in &titles {
         let alone = cell
             .starts_with(['[', '('])
             .then(|| LengthUnit::named(cell))
@@ -709,10 +716,17 @@ fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
         let mut letters = cell.chars();
         let letter = letters.next().unwrap_or(' ').to_ascii_lowercase();
         let is_axis = letters.next().is_none_or(|next| !next.is_alphanumeric());
+        // `z raw` is not the axis if another title is `z`.
+        let is_other = cell.len() > 1
+            && titles
+                .iter()
+                .any(|title| title.len() == 1 && title.to_ascii_lowercase().starts_with(letter));
         let unit = cell.get(1..).and_then(LengthUnit::named);
-        names.push((if is_axis { letter } else { ' ' }, unit));
+        names.push((if is_axis && !is_other { letter } else { ' ' }, unit));
     }
-    let width = table.rows[0].numbers.len();
+    if names.len() + 1 == width && counts_rows(table) {
+        names.insert(0, (' ', None));
+    }
     let place = |name: char| names.iter().position(|(own, _)| *own == name);
     let columns = [['y', 'z'], ['x', 'y'], ['x', 'z']]
         .into_iter()
@@ -725,18 +739,13 @@ fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
 }
 
 /// The cells of a line of titles or units, separated by commas, semicolons or tabs if it has any, otherwise by blanks.
-fn cells<'a>(line: &'a Line<'_>) -> impl Iterator<Item = &'a str> {
-    let separated = line.bare.contains([',', ';', '\t']);
-    line.bare
-        .split(move |c: char| {
-            if separated {
-                ",;\t".contains(c)
-            } else {
-                c.is_whitespace()
-            }
-        })
-        .map(str::trim)
-        .filter(|cell| !cell.is_empty())
+fn cells<'a>(line: &'a Line<'_>) -> Vec<&'a str> {
+    let separators = [',', ';', '\t'];
+    if line.bare.contains(separators) {
+        line.bare.split(separators).map(str::trim).collect()
+    } else {
+        line.bare.split_whitespace().collect()
+    }
 }
 
 /// A row of numbers.
