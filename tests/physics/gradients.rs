@@ -162,7 +162,7 @@ fn errors_of_gradients_cover_the_changes_to_a_finer_target() {
                 let off = (off - 1e-6 * unit[k][j]).max(0.0);
                 compared += 1;
                 beyond += u32::from(off > errors[k][j]);
-                far += u32::from(off > 2.0 * errors[k][j]);
+                far += u32::from(off > 2.0 * errors[k][j] + self::errors(&fine)[k][j]);
             }
         }
     }
