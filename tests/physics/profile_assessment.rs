@@ -435,7 +435,7 @@ fn what_is_known_before_the_solve_is_in_the_check() {
 }
 
 /// Returns a pair with points this far apart in mm and white noise of this standard deviation in mm.
-fn coarse(spacing: f64, noise: f64, seed: u64) -> Value {
+fn noisy(spacing: f64, noise: f64, seed: u64) -> Value {
     let mut random = Random(seed);
     let [rail, wheel] = [rail_60e1(), s1002()].map(|points| {
         let points = resampled(&points, spacing);
@@ -458,7 +458,7 @@ fn auto_smooths_the_noise_of_coarse_points_and_what_that_leaves_open_is_known() 
     let sound = solved(&on_rail(&rail_60e1()));
     let limit = 0.3 * sound.patches.iter().map(|p| p.normal_force_n).sum::<f64>();
     for seed in 1..=4 {
-        let found = solved(&coarse(1.7, 0.005, seed));
+        let found = solved(&noisy(1.7, 0.005, seed));
         let used = smoothings(&found);
         assert!(used.iter().all(|length| *length > 4.0), "{seed}: {used:?}");
         let open = found.total[0].profile_uncertainty.expect("an uncertainty");
@@ -474,14 +474,28 @@ fn auto_smooths_the_noise_of_coarse_points_and_what_that_leaves_open_is_known() 
         );
     }
     // Exact points with the same spacing are not smoothed and cause no remark.
-    let clean = solved(&coarse(1.7, 0.0, 1));
+    let clean = solved(&noisy(1.7, 0.0, 1));
     assert_eq!(smoothings(&clean), [0.0; 2]);
     assert!(!has(&clean, "smoothing-undecided"), "{:?}", clean.remarks);
 }
 
+/// Short chords of noisy points turn by more than the 30° of a corner.
+#[test]
+fn auto_smooths_the_noise_of_dense_points() {
+    let sound = solved(&on_rail(&rail_60e1()));
+    for (spacing, noise) in [(0.1, 0.02), (0.05, 0.01)] {
+        for seed in 1..=2 {
+            let found = solved(&noisy(spacing, noise, seed));
+            assert_eq!(found.patches.len(), sound.patches.len(), "{spacing} {seed}");
+            let ratio = pressure_max(&found) / pressure_max(&sound);
+            assert!((0.75..1.3).contains(&ratio), "{spacing} {seed}: {ratio}");
+        }
+    }
+}
+
 #[test]
 fn auto_says_so_where_points_are_too_far_apart_to_tell_noise_from_shape() {
-    let auto = accepted(&coarse(5.0, 0.005, 1));
+    let auto = accepted(&noisy(5.0, 0.005, 1));
     let mut plain = auto.clone();
     for body in ["rail", "wheel"] {
         plain["contact"][body]["smoothing_mm"] = json!(0.0);
