@@ -277,6 +277,23 @@ fn outliers_and_steps_are_told_with_their_place() {
     }
 }
 
+#[test]
+fn spikes_do_not_hide_the_shape_of_dense_points() {
+    let mut random = Random(5);
+    let [rail, wheel] = [rail_60e1(), s1002()].map(|points| {
+        let mut points = resampled(&points, 0.04);
+        for _ in 0..20 {
+            let k = random.below(points.len());
+            points[k][1] += random.sign() * random.between(0.05, 2.0);
+        }
+        points
+    });
+    let found = solved(&accepted(&with(&tread(), &rail, &wheel, 0.0)));
+    let codes: Vec<&str> = found.remarks.iter().map(|r| r.code.as_str()).collect();
+    assert!(codes.contains(&"profile-points-dropped"), "{codes:?}");
+    assert_eq!(found.patches.len(), 1);
+}
+
 /// The ridge under the point is nearly two hundred times as long as wide.
 #[test]
 fn a_ridge_under_an_outlier_is_refused_or_remarked_on_with_its_place() {

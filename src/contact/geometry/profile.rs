@@ -134,7 +134,10 @@ impl Profile {
             unit: unit.name(),
         }));
         let scale = likely.map_or(1.0, |(_, unit)| unit.mm());
-        let (senses, flange) = orient(body, given, scale, reading, format, &mut remarks)?;
+        // Spikes hide the shape.
+        let mut shown = given.to_vec();
+        drop_backward_points(body, &mut shown, &mut Vec::new())?;
+        let (senses, flange) = orient(body, &shown, scale, reading, format, &mut remarks)?;
         let mut points = orientation::in_senses(given, senses);
         check_order(&points)?;
         drop_backward_points(body, &mut points, &mut remarks)?;
@@ -437,7 +440,7 @@ fn drop_backward_points(
         points.remove(k + 1);
         if given - points.len() > allowed {
             return Err(format!(
-                "more than {allowed} of {given} points run back against their neighbours; are they in order along the profile?"
+                "more than {allowed} of {given} points run back against their neighbours; are they in order along the profile, or is their noise larger than a third of their distance? Then thin them out or average them"
             ));
         }
     }
