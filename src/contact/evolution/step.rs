@@ -96,8 +96,16 @@ impl Evolution {
         if state.share == 0.0 || matches!(error, SolveError::Cancelled) {
             return Err(error);
         }
+        let reason = match error {
+            // The motions are those of one state.
+            SolveError::OutOfTime { limit_s, .. } => SolveError::OutOfTime {
+                limit_s,
+                motions: None,
+            },
+            other => other,
+        };
         Ok(EvolutionState {
-            ended_early: Some(error.to_string()),
+            ended_early: Some(reason.to_string()),
             recorded: true,
             ..state.clone()
         })
