@@ -1,7 +1,7 @@
 //! The stage of the normal problem: computes region and pressure of a contact whose patches share one frame.
 
 use crate::error::SolveError;
-use crate::half_space::grid_operator::GridWorkspace;
+use crate::half_space::bent_surface::BentWorkspace;
 use crate::monitor::Monitor;
 use crate::normal::footprint::{Footprint, NormalTask};
 use crate::normal::gap::grid::{GridFineness, NormalError, NormalWork};
@@ -43,7 +43,7 @@ pub fn solve(case: &CheckedCase, monitor: &dyn Monitor) -> Result<SolvedFootprin
         NormalTask::Given(field) => Ok(known(Footprint::given(field.clone()), first_order_error)),
         NormalTask::Gap(task) => {
             let began = monitor.elapsed();
-            let workspace = &mut GridWorkspace::default();
+            let workspace = &mut BentWorkspace::default();
             let fineness = GridFineness::for_answer(case.run.target());
             let mut found = solve_gap(case, task, fineness, workspace, monitor)?;
             found.coupling_error = first_order_error;
@@ -67,7 +67,7 @@ pub(crate) fn solve_gap(
     case: &CheckedCase,
     task: &GapTask,
     fineness: GridFineness,
-    workspace: &mut GridWorkspace,
+    workspace: &mut BentWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<SolvedFootprint, SolveError> {
     let found = task.solve_as(fineness, workspace, monitor)?;

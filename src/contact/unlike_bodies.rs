@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::error::SolveError;
-use crate::half_space::grid_operator::GridWorkspace;
+use crate::half_space::bent_surface::BentWorkspace;
 use crate::half_space::unlike_bodies::opening;
 use crate::mesh::MeshSize;
 use crate::monitor::Monitor;
@@ -95,7 +95,7 @@ impl UnlikeGap {
             // Finer grids would only resolve the coarse cells of the tractions. The contact without tractions shows whether the gap is rough.
             fineness = fineness.alone();
         }
-        let workspace = &mut GridWorkspace::default();
+        let workspace = &mut BentWorkspace::default();
         let mut found: Option<SolvedFootprint> = None;
         let mut before = None;
         let mut left = f64::INFINITY;

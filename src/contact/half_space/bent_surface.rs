@@ -1,6 +1,6 @@
-//! Influence between the cells of a contact surface that bends around the rail.
+//! Influence between the cells of a contact surface: a plane, or a surface that bends around the rail.
 //!
-//! The surface is unfolded: cells are equal rectangles along x and along the arc length s of the cross-section, whose tangent has the angle α. Let `A` be the normal
+//! A surface that bends is unfolded: cells are equal rectangles along x and along the arc length s of the cross-section, whose tangent has the angle α. Let `A` be the normal
 //! influence of the half-space at the distances `x` and `d = s_j − s_k`, and `Δ = α_j − α_k` the turn from the loaded strip k to the strip j. For both bodies
 //! together:
 //!
@@ -24,10 +24,9 @@ use rustfft::{Fft, FftPlanner};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::half_space::grid_operator::{coefficients, lines, smooth};
 use crate::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
 use crate::lazy_field::LazyField;
-use crate::numerics::simd::{self, LANES};
+use crate::numerics::simd::{self, Float, LANES};
 
 /// How cells of a curved contact surface act on each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema, Words)]
@@ -57,6 +56,18 @@ pub struct BentStrips {
     pub run: Vec<usize>,
     /// Whether the factors for the turn apply.
     pub corrected: bool,
+}
+
+impl BentStrips {
+    /// Adjoining strips of a plane.
+    fn flat(count: usize) -> BentStrips {
+        BentStrips {
+            number: (0..count).collect(),
+            angle: vec![0.0; count],
+            run: vec![0; count],
+            corrected: false,
+        }
+    }
 }
 
 /// Normal displacements and gaps of cells of a curved surface by pressures and tractions on them.
@@ -94,6 +105,23 @@ pub struct StripFactors(Vec<f32>);
 type Spectrum = Vec<[f32; LANES]>;
 
 impl BentOperator {
+    /// The operator of `nx` cells along x and `ny` strips of a plane, of sizes `step` in mm, for the contact modulus `E*` in MPa.
+    pub fn flat(
+        [nx, ny]: [usize; 2],
+        step: [f64; 2],
+        contact_modulus: f64,
+        workspace: &mut BentWorkspace,
+    ) -> BentOperator {
+        // Without Poisson's ratio the contact modulus is the shear modulus.
+        let elasticity = Elasticity {
+            shear_modulus: contact_modulus,
+            poisson_ratio: 0.0,
+            difference: 0.0,
+            lower_share: 0.5,
+        };
+        BentOperator::new(nx, step, &elasticity, BentStrips::flat(ny), workspace)
+    }
+
     /// The operator of `nx` cells along x of sizes `step` in mm on strips.
     pub fn new(
         nx: usize,
@@ -112,7 +140,7 @@ impl BentOperator {
             step[1],
             elasticity.contact_modulus(),
         );
-        let width = smooth(2 * nx - 1, false);
+        let width = smooth(2 * nx - 1);
         let mut used = vec![false; distances];
         for of in &strips.number {
             strips
@@ -724,6 +752,81 @@ impl NullaryFnOnce for Changes<'_> {
             }
         }
     }
+}
+
+/// The smallest number not below `n` with no prime factor above 5, because transforms of such lengths are fast.
+fn smooth(n: usize) -> usize {
+    let is_smooth = |n: &usize| {
+        let mut n = *n;
+        for factor in [2, 3, 5] {
+            while n.is_multiple_of(factor) {
+                n /= factor;
+            }
+        }
+        n == 1
+    };
+    (n..).find(is_smooth).unwrap_or(n)
+}
+
+/// Displacement i cells along x and j cells along y away from a cell with unit pressure, stored at `j * nx + i`.
+fn coefficients(nx: usize, ny: usize, dx: f64, dy: f64, contact_modulus: f64) -> Vec<f64> {
+    let factor = 1.0 / (std::f64::consts::PI * contact_modulus);
+    // Corners lie half a cell before and after the centres. Neighbouring cells share them, so each is evaluated once. The two corners of the first cell differ only in
+    // sign.
+    let places = |n: usize, d: f64| -> Vec<f64> { (0..n).map(|i| (i as f64 + 0.5) * d).collect() };
+    let (x, y) = (places(nx, dx), places(ny, dy));
+    let mut corners = vec![0.0; nx * ny];
+    simd::dispatch(Corners {
+        x: &x,
+        y: &y,
+        out: &mut corners,
+    });
+    let between = |line: &[f64], i: usize| {
+        let before = if i == 0 { -line[0] } else { line[i - 1] };
+        line[i] - before
+    };
+    let mut out = Vec::with_capacity(nx * ny);
+    for j in 0..ny {
+        let above = &corners[j * nx..(j + 1) * nx];
+        let (below, sign) = if j == 0 {
+            (above, -1.0)
+        } else {
+            (&corners[(j - 1) * nx..j * nx], 1.0)
+        };
+        out.extend((0..nx).map(|i| factor * (between(above, i) - sign * between(below, i))));
+    }
+    out
+}
+
+/// `p asinh(q/p) + q asinh(p/q)` at all pairs of two lists of positive lengths.
+struct Corners<'a> {
+    x: &'a [f64],
+    y: &'a [f64],
+    out: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Corners<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (q, line) in self.y.iter().zip(self.out.chunks_exact_mut(self.x.len())) {
+            for (p, corner) in self.x.iter().zip(line) {
+                let r = (p * p + q * q).sqrt();
+                *corner = p * Float::ln((q + r) / *p) + q * Float::ln((p + r) / *q);
+            }
+        }
+    }
+}
+
+/// The coefficients and their mirror images for negative i, row by row.
+fn lines(nx: usize, coefficients: &[f64]) -> Vec<f64> {
+    let mut lines = Vec::with_capacity(coefficients.len() / nx * (2 * nx - 1));
+    for row in coefficients.chunks_exact(nx) {
+        lines.extend(row[1..].iter().rev());
+        lines.extend_from_slice(row);
+    }
+    lines
 }
 
 #[cfg(test)]

@@ -8,15 +8,13 @@ use std::f64::consts::PI;
 
 use crate::geometry::profile::{GROOVE_DEPTH, POINT_SPACING};
 use crate::geometry::reference_curve::{CurvePlace, FACING_LEAST, Nearest, ReferenceCurve};
-use crate::half_space::bent_surface::{
-    BentOperator, BentStrips, BentWorkspace, Influence, StripFactors,
-};
+use crate::half_space::bent_surface::{BentOperator, BentStrips, BentWorkspace, Influence};
 use crate::half_space::unlike_bodies::Elasticity;
 use crate::lazy_field::LazyField;
 use crate::monitor::Monitor;
 use crate::normal::curve_grid::{CurveGrid, FREE, WheelOverGrid, extent_of};
 
-use crate::normal::gap::conjugate_gradients::{PressureInfluence, PressureTask, solve_pressure};
+use crate::normal::gap::conjugate_gradients::{PressureTask, WeightedStrips, solve_pressure};
 use crate::normal::gap::grid::{
     GridFineness, NEAR, NormalError, NormalWork, SHARE_MIN, first_pressure, no_touch, squares,
 };
@@ -27,7 +25,6 @@ use crate::normal::wheel::WheelLoad;
 use crate::numerics::ITERATIONS_MAX;
 use crate::numerics::flood_fill::groups;
 use crate::numerics::roots::{HALVINGS, bisect};
-use crate::numerics::simd::LANES;
 
 /// Cells across the largest overlap on the coarse grid.
 const FIRST: f64 = 24.0;
@@ -107,41 +104,6 @@ pub(crate) struct Friction {
 
 /// Buffers that successive solves reuse.
 pub(crate) type Workspace = BentWorkspace;
-
-/// The influence of pressures multiplied by weights of their strips. A uniform approach of these lowers the wheel.
-struct WeightedStrips<'a> {
-    operator: &'a BentOperator,
-    factors: StripFactors,
-    weights: &'a [f64],
-}
-
-impl PressureInfluence for WeightedStrips<'_> {
-    const CHANGES_MAX: usize = 80;
-    type Workspace = BentWorkspace;
-
-    fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut BentWorkspace) {
-        self.operator
-            .opened_by_pressure(&self.factors, pressure, displacement, workspace);
-    }
-
-    fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
-        self.operator
-            .add_opened(&self.factors, changes, displacement);
-    }
-
-    fn own(&self) -> f64 {
-        self.operator.own() / self.weights[0].powi(2)
-    }
-
-    fn weights(&self, cells: usize) -> Vec<f64> {
-        let mut weights = vec![1.0; cells.next_multiple_of(LANES)];
-        let rows = weights[..cells].chunks_exact_mut(cells / self.weights.len());
-        for (row, weight) in rows.zip(self.weights) {
-            row.fill((weight / self.weights[0]).powi(2));
-        }
-        weights
-    }
-}
 
 impl CurveTask<'_> {
     /// The mean of angles of rail and wheel, weighted with their parts of the displacements.
@@ -500,11 +462,7 @@ impl CurveTask<'_> {
             None => 1.0,
         };
         let weights: Vec<f64> = grid.places.iter().map(weight).collect();
-        let influence = WeightedStrips {
-            factors: operator.weighted_pressure_factors(&weights),
-            operator: &operator,
-            weights: &weights,
-        };
+        let influence = WeightedStrips::new(&operator, &weights);
         let mut sum = wanted.map(|wanted| match self.loading {
             WheelLoad::Normal(_) => wanted * mean_weight(nx, &pressure, &over.gap, &weights),
             _ => wanted,

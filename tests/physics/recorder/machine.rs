@@ -3,7 +3,8 @@
 use faer::Mat;
 use faer::prelude::Solve;
 use railhead_contact::numerics::simd::SimdLevel;
-use realfft::RealFftPlanner;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
 
 use crate::recorder::record::Digest;
 
@@ -39,13 +40,11 @@ pub fn arithmetic(level: SimdLevel) -> String {
         digest.word(solved[(i, 0)].to_bits());
         digest.word(product[(i, n - 1 - i)].to_bits());
     }
-    let transform = RealFftPlanner::<f32>::new().plan_fft_forward(180);
-    let mut values: Vec<f32> = (0..180).map(|i| entry(i, 1) as f32).collect();
-    let mut spectrum = transform.make_output_vec();
-    transform
-        .process(&mut values, &mut spectrum)
-        .expect("lengths that fit");
-    for value in spectrum {
+    let values = (0..180).map(|i| Complex::new(entry(i, 1) as f32, entry(i, 2) as f32));
+    let mut values: Vec<Complex<f32>> = values.collect();
+    let transform = FftPlanner::new().plan_fft_forward(values.len());
+    transform.process(&mut values);
+    for value in values {
         digest.word(f64::from(value.re).to_bits());
         digest.word(f64::from(value.im).to_bits());
     }

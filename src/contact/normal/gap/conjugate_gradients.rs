@@ -3,48 +3,53 @@
 //! The solution satisfies `p ≥ 0`, `g = u(p) + h − δ ≥ 0` and `p g = 0` at every cell; either the sum of p or the approach δ is prescribed (Polonsky and Keer 1999).
 //! Distances may be scaled by the displacement of a cell by its own pressure.
 
-use crate::half_space::grid_operator::{GridOperator, GridWorkspace};
+use crate::half_space::bent_surface::{BentOperator, BentWorkspace, StripFactors};
 use crate::monitor::{Monitor, Stop};
 use crate::normal::gap::cell_sums;
 use crate::normal::gap::cell_sums::{Advance, CellSum, Direction, Distances, Parting, StepSums};
 use crate::normal::hertz::NormalLoad;
 use crate::numerics::simd::LANES;
 
-/// Displacements of equal cells by their pressures.
-pub(crate) trait PressureInfluence {
-    /// Largest number of changed pressures whose displacements are added one by one, which costs less than a product.
-    const CHANGES_MAX: usize;
-    /// Buffers of a product.
-    type Workspace;
-    /// Displacement in mm at every centre for pressures in MPa.
-    fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut Self::Workspace);
-    /// Adds the displacement in mm of at most `CHANGES_MAX` changed pressures in MPa.
-    fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]);
-    /// Displacement in mm/MPa of the first cell by its own pressure.
-    fn own(&self) -> f64;
-    /// The displacement of the first cell by its own pressure over that of each cell, for a multiple of [`LANES`] cells. Distances times these weights are the direction
-    /// of steepest descent.
-    fn weights(&self, cells: usize) -> Vec<f64>;
+/// Largest number of changed pressures whose displacements are added one by one, which costs less than a product.
+const CHANGES_MAX: usize = 80;
+
+/// The influence of pressures multiplied by weights of their strips. On a surface that bends, a uniform approach of these lowers the wheel.
+pub(crate) struct WeightedStrips<'a> {
+    operator: &'a BentOperator,
+    factors: StripFactors,
+    weights: &'a [f64],
 }
 
-impl PressureInfluence for GridOperator {
-    const CHANGES_MAX: usize = 12;
-    type Workspace = GridWorkspace;
-
-    fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut GridWorkspace) {
-        GridOperator::apply(self, pressure, displacement, workspace);
+impl WeightedStrips<'_> {
+    /// The influence on the strips of an operator, with a weight for each strip.
+    pub(crate) fn new<'a>(operator: &'a BentOperator, weights: &'a [f64]) -> WeightedStrips<'a> {
+        WeightedStrips {
+            factors: operator.weighted_pressure_factors(weights),
+            operator,
+            weights,
+        }
     }
 
-    fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
-        GridOperator::add(self, changes, displacement);
+    /// Displacement in mm at every centre for pressures in MPa.
+    fn apply(&self, pressure: &[f64], displacement: &mut [f64], workspace: &mut BentWorkspace) {
+        self.operator
+            .opened_by_pressure(&self.factors, pressure, displacement, workspace);
     }
 
+    /// Displacement in mm/MPa of the first cell by its own pressure.
     fn own(&self) -> f64 {
-        GridOperator::own(self)
+        self.operator.own() / self.weights[0].powi(2)
     }
 
-    fn weights(&self, cells: usize) -> Vec<f64> {
-        vec![1.0; cells.next_multiple_of(LANES)]
+    /// The displacement of the first cell by its own pressure over that of each cell, for a multiple of [`LANES`] cells. Distances times these weights are the direction
+    /// of steepest descent.
+    fn of_cells(&self, cells: usize) -> Vec<f64> {
+        let mut weights = vec![1.0; cells.next_multiple_of(LANES)];
+        let rows = weights[..cells].chunks_exact_mut(cells / self.weights.len());
+        for (row, weight) in rows.zip(self.weights) {
+            row.fill((weight / self.weights[0]).powi(2));
+        }
+        weights
     }
 }
 
@@ -96,11 +101,11 @@ pub(crate) struct PressureTask<'a> {
 /// Solves for the pressure under which the surfaces touch.
 ///
 /// `start` is any pressure that is not 0 everywhere. It only affects the number of iterations.
-pub(crate) fn solve_pressure<I: PressureInfluence>(
+pub(crate) fn solve_pressure(
     task: &PressureTask,
-    influence: &I,
+    influence: &WeightedStrips,
     start: Vec<f64>,
-    workspace: &mut I::Workspace,
+    workspace: &mut BentWorkspace,
     monitor: &dyn Monitor,
 ) -> Result<PressureAnswer, PressureFailure> {
     let PressureTask {
@@ -111,7 +116,7 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
     } = *task;
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
     let n = gap.len();
-    let mut work = PressureIterate::new(gap, start, influence.weights(n));
+    let mut work = PressureIterate::new(gap, start, influence.of_cells(n));
     work.scale_to(loading, cell);
     influence.apply(&work.p[..n], &mut work.u[..n], workspace);
     let mut below = f64::INFINITY;
@@ -143,11 +148,14 @@ pub(crate) fn solve_pressure<I: PressureInfluence>(
         let step;
         [step, below] = work.step_after(factor, n, influence, loading, workspace);
         work.advance(step);
-        if work.changes.len() <= I::CHANGES_MAX {
+        if work.changes.len() <= CHANGES_MAX {
             for (u, r) in work.u.iter_mut().zip(&work.r) {
                 *u -= step * r;
             }
-            influence.add(&work.changes, &mut work.u[..n]);
+            let u = &mut work.u[..n];
+            influence
+                .operator
+                .add_opened(&influence.factors, &work.changes, u);
             let scale = work.scale_to(loading, cell);
             if scale != 1.0 {
                 work.u.iter_mut().for_each(|u| *u *= scale);
@@ -250,13 +258,13 @@ impl PressureIterate {
     /// Chooses the direction and computes its displacement. Returns the step length and the curvature `tᵀAt` along the direction.
     ///
     /// Cells that left the contact change the conjugate direction. If it no longer lowers the energy, steepest descent replaces it.
-    fn step_after<I: PressureInfluence>(
+    fn step_after(
         &mut self,
         factor: f64,
         n: usize,
-        influence: &I,
+        influence: &WeightedStrips,
         loading: NormalLoad,
-        workspace: &mut I::Workspace,
+        workspace: &mut BentWorkspace,
     ) -> [f64; 2] {
         for factor in [factor, 0.0] {
             self.direct(factor);
@@ -314,51 +322,11 @@ impl PressureIterate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::half_space::grid_operator::coefficients;
     use crate::monitor::Unmonitored;
 
     const CELLS: usize = 24;
     const STEP: f64 = 0.5;
     const MODULUS: f64 = 115_000.0;
-
-    /// The influence of the cells in double precision, summed cell by cell.
-    struct Summed(Vec<f64>);
-
-    impl Summed {
-        fn new() -> Summed {
-            Summed(coefficients(CELLS, CELLS, STEP, STEP, MODULUS))
-        }
-    }
-
-    impl PressureInfluence for Summed {
-        const CHANGES_MAX: usize = 0;
-        type Workspace = ();
-
-        fn apply(&self, pressure: &[f64], displacement: &mut [f64], (): &mut ()) {
-            displacement.fill(0.0);
-            let all: Vec<(usize, f64)> = pressure.iter().copied().enumerate().collect();
-            self.add(&all, displacement);
-        }
-
-        fn add(&self, changes: &[(usize, f64)], displacement: &mut [f64]) {
-            for (at, u) in displacement.iter_mut().enumerate() {
-                let (i, j) = (at % CELLS, at / CELLS);
-                let by = |(of, p): &(usize, f64)| {
-                    let (k, l) = (of % CELLS, of / CELLS);
-                    p * self.0[j.abs_diff(l) * CELLS + i.abs_diff(k)]
-                };
-                *u += changes.iter().map(by).sum::<f64>();
-            }
-        }
-
-        fn own(&self) -> f64 {
-            self.0[0]
-        }
-
-        fn weights(&self, cells: usize) -> Vec<f64> {
-            vec![1.0; cells.next_multiple_of(LANES)]
-        }
-    }
 
     fn paraboloid() -> Vec<f64> {
         let at = |i: usize| (i as f64 - 11.3) * STEP;
@@ -367,26 +335,30 @@ mod tests {
             .collect()
     }
 
-    fn solved(loading: NormalLoad, start: Vec<f64>) -> PressureAnswer {
+    fn pressed(
+        loading: NormalLoad,
+        tolerance: f64,
+        start: Vec<f64>,
+    ) -> Result<PressureAnswer, PressureFailure> {
+        let workspace = &mut BentWorkspace::default();
+        let operator = BentOperator::flat([CELLS; 2], [STEP; 2], MODULUS, workspace);
         let task = PressureTask {
             gap: &paraboloid(),
             cell: STEP * STEP,
             loading,
-            tolerance: 1e-9,
+            tolerance,
         };
-        solve_pressure(&task, &Summed::new(), start, &mut (), &Unmonitored).unwrap()
+        let influence = WeightedStrips::new(&operator, &[1.0; CELLS]);
+        solve_pressure(&task, &influence, start, workspace, &Unmonitored)
+    }
+
+    fn solved(loading: NormalLoad, start: Vec<f64>) -> PressureAnswer {
+        pressed(loading, 1e-6, start).unwrap()
     }
 
     #[test]
     fn a_tolerance_that_cannot_be_met_is_said() {
-        let task = PressureTask {
-            gap: &paraboloid(),
-            cell: STEP * STEP,
-            loading: NormalLoad::Force(5e4),
-            tolerance: -1.0,
-        };
-        let start = vec![1.0; CELLS * CELLS];
-        match solve_pressure(&task, &Summed::new(), start, &mut (), &Unmonitored) {
+        match pressed(NormalLoad::Force(5e4), -1.0, vec![1.0; CELLS * CELLS]) {
             Err(PressureFailure::NotConverged(residual)) => assert!(residual < 1e-6, "{residual}"),
             Err(PressureFailure::Stopped(_)) => panic!("stopped"),
             Ok(pressed) => panic!("{}", pressed.residual),
@@ -420,8 +392,8 @@ mod tests {
         let pressed = solved(NormalLoad::Force(5e4), vec![1.0; CELLS * CELLS]);
         let depth = pressed.approach;
         for (p, g) in pressed.pressure.iter().zip(&pressed.distance) {
-            assert!(*p >= 0.0 && *g >= -1e-8 * depth);
-            assert!(*p == 0.0 || g.abs() < 1e-8 * depth, "{p} {g}");
+            assert!(*p >= 0.0 && *g >= -2e-6 * depth);
+            assert!(*p == 0.0 || g.abs() < 2e-6 * depth, "{p} {g}");
         }
     }
 }

@@ -3,7 +3,7 @@
 //! The patches come from a solution on one grid. Each gets a grid adapted to its own width; patches whose boxes overlap share one. Every patch is solved at the
 //! common approach, in the gap opened by the loads of the others. Loads and approach are iterated.
 
-use crate::half_space::grid_operator::GridWorkspace;
+use crate::half_space::bent_surface::BentWorkspace;
 use crate::monitor::Monitor;
 use crate::normal::gap::grid::{
     FIRST, GapOutcome, GridFineness, NEAR, NormalError, PatchGrid, PressureGrid, within,
@@ -28,7 +28,7 @@ impl GapTask {
         whole: &PatchGrid,
         least: f64,
         mut fineness: GridFineness,
-        workspace: &mut GridWorkspace,
+        workspace: &mut BentWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<Option<GapOutcome>, NormalError> {
         let mut grids = boxes(whole, self.gap.window());

@@ -4,9 +4,11 @@
 //! solution on the previous one and is reduced to the contact. If one grid cannot resolve all patches, each patch gets its own grid (see `patch_grids.rs`).
 //! Finally the edges are placed between the cells.
 
-use crate::half_space::grid_operator::{GridOperator, GridWorkspace};
+use crate::half_space::bent_surface::{BentOperator, BentWorkspace};
 use crate::monitor::Monitor;
-use crate::normal::gap::conjugate_gradients::{PressureAnswer, PressureTask, solve_pressure};
+use crate::normal::gap::conjugate_gradients::{
+    PressureAnswer, PressureTask, WeightedStrips, solve_pressure,
+};
 use crate::normal::gap::grid::{
     APPROACH_CHANGE, CELLS_ACROSS_MIN, CELLS_BY_ERROR, COARSER_MAX, FIRST, GapOutcome,
     GridFineness, GridSide, LOOSER_MAX, NEAR, NormalAnswer, NormalError, PRESSURE_CHANGE,
@@ -53,7 +55,7 @@ impl GapTask {
     pub(crate) fn solve_as(
         &self,
         resolution: GridFineness,
-        workspace: &mut GridWorkspace,
+        workspace: &mut BentWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<NormalAnswer, NormalError> {
         let reach = self.touching_reach()?;
@@ -88,7 +90,7 @@ impl GapTask {
         mut solved: Option<(PressureGrid, PressureAnswer)>,
         mut reach: SearchBox,
         resolution: GridFineness,
-        workspace: &mut GridWorkspace,
+        workspace: &mut BentWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<(GapOutcome, bool), NormalError> {
         let (mut iterations, mut pressure_change) = (0, 0.0);
@@ -155,7 +157,7 @@ impl GapTask {
             reach,
             tolerance,
         }: GridStart,
-        workspace: &mut GridWorkspace,
+        workspace: &mut BentWorkspace,
         monitor: &dyn Monitor,
     ) -> Result<PressureAnswer, NormalError> {
         let gap = grid.gap(&self.gap);
@@ -171,7 +173,9 @@ impl GapTask {
                 (pressure, TOLERANCE_FIRST)
             }
         };
-        let influence = GridOperator::new(grid.cells, grid.step, self.contact_modulus, workspace);
+        let operator = BentOperator::flat(grid.cells, grid.step, self.contact_modulus, workspace);
+        let weights = vec![1.0; grid.cells[1]];
+        let influence = WeightedStrips::new(&operator, &weights);
         let task = PressureTask {
             gap: &gap,
             cell,
