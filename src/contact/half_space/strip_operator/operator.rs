@@ -189,14 +189,6 @@ impl StripOperator {
         (self.stored(row, xx, cell), self.stored(row, yy, cell))
     }
 
-    /// An entry of the matrix applied by [`apply`](Self::apply), as `[xx, xy, yx, yy]`: the change of u_x per T_x and per T_y, then that of u_y. A folded matrix has
-    /// entries only for a parity.
-    pub fn entry(&self, parity: Option<Parity>, row: usize, cell: usize) -> [f64; 4] {
-        debug_assert!(!self.folded || parity.is_some());
-        self.roles(parity)
-            .map(|block| self.stored(row, block, cell))
-    }
-
     /// Displacement differences `out_x`, `out_y` (one value per row) caused by tractions `tx`, `ty`.
     ///
     /// Without parity, vectors cover the whole mesh; rows of the mirrored half follow in the order of their segments.
@@ -624,7 +616,10 @@ mod tests {
                 let parity = folded.then_some(Parity::Lateral);
                 for row in 0..here.row_count() {
                     for cell in 0..here.cells(here.segments() - 1).end {
-                        let pairs = [&here, &there].map(|all| all.entry(parity, row, cell));
+                        let entry = |all: &StripOperator| {
+                            all.roles(parity).map(|block| all.stored(row, block, cell))
+                        };
+                        let pairs = [&here, &there].map(entry);
                         for (a, b) in pairs[0].into_iter().zip(pairs[1]) {
                             assert!(
                                 (a - b).abs() < 1e-12,
