@@ -24,8 +24,8 @@ fn main() {
     // Every second motion, to match the published counts of the same sweep.
     let motions: Vec<[f64; 3]> = motions().into_iter().step_by(2).collect();
     println!(
-        "rule | cells | region | guess 1 | guess 2 | continued | 1 then 2 | all three | guess 1: divisions + steps, \
-         diverged/repeats/other | guess 2 | continued | seconds"
+        "rule | cells | region | guess 1 | guess 2 | 1 then 2 | all three | guess 1: divisions + steps, \
+         diverged/repeats/other | guess 2 | seconds"
     );
     for rule in [Rule::Upwind, Rule::ThreePoint, Rule::Trapezoid] {
         for (strips, grading, name) in [

@@ -5,9 +5,7 @@ use railhead_contact::monitor::Unmonitored;
 use railhead_contact::rolling::methods::liu_hsu::active_set::{
     InitialGuess, ZonesRun, ZonesTermination,
 };
-use railhead_contact::rolling::methods::liu_hsu::solve::{
-    coarse_pole, solve_by_upwind, solve_with,
-};
+use railhead_contact::rolling::methods::liu_hsu::solve::{coarse_pole, solve, solve_with};
 use railhead_contact::rolling::slip_rules::Rule;
 
 use crate::regions::{Contact, Region, motion};
@@ -40,17 +38,14 @@ pub struct Counts {
     pub guess_1: usize,
     /// Motions that converge from guess 2 alone, about the pole of a coarse mesh. Without spin there is no guess 2, and guess 1 counts.
     pub guess_2: usize,
-    /// Motions that converge from the continued tractions alone.
-    pub continued: usize,
     /// Motions that converge from guess 1 or else guess 2, as in the paper.
     pub paper: usize,
-    /// Motions that converge with the complete method: the paper's guesses, then the continued run. Rules other than upwind then start from an
-    /// upwind solution.
+    /// Motions that converge with the complete method: the paper's guesses, then a start from tractions of the boundary element method.
     pub shipped: usize,
-    /// Failures of each of the three guesses: Newton–Raphson divergence, repeating zones, other.
-    pub failures: [[usize; 3]; 3],
+    /// Failures of each of the two guesses: Newton–Raphson divergence, repeating zones, other.
+    pub failures: [[usize; 3]; 2],
     /// Divisions and Newton–Raphson steps of the converged runs of each guess.
-    pub work: [[u32; 2]; 3],
+    pub work: [[u32; 2]; 2],
 }
 
 impl Counts {
@@ -62,16 +57,14 @@ impl Counts {
             format!("{outer:.1} + {newton:.1}, {diverged}/{repeated}/{other}")
         };
         format!(
-            "{:3} | {:3} | {:3} | {:3} | {:3} of {} | {} | {} | {}",
+            "{:3} | {:3} | {:3} | {:3} of {} | {} | {}",
             self.guess_1,
             self.guess_2,
-            self.continued,
             self.paper,
             self.shipped,
             self.motions,
             per_run(0, self.guess_1),
             per_run(1, self.guess_2),
-            per_run(2, self.continued),
         )
     }
 }
@@ -88,7 +81,6 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
     let fine = Contact::new(region, per_patch(mesh.0), mesh.1);
     let coarse = Contact::new(region, per_patch(5), &Grading::uniform(5));
     let (on_fine, on_coarse) = (fine.equations(rule), coarse.equations(rule));
-    let on_upwind = fine.equations(Rule::Upwind);
     let mut counts = Counts {
         motions: motions.len(),
         ..Counts::default()
@@ -100,11 +92,10 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
         let stage = fine.stage(&on_fine, &rigid, motion, 1e-8);
         let first_stage = coarse.stage(&on_coarse, &rigid_coarse, motion, 1e-8);
         let pole = coarse_pole(&first_stage, &Unmonitored).unwrap();
-        let mut converges = [false; 3];
+        let mut converges = [false; 2];
         for (k, guess) in [
             InitialGuess::RigidSlip,
             pole.map_or(InitialGuess::RigidSlip, InitialGuess::SpinPole),
-            InitialGuess::Continued,
         ]
         .into_iter()
         .enumerate()
@@ -116,14 +107,10 @@ pub fn count(region: Region, rule: Rule, mesh: (usize, &Grading), motions: &[[f6
         }
         counts.guess_1 += usize::from(converges[0]);
         counts.guess_2 += usize::from(converges[1]);
-        counts.continued += usize::from(converges[2]);
         let paper = converges[0] || converges[1];
         counts.paper += usize::from(paper);
-        let rigid = on_upwind.rigid(&motion);
-        let upwind = fine.stage(&on_upwind, &rigid, motion, 1e-8);
-        t.fill(0.0);
         let shipped = paper
-            || solve_by_upwind(&stage, &upwind, None, &mut t, &Unmonitored)
+            || solve(&stage, None, &mut t, &Unmonitored)
                 .unwrap()
                 .exit()
                 .converged();

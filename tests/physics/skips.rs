@@ -144,24 +144,18 @@ fn mirror_symmetry_halves_the_work_and_does_not_move_the_answer() {
 
 #[test]
 fn in_full_slip_nothing_sticks_and_the_answer_is_that_of_a_plain_newton_solve() {
-    for motion in [[60.0, 0.0, 0.0], [80.0, -40.0, 3.0]] {
-        let contact = Ellipse::steel(1.4, 0.28).normalised(motion[0], motion[1], motion[2]);
+    for (a_over_b, nu, motion) in [
+        (1.4, 0.28, [60.0, 0.0, 0.0]),
+        (1.4, 0.28, [80.0, -40.0, 3.0]),
+        (0.05, 0.5, [3e7, 2e7, 0.0]),
+        (1.0, 0.28, [3e8, 2e8, 0.0]),
+        (20.0, 0.0, [3e7, 2e7, 1e5]),
+    ] {
+        let contact = Ellipse::steel(a_over_b, nu).normalised(motion[0], motion[1], motion[2]);
         let point = answered(&contact);
         assert_eq!(point.stick_area_mm2, Some(0.0));
         let distance = distance_to_plain_newton(&contact);
-        assert!(distance < 1e-6, "{motion:?}: {distance:e}");
-    }
-}
-
-#[test]
-fn overwhelming_slip_needs_no_influence_and_does_not_move_the_answer() {
-    for (a_over_b, nu) in [(0.05, 0.5), (1.0, 0.0), (1.0, 0.28), (20.0, 0.5)] {
-        let contact = Ellipse::steel(a_over_b, nu).normalised(3e7, 2e7, 0.0);
-        let point = answered(&contact);
-        assert_eq!(point.solver.products, 0, "{:?}", point.solver.skipped);
-        assert!(point.solver.skipped[0].contains("factor of a million"));
-        let distance = distance_to_plain_newton(&contact);
-        assert!(distance < 1e-6, "a/b {a_over_b}: {distance:e}");
+        assert!(distance < 1e-6, "{a_over_b} {motion:?}: {distance:e}");
     }
 }
 

@@ -22,7 +22,7 @@ use crate::monitor::{Monitor, Stop};
 use crate::normal::footprint::Footprint;
 use crate::numerics::simd;
 use crate::numerics::simd::Float;
-use crate::rolling::answer::{LevelAnswer, Skip};
+use crate::rolling::answer::LevelAnswer;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
@@ -68,7 +68,7 @@ pub fn cell_power(
     let (level, answer) = (of.level, of.answer);
     let unit = level.scale.slip();
     let mut slip = [0, 1].map(|k| answer.slip[k].iter().map(|s| s * unit).collect::<Vec<_>>());
-    if let Some(Skip::NoMotion | Skip::NoFriction) = answer.skip {
+    if answer.is_without_traction() {
         let power = vec![0.0; level.area.len()];
         return Ok(CellPower { power, slip });
     }
@@ -136,14 +136,12 @@ fn cell_mean_powers(of: SolvedMotion, monitor: &dyn Monitor) -> Result<Vec<f64>,
             *power += areas[i] * (traction[0][i] * x[i] + traction[1][i] * y[i]);
         }
     }
-    if of.answer.skip != Some(Skip::RigidSlip) {
-        let differences = match level.precision {
-            Precision::Single => Differences::of::<f32>(mesh, nu, traction, monitor)?,
-            Precision::Double => Differences::of::<f64>(mesh, nu, traction, monitor)?,
-        };
-        differences.add_powers(mesh, traction, &mut power);
-        add_layer_powers(mesh, level.layer, traction, &mut power);
-    }
+    let differences = match level.precision {
+        Precision::Single => Differences::of::<f32>(mesh, nu, traction, monitor)?,
+        Precision::Double => Differences::of::<f64>(mesh, nu, traction, monitor)?,
+    };
+    differences.add_powers(mesh, traction, &mut power);
+    add_layer_powers(mesh, level.layer, traction, &mut power);
     Ok(power)
 }
 

@@ -27,12 +27,26 @@ pub struct LevelAnswer {
 }
 
 impl LevelAnswer {
-    /// Whether the tractions were found without an iteration.
-    pub fn is_closed_form(&self) -> bool {
-        matches!(
-            self.skip,
-            Some(Skip::NoMotion | Skip::NoFriction | Skip::RigidSlip)
-        )
+    /// The solution without tractions for a motion about the origin of the case, where the slips are those of the motion.
+    pub(crate) fn without_traction(level: &StripMesh, motion: &Motion, skip: Skip) -> LevelAnswer {
+        let (cells, mesh) = (level.mesh.cells(), &level.mesh);
+        let along = |y: f64| motion.creepage_x - motion.spin_per_mm * y;
+        let across = |x: &f64| motion.creepage_y + motion.spin_per_mm * x;
+        LevelAnswer {
+            traction: [vec![0.0; cells], vec![0.0; cells]],
+            slip: [
+                mesh.cell_load_y().into_iter().map(along).collect(),
+                mesh.node.iter().map(across).collect(),
+            ],
+            slips: vec![!motion.is_still(); cells],
+            skip: Some(skip),
+            ..LevelAnswer::default()
+        }
+    }
+
+    /// Whether there are no tractions because there is no motion or no friction.
+    pub fn is_without_traction(&self) -> bool {
+        matches!(self.skip, Some(Skip::NoMotion | Skip::NoFriction))
     }
 }
 
@@ -141,8 +155,6 @@ pub enum Skip {
     NoMotion,
     /// Without friction there are no tractions.
     NoFriction,
-    /// The rigid slip is so large that tractions follow it to one part in a million.
-    RigidSlip,
     /// Patch and motion are mirror-symmetric, so that half the cells are unknowns.
     HalfTheCells,
     /// The patch alone is mirror-symmetric, so that half the operator is enough.
@@ -156,9 +168,6 @@ impl Skip {
             Skip::Mesh => "the bound of the creep table meets the target: no mesh",
             Skip::NoMotion => "no creepage and no spin: nothing to solve",
             Skip::NoFriction => "no friction: no tractions",
-            Skip::RigidSlip => {
-                "the rigid slip exceeds the elastic slip by a factor of a million: tractions follow the rigid slip"
-            }
             Skip::HalfTheCells => "mirror symmetry of patch and motion: half the cells",
             Skip::HalfTheOperator => {
                 "mirror symmetry of the patch: half of the influence matrix was computed"

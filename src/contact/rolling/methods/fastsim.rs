@@ -11,15 +11,14 @@ use crate::error::SolveError;
 use crate::friction::law::FrictionLaw;
 use crate::friction::path_dependent::Interface;
 use crate::half_space::unlike_bodies::Elasticity;
-use crate::mesh::{MeshSize, SIDE_GOOD};
+use crate::mesh::{Mesh, MeshSize, SIDE_GOOD, Segment};
 use crate::method::{Method, TractionBound};
 use crate::normal::footprint::Footprint;
 use crate::normal::hertz::{Ellipse, NormalLoad};
 use crate::numerics::simd::length;
-use crate::rolling::answer::{LevelAnswer, Work};
+use crate::rolling::answer::{LevelAnswer, Skip, Work};
 use crate::rolling::linear_theory;
 use crate::rolling::load_ellipse::LoadEllipse;
-use crate::rolling::methods::full_slip;
 use crate::rolling::strip_mesh::{Scale, StripMesh};
 use crate::rolling::task::{Motion, Resolution, RollingTask};
 
@@ -47,8 +46,8 @@ pub fn stated_error(mesh: MeshSize) -> f64 {
 /// parabolic bound exceed μp in the middle of a patch.
 pub fn solve(task: &RollingTask, level: &StripMesh, motion: &Motion) -> LevelAnswer {
     let parabolic = task.traction_bound == TractionBound::Parabolic;
-    if !parabolic && let Some(answer) = full_slip::rigid_answer(level, motion) {
-        return answer;
+    if motion.is_still() {
+        return LevelAnswer::without_traction(level, motion, Skip::NoMotion);
     }
     let cells = level.mesh.cells();
     let mut answer = LevelAnswer {
@@ -168,23 +167,10 @@ impl EllipseMesh {
         let (mut force, mut stick, mut whole) = ([0.0; 3], 0.0, 0.0);
         for (segment, load_y) in mesh.segments.iter().zip(&mesh.load_y) {
             let arm = 0.5 * b * (segment.chord.y + load_y);
-            let across = brush.growth[0] - brush.turning * b * segment.chord.y;
-            let mut ahead = a * segment.chord.right;
-            let mut traction = [0.0; 2];
-            for i in segment.cells.clone().rev() {
-                let here = a * mesh.node[i];
-                let (step, halfway) = (ahead - here, 0.5 * (ahead + here));
-                traction = [
-                    traction[0] + step * across,
-                    traction[1] + step * (brush.growth[1] + brush.turning * halfway),
-                ];
-                let size = length(traction[0], traction[1]);
+            brush.sweep_strip(mesh, segment, [a, b], &self.bound, |i, traction, slip| {
                 let area = self.level.area[i];
                 whole += area;
-                if size > self.bound[i] {
-                    let share = self.bound[i] / size;
-                    traction = traction.map(|t| share * t);
-                } else {
+                if slip.is_none() {
                     stick += area;
                 }
                 let [x, y] = traction.map(|t| area * t);
@@ -192,8 +178,7 @@ impl EllipseMesh {
                 force[0] += x;
                 force[1] += y;
                 force[2] += middle * y - arm * x;
-                ahead = here;
-            }
+            });
         }
         (force.map(|part| part / PER_LIMIT), stick / whole)
     }
@@ -251,7 +236,7 @@ impl SimplifiedTheory {
         }
     }
 
-    /// Sweeps each segment of a patch from its leading to its trailing edge. `take` receives each cell, its traction, and its slip if it slips.
+    /// Sweeps each segment of a patch. `take` receives each cell, its traction, and its slip if it slips.
     fn sweep_patch(
         &self,
         level: &StripMesh,
@@ -259,32 +244,44 @@ impl SimplifiedTheory {
         bound: &[f64],
         mut take: impl FnMut(usize, [f64; 2], Option<[f64; 2]>),
     ) {
-        let segments = &level.normalised.segments;
-        for segment in segments.iter().filter(|s| s.chord.patch == patch) {
-            let mut ahead = segment.chord.right;
-            let mut traction = [0.0; 2];
-            let across = self.growth[0] - self.turning * (segment.chord.y - self.centre[1]);
-            for i in segment.cells.clone().rev() {
-                let here = level.normalised.node[i];
-                let step = ahead - here;
-                // The rigid slip is linear along the strip: its value halfway makes the step exact.
-                let halfway = 0.5 * (ahead + here) - self.centre[0];
-                let trial = [
-                    traction[0] + step * across,
-                    traction[1] + step * (self.growth[1] + self.turning * halfway),
-                ];
-                let size = length(trial[0], trial[1]);
-                traction = trial;
-                let mut slip = None;
-                if size > bound[i] {
-                    let share = bound[i] / size;
-                    traction = trial.map(|t| share * t);
-                    let back = self.flexibility * (1.0 - share) / step;
-                    slip = Some(trial.map(|t| back * t));
-                }
-                take(i, traction, slip);
-                ahead = here;
+        let mesh = &level.normalised;
+        for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
+            self.sweep_strip(mesh, segment, [1.0; 2], bound, &mut take);
+        }
+    }
+
+    /// Sweeps a segment of a mesh, stretched by factors along x and across, from its leading to its trailing edge. See [`Self::sweep_patch`] for `take`.
+    fn sweep_strip(
+        &self,
+        mesh: &Mesh,
+        segment: &Segment,
+        [along, across]: [f64; 2],
+        bound: &[f64],
+        mut take: impl FnMut(usize, [f64; 2], Option<[f64; 2]>),
+    ) {
+        let growth_x = self.growth[0] - self.turning * (across * segment.chord.y - self.centre[1]);
+        let mut ahead = along * segment.chord.right;
+        let mut traction = [0.0; 2];
+        for i in segment.cells.clone().rev() {
+            let here = along * mesh.node[i];
+            let step = ahead - here;
+            // The rigid slip is linear along the strip: its value halfway makes the step exact.
+            let halfway = 0.5 * (ahead + here) - self.centre[0];
+            let trial = [
+                traction[0] + step * growth_x,
+                traction[1] + step * (self.growth[1] + self.turning * halfway),
+            ];
+            let size = length(trial[0], trial[1]);
+            traction = trial;
+            let mut slip = None;
+            if size > bound[i] {
+                let share = bound[i] / size;
+                traction = trial.map(|t| share * t);
+                let back = self.flexibility * (1.0 - share) / step;
+                slip = Some(trial.map(|t| back * t));
             }
+            take(i, traction, slip);
+            ahead = here;
         }
     }
 }

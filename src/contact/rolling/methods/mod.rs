@@ -2,6 +2,5 @@
 
 pub mod boundary_element;
 pub mod fastsim;
-pub mod full_slip;
 pub mod liu_hsu;
 pub mod table;

@@ -5,9 +5,8 @@ use std::f64::consts::{PI, SQRT_2};
 use crate::mesh::SIDE_GOOD;
 use crate::method::Method;
 use crate::normal::hertz::Patch;
-use crate::rolling::answer::{RelativeErrors, Resultants, Skip};
+use crate::rolling::answer::{RelativeErrors, Resultants};
 use crate::rolling::methods::fastsim;
-use crate::rolling::methods::full_slip::NEGLIGIBLE;
 use crate::rolling::refinement::on_mesh::DiscreteSolution;
 use crate::rolling::task::{Resolution, RollingTask};
 
@@ -75,8 +74,7 @@ impl Estimate {
             resultants: finest.resultants.clone(),
             errors: vec![None; patches.len() + 1],
         };
-        let skip = finest.tangential.skip;
-        if let Some(Skip::NoMotion | Skip::NoFriction) = skip {
+        if finest.tangential.is_without_traction() {
             found.errors.fill(Some(0.0));
             return Some(found);
         }
@@ -121,10 +119,9 @@ impl Estimate {
         };
         let given = matches!(task.resolution, Resolution::Mesh(_));
         let inverse_squares = || [size.strips, size.cells].map(|n| f64::from(n).powi(-2));
-        let least = match skip {
-            Some(Skip::RigidSlip) => 1.0 / NEGLIGIBLE,
-            _ if given && side < SIDE_FEW => alone,
-            _ if given && side < SIDE_GOOD => ERROR_FEW * inverse_squares().iter().sum::<f64>(),
+        let least = match given {
+            true if side < SIDE_FEW => alone,
+            true if side < SIDE_GOOD => ERROR_FEW * inverse_squares().iter().sum::<f64>(),
             _ => task.tolerance(index),
         };
         let normal = normal_errors(task, patches);

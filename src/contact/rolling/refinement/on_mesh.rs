@@ -8,11 +8,11 @@ use crate::method::Method;
 use crate::monitor::Monitor;
 use crate::normal::hertz::Patch;
 use crate::remark::kind::short;
-use crate::rolling::answer::{LevelAnswer, LevelFailure, Resultants, Work};
+use crate::rolling::answer::{LevelAnswer, LevelFailure, Resultants, Skip, Work};
 use crate::rolling::methods::boundary_element::solve as boundary_element;
 use crate::rolling::methods::boundary_element::task::LevelTask;
+use crate::rolling::methods::fastsim;
 use crate::rolling::methods::liu_hsu::on_level;
-use crate::rolling::methods::{fastsim, full_slip};
 use crate::rolling::refinement::interpolate::{RefinementState, prolonged};
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{MeshPlan, Motion, RollingTask};
@@ -71,9 +71,11 @@ pub fn solve_on_mesh(
     let mesh = state.levels.get(number);
     let tangential = match task.method {
         // Without friction, tractions are 0 for every method.
-        _ if task.friction.is_frictionless() => {
-            Ok(full_slip::frictionless_answer(&mesh, &asked.motion))
-        }
+        _ if task.friction.is_frictionless() => Ok(LevelAnswer::without_traction(
+            &mesh,
+            &asked.motion,
+            Skip::NoFriction,
+        )),
         Method::LiuHsu => {
             let coarse = StripMesh::new(task, POLE_MESH).ok();
             let tolerance = task.tolerance(asked.index);
@@ -127,7 +129,7 @@ fn boundary_elements(
     };
     let found = boundary_element::solve(of_mesh, start.as_ref(), &mut state.workspace, monitor)?;
     let is_predicting = task.motions.len() > 1 || task.forces[asked.index] != [None; 2];
-    if is_unique && is_predicting && !found.is_closed_form() {
+    if is_unique && is_predicting && !found.is_without_traction() {
         state.predictor.remember(number, motion, &found.traction);
     }
     Ok(found)
@@ -145,7 +147,7 @@ pub(crate) fn add_smooth_slips(
     answer: &mut LevelAnswer,
     monitor: &dyn Monitor,
 ) -> Result<Work, SolveError> {
-    let is_smooth = answer.second.is_some() || answer.is_closed_form();
+    let is_smooth = answer.second.is_some() || answer.is_without_traction();
     if task.method != Method::BoundaryElement || is_smooth {
         return Ok(Work::default());
     }

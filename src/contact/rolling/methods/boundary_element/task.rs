@@ -3,7 +3,6 @@
 use crate::friction::path_dependent::PathDependentFriction;
 use crate::friction::velocity_weakening::Softening;
 use crate::rolling::answer::{LevelAnswer, Skip};
-use crate::rolling::methods::full_slip;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 
@@ -23,15 +22,10 @@ pub struct LevelTask<'a> {
 }
 
 impl LevelTask<'_> {
-    /// The solution without an iteration: where nothing moves, or where the rigid slip alone determines tractions whose bounds do not depend on slip.
+    /// The solution without an iteration if nothing moves.
     pub(crate) fn without_iteration(&self) -> Option<LevelAnswer> {
-        if self.level.surface_slip.is_some() {
-            return None;
-        }
-        let answer = full_slip::rigid_answer(self.level, self.motion)?;
-        let still = answer.skip == Some(Skip::NoMotion);
-        let constant = self.fall.is_none() && self.passage.is_none();
-        (still || constant).then_some(answer)
+        let moves = self.level.surface_slip.is_some() || !self.motion.is_still();
+        (!moves).then(|| LevelAnswer::without_traction(self.level, self.motion, Skip::NoMotion))
     }
 }
 

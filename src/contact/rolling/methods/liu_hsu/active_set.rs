@@ -137,26 +137,13 @@ fn solve_division(
     division: &mut Zoning,
     monitor: &dyn Monitor,
 ) -> Result<bool, Stop> {
-    let bound = system.slip_cells.iter().map(|i| task.bound[*i]);
-    let mut roots = RootChoice {
-        system,
-        bound: bound.collect(),
-        iterations: 0,
-        monitor,
-    };
-    let start = |guess| start_tractions(task, system, guess, &division.tractions);
-    let found = match attempt.guess {
-        InitialGuess::Continued => roots.along_slip(
-            start(InitialGuess::Continued),
-            start(InitialGuess::RigidSlip),
-        )?,
-        // The guesses of the paper use its full steps and accept any root.
-        guess => roots.find(start(guess), StepRule::Full)?,
-    };
-    attempt.newton_iterations += roots.iterations;
-    let Some(t) = found else {
+    let bound: Vec<f64> = system.slip_cells.iter().map(|i| task.bound[*i]).collect();
+    let mut t = start_tractions(task, system, attempt.guess, &division.tractions);
+    let (converged, steps) = solve(system, &bound, &mut t, monitor)?;
+    attempt.newton_iterations += steps;
+    if !converged {
         return Ok(false);
-    };
+    }
     division.tractions.fill(0.0);
     let on_stick = both_components(&system.stick_cells, task.cells);
     for (place, value) in on_stick.iter().zip(system.stick_tractions(&t)) {
@@ -169,44 +156,6 @@ fn solve_division(
     Ok(true)
 }
 
-/// The search for a root of eq. 8 and 9 for a division.
-struct RootChoice<'a> {
-    system: &'a SlipSystem,
-    bound: Vec<f64>,
-    iterations: u32,
-    monitor: &'a dyn Monitor,
-}
-
-impl RootChoice<'_> {
-    /// The root that Newton–Raphson reaches from a start, if it converges.
-    fn find(&mut self, mut t: Vec<f64>, steps: StepRule) -> Result<Option<Vec<f64>>, Stop> {
-        let (converged, steps) = solve(self.system, &self.bound, steps, &mut t, self.monitor)?;
-        self.iterations += steps;
-        Ok(converged.then_some(t))
-    }
-
-    /// A root with as few tractions as possible that oppose their slip; eq. 9 has a root for every choice of such cells. The starts are `first`, the root found
-    /// with the opposing tractions reversed, and `second`.
-    fn along_slip(&mut self, first: Vec<f64>, second: Vec<f64>) -> Result<Option<Vec<f64>>, Stop> {
-        let mut best = self.find(first, StepRule::OnCircles)?;
-        let turned = best.as_ref().map(|t| turned(self.system, t));
-        for start in turned.into_iter().chain([second]) {
-            let count = |t: &Vec<f64>| opposed(self.system, t).len();
-            let least = best.as_ref().map_or(usize::MAX, count);
-            // Without opposing tractions there is no better root.
-            if least == 0 {
-                break;
-            }
-            if let Some(t) = self.find(start, StepRule::OnCircles)?
-                && opposed(self.system, &t).len() < least
-            {
-                best = Some(t);
-            }
-        }
-        Ok(best)
-    }
-}
-
 /// Indices, in the list of slip cells, of the cells whose tractions oppose their slips (eq. 10).
 fn opposed(system: &SlipSystem, t: &[f64]) -> Vec<usize> {
     let count = system.slip_cells.len();
@@ -214,17 +163,6 @@ fn opposed(system: &SlipSystem, t: &[f64]) -> Vec<usize> {
     (0..count)
         .filter(|k| slip[*k] * t[*k] + slip[count + k] * t[count + k] < 0.0)
         .collect()
-}
-
-/// The tractions with the opposing ones reversed.
-fn turned(system: &SlipSystem, t: &[f64]) -> Vec<f64> {
-    let count = system.slip_cells.len();
-    let mut next = t.to_vec();
-    for k in opposed(system, t) {
-        next[k] = -next[k];
-        next[count + k] = -next[count + k];
-    }
-    next
 }
 
 /// The initial guess for the slip cells, x before y.
@@ -274,7 +212,7 @@ pub enum InitialGuess {
     /// The paper prints a minus under the root of eq. 15, which must be a plus, and omits the sign of φ. With the rigid pole `(−ν_y/φ, ν_x/φ)` this would equal
     /// guess 1; the pole of the elastic problem differs.
     SpinPole([f64; 2]),
-    /// Along the tractions of the previous division; not in the paper (see [`liu_hsu`](crate::rolling::methods::liu_hsu)).
+    /// Along the tractions of the start or of the previous division; not in the paper (see [`liu_hsu`](crate::rolling::methods::liu_hsu)).
     Continued,
 }
 
@@ -306,34 +244,20 @@ fn unit(v: [f64; 2]) -> Option<[f64; 2]> {
     (length > 0.0 && length.is_finite()).then(|| [v[0] / length, v[1] / length])
 }
 
-/// Largest number of halvings of a step on the circles.
-const HALVINGS_MAX: u32 = 6;
 /// The iteration has converged if no traction changes by more than this share of its bound. The error left is about the square of this.
 const STEP_SMALL: f64 = 1e-8;
-
-/// The form of a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StepRule {
-    /// As in the paper: full steps; `|T|² = g²` is one of the equations.
-    Full,
-    /// The unknown is the angle of each traction, so tractions stay on their friction circles. A step is halved until the component of slip perpendicular to the
-    /// traction decreases.
-    OnCircles,
-}
 
 /// Solves `|T|² = g²` (eq. 8) and `s_x T_y − s_y T_x = 0` (eq. 9), `s = q' + K T` (eq. 13), on the slip cells.
 ///
 /// `t` contains the initial guess and receives the solution, x of all slip cells before y; no initial traction is 0. `bound` is g of the slip cells, more than
 /// 0. The guess determines the root (traction along or against the slip). Returns whether the last step was small, and the number of steps. A step that is not
 /// finite ends the iteration.
-/// was small, and the number of steps; the iteration ends with a step that is not finite.
 ///
 /// # Errors
 /// Only if the monitor stops the work.
 pub fn solve(
     system: &SlipSystem,
     bound: &[f64],
-    steps: StepRule,
     t: &mut [f64],
     monitor: &dyn Monitor,
 ) -> Result<(bool, u32), Stop> {
@@ -354,13 +278,8 @@ pub fn solve(
         if !largest.is_finite() {
             return Ok((false, taken));
         }
-        match steps {
-            StepRule::Full => {
-                for (value, change) in t.iter_mut().zip(&step) {
-                    *value += change;
-                }
-            }
-            StepRule::OnCircles => search_on_circles(system, bound, &step, t),
+        for (value, change) in t.iter_mut().zip(&step) {
+            *value += change;
         }
         if largest <= STEP_SMALL {
             return Ok((true, taken));
@@ -422,38 +341,6 @@ pub fn newton_step(
         radial_part[n + i] += tau[i] * across[i].1;
     }
     Ok(radial_part)
-}
-
-/// Moves `t` along the step and projects it onto the circles. Accepts the first of the halved steps that reduces the residual of eq. 9.
-fn search_on_circles(system: &SlipSystem, bound: &[f64], step: &[f64], t: &mut [f64]) {
-    let n = bound.len();
-    let before = t.to_vec();
-    let start = slip_across(system, bound, &before);
-    for halvings in 0..=HALVINGS_MAX {
-        let share = 0.5_f64.powi(halvings as i32);
-        for i in 0..n {
-            let (x, y) = (
-                before[i] + share * step[i],
-                before[n + i] + share * step[n + i],
-            );
-            let length = x.hypot(y);
-            t[i] = bound[i] * x / length;
-            t[n + i] = bound[i] * y / length;
-        }
-        if slip_across(system, bound, t) < (1.0 - 1e-4 * share) * start {
-            break;
-        }
-    }
-}
-
-/// Root of the sum of squares of the slip perpendicular to the traction.
-fn slip_across(system: &SlipSystem, bound: &[f64], t: &[f64]) -> f64 {
-    let n = bound.len();
-    let slip = system.slip(t);
-    (0..n)
-        .map(|i| ((slip[i] * t[n + i] - slip[n + i] * t[i]) / bound[i]).powi(2))
-        .sum::<f64>()
-        .sqrt()
 }
 
 #[cfg(test)]

@@ -35,30 +35,30 @@
 //!
 //! The paper says always. Measured, that is true only of the upwind rule without spin. Most failures are divisions that
 //! repeat, because Newton–Raphson converges to a root of eq. 9 at which some tractions oppose their slips. If both guesses
-//! fail, a third run follows, which is not in the paper ([`Guess::Continued`](crate::rolling::methods::liu_hsu::active_set::InitialGuess::Continued)): tractions start from those of the
-//! previous division and keep their magnitudes, and where a root has tractions that oppose their slips, the iteration is
-//! repeated with these reversed. Rules of second order start the third run from an upwind solution ([`solve_by_upwind`](crate::rolling::methods::liu_hsu::solve::solve_by_upwind)). The table
-//! counts how many of 109 motions converge (normalised creepage 0 to 3 in four directions, spin 0 to 20). The pole of guess 2
-//! comes from 25 coarse cells; without spin guess 1 stands in its place. `cargo bench --bench convergence_domain` prints more.
+//! fail, a third run follows, which is not in the paper ([`InitialGuess::Continued`](active_set::InitialGuess::Continued)):
+//! it starts from the tractions and zones at which the Newton iteration of the boundary element method ends. It solves
+//! all these motions on 5 × 5 cells. The table counts how many of 109 motions converge without it (normalised creepage 0
+//! to 3 in four directions, spin 0 to 20). The pole of guess 2 comes from 25 coarse cells; without spin guess 1 stands in
+//! its place. `cargo bench --bench convergence_domain` prints more.
 //!
-//! | rule, mesh | region | guess 1 | guess 2 | 1, then 2 (the paper) | 1, 2, third run |
-//! |---|---|---|---|---|---|
-//! | upwind, 5 × 5 equal cells | circle | 63 | 101 | 102 | 109 |
-//! | | ellipse, b = 0.3 a | 59 | 88 | 90 | 107 |
-//! | | ellipse, b = 3.3 a | 75 | 97 | 97 | 106 |
-//! | | egg | 70 | 102 | 102 | 109 |
-//! | upwind, 10 × 10 equal cells | circle | 54 | 93 | 93 | 108 |
-//! | | ellipse, b = 0.3 a | 53 | 78 | 80 | 108 |
-//! | | ellipse, b = 3.3 a | 99 | 105 | 105 | 109 |
-//! | | egg | 43 | 89 | 89 | 109 |
-//! | trapezoid, 5 × 5 equal cells | circle | 78 | 99 | 100 | 109 |
-//! | | ellipse, b = 0.3 a | 66 | 92 | 94 | 109 |
-//! | | ellipse, b = 3.3 a | 89 | 91 | 94 | 109 |
-//! | | egg | 84 | 99 | 103 | 109 |
-//! | trapezoid, 12 × 12 graded cells | circle | 51 | 84 | 84 | 109 |
-//! | | ellipse, b = 0.3 a | 45 | 61 | 66 | 109 |
-//! | | ellipse, b = 3.3 a | 92 | 96 | 96 | 109 |
-//! | | egg | 59 | 82 | 84 | 108 |
+//! | rule, mesh | region | guess 1 | guess 2 | 1, then 2 (the paper) |
+//! |---|---|---|---|---|
+//! | upwind, 5 × 5 equal cells | circle | 63 | 101 | 102 |
+//! | | ellipse, b = 0.3 a | 59 | 88 | 90 |
+//! | | ellipse, b = 3.3 a | 75 | 97 | 97 |
+//! | | egg | 70 | 102 | 102 |
+//! | upwind, 10 × 10 equal cells | circle | 54 | 93 | 93 |
+//! | | ellipse, b = 0.3 a | 53 | 78 | 80 |
+//! | | ellipse, b = 3.3 a | 99 | 105 | 105 |
+//! | | egg | 43 | 89 | 89 |
+//! | trapezoid, 5 × 5 equal cells | circle | 78 | 99 | 100 |
+//! | | ellipse, b = 0.3 a | 66 | 92 | 94 |
+//! | | ellipse, b = 3.3 a | 89 | 91 | 94 |
+//! | | egg | 84 | 99 | 103 |
+//! | trapezoid, 12 × 12 graded cells | circle | 51 | 84 | 84 |
+//! | | ellipse, b = 0.3 a | 45 | 61 | 66 |
+//! | | ellipse, b = 3.3 a | 92 | 96 | 96 |
+//! | | egg | 59 | 82 | 84 |
 //!
 //! A solve that does not converge is an error; `boundary_element` converges in all these states. All matrices are dense: 1000
 //! cells take seconds and more than 100 MB, and the checks of a case allow no more cells than that.

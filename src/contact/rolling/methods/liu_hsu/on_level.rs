@@ -2,11 +2,10 @@
 
 use crate::half_space::strip_operator::operator::StripOperator;
 use crate::monitor::{Monitor, Stop};
-use crate::rolling::answer::{LevelAnswer, LevelFailure, Work, project_on_bound};
+use crate::rolling::answer::{LevelAnswer, LevelFailure, Skip, Work, project_on_bound};
 use crate::rolling::methods::boundary_element::newton::Newton;
 use crate::rolling::methods::boundary_element::task::NewtonTask;
-use crate::rolling::methods::full_slip;
-use crate::rolling::methods::liu_hsu::solve::{ZonesOutcome, solve_by_upwind};
+use crate::rolling::methods::liu_hsu::solve::{self, ZonesOutcome};
 use crate::rolling::methods::liu_hsu::stick_block::DenseTask;
 use crate::rolling::slip_equations::SlipEquations;
 use crate::rolling::slip_rules::Rule;
@@ -24,23 +23,21 @@ pub fn solve(
     tolerance: f64,
     monitor: &dyn Monitor,
 ) -> Result<LevelAnswer, LevelFailure> {
-    let here = level.scale.motion(motion);
-    if let Some(answer) = full_slip::rigid_answer(level, &here) {
-        return Ok(answer);
+    if motion.is_still() {
+        return Ok(LevelAnswer::without_traction(level, motion, Skip::NoMotion));
     }
+    let here = level.scale.motion(motion);
     let operator = level.operator(monitor)?;
     let coarse = coarse.map(|coarse| Ok::<_, Stop>((coarse, coarse.operator(monitor)?)));
     let coarse = coarse.transpose()?;
-    let fine = DenseParts::new(level, &operator, Rule::Trapezoid, &here);
-    let upwind = DenseParts::new(level, &operator, Rule::Upwind, &here);
+    let fine = DenseParts::new(level, &operator, &here);
     let coarse = coarse.as_ref().map(|(level, operator)| {
         let motion = level.scale.motion(motion);
-        DenseParts::new(level, operator, Rule::Trapezoid, &motion)
+        DenseParts::new(level, operator, &motion)
     });
     let mut t = vec![0.0; 2 * fine.equations.padded()];
-    let outcome = solve_by_upwind(
+    let outcome = solve::solve(
         &fine.stage(tolerance),
-        &upwind.stage(tolerance),
         coarse.as_ref().map(|c| c.stage(tolerance)).as_ref(),
         &mut t,
         monitor,
@@ -81,7 +78,7 @@ fn work(outcome: &ZonesOutcome) -> Work {
     }
 }
 
-/// The equations of one rule on a level, with the data that a [`DenseTask`] borrows.
+/// The equations of a level, with the data that a [`DenseTask`] borrows.
 struct DenseParts<'a> {
     level: &'a StripMesh,
     equations: SlipEquations<'a>,
@@ -94,13 +91,8 @@ struct DenseParts<'a> {
 }
 
 impl<'a> DenseParts<'a> {
-    fn new(
-        level: &'a StripMesh,
-        operator: &'a StripOperator,
-        rule: Rule,
-        motion: &Motion,
-    ) -> DenseParts<'a> {
-        let equations = SlipEquations::new(rule, &level.normalised, operator, None);
+    fn new(level: &'a StripMesh, operator: &'a StripOperator, motion: &Motion) -> DenseParts<'a> {
+        let equations = SlipEquations::new(Rule::Trapezoid, &level.normalised, operator, None);
         let padded = equations.padded();
         let resized = |mut values: Vec<f64>| {
             values.resize(padded, 0.0);

@@ -1,16 +1,16 @@
-//! The sequence of runs: the guesses of the paper, then a start from an upwind solution.
+//! The sequence of runs: the guesses of the paper, then a start from tractions of the boundary element method.
 
 use crate::monitor::{Monitor, Stop};
 use crate::numerics::simd::length;
 use crate::rolling::methods::boundary_element::newton::Newton;
-use crate::rolling::methods::boundary_element::task::Convergence;
+use crate::rolling::methods::boundary_element::task::{Convergence, NewtonTask};
 use crate::rolling::methods::boundary_element::workspace::NewtonWorkspace;
 use crate::rolling::methods::liu_hsu::active_set;
 use crate::rolling::methods::liu_hsu::active_set::{
     InitialGuess, ZonesRun, ZonesTermination, Zoning,
 };
 use crate::rolling::methods::liu_hsu::stick_block::{DenseProblem, DenseTask};
-use crate::rolling::slip_rules::Rule;
+use crate::rolling::task::TOLERANCE_LEAST;
 
 /// The results of a solve besides the tractions.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,10 +53,10 @@ impl ZonesOutcome {
     }
 }
 
-/// Solves for the tractions on the fine mesh with guess 1, then guess 2, then the continued run (see the [module](super)).
+/// Solves for the tractions on the fine mesh with guess 1, then guess 2, then from the tractions of the boundary element method (see the [module](super)).
 ///
-/// `t` contains the start of the continued run (0 if unknown). It receives the solution or, without convergence, the tractions with the smallest residual.
-/// Without a coarse mesh or without spin there is no pole, and guess 2 is skipped.
+/// `t` receives the solution or, without convergence, the tractions with the smallest residual. Without a coarse mesh or without spin there is no pole, and guess
+/// 2 is skipped.
 ///
 /// # Errors
 /// Only if the monitor stops the work; the outcome reports other failures.
@@ -66,39 +66,14 @@ pub fn solve(
     t: &mut [f64],
     monitor: &dyn Monitor,
 ) -> Result<ZonesOutcome, Stop> {
-    let mut search = ZonesSearch::new(fine, t, monitor)?;
+    let mut search = ZonesSearch::new(fine, monitor)?;
     if !search.as_in_the_paper(coarse)? {
-        search.attempt(InitialGuess::Continued)?;
+        search.continue_from_newton()?;
     }
     Ok(search.finish(t))
 }
 
-/// Solves like [`solve`], but starts the continued run from a solution of `upwind`, the same mesh and motion with [`Rule::Upwind`]. The continued run of the
-/// other rules fails more often.
-///
-/// # Errors
-/// Only if the monitor stops the work; the outcome reports other failures.
-pub fn solve_by_upwind(
-    fine: &DenseTask,
-    upwind: &DenseTask,
-    coarse: Option<&DenseTask>,
-    t: &mut [f64],
-    monitor: &dyn Monitor,
-) -> Result<ZonesOutcome, Stop> {
-    debug_assert_eq!(upwind.equations.rule, Rule::Upwind);
-    let mut search = ZonesSearch::new(fine, t, monitor)?;
-    if !search.as_in_the_paper(coarse)? {
-        let first = solve(upwind, None, t, monitor)?;
-        search.attempts.extend(&first.attempts);
-        if first.exit().converged() {
-            search.start = search.task.compact(t);
-        }
-        search.attempt(InitialGuess::Continued)?;
-    }
-    Ok(search.finish(t))
-}
-
-/// Solves with one guess. `t` is as in [`solve`]; only [`InitialGuess::Continued`] reads it.
+/// Solves with one guess. `t` is as in [`solve`].
 ///
 /// # Errors
 /// Only if the monitor stops the work.
@@ -108,7 +83,7 @@ pub fn solve_with(
     t: &mut [f64],
     monitor: &dyn Monitor,
 ) -> Result<ZonesOutcome, Stop> {
-    let mut search = ZonesSearch::new(stage, t, monitor)?;
+    let mut search = ZonesSearch::new(stage, monitor)?;
     search.attempt(guess)?;
     Ok(search.finish(t))
 }
@@ -134,8 +109,8 @@ struct ZonesSearch<'a> {
     stage: &'a DenseTask<'a>,
     monitor: &'a dyn Monitor,
     task: DenseProblem,
-    /// Start of the continued run, one pair per cell without padding.
-    start: Vec<f64>,
+    /// Tractions whose zones are the first ones, without padding; `None` if all cells stick at first.
+    start: Option<Vec<f64>>,
     newton: Newton<'a>,
     workspace: NewtonWorkspace,
     attempts: Vec<ZonesRun>,
@@ -143,17 +118,12 @@ struct ZonesSearch<'a> {
 }
 
 impl<'a> ZonesSearch<'a> {
-    fn new(
-        stage: &'a DenseTask<'a>,
-        t: &[f64],
-        monitor: &'a dyn Monitor,
-    ) -> Result<ZonesSearch<'a>, Stop> {
-        let task = DenseProblem::new(stage, monitor)?;
+    fn new(stage: &'a DenseTask<'a>, monitor: &'a dyn Monitor) -> Result<ZonesSearch<'a>, Stop> {
         Ok(ZonesSearch {
             stage,
             monitor,
-            start: task.compact(t),
-            task,
+            start: None,
+            task: DenseProblem::new(stage, monitor)?,
             newton: Newton::new(stage.equations),
             workspace: NewtonWorkspace::default(),
             attempts: Vec::new(),
@@ -175,9 +145,22 @@ impl<'a> ZonesSearch<'a> {
         }
     }
 
+    /// Starts from the tractions at which the Newton iteration of the boundary element method ends.
+    fn continue_from_newton(&mut self) -> Result<bool, Stop> {
+        let law = NewtonTask {
+            tolerance: TOLERANCE_LEAST,
+            ..self.stage.law
+        };
+        let mut t = vec![0.0; 2 * self.stage.equations.padded()];
+        let workspace = &mut self.workspace;
+        self.newton.solve(&law, &mut t, workspace, self.monitor)?;
+        self.start = Some(self.task.compact(&t));
+        self.attempt(InitialGuess::Continued)
+    }
+
     /// Runs the outer iteration with one guess; returns whether it converged.
     fn attempt(&mut self, guess: InitialGuess) -> Result<bool, Stop> {
-        let start = (guess == InitialGuess::Continued).then_some(&self.start[..]);
+        let start = self.start.as_deref();
         let (mut attempt, division) = active_set::run(&self.task, guess, start, self.monitor)?;
         let residual = self.residual(&division.tractions);
         let exact = residual <= self.stage.law.tolerance;
