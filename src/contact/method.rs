@@ -1,8 +1,6 @@
 //! The methods that solve a motion.
 
-use railhead_macros::{Named, Words};
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use railhead_macros::{Named, Words, keyword};
 
 /// A method. Each has a file or folder of its name in [`rolling::methods`](crate::rolling::methods).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Named)]
@@ -19,8 +17,7 @@ pub enum Method {
 }
 
 /// Traction bound at which `fastsim` slips.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Default, Words)]
 pub enum TractionBound {
     /// At μ times the pressure, for an ellipse Hertz's semi-ellipsoid.
     #[default]

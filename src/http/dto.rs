@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use railhead_macros::none_is_absent;
+use railhead_macros::{keyword, none_is_absent};
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -224,8 +224,7 @@ pub(crate) struct BatchAnswer {
 }
 
 /// State of a batch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[keyword]
 pub(crate) enum BatchState {
     /// No job has begun.
     Queued,

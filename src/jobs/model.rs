@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use railhead_macros::Names;
+use railhead_macros::{Names, keyword};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -118,10 +118,7 @@ pub(crate) fn is_tenant(name: &str) -> bool {
 }
 
 /// Order among the tenant's queued jobs. It has no effect between tenants, which take turns.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, ToSchema, Names,
-)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Hash, Default, Names)]
 pub enum Priority {
     /// Before all others.
     High,
@@ -271,21 +268,7 @@ pub struct QueuePlace {
 }
 
 /// State of a job.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Serialize,
-    Deserialize,
-    ToSchema,
-    Names,
-)]
-#[serde(rename_all = "snake_case")]
+#[keyword(PartialOrd, Ord, Hash, Names)]
 pub enum State {
     /// Waits for a worker.
     Queued,
@@ -318,8 +301,7 @@ pub struct Failure {
 }
 
 /// The kinds of failure a client can meet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Names)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Names)]
 pub enum FailureKind {
     /// The iteration ended without meeting its tolerance.
     NotConverged,

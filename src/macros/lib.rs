@@ -122,6 +122,18 @@ fn docs(attributes: &[Attribute]) -> Vec<&Attribute> {
     docs.collect()
 }
 
+/// Declares an enum of unit variants whose values are words in snake case in JSON and in the contract. The arguments are further derives.
+#[proc_macro_attribute]
+pub fn keyword(derives: TokenStream, item: TokenStream) -> TokenStream {
+    let (derives, item) = (Tokens::from(derives), Tokens::from(item));
+    quote! {
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema, #derives)]
+        #[serde(rename_all = "snake_case")]
+        #item
+    }
+    .into()
+}
+
 /// Gives an enum of unit variants `WORDS`: the words of a request and what they mean, in the order of the variants. A word is the name of its
 /// variant in snake case, as by `#[serde(rename_all = "snake_case")]`, or that of `#[serde(rename = …)]`.
 #[proc_macro_derive(Words)]

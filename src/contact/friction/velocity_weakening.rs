@@ -2,9 +2,7 @@
 
 use std::f64::consts::{LN_2, PI};
 
-use railhead_macros::Words;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use railhead_macros::{Words, keyword};
 
 use crate::normal::hertz::Patch;
 use crate::numerics::roots::{CloseEnough, Course, find};
@@ -24,8 +22,7 @@ const CELL_OVER_GROWTH: f64 = 6.0;
 
 /// How a coefficient falls with the slip speed v. In the formulas, f₀ is `limit`; f₁, f₂ are the `coefficient` and v₁, v₂ the
 /// `half_speed_mm_per_s` of the terms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Words)]
 #[schema(as = FallName)]
 pub enum FallForm {
     /// f₀ + f₁ exp(−ln 2 v/v₁) + f₂ exp(−ln 2 v/v₂). Polach's μ₀((1 − A) exp(−B v) + A) is f₀ = A μ₀, f₁ = (1 − A) μ₀, v₁ = ln 2/B.

@@ -13,17 +13,14 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-use railhead_macros::{Named, Words};
-use serde::Serialize;
-use utoipa::ToSchema;
+use railhead_macros::{Named, Words, keyword};
 
 use crate::geometry::plane_curve::{chords, distance};
 use crate::geometry::profile::{LengthUnit, POINTS_MIN};
 use crate::geometry::profile_quality::{LONG_MEDIANS, median};
 
 /// A file format of cross-sections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words, Named)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Words, Named)]
 pub enum Format {
     /// Columns of numbers, the first two or those with the titles y and z, separated by blanks, commas, semicolons or tabs.
     Columns,

@@ -6,9 +6,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use railhead_macros::{Named, Words};
-use serde::Serialize;
-use utoipa::ToSchema;
+use railhead_macros::{Named, Words, keyword};
 
 use crate::geometry::orientation::{
     self, Flange, FormatSenses, FoundSenses, Senses, StatedSenses, SureBody,
@@ -520,8 +518,7 @@ fn visited_again(points: &[[f64; 2]]) -> Option<[f64; 2]> {
 }
 
 /// A unit of length of cross-sections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words, Named)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Words, Named)]
 pub enum LengthUnit {
     /// Millimetre.
     Mm,

@@ -9,9 +9,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use railhead_macros::Words;
-use serde::Serialize;
-use utoipa::ToSchema;
+use railhead_macros::{Words, keyword};
 
 use crate::geometry::curve_place::CurvePlace;
 use crate::geometry::envelope::Envelope;
@@ -22,8 +20,7 @@ use crate::lazy_field::LazyField;
 use crate::numerics::roots::bounds;
 
 /// Left or right rail, seen in the rolling direction.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Words)]
 pub enum Side {
     /// The rail at positive y of the track.
     Left,

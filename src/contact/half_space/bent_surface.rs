@@ -18,19 +18,16 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use pulp::{NullaryFnOnce, Simd, WithSimd};
-use railhead_macros::Words;
+use railhead_macros::{Words, keyword};
 use rustfft::num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
-use serde::Serialize;
-use utoipa::ToSchema;
 
 use crate::half_space::unlike_bodies::{Elasticity, displacement_by_cell};
 use crate::lazy_field::LazyField;
 use crate::numerics::simd::{self, Float, LANES};
 
 /// How cells of a curved contact surface act on each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Default, Words)]
 #[schema(as = SurfaceInfluence)]
 pub enum Influence {
     /// As on a half-space with factors for the turn of the surface between them, across the whole contact.

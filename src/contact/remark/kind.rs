@@ -1,5 +1,6 @@
 //! Severity, figures and rounded numbers of remarks, and the macro that generates the enum of remarks from their list.
 
+use railhead_macros::keyword;
 use std::borrow::Borrow;
 use std::fmt::{Display, Formatter, Result};
 
@@ -7,8 +8,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// How much attention a remark needs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[keyword]
 pub enum Severity {
     /// A fact about the answer; nothing needs to be done.
     Info,
@@ -82,6 +82,11 @@ pub(crate) fn percent(ratio: impl Borrow<f64>) -> Rounded {
     short(100.0 * ratio.borrow())
 }
 
+/// Displays a range with one decimal.
+pub(crate) fn span([low, high]: &[f64; 2]) -> String {
+    format!("{low:.1} to {high:.1}")
+}
+
 /// Range of decimal exponents of numbers that are displayed without an exponent.
 const PLAIN: std::ops::Range<i32> = -4..7;
 
@@ -107,8 +112,8 @@ impl Display for Rounded {
 }
 
 /// Declares the enum `Remark`. The documentation of a variant is the explanation that clients read, and its name in kebab case is its code.
-/// Every figure has a value for the example. `detail` is an expression that forms the sentence from references to the figures. A figure with
-/// `@short` or `@percent` denotes its rounded value there.
+/// Every figure has a value for the example. `detail` forms the sentence from references to the figures: it is a format string with their
+/// names, the arguments of `format!` in parentheses, or a block. A figure with `@short`, `@percent` or `@span` denotes its rounded value there.
 macro_rules! remarks {
     ($(
         $(#[doc = $meaning:literal])+
@@ -116,7 +121,7 @@ macro_rules! remarks {
             $( $(#[doc = $about:literal])+ $figure:ident: $(@ $display:ident)? $kind:ty = $example:expr, )*
         }
         advice: $advice:literal,
-        detail: $detail:expr,
+        detail: $($text:literal)? $(( $($format:tt)+ ))? $({ $($sentence:tt)+ })?,
     )+) => {
         /// A remark on an answer.
         #[derive(Debug, Clone, PartialEq, railhead_macros::Code)]
@@ -145,7 +150,7 @@ macro_rules! remarks {
                 match self {
                     $( Remark::$name { $($figure),* } => {
                         $( $( let $figure = $display($figure); )? )*
-                        $detail
+                        $( format!($text) )? $( format!($($format)+) )? $( $($sentence)+ )?
                     } )+
                 }
             }

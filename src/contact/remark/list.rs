@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::remark::kind::{AsFigure, Figure, RemarkKind, Severity, percent, remarks, short};
+use crate::remark::kind::{AsFigure, Figure, RemarkKind, Severity, percent, remarks, short, span};
 
 remarks! {
     // Members of a case.
@@ -19,7 +19,7 @@ remarks! {
         usual_max: f64 = 1.0,
     }
     advice: "Check `friction.coefficient`: dry steel has about 0.3 to 0.6.",
-    detail: format!("the friction coefficient {coefficient} is more than {usual_max}"),
+    detail: "the friction coefficient {coefficient} is more than {usual_max}",
 
     /// A number is unusual for wheel and rail, but usual in another unit.
     Warning UnitSuspected {
@@ -31,7 +31,7 @@ remarks! {
         likely_unit: String = "kN".to_owned(),
     }
     advice: "Check the unit of the member that `pointer` names; if the number is intended, no action is needed.",
-    detail: format!("{given} {unit} is unusual for wheel and rail: is it given in {likely_unit}?"),
+    detail: "{given} {unit} is unusual for wheel and rail: is it given in {likely_unit}?",
 
     /// The materials of the bodies differ. They are combined, but the coupling of pressure and traction is neglected.
     Warning CouplingNeglected {
@@ -39,7 +39,7 @@ remarks! {
         difference_parameter: @short f64 = 0.021,
     }
     advice: "Expect errors of the order of K in tractions, or use `boundary_element`, which includes the coupling.",
-    detail: format!("the two bodies differ (K = {difference_parameter}); the coupling of pressure and traction is neglected"),
+    detail: "the two bodies differ (K = {difference_parameter}); the coupling of pressure and traction is neglected",
 
     /// The materials of the bodies differ. The effect of pressure on tractions is included, the effect of tractions on pressure
     /// is not.
@@ -50,10 +50,8 @@ remarks! {
         error: @short f64 = 0.018,
     }
     advice: "The error estimates include this error. Steady motions include both effects, except motions whose tractions separate or join patches.",
-    detail: format!(
-        "the two bodies differ (K = {difference_parameter}); the effect of pressure on tractions is included, the effect of tractions on \
-         pressure is not; this leaves an error of {error} of the friction limit"
-    ),
+    detail: "the two bodies differ (K = {difference_parameter}); the effect of pressure on tractions is included, the effect of tractions on \
+         pressure is not; this leaves an error of {error} of the friction limit",
 
     // Profiles of rail and wheel: how they were read, and how well their points describe them.
 
@@ -63,7 +61,7 @@ remarks! {
         profile: &'static str = "rail",
     }
     advice: "Give `mirror_z` to decide this yourself.",
-    detail: format!("{profile}: z was recognised as positive upward and has been mirrored"),
+    detail: "{profile}: z was recognised as positive upward and has been mirrored",
 
     /// The flange of a wheel is not at the end of y that is usual for the format; the direction of y was taken from the flange.
     Info ProfileYMirrored {
@@ -73,13 +71,15 @@ remarks! {
         flange: &'static str = "positive",
     }
     advice: "Give `mirror_y` to decide this yourself.",
-    detail: if *flange == "positive" {
-        format!("{profile}: the flange was found at the positive end of y, so y has been mirrored (mirror_y: true)")
-    } else {
-        format!(
-            "{profile}: the flange was found at the negative end of y, so y has not been mirrored as is usual for this format \
-             (mirror_y: false)"
-        )
+    detail: {
+        if *flange == "positive" {
+            format!("{profile}: the flange was found at the positive end of y, so y has been mirrored (mirror_y: true)")
+        } else {
+            format!(
+                "{profile}: the flange was found at the negative end of y, so y has not been mirrored as is usual for this format \
+                 (mirror_y: false)"
+            )
+        }
     },
 
     /// A stated direction of y or z contradicts the shape of the profile.
@@ -92,9 +92,7 @@ remarks! {
         given: &'static str = "true",
     }
     advice: "Omit `mirror_y` or `mirror_z`, or check the measurement. The case is solved as stated.",
-    detail: format!(
-        "{profile}: {member}: {given} is stated, but the shape of the points shows the opposite; the case is solved as stated"
-    ),
+    detail: "{profile}: {member}: {given} is stated, but the shape of the points shows the opposite; the case is solved as stated",
 
     /// `flange_back_position_mm` was omitted, and the back of the flange was found in the points of the wheel.
     Info FlangeBackFound {
@@ -104,9 +102,7 @@ remarks! {
         position_mm: f64 = 0.0,
     }
     advice: "Give `flange_back_position_mm` to decide this yourself.",
-    detail: format!(
-        "{profile}: flange_back_position_mm was omitted; the back of the flange was found at y = {position_mm:.2} mm and was used"
-    ),
+    detail: "{profile}: flange_back_position_mm was omitted; the back of the flange was found at y = {position_mm:.2} mm and was used",
 
     /// The stated position of the back of a flange differs from that in the points of the wheel.
     Warning FlangeBackContradicted {
@@ -118,10 +114,8 @@ remarks! {
         found_mm: f64 = -70.0,
     }
     advice: "Omit `flange_back_position_mm`, or check it. The case is solved as stated.",
-    detail: format!(
-        "{profile}: flange_back_position_mm: {given_mm} is stated, but the back of the flange was found at y = {found_mm:.2} mm; the case is \
-         solved as stated"
-    ),
+    detail: "{profile}: flange_back_position_mm: {given_mm} is stated, but the back of the flange was found at y = {found_mm:.2} mm; the case is \
+         solved as stated",
 
     /// The tread of a wheel is far from z = 0, where `rolling_radius_mm` is measured.
     Warning WheelHeightUnusual {
@@ -133,10 +127,8 @@ remarks! {
         z_mm: f64 = 30.0,
     }
     advice: "Check the origin of z: `rolling_radius_mm` is the radius at z = 0 of the wheel's cross-section. Give the radius there, or move the points.",
-    detail: format!(
-        "{profile}: the tread, 70 mm from the back of the flange at y = {y_mm:.2} mm, has z = {z_mm:.2} mm; rolling_radius_mm is the radius at \
-         z = 0"
-    ),
+    detail: "{profile}: the tread, 70 mm from the back of the flange at y = {y_mm:.2} mm, has z = {z_mm:.2} mm; rolling_radius_mm is the radius at \
+         z = 0",
 
     /// The header of a profile file states another number of points than the file has, commented-out rows included.
     Warning ProfileCountDiffers {
@@ -148,7 +140,7 @@ remarks! {
         found: usize = 83,
     }
     advice: "No action is needed if the file was edited by hand; otherwise check that it is complete.",
-    detail: format!("{profile}: {found} points were read, while the header of the file states {stated}"),
+    detail: "{profile}: {found} points were read, while the header of the file states {stated}",
 
     /// Rows of numbers above the points of a profile file were read as a part of its header.
     Info ProfileHeaderRows {
@@ -160,7 +152,7 @@ remarks! {
         line: usize = 7,
     }
     advice: "No action is needed if these rows are not points: old files have dimensions of the wheel there.",
-    detail: format!("{profile}: rows of numbers above the points ({count}, the first in line {line}) were read as a part of the header"),
+    detail: "{profile}: rows of numbers above the points ({count}, the first in line {line}) were read as a part of the header",
 
     /// The unit in the case differs from the unit in the file of a profile; the unit in the case was used.
     Warning ProfileUnitDiffers {
@@ -172,7 +164,7 @@ remarks! {
         file_mm: f64 = 1000.0,
     }
     advice: "Omit `unit` to use the unit of the file.",
-    detail: format!("{profile}: unit states {stated_mm} mm per unit of length, while the file states {file_mm} mm; unit was used"),
+    detail: "{profile}: unit states {stated_mm} mm per unit of length, while the file states {file_mm} mm; unit was used",
 
     /// The size of a profile is unusual in mm, but usual in another unit.
     Warning ProfileSizeUnusual {
@@ -184,7 +176,7 @@ remarks! {
         unit: &'static str = "cm",
     }
     advice: "State `unit` of the cross-section if its numbers are not in mm; for models of a reduced scale no action is needed.",
-    detail: format!("{profile}: the profile is {width_mm} mm wide; if its numbers are in {unit}, state unit: \"{unit}\""),
+    detail: "{profile}: the profile is {width_mm} mm wide; if its numbers are in {unit}, state unit: \"{unit}\"",
 
     /// Points of a profile that nearly coincide were merged.
     Info ProfilePointsMerged {
@@ -196,7 +188,7 @@ remarks! {
         nearer_than_mm: f64 = 0.001,
     }
     advice: "No action is needed: files often repeat points at the joints of arcs.",
-    detail: format!("{profile}: {count} points less than {nearer_than_mm} mm from another one were merged with it"),
+    detail: "{profile}: {count} points less than {nearer_than_mm} mm from another one were merged with it",
 
     /// Points of a profile that ran backwards were dropped.
     Warning ProfilePointsDropped {
@@ -206,7 +198,7 @@ remarks! {
         count: usize = 2,
     }
     advice: "Check the measurement where pieces are joined.",
-    detail: format!("{profile}: {count} points that ran backwards (zig-zag) were dropped"),
+    detail: "{profile}: {count} points that ran backwards (zig-zag) were dropped",
 
     /// One or two points at an end of a profile, far from all others, were dropped.
     Info ProfileEndDropped {
@@ -218,7 +210,7 @@ remarks! {
         distance_mm: @short f64 = 67.0,
     }
     advice: "No action is needed if the profile ends there; otherwise check the file.",
-    detail: format!("{profile}: {count} stray points at an end, {distance_mm} mm from the next one, were dropped"),
+    detail: "{profile}: {count} stray points at an end, {distance_mm} mm from the next one, were dropped",
 
     /// A profile has the shape of the other body.
     Warning ProfileOfOtherBody {
@@ -228,7 +220,7 @@ remarks! {
         like: &'static str = "a wheel with its flange",
     }
     advice: "Check that rail and wheel were not exchanged. If each looks like the other, the case is refused.",
-    detail: format!("the profile given as {profile} looks like {like}; were rail and wheel exchanged?"),
+    detail: "the profile given as {profile} looks like {like}; were rail and wheel exchanged?",
 
     /// The smoothing of a profile was chosen from its noise and the pressure, as requested.
     Info SmoothingChosen {
@@ -238,10 +230,12 @@ remarks! {
         smoothing_mm: f64 = 3.4,
     }
     advice: "No action is needed; give `smoothing_mm` as a number to use the same smoothing in other cases.",
-    detail: if *smoothing_mm > 0.0 {
-        format!("{profile}: smoothed by {smoothing_mm} mm, chosen from the noise of its points", smoothing_mm = short(smoothing_mm))
-    } else {
-        format!("{profile}: not smoothed, because its points have little noise")
+    detail: {
+        if *smoothing_mm > 0.0 {
+            format!("{profile}: smoothed by {smoothing_mm} mm, chosen from the noise of its points", smoothing_mm = short(smoothing_mm))
+        } else {
+            format!("{profile}: not smoothed, because its points have little noise")
+        }
     },
 
     /// The points of a profile are too few or too far apart to distinguish noise from shape, so `smoothing_mm: "auto"` chose no
@@ -253,7 +247,7 @@ remarks! {
         spacing_mm: @short f64 = 4.0,
     }
     advice: "Send points that lie nearer to each other, 0.25 mm at gauge corner and flange, or give `smoothing_mm` as a number.",
-    detail: format!("{profile}: with points {spacing_mm} mm apart, noise cannot be distinguished from shape, so no smoothing is used"),
+    detail: "{profile}: with points {spacing_mm} mm apart, noise cannot be distinguished from shape, so no smoothing is used",
 
     /// One point of a profile near the contact, or a few neighbours, are off the curve of the points on both sides.
     Warning ProfileOutlier {
@@ -273,17 +267,19 @@ remarks! {
         share: f64 = 0.4,
     }
     advice: "Remove or correct the points; smoothing only spreads their error.",
-    detail: if *points == 1 {
-        format!(
-            "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um} µm off the curve of its neighbours, equivalent to \
-             {waviness_mpa} MPa of contact pressure: remove or correct it"
-        )
-    } else {
-        format!(
-            "the {profile}'s points jump at y = {at_y_mm:.2} mm: {points} points from y {:.2} to {:.2} mm are up to {distance_um} µm off the \
-             curve of their neighbours, equivalent to {waviness_mpa} MPa of contact pressure: remove or correct them",
-            y_mm[0], y_mm[1]
-        )
+    detail: {
+        if *points == 1 {
+            format!(
+                "the {profile}'s point at y = {at_y_mm:.2} mm is {distance_um} µm off the curve of its neighbours, equivalent to \
+                 {waviness_mpa} MPa of contact pressure: remove or correct it"
+            )
+        } else {
+            format!(
+                "the {profile}'s points jump at y = {at_y_mm:.2} mm: {points} points from y {:.2} to {:.2} mm are up to {distance_um} µm off the \
+                 curve of their neighbours, equivalent to {waviness_mpa} MPa of contact pressure: remove or correct them",
+                y_mm[0], y_mm[1]
+            )
+        }
     },
 
     /// A profile jumps between two points near the contact.
@@ -300,7 +296,7 @@ remarks! {
         share: f64 = 0.4,
     }
     advice: "Measure this part again, or join the pieces better: smoothing does not remove a step, and forces are wrong as well.",
-    detail: format!(
+    detail: (
         "the {profile}'s points jump by {} µm at y = {at_y_mm:.2} mm, equivalent to {waviness_mpa} MPa of contact pressure: smoothing does \
          not remove a step, measure this part again",
         short(height_um.abs())
@@ -311,7 +307,7 @@ remarks! {
         /// `rail` or `wheel`.
         profile: &'static str = "rail",
         /// Range of y on the profile.
-        y_mm: [f64; 2] = [-6.0, 5.0],
+        y_mm: @span [f64; 2] = [-6.0, 5.0],
         /// Length of the chords.
         chord_mm: @short f64 = 0.5,
         /// Roughness of the profile as the pressure that flattens it.
@@ -322,10 +318,10 @@ remarks! {
         smoothing_mm: Option<f64> = Some(2.5),
     }
     advice: "Send the points as measured, without resampling, or give the `smoothing_mm` named here.",
-    detail: format!(
-        "the {profile}'s points under the patch (y {:.1} to {:.1} mm) lie on straight chords of {chord_mm} mm, as linear resampling leaves \
+    detail: (
+        "the {profile}'s points under the patch (y {y_mm} mm) lie on straight chords of {chord_mm} mm, as linear resampling leaves \
          them; the kinks are equivalent to {waviness_mpa} MPa of contact pressure: send the points as measured{}",
-        y_mm[0], y_mm[1], smoothing_mm.map_or_else(String::new, |length| format!(", or give smoothing_mm: {length}"))
+        smoothing_mm.map_or_else(String::new, |length| format!(", or give smoothing_mm: {length}"))
     ),
 
     /// Noise of the points of a profile, from the measurement or from rounding, changes the pressure considerably.
@@ -333,7 +329,7 @@ remarks! {
         /// `rail` or `wheel`.
         profile: &'static str = "rail",
         /// Range of y on the profile.
-        y_mm: [f64; 2] = [-6.0, 5.0],
+        y_mm: @span [f64; 2] = [-6.0, 5.0],
         /// Standard deviation along the normal.
         noise_um: @short f64 = 1.9,
         /// Mean distance of the points.
@@ -348,12 +344,10 @@ remarks! {
         smoothing_mm: Option<f64> = Some(4.0),
     }
     advice: "Give the `smoothing_mm` named here, or `\"auto\"`; send points with more decimals where they were rounded.",
-    detail: format!(
-        "noise of {noise_um} µm{} at points {spacing_mm} mm apart makes waves on the {profile} (y {:.1} to {:.1} mm) equivalent \
+    detail: (
+        "noise of {noise_um} µm{} at points {spacing_mm} mm apart makes waves on the {profile} (y {y_mm} mm) equivalent \
          to {waviness_mpa} MPa of contact pressure{}",
         rounding_mm.map_or_else(String::new, |step| format!(" (heights rounded to {step} mm)")),
-        y_mm[0],
-        y_mm[1],
         smoothing_mm.map_or_else(String::new, |length| format!(": give smoothing_mm: {length}"))
     ),
 
@@ -362,7 +356,7 @@ remarks! {
         /// `rail` or `wheel`.
         profile: &'static str = "wheel",
         /// Range of y on the profile.
-        y_mm: [f64; 2] = [-6.0, 5.0],
+        y_mm: @span [f64; 2] = [-6.0, 5.0],
         /// Upper bound of their wavelength.
         shorter_than_mm: @short f64 = 3.0,
         /// Roughness of the profile as the pressure that flattens it.
@@ -371,18 +365,15 @@ remarks! {
         share: f64 = 0.17,
     }
     advice: "If they come from the measurement, remove them with a `smoothing_mm` of about their length; real waves belong to the result.",
-    detail: format!(
-        "waves on the {profile} shorter than {shorter_than_mm} mm (y {:.1} to {:.1} mm) are equivalent to {waviness_mpa} MPa of \
+    detail: "waves on the {profile} shorter than {shorter_than_mm} mm (y {y_mm} mm) are equivalent to {waviness_mpa} MPa of \
          contact pressure: if they come from the measurement, remove them with smoothing_mm",
-        y_mm[0], y_mm[1]
-    ),
 
     /// The points of a profile under the contact are so far apart that the curve between them is uncertain.
     Warning ProfileSpacing {
         /// `rail` or `wheel`.
         profile: &'static str = "rail",
         /// Interval of y of the largest distance between neighbouring points.
-        y_mm: [f64; 2] = [-4.1, 3.9],
+        y_mm: @span [f64; 2] = [-4.1, 3.9],
         /// Length of the interval.
         spacing_mm: @short f64 = 8.0,
         /// Length of the interval divided by the width of the patch.
@@ -391,27 +382,21 @@ remarks! {
         ambiguity_mpa: @short f64 = 400.0,
     }
     advice: "Send points 0.5 mm apart on the tread, 0.25 mm at gauge corner and flange.",
-    detail: format!(
-        "the {profile}'s points are {spacing_mm} mm apart where it touches (y {:.1} to {:.1} mm), {spacing_over_width} times the width of the \
+    detail: "the {profile}'s points are {spacing_mm} mm apart where it touches (y {y_mm} mm), {spacing_over_width} times the width of the \
          patch; the curve between them is uncertain by {ambiguity_mpa} MPa of pressure: send more points there",
-        y_mm[0], y_mm[1]
-    ),
 
     /// A profile has a stretch without points near the contact in which the bodies may also touch.
     Warning ProfileHole {
         /// `rail` or `wheel`.
         profile: &'static str = "rail",
         /// Range of y of the stretch.
-        y_mm: [f64; 2] = [-25.0, 25.0],
+        y_mm: @span [f64; 2] = [-25.0, 25.0],
         /// Length of the interval.
         hole_mm: @short f64 = 50.0,
     }
     advice: "Send the points there: the contact may be elsewhere than found.",
-    detail: format!(
-        "the {profile} has no points from y {:.1} to {:.1} mm ({hole_mm} mm), where the bodies may touch: the contact may be elsewhere than \
+    detail: "the {profile} has no points from y {y_mm} mm ({hole_mm} mm), where the bodies may touch: the contact may be elsewhere than \
          found; send the points there",
-        y_mm[0], y_mm[1]
-    ),
 
     // Contact of a wheel and a rail: its position, and what its model neglects.
 
@@ -420,29 +405,24 @@ remarks! {
         /// `rail` or `wheel`.
         profile: &'static str = "wheel",
         /// Range of y on the profile.
-        y_mm: [f64; 2] = [-58.0, -52.0],
+        y_mm: @span [f64; 2] = [-58.0, -52.0],
     }
     advice: "Check lateral shift, gauge, flange-back distance and position.",
-    detail: format!(
-        "the contact at y {:.1} to {:.1} mm of the {profile} is on the tip of its flange, as on a wheel that climbs or has derailed: check lateral \
-         shift, gauge and flange-back distance", y_mm[0], y_mm[1]
-    ),
+    detail: "the contact at y {y_mm} mm of the {profile} is on the tip of its flange, as on a wheel that climbs or has derailed: check lateral \
+         shift, gauge and flange-back distance",
 
     /// The contact is near the end of a profile, so that part of it may be cut off.
     Warning ContactAtProfileEnd {
         /// `rail` or `wheel`.
         profile: &'static str = "wheel",
         /// Range of y on the profile.
-        y_mm: [f64; 2] = [52.0, 58.0],
+        y_mm: @span [f64; 2] = [52.0, 58.0],
         /// Length of the profile beyond the contact.
         left_mm: @short f64 = 2.0,
     }
     advice: "Check lateral shift and gauge, or send at least 5 mm of profile beyond the contact.",
-    detail: format!(
-        "the contact at y {:.1} to {:.1} mm of the {profile} is {left_mm} mm from the end of its profile: check lateral shift and gauge, or send \
+    detail: "the contact at y {y_mm} mm of the {profile} is {left_mm} mm from the end of its profile: check lateral shift and gauge, or send \
          a longer profile",
-        y_mm[0], y_mm[1]
-    ),
 
     /// The target is smaller than the uncertainty due to the measurement of the profiles; a finer solution does not improve the
     /// result.
@@ -453,9 +433,7 @@ remarks! {
         uncertainty: @percent f64 = 0.02,
     }
     advice: "A better measurement reduces the uncertainty; a smaller target does not.",
-    detail: format!(
-        "the profiles leave forces uncertain by {uncertainty} % of μN, more than the target of {target} %"
-    ),
+    detail: "the profiles leave forces uncertain by {uncertainty} % of μN, more than the target of {target} %",
 
     /// The target is smaller than the error that the factors for the turn of the contact surface leave: a finer solve adds nothing.
     Info TargetBelowCurveError {
@@ -465,9 +443,7 @@ remarks! {
         error: @percent f64 = 0.035,
     }
     advice: "The error is part of the estimates; `target_met` judges the rest of them. Give `influence` \"half_space\" to leave the factors out.",
-    detail: format!(
-        "the surface turns under the contact, which leaves forces uncertain by {error} % of μN, more than the target of {target} %"
-    ),
+    detail: "the surface turns under the contact, which leaves forces uncertain by {error} % of μN, more than the target of {target} %",
 
     /// The case names no reference surface and cannot be solved on the curve of the rail, so it is solved on planes of contact.
     Warning OnPlanes {
@@ -475,7 +451,7 @@ remarks! {
         reason: String = "only boundary_element is solved on the curve of the rail".to_owned(),
     }
     advice: "Expect larger errors than the error estimate where the rail bends under a patch: 15 % of μN at a gauge corner. Give `reference_surface` \"plane\" to solve on planes without this remark.",
-    detail: format!("solved on planes of contact: {reason}"),
+    detail: "solved on planes of contact: {reason}",
 
     /// The slope of the surface changes over the contact by more than the range for which influence factors are known.
     Info TurnBeyondRange {
@@ -485,14 +461,14 @@ remarks! {
         range_rad: f64 = 1.25,
     }
     advice: "Treat the forces as approximate: the influence between the ends of the contact is extrapolated, and the rail head is not a half-space there.",
-    detail: format!("the surface turns by {turn_rad} rad over the contact; the influence between its ends is known up to {range_rad} rad"),
+    detail: "the surface turns by {turn_rad} rad over the contact; the influence between its ends is known up to {range_rad} rad",
 
     /// The tractions of one of several motions change the number of patches or have no solution; the pressures of this motion
     /// are those without tractions.
     Warning NormalForcesAloneBalance {}
     advice: "Submit the motion as a separate case to include the effect of its tractions on the pressures and of its friction on the vertical balance.",
     detail: "the tractions of this motion change the number of patches, which must be the same for all motions of a case, or have no \
-             solution: its pressures are those without tractions, and normal forces alone balance the load".to_owned(),
+             solution: its pressures are those without tractions, and normal forces alone balance the load",
 
     /// All points of a history under a vertical force have the pressures of its last point.
     Info PressuresOfLastPoint {
@@ -500,17 +476,15 @@ remarks! {
         part: @percent f64 = 0.12,
     }
     advice: "Compare `total.force_z_n` of the points with the load; end the history where the forces are needed, or give `normal_force_n`.",
-    detail: format!(
-        "all points of a history have the pressures of its last one, at which the vertical force is met; at other points friction \
-         changes the vertical force by up to {part} %, which the error estimates of their forces include"
-    ),
+    detail: "all points of a history have the pressures of its last one, at which the vertical force is met; at other points friction \
+         changes the vertical force by up to {part} %, which the error estimates of their forces include",
 
     // The normal problem: region, pressure and load.
 
     /// Pressure and region still change when the grid of the normal problem is refined.
     Warning GapRough {}
     advice: "Smooth the gap; if the surfaces are really as rough as this, give it on a finer grid.",
-    detail: "the gap is rough: pressure and region still change when the grid of the normal problem is refined".to_owned(),
+    detail: "the gap is rough: pressure and region still change when the grid of the normal problem is refined",
 
     /// A patch that carries a noticeable part of the load has few cells in the normal problem.
     Warning PatchCoarse {
@@ -520,15 +494,13 @@ remarks! {
         load_share: @percent f64 = 0.059,
     }
     advice: "Take the width and the pressure of this patch as uncertain by some per cent; if it matters, solve it in a separate case.",
-    detail: format!(
-        "the patch carries {load_share} % of the load and has only {cells_across:.0} cells across: its width and its pressure are uncertain by \
-         some per cent"
-    ),
+    detail: "the patch carries {load_share} % of the load and has only {cells_across:.0} cells across: its width and its pressure are uncertain by \
+         some per cent",
 
     /// A given pressure does not fall to 0 at the edge of its grid.
     Warning PressureCutAtEdge {}
     advice: "Give the pressure over the whole region where it is more than 0, with one row of zeros around it.",
-    detail: "the pressure does not fall to 0 at the edge of the grid; the contact is taken to end within the next spacing".to_owned(),
+    detail: "the pressure does not fall to 0 at the edge of the grid; the contact is taken to end within the next spacing",
 
     /// A patch of a given pressure has few samples.
     Warning PressureCoarse {
@@ -538,9 +510,7 @@ remarks! {
         samples_y: usize = 7,
     }
     advice: "Give the pressure on a finer grid.",
-    detail: format!(
-        "the patch has only {samples_x} by {samples_y} samples of pressure; its force and its edge are uncertain by some per cent"
-    ),
+    detail: "the patch has only {samples_x} by {samples_y} samples of pressure; its force and its edge are uncertain by some per cent",
 
     /// The given pressure jumps from one sample to the next, more than it would at the edge of a contact. Strips and cells do not follow
     /// the jump, and errors may be larger than estimated.
@@ -553,9 +523,7 @@ remarks! {
         share_of_largest: @short f64 = 0.8,
     }
     advice: "Give finer samples, or smooth the pressure over two or three of them.",
-    detail: format!(
-        "the pressure jumps by {share_of_largest} of its largest value between samples at ({x_mm}, {y_mm}) mm, which strips and cells do not follow"
-    ),
+    detail: "the pressure jumps by {share_of_largest} of its largest value between samples at ({x_mm}, {y_mm}) mm, which strips and cells do not follow",
 
     /// The contact is long compared with the rolling radius: the bodies are nearly conformal.
     Warning NearlyConformal {
@@ -565,10 +533,8 @@ remarks! {
         rolling_radius_mm: f64 = 20.0,
     }
     advice: "Half-spaces do not describe such bodies: treat the result as approximate.",
-    detail: format!(
-        "the contact is {length_mm} mm long, compared with a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
-         conformal, and half-spaces do not describe them"
-    ),
+    detail: "the contact is {length_mm} mm long, compared with a rolling radius of {rolling_radius_mm} mm: the bodies are nearly \
+         conformal, and half-spaces do not describe them",
 
     /// The bodies overlap so deeply that strains are too large for linear elasticity.
     Warning StrainsTooLarge {
@@ -578,9 +544,7 @@ remarks! {
         half_width_mm: @short f64 = 3.4,
     }
     advice: "Check units and load. If they are right, the bodies yield and pressures are lower than those of the result.",
-    detail: format!(
-        "the bodies overlap by {overlap_mm} mm, compared with a half width of {half_width_mm} mm of the contact: strains are too large for linear elasticity"
-    ),
+    detail: "the bodies overlap by {overlap_mm} mm, compared with a half width of {half_width_mm} mm of the contact: strains are too large for linear elasticity",
 
     /// The patch is large compared with the radii of the bodies, so that half-spaces do not describe them.
     Warning PatchLarge {
@@ -592,7 +556,7 @@ remarks! {
         radius_mm: f64 = 460.0,
     }
     advice: "Check the units of load and radii: bodies are like half-spaces only if the half width is below a third of the radius.",
-    detail: format!("the patch has a half width of {half_width_mm} mm in the {direction} direction, compared with a radius of {radius_mm} mm"),
+    detail: "the patch has a half width of {half_width_mm} mm in the {direction} direction, compared with a radius of {radius_mm} mm",
 
     /// The largest pressure is far above the strength of steel.
     Warning PressureImplausible {
@@ -602,7 +566,7 @@ remarks! {
         usual_max_mpa: f64 = 5000.0,
     }
     advice: "Check the units of load and geometry. If they are right, the bodies yield and the pressure is lower than that of the result.",
-    detail: format!("the largest pressure is {pressure_max_mpa} MPa, more than {usual_max_mpa} MPa: bodies of steel would yield"),
+    detail: "the largest pressure is {pressure_max_mpa} MPa, more than {usual_max_mpa} MPa: bodies of steel would yield",
 
     /// A length of the track or the wheelset is unusual in mm, but usual in another unit.
     Warning LengthUnusual {
@@ -612,7 +576,7 @@ remarks! {
         unit: &'static str = "m",
     }
     advice: "Check its unit: lengths are in mm.",
-    detail: format!("{length_mm} mm is unusual here and would be usual in {unit}: lengths are in mm"),
+    detail: "{length_mm} mm is unusual here and would be usual in {unit}: lengths are in mm",
 
     /// The largest pressure is above the shakedown limit of rail steel.
     Info PressureAboveShakedown {
@@ -622,10 +586,8 @@ remarks! {
         shakedown_limit_mpa: f64 = 1500.0,
     }
     advice: "The result is elastic. Harder steel has a higher limit; traction lowers it.",
-    detail: format!(
-        "the largest pressure of {pressure_max_mpa:.0} MPa is above {shakedown_limit_mpa} MPa, the shakedown limit of rail steel R260 in \
-         pure rolling: repeated passages deform the surface plastically"
-    ),
+    detail: "the largest pressure of {pressure_max_mpa:.0} MPa is above {shakedown_limit_mpa} MPa, the shakedown limit of rail steel R260 in \
+         pure rolling: repeated passages deform the surface plastically",
 
     /// The load is larger than any wheel carries.
     Warning LoadImplausible {
@@ -635,7 +597,7 @@ remarks! {
         usual_max_n: f64 = 1e7,
     }
     advice: "Check its unit: forces are in N.",
-    detail: format!("the normal force is {normal_force_n} N, more than {usual_max_n:e} N"),
+    detail: "the normal force is {normal_force_n} N, more than {usual_max_n:e} N",
 
     // Motions and their forces.
 
@@ -660,12 +622,12 @@ remarks! {
     /// The second discretisation rule did not converge; forces come from the first alone.
     Warning SecondRuleFailed {}
     advice: "Use the forces with their larger error estimate, or try another mesh or target.",
-    detail: "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger".to_owned(),
+    detail: "the trapezoid rule did not converge; forces come from the three-point rule and their error is larger",
 
     /// A solve for the gradients of a motion did not converge.
     Warning GradientsNotConverged {}
     advice: "The forces are not affected. Without gradients, take differences between motions.",
-    detail: "a solve for the gradients of this motion did not converge; they are missing".to_owned(),
+    detail: "a solve for the gradients of this motion did not converge; they are missing",
 
     /// The contact passes so slowly that heat also flows along the surface.
     Warning HeatSpreads {
@@ -675,9 +637,7 @@ remarks! {
         least: f64 = 10.0,
     }
     advice: "Take the temperatures as an upper bound; check the speed, which is in mm/s.",
-    detail: format!(
-        "the Péclet number is {peclet}; temperatures are computed as if heat flowed only into the depth, which holds from about {least} on"
-    ),
+    detail: "the Péclet number is {peclet}; temperatures are computed as if heat flowed only into the depth, which holds from about {least} on",
 
     /// The estimated error exceeds the target, or is unknown.
     Warning TargetMissed {
@@ -689,9 +649,11 @@ remarks! {
         target: f64 = 1e-3,
     }
     advice: "Use the numbers with their error estimate, or request a larger target.",
-    detail: match estimate {
-        Some(estimate) => format!("the error relative to {relative_to} is estimated at {}, the target was {target}", short(estimate)),
-        None => format!("the error relative to {relative_to} is unknown, the target was {target}"),
+    detail: {
+        match estimate {
+            Some(estimate) => format!("the error relative to {relative_to} is estimated at {}, the target was {target}", short(estimate)),
+            None => format!("the error relative to {relative_to} is unknown, the target was {target}"),
+        }
     },
 
     /// The error is a large part of the force, although it is a small part of μN.
@@ -704,7 +666,7 @@ remarks! {
         usual_max: f64 = 0.1,
     }
     advice: "Give `solver.relative_to: \"force\"` to solve to a share of the force, or a smaller `target_error`.",
-    detail: format!(
+    detail: (
         "the force is {force_over_limit} of μN, and its estimated error is {:.0} % of it; the target counts relative to μN",
         100.0 * error_over_force
     ),
@@ -743,9 +705,7 @@ remarks! {
         tolerance: f64 = 2e-6,
     }
     advice: "Compare `residual` with `tolerance` to decide whether the result is accurate enough; the error estimate does not include this deviation.",
-    detail: format!(
-        "{iteration} ended before its tolerance was met: {reason}; the residual is {residual:.2e}, the tolerance {tolerance:.2e}"
-    ),
+    detail: "{iteration} ended before its tolerance was met: {reason}; the residual is {residual:.2e}, the tolerance {tolerance:.2e}",
 
     /// The scatter of the wear coefficients is not published; a stated factor replaces it.
     Info CoefficientScatterStated {
@@ -753,9 +713,7 @@ remarks! {
         factor: f64 = 2.0,
     }
     advice: "Give the scatter of your own measurements as `coefficient_factor`.",
-    detail: format!(
-        "no scatter of the coefficients of this wear map is published; it is assumed to be a factor of {factor} with a probability of 90 %"
-    ),
+    detail: "no scatter of the coefficients of this wear map is published; it is assumed to be a factor of {factor} with a probability of 90 %",
 
     /// The contact pressure of a worn profile exceeds the hardness of the steel.
     Warning PressureAboveHardness {
@@ -765,9 +723,7 @@ remarks! {
         hardness_mpa: f64 = 2550.0,
     }
     advice: "Plastic flow would round the section there. Add states of traction, braking and other shifts to the traffic: a traffic without them leaves a ridge where nothing slips.",
-    detail: format!(
-        "the largest pressure is {largest_mpa:.0} MPa, above the hardness of {hardness_mpa:.0} MPa; plastic flow is not modelled"
-    ),
+    detail: "the largest pressure is {largest_mpa:.0} MPa, above the hardness of {hardness_mpa:.0} MPa; plastic flow is not modelled",
 
     /// A condensed traffic does not meet its tolerance.
     Warning TrafficCoarse {
@@ -777,7 +733,7 @@ remarks! {
         tolerance_asked: @percent f64 = 0.03,
     }
     advice: "Raise `accuracy.states_max`.",
-    detail: format!("twice the number of states would change the distribution of wear by {traffic_error} %; the tolerance is {tolerance_asked} %"),
+    detail: "twice the number of states would change the distribution of wear by {traffic_error} %; the tolerance is {tolerance_asked} %",
 
     /// Part of the traffic could not be solved and causes no wear.
     Warning StatesUnsolved {
@@ -785,7 +741,7 @@ remarks! {
         unsolved_share: @percent f64 = 0.03,
     }
     advice: "`failure` in the states of the records says why.",
-    detail: format!("up to {unsolved_share} % of the traffic could not be solved and causes no wear"),
+    detail: "up to {unsolved_share} % of the traffic could not be solved and causes no wear",
 
     /// An evolution ended before its extent.
     Warning EvolutionEndedEarly {
@@ -795,7 +751,7 @@ remarks! {
         done_share: @percent f64 = 0.4,
     }
     advice: "The records are those up to the end. Raise `accuracy.steps_max` or `accuracy.step_depth_mm`, or shorten the extent.",
-    detail: format!("the evolution ended when {done_share} % of its extent was done: {reason}"),
+    detail: "the evolution ended when {done_share} % of its extent was done: {reason}",
 }
 
 #[cfg(test)]

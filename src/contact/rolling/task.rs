@@ -1,6 +1,6 @@
 //! The tangential problem of one footprint: physics, motions, method and accuracy.
 
-use railhead_macros::{Finite, Words};
+use railhead_macros::{Finite, Words, keyword};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -135,8 +135,7 @@ const ERROR_MAX: f64 = 0.95;
 pub const TARGET_LEAST: f64 = 1e-4;
 
 /// Reference quantity of a relative error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Default, Words)]
 pub enum RelativeTo {
     /// The friction limit μN.
     #[default]

@@ -2,10 +2,8 @@
 
 use axum::http::{HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
-use railhead_macros::Names;
-use serde::Serialize;
+use railhead_macros::{Names, keyword};
 use serde_json::Value;
-use utoipa::ToSchema;
 use uuid::Uuid;
 
 use crate::extract::query::{Parameters, count, query, reader, word};
@@ -29,8 +27,7 @@ use railhead_jobs::Jobs;
 use railhead_jobs::error::JobsError;
 
 /// View shown by a picture.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Names)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Names)]
 pub(crate) enum View {
     /// One patch from above.
     Patch,

@@ -1,6 +1,6 @@
 //! The members `contact` and `load` of a case.
 
-use railhead_macros::{Finite, Members, Words, none_is_absent};
+use railhead_macros::{Finite, Members, Words, keyword, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -347,8 +347,7 @@ pub struct Load {
 }
 
 /// The surface on which the contact of a wheel on a rail is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Words)]
 #[schema(as = ReferenceSurface)]
 pub enum SurfaceName {
     /// A plane of contact for each patch, or for patches near each other: for comparison.

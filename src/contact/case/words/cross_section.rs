@@ -1,13 +1,11 @@
 //! A cross-section of a rail or a wheel in a case.
 
-use railhead_macros::{Members, none_is_absent};
+use railhead_macros::{Members, keyword, none_is_absent};
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::case::words::object::{
-    AllowedRange, Faults, LISTED_MAX, Object, elements_of, join, names, number, shown,
-};
+use crate::case::words::object::{AllowedRange, Object, names, shown};
 use crate::case::words::samples::COORDINATE;
 use crate::geometry::formats::Format;
 use crate::geometry::profile::LengthUnit;
@@ -67,8 +65,7 @@ impl Default for Smoothing {
 }
 
 /// A smoothing that the service chooses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[keyword]
 pub enum SmoothingWord {
     /// From the noise of the points and the pressure.
     Auto,
@@ -117,24 +114,11 @@ pub(crate) fn smoothing(block: &mut Object, name: &str) -> Option<Smoothing> {
 /// Reads the points of a cross-section. The first [`LISTED_MAX`] faulty ones get a fault each; one more fault counts the rest.
 pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 2]>> {
     let what = format!("an array of {POINTS_MIN} to {POINTS_MAX} points [y, z] in mm");
-    let elements = block.array(name, POINTS_MIN..=POINTS_MAX, &what)?;
-    let (pointer, mut refused) = (block.pointer_to(name), 0);
-    let faults = block.faults();
-    let read = elements_of(
-        elements,
-        &pointer,
-        &mut refused,
-        faults,
-        point,
-        refuse_point,
-    );
-    let rest = refused.saturating_sub(LISTED_MAX);
-    if rest > 0 {
-        let detail = format!(
-            "{rest} more points are refused for the same reason; each must be a pair [y, z], both {COORDINATE}"
-        );
-        faults.add(pointer, detail);
-    }
+    block.array(name, POINTS_MIN..=POINTS_MAX, &what)?;
+    let (mut points, mut refused) = (block.elements(name)?, 0);
+    let read = points.own_elements(&mut refused, point, refuse_point);
+    let needed = format!("each must be a pair [y, z], both {COORDINATE}");
+    points.count_rest(refused, "points", needed);
     read
 }
 
@@ -145,13 +129,16 @@ fn point(element: &Value) -> Option<[f64; 2]> {
     Some([COORDINATE.read(y)?, COORDINATE.read(z)?])
 }
 
-fn refuse_point(element: &Value, pointer: &str, faults: &mut Faults) {
-    let Some(pair) = element.as_array().filter(|pair| pair.len() == 2) else {
+fn refuse_point(points: &mut Object, index: &str) {
+    let element = points.value(index).unwrap_or(&Value::Null);
+    if element.as_array().is_none_or(|pair| pair.len() != 2) {
         let given = shown(element);
         let detail = format!("{given} given; a pair [y, z] in mm is needed");
-        return faults.add(pointer, detail);
-    };
-    for (k, value) in pair.iter().enumerate() {
-        number(value, &join(pointer, k), COORDINATE, faults);
+        let pointer = points.pointer_to(index);
+        return points.faults().add(pointer, detail);
+    }
+    if let Some(mut pair) = points.elements(index) {
+        pair.number("0", COORDINATE);
+        pair.number("1", COORDINATE);
     }
 }

@@ -6,7 +6,7 @@ use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::case::words::cross_section::CrossSection;
-use crate::case::words::object::{AllowedRange, Faults, Object, shown};
+use crate::case::words::object::{AllowedRange, Faults, Member, Object, shown};
 use crate::case::words::subsurface::DamageModel;
 use crate::error::CaseError;
 use crate::numerics::quadrature::PRIMES;
@@ -302,10 +302,7 @@ pub(crate) fn events(
     most: usize,
 ) -> Option<Vec<EvolutionEvent>> {
     let what = format!("an array of at most {most} events");
-    let elements = all.array(name, least..=most, &what)?;
-    all.each(name, elements, |element, pointer, faults| {
-        EvolutionEvent::members(&mut Object::open(element, pointer, faults)?)
-    })
+    all.each(name, least..=most, &what, EvolutionEvent::read)
 }
 
 /// Refuses an event without effect.
@@ -390,11 +387,7 @@ fn distribution(mut block: Object) -> Option<TrafficDistribution> {
 
 /// Reads one number for each row.
 fn numbers(block: &mut Object, name: &str, allowed: AllowedRange, rows: u32) -> Option<Vec<f64>> {
-    let value = block.value(name)?;
-    let Some(elements) = value.as_array().filter(|all| all.len() == rows as usize) else {
-        let given = shown(value);
-        let detail = format!("{given} given; one number for each of {rows} rows is needed");
-        return block.refuse(name, detail);
-    };
-    block.numbers(name, elements, allowed)
+    let (rows, what) = (rows as usize, format!("one number for each of {rows} rows"));
+    block.array(name, rows..=rows, &what)?;
+    block.numbers(name, allowed)
 }

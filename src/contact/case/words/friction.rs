@@ -4,7 +4,7 @@ use railhead_macros::{Members, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::case::words::object::{AllowedRange, Object};
+use crate::case::words::object::{AllowedRange, Member, Object};
 use crate::case::words::samples::AXIS_POINTS;
 use crate::friction::velocity_weakening::FallForm;
 
@@ -206,10 +206,7 @@ pub(crate) fn faults_of_friction(block: &mut Object, read: Option<&Friction>) ->
 
 /// Reads the terms of a coefficient that falls with slip speed.
 pub(crate) fn terms(block: &mut Object, name: &str) -> Option<Vec<FallTerm>> {
-    let elements = block.array(name, 1..=2, TERMS)?;
-    block.each(name, elements, |element, pointer, faults| {
-        FallTerm::members(&mut Object::open(element, pointer, faults)?)
-    })
+    block.each(name, 1..=2, TERMS, FallTerm::read)
 }
 
 /// Refuses positions that are given in no way, in two ways or out of order.

@@ -1,11 +1,11 @@
 //! The member `motion` of a case: one motion, a list, a sweep, a history or the motion of a wheelset.
 
-use railhead_macros::{Members, Words, none_is_absent};
+use railhead_macros::{Members, Words, keyword, none_is_absent};
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
-use crate::case::words::object::{AllowedRange, Faults, Member, Object, shown};
+use crate::case::words::object::{AllowedRange, Member, Object, shown};
 use crate::rolling::history::plan::HistoryStart;
 
 /// A motion of a case: creepages and spin. A tangential force may replace a creepage; the creepage is then computed and reported.
@@ -141,8 +141,7 @@ pub struct Sweep {
 }
 
 /// How several components of a sweep are combined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Default, Words)]
 pub enum Combine {
     /// Motion n has value n of every component; all components that vary have the same number of values.
     #[default]
@@ -358,20 +357,18 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
         .and_then(|contact| contact.get("type"));
     let kind = kind.and_then(Value::as_str);
     let (of_profiles, of_wheelset) = (kind == Some("profiles"), kind == Some("wheelset"));
-    let pointer = case.pointer_to("motion");
-    let faults = case.faults();
     match value {
         Value::Object(members) if members.contains_key("sweep") && !of_wheelset => {
-            let mut block = Object::open(value, pointer, faults)?;
+            let mut block = case.child("motion")?;
             block.only(&["sweep"]);
             let sweep = Sweep::read(&mut block, "sweep")?;
             Some(Motions::Sweep { sweep })
         }
         Value::Object(members) if members.contains_key("history") => {
-            read_history(&mut Object::open(value, pointer, faults)?)
+            read_history(&mut case.child("motion")?)
         }
         Value::Object(members) if members.contains_key("wheelset") => {
-            let mut block = Object::open(value, pointer, faults)?;
+            let mut block = case.child("motion")?;
             block.only(&["wheelset"]);
             if !of_profiles && !of_wheelset {
                 let detail = "given for another contact than \"type\": \"profiles\" or \"wheelset\"; give creepages instead";
@@ -379,9 +376,10 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
             }
             match members.get("wheelset") {
                 Some(Value::Array(motions)) if of_wheelset && !motions.is_empty() => {
-                    let wheelset = block.each("wheelset", motions, |motion, pointer, faults| {
-                        wheelset(&mut Object::open(motion, pointer, faults)?, true)
-                    })?;
+                    let read = |motions: &mut Object, index: &str| {
+                        wheelset(&mut motions.child(index)?, true)
+                    };
+                    let wheelset = block.each("wheelset", 1..=usize::MAX, "", read)?;
                     Some(Motions::Wheelsets { wheelset })
                 }
                 _ => {
@@ -393,18 +391,21 @@ pub(crate) fn read(case: &mut Object) -> Option<Motions> {
         _ if of_wheelset => {
             let what = "the motion of the wheelset is needed, such as {\"wheelset\": {\"speed_mm_per_s\": 20000, \"drive_torque_n_mm\": 0}}, from which \
                         every patch gets its own creepages";
-            faults.refuse(pointer, format!("{} given; {what}", shown(value)))
+            let pointer = case.pointer_to("motion");
+            let given = shown(value);
+            case.faults()
+                .refuse(pointer, format!("{given} given; {what}"))
         }
-        Value::Object(_) => motion(value, pointer, faults).map(Motions::One),
-        Value::Array(elements) if !elements.is_empty() => {
-            case.each("motion", elements, motion).map(Motions::Many)
+        Value::Object(_) => motion(case, "motion").map(Motions::One),
+        _ => {
+            let motions = case.each("motion", 1..=usize::MAX, what, motion);
+            motions.map(Motions::Many)
         }
-        _ => case.mistaken("motion", what),
     }
 }
 
-fn motion(value: &Value, pointer: String, faults: &mut Faults) -> Option<AskedMotion> {
-    let read = AskedMotion::members(&mut Object::open(value, pointer, faults)?)?;
+fn motion(block: &mut Object, name: &str) -> Option<AskedMotion> {
+    let read = AskedMotion::read(block, name)?;
     let left_out = |force: Option<f64>| force.is_none().then_some(0.0);
     Some(AskedMotion {
         creepage_x: read.creepage_x.or(left_out(read.force_x_n)),
@@ -611,7 +612,7 @@ pub(crate) fn course(block: &mut Object, name: &str, allowed: AllowedRange) -> O
     match block.value(name)? {
         Value::Number(_) => block.number(name, allowed).map(Course::Constant),
         Value::Array(elements) if (1..=POINTS_MAX as usize).contains(&elements.len()) => {
-            block.numbers(name, elements, allowed).map(Course::Values)
+            block.numbers(name, allowed).map(Course::Values)
         }
         Value::Object(_) => {
             let (from, to, points) = block.child(name)?.range(allowed, 2, POINTS_MAX)?;

@@ -11,11 +11,11 @@ use crate::error::{Fault, FaultCode, FaultFigures};
 /// Maximum number of faulty values of an array or a grid that get a fault of their own.
 pub(crate) const LISTED_MAX: usize = 5;
 
-/// A JSON object, its JSON pointer and the list that collects its faults.
+/// A JSON object or array, its JSON pointer and the list that collects its faults. The members of an array are its elements, by their index.
 ///
 /// A reading method returns `None` both for an absent and for a faulty member. A faulty member also adds a fault, so that the case is refused.
 pub(crate) struct Object<'v, 'f> {
-    members: &'v Map<String, Value>,
+    value: &'v Value,
     pointer: String,
     faults: &'f mut Faults,
 }
@@ -23,25 +23,21 @@ pub(crate) struct Object<'v, 'f> {
 impl<'v, 'f> Object<'v, 'f> {
     /// Opens a value that must be an object.
     pub(crate) fn open(value: &'v Value, pointer: String, faults: &'f mut Faults) -> Option<Self> {
-        if let Value::Object(members) = value {
-            Some(Object {
-                members,
-                pointer,
-                faults,
-            })
-        } else {
-            faults.add_with(
-                pointer,
-                format!("{} given; an object is needed", shown(value)),
-                figures(FaultCode::WrongType, Some(value)),
-            );
-            None
+        if !value.is_object() {
+            let detail = format!("{} given; an object is needed", shown(value));
+            faults.add_with(pointer, detail, figures(FaultCode::WrongType, Some(value)));
+            return None;
         }
+        Some(Object {
+            value,
+            pointer,
+            faults,
+        })
     }
 
     /// Whether the object has this member.
     pub(crate) fn has(&self, name: &str) -> bool {
-        self.members.contains_key(name)
+        self.value(name).is_some()
     }
 
     /// Returns those of `names` that the object has.
@@ -74,7 +70,10 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Returns the value of a member, if the object has it.
     pub(crate) fn value(&self, name: &str) -> Option<&'v Value> {
-        self.members.get(name)
+        match self.value {
+            Value::Array(elements) => elements.get(name.parse::<usize>().ok()?),
+            object => object.get(name),
+        }
     }
 
     /// Returns the JSON pointer of a member.
@@ -89,7 +88,7 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Adds a fault of a member.
     pub(crate) fn fault(&mut self, name: &str, detail: impl Into<String>) {
-        let figures = figures(FaultCode::Invalid, self.members.get(name));
+        let figures = figures(FaultCode::Invalid, self.value(name));
         self.fault_with(name, detail, figures);
     }
 
@@ -133,8 +132,8 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Refuses every member that is neither in `allowed` nor in `reserved`. The fault lists `allowed` only.
     pub(crate) fn only_or(&mut self, allowed: &[&str], reserved: &[&str]) {
-        let members = self.members;
-        for (name, value) in members {
+        let own = self.value;
+        for (name, value) in own.as_object().into_iter().flatten() {
             if !allowed.contains(&name.as_str()) && !reserved.contains(&name.as_str()) {
                 let detail = format!(
                     "unknown member (its value is {}); allowed here: {}",
@@ -152,7 +151,7 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Returns the value of a required member. If it is absent, adds a fault that states `what` is needed.
     pub(crate) fn required(&mut self, name: &str, what: &str) -> Option<&'v Value> {
-        let value = self.members.get(name);
+        let value = self.value(name);
         if value.is_none() {
             let detail = format!("missing; {what} is needed");
             self.fault_with(name, detail, figures(FaultCode::Missing, None));
@@ -162,9 +161,14 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Reads a number; `None` if it is absent or faulty.
     pub(crate) fn number(&mut self, name: &str, allowed: AllowedRange) -> Option<f64> {
-        let value = self.members.get(name)?;
-        let pointer = self.pointer_to(name);
-        number(value, &pointer, allowed, self.faults)
+        let value = self.value(name)?;
+        let read = allowed.read(value);
+        if read.is_none() {
+            let detail = format!("{} given; {allowed} is needed", shown(value));
+            let code = number_code(value);
+            self.fault_with(name, detail, allowed.figures(code, Some(value)));
+        }
+        read
     }
 
     /// Reads an optional member with `read`. The outer `None` means a fault, the inner one an absent member.
@@ -200,16 +204,55 @@ impl<'v, 'f> Object<'v, 'f> {
     }
 
     /// Reads the elements of an array as numbers. The first [`LISTED_MAX`] faulty ones get a fault each; one more fault counts the rest.
-    pub(crate) fn numbers(
-        &mut self,
-        name: &str,
-        elements: &[Value],
-        allowed: AllowedRange,
-    ) -> Option<Vec<f64>> {
-        let (pointer, mut refused) = (self.pointer_to(name), 0);
-        let read = numbers(elements, &pointer, allowed, &mut refused, self.faults);
-        count_rest(&pointer, allowed, refused, self.faults);
+    pub(crate) fn numbers(&mut self, name: &str, allowed: AllowedRange) -> Option<Vec<f64>> {
+        let (mut array, mut refused) = (self.elements(name)?, 0);
+        let read = array.own_numbers(allowed, &mut refused);
+        array.count_rest(refused, "values", format!("{allowed} is needed"));
         read
+    }
+
+    /// Reads the elements of this array as numbers, see [`own_elements`](Object::own_elements).
+    pub(crate) fn own_numbers(
+        &mut self,
+        allowed: AllowedRange,
+        refused: &mut usize,
+    ) -> Option<Vec<f64>> {
+        let refuse = |array: &mut Self, index: &str| {
+            array.number(index, allowed);
+        };
+        self.own_elements(refused, |value| allowed.read(value), refuse)
+    }
+
+    /// Reads the elements of this array with `read`. Counts those that it refuses in `refused`, and calls `refuse` for each of the first
+    /// [`LISTED_MAX`].
+    pub(crate) fn own_elements<T>(
+        &mut self,
+        refused: &mut usize,
+        read: impl Fn(&Value) -> Option<T>,
+        refuse: impl Fn(&mut Self, &str),
+    ) -> Option<Vec<T>> {
+        let elements = self.value.as_array()?;
+        let mut all = Vec::with_capacity(elements.len());
+        for (i, value) in elements.iter().enumerate() {
+            if let Some(one) = read(value) {
+                all.push(one);
+                continue;
+            }
+            *refused += 1;
+            if *refused <= LISTED_MAX {
+                refuse(self, &i.to_string());
+            }
+        }
+        (all.len() == elements.len()).then_some(all)
+    }
+
+    /// Adds a fault with the number of refused elements of this array beyond the first [`LISTED_MAX`], if there are any.
+    pub(crate) fn count_rest(&mut self, refused: usize, what: &str, needed: impl fmt::Display) {
+        let rest = refused.saturating_sub(LISTED_MAX);
+        if rest > 0 {
+            let detail = format!("{rest} more {what} are refused for the same reason; {needed}");
+            self.faults.add(self.pointer.clone(), detail);
+        }
     }
 
     /// Reads a required array of numbers whose length lies in `lengths`.
@@ -221,8 +264,8 @@ impl<'v, 'f> Object<'v, 'f> {
         allowed: AllowedRange,
     ) -> Option<Vec<f64>> {
         self.required(name, what)?;
-        let elements = self.array(name, lengths, what)?;
-        self.numbers(name, elements, allowed)
+        self.array(name, lengths, what)?;
+        self.numbers(name, allowed)
     }
 
     /// Adds the fault that a member has the wrong value or type, and returns `None`.
@@ -257,19 +300,34 @@ impl<'v, 'f> Object<'v, 'f> {
         }
     }
 
-    /// Reads the elements of the array `name`; `read` gets each with its JSON pointer. Returns `None` if one of them is faulty.
+    /// Reads the elements of an array whose number lies in `lengths`; `read` gets the array and the index of each. Returns `None` if one of
+    /// them is faulty.
     pub(crate) fn each<T>(
         &mut self,
         name: &str,
-        elements: &'v [Value],
-        read: impl Fn(&'v Value, String, &mut Faults) -> Option<T>,
+        lengths: RangeInclusive<usize>,
+        what: &str,
+        read: impl Fn(&mut Object, &str) -> Option<T>,
     ) -> Option<Vec<T>> {
-        let pointer = self.pointer_to(name);
-        let elements = elements.iter().enumerate();
-        let all: Vec<Option<T>> = elements
-            .map(|(k, element)| read(element, join(&pointer, k), self.faults))
-            .collect();
+        let count = self.array(name, lengths, what)?.len();
+        let mut array = self.elements(name)?;
+        let all = (0..count).map(|k| read(&mut array, &k.to_string()));
+        let all: Vec<Option<T>> = all.collect();
         all.into_iter().collect()
+    }
+
+    /// Reads keywords from an array with at least one, sorted and without repetition.
+    pub(crate) fn words<T: Copy + Ord>(
+        &mut self,
+        name: &str,
+        table: &[(&str, T)],
+        read: impl Fn(&mut Object, &str) -> Option<T>,
+    ) -> Option<Vec<T>> {
+        let what = format!("an array with at least one of {}", names(table));
+        let mut words = self.each(name, 1..=usize::MAX, &what, read)?;
+        words.sort_unstable();
+        words.dedup();
+        Some(words)
     }
 
     /// Reads the members of `{"from": …, "to": …, "points": …}`, with `low` to `high` points.
@@ -288,7 +346,7 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Reads a text of at most `length_max` characters; `None` if it is absent or faulty.
     pub(crate) fn text(&mut self, name: &str, length_max: usize) -> Option<String> {
-        let value = self.members.get(name)?;
+        let value = self.value(name)?;
         match value.as_str() {
             Some(text) if text.chars().count() <= length_max => Some(text.to_owned()),
             _ => {
@@ -322,15 +380,28 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Reads a keyword of a table and returns its value; `None` if it is absent or faulty.
     pub(crate) fn word<T: Copy>(&mut self, name: &str, table: &[(&str, T)]) -> Option<T> {
-        let value = self.members.get(name)?;
-        let pointer = self.pointer_to(name);
-        word(value, &pointer, table, self.faults)
+        let value = self.value(name)?;
+        let text = value.as_str();
+        if let Some((_, meaning)) = table.iter().find(|(word, _)| Some(*word) == text) {
+            return Some(*meaning);
+        }
+        let detail = format!("{} given; allowed: {}", shown(value), names(table));
+        let code = match value {
+            Value::String(_) => FaultCode::UnknownWord,
+            _ => FaultCode::WrongType,
+        };
+        let figures = FaultFigures {
+            allowed: table.iter().map(|(word, _)| (*word).to_owned()).collect(),
+            ..figures(code, Some(value))
+        };
+        self.fault_with(name, detail, figures);
+        None
     }
 
     /// Opens a member that must be an object. An absent member is opened as an empty object.
     pub(crate) fn child_or_empty(&mut self, name: &str) -> Option<Object<'v, '_>> {
         static EMPTY: LazyLock<Value> = LazyLock::new(|| Value::Object(Map::new()));
-        let value = self.members.get(name).unwrap_or(&EMPTY);
+        let value = self.value(name).unwrap_or(&EMPTY);
         let pointer = self.pointer_to(name);
         Object::open(value, pointer, self.faults)
     }
@@ -340,6 +411,15 @@ impl<'v, 'f> Object<'v, 'f> {
         let value = self.required(name, "an object")?;
         let pointer = self.pointer_to(name);
         Object::open(value, pointer, self.faults)
+    }
+
+    /// Opens a member that is an array.
+    pub(crate) fn elements(&mut self, name: &str) -> Option<Object<'v, '_>> {
+        Some(Object {
+            value: self.value(name)?,
+            pointer: self.pointer_to(name),
+            faults: self.faults,
+        })
     }
 }
 
@@ -355,104 +435,10 @@ impl<T: Member> Member for Box<T> {
     }
 }
 
-/// Reads a number within an interval and adds a fault if it is not one.
-pub(crate) fn number(
-    value: &Value,
-    pointer: &str,
-    allowed: AllowedRange,
-    faults: &mut Faults,
-) -> Option<f64> {
-    let read = allowed.read(value);
-    if read.is_none() {
-        let detail = format!("{} given; {allowed} is needed", shown(value));
-        let code = number_code(value);
-        faults.add_with(pointer, detail, allowed.figures(code, Some(value)));
-    }
-    read
-}
-
-/// Reads a keyword of a table, see [`Object::word`].
-pub(crate) fn word<T: Copy>(
-    value: &Value,
-    pointer: &str,
-    table: &[(&str, T)],
-    faults: &mut Faults,
-) -> Option<T> {
-    let text = value.as_str();
-    if let Some((_, meaning)) = table.iter().find(|(word, _)| Some(*word) == text) {
-        return Some(*meaning);
-    }
-    let detail = format!("{} given; allowed: {}", shown(value), names(table));
-    let code = match value {
-        Value::String(_) => FaultCode::UnknownWord,
-        _ => FaultCode::WrongType,
-    };
-    let figures = FaultFigures {
-        allowed: table.iter().map(|(word, _)| (*word).to_owned()).collect(),
-        ..figures(code, Some(value))
-    };
-    faults.add_with(pointer, detail, figures);
-    None
-}
-
 /// Returns the keywords of a table, joined for a sentence.
 pub(crate) fn names<T>(table: &[(&str, T)]) -> String {
     let words: Vec<&str> = table.iter().map(|(word, _)| *word).collect();
     words.join(", ")
-}
-
-/// Reads the numbers of an array. Counts faulty ones in `refused`, and adds a fault for each of the first [`LISTED_MAX`].
-pub(crate) fn numbers(
-    elements: &[Value],
-    pointer: &str,
-    allowed: AllowedRange,
-    refused: &mut usize,
-    faults: &mut Faults,
-) -> Option<Vec<f64>> {
-    let good = |value: &Value| allowed.read(value);
-    let refuse = |value: &Value, pointer: &str, faults: &mut Faults| {
-        number(value, pointer, allowed, faults);
-    };
-    elements_of(elements, pointer, refused, faults, good, refuse)
-}
-
-/// Reads the elements of an array with `read`. Counts those that it refuses in `refused`, and calls `refuse` for each of the first
-/// [`LISTED_MAX`].
-pub(crate) fn elements_of<T>(
-    elements: &[Value],
-    pointer: &str,
-    refused: &mut usize,
-    faults: &mut Faults,
-    read: impl Fn(&Value) -> Option<T>,
-    refuse: impl Fn(&Value, &str, &mut Faults),
-) -> Option<Vec<T>> {
-    let mut all = Vec::with_capacity(elements.len());
-    for (i, value) in elements.iter().enumerate() {
-        if let Some(one) = read(value) {
-            all.push(one);
-            continue;
-        }
-        *refused += 1;
-        if *refused <= LISTED_MAX {
-            refuse(value, &join(pointer, i), faults);
-        }
-    }
-    (all.len() == elements.len()).then_some(all)
-}
-
-/// Adds a fault with the number of faulty values beyond the first [`LISTED_MAX`], if there are any.
-pub(crate) fn count_rest(
-    pointer: &str,
-    allowed: AllowedRange,
-    refused: usize,
-    faults: &mut Faults,
-) {
-    let rest = refused.saturating_sub(LISTED_MAX);
-    if rest > 0 {
-        let detail =
-            format!("{rest} more values are refused for the same reason; {allowed} is needed");
-        faults.add(pointer, detail);
-    }
 }
 
 /// Appends a reference token to a JSON pointer, escaped by RFC 6901, section 3.

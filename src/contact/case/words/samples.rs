@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::case::words::object::{AllowedRange, Object, count_rest, join, numbers};
+use crate::case::words::object::{AllowedRange, Object};
 
 /// The allowed coordinates.
 pub(crate) const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
@@ -63,7 +63,7 @@ pub(crate) fn gap_line(block: &mut Object, member: &str) -> Option<Vec<f64>> {
         let detail = format!("{count} values given; {what} is needed, which are {n}");
         return block.refuse(member, detail);
     }
-    block.numbers(member, elements, COORDINATE)
+    block.numbers(member, COORDINATE)
 }
 
 /// Reads a gap for every point of a grid.
@@ -112,14 +112,12 @@ fn grid(
         );
         return block.refuse(member, detail);
     }
-    let pointer = block.pointer_to(member);
-    let faults = block.faults();
-    let mut refused = 0;
-    let read: Vec<Option<Vec<f64>>> = rows
-        .iter()
-        .enumerate()
-        .map(|(j, row)| numbers(row, &join(&pointer, j), allowed, &mut refused, faults))
-        .collect();
-    count_rest(&pointer, allowed, refused, faults);
+    let (mut grid, mut refused) = (block.elements(member)?, 0);
+    let mut row = |j: usize| {
+        let mut row = grid.elements(&j.to_string())?;
+        row.own_numbers(allowed, &mut refused)
+    };
+    let read: Vec<Option<Vec<f64>>> = (0..height).map(&mut row).collect();
+    grid.count_rest(refused, "values", format!("{allowed} is needed"));
     read.into_iter().collect()
 }

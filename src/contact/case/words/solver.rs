@@ -4,8 +4,8 @@
 
 use std::collections::BTreeMap;
 
-use railhead_macros::{Finite, Members, Named, Words, none_is_absent};
-use serde::{Deserialize, Serialize};
+use railhead_macros::{Finite, Members, Named, Words, keyword, none_is_absent};
+use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
 
@@ -13,7 +13,7 @@ use crate::case::words::contact::{Contact, Load};
 use crate::case::words::friction::Friction;
 use crate::case::words::material::{Material, Thermal};
 use crate::case::words::motion::Motions;
-use crate::case::words::object::{Object, names, shown, word};
+use crate::case::words::object::{Member, Object};
 use crate::case::words::subsurface::{DamageWords, Subsurface};
 use crate::mesh::MeshSize;
 use crate::method::TractionBound;
@@ -47,21 +47,7 @@ pub struct Solver {
 }
 
 /// The methods a client can choose.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    Serialize,
-    Deserialize,
-    ToSchema,
-    Words,
-    Named,
-    Finite,
-)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Default, Words, Named, Finite)]
 #[schema(as = Method)]
 pub enum MethodName {
     /// Resultants by `table` where its error bound meets the target, and else by `boundary_element`, which also gives the values per cell.
@@ -79,21 +65,7 @@ pub enum MethodName {
 }
 
 /// A quantity that a case can request. The result contains requested quantities only.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    ToSchema,
-    Words,
-    Named,
-)]
-#[serde(rename_all = "snake_case")]
+#[keyword(PartialOrd, Ord, Words, Named)]
 pub enum Output {
     /// Forces, moment, dissipated power.
     Resultants,
@@ -226,21 +198,17 @@ pub(crate) fn read_outputs(
         usual.retain(|output| without_fields.is_none() || !output.needs_fields());
         return Some(usual);
     }
-    let what = format!("an array with at least one of {}", names(Output::WORDS));
-    let elements = case.array("outputs", 1..=usize::MAX, &what)?;
-    let mut outputs = case.each("outputs", elements, |element, pointer, faults| {
-        let output = word(element, &pointer, Output::WORDS, faults)?;
+    case.words("outputs", Output::WORDS, |outputs, index| {
+        let output = Output::read(outputs, index)?;
         let detail = match without_fields {
             Some(method) if output.needs_fields() => format!(
-                "{} given; \"method\": \"{}\" computes only \"resultants\", \"gradients\" and \"damage\"",
-                shown(element),
+                "\"{}\" given; \"method\": \"{}\" computes only \"resultants\", \"gradients\" and \"damage\"",
+                output.name(),
                 method.name()
             ),
             _ => return Some(output),
         };
-        faults.refuse(pointer, detail)
-    })?;
-    outputs.sort_unstable();
-    outputs.dedup();
-    Some(outputs)
+        let pointer = outputs.pointer_to(index);
+        outputs.faults().refuse(pointer, detail)
+    })
 }

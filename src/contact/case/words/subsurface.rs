@@ -1,14 +1,12 @@
 //! The members `subsurface` and `damage` of a case.
 
-use railhead_macros::{Finite, Members, Words, none_is_absent};
+use railhead_macros::{Finite, Members, Words, keyword, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
 
 use crate::case::words::motion::POINTS_MAX;
-use crate::case::words::object::{
-    AllowedRange, Faults, Member, Object, join, names, number, shown, word,
-};
+use crate::case::words::object::{AllowedRange, Member, Object, shown};
 use crate::case::words::samples::COORDINATE;
 
 /// Points for stresses below the surface, in the axes of the patch: x along rolling, y to the left, depth positive into the body. At most
@@ -60,8 +58,7 @@ pub enum DepthLineAt {
 }
 
 /// A point that is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[keyword]
 pub enum FoundPlace {
     /// Where von Mises' stress is largest.
     Worst,
@@ -102,10 +99,7 @@ pub enum GridAxis {
 }
 
 /// One of the two bodies.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words, Finite,
-)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Default, Words, Finite)]
 #[schema(as = Body)]
 pub enum BodyName {
     /// Body 2, the rail.
@@ -132,21 +126,7 @@ pub struct DamageWords {
 }
 
 /// A damage model.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    ToSchema,
-    Words,
-    Finite,
-)]
-#[serde(rename_all = "snake_case")]
+#[keyword(PartialOrd, Ord, Words, Finite)]
 pub enum DamageModel {
     /// Friction power over rolling speed, with and without spin.
     TGamma,
@@ -173,9 +153,7 @@ pub enum DamageParameterWords {
 }
 
 /// Named parameter sets; a set that is changed gets another name.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words, Finite,
-)]
+#[keyword(Default, Words, Finite)]
 pub enum DamageSetName {
     /// Rail UIC 900A, wheel R8T.
     #[default]
@@ -284,17 +262,7 @@ pub(crate) fn read_damage(
 
 /// Reads damage models, sorted and without repetition.
 pub(crate) fn models(block: &mut Object, name: &str) -> Option<Vec<DamageModel>> {
-    let what = format!(
-        "an array with at least one of {}",
-        names(DamageModel::WORDS)
-    );
-    let elements = block.array(name, 1..=usize::MAX, &what)?;
-    let mut models = block.each(name, elements, |element, pointer, faults| {
-        word(element, &pointer, DamageModel::WORDS, faults)
-    })?;
-    models.sort_unstable();
-    models.dedup();
-    Some(models)
+    block.words(name, DamageModel::WORDS, DamageModel::read)
 }
 
 /// Reads the name of a parameter set, or parameters of the client.
@@ -322,11 +290,10 @@ pub(crate) fn faults_of_wlrm(block: &mut Object, read: Option<&WlrmFigures>) -> 
 /// Reads `[low, high]`, both more than 0 and in order.
 pub(crate) fn pair(block: &mut Object, name: &str) -> Option<[f64; 2]> {
     let value = block.required(name, "[low, high]")?;
-    let pointer = block.pointer_to(name);
-    let Some(both) = value.as_array().filter(|both| both.len() == 2) else {
+    if value.as_array().is_none_or(|both| both.len() != 2) {
         return block.mistaken(name, "[low, high]");
-    };
-    let [low, high] = tuple(both, &pointer, [FIGURE; 2], block.faults())?;
+    }
+    let [low, high] = tuple(block, name, [FIGURE; 2])?;
     if low > high {
         let detail = format!("[{low}, {high}] given; the first may not be larger");
         return block.refuse(name, detail);
@@ -336,15 +303,13 @@ pub(crate) fn pair(block: &mut Object, name: &str) -> Option<[f64; 2]> {
 
 /// Reads numbers of an array, each in its own range; there are at least `N` elements.
 fn tuple<const N: usize>(
-    elements: &[Value],
-    pointer: &str,
+    block: &mut Object,
+    name: &str,
     allowed: [AllowedRange; N],
-    faults: &mut Faults,
 ) -> Option<[f64; N]> {
-    let mut read = [None; N];
-    for (k, place) in read.iter_mut().enumerate() {
-        *place = number(&elements[k], &join(pointer, k), allowed[k], faults);
-    }
+    let mut elements = block.elements(name)?;
+    let read: [Option<f64>; N] =
+        std::array::from_fn(|k| elements.number(&k.to_string(), allowed[k]));
     let all: Option<Vec<f64>> = read.into_iter().collect();
     all?.try_into().ok()
 }
@@ -405,14 +370,15 @@ pub(crate) fn faults_of_places(block: &mut Object, _: Option<&Subsurface>) -> Op
 /// Reads points `[x, y, depth]`.
 pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 3]>> {
     let what = "an array of points [x, y, depth] in mm";
-    let elements = block.array(name, 1..=usize::MAX, what)?;
-    block.each(name, elements, |element, pointer, faults| {
-        let Some(point) = element.as_array().filter(|point| point.len() == 3) else {
+    block.each(name, 1..=usize::MAX, what, |points, index| {
+        let element = points.value(index)?;
+        if element.as_array().is_none_or(|point| point.len() != 3) {
             let given = shown(element);
             let detail = format!("{given} given; three numbers [x, y, depth] in mm are needed");
-            return faults.refuse(pointer, detail);
-        };
-        tuple(point, &pointer, [COORDINATE, COORDINATE, DEPTH], faults)
+            let pointer = points.pointer_to(index);
+            return points.faults().refuse(pointer, detail);
+        }
+        tuple(points, index, [COORDINATE, COORDINATE, DEPTH])
     })
 }
 
@@ -422,10 +388,8 @@ pub(crate) fn line_at(block: &mut Object, name: &str) -> Option<DepthLineAt> {
     if value.as_str() == Some("worst") {
         return Some(DepthLineAt::Found(FoundPlace::Worst));
     }
-    let pointer = block.pointer_to(name);
-    if let Some(place) = value.as_array().filter(|place| place.len() == 2) {
-        let place = tuple(place, &pointer, [COORDINATE; 2], block.faults());
-        return place.map(DepthLineAt::Place);
+    if value.as_array().is_some_and(|place| place.len() == 2) {
+        return tuple(block, name, [COORDINATE; 2]).map(DepthLineAt::Place);
     }
     block.mistaken(name, "[x, y] in mm or \"worst\"")
 }

@@ -3,9 +3,7 @@
 //! Steps are equal from point to point and shorter where a sequence begins. Each is a backward difference of second order in the displacements (BDF2) with the
 //! weights for unequal steps (Hairer, Nørsett & Wanner 1993, §III.5), or of first order if no step precedes it.
 
-use railhead_macros::Words;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use railhead_macros::{Words, keyword};
 
 use crate::half_space::strip_operator::kind::Parity;
 use crate::half_space::strip_operator::operator::StripOperator;
@@ -234,8 +232,7 @@ pub(super) fn steady<'e>(
 }
 
 /// The state in which a history begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, ToSchema, Words)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Default, Words)]
 #[schema(as = HistoryStartName)]
 pub enum HistoryStart {
     /// Pressed together without tangential tractions.

@@ -3,7 +3,7 @@
 //! Forces and tractions act on the lower body (body 2, the rail). Frame: x along rolling (the leading edge is at the larger x), y to the left,
 //! z up; moments and spin refer to [`Solution::origin`].
 
-use railhead_macros::{Finite, Named, none_is_absent};
+use railhead_macros::{Finite, Named, keyword, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -532,8 +532,7 @@ pub struct PointFields {
 }
 
 /// State of a cell of the contact patch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Named, Finite)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Named, Finite)]
 pub enum Zone {
     /// No relative slip.
     Stick,
@@ -732,8 +731,7 @@ pub struct FirstTouch {
 }
 
 /// How a solve time was determined.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
+#[keyword]
 pub enum FoundBy {
     /// The case was solved.
     Solve,

@@ -1,6 +1,6 @@
 //! Damage of the surfaces and quality of the profiles in an answer.
 
-use railhead_macros::{Finite, none_is_absent};
+use railhead_macros::{Finite, keyword, none_is_absent};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -53,8 +53,7 @@ pub struct TGamma {
 }
 
 /// A regime of wear.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema, Finite)]
-#[serde(rename_all = "snake_case")]
+#[keyword(Finite)]
 pub enum WearRegime {
     /// Mild.
     Mild,
