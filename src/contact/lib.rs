@@ -84,7 +84,6 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use crate::case::draft;
 use crate::case::rail_pair::KnownPair;
 use crate::monitor::MonitorPart;
 use crate::normal::footprint::NormalTask;
@@ -164,8 +163,7 @@ pub fn check_with(
     case: &Value,
     limits: &Limits,
 ) -> Result<CheckedCase, CaseError> {
-    let (draft, faults) = draft::draft(case);
-    CheckedCase::new(draft, faults, limits, known)
+    CheckedCase::new(case, limits, known)
 }
 
 /// Solves a checked case, slice by slice.

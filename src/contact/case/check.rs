@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::case::checks::{CheckedParts, unusual_friction};
 use crate::case::digest::digest;
-use crate::case::draft::CaseDraft;
+use crate::case::draft::draft;
 use crate::case::motions::ExpandedMotions;
 use crate::case::rail_pair::KnownPair;
 use crate::case::solver::{Limits, resolution};
@@ -31,16 +31,16 @@ use crate::solution::words::answer::Asked;
 use crate::solution::words::damage::{PairQuality, SectionQuality};
 
 impl CheckedCase {
-    /// Checks the members of a case against physics and limits and prepares its numbers. Profiles in `known` are not read again.
+    /// Reads a case, checks its members against physics and limits and prepares its numbers. Profiles in `known` are not read again.
     ///
     /// # Errors
     /// All faults of the text and of the checks, each with its JSON pointer.
     pub(crate) fn new(
-        draft: CaseDraft,
-        mut faults: Vec<Fault>,
+        given: &Value,
         limits: &Limits,
         known: &KnownPair,
     ) -> Result<CheckedCase, CaseError> {
+        let (draft, mut faults) = draft(given);
         let (parts, found) = CheckedParts::check(&draft, known, limits);
         faults.extend(found);
         if faults.is_empty() && parts.task.is_none() {
@@ -70,15 +70,19 @@ impl CheckedCase {
         let patches = task.known_patches().unwrap_or_default();
         let first_move = wheel_task::moves(&case.motion).into_iter().next();
         // Creepages that the solver must find are assessed in the answer.
-        let given = match forces.iter().all(|forces| *forces == [None; 2]) {
+        let known_motions = match forces.iter().all(|forces| *forces == [None; 2]) {
             true => &motions[..],
             false => &[],
         };
         let remarks = merged(
             of_case
                 .chain(remarks)
-                .chain(checked_case::of_case(&case.contact, &patches, given))
-                .chain(units::remarks(&case, &patches)),
+                .chain(checked_case::of_case(
+                    &case.contact,
+                    &patches,
+                    known_motions,
+                ))
+                .chain(units::remarks(&case, given, &patches)),
         );
         let digest = digest(&case, &elasticity, &motions, &forces, &speeds);
         let problem = Problem {

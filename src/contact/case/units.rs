@@ -3,11 +3,11 @@
 //! A number is suspect if it is unusual for wheel and rail in its own unit and usual in another one. Lengths of wheel and track are checked in
 //! `contact_task`.
 
-use crate::case::words::contact::{Contact, Load};
-use crate::case::words::material::{Material, Thermal};
-use crate::case::words::motion::{AskedMotion, Course, Motions, Swept, Wheelset};
+use serde_json::Value;
+
+use crate::case::words::contact::Contact;
+use crate::case::words::material::Material;
 use crate::case::words::solver::Case;
-use crate::case::words::subsurface::DamageParameterWords;
 use crate::geometry::profile::LengthUnit;
 use crate::normal::hertz::Patch;
 use crate::remark::entry::RemarkEntry;
@@ -55,115 +55,91 @@ fn is_within(value: f64, [low, high]: [f64; 2]) -> bool {
     (low..=high).contains(&value)
 }
 
-/// Returns the remarks on numbers that seem to be in another unit.
-pub(crate) fn remarks(case: &Case, patches: &[Patch]) -> Vec<RemarkEntry> {
-    let (contact, load) = (&case.contact, case.load.as_ref());
-    let mut suspects = of_material(&case.material);
-    suspects.extend(of_metal(case));
-    suspects.extend(of_load(&case.material, contact, load, patches));
-    suspects.extend(lengths_of_patch(contact, patches));
-    suspects.extend(of_place(contact));
-    suspects.extend(of_motion(&case.motion));
-    suspects
-}
-
-/// Returns the constants of each body with their JSON pointers, those that both bodies share once.
-fn bodies<'a, T>(pointer: &str, [lower, upper]: [&'a T; 2]) -> Vec<(String, &'a T)> {
-    match std::ptr::eq(lower, upper) {
-        true => vec![(pointer.to_owned(), lower)],
-        false => vec![
-            (format!("{pointer}/lower"), lower),
-            (format!("{pointer}/upper"), upper),
-        ],
+/// Returns the number at a pointer into a case, of several values the one with the largest magnitude.
+fn number_at(case: &Value, pointer: &str) -> Option<f64> {
+    let larger = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
+    match case.pointer(pointer)? {
+        Value::Array(values) => values.iter().filter_map(Value::as_f64).reduce(larger),
+        Value::Object(range) if range.contains_key("values") => {
+            number_at(case, &format!("{pointer}/values"))
+        }
+        Value::Object(range) => {
+            let ends = ["from", "to"].map(|end| range.get(end)?.as_f64());
+            ends.into_iter().flatten().reduce(larger)
+        }
+        value => value.as_f64(),
     }
 }
 
-fn of_material(material: &Material) -> Vec<RemarkEntry> {
+/// Returns the remarks on numbers that seem to be in another unit. `given` is the case as it was read.
+pub(crate) fn remarks(case: &Case, given: &Value, patches: &[Patch]) -> Vec<RemarkEntry> {
+    let of_material = of_material(given);
+    let is_metal = is_metal(&case.material, &of_material);
+    let mut suspects = of_material;
+    if is_metal {
+        suspects.extend(of_metal(given));
+        suspects.extend(of_load(&case.contact, given, patches));
+    }
+    suspects.extend(lengths_of_patch(&case.contact, patches));
+    suspects.extend(of_place(given));
+    suspects.extend(of_motion(given));
+    suspects
+}
+
+/// The places of the constants of a body in `material` and `thermal`, those that both bodies share first.
+const BODIES: [&str; 3] = ["", "/lower", "/upper"];
+
+fn of_material(given: &Value) -> Vec<RemarkEntry> {
     let mut suspects = Vec::new();
-    for (pointer, body) in bodies("/material", material.bodies()) {
-        let moduli = [
-            ("shear_modulus_mpa", body.shear_modulus_mpa, SHEAR_GPA),
-            (
-                "young_modulus_mpa",
-                body.young_modulus_mpa,
-                SHEAR_GPA.map(|g| 2.5 * g),
-            ),
-        ];
-        for (name, modulus, range) in moduli {
-            let modulus = modulus.filter(|value| is_within(*value, range));
-            if let Some(value) = modulus.filter(|_| body.poisson_ratio < POISSON_METAL) {
-                suspects.push(suspect(&format!("{pointer}/{name}"), value, "MPa", "GPa"));
-            }
+    for body in BODIES {
+        let poisson = number_at(given, &format!("/material{body}/poisson_ratio"));
+        let is_metal = poisson.is_some_and(|ratio| ratio < POISSON_METAL);
+        for (name, factor) in [("shear_modulus_mpa", 1.0), ("young_modulus_mpa", 2.5)] {
+            let pointer = format!("/material{body}/{name}");
+            let modulus = number_at(given, &pointer).filter(|_| is_metal);
+            let modulus = modulus.filter(|value| is_within(*value, SHEAR_GPA.map(|g| factor * g)));
+            suspects.extend(modulus.map(|value| suspect(&pointer, value, "MPa", "GPa")));
         }
     }
     suspects
 }
 
-/// Whether both bodies are metals, with moduli in MPa or in GPa.
-fn is_metal(material: &Material) -> bool {
-    let suspects = of_material(material);
-    let bodies = bodies("/material", material.bodies());
-    bodies.into_iter().all(|(pointer, body)| {
+/// Whether both bodies are metals, with moduli in MPa or, by the remarks on them, in GPa.
+fn is_metal(material: &Material, suspects: &[RemarkEntry]) -> bool {
+    let suspected = |body: &str| {
         let mut pointers = suspects.iter().filter_map(|one| one.pointer.as_deref());
-        let shear = body.shear().unwrap_or(0.0);
-        shear >= 1e3 * SHEAR_GPA[0] || pointers.any(|own| own.starts_with(&pointer))
-    })
+        pointers.any(|pointer| pointer.starts_with(body))
+    };
+    let places = match material {
+        Material::Same(_) => ["/material"; 2],
+        Material::Pair { .. } => ["/material/lower", "/material/upper"],
+    };
+    let mut bodies = material.bodies().into_iter().zip(places);
+    bodies
+        .all(|(body, place)| body.shear().unwrap_or(0.0) >= 1e3 * SHEAR_GPA[0] || suspected(place))
 }
 
 /// Returns the remarks on thermal properties and on parameters of damage models.
-fn of_metal(case: &Case) -> Vec<RemarkEntry> {
-    if !is_metal(&case.material) {
-        return Vec::new();
-    }
-    let thermal = case.thermal.as_ref().map(Thermal::bodies).into_iter();
-    let thermal = thermal.flat_map(|both| bodies("/thermal", both));
-    let thermal = thermal.flat_map(|(pointer, body)| {
-        let values = [
-            body.conductivity_w_per_mk,
-            body.specific_heat_j_per_kgk,
-            body.density_kg_per_m3,
-        ];
-        LEAST_OF_METALS
-            .iter()
-            .zip(values)
-            .map(move |(usual, value)| (pointer.clone(), usual, value))
-    });
-    let parameters = case
-        .damage
-        .as_ref()
-        .and_then(|damage| damage.parameters.as_ref());
-    let own = match parameters {
-        Some(DamageParameterWords::Own(own)) => {
-            [own.density_kg_per_m3, own.hardness_mpa, own.shear_yield_mpa]
-        }
-        _ => [None; 3],
-    };
-    let damage = LEAST_OF_METALS[2..].iter().zip(own);
-    let damage =
-        damage.filter_map(|(usual, value)| Some(("/damage/parameters".to_owned(), usual, value?)));
-    thermal
-        .chain(damage)
-        .filter(|(_, (_, least, ..), value)| value < least)
-        .map(|(pointer, (name, _, unit, likely), value)| {
-            suspect(&format!("{pointer}/{name}"), value, unit, likely)
+fn of_metal(given: &Value) -> Vec<RemarkEntry> {
+    let thermal = BODIES.map(|body| (format!("/thermal{body}"), &LEAST_OF_METALS[..3]));
+    let damage = ("/damage/parameters".to_owned(), &LEAST_OF_METALS[2..]);
+    let places = thermal.into_iter().chain([damage]);
+    let all = places.flat_map(|(place, usual)| {
+        usual.iter().filter_map(move |(name, least, unit, likely)| {
+            let pointer = format!("{place}/{name}");
+            let value = number_at(given, &pointer).filter(|value| value < least)?;
+            Some(suspect(&pointer, value, unit, likely))
         })
-        .collect()
+    });
+    all.collect()
 }
 
-fn of_load(
-    material: &Material,
-    contact: &Contact,
-    load: Option<&Load>,
-    patches: &[Patch],
-) -> Option<RemarkEntry> {
-    let load = load?;
-    let given = [
-        ("/load/normal_force_n", load.normal_force_n),
-        ("/load/vertical_force_n", load.vertical_force_n),
-    ];
-    let (pointer, force) = given
+/// Returns the remark on the load of two metals.
+fn of_load(contact: &Contact, given: &Value, patches: &[Patch]) -> Option<RemarkEntry> {
+    let pointers = ["/load/normal_force_n", "/load/vertical_force_n"];
+    let (pointer, force) = pointers
         .into_iter()
-        .find_map(|(at, force)| Some((at, force?)))?;
+        .find_map(|at| Some((at, number_at(given, at)?)))?;
     let wheels = match contact {
         Contact::Wheelset { .. } => 2.0,
         _ => 1.0,
@@ -183,8 +159,7 @@ fn of_load(
             .any(|patch| is_within(1e3 * patch.pressure_max, PRESSURES)),
         _ => radius.is_some_and(|radius| radius >= RADIUS_LEAST),
     };
-    (of_wheel && force < wheels * LOAD_LEAST && is_metal(material))
-        .then(|| suspect(pointer, force, "N", "kN"))
+    (of_wheel && force < wheels * LOAD_LEAST).then(|| suspect(pointer, force, "N", "kN"))
 }
 
 /// Returns the units of length in which the pressure of a patch would be usual; it falls with this power of the length.
@@ -212,85 +187,45 @@ fn lengths_of_patch(contact: &Contact, patches: &[Patch]) -> Option<RemarkEntry>
 }
 
 /// Returns the remarks on the angles of wheel and rail.
-fn of_place(contact: &Contact) -> Vec<RemarkEntry> {
-    let Some(rails) = contact.on_rails() else {
-        return Vec::new();
-    };
-    let placement = rails.placement;
-    let yaw = match contact {
-        Contact::Wheelset { yaw_rad, .. } => largest(&yaw_rad.values()),
-        _ => placement.yaw,
-    };
+fn of_place(given: &Value) -> Vec<RemarkEntry> {
     // Rails may be inclined by twice the usual angle.
     let angles = [
-        ("cant_rad", placement.cant, 2.0 * ANGLE_MOST),
-        ("yaw_rad", yaw, ANGLE_MOST),
-        ("roll_rad", placement.roll, ANGLE_MOST),
+        ("/contact/cant_rad", 2.0 * ANGLE_MOST),
+        ("/contact/yaw_rad", ANGLE_MOST),
+        ("/contact/roll_rad", ANGLE_MOST),
     ];
-    let large = angles
-        .into_iter()
-        .filter(|(_, angle, most)| angle.abs() > *most);
-    large
-        .map(|(name, angle, _)| suspect(&format!("/contact/{name}"), angle, "rad", "degrees"))
-        .collect()
-}
-
-/// Returns the value with the largest magnitude; 0 if there is none.
-fn largest(values: &[f64]) -> f64 {
-    let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
-    values.iter().fold(0.0, larger)
-}
-
-/// Longitudinal and lateral creepage and the speed, with the JSON pointer to their object.
-type MotionNumbers = (String, [Option<f64>; 3]);
-
-/// Returns the numbers of all motions; for a sweep and a history those with the largest magnitude.
-fn numbers_of(motion: &Motions) -> Vec<MotionNumbers> {
-    let swept = |swept: &Option<Swept>| Some(largest(&swept.as_ref()?.values()));
-    let course = |course: &Option<Course>| Some(largest(&course.as_ref()?.values(1)));
-    let asked = |one: &AskedMotion| [one.creepage_x, one.creepage_y, one.speed_mm_per_s];
-    let rolling = |one: &Wheelset| [None, None, Some(one.speed_mm_per_s)];
-    let alone = |of: &str, numbers| vec![(of.to_owned(), numbers)];
-    match motion {
-        Motions::One(one) => alone("/motion", asked(one)),
-        Motions::Many(all) => {
-            let all = all.iter().enumerate();
-            all.map(|(k, one)| (format!("/motion/{k}"), asked(one)))
-                .collect()
-        }
-        Motions::Sweep { sweep } => {
-            let [x, y] = [&sweep.creepage_x, &sweep.creepage_y].map(swept);
-            alone("/motion/sweep", [x, y, sweep.speed_mm_per_s])
-        }
-        Motions::History { history, .. } => {
-            let [x, y] = [&history.creepage_x, &history.creepage_y].map(course);
-            alone("/motion/history", [x, y, history.speed_mm_per_s])
-        }
-        Motions::Wheelset { wheelset } => alone("/motion/wheelset", rolling(wheelset)),
-        Motions::Wheelsets { wheelset } => {
-            let all = wheelset.iter().enumerate();
-            all.map(|(k, one)| (format!("/motion/wheelset/{k}"), rolling(one)))
-                .collect()
-        }
-    }
+    let large = angles.into_iter().filter_map(|(pointer, most)| {
+        let angle = number_at(given, pointer).filter(|angle| angle.abs() > most)?;
+        Some(suspect(pointer, angle, "rad", "degrees"))
+    });
+    large.collect()
 }
 
 /// Returns the remarks on creepages and speeds; for several motions those on the first unusual ones.
-fn of_motion(motion: &Motions) -> Vec<RemarkEntry> {
-    let all = numbers_of(motion);
-    let names = ["creepage_x", "creepage_y", "speed_mm_per_s"];
-    let first = |(k, name): (usize, &str)| {
-        all.iter().find_map(|(of, numbers)| {
-            let value = numbers[k]?;
-            let pointer = format!("{of}/{name}");
-            if name == "speed_mm_per_s" {
-                (0.0 < value && value < SPEED_LEAST)
-                    .then(|| suspect(&pointer, value, "mm/s", "m/s or km/h"))
-            } else {
-                is_within(value.abs(), CREEPAGE_PERCENT)
-                    .then(|| suspect(&pointer, value, "as a ratio", "per cent"))
+fn of_motion(given: &Value) -> Vec<RemarkEntry> {
+    let mut motions = Vec::new();
+    for place in ["", "/sweep", "/history", "/wheelset"] {
+        let place = format!("/motion{place}");
+        match given.pointer(&place) {
+            Some(Value::Array(all)) => {
+                motions.extend((0..all.len()).map(|k| format!("{place}/{k}")));
             }
+            _ => motions.push(place),
+        }
+    }
+    let is_percent = |creepage: f64| is_within(creepage.abs(), CREEPAGE_PERCENT);
+    let is_slow = |speed: f64| 0.0 < speed && speed < SPEED_LEAST;
+    let first = |name: &str, unusual: &dyn Fn(f64) -> bool, unit: &str, likely: &str| {
+        motions.iter().find_map(|motion| {
+            let pointer = format!("{motion}/{name}");
+            let value = number_at(given, &pointer).filter(|value| unusual(*value))?;
+            Some(suspect(&pointer, value, unit, likely))
         })
     };
-    names.into_iter().enumerate().filter_map(first).collect()
+    let remarks = [
+        first("creepage_x", &is_percent, "as a ratio", "per cent"),
+        first("creepage_y", &is_percent, "as a ratio", "per cent"),
+        first("speed_mm_per_s", &is_slow, "mm/s", "m/s or km/h"),
+    ];
+    remarks.into_iter().flatten().collect()
 }
