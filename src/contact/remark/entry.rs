@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use railhead_macros::none_is_absent;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -13,6 +14,7 @@ use crate::remark::list::Remark;
 const KEPT_MAX: usize = 4;
 
 /// A remark on a result: its code, its location, a sentence, and the values in it by name.
+#[none_is_absent(nullable)]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RemarkEntry {
     /// The kind of remark; `/v1/remarks` lists them all.
@@ -21,17 +23,14 @@ pub struct RemarkEntry {
     /// How much attention it needs.
     pub severity: Severity,
     /// Index of the patch that it applies to, from 0; absent if it applies to all.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
     pub patch: Option<usize>,
     /// Index of the motion that it applies to, from 0; absent if it applies to all.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
     pub point: Option<usize>,
     /// Further motions with the same remark but their own values, as ranges `[first, last]`.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     #[schema(required = false)]
     pub also_at_points: Vec<[usize; 2]>,
     /// JSON pointer (RFC 6901) to the part of the case that it applies to, if there is one.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
     pub pointer: Option<String>,
     /// One sentence.
     pub detail: String,

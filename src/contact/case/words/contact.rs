@@ -78,10 +78,8 @@ pub enum Contact {
     #[members(faults_of_pair)]
     Profiles {
         /// Cross-section of the rail.
-        #[schema(inline = false)]
         rail: Box<CrossSection>,
         /// Cross-section of the wheel.
-        #[schema(inline = false)]
         wheel: Box<CrossSection>,
         /// The side of the wheel in its wheelset, seen in the rolling direction.
         #[member(what = "left or right")]
@@ -134,13 +132,10 @@ pub enum Contact {
     #[members(faults_of_pair, faults_of_poses)]
     Wheelset {
         /// Cross-section of both rails, or of the left one if `right` gives another.
-        #[schema(inline = false)]
         rail: Box<CrossSection>,
         /// Cross-section of both wheels, or of the left one if `right` gives another.
-        #[schema(inline = false)]
         wheel: Box<CrossSection>,
         /// Differences on the right; default none.
-        #[schema(inline = false)]
         right: Option<Box<RightSide>>,
         /// Radius of the wheels at z = 0 of their cross-section, in mm.
         #[member(positive(1e5, "mm"))]
@@ -167,18 +162,15 @@ pub enum Contact {
         flange_back_position_mm: Option<f64>,
         /// Shift of the wheelset to the left, in mm: one number or several; default 0. Each shift with a yaw is a position with its own
         /// patches.
-        #[schema(inline = false)]
         #[member(with = swept, closed(-1e3, 1e3, "mm"), default = Swept::Constant(0.0))]
         lateral_shift_mm: Swept,
         /// Yaw of the wheelset in rad, positive from x to y: one number or several; default 0.
-        #[schema(inline = false)]
         #[member(with = swept, closed(-0.3, 0.3, "rad"), default = Swept::Constant(0.0))]
         yaw_rad: Swept,
         /// How several shifts and yaws form positions: `together` (default), or `grid`, in which the yaw varies fastest.
         #[member(default)]
         combine: Combine,
         /// Requests the difference of the rolling radii over the shift, and the equivalent conicity.
-        #[schema(inline = false)]
         kinematics: Option<KinematicsWords>,
         /// As in `profiles`.
         #[serde(skip_serializing_if = "is_false")]
@@ -201,10 +193,8 @@ fn is_false(value: &bool) -> bool {
 #[members(faults_of_right)]
 pub struct RightSide {
     /// Cross-section of the right rail.
-    #[schema(inline = false)]
     pub rail: Option<Box<CrossSection>>,
     /// Cross-section of the right wheel.
-    #[schema(inline = false)]
     pub wheel: Option<Box<CrossSection>>,
     /// Radius of the right wheel at z = 0 of its cross-section, in mm.
     #[member(positive(1e5, "mm"))]

@@ -1,6 +1,6 @@
 //! The request of an evolution: the bodies that wear, the wear model, the extent, events and limits.
 
-use railhead_macros::{Members, Words, none_is_absent};
+use railhead_macros::{Members, Words, keyword, none_is_absent};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -12,7 +12,8 @@ use crate::error::CaseError;
 use crate::numerics::quadrature::PRIMES;
 
 /// Profiles that wear under a traffic.
-#[derive(Debug, Clone, PartialEq, ToSchema, Members)]
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_extent)]
 #[schema(as = EvolutionRequest)]
 pub struct EvolutionWords {
@@ -25,34 +26,29 @@ pub struct EvolutionWords {
     #[member(with = traffic)]
     pub traffic: Traffic,
     /// Which bodies wear; default `both`.
-    #[schema(required = false)]
     #[member(default)]
     pub wearing: WearingBodies,
     /// Wear law: `usfd_wear` (default) or `archard_wear`, with the parameters in `damage.parameters` of the template.
-    #[schema(required = false)]
     #[member(with = wear_model, default = DamageModel::UsfdWear)]
     pub wear_model: DamageModel,
     /// Traffic over the rail and distance of the wheel.
     pub extent: EvolutionExtent,
     /// Number of stored steps after the start, equally spaced over the extent; default 10.
-    #[schema(required = false, minimum = 1, maximum = 500)]
+    #[schema(minimum = 1, maximum = 500)]
     #[member(1..=500, default = 10)]
     pub records: u32,
     /// Tolerances of the condensed traffic and of the steps.
-    #[schema(required = false)]
     #[member(empty)]
     pub accuracy: EvolutionAccuracy,
     /// Losses for which the result reports when they are reached.
-    #[schema(required = false)]
     #[member(default)]
     pub limits: WearLosses,
     /// Maintenance, in any order.
-    #[schema(required = false)]
     #[member(with = events, 0..=100, default)]
     pub events: Vec<EvolutionEvent>,
     /// Uncertainty of a wear coefficient whose scatter is not published: with 90 % probability it lies between its value divided and
     /// multiplied by this factor; default 2.
-    #[schema(required = false, minimum = 1.0)]
+    #[schema(minimum = 1.0)]
     #[member(closed(1.0, 100.0, ""), default = 2.0)]
     pub coefficient_factor: f64,
 }
@@ -83,6 +79,7 @@ pub enum TrafficColumn {
 }
 
 /// Distribution of a column: normal between two values if a mean and a standard deviation are given, otherwise uniform.
+#[none_is_absent]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct TrafficDistribution {
     /// Smallest value.
@@ -90,16 +87,14 @@ pub struct TrafficDistribution {
     /// Largest value.
     pub max: f64,
     /// Mean before truncation.
-    #[schema(nullable = false)]
     pub mean: Option<f64>,
     /// Standard deviation before truncation.
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
+    #[schema(exclusive_minimum = 0.0)]
     pub standard_deviation: Option<f64>,
 }
 
 /// The bodies that wear.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ToSchema, Words)]
-#[schema(rename_all = "snake_case")]
+#[keyword(Default, Words)]
 pub enum WearingBodies {
     /// The rail.
     Rail,
@@ -127,18 +122,16 @@ impl WearingBodies {
 }
 
 /// Extent of an evolution. Rail and wheel advance in proportion.
-#[derive(Debug, Clone, Copy, PartialEq, ToSchema, Members)]
+#[none_is_absent]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema, Members)]
 pub struct EvolutionExtent {
     /// Traffic over the rail in million gross tonnes; a row of the traffic counts twice its wheel load.
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
     #[member(positive(1e12, ""))]
     pub mgt: Option<f64>,
     /// Traffic over the rail as a number of axles, in place of `mgt`.
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
     #[member(positive(1e12, ""))]
     pub axle_passes: Option<f64>,
     /// Distance in km that the wheel rolls under this traffic; required if the wheel wears.
-    #[schema(nullable = false, exclusive_minimum = 0.0)]
     #[member(positive(1e12, ""))]
     pub wheel_distance_km: Option<f64>,
 }
@@ -206,7 +199,8 @@ impl WearLosses {
 }
 
 /// A maintenance event.
-#[derive(Debug, Clone, PartialEq, ToSchema, Members)]
+#[none_is_absent]
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema, Members)]
 #[members(faults_of_event)]
 pub struct EvolutionEvent {
     /// Time of the event in the unit of the extent: `mgt` or `axle_passes`, or km if only the wheel wears.
@@ -214,17 +208,15 @@ pub struct EvolutionEvent {
     #[member(closed(0.0, 1e12, ""))]
     pub at: f64,
     /// Grinds the rail to this section, lowered until it lies nowhere above the current one.
-    #[schema(nullable = false, inline = false)]
     pub grind: Option<Box<CrossSection>>,
     /// Turns the wheel to this section, moved toward the axle until it lies nowhere outside the current one.
-    #[schema(nullable = false, inline = false)]
     pub reprofile: Option<Box<CrossSection>>,
     /// Additional depth in mm that grinding or turning removes; default 0.
-    #[schema(required = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     #[member(closed(0.0, 20.0, "mm"), default)]
     pub depth_mm: f64,
     /// Coefficient of friction of all states from this time on, for example after a lubricator is installed.
-    #[schema(nullable = false, minimum = 0.0)]
+    #[schema(minimum = 0.0)]
     #[member(closed(0.0, 2.0, ""))]
     pub friction_coefficient: Option<f64>,
 }

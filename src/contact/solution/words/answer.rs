@@ -671,32 +671,30 @@ pub struct EquivalentConicity {
 }
 
 /// How a case was interpreted, without solving it.
+#[none_is_absent(nullable)]
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Understanding {
     /// The patches, if known beforehand: by Hertz's formulas for `radii` and `ellipse`, from the grid for `pressure_grid`. Otherwise empty.
     pub patches: Vec<KnownPatch>,
     /// Friction coefficient times normal force in N, which no tangential force can exceed; absent if the normal force must be computed.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub friction_limit_n: Option<f64>,
     /// Position of wheel and rail; only for `profiles`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub placement: Option<PlacedProfiles>,
 }
 
 /// A patch that is known before solving.
+#[none_is_absent(nullable)]
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct KnownPatch {
     /// Normal force in N.
     pub normal_force_n: f64,
     /// Approach of distant points in mm; absent if the pressure was given.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub approach_mm: Option<f64>,
     /// Contact area in mm².
     pub area_mm2: f64,
     /// Largest pressure in MPa.
     pub pressure_max_mpa: f64,
     /// Semi-axes along x and y in mm; only for elliptic patches.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub semi_axes_mm: Option<[f64; 2]>,
     /// Extent of the patch `[x_min, x_max, y_min, y_max]` in mm.
     pub extent_mm: [f64; 4],

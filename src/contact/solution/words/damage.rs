@@ -176,10 +176,8 @@ pub struct DamageFiguresUsed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema, Finite)]
 pub struct PatchQuality {
     /// Quality of the rail's profile.
-    #[schema(inline = false)]
     pub rail: ProfileQuality,
     /// Quality of the wheel's profile.
-    #[schema(inline = false)]
     pub wheel: ProfileQuality,
 }
 
@@ -236,10 +234,8 @@ pub struct SectionQuality {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
 pub struct PairQuality {
     /// Quality of the rail's profile.
-    #[schema(inline = false)]
     pub rail: SectionQuality,
     /// Quality of the wheel's profile.
-    #[schema(inline = false)]
     pub wheel: SectionQuality,
 }
 
