@@ -145,14 +145,12 @@ impl Model {
 
     /// Returns whether the queue has room for this many more jobs.
     pub fn admit(&self, tenant: &str, jobs: u64) -> Result<(), Refusal> {
-        let of_tenant = self.taken(Some(tenant));
-        let places = jobs
-            .min(BOUNDS.0.saturating_sub(self.taken(None)))
-            .min(BOUNDS.1.saturating_sub(of_tenant));
-        match places == jobs {
-            true => Ok(()),
-            false if of_tenant + places >= BOUNDS.1 => Err(Refusal::Quota),
-            false => Err(Refusal::Queue),
+        if self.taken(Some(tenant)) + jobs > BOUNDS.1 {
+            return Err(Refusal::Quota);
+        }
+        match self.taken(None) + jobs > BOUNDS.0 {
+            true => Err(Refusal::Queue),
+            false => Ok(()),
         }
     }
 

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use futures_util::future::try_join_all;
 use railhead::jobs::store::{BatchBegun, Enqueued, NewJob, QueueBounds, Store};
-use uuid::Uuid;
 
 use crate::store::*;
 
@@ -66,10 +65,7 @@ async fn a_quota_is_exact_whoever_submits_at_the_same_moment(kind: StoreKind) {
         stored: None,
     };
     // A batch holds some of the places already.
-    let reserved = stores[0]
-        .reserve(Uuid::now_v7(), "anonymous", 5, bounds)
-        .await;
-    assert_eq!(reserved.unwrap(), Ok(5));
+    begin(&*stores[0], &new_batch("anonymous", 5), []).await;
     let jobs = (0..40).map(|_| new_job()).collect();
     let answers = submit(&stores, jobs, bounds).await;
     let created = answers
@@ -97,8 +93,8 @@ async fn one_key_makes_one_batch_and_is_known_once_it_is_acknowledged(kind: Stor
         .unwrap();
     assert!(claim_up_to(&*stores[1], 0, LEASE, 9).await.is_empty());
     stores[0].complete_batch(first.id).await.unwrap();
-    let known = stores[1].batch_by_key(&second, &|_| false).await;
-    assert_eq!(known.unwrap(), Some(BatchBegun::Existing(first.id)));
+    let known = stores[1].begin_batch(&second, &|_| false, QueueBounds::NONE);
+    assert_eq!(known.await.unwrap(), BatchBegun::Existing(first.id));
     assert_eq!(claim_up_to(&*stores[1], 0, LEASE, 9).await.len(), 1);
 }
 

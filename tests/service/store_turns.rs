@@ -89,7 +89,6 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
     let table = Table::new(kind).await;
     let store = &*table.store;
     let of_kind = |kind| NewJob { kind, ..new_job() };
-    let none = |_| false;
     let run = NewBatch {
         kind: Kind::Rows,
         idempotency: Some(("key".to_owned(), [1; 32])),
@@ -127,15 +126,6 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
         let batch = store.batch("anonymous", kind, run.id).await.unwrap();
         assert_eq!(batch.is_some(), found == 1);
     }
-    // The same key can belong to a run and to a batch.
-    let batch = NewBatch {
-        kind: Kind::Cases,
-        ..run.clone()
-    };
-    assert_eq!(store.batch_by_key(&batch, &none).await.unwrap(), None);
-    let known = store.batch_by_key(&run, &none).await.unwrap();
-    assert_eq!(known, Some(BatchBegun::Existing(run.id)));
-
     let queues = store.queues().await.unwrap();
     let kinds: Vec<Kind> = queues.iter().map(|(queue, _)| queue.kind).collect();
     assert_eq!(kinds, [Kind::Case, Kind::Rows]);
@@ -146,4 +136,17 @@ async fn jobs_and_chunks_of_a_tenant_wait_in_two_queues_and_count_together(kind:
     );
     assert_eq!(claim_up_to(store, 0, 1000, 8).await.len(), 2);
     assert_eq!(store.queues().await.unwrap(), []);
+    // The same key can belong to a run and to a batch.
+    for (kind, begun) in [
+        (Kind::Rows, BatchBegun::Existing(run.id)),
+        (Kind::Cases, BatchBegun::Created),
+    ] {
+        let again = NewBatch {
+            kind,
+            idempotency: run.idempotency.clone(),
+            ..new_batch("anonymous", 2)
+        };
+        let answer = store.begin_batch(&again, &|_| false, QueueBounds::NONE);
+        assert_eq!(answer.await.unwrap(), begun);
+    }
 }

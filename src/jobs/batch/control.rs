@@ -93,57 +93,52 @@ impl Jobs {
         options: WorkOptions,
         traceparent: Option<Arc<str>>,
     ) -> Result<(Uuid, bool)> {
-        let (id, submit) = (draft.new.id, options.submit);
+        let submit = (options.submit, traceparent);
         let new = draft.as_new(options);
+        // The batch is stored even if the client disconnects, so that none is left incomplete.
+        let jobs = self.clone();
+        let stored = self.shared.tasks.spawn(async move {
+            let stored = jobs.begin_and_fill(&new, &mut draft, submit).await;
+            if stored.is_err() {
+                jobs.shared.abandon(new.id);
+            }
+            drop(draft);
+            match &stored {
+                Ok(_) => jobs.shared.wake_workers(),
+                Err(_) => jobs.shared.drop_abandoned().await,
+            }
+            stored
+        });
+        let stored = stored.await;
+        stored.map_err(|error| JobsError::Damaged(error.to_string()))?
+    }
+
+    /// Stores a batch, or finds that of its idempotency key; `true` in the second case.
+    async fn begin_and_fill(
+        &self,
+        new: &NewBatch,
+        draft: &mut BatchUpload,
+        submit: (SubmitOptions, Option<Arc<str>>),
+    ) -> Result<(Uuid, bool)> {
+        let store = &self.shared.store;
         let filled_here = |id| lock(&self.shared.batches).living.contains(&id);
         let mut pause = FILLING_PAUSE.0;
         loop {
             if self.shared.draining.is_cancelled() {
                 return Err(JobsError::Draining);
             }
-            let known = self.shared.store.batch_by_key(&new, &filled_here).await?;
-            let begun = match known {
-                Some(begun) => begun,
-                None => {
-                    draft.in_table = true;
-                    let bounds = self.queue_bounds();
-                    let store = &self.shared.store;
-                    let begun = store.begin_batch(&new, &filled_here, bounds).await;
-                    self.observe_write(begun)?
-                }
-            };
-            match begun {
+            let begun = store.begin_batch(new, &filled_here, self.queue_bounds());
+            match self.observe_write(begun.await)? {
                 BatchBegun::Created => break,
                 BatchBegun::Existing(id) => return Ok((id, true)),
                 BatchBegun::Conflict => return Err(JobsError::IdempotencyConflict),
-                BatchBegun::Refused(refusal) => {
-                    self.give_up(draft).await;
-                    return Err(self.refused(refusal));
-                }
+                BatchBegun::Refused(refusal) => return Err(self.refused(refusal)),
                 BatchBegun::Unfinished => tokio::time::sleep(pause).await,
             }
             pause = (2 * pause).min(FILLING_PAUSE.1);
         }
-        // Filling continues if the client disconnects, so that no batch is left incomplete.
-        let jobs = self.clone();
-        let filled = self.shared.tasks.spawn(async move {
-            let filled = jobs.fill(&new, &mut draft, (submit, traceparent)).await;
-            match &filled {
-                Ok(()) => {
-                    draft.settle();
-                    // Makes the batch visible to the workers.
-                    drop(draft);
-                    jobs.shared.wake_workers();
-                }
-                Err(_) => jobs.give_up(draft).await,
-            }
-            filled
-        });
-        let filled = filled
-            .await
-            .map_err(|error| JobsError::Damaged(error.to_string()))?;
-        self.observe_write(filled)?;
-        Ok((id, false))
+        self.observe_write(self.fill(new, draft, submit).await)?;
+        Ok((new.id, false))
     }
 
     async fn fill(
@@ -199,15 +194,6 @@ impl Jobs {
         self.shared.store.complete_batch(new.id).await?;
         tracing::info!(batch = %new.id, jobs = new.count, rejected = new.rejected, "batch queued");
         Ok(())
-    }
-
-    /// Removes the jobs of a failed upload.
-    async fn give_up(&self, mut draft: BatchUpload) {
-        if draft.in_table {
-            self.shared.abandon(draft.new.id);
-            draft.settle();
-            self.shared.drop_abandoned().await;
-        }
     }
 }
 

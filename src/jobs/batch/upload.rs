@@ -8,7 +8,6 @@ use std::sync::Arc;
 use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tokio::runtime::Handle;
 
 use crate::data_dir::nameless;
 use crate::error::{JobsError, Result};
@@ -140,11 +139,6 @@ impl StoredCase {
 /// Number of invalid cases whose faults are kept; further ones are only counted.
 const FAULTY_KEPT: usize = 1000;
 
-/// Number of valid cases of a batch that are staged without a reservation. A batch up to this size is refused when it is
-/// queued, which is early enough. A repeated submission with its idempotency key is found even if the queue is full by
-/// then.
-const UNRESERVED_MAX: u32 = 1000;
-
 /// An invalid case of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FaultyCase {
@@ -190,14 +184,10 @@ pub struct BatchUpload {
     pub cases: u32,
     /// The first invalid cases.
     pub faulty: Vec<FaultyCase>,
-    /// Number of places in the queue that are reserved.
-    reserved: u32,
     /// Number of bytes counted as staged.
     staged: u64,
     /// Stored profiles that its cases refer to.
     profiles: KnownSections,
-    /// Whether the job table may contain a part of it.
-    pub(crate) in_table: bool,
 }
 
 /// The template of a table.
@@ -337,7 +327,6 @@ impl BatchUpload {
     fn stage(&mut self, own: CaseOptions, job: NewJob, kept: &[u8]) -> Result<()> {
         let staged = (self.cases, own, job);
         self.cases += 1;
-        self.require_place()?;
         let Some(staging) = &mut self.staging else {
             return Ok(());
         };
@@ -406,29 +395,6 @@ impl BatchUpload {
         Ok(())
     }
 
-    /// Reserves places as the batch grows, twice as many each time, so that few writes are needed.
-    fn require_place(&mut self) -> Result<()> {
-        let good = self.cases - self.new.rejected;
-        if good <= UNRESERVED_MAX || good <= self.reserved {
-            return Ok(());
-        }
-        let most = self.reserved.max(2 * UNRESERVED_MAX);
-        self.in_table = true;
-        let store = &self.jobs.shared.store;
-        let bounds = self.jobs.queue_bounds();
-        let reserved =
-            Handle::current().block_on(store.reserve(self.new.id, &self.jobs.tenant, most, bounds));
-        self.reserved += match self.jobs.observe_write(reserved)? {
-            Ok(places) => places,
-            Err(refusal) => return Err(self.jobs.refused(refusal)),
-        };
-        if good > self.reserved {
-            // The first reservation has to cover the cases that were staged without one.
-            return self.require_place();
-        }
-        Ok(())
-    }
-
     /// The batch as it will be stored. Its digest covers all cases, name, labels and options.
     pub(crate) fn as_new(&mut self, options: WorkOptions) -> NewBatch {
         let (name, labels) = (options.name, options.labels);
@@ -446,27 +412,13 @@ impl BatchUpload {
             ..self.new.clone()
         }
     }
-
-    /// Marks the batch as stored or abandoned: dropping it only releases its staged bytes.
-    pub(crate) fn settle(&mut self) {
-        self.in_table = false;
-    }
 }
 
 impl Drop for BatchUpload {
     fn drop(&mut self) {
         let shared = &self.jobs.shared;
         shared.staged.give_back(&self.jobs.tenant, self.staged);
-        if self.in_table {
-            shared.abandon(self.new.id);
-            if let Ok(runtime) = Handle::try_current() {
-                let shared = shared.clone();
-                let tasks = shared.tasks.clone();
-                tasks.spawn_on(async move { shared.drop_abandoned().await }, &runtime);
-            }
-        } else {
-            lock(&shared.batches).living.remove(&self.new.id);
-        }
+        lock(&shared.batches).living.remove(&self.new.id);
     }
 }
 
@@ -497,10 +449,8 @@ impl Jobs {
             digest: blake3::Hasher::new(),
             cases: 0,
             faulty: Vec::new(),
-            reserved: 0,
             staged: 0,
             profiles: KnownSections::new(),
-            in_table: false,
         })
     }
 }

@@ -676,9 +676,9 @@ pub struct Stats {
 pub struct Usage {
     /// Number of jobs and of chunks of runs by state; a state may be missing.
     pub jobs: BTreeMap<State, u64>,
-    /// Number of places in the queue that are reserved for batches that are being received.
+    /// Number of places in the queue that are reserved for batches that are being filled.
     pub reserved: u64,
-    /// Number of staged bytes of these batches.
+    /// Number of staged bytes of batches that are being received.
     pub staged_bytes: u64,
     /// Number of bytes of stored cases, templates and results.
     pub stored_bytes: u64,
@@ -787,7 +787,7 @@ pub enum Refusal {
 /// A batch to be filled.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct NewBatch {
-    /// UUIDv7, which is also the id of its reservation.
+    /// UUIDv7.
     pub id: Uuid,
     /// The tenant that owns the batch.
     pub tenant: Arc<str>,

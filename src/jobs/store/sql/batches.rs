@@ -17,9 +17,9 @@ use super::rows::{
 };
 use super::submit::{Places, insert_jobs};
 use crate::error::StoreError;
-use crate::model::{Batch, BatchItem, Kind, RunRecord, State, created_at};
+use crate::model::{Batch, BatchItem, Kind, RunRecord, State};
 use crate::store::{
-    BatchBegun, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Refusal, Result, Total,
+    BatchBegun, FilledHere, Filter, NewBatch, NewJob, Page, QueueBounds, Result, Total,
 };
 
 macro_rules! batch_columns {
@@ -43,45 +43,8 @@ const CANCEL: &str = concat!(
 /// Batches and runs: filled in portions, acknowledged once complete, read and removed as a whole.
 #[store_trait]
 impl Batches for SqlStore {
-    /// Reserves up to `most` more places in the queue for a batch that is being received; returns the number.
-    async fn reserve(
-        &self,
-        id: Uuid,
-        tenant: &str,
-        most: u32,
-        bounds: QueueBounds,
-    ) -> Result<Result<u32, Refusal>> {
-        let mut transaction = engine::begin(&self.writer).await?;
-        engine::lock_admission(&mut transaction).await?;
-        let mut places = Places::of(&mut transaction, [tenant], bounds).await?;
-        let taken = places
-            .store(tenant, 0)
-            .and_then(|()| places.take(tenant, u64::from(most)));
-        let places = match taken {
-            Ok(places) => u32::try_from(places).unwrap_or(most),
-            Err(refusal) => return Ok(Err(refusal)),
-        };
-        sql!(execute, &mut *transaction,
-            "INSERT INTO batches (id, tenant, created_at, reserved) VALUES ($1, $2, $3, $4) \
-             ON CONFLICT (id) DO UPDATE SET reserved = batches.reserved + $4";
-            id.to_string(), tenant, created_at(id), i64::from(places)
-        )?;
-        transaction.commit().await?;
-        Ok(Ok(places))
-    }
-
-    /// The answer of [`Batches::begin_batch`] that follows from the idempotency key; `None` if the key is free.
-    async fn batch_by_key(
-        &self,
-        new: &NewBatch,
-        filled_here: FilledHere<'_>,
-    ) -> Result<Option<BatchBegun>> {
-        let mut connection = self.readers.acquire().await?;
-        by_key(&mut connection, new, filled_here).await
-    }
-
-    /// Begins to fill a batch, or finds the batch of its idempotency key. Afterwards exactly the places of its jobs are
-    /// reserved. The key of an unfinished batch that no process fills is free.
+    /// Begins to fill a batch, whose places are then reserved, or finds the batch of its idempotency key. The key of an
+    /// unfinished batch that no process fills is free.
     async fn begin_batch(
         &self,
         new: &NewBatch,
@@ -93,20 +56,9 @@ impl Batches for SqlStore {
         if let Some(begun) = by_key(&mut transaction, new, filled_here).await? {
             return Ok(begun);
         }
-        let reserved = sql!(fetch_optional, &mut *transaction,
-            "SELECT reserved FROM batches WHERE id = $1";
-            new.id.to_string()
-        )?;
-        let reserved = match &reserved {
-            Some(row) => read_count(row, "reserved")?,
-            None => 0,
-        };
-        let lacking = u64::from(new.count).saturating_sub(reserved);
         let mut places = Places::of(&mut transaction, [&*new.tenant], bounds).await?;
-        match places.take(&new.tenant, lacking) {
-            Ok(taken) if taken == lacking => {}
-            Ok(_) => return Ok(BatchBegun::Refused(places.refusal_of(&new.tenant))),
-            Err(refusal) => return Ok(BatchBegun::Refused(refusal)),
+        if let Err(refusal) = places.take(&new.tenant, new.count) {
+            return Ok(BatchBegun::Refused(refusal));
         }
         let template = new.template.as_ref();
         let template = template.map(|body| (blake3::hash(body).as_bytes().to_vec(), body));
@@ -123,8 +75,7 @@ impl Batches for SqlStore {
         }
         sql!(execute, &mut *transaction,
             "INSERT INTO batches (id, tenant, created_at, count, rejected, reserved, name, labels, template, head, kind) \
-             VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10) \
-             ON CONFLICT (id) DO UPDATE SET count = $4, rejected = $5, reserved = $4, name = $6, labels = $7, template = $8, head = $9, kind = $10";
+             VALUES ($1, $2, $3, $4, $5, $4, $6, $7, $8, $9, $10)";
             new.id.to_string(), &*new.tenant, new.created_at, i64::from(new.count),
             i64::from(new.rejected), &new.name, to_json(&new.labels)?,
             template.as_ref().map(|(digest, _)| digest), new.head.as_deref(), new.kind.name()

@@ -56,19 +56,20 @@ impl Places {
         Ok(places)
     }
 
-    /// Takes the available places, at most `most`; a refusal if there is none.
-    pub(crate) fn take(&mut self, tenant: &str, most: u64) -> Result<u64, Refusal> {
+    /// Takes this many places; a refusal if there are fewer.
+    pub(crate) fn take(&mut self, tenant: &str, places: u32) -> Result<(), Refusal> {
         let (of_tenant, stored) = self.taken_by(tenant);
-        let places = most
-            .min(self.bounds.all.saturating_sub(self.all))
-            .min(self.bounds.tenant.saturating_sub(of_tenant));
-        if places == 0 && most > 0 {
-            return Err(self.refusal_of(tenant));
+        let (of_tenant, all) = (of_tenant + u64::from(places), self.all + u64::from(places));
+        if of_tenant > self.bounds.tenant {
+            return Err(Refusal::Quota);
         }
-        self.all += places;
+        if all > self.bounds.all {
+            return Err(Refusal::Queue);
+        }
+        self.all = all;
         self.of_tenants
-            .insert(tenant.to_owned(), (of_tenant + places, stored));
-        Ok(places)
+            .insert(tenant.to_owned(), (of_tenant, stored));
+        Ok(())
     }
 
     /// Adds bytes to be stored; a refusal if the tenant would exceed its bound.
@@ -84,15 +85,6 @@ impl Places {
 
     fn taken_by(&self, tenant: &str) -> (u64, u64) {
         self.of_tenants.get(tenant).copied().unwrap_or((0, 0))
-    }
-
-    /// The bound that is reached.
-    pub(crate) fn refusal_of(&self, tenant: &str) -> Refusal {
-        if self.taken_by(tenant).0 >= self.bounds.tenant {
-            Refusal::Quota
-        } else {
-            Refusal::Queue
-        }
     }
 }
 
@@ -282,10 +274,10 @@ async fn store_together(
             .source
             .is_some_and(|(source, _)| living.contains(&source));
         let taken = match ends {
-            true => Ok(0),
+            true => Ok(()),
             false => places.take(&job.tenant, 1),
         };
-        let room = taken.and_then(|_| places.store(&job.tenant, job.body.len() as u64));
+        let room = taken.and_then(|()| places.store(&job.tenant, job.body.len() as u64));
         if let Err(refusal) = room {
             known.insert(job.id, Enqueued::Refused(refusal));
         }
