@@ -174,26 +174,6 @@ async fn a_batch_is_bounded_by_case_by_bytes_and_by_count() {
 }
 
 #[tokio::test]
-async fn cancelling_a_batch_ends_its_queued_jobs_and_no_other() {
-    let server = Server::idle().await;
-    let alone = server.post("/v1/jobs", &small("alone")).await.json;
-    let body = lines(&vec![small("x"); 5]);
-    let batch = send(&server, "", "application/x-ndjson", body).await.json;
-    let path = link(&batch, "cancel");
-    let answer = server
-        .send(Method::POST, path, |request| request)
-        .await
-        .is(200);
-    assert_eq!(answer.json["states"]["cancelled"], 5);
-    let lines = results(&server, &batch, "?wait=10").await;
-    assert!(lines.iter().all(|line| line["state"] == "cancelled"));
-    let other = server.read(link(&alone, "self")).await;
-    assert_eq!(other["state"], "queued");
-    let listed = server.read(link(&batch, "jobs")).await;
-    assert_eq!(count(&listed["jobs"]), 5);
-}
-
-#[tokio::test]
 async fn results_as_csv_have_a_header_and_a_line_per_motion() {
     let server = Server::start().await;
     let mut sweep = small("two, motions");

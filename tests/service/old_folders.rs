@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use crate::csv_table::Csv;
 use crate::server::{Answer, example, example_text};
-use crate::support::{Service, case, pause, railhead};
+use crate::support::{Service, case, railhead};
 
 /// Unpacks a data folder of a schema version. Returns it with the answers of the program that wrote it.
 fn of_form(form: u32) -> (TempDir, Value) {
@@ -28,51 +28,24 @@ fn of_form(form: u32) -> (TempDir, Value) {
     (folder, serde_json::from_str(&expected).unwrap())
 }
 
-struct Client<'a> {
-    service: &'a Service,
-    key: &'a str,
+/// Repeats a submission with its idempotency key.
+async fn send_again(
+    service: &Service,
+    (path, key): (&str, &str),
+    form: &str,
+    body: String,
+) -> Answer {
+    let request = service.request(Method::POST, path).body(body);
+    let request = request.header("content-type", form);
+    Answer::to(request.header("idempotency-key", key)).await
 }
 
-impl Client<'_> {
-    async fn text(&self, path: &str) -> String {
-        let request = self.service.request(Method::GET, path);
-        Answer::to(request.bearer_auth(self.key)).await.is(200).text
-    }
-
-    async fn get(&self, path: &str) -> Value {
-        serde_json::from_str(&self.text(path).await).unwrap()
-    }
-
-    /// Repeats a submission with its idempotency key.
-    async fn send_again(&self, path: &str, key: &str, form: &str, body: String) -> Answer {
-        let request = self.service.request(Method::POST, path).body(body);
-        let request = request.bearer_auth(self.key).header("content-type", form);
-        Answer::to(request.header("idempotency-key", key)).await
-    }
-
-    /// Repeats a submission. Returns the id in the answer, and whether the answer was a replay of the first one.
-    async fn again(&self, path: &str, key: &str, form: &str, body: String) -> (Value, bool) {
-        let answer = self.send_again(path, key, form, body).await;
-        let replayed = answer.header("idempotency-replayed").is_some();
-        assert!(answer.json["id"].is_string(), "{path}: {}", answer.text);
-        (answer.json["id"].clone(), replayed)
-    }
-
-    /// Repeats a submission whose key now belongs to another digest. Asserts the conflict.
-    async fn assert_conflict(&self, path: &str, key: &str, form: &str, body: String) {
-        let answer = self.send_again(path, key, form, body).await.is(422);
-        assert_eq!(answer.json["type"], "/problems/idempotency-conflict");
-    }
-
-    async fn until_ended(&self, path: &str) -> Value {
-        loop {
-            let now = self.get(path).await;
-            if !now["ended_at"].is_null() && now["state"] != "running" && now["state"] != "queued" {
-                return now;
-            }
-            pause().await;
-        }
-    }
+/// Asserts whether the answer to a repeated submission is a replay, and returns the id in it.
+fn assert_replayed(answer: Answer, replayed: bool) -> Value {
+    let header = answer.header("idempotency-replayed");
+    assert_eq!(header.is_some(), replayed, "{}", answer.text);
+    assert!(answer.json["id"].is_string(), "{}", answer.text);
+    answer.json["id"].clone()
 }
 
 /// Above the number of starts of a test: each start that is killed takes one attempt of the jobs in the folder.
@@ -114,41 +87,32 @@ async fn opens_with_all_that_is_in_it(form: u32) {
     let service = Service::start(folder.path(), &["--workers", "1", option, attempts]);
     let text = |name: &str| expected[name].as_str().unwrap().to_owned();
     let id = text;
-    let key = text("key");
-    let client = Client {
-        service: &service,
-        key: &key,
-    };
+    let service = service.with_key(&text("key"));
 
-    let result = client.get(&format!("/v1/jobs/{}/result", id("job"))).await;
+    let result = service.get(&format!("/v1/jobs/{}/result", id("job"))).await;
     let force = |result: &Value| {
         result["patches"][0]["points"][0]["force_y_n"]
             .as_f64()
             .unwrap()
     };
     assert_eq!(force(&result), force(&expected["result"]));
-    client.get(&format!("/v1/profiles/{}", id("profile"))).await;
-    let batch = client
-        .text(&format!("/v1/batches/{}/results?format=csv", id("batch")))
-        .await;
-    let run = client
-        .text(&format!("/v1/runs/{}/results?format=csv", id("run")))
-        .await;
-    for (now, then) in [(batch, text("batch_results")), (run, text("run_results"))] {
-        let (now, then) = (Csv::read(&now), Csv::read(&then));
+    let profile = format!("/v1/profiles/{}", id("profile"));
+    service.get(&profile).await;
+    for (kind, work) in [("batches", "batch"), ("runs", "run")] {
+        let path = format!("/v1/{kind}/{}/results?format=csv", id(work));
+        let now = Csv::read(&service.ask(&path).await.is(200).text);
+        let then = Csv::read(&text(&format!("{work}_results")));
         assert_eq!(now.column("force_x_n"), then.column("force_x_n"));
     }
-    let row = client.get(&format!("/v1/runs/{}/rows/1", id("run"))).await;
+    let row = service.get(&format!("/v1/runs/{}/rows/1", id("run"))).await;
     assert_eq!(row["case"]["load"]["normal_force_n"], json!(74000.0));
 
     // Repeated requests with their idempotency keys return the same jobs.
     let before = form;
     let form = "application/json";
     let spin = example("spin.case.json").to_string();
-    assert_eq!(
-        client.again("/v1/jobs", "job", form, spin).await,
-        (json!(id("job")), true)
-    );
+    let job = send_again(&service, ("/v1/jobs", "job"), form, spin).await;
+    assert_eq!(assert_replayed(job, true), id("job"));
     let table = "creepage_x,label:km,name\n0.001,1,first\n0.002,2,second\n".to_owned();
     // Digests of tables and rows have changed since schema version 7. A repeated key is then a conflict and never creates a second batch or run.
     let rows = example_text("run.json");
@@ -157,22 +121,22 @@ async fn opens_with_all_that_is_in_it(form: u32) {
         (batch.as_str(), "batch", "text/csv", table),
         ("/v1/runs?name=rows&label=line:7", "run", form, rows),
     ] {
+        let answer = send_again(&service, (path, key_used), form, body).await;
         if before == 7 {
-            client.assert_conflict(path, key_used, form, body).await;
+            let conflict = &answer.is(422).json["type"];
+            assert_eq!(conflict, "/problems/idempotency-conflict");
         } else {
-            let found = client.again(path, key_used, form, body).await;
-            assert_eq!(found, (json!(id(key_used)), true));
+            assert_eq!(assert_replayed(answer, true), id(key_used));
         }
     }
     // Runs are not listed as batches, and batches are not listed as runs.
     for (kind, other) in [("batches", "runs"), ("runs", "batches")] {
-        let listed = client.get(&format!("/v1/{kind}?limit=100")).await;
+        let listed = service.get(&format!("/v1/{kind}?limit=100")).await;
         let listed = listed[kind].as_array().unwrap();
         assert_eq!(listed.len(), 2, "{listed:?}");
         for entry in listed {
             let path = format!("/v1/{other}/{}", entry["id"].as_str().unwrap());
-            let request = service.request(Method::GET, &path).bearer_auth(&key);
-            assert_eq!(request.send().await.unwrap().status(), 404, "{path}");
+            service.ask(&path).await.is(404);
         }
     }
 
@@ -183,35 +147,32 @@ async fn opens_with_all_that_is_in_it(form: u32) {
         format!("/v1/batches/{}", id("queued_batch")),
         format!("/v1/runs/{}", id("queued_run")),
     ] {
-        let ended = client.until_ended(&path).await;
+        let ended = service.get(&format!("{path}?wait=240")).await;
         assert!(
             ended["state"] == "succeeded" || ended["states"]["succeeded"] == 2,
             "{ended}"
         );
     }
-    let new = client
-        .again("/v1/jobs", "new", form, case("new").to_string())
-        .await;
-    assert!(!new.1);
-
-    assert_stored_bytes_go(&client, [id("run"), id("batch")]).await;
+    let new = case("new").to_string();
+    assert_replayed(
+        send_again(&service, ("/v1/jobs", "new"), form, new).await,
+        false,
+    );
+    assert_stored_bytes_go(&service, [id("run"), id("batch")]).await;
 }
 
 /// Asserts that stored bytes are counted, and that they are freed with their run and batch.
-async fn assert_stored_bytes_go(client: &Client<'_>, [run, batch]: [String; 2]) {
+async fn assert_stored_bytes_go(service: &Service, [run, batch]: [String; 2]) {
     let stored = async || {
-        client.get("/v1/me").await["used"]["stored_bytes"]
+        service.get("/v1/me").await["used"]["stored_bytes"]
             .as_u64()
             .unwrap()
     };
     let before = stored().await;
     assert!(before > 10_000, "{before}");
     for path in [format!("/v1/runs/{run}"), format!("/v1/batches/{batch}")] {
-        let request = client
-            .service
-            .request(Method::DELETE, &path)
-            .bearer_auth(client.key);
-        assert_eq!(request.send().await.unwrap().status(), 204);
+        let request = service.request(Method::DELETE, &path);
+        Answer::to(request).await.is(204);
     }
     assert!(stored().await < before);
 }

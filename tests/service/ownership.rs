@@ -1,90 +1,29 @@
-//! Tests that a stored result lives exactly as long as a job refers to it, and that results left behind by a killed process are removed.
+//! Tests stored results that are removed while they are read, and results left behind by a killed process.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use railhead::jobs::State;
-use serde_json::{Value, json};
+use serde_json::json;
 use uuid::Uuid;
 
 use crate::batches::results;
-use crate::errors::assert_problem;
 use crate::lab::Lab;
 use crate::results::path_of;
 use crate::server::{Server, Setup, link};
-use crate::support::{Turned, case, files_below, loaded, pause};
+use crate::support::{case, files_below, loaded, pause};
 
-/// Starts a service that stores every result in a folder and keeps ended jobs for 30 days. Returns it with the folder and its clock.
-async fn in_folders() -> (Server, PathBuf, Turned) {
+/// Starts a service that stores every result in a folder. Returns it with the folder.
+async fn in_folders() -> (Server, PathBuf) {
     let mut setup = Setup::new();
     setup.options.small_result_max_bytes = 0;
-    setup.options.retention = Some(Duration::from_secs(30 * 24 * 3600));
-    let turned = Turned::default();
-    setup.options.clock = turned.clock();
     let folder = setup.options.data_dir.join("results");
-    (setup.start().await, folder, turned)
-}
-
-async fn solved_batch(server: &Server, cases: &[Value]) -> Value {
-    let batch = server.post("/v1/batches", &json!(cases)).await.json;
-    for line in results(server, &batch, "?wait=60").await {
-        assert_eq!(line["state"], "succeeded", "{line}");
-    }
-    batch
-}
-
-async fn assert_readable(server: &Server, job: &str) {
-    for part in ["result", "tractions", "resultants"] {
-        let answer = server.get(&format!("{job}/{part}")).await;
-        assert_eq!(answer.status, 200, "{part}: {}", answer.text);
-    }
-}
-
-fn own_path(batch: &Value) -> String {
-    link(batch, "self").to_owned()
-}
-
-#[tokio::test]
-async fn deleting_a_batch_leaves_the_results_that_its_jobs_lent() {
-    let (server, folder, _) = in_folders().await;
-    let lender = solved_batch(&server, &[case("first"), case("first")]).await;
-    let borrower = server.solve(&case("second")).await;
-    assert_eq!(borrower["cached"], true);
-    let other = solved_batch(&server, &[case("third")]).await;
-    assert_eq!(server.delete(&own_path(&lender)).await.status, 204);
-    assert_readable(&server, &path_of(&borrower)).await;
-    let lines = results(&server, &other, "").await;
-    assert_eq!(lines[0]["result"]["cached"], true, "{}", lines[0]);
-
-    // Deleting the batch removes the last reference, and with it the result.
-    assert_eq!(server.delete(&path_of(&borrower)).await.status, 204);
-    assert!(!files_below(&folder).is_empty());
-    assert_eq!(server.delete(&own_path(&other)).await.status, 204);
-    assert_eq!(files_below(&folder), Vec::<PathBuf>::new());
-}
-
-#[tokio::test]
-async fn an_expiring_lender_leaves_its_result_to_the_borrower() {
-    let (server, folder, turned) = in_folders().await;
-    let lender = server.solve(&case("first")).await;
-    let batch = solved_batch(&server, &[case("second")]).await;
-    turned.turn(20);
-    let borrower = server.solve(&case("third")).await;
-    assert_eq!(borrower["cached"], true);
-    turned.turn(11);
-    server.jobs.sweep_expired().await.unwrap();
-    for gone in [path_of(&lender), own_path(&batch)] {
-        assert_problem(&server.get(&gone).await, 410, "expired", "");
-    }
-    assert_readable(&server, &path_of(&borrower)).await;
-    turned.turn(31);
-    server.jobs.sweep_expired().await.unwrap();
-    assert_eq!(files_below(&folder), Vec::<PathBuf>::new());
+    (setup.start().await, folder)
 }
 
 #[tokio::test]
 async fn reads_that_race_with_removal_are_answered_404_or_410_and_never_500() {
-    let (server, _, _) = in_folders().await;
+    let (server, _) = in_folders().await;
     for round in 0..6 {
         let path = path_of(&server.solve(&loaded(50_000 + round)).await);
         let reads = ["tractions", "result"].map(|part| format!("{path}/{part}"));
@@ -109,10 +48,10 @@ async fn reads_that_race_with_removal_are_answered_404_or_410_and_never_500() {
 
 #[tokio::test]
 async fn a_result_whose_file_is_gone_costs_one_line_of_a_batch() {
-    let (server, folder, _) = in_folders().await;
+    let (server, folder) = in_folders().await;
     let cases = [60_000, 60_001, 60_002].map(loaded);
-    let batch = solved_batch(&server, &cases).await;
-    let lines = results(&server, &batch, "").await;
+    let batch = server.post("/v1/batches", &json!(cases)).await.json;
+    let lines = results(&server, &batch, "?wait=60").await;
     let lost = lines[1]["id"].as_str().expect("an id");
     for file in files_below(&folder) {
         if file.to_string_lossy().contains(lost) {

@@ -1,13 +1,11 @@
 //! Tests runs, which are many rows that vary one case.
 
-use railhead::tables::arrow::read;
-use railhead::tables::parquet::TableReader;
-use railhead::tables::table::{RowTable, TableColumn};
 use serde_json::{Value, json};
 
 use crate::errors::assert_problem;
 use crate::server::{Answer, Server, Setup, example};
 use crate::support::files_below;
+use crate::table_forms::lines_of;
 
 pub fn template(method: &str) -> Value {
     json!({
@@ -93,21 +91,14 @@ async fn assert_forms(server: &Server, results: &str, all: &[Value]) {
     let expected: String = all[117..].iter().map(line).collect();
     let csv = server.get(&path).await.text;
     assert_eq!(csv, format!("row,force_x_n\n{expected}"));
-    let parquet = server.get(&format!("{results}?format=parquet")).await;
-    let parquet = TableReader::new(bytes::Bytes::from(parquet.bytes)).expect("Parquet");
-    let arrow = server.get(&format!("{results}?format=arrow")).await;
-    let arrow = read(std::io::Cursor::new(arrow.bytes)).expect("Arrow");
-    let forces = all.iter().filter_map(|row| row["force_x_n"].as_f64());
-    let forces: Vec<f64> = forces.collect();
-    let of = |table: &RowTable| match table.column("force_x_n") {
-        Some(TableColumn::Numbers(numbers)) => numbers.clone(),
-        _ => Vec::new(),
-    };
-    let groups = (0..parquet.groups())
-        .flat_map(|group| of(&parquet.read(group, |_| true).expect("a group")));
-    assert_eq!(groups.collect::<Vec<_>>(), forces);
-    let batches = arrow.flat_map(|table| of(&table.expect("a batch")));
-    assert_eq!(batches.collect::<Vec<_>>(), forces);
+    for format in ["parquet", "arrow"] {
+        let answer = server.get(&format!("{results}?format={format}")).await;
+        let lines = lines_of(format, &answer);
+        assert_eq!(lines.len(), all.len(), "{format}");
+        for (line, row) in lines.iter().zip(all) {
+            assert_eq!(line["force_x_n"], row["force_x_n"], "{format}");
+        }
+    }
 }
 
 /// Asserts that the files of the manifest have every row once.

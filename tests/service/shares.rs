@@ -134,22 +134,6 @@ async fn clients_behind_a_trusted_proxy_are_counted_one_by_one() {
 }
 
 #[tokio::test]
-async fn a_tenant_may_have_so_many_queued_jobs_and_no_more() {
-    let guarded = Guarded::start(Setup::idle(), |options| options.tenant_queue_max = 2).await;
-    let (north, south) = (&guarded.north, &guarded.south);
-    let first = guarded.submit(north, &case("1")).await;
-    guarded.submit(north, &case("2")).await;
-    for (path, body) in [("/v1/jobs", case("3")), ("/v1/batches", json!([case("3")]))] {
-        let answer = guarded.post(north, path, &body).await;
-        assert_problem(&answer, 429, "quota-exceeded", "2 jobs");
-        assert!(answer.header("retry-after").is_some());
-    }
-    guarded.submit(south, &case("of another tenant")).await;
-    guarded.cancel(north, &first).await.is(200);
-    guarded.submit(north, &case("has room again")).await;
-}
-
-#[tokio::test]
 async fn a_flood_of_one_tenant_does_not_hold_up_another() {
     let guarded = Guarded::start(Setup::new(), |_| {}).await;
     let flood: Vec<Value> = (1..=1000).map(|number| loaded(1000 + number)).collect();

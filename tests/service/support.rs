@@ -12,7 +12,7 @@ use std::time::Duration;
 use railhead::contact::error::SolveError;
 use railhead::contact::monitor::Monitor;
 use railhead::jobs::clock::Clock;
-use reqwest::header::HeaderMap;
+use reqwest::header::{AUTHORIZATION, HeaderMap};
 use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -187,6 +187,16 @@ impl Service {
             client: reqwest::Client::new(),
             _folder: folder,
         }
+    }
+
+    /// Sends this API key with every request.
+    #[must_use]
+    pub fn with_key(mut self, key: &str) -> Service {
+        let bearer = format!("Bearer {key}").parse().unwrap();
+        let headers = HeaderMap::from_iter([(AUTHORIZATION, bearer)]);
+        let client = reqwest::Client::builder().default_headers(headers);
+        self.client = client.build().unwrap();
+        self
     }
 
     /// Returns the address on which the service listens.

@@ -169,7 +169,9 @@ async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
         let path = format!("{path}&format={format}");
         let (csv, body) = forms(&rows(None)).remove(0);
         let answer = server.post_as(&path, csv, body).await;
-        for (row, line) in lines_of(format, &answer).iter().enumerate() {
+        let lines = lines_of(format, &answer);
+        assert_eq!(lines.len(), 3, "{format}");
+        for (row, line) in lines.iter().enumerate() {
             for (name, values) in expected.as_object().expect("columns") {
                 assert_eq!(line[name], values[row], "{format}, row {row}, {name}");
             }
@@ -182,10 +184,10 @@ async fn an_evaluation_answers_the_same_rows_alike_in_every_form_in_and_out() {
     assert_problem(&refused, 422, "faulty-table", words);
 }
 
-/// Returns the three rows of an answer in a table format.
-fn lines_of(format: &str, answer: &Answer) -> Vec<Value> {
+/// Returns the rows of an answer in a table format.
+pub fn lines_of(format: &str, answer: &Answer) -> Vec<Value> {
     assert_eq!(answer.status, 200, "{format}: {}", answer.text);
-    let lines: Vec<Value> = match format {
+    match format {
         "ndjson" => answer.lines(),
         "csv" => {
             let table = Csv::read(&answer.text);
@@ -200,22 +202,18 @@ fn lines_of(format: &str, answer: &Answer) -> Vec<Value> {
             });
             lines.collect()
         }
-        "arrow" => rows_of(
-            &read(Cursor::new(answer.bytes.clone()))
-                .expect("a stream")
-                .next()
-                .expect("a batch")
-                .expect("a table"),
-        ),
-        _ => rows_of(
-            &TableReader::new(Bytes::from(answer.bytes.clone()))
-                .expect("a file")
-                .read(0, |_| true)
-                .expect("a group"),
-        ),
-    };
-    assert_eq!(lines.len(), 3, "{format}");
-    lines
+        "arrow" => {
+            let batches = read(Cursor::new(answer.bytes.clone())).expect("a stream");
+            let rows = batches.flat_map(|table| rows_of(&table.expect("a batch")));
+            rows.collect()
+        }
+        _ => {
+            let file = TableReader::new(Bytes::from(answer.bytes.clone())).expect("a file");
+            let groups = 0..file.groups();
+            let rows = groups.flat_map(|k| rows_of(&file.read(k, |_| true).expect("a group")));
+            rows.collect()
+        }
+    }
 }
 
 fn rows_of(table: &RowTable) -> Vec<Value> {

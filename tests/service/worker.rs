@@ -104,18 +104,16 @@ async fn a_solver_that_hangs_loses_its_job_but_not_the_worker() {
 }
 
 #[tokio::test]
-async fn a_solver_deaf_to_its_cancellation_is_left_behind() {
+async fn a_solver_deaf_to_its_cancellation_or_deadline_is_left_behind() {
+    let [short, long] = [Duration::from_millis(300), Duration::from_secs(600)];
     // The solver is abandoned when its lease ends, and also with a lease that is much longer.
-    for lease in [Duration::from_millis(300), Duration::from_secs(600)] {
-        assert_eq!(end_of_deaf(lease, None).await, State::Cancelled);
+    for (lease, deadline, ended) in [
+        (short, None, State::Cancelled),
+        (long, None, State::Cancelled),
+        (long, Some(Duration::from_secs(1)), State::Failed),
+    ] {
+        assert_eq!(end_of_deaf(lease, deadline).await, ended);
     }
-}
-
-#[tokio::test]
-async fn a_solver_deaf_to_its_deadline_is_left_behind() {
-    let deadline = Some(Duration::from_secs(1));
-    let ended = end_of_deaf(Duration::from_secs(600), deadline).await;
-    assert_eq!(ended, State::Failed);
 }
 
 /// Returns the final state of a job whose solver ignores its deadline or cancellation. Asserts that the next job is solved.
