@@ -152,6 +152,15 @@ pub enum SolveError {
     },
 }
 
+impl SolveError {
+    /// Creates the error of a normal problem without a solution from the reason, a clause.
+    pub(crate) fn normal_problem(reason: impl Into<String>) -> SolveError {
+        SolveError::NormalProblem {
+            reason: reason.into(),
+        }
+    }
+}
+
 impl From<Stop> for SolveError {
     fn from(stop: Stop) -> Self {
         match stop {

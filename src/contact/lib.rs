@@ -89,7 +89,7 @@ use crate::monitor::MonitorPart;
 use crate::normal::footprint::NormalTask;
 use crate::profile_assessment::trust;
 use crate::rolling::operator_store::OperatorStore;
-use crate::slices::slices;
+use crate::slices::{joined, slices};
 use crate::solution::finish::finish;
 use crate::time_limit::TimeLimit;
 use crate::unlike_bodies::UnlikeGap;
@@ -183,17 +183,8 @@ pub fn solve_with(
     case: &CheckedCase,
     monitor: &dyn Monitor,
 ) -> Result<(Solution, Fields), SolveError> {
-    let mut ranges = slices(case).into_iter();
-    let Some(first) = ranges.next() else {
-        unreachable!("a case has at least one slice")
-    };
-    let (mut solution, mut fields) = solve_slice(operators, case, first, monitor)?;
-    for range in ranges {
-        let (more, more_fields) = solve_slice(operators, case, range, monitor)?;
-        solution.append(more);
-        fields.append(more_fields);
-    }
-    Ok((solution, fields))
+    let ranges = slices(case).into_iter();
+    joined(ranges.map(|range| solve_slice(operators, case, range, monitor)))
 }
 
 /// Solves one slice of a case: a range of motions from [`slices()`]. Motions have their numbers in the case.
@@ -210,11 +201,11 @@ pub fn solve_slice(
     if range == (0..all) {
         return solve_motions(operators, case, monitor);
     }
-    let share = MonitorPart {
-        inner: monitor,
-        before: range.start as f64 / all as f64,
-        own: range.len() as f64 / all as f64,
-    };
+    let share = MonitorPart::new(
+        monitor,
+        range.start as f64 / all as f64,
+        range.len() as f64 / all as f64,
+    );
     solve_motions(operators, &case.slice(range), &share)
 }
 

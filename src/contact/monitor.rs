@@ -33,12 +33,16 @@ pub trait Monitor {
 
 /// The monitor of a part of the work.
 pub(crate) struct MonitorPart<'a> {
-    /// The monitor of the whole work.
-    pub(crate) inner: &'a dyn Monitor,
-    /// Progress when the part begins.
-    pub(crate) before: f64,
-    /// Progress that the part adds.
-    pub(crate) own: f64,
+    inner: &'a dyn Monitor,
+    before: f64,
+    own: f64,
+}
+
+impl<'a> MonitorPart<'a> {
+    /// Creates the monitor of a part from that of the whole work, the progress when the part begins, and the progress that it adds.
+    pub(crate) fn new(inner: &'a dyn Monitor, before: f64, own: f64) -> MonitorPart<'a> {
+        MonitorPart { inner, before, own }
+    }
 }
 
 impl Monitor for MonitorPart<'_> {

@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use crate::error::SolveError;
 use crate::half_space::strip_operator::kind::Precision;
 use crate::problem::checked_case::CheckedCase;
 use crate::remark::entry::merged;
@@ -40,6 +41,23 @@ pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
     (0..parts)
         .map(|part| start(part)..start(part + 1))
         .collect()
+}
+
+/// Joins the answers to consecutive motions of a case, of which there is at least one. It ends at the first error.
+pub(crate) fn joined(
+    answers: impl IntoIterator<Item = Result<(Solution, Fields), SolveError>>,
+) -> Result<(Solution, Fields), SolveError> {
+    let mut answers = answers.into_iter();
+    let Some(first) = answers.next() else {
+        unreachable!("a case has at least one motion")
+    };
+    let (mut solution, mut fields) = first?;
+    for later in answers {
+        let (more, more_fields) = later?;
+        solution.append(more);
+        fields.append(more_fields);
+    }
+    Ok((solution, fields))
 }
 
 impl Solution {

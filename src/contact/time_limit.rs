@@ -49,11 +49,7 @@ impl<'a> TimeLimit<'a> {
     /// Returns the monitor of the next `motions`, which are solved together.
     pub(crate) fn of_next(&self, motions: usize) -> MonitorPart<'_> {
         let left = self.motions.saturating_sub(self.done.get()).max(1);
-        MonitorPart {
-            inner: self,
-            before: 0.0,
-            own: (motions as f64 / left as f64).min(1.0),
-        }
+        MonitorPart::new(self, 0.0, (motions as f64 / left as f64).min(1.0))
     }
 
     /// Counts a solved motion.

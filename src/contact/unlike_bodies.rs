@@ -27,6 +27,7 @@ use crate::rolling::refinement::interpolate::RefinementState;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Resolution, RollingTask, TARGET_USUAL};
 use crate::rolling::{force_control, history};
+use crate::slices::joined;
 use crate::solution::words::answer::{Fields, NormalReport, PatchSolution, Solution};
 use crate::time_limit::TimeLimit;
 use crate::{normal_stage, rolling_stage};
@@ -285,8 +286,7 @@ pub(crate) fn solve(
 ) -> Result<(Solution, Fields), SolveError> {
     let several = case.problem.part.all > 1;
     let mut neighbour: Option<SolvedFootprint> = None;
-    let mut answer: Option<(Solution, Fields)> = None;
-    for index in 0..case.problem.motions.len() {
+    joined((0..case.problem.motions.len()).map(|index| {
         let part = case.slice(index..index + 1);
         let solved = gap
             .solve(operators, &part, neighbour.as_ref(), watch)
@@ -300,19 +300,9 @@ pub(crate) fn solve(
         if several {
             solution.patches.iter_mut().for_each(tell_region);
         }
-        match &mut answer {
-            None => answer = Some((solution, fields)),
-            Some((all, all_fields)) => {
-                all.append(solution);
-                all_fields.append(fields);
-            }
-        }
         neighbour = Some(solved);
-    }
-    let Some(answer) = answer else {
-        unreachable!("a case has at least one motion")
-    };
-    Ok(answer)
+        Ok::<_, SolveError>((solution, fields))
+    }))
 }
 
 /// The contact of a motion with as many patches as without tractions, because a solution has one list of patches. If tractions divide or join patches, the motion is solved

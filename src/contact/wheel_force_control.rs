@@ -169,11 +169,7 @@ impl ForceSearch<'_> {
     }
 
     fn first(&self) -> Result<FirstEstimate, SolveError> {
-        let part = MonitorPart {
-            inner: self.monitor,
-            before: 0.0,
-            own: PROGRESS[0],
-        };
+        let part = MonitorPart::new(self.monitor, 0.0, PROGRESS[0]);
         let run = self.case.run.for_resultants(TARGET_FIRST);
         let rolling = FreeRollingState::about(&self.contact.geometry.placement);
         let found = self.judged(&self.at([0.0; 2], rolling, &run), part)?;
@@ -185,18 +181,14 @@ impl ForceSearch<'_> {
         let limit = first.limit;
         if limit <= 0.0 {
             let asked = self.asked();
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "{asked} was asked for under a wheel without friction, where no creepage changes it; give creepages"
-                ),
-            });
+            return Err(SolveError::normal_problem(format!(
+                "{asked} was asked for under a wheel without friction, where no creepage changes it; give creepages"
+            )));
         }
         if let Some(force) = self.forces[0].filter(|force| force.abs() > limit) {
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "a longitudinal force force_x_n of {force} N was asked for; friction carries at most {limit:.1} N under this load"
-                ),
-            });
+            return Err(SolveError::normal_problem(format!(
+                "a longitudinal force force_x_n of {force} N was asked for; friction carries at most {limit:.1} N under this load"
+            )));
         }
         let mut reach = Reach {
             start: [self.forces[0].unwrap_or(0.0) / limit, 0.0],
@@ -245,11 +237,7 @@ impl ForceSearch<'_> {
 
     /// The lateral force in N in full slip at one end; `None` if the wheel has no equilibrium there.
     fn end(&self, place: f64, first: &FirstEstimate) -> Result<Option<f64>, SolveError> {
-        let part = MonitorPart {
-            inner: self.monitor,
-            before: PROGRESS[0],
-            own: 0.0,
-        };
+        let part = MonitorPart::new(self.monitor, PROGRESS[0], 0.0);
         let run = self.case.run.for_resultants(TARGET_FIRST);
         let creepages = [0.0, first.law.creepage(1, place)];
         match self.judged(&self.at(creepages, first.rolling, &run), part) {
@@ -290,11 +278,9 @@ impl ForceSearch<'_> {
             Some(_) => ", and less together with a longitudinal force",
             None => "",
         };
-        SolveError::NormalProblem {
-            reason: format!(
-                "{asked} was asked for; normal forces and friction carry {reach} across the track in this position under this load{beside}"
-            ),
-        }
+        SolveError::normal_problem(format!(
+            "{asked} was asked for; normal forces and friction carry {reach} across the track in this position under this load{beside}"
+        ))
     }
 
     /// The error of a search that ended without the forces.
@@ -303,11 +289,9 @@ impl ForceSearch<'_> {
             return self.unreached(reach.ends);
         }
         let (asked, reason) = (self.asked(), end.reason());
-        SolveError::NormalProblem {
-            reason: format!(
-                "no creepage was found that gives {asked}: {reason}; friction may not carry it together with the other given values"
-            ),
-        }
+        SolveError::normal_problem(format!(
+            "no creepage was found that gives {asked}: {reason}; friction may not carry it together with the other given values"
+        ))
     }
 
     /// Searches for the forces and solves the case there.
@@ -330,11 +314,11 @@ impl ForceSearch<'_> {
         let root: Equilibrium<2, ()> =
             Search::new(scale, [PLACE_MAX; 2]).find(reach.start, |place| {
                 let share = (PROGRESS[1] - PROGRESS[0]) / TRIALS_USUAL;
-                let part = MonitorPart {
-                    inner: self.monitor,
-                    before: PROGRESS[0] + share * f64::min(trials, TRIALS_USUAL - 1.0),
-                    own: share,
-                };
+                let part = MonitorPart::new(
+                    self.monitor,
+                    PROGRESS[0] + share * f64::min(trials, TRIALS_USUAL - 1.0),
+                    share,
+                );
                 trials += 1.0;
                 let case = self.at(creepages_at(place), first.rolling, &run);
                 let total = self.judged(&case, part)?.solution.total[0];
@@ -349,11 +333,7 @@ impl ForceSearch<'_> {
         if !root.converged() && (root.end == Termination::AtLimit || root.residual > target) {
             return Err(self.missed(root.end, reach));
         }
-        let part = MonitorPart {
-            inner: self.monitor,
-            before: PROGRESS[1],
-            own: 1.0 - PROGRESS[1],
-        };
+        let part = MonitorPart::new(self.monitor, PROGRESS[1], 1.0 - PROGRESS[1]);
         let case = self.at(creepages_at(root.place), first.rolling, &self.case.run);
         let mut found = self.judged(&case, part)?;
         let remark = root.inexact("the search for the creepages of the prescribed force");

@@ -24,6 +24,7 @@ use crate::remark::entry::RemarkEntry;
 use crate::remark::kind::short;
 use crate::remark::list::Remark;
 use crate::rolling::operator_store::OperatorStore;
+use crate::slices::joined;
 use crate::solution::words::answer::{Fields, Solution};
 use crate::time_limit::TimeLimit;
 use crate::unlike_bodies::tell_region;
@@ -76,14 +77,14 @@ pub(crate) fn solve(
         false => None,
     };
     let together = if each { 1 } else { motions };
-    let mut whole: Option<SolvedWheel> = None;
-    for index in (0..motions).step_by(together) {
+    let mut first = None;
+    let answers = (0..motions).step_by(together).map(|index| {
         let part = case.slice(index..index + together);
-        let share = MonitorPart {
-            inner: monitor,
-            before: index as f64 / motions as f64,
-            own: together as f64 / motions as f64,
-        };
+        let share = MonitorPart::new(
+            monitor,
+            index as f64 / motions as f64,
+            together as f64 / motions as f64,
+        );
         let watch = TimeLimit::new(&share, case.run.time_limit, 1);
         let solved = match &at_rest {
             Some(at_rest) => one_of_several(operators, &part, contact, at_rest, &watch),
@@ -92,18 +93,18 @@ pub(crate) fn solve(
             }),
         };
         let solved = solved.map_err(|error| watch.explained(error, &part))?;
-        match &mut whole {
-            None => whole = Some(solved),
-            Some(whole) => {
-                whole.solution.append(solved.solution);
-                whole.fields.append(solved.fields);
-            }
-        }
-    }
-    let Some(whole) = whole else {
+        first.get_or_insert(solved.wheel);
+        Ok::<_, SolveError>((solved.solution, solved.fields))
+    });
+    let (solution, fields) = joined(answers)?;
+    let Some(wheel) = first else {
         unreachable!("a case has at least one motion")
     };
-    Ok(whole)
+    Ok(SolvedWheel {
+        wheel,
+        solution,
+        fields,
+    })
 }
 
 /// Solves one of several motions. All motions of an answer have the same number of patches. If tractions change this number, or if there is no
@@ -149,8 +150,7 @@ fn surface<'a>(
     if let ReferenceSurface::Curve { influence, .. } = contact.surface {
         return Ok(Surface { curve, influence });
     }
-    let locus = ContactLocus::new(&contact.geometry)
-        .map_err(|reason| SolveError::NormalProblem { reason })?;
+    let locus = ContactLocus::new(&contact.geometry).map_err(SolveError::normal_problem)?;
     let of_curve = Surface {
         curve,
         influence: Influence::HalfSpace,
@@ -265,9 +265,7 @@ impl<'a> WheelSolve<'a> {
         surface: &'a Surface<'a>,
         watch: &'a TimeLimit<'a>,
     ) -> Result<WheelSolve<'a>, SolveError> {
-        let [touch, expected] = contact
-            .first_touch()
-            .map_err(|reason| SolveError::NormalProblem { reason })?;
+        let [touch, expected] = contact.first_touch().map_err(SolveError::normal_problem)?;
         Ok(WheelSolve {
             operators,
             case,
@@ -357,11 +355,9 @@ impl<'a> WheelSolve<'a> {
         let nearest = self.curve.nearest(&place, contact.centre);
         let over =
             nearest.and_then(|(_, start)| self.curve.over(&place, x, contact.centre, &start));
-        let over = over.ok_or_else(|| SolveError::NormalProblem {
-            reason: format!(
+        let over = over.ok_or_else(|| SolveError::normal_problem(format!(
                 "the wheel's surface was not found above the position x = {x:.3} mm, s = {s:.3} mm of the rail"
-            ),
-        })?;
+            )))?;
         Ok((place, over))
     }
 
@@ -378,11 +374,9 @@ impl<'a> WheelSolve<'a> {
                     continue;
                 }
                 let [y, _] = self.contact.geometry.on_rail(place.rail);
-                return Err(SolveError::NormalProblem {
-                    reason: format!(
-                        "the contact at y = {y:.1} mm on the rail reaches the end of a profile, where it may be cut off; longer profiles are needed"
-                    ),
-                });
+                return Err(SolveError::normal_problem(format!(
+                    "the contact at y = {y:.1} mm on the rail reaches the end of a profile, where it may be cut off; longer profiles are needed"
+                )));
             }
         }
         Ok(())
@@ -436,14 +430,12 @@ impl<'a> WheelSolve<'a> {
             (counts && length > most * width).then_some([length, width, most])
         });
         if let Some([length, width, most]) = slender.filter(|_| !self.curve.is_flat()) {
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "a patch on the curve of the rail is {} mm long and {} mm wide, more than {most:.0} times as long as wide, as on a ridge; \
+            return Err(SolveError::normal_problem(format!(
+                "a patch on the curve of the rail is {} mm long and {} mm wide, more than {most:.0} times as long as wide, as on a ridge; \
                      smooth the profiles, or give reference_surface \"plane\"",
-                    short(length),
-                    short(width)
-                ),
-            });
+                short(length),
+                short(width)
+            )));
         }
         Ok(WheelContact {
             lowering: self.touch - contact.centre,

@@ -299,11 +299,7 @@ impl Solver<'_> {
     /// Solves the states with these values independently, on the threads of the context.
     fn passes(&self, on: Sections, states: &[&[f64]]) -> Result<Vec<Pass>, SolveError> {
         let solve = |values: &&[f64]| {
-            let monitor = MonitorPart {
-                inner: self.monitor,
-                before: self.share,
-                own: 0.0,
-            };
+            let monitor = MonitorPart::new(self.monitor, self.share, 0.0);
             pass(self.task, self.context, on, values, &monitor)
         };
         let threads = self.context.threads;

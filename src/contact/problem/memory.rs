@@ -253,14 +253,12 @@ impl CheckedCase {
         }
         .bytes() as u64;
         if bytes > self.run.memory_bytes {
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "the contact splits into {patches} patches with {sum:.1} segments per strip, which need about {} MiB; at \
+            return Err(SolveError::normal_problem(format!(
+                "the contact splits into {patches} patches with {sum:.1} segments per strip, which need about {} MiB; at \
                      most {} MiB are allowed for one case",
-                    bytes >> 20,
-                    self.run.memory_bytes >> 20
-                ),
-            });
+                bytes >> 20,
+                self.run.memory_bytes >> 20
+            )));
         }
         Ok(())
     }

@@ -77,11 +77,7 @@ pub(crate) fn add(
                 // The profiles of companions are not assessed.
                 &mut |_| Ok(()),
                 // Companions can be stopped, but report no progress, because that of the solve is complete.
-                &MonitorPart {
-                    inner: monitor,
-                    before: 1.0,
-                    own: 0.0,
-                },
+                &MonitorPart::new(monitor, 1.0, 0.0),
             ) {
                 Ok(found) => companions.push(found.solution),
                 Err(stop @ (SolveError::Cancelled | SolveError::OutOfTime { .. })) => {

@@ -96,13 +96,11 @@ impl WheelSolve<'_> {
             if change <= 1.0 || round == ROUNDS_MAX {
                 let residual = change * NEGLIGIBLE_OF_TARGET * target;
                 if change > 1.0 && residual > CHANGE_POOR {
-                    return Err(SolveError::NormalProblem {
-                        reason: format!(
-                            "pressures and tractions on the curve of the rail do not converge in {ROUNDS_MAX} iterations: forces still change by \
+                    return Err(SolveError::normal_problem(format!(
+                        "pressures and tractions on the curve of the rail do not converge in {ROUNDS_MAX} iterations: forces still change by \
                              {:.1} % of the friction limit; give reference_surface \"plane\"",
-                            100.0 * residual
-                        ),
-                    });
+                        100.0 * residual
+                    )));
                 }
                 let remark = Remark::IterationInexact {
                     iteration: "pressures and tractions on the curve of the rail",

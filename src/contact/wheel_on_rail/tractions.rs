@@ -81,12 +81,10 @@ impl WheelSolve<'_> {
         let parts: Vec<Vec<GridPressure>> = parts.collect::<Result<_, _>>()?;
         let patches: usize = parts.iter().map(Vec::len).sum();
         if patches > PATCHES_MAX && !self.curve.is_flat() {
-            return Err(SolveError::NormalProblem {
-                reason: format!(
-                    "the contact on the curve of the rail splits into {patches} patches; at most {PATCHES_MAX} can be solved together; smooth the \
+            return Err(SolveError::normal_problem(format!(
+                "the contact on the curve of the rail splits into {patches} patches; at most {PATCHES_MAX} can be solved together; smooth the \
                      profiles, or give reference_surface \"plane\""
-                ),
-            });
+            )));
         }
         let mut solved = Vec::with_capacity(parts.len());
         for patches in parts {

@@ -118,9 +118,7 @@ impl WheelsetSolve<'_> {
     pub(crate) fn at_rest(&self, rigid: &RigidPose) -> Result<AtRest, SolveError> {
         let problem = &self.case.problem;
         let Some(motion) = problem.wheelset else {
-            return Err(SolveError::NormalProblem {
-                reason: "a wheelset has no motion".to_owned(),
-            });
+            return Err(SolveError::normal_problem("a wheelset has no motion"));
         };
         let both = self.balanced(rigid, &motion, problem.drive_torque)?;
         let (height, torque) = (both.height(), -both.torque_of_rails());
@@ -203,9 +201,10 @@ impl WheelsetSolve<'_> {
                 return Ok(both);
             }
         };
-        Err(SolveError::NormalProblem {
-            reason: format!("at a lateral shift of {} mm {failure}", rigid.lateral_shift),
-        })
+        Err(SolveError::normal_problem(format!(
+            "at a lateral shift of {} mm {failure}",
+            rigid.lateral_shift
+        )))
     }
 
     /// Both wheels at a shift, a yaw and a roll.
@@ -249,9 +248,9 @@ impl WheelsetSolve<'_> {
         let name = ["left", "right"][side];
         let place = format!("the {name} wheel at a lateral shift of {} mm", pose[0]);
         match error {
-            SolveError::NormalProblem { reason } => SolveError::NormalProblem {
-                reason: format!("{place}: {reason}"),
-            },
+            SolveError::NormalProblem { reason } => {
+                SolveError::normal_problem(format!("{place}: {reason}"))
+            }
             SolveError::RoughProfile { pointer, reason } => SolveError::RoughProfile {
                 pointer: if side == 1 {
                     self.task.pointer_on_right(&pointer)
@@ -475,13 +474,9 @@ pub(crate) fn solve(
     let mut roll = 0.0;
     let places = task.poses.iter().zip(&task.moves).enumerate();
     for (k, ([shift, yaw], moving)) in places {
-        let part = MonitorPart {
-            inner: monitor,
-            before: k as f64 / count as f64,
-            own: 1.0 / count as f64,
-        };
+        let part = MonitorPart::new(monitor, k as f64 / count as f64, 1.0 / count as f64);
         let rigid = rails.pose(*shift, *yaw, roll);
-        let rigid = rigid.map_err(|reason| SolveError::NormalProblem { reason })?;
+        let rigid = rigid.map_err(SolveError::normal_problem)?;
         roll = rigid.roll;
         let case = CheckedCase {
             problem: Problem {

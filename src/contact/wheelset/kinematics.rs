@@ -146,7 +146,7 @@ fn over_shifts(
     monitor: &dyn Monitor,
     mut pose: impl FnMut(f64, f64) -> Result<RigidPose, String>,
 ) -> Result<PosesOverShifts, SolveError> {
-    let centred = pose(0.0, 0.0).map_err(|reason| SolveError::NormalProblem { reason })?;
+    let centred = pose(0.0, 0.0).map_err(SolveError::normal_problem)?;
     let steps = (asked.reach / asked.step).round() as i32;
     let (mut poses, mut end) = (vec![centred], None);
     for sign in [-1.0, 1.0] {

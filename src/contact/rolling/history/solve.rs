@@ -157,11 +157,7 @@ pub fn solve(
     let mut work = Work::default();
     for (k, plan) in plans.iter().enumerate() {
         let [before_level, own] = progress(k);
-        let part = MonitorPart {
-            inner: monitor,
-            before: before_level,
-            own,
-        };
+        let part = MonitorPart::new(monitor, before_level, own);
         let mut found = on_level(task, history, *plan, state, &part)?;
         seconds += found.seconds;
         found.seconds = seconds;
