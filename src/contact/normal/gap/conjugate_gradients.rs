@@ -5,10 +5,7 @@
 
 use crate::half_space::bent_surface::{BentOperator, BentWorkspace, StripFactors};
 use crate::monitor::{Monitor, Stop};
-use crate::normal::gap::cell_sums;
-use crate::normal::gap::cell_sums::{Advance, CellSum, Direction, Distances, Parting, StepSums};
 use crate::normal::hertz::NormalLoad;
-use crate::numerics::simd::LANES;
 
 /// Largest number of changed pressures whose displacements are added one by one, which costs less than a product.
 const CHANGES_MAX: usize = 80;
@@ -41,15 +38,13 @@ impl WeightedStrips<'_> {
         self.operator.own() / self.weights[0].powi(2)
     }
 
-    /// The displacement of the first cell by its own pressure over that of each cell, for a multiple of [`LANES`] cells. Distances times these weights are the direction
-    /// of steepest descent.
+    /// The displacement of the first cell by its own pressure over that of each cell. Distances times these weights are the direction of steepest descent.
     fn of_cells(&self, cells: usize) -> Vec<f64> {
-        let mut weights = vec![1.0; cells.next_multiple_of(LANES)];
-        let rows = weights[..cells].chunks_exact_mut(cells / self.weights.len());
-        for (row, weight) in rows.zip(self.weights) {
-            row.fill((weight / self.weights[0]).powi(2));
-        }
-        weights
+        let width = cells / self.weights.len();
+        let rows = self.weights.iter();
+        let rows = rows.map(|weight| (weight / self.weights[0]).powi(2));
+        rows.flat_map(|weight| std::iter::repeat_n(weight, width))
+            .collect()
     }
 }
 
@@ -115,10 +110,9 @@ pub(crate) fn solve_pressure(
         tolerance,
     } = *task;
     let least = gap.iter().copied().fold(f64::INFINITY, f64::min);
-    let n = gap.len();
-    let mut work = PressureIterate::new(gap, start, influence.of_cells(n));
+    let mut work = PressureIterate::new(gap, start, influence.of_cells(gap.len()));
     work.scale_to(loading, cell);
-    influence.apply(&work.p[..n], &mut work.u[..n], workspace);
+    influence.apply(&work.p, &mut work.u, workspace);
     let mut below = f64::INFINITY;
     let mut least_residual = f64::INFINITY;
     for iterations in 0..ITERATIONS_MAX {
@@ -133,8 +127,6 @@ pub(crate) fn solve_pressure(
         let residual = violation / (approach - least);
         least_residual = least_residual.min(residual);
         if residual <= tolerance && approach > least {
-            work.p.truncate(n);
-            work.g.truncate(n);
             return Ok(PressureAnswer {
                 pressure: work.p,
                 distance: work.g,
@@ -146,32 +138,31 @@ pub(crate) fn solve_pressure(
         // Conjugate to the last direction, although cells may have come into contact or left it; 0 in the first step.
         let factor = (-along / below).max(0.0);
         let step;
-        [step, below] = work.step_after(factor, n, influence, loading, workspace);
+        [step, below] = work.step_after(factor, influence, loading, workspace);
         work.advance(step);
         if work.changes.len() <= CHANGES_MAX {
             for (u, r) in work.u.iter_mut().zip(&work.r) {
                 *u -= step * r;
             }
-            let u = &mut work.u[..n];
             influence
                 .operator
-                .add_opened(&influence.factors, &work.changes, u);
+                .add_opened(&influence.factors, &work.changes, &mut work.u);
             let scale = work.scale_to(loading, cell);
             if scale != 1.0 {
                 work.u.iter_mut().for_each(|u| *u *= scale);
             }
         } else {
             work.scale_to(loading, cell);
-            influence.apply(&work.p[..n], &mut work.u[..n], workspace);
+            influence.apply(&work.p, &mut work.u, workspace);
         }
     }
     Err(PressureFailure::NotConverged(least_residual))
 }
 
-/// The vectors of the iteration over all cells, padded without pressure to a multiple of [`LANES`].
-struct PressureIterate {
+/// The vectors of the iteration over all cells.
+struct PressureIterate<'a> {
     /// Gap of the undeformed surfaces.
-    h: Vec<f64>,
+    h: &'a [f64],
     weights: Vec<f64>,
     /// Pressure and displacement.
     p: Vec<f64>,
@@ -181,29 +172,21 @@ struct PressureIterate {
     /// Direction of the step, 0 outside the contact, and its displacement.
     t: Vec<f64>,
     r: Vec<f64>,
-    /// Difference of every pressure from that of the full step.
-    off: Vec<f64>,
     /// Cells whose pressure differs from that of the full step, with the difference.
     changes: Vec<(usize, f64)>,
 }
 
-impl PressureIterate {
-    fn new(gap: &[f64], mut start: Vec<f64>, weights: Vec<f64>) -> PressureIterate {
-        let padded = gap.len().next_multiple_of(LANES);
-        let mut h = gap.to_vec();
-        // Padding never touches.
-        h.resize(padded, f64::INFINITY);
-        start.resize(padded, 0.0);
-        let zeros = || vec![0.0; padded];
+impl PressureIterate<'_> {
+    fn new(h: &[f64], p: Vec<f64>, weights: Vec<f64>) -> PressureIterate<'_> {
+        let zeros = || vec![0.0; h.len()];
         PressureIterate {
             h,
             weights,
-            p: start,
+            p,
             u: zeros(),
             g: zeros(),
             t: zeros(),
             r: zeros(),
-            off: zeros(),
             changes: Vec::new(),
         }
     }
@@ -213,20 +196,21 @@ impl PressureIterate {
         let NormalLoad::Force(force) = loading else {
             return 1.0;
         };
-        let scale = force / (cell * cell_sums::run(CellSum(&self.p)));
+        let scale = force / (cell * self.p.iter().sum::<f64>());
         self.p.iter_mut().for_each(|p| *p *= scale);
         scale
     }
 
     /// Computes `g = u + h` and returns the approach δ; with a force it is the weighted mean of g over the contact.
     fn distances(&mut self, loading: NormalLoad) -> f64 {
-        let [sum, count] = cell_sums::run(Distances {
-            distance: &mut self.g,
-            displacement: &self.u,
-            gap: &self.h,
-            pressure: &self.p,
-            weights: &self.weights,
-        });
+        let (mut sum, mut count) = (0.0, 0.0);
+        for k in 0..self.p.len() {
+            self.g[k] = self.u[k] + self.h[k];
+            if self.p[k] > 0.0 {
+                sum += self.weights[k] * self.g[k];
+                count += self.weights[k];
+            }
+        }
         match loading {
             NormalLoad::Force(_) => sum / count,
             NormalLoad::Approach(approach) => approach,
@@ -236,23 +220,28 @@ impl PressureIterate {
     /// Subtracts the approach from the distances. Returns their largest violation, and in the contact the weighted sums of their squares and of their products with the
     /// displacement of the last direction.
     fn part_from(&mut self, approach: f64) -> [f64; 3] {
-        cell_sums::run(Parting {
-            distance: &mut self.g,
-            displacement: &self.r,
-            pressure: &self.p,
-            weights: &self.weights,
-            approach,
-        })
+        let (mut violation, mut square, mut along) = (0.0_f64, 0.0, 0.0);
+        for (k, g) in self.g.iter_mut().enumerate() {
+            *g -= approach;
+            if self.p[k] > 0.0 {
+                violation = violation.max(g.abs());
+                square += self.weights[k] * *g * *g;
+                along += self.weights[k] * *g * self.r[k];
+            } else {
+                violation = violation.max(-*g);
+            }
+        }
+        [violation, square, along]
     }
 
+    /// Computes the next direction: steepest descent plus a multiple of the last direction, 0 outside the contact.
     fn direct(&mut self, factor: f64) {
-        cell_sums::run(Direction {
-            direction: &mut self.t,
-            distance: &self.g,
-            pressure: &self.p,
-            weights: &self.weights,
-            factor,
-        });
+        for (k, t) in self.t.iter_mut().enumerate() {
+            *t = match self.p[k] > 0.0 {
+                true => self.weights[k] * self.g[k] + factor * *t,
+                false => 0.0,
+            };
+        }
     }
 
     /// Chooses the direction and computes its displacement. Returns the step length and the curvature `tᵀAt` along the direction.
@@ -261,14 +250,13 @@ impl PressureIterate {
     fn step_after(
         &mut self,
         factor: f64,
-        n: usize,
         influence: &WeightedStrips,
         loading: NormalLoad,
         workspace: &mut BentWorkspace,
     ) -> [f64; 2] {
         for factor in [factor, 0.0] {
             self.direct(factor);
-            influence.apply(&self.t[..n], &mut self.r[..n], workspace);
+            influence.apply(&self.t, &mut self.r, workspace);
             if let Some(step) = self.step(loading) {
                 return step;
             }
@@ -282,13 +270,16 @@ impl PressureIterate {
 
     /// The step length and the curvature along the direction, if the direction lowers the energy.
     fn step(&self, loading: NormalLoad) -> Option<[f64; 2]> {
-        let [above, product, along, sum, count] = cell_sums::run(StepSums {
-            distance: &self.g,
-            direction: &self.t,
-            displacement: &self.r,
-            pressure: &self.p,
-            weights: &self.weights,
-        });
+        let (mut above, mut product, mut along) = (0.0, 0.0, 0.0);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for k in (0..self.p.len()).filter(|k| self.p[*k] > 0.0) {
+            let (t, r, weight) = (self.t[k], self.r[k], self.weights[k]);
+            above += t * self.g[k];
+            product += t * r;
+            along += t;
+            sum += weight * r;
+            count += weight;
+        }
         let below = match loading {
             NormalLoad::Force(_) => product - sum / count * along,
             NormalLoad::Approach(_) => product,
@@ -296,25 +287,20 @@ impl PressureIterate {
         (below > 0.0 && above > 0.0).then(|| [above / below, below])
     }
 
-    /// Takes the step and records the cells whose pressure differs from the full step.
+    /// Takes the step and records the cells whose pressure differs from the full step. Outside the contact, and where a cell leaves it, the pressure becomes 0 or follows from
+    /// the overlap.
     fn advance(&mut self, step: f64) {
-        cell_sums::run(Advance {
-            pressure: &mut self.p,
-            off: &mut self.off,
-            direction: &self.t,
-            distance: &self.g,
-            weights: &self.weights,
-            step,
-        });
         self.changes.clear();
-        for (block, off) in self.off.chunks(LANES).enumerate() {
-            // Nearly all blocks are 0.
-            if off.iter().fold(0, |bits, off| bits | off.to_bits()) == 0 {
-                continue;
+        for (k, p) in self.p.iter_mut().enumerate() {
+            let stepped = *p - step * self.t[k];
+            let next = match *p > 0.0 && stepped > 0.0 {
+                true => stepped,
+                false => -step * self.weights[k] * self.g[k].min(0.0),
+            };
+            *p = next;
+            if next != stepped {
+                self.changes.push((k, next - stepped));
             }
-            let changed = off.iter().enumerate().filter(|(_, off)| **off != 0.0);
-            self.changes
-                .extend(changed.map(|(k, off)| (block * LANES + k, *off)));
         }
     }
 }

@@ -1,6 +1,5 @@
 //! Region and pressure of a given gap.
 
-pub mod cell_sums;
 pub mod conjugate_gradients;
 pub mod grid;
 pub mod outcome;
