@@ -1,5 +1,7 @@
 //! The gap problem: the surfaces and their load; and estimates of a contact from the samples of its gap, before it is solved.
 
+use std::f64::consts::PI;
+
 use crate::normal::gap::surface::{GapSurface, Window};
 use crate::normal::hertz::NormalLoad;
 use crate::numerics::ITERATIONS_MAX;
@@ -174,39 +176,20 @@ impl GapSamples {
     fn depth(&self, force: f64) -> f64 {
         let shares = [0, 1].map(|k| shares(&self.axes[k]));
         let width = self.axes[0].len();
-        let mut cells: Vec<(f64, f64)> = self
-            .values
-            .iter()
-            .enumerate()
-            .map(|(k, value)| {
-                (
-                    value - self.least,
-                    shares[0][k % width] * shares[1][k / width],
-                )
-            })
+        let share = |k: usize| shares[0][k % width] * shares[1][k / width];
+        let heights = self.values.iter().enumerate();
+        let mut cells: Vec<(f64, f64)> = heights
+            .map(|(k, value)| (value - self.least, share(k)))
             .collect();
-        let carried =
-            |area: f64, depth: f64| 4.0 / 3.0 * (area / std::f64::consts::PI).sqrt() * depth;
-        // Finds the least height at which the force is carried, by bisection: lower heights are moved to the front, but only in the half that contains the result.
-        let (mut area, mut rest) = (0.0, &mut cells[..]);
-        while rest.len() > 1 {
-            let middle = rest.len() / 2;
-            rest.select_nth_unstable_by(middle, |a, b| a.0.total_cmp(&b.0));
-            let (lower, upper) = rest.split_at_mut(middle);
-            let highest = lower.iter().map(|cell| cell.0).fold(0.0, f64::max);
-            let whole = area + lower.iter().map(|cell| cell.1).sum::<f64>();
-            if carried(whole, 2.0 * highest) >= force {
-                rest = lower;
-            } else {
-                (area, rest) = (whole, upper);
-            }
-        }
-        let (height, share) = rest[0];
-        area += share;
-        if carried(area, 2.0 * height) >= force {
-            2.0 * height
-        } else {
-            force / carried(area, 1.0)
+        cells.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let mut area = 0.0;
+        let mut carried = |(height, share): &(f64, f64)| {
+            area += share;
+            8.0 / 3.0 * (area / PI).sqrt() * height
+        };
+        match cells.iter().find(|cell| carried(cell) >= force) {
+            Some((height, _)) => 2.0 * height,
+            None => 0.75 * force / (area / PI).sqrt(),
         }
     }
 
