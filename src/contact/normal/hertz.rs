@@ -250,15 +250,10 @@ pub struct Patch {
 
 /// The ratio k of the semi-axes, smaller to larger, and the integral D there, for the ratio A/B of the curvatures from 0 to 1.
 ///
-/// Solves `k² D(k)/(K(k) − D(k)) = A/B` by Newton's method for ln k. The start is a rational function, accurate to 1e-6 unless the ellipse is very slender. The
-/// derivatives follow from the integrals: `dK/dk = −(K − D)/k` and `dD/dk = −k (r⁻¹ − 1) D/m` with `r = k² D/(K − D)` and `m = 1 − k²`.
+/// Solves `k² D(k)/(K(k) − D(k)) = A/B` by Newton's method for ln k. The start is the solution to first order near the circle. The derivatives follow from the integrals:
+/// `dK/dk = −(K − D)/k` and `dD/dk = −k (r⁻¹ − 1) D/m` with `r = k² D/(K − D)` and `m = 1 − k²`.
 pub(crate) fn axis_ratio(curvature_ratio: f64) -> (f64, f64) {
-    let ln_curvatures = curvature_ratio.ln();
-    let square = ln_curvatures * ln_curvatures;
-    let sum = |c: [f64; 4]| c[0] + square * (c[1] + square * (c[2] + square * c[3]));
-    let mut k = (ln_curvatures * sum(POWER_ABOVE) / sum(POWER_BELOW))
-        .exp()
-        .min(1.0);
+    let mut k = curvature_ratio.cbrt().powi(2);
     let mut d = 0.0;
     for _ in 0..ITERATIONS_MAX {
         let (k_integral, found) = complete_integrals(k);
@@ -279,22 +274,6 @@ pub(crate) fn axis_ratio(curvature_ratio: f64) -> (f64, f64) {
     }
     (k, d)
 }
-
-/// Numerator of `ln k/ln(A/B)` for A/B from exp(−10) to 1, which is 2/3 at the circle and falls slowly: a quotient of two polynomials of `ln²(A/B)`, fitted to the
-/// inverse of A/B with the least largest error of ln k, 1.0e-6.
-const POWER_ABOVE: [f64; 4] = [
-    2.0 / 3.0,
-    0.052_821_991_585_557_69,
-    9.364_049_705_523_599e-4,
-    2.630_387_036_952_323e-6,
-];
-/// Denominator of the quotient with [`POWER_ABOVE`].
-const POWER_BELOW: [f64; 4] = [
-    1.0,
-    0.083_860_695_138_854_51,
-    1.600_879_939_140_760_7e-3,
-    4.910_379_437_887_814_5e-6,
-];
 
 /// Complete elliptic integrals K and `D = (K − E)/m` of parameter m = 1 − k², for 0 < k ≤ 1.
 ///
