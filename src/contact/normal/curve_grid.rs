@@ -2,6 +2,7 @@
 
 use crate::geometry::reference_curve::{CurvePlace, ReferenceCurve, WheelOver};
 use crate::normal::gap::grid::{bilinear, continued};
+use crate::numerics::interpolation::polynomial_weight;
 
 /// Least gap of a strip in mm above which it is not part of the contact.
 pub(super) const APART: f64 = 0.3;
@@ -90,7 +91,11 @@ impl CurveGrid {
         let [nx, ny] = self.cells();
         let [first, last] = [self.x[0], self.x[nx - 1]];
         let nodes = curve.nodes([first, last]);
-        let weights: Vec<Vec<f64>> = self.x.iter().map(|x| lagrange(&nodes, *x)).collect();
+        let weights = |x: &f64| {
+            let nodes = (0..nodes.len()).map(|node| polynomial_weight(&nodes, node, *x));
+            nodes.collect()
+        };
+        let weights: Vec<Vec<f64>> = self.x.iter().map(weights).collect();
         let mut over = WheelOverGrid {
             centre,
             gap: Vec::with_capacity(nx * ny),
@@ -302,17 +307,6 @@ impl CurveGrid {
         };
         runs.iter().map(|run| run.map(same)).collect()
     }
-}
-
-/// Weights of values at nodes for the polynomial through them.
-pub(super) fn lagrange(nodes: &[f64], at: f64) -> Vec<f64> {
-    let weight = |k: usize| {
-        let others = (0..nodes.len()).filter(|m| *m != k);
-        others
-            .map(|m| (at - nodes[m]) / (nodes[k] - nodes[m]))
-            .product()
-    };
-    (0..nodes.len()).map(weight).collect()
 }
 
 impl WheelOverGrid {

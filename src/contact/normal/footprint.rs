@@ -439,11 +439,8 @@ impl NormalTask {
 
     /// The patches by increasing smallest y; `None` if they must be computed.
     pub fn known_patches(&self) -> Option<Vec<Patch>> {
-        match self {
-            NormalTask::Hertz(ellipse) => Some(vec![ellipse.patch()]),
-            NormalTask::Given(field) => Some(field.patches()),
-            NormalTask::Gap(_) | NormalTask::Wheel(_) | NormalTask::Wheelset(_) => None,
-        }
+        let footprint = self.known_footprint()?;
+        Some(footprint.patches)
     }
 }
 

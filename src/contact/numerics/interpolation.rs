@@ -171,14 +171,16 @@ pub(crate) fn akima_slopes(axis: &[f64], values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Weights of the values at the nodes in the value at `at` of the polynomial through them. No two nodes are equal.
+/// Weight of the value at a node in the value at `at` of the polynomial through the nodes. No two nodes are equal.
+pub(crate) fn polynomial_weight(nodes: &[f64], node: usize, at: f64) -> f64 {
+    let others = (0..nodes.len()).filter(|other| *other != node);
+    let parts = others.map(|other| (at - nodes[other]) / (nodes[node] - nodes[other]));
+    parts.product()
+}
+
+/// The weights of all nodes; see [`polynomial_weight`].
 pub(crate) fn polynomial_weights<const N: usize>(nodes: &[f64; N], at: f64) -> [f64; N] {
-    std::array::from_fn(|i| {
-        let others = || (0..N).filter(|j| *j != i);
-        let above: f64 = others().map(|j| at - nodes[j]).product();
-        let below: f64 = others().map(|j| nodes[i] - nodes[j]).product();
-        above / below
-    })
+    std::array::from_fn(|node| polynomial_weight(nodes, node, at))
 }
 
 /// Value at `at` of the polynomial of least degree through at least one point `(place, value)`.
