@@ -132,10 +132,11 @@ impl Profile {
             unit: unit.name(),
         }));
         let scale = likely.map_or(1.0, |(_, unit)| unit.mm());
-        // Spikes hide the shape.
-        let mut shown = given.to_vec();
-        drop_backward_points(body, &mut shown, &mut Vec::new())?;
-        let (senses, flange) = orient(body, &shown, scale, reading, format, &mut remarks)?;
+        // Spikes hide the shape. Points that are not in order are refused below.
+        let mut without_spikes = given.to_vec();
+        let dropped = drop_backward_points(body, &mut without_spikes, &mut Vec::new());
+        let shown = dropped.map_or(given, |()| &without_spikes);
+        let (senses, flange) = orient(body, shown, scale, reading, format, &mut remarks)?;
         let mut points = orientation::in_senses(given, senses);
         check_order(&points)?;
         drop_backward_points(body, &mut points, &mut remarks)?;
@@ -427,15 +428,22 @@ fn drop_backward_points(
 ) -> Result<(), String> {
     let given = points.len();
     let allowed = (BACKWARD_SHARE_MAX * given as f64).ceil() as usize;
+    let is_back = |at: [[f64; 2]; 3]| {
+        let [first, second] = [0, 1].map(|k| [at[k + 1][0] - at[k][0], at[k + 1][1] - at[k][1]]);
+        let lengths = first[0].hypot(first[1]) * second[0].hypot(second[1]);
+        first[0] * second[0] + first[1] * second[1] < BACKWARD_COSINE * lengths
+    };
     loop {
-        let back = points.windows(3).position(|at| {
-            let [first, second] =
-                [0, 1].map(|k| [at[k + 1][0] - at[k][0], at[k + 1][1] - at[k][1]]);
-            let lengths = first[0].hypot(first[1]) * second[0].hypot(second[1]);
-            first[0] * second[0] + first[1] * second[1] < BACKWARD_COSINE * lengths
-        });
+        let back = points
+            .windows(3)
+            .position(|at| is_back([at[0], at[1], at[2]]));
         let Some(k) = back else { break };
-        points.remove(k + 1);
+        // A point that lies behind the one before it is the stray one if the next point goes on.
+        let stray = match points[k..] {
+            [a, b, c, d, ..] if is_back([a, c, d]) && !is_back([a, b, d]) => k + 2,
+            _ => k + 1,
+        };
+        points.remove(stray);
         if given - points.len() > allowed {
             return Err(format!(
                 "more than {allowed} of {given} points run back against their neighbours; are they in order along the profile, or is their noise larger than a third of their distance? Then thin them out or average them"
