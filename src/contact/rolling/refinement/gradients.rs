@@ -16,7 +16,7 @@ use crate::rolling::task::{Motion, RollingTask};
 /// of a solve, 1e-5 μN, is far below the error of the mesh.
 pub(crate) const STEP: f64 = 0.005;
 
-/// The meshes are those of a motion of at least this size, over the same unit. Those of a slower motion meet the target of its small forces, but not that of
+/// Least size, over the same unit, of the motion whose meshes are used. The meshes of a slower motion meet the target of its small forces, but do not resolve
 /// their slopes.
 const LEAST: f64 = 0.3;
 
