@@ -111,7 +111,7 @@ pub(crate) fn smoothing(block: &mut Object, name: &str) -> Option<Smoothing> {
     block.number(name, SMOOTHING).map(Smoothing::Length)
 }
 
-/// Reads the points of a cross-section. The first [`LISTED_MAX`] faulty ones get a fault each; one more fault counts the rest.
+/// Reads the points of a cross-section. The first [`LISTED_MAX`](crate::case::words::object) faulty ones get a fault each; one more fault counts the rest.
 pub(crate) fn points(block: &mut Object, name: &str) -> Option<Vec<[f64; 2]>> {
     let what = format!("an array of {POINTS_MIN} to {POINTS_MAX} points [y, z] in mm");
     block.array(name, POINTS_MIN..=POINTS_MAX, &what)?;
