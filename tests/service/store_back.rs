@@ -14,7 +14,7 @@ use crate::store_moves::Pair;
 
 /// The tables in PostgreSQL. A table comes after the tables that it refers to.
 #[cfg(feature = "cluster")]
-const TABLES: [&str; 13] = [
+const TABLES: [&str; 14] = [
     "templates",
     "batches",
     "blobs",
@@ -22,6 +22,7 @@ const TABLES: [&str; 13] = [
     "cases",
     "job_labels",
     "job_counts",
+    "stored_bytes",
     "objects",
     "blob_outbox",
     "job_slices",
@@ -29,6 +30,10 @@ const TABLES: [&str; 13] = [
     "idempotency_keys",
     "tombstones",
 ];
+
+/// The tables whose triggers count.
+#[cfg(feature = "cluster")]
+const COUNTED: [&str; 3] = ["templates", "blobs", "jobs"];
 
 /// A saved state of the model and the test, to which the database can return.
 #[derive(Debug)]
@@ -100,10 +105,15 @@ impl Pair {
             StoreKind::Postgres => {
                 let back =
                     TABLES.map(|table| format!("INSERT INTO {table} SELECT * FROM saved_{table};"));
+                let triggers = |state: &str| {
+                    COUNTED.map(|table| format!("ALTER TABLE {table} {state} TRIGGER USER;"))
+                };
                 let statements = format!(
-                    "BEGIN; ALTER TABLE jobs DISABLE TRIGGER USER; TRUNCATE {}; {} ALTER TABLE jobs ENABLE TRIGGER USER; COMMIT",
+                    "BEGIN; {} TRUNCATE {}; {} {} COMMIT",
+                    triggers("DISABLE").join(" "),
                     TABLES.join(", "),
-                    back.join(" ")
+                    back.join(" "),
+                    triggers("ENABLE").join(" ")
                 );
                 self.server(statements).await;
             }
