@@ -71,7 +71,7 @@ impl Evolution {
     }
 
     /// Does one step: condenses the traffic, applies the events that are due, or advances the sections. Returns the new state, and the record of the
-    /// state before if one is due. An evolution that cannot be continued, or not within its time limit, ends early after its first step.
+    /// state before if one is due. An evolution with at least one step ends early if it cannot be continued or its time is over.
     ///
     /// # Errors
     /// Returns an error if the work is cancelled, or if the first step fails: more than a tenth of the traffic has no answer, or the time is over.

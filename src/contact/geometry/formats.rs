@@ -696,7 +696,7 @@ fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
     }
     let width = table.rows[0].numbers.len();
     let mut titles = cells(line);
-    // Empty cells are the titles of columns, or a part of the separator.
+    // With a cell for each column, an empty cell is the title of a column. Otherwise separators are repeated.
     if titles.len() != width {
         titles.retain(|title| !title.is_empty());
     }
@@ -721,6 +721,7 @@ fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
         let unit = cell.get(1..).and_then(LengthUnit::named);
         names.push((if is_axis && !is_other { letter } else { ' ' }, unit));
     }
+    // The count of the rows may have no cell in the line of titles.
     if names.len() + 1 == width && counts_rows(table) {
         names.insert(0, (' ', None));
     }

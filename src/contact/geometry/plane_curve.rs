@@ -399,6 +399,14 @@ mod tests {
         }
     }
 
+    /// The next number of a linear congruential generator, from 0 to 1.
+    pub(super) fn random(state: &mut u64) -> f64 {
+        *state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (*state >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
     fn corners(points: &[[f64; 2]]) -> Vec<usize> {
         (1..points.len() - 1)
             .filter(|k| is_corner(points, *k))
@@ -439,15 +447,10 @@ mod tests {
 
     #[test]
     fn noise_of_dense_points_is_no_corner() {
-        let mut state = 1_u64;
-        let mut noise = |_| {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-        };
+        let mut state = 1;
+        let mut noise = || random(&mut state) - 0.5;
         for spacing in [0.05, 0.1, 0.25] {
-            let line = (0..2000).map(|k| [spacing * f64::from(k), 0.07 * noise(k)]);
+            let line = (0..2000).map(|k| [spacing * f64::from(k), 0.07 * noise()]);
             let mut points: Vec<[f64; 2]> = line.collect();
             assert_eq!(corners(&points), [0; 0], "{spacing}");
             let last = points[1999];
@@ -471,6 +474,7 @@ mod tests {
 
 #[cfg(test)]
 mod crossing_tests {
+    use super::tests::random;
     use super::*;
 
     /// Compares every pair of chords.
@@ -485,11 +489,7 @@ mod crossing_tests {
         let mut angle = 0.0_f64;
         let mut at = [0.0; 2];
         let step = |_| {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            let part = (state >> 11) as f64 / (1_u64 << 53) as f64;
-            angle += unrest * (part - 0.5);
+            angle += unrest * (random(&mut state) - 0.5);
             at = [at[0] + angle.cos(), at[1] + angle.sin()];
             at
         };
