@@ -14,16 +14,17 @@ pub fn seconds_of<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (clock.elapsed().as_secs_f64(), answer)
 }
 
-/// Returns the median of the values.
-pub fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+/// Returns the median of the values, or NaN without values.
+pub fn median(values: Vec<f64>) -> f64 {
+    quantile(values, 0.5)
 }
 
-/// Returns the value below which a share of the values lies.
+/// Returns the value below which a share of the values lies, or NaN without values.
 pub fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
-    values[((values.len() as f64 * share) as usize).min(values.len() - 1)]
+    let last = values.len().saturating_sub(1);
+    let place = ((values.len() as f64 * share) as usize).min(last);
+    values.get(place).copied().unwrap_or(f64::NAN)
 }
 
 /// Returns the seconds of one 500 × 500 f64 LU factorisation in place: the unit of machine speed.

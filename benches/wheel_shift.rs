@@ -84,6 +84,7 @@ pub(crate) fn draw(pairs: &[Shifted]) -> Picture {
         let frame = Frame {
             x: [0.0, SHIFT_MAX],
             y: [low, high],
+            logarithmic: false,
             left,
             right: left + 360.0,
             bottom: 280.0,

@@ -3,9 +3,14 @@
 //! `cargo bench --bench wheels` prints the best of several times in LU (the report's unit). `-- rows 1000` prints the means over this number of
 //! rows, which differ in shift, yaw and load. They are solved one after the other as in a run, at a target of 0.02 and without fields. `-- shift`
 //! draws forces over the shift of the wheelset into `docs/wheel-rail/shift.svg`; the worn pair needs the reference files. `-- curve 20` prints the
-//! ratio of the time on the reference curve to that on planes, for 20 random placements of each class.
+//! ratio of the time on the reference curve to that on planes, for 20 random placements of each class. `-- worn` solves the worn pair in 336 states
+//! and prints which reach equilibrium and how smoothly forces depend on the load; it fails if more than one state in a hundred has no answer.
+//!
+//! `RAILHEAD_REFERENCE` names the folder of the reference files.
 
+use std::collections::BTreeMap;
 use std::hint::black_box;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use machine::{lu_seconds, median, quantile, seconds_of};
@@ -14,16 +19,16 @@ use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
 use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::{check, check_with, solve, solve_with};
+use random::Random;
 use serde_json::{Value, json};
 use wheel_shift::{Shifted, draw};
-use worn_pair::worn_pair;
 
-#[path = "figures/drawing.rs"]
 #[allow(dead_code, reason = "other pictures use the rest")]
 mod drawing;
 mod machine;
+#[allow(dead_code, reason = "other benches use more of it")]
+mod random;
 mod wheel_shift;
-mod worn_pair;
 
 /// Lateral shifts of the wheelset in mm, from the tread to the gauge corner.
 const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];
@@ -50,6 +55,8 @@ fn main() {
         curve(count);
     } else if form("shift", 1).is_some() {
         shift();
+    } else if form("worn", 1).is_some() {
+        worn();
     } else {
         cases();
     }
@@ -126,24 +133,13 @@ fn rows(count: usize) {
     );
 }
 
-/// Returns a function that gives random numbers between two ends, the same on every machine.
-fn random(seed: usize) -> impl FnMut(f64, f64) -> f64 {
-    let mut state = (seed as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    move |low: f64, high: f64| {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        low + (high - low) * ((state >> 11) as f64 / (1_u64 << 53) as f64)
-    }
-}
-
 /// Returns the case of a row, on the tread or at the gauge corner.
 fn row(pair: &Value, number: usize) -> Value {
-    let mut between = random(number);
+    let mut random = Random(number as u64);
     let mut case = pair.clone();
-    case["contact"]["lateral_shift_mm"] = json!(between(-5.0, 4.0));
-    case["contact"]["yaw_rad"] = json!(between(-0.01, 0.01));
-    case["load"]["vertical_force_n"] = json!(between(40e3, 110e3));
+    case["contact"]["lateral_shift_mm"] = json!(random.between(-5.0, 4.0));
+    case["contact"]["yaw_rad"] = json!(random.between(-0.01, 0.01));
+    case["load"]["vertical_force_n"] = json!(random.between(40e3, 110e3));
     case["solver"] = json!({ "method": "boundary_element", "target_error": 0.02 });
     case["outputs"] = json!(["resultants"]);
     case
@@ -174,11 +170,12 @@ fn curve(count: usize) {
         let (mut patches, mut failed) = (Vec::new(), 0);
         let (operators, known) = ([Arc::default(), Arc::default()], KnownPair::default());
         for k in 0..count {
-            let mut between = random(1000 * seed + k);
+            let mut random = Random((1000 * seed + k) as u64);
+            let mut between = |[low, high]: [f64; 2]| random.between(low, high);
             let mut case = class.pair.clone();
-            case["contact"]["lateral_shift_mm"] = json!(between(class.shifts[0], class.shifts[1]));
-            case["contact"]["yaw_rad"] = json!(between(class.yaw[0], class.yaw[1]));
-            case["load"] = json!({ "vertical_force_n": between(class.force[0], class.force[1]) });
+            case["contact"]["lateral_shift_mm"] = json!(between(class.shifts));
+            case["contact"]["yaw_rad"] = json!(between(class.yaw));
+            case["load"] = json!({ "vertical_force_n": between(class.force) });
             case["solver"] = json!({ "method": "boundary_element", "target_error": if class.rows { 0.02 } else { 0.005 } });
             case["outputs"] = json!(["resultants"]);
             let problems = ["plane", "curve"].map(|surface| {
@@ -242,7 +239,8 @@ fn classes() -> Vec<Class> {
         of_new("tread, rows", [-2.0, 4.0], true),
         of_new("gauge corner, rows", [-5.9, -3.5], true),
     ];
-    if let Some(pair) = worn_case() {
+    if let Some(mut pair) = worn_case() {
+        pair["contact"]["accept_rough_profiles"] = json!(true);
         for (name, shifts) in [
             ("worn, tread", [-13.8, -12.5]),
             ("worn, tread and flange", [-15.2, -14.5]),
@@ -267,11 +265,14 @@ fn shift() {
         load: 75e3,
         yaw: 0.003,
     };
-    let worn = worn_case().map(|pair| Shifted {
-        name: "worn pair, 137 kN",
-        pair,
-        load: 137e3,
-        yaw: 0.005,
+    let worn = worn_case().map(|mut pair| {
+        pair["contact"]["accept_rough_profiles"] = json!(true);
+        Shifted {
+            name: "worn pair, 137 kN",
+            pair,
+            load: 137e3,
+            yaw: 0.005,
+        }
     });
     let pairs: Vec<Shifted> = std::iter::once(new).chain(worn).collect();
     let path = format!(
@@ -282,9 +283,61 @@ fn shift() {
     println!("{path}");
 }
 
+/// Solves the worn pair in 336 states, and over the load in one of them.
+fn worn() {
+    let mut case = worn_case().expect("RAILHEAD_REFERENCE names the folder of the reference files");
+    case["outputs"] = json!(["resultants"]);
+    let solved = |shift: f64, force: f64, yaw: f64| {
+        let mut case = case.clone();
+        case["contact"]["lateral_shift_mm"] = json!(shift);
+        case["contact"]["yaw_rad"] = json!(yaw);
+        case["load"] = json!({ "vertical_force_n": force });
+        let checked = check(&case, &Limits::default()).map_err(|error| error.to_string())?;
+        solve(&checked, &Unmonitored).map_err(|error| error.to_string())
+    };
+    let (mut count, mut failures) = (0, BTreeMap::<String, u32>::new());
+    for shift in (0..12).map(|k| -13.0 - 0.2 * f64::from(k)) {
+        for force in [120e3, 129e3, 137e3, 145e3] {
+            for yaw in [-0.01, -0.005, -0.001, 0.0, 0.001, 0.005, 0.01] {
+                count += 1;
+                if let Err(reason) = solved(shift, force, yaw) {
+                    println!("shift {shift:.2} mm, {force} N, yaw {yaw}: {reason}");
+                    let words = reason.chars().filter(|c| !c.is_ascii_digit()).take(80);
+                    *failures.entry(words.collect()).or_default() += 1;
+                }
+            }
+        }
+    }
+    let failed: u32 = failures.values().sum();
+    println!("{failed} of {count} states have no answer: {failures:#?}\n");
+    println!(
+        "| load, kN | lateral force, N | largest pressure, MPa | patches |\n|---|---|---|---|"
+    );
+    for load in (0..=10).map(|k| 100.0 + 5.0 * f64::from(k)) {
+        match solved(-14.7, 1e3 * load, 0.005) {
+            Ok((solution, _)) => {
+                let peaks = solution.patches.iter().map(|p| p.pressure_max_mpa);
+                println!(
+                    "| {load} | {:.0} | {:.0} | {} |",
+                    solution.total[0].force_y_n,
+                    peaks.fold(0.0, f64::max),
+                    solution.patches.len()
+                );
+            }
+            Err(reason) => println!("| {load} | {reason} | | |"),
+        }
+    }
+    assert!(100 * failed <= count, "too many states have no answer");
+}
+
 /// Returns the worn pair of the reference files for the right-hand rail, or `None` without the files.
 fn worn_case() -> Option<Value> {
-    let [rail, wheel] = worn_pair()?;
+    let folder = PathBuf::from(std::env::var_os("RAILHEAD_REFERENCE")?);
+    let section = |name: &str| {
+        let text = std::fs::read_to_string(folder.join("extended/profiles").join(name)).ok()?;
+        Some(json!({ "format": "simpack", "text": text }))
+    };
+    let (rail, wheel) = (section("site_b_hr.prr")?, section("worn_high_mileage.prw")?);
     Some(json!({
         "material": { "shear_modulus_mpa": 82000, "poisson_ratio": 0.28 },
         "friction": { "coefficient": 0.3 },
@@ -292,7 +345,6 @@ fn worn_case() -> Option<Value> {
             "type": "profiles", "rail": rail, "wheel": wheel,
             "side": "right", "rolling_radius_mm": 444, "gauge_mm": 1435.1, "gauge_height_mm": 15.875,
             "flange_back_distance_mm": 1347.4, "flange_back_position_mm": 0, "roll_rad": -0.0013,
-            "accept_rough_profiles": true,
         },
         "motion": { "wheelset": { "speed_mm_per_s": 15000, "free_rolling_radius_mm": 444 } },
     }))

@@ -11,6 +11,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpSocket;
 
 use crate::Check;
+use crate::process::below;
 use crate::service::{Service, make_key};
 
 /// Maximum time in s for a request of another tenant. The service refuses requests that wait longer for memory.
@@ -114,7 +115,7 @@ async fn beside_table(what: &str, template: &Value, path: &str, table: &str) -> 
         .ended(&service.attacker, &format!("/v1/jobs/{template}"))
         .await;
     let before = service.processor_s();
-    let url = format!("http://{}{path}?template={template}", service.address);
+    let url = format!("{}{path}?template={template}", service.process.url);
     let (key, body) = (service.attacker.clone(), packed(table));
     // A separate client, so that its connection closes with it.
     let attack = tokio::spawn(async move {
@@ -293,7 +294,7 @@ pub async fn full_disk() -> Vec<Check> {
             .await;
         accepted += usize::from(submitted.status == 202);
         ready += usize::from(service.get(&service.attacker, "/readyz").await.status == 200);
-        let metrics = reqwest::get(format!("http://{}/metrics", service.address)).await;
+        let metrics = reqwest::get(format!("{}/metrics", service.process.url)).await;
         let metrics = metrics.expect("an answer").text().await.expect("a body");
         calm += usize::from(!metrics.contains("\nrailhead_storage_failing 1\n"));
         tokio::time::sleep(Duration::from_millis(500)).await;
@@ -346,7 +347,7 @@ pub async fn wrong_keys() -> Vec<Check> {
         tokio::time::sleep(Duration::from_millis(50)).await;
     }
     let elsewhere = ask("rh_000000000000_0", "192.0.2.2").await;
-    let direct = reqwest::Client::new().get(format!("http://{}/v1/jobs", service.address));
+    let direct = reqwest::Client::new().get(format!("{}/v1/jobs", service.process.url));
     let via = direct
         .header("via", "1.1 proxy")
         .send()
@@ -476,18 +477,6 @@ async fn cells_of(service: &Service, path: &str, title: &str, text: &str) -> Opt
     )
 }
 
-/// Returns the bytes of the files below a folder.
-fn below(folder: &Path) -> u64 {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    entries
-        .map(|entry| match entry.metadata() {
-            Ok(about) if about.is_dir() => below(&entry.path()),
-            Ok(about) => about.len(),
-            Err(_) => 0,
-        })
-        .sum()
-}
-
 /// N6: many runs and batches of one row over a large template.
 pub async fn stored_bytes() -> Vec<Check> {
     const TIMES: usize = 60;
@@ -500,7 +489,8 @@ pub async fn stored_bytes() -> Vec<Check> {
         .await;
     let mut checks = Vec::new();
     for path in ["/v1/runs", "/v1/batches"] {
-        let before = below(&service.data);
+        let stored = || below(&service.process.data).1;
+        let before = stored();
         let mut accepted = 0;
         for number in 0..TIMES {
             let table = format!("/friction/coefficient\n0.{}\n", 30 + number);
@@ -510,7 +500,7 @@ pub async fn stored_bytes() -> Vec<Check> {
                 .await;
             accepted += usize::from(answer.status == 202);
         }
-        let grown = below(&service.data).saturating_sub(before);
+        let grown = stored().saturating_sub(before);
         checks.push(Check::judged(
             "N6",
             format!("{TIMES} times one row over {size} bytes to {path}"),
@@ -542,10 +532,11 @@ pub async fn revoked() -> Vec<Check> {
     for format in ["csv", "ndjson"] {
         let path = format!("{run}/results?format={format}");
         let whole = service.get(&service.attacker, &path).await.text.len();
-        let key = make_key(&service.data, "attacker");
+        let key = make_key(&service.process.data, "attacker");
         let socket = TcpSocket::new_v4().expect("a socket");
         socket.set_recv_buffer_size(4096).expect("a small buffer");
-        let address = service.address.parse().expect("an address");
+        let address = service.process.url.trim_start_matches("http://");
+        let address = address.parse().expect("an address");
         let mut stream = socket.connect(address).await.expect("a connection");
         let request = format!(
             "GET {path} HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\nauthorization: Bearer {key}\r\n\r\n"

@@ -6,6 +6,9 @@
 //! exits with 1 if one fails. N3 mounts a small file system and is skipped where this is not allowed.
 
 mod attacks;
+#[path = "../service.rs"]
+#[allow(dead_code, reason = "other benches use the rest")]
+mod process;
 mod service;
 
 use std::process::ExitCode;

@@ -1,31 +1,22 @@
 //! The real program on a separate data folder, with keys of two tenants.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use reqwest::{Method, RequestBuilder};
 use serde_json::Value;
+use tempfile::TempDir;
 
-/// Maximum time until the program listens.
-const STARTS_WITHIN: Duration = Duration::from_secs(20);
-/// Unit in which Linux gives process times.
-const TICKS_PER_SECOND: f64 = 100.0;
+use crate::process::{self, railhead};
 
-/// A running service, which is killed on drop.
+/// A running service with two tenants.
 pub struct Service {
-    child: Child,
-    /// Address and port on which it listens.
-    pub address: String,
-    /// Its data folder.
-    pub data: PathBuf,
+    pub process: process::Service,
     /// Key of the attacking tenant.
     pub attacker: String,
     /// Key of the tenant that must not be affected.
     pub other: String,
     client: reqwest::Client,
-    _folder: tempfile::TempDir,
 }
 
 /// A response with its time in s.
@@ -39,32 +30,22 @@ pub struct Answer {
 impl Service {
     /// Starts `railhead serve` with one worker and returns when it listens.
     pub fn start(flags: &[&str]) -> Service {
-        let folder = tempfile::tempdir().expect("a folder");
-        let data = folder.path().join("data");
-        Service::start_on(folder, data, flags)
+        Service::with_keys(process::Service::start(1, flags))
     }
 
-    /// Starts `railhead serve` on an existing data folder.
-    pub fn start_on(folder: tempfile::TempDir, data: PathBuf, flags: &[&str]) -> Service {
-        let log = folder.path().join("log");
-        let child = program()
-            .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
-            .args(["--workers", "1", "--data-dir"])
-            .arg(&data)
-            .args(flags)
-            .stderr(Stdio::from(File::create(&log).expect("a log")))
-            .spawn()
-            .expect("a service");
-        let address = listening(&log);
-        let [attacker, other] = ["attacker", "other"].map(|tenant| make_key(&data, tenant));
+    /// Starts `railhead serve` with one worker on a data folder.
+    pub fn start_on(folder: TempDir, data: PathBuf, flags: &[&str]) -> Service {
+        let place = (folder, data);
+        Service::with_keys(process::Service::start_on(railhead(), place, 1, flags))
+    }
+
+    fn with_keys(process: process::Service) -> Service {
+        let [attacker, other] = ["attacker", "other"].map(|tenant| make_key(&process.data, tenant));
         Service {
-            child,
-            address,
-            data,
+            process,
             attacker,
             other,
             client: reqwest::Client::new(),
-            _folder: folder,
         }
     }
 
@@ -77,7 +58,7 @@ impl Service {
         shape: impl FnOnce(RequestBuilder) -> RequestBuilder,
     ) -> Answer {
         let start = Instant::now();
-        let url = format!("http://{}{path}", self.address);
+        let url = format!("{}{path}", self.process.url);
         let request = self.client.request(method, url).bearer_auth(key);
         let answer = shape(request).send().await.expect("an answer");
         let status = answer.status().as_u16();
@@ -142,21 +123,16 @@ impl Service {
     /// Revokes a key while the service runs.
     pub fn revoke(&self, key: &str) {
         let id = key.split('_').nth(1).expect("an id");
-        let revoked = program()
+        let revoked = railhead()
             .args(["keys", "revoke", id, "--data-dir"])
-            .arg(&self.data)
+            .arg(&self.process.data)
             .output();
         assert!(revoked.expect("the program").status.success());
     }
 
     /// Returns the processor time of the process so far in s.
     pub fn processor_s(&self) -> f64 {
-        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id()));
-        let stat = stat.expect("the process lives");
-        // Fields 14 and 15. The second field, a name, may contain spaces and ends with a parenthesis.
-        let ticks = stat.rsplit(')').next().expect("its fields").split(' ');
-        let ticks = ticks.skip(12).take(2).map(str::parse::<f64>);
-        ticks.sum::<Result<f64, _>>().expect("ticks") / TICKS_PER_SECOND
+        self.process.usage().processor_s
     }
 }
 
@@ -167,25 +143,9 @@ impl Answer {
     }
 }
 
-impl Drop for Service {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// Returns the real program without `RAILHEAD_` variables of the environment.
-fn program() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_railhead"));
-    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
-        command.env_remove(name);
-    }
-    command
-}
-
 /// Creates a key for a tenant while the service runs.
 pub fn make_key(data: &Path, tenant: &str) -> String {
-    let made = program()
+    let made = railhead()
         .args(["keys", "create", "--tenant", tenant, "--data-dir"])
         .arg(data)
         .output();
@@ -199,25 +159,4 @@ pub fn make_key(data: &Path, tenant: &str) -> String {
         .expect("a key")
         .trim()
         .to_owned()
-}
-
-/// Returns the address in the log event `listening`.
-fn listening(log: &Path) -> String {
-    let start = Instant::now();
-    while start.elapsed() < STARTS_WITHIN {
-        let text = std::fs::read_to_string(log).expect("the log");
-        let events = text
-            .lines()
-            .filter_map(|line| serde_json::from_str::<Value>(line).ok());
-        for event in events {
-            if event["message"] == "listening" {
-                return event["address"].as_str().expect("an address").to_owned();
-            }
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    panic!(
-        "the service does not listen: {}",
-        std::fs::read_to_string(log).unwrap_or_default()
-    );
 }

@@ -2,11 +2,11 @@
 //!
 //! `cargo bench --bench calibrate` prints the tables for the halves of every class (the first for fitting, the second for checking; every patch of
 //! wheels on rails counts). With names of classes (`ellipse smooth jump gap profiles curve roller uneven`), it prints only these. The reference
-//! results are in `tests/data/finer_meshes.json`. `-- truths [classes]` computes missing ones, which takes some seconds each. `-- continuity` prints
-//! how the estimate changes along a sweep, `-- sweeps` the accuracy of the estimate along many sweeps, `-- case gap 42` one case as JSON.
+//! results are in `tests/data/finer_meshes.json`. `-- truths [classes]` computes missing ones, which takes some seconds each. `-- sweeps`
+//! prints the accuracy of the estimate along many sweeps, `-- case gap 42` one case as JSON.
 
-use cpu_time::ThreadTime;
 use judge::judged;
+use machine::{median, quantile, seconds_of};
 use population::{Class, case, on_planes};
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
@@ -15,14 +15,15 @@ use railhead_contact::solution::words::answer::Solution;
 use serde_json::json;
 use truth::{Judged, Truths};
 
-mod continuity;
 mod finer;
 mod judge;
+#[path = "../machine.rs"]
+mod machine;
 mod patches;
 mod population;
 #[path = "../../tests/physics/profile_shapes.rs"]
 mod profile_shapes;
-#[path = "../stress/random.rs"]
+#[path = "../random.rs"]
 mod random;
 mod sweeps;
 mod truth;
@@ -53,10 +54,6 @@ fn main() {
         if let (Some(class), Ok(number)) = (class, number.parse()) {
             println!("{}", case(class, number));
         }
-        return;
-    }
-    if has("continuity") {
-        continuity::table();
         return;
     }
     if has("sweeps") {
@@ -127,15 +124,14 @@ fn tables(class: Class, truths: &Truths, each: bool) {
             question["solver"] = json!({ "method": "boundary_element", "target_error": target });
             on_planes(class, &mut question);
             let checked = contact::check(&question, &Limits::default()).expect("a sound case");
-            let began = ThreadTime::now();
-            let answer = match contact::solve(&checked, &Unmonitored) {
+            let (seconds, solved) = seconds_of(|| contact::solve(&checked, &Unmonitored));
+            let answer = match solved {
                 Ok(found) => found,
                 Err(error) => {
                     println!("{} {number} at {target}: {error}", class.name());
                     continue;
                 }
             };
-            let seconds = began.elapsed().as_secs_f64();
             let half = &mut halves[usize::from(2 * *number >= class.count())];
             for judged in judged(class, truth, &checked, &answer).expect("an estimate") {
                 let outcome = Outcome {
@@ -180,23 +176,12 @@ fn row(name: &str, target: f64, outcomes: &[Outcome]) {
         let part = outcomes.iter().filter(|o| test(o)).count();
         part as f64 / outcomes.len().max(1) as f64
     };
-    let sorted = |mut values: Vec<f64>| {
-        values.sort_by(f64::total_cmp);
-        values
-    };
-    // Interpolates linearly between two values.
-    let at = |values: &[f64], part: f64| {
-        let place = part * values.len().saturating_sub(1) as f64;
-        let value = |k: f64| values.get(k as usize).copied().unwrap_or(f64::NAN);
-        let [low, high] = [place.floor(), place.ceil()].map(value);
-        low + (place - place.floor()) * (high - low)
-    };
     let clear = outcomes
         .iter()
         .filter(|o| o.judged.error > o.judged.uncertainty);
-    let ratios = sorted(clear.map(|o| o.judged.estimate / o.judged.error).collect());
-    let errors = sorted(outcomes.iter().map(|o| o.judged.error).collect());
-    let times = sorted(outcomes.iter().map(|o| 1e3 * o.seconds).collect());
+    let ratios = clear.map(|o| o.judged.estimate / o.judged.error).collect();
+    let errors: Vec<f64> = outcomes.iter().map(|o| o.judged.error).collect();
+    let times: Vec<f64> = outcomes.iter().map(|o| 1e3 * o.seconds).collect();
     println!(
         "| {name} | {target} | {} | {:.3} | {:.3} | {:.3} | {:.2} | {:.1} | {:.5}, {:.5} | {:.1}, {:.1} |",
         outcomes.len(),
@@ -204,10 +189,10 @@ fn row(name: &str, target: f64, outcomes: &[Outcome]) {
         count(&|o| o.judged.error <= o.judged.estimate + o.judged.uncertainty),
         count(&|o| o.judged.error > 2.0 * o.judged.estimate + o.judged.uncertainty),
         count(&|o| o.met),
-        at(&ratios, 0.5),
-        at(&errors, 0.5),
-        at(&errors, 0.9),
+        median(ratios),
+        median(errors.clone()),
+        quantile(errors, 0.9),
         times.iter().sum::<f64>() / times.len().max(1) as f64,
-        at(&times, 0.5),
+        median(times),
     );
 }

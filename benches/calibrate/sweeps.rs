@@ -3,13 +3,13 @@
 
 use std::f64::consts::TAU;
 
-use cpu_time::ThreadTime;
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
 use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
+use crate::machine::{median, seconds_of};
 use crate::population::{Class, case};
 use crate::random::Random;
 use crate::truth::{Frame, Judged, distance};
@@ -110,9 +110,8 @@ fn solved(question: &Value, motion: Value, target: f64) -> Option<(Solution, f64
     question["motion"] = motion;
     question["solver"] = json!({ "method": "boundary_element", "target_error": target });
     let checked = contact::check(&question, &Limits::default()).expect("a sound case");
-    let began = ThreadTime::now();
-    let (solution, _) = contact::solve(&checked, &Unmonitored).ok()?;
-    Some((solution, began.elapsed().as_secs_f64()))
+    let (seconds, solved) = seconds_of(|| contact::solve(&checked, &Unmonitored));
+    Some((solved.ok()?.0, seconds))
 }
 
 /// Returns the resultants and the estimate of a motion, relative to μN.
@@ -228,17 +227,13 @@ fn row(form: Form, target: f64, half: &str, sum: &Sum) {
         count as f64 / found.len().max(1) as f64
     };
     let words = |found: &[Judged]| {
-        let mut ratios: Vec<f64> = found
-            .iter()
-            .filter(|judged| judged.error > judged.uncertainty)
-            .map(|judged| judged.estimate / judged.error)
-            .collect();
-        ratios.sort_by(f64::total_cmp);
+        let clear = found.iter().filter(|j| j.error > j.uncertainty);
+        let ratios = clear.map(|judged| judged.estimate / judged.error);
         format!(
             "{:.3} | {:.3} | {:.1}",
             part(found, &|j| j.error <= j.estimate + j.uncertainty),
             part(found, &|j| j.error > 2.0 * j.estimate + j.uncertainty),
-            ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN),
+            median(ratios.collect()),
         )
     };
     let each = |value: f64| value / sum.motions.max(1) as f64;

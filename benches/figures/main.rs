@@ -14,6 +14,8 @@ use railhead_contact::{self, check, solve};
 use serde_json::{Value, json};
 use shape::sheet::Sheet;
 
+#[path = "../drawing.rs"]
+#[allow(dead_code, reason = "other pictures use the rest")]
 mod drawing;
 #[path = "../../src/http/render/shape/mod.rs"]
 #[allow(
@@ -128,6 +130,7 @@ impl Figure {
         Frame {
             x,
             y,
+            logarithmic: false,
             left,
             right: left + width,
             bottom: top + height,
@@ -235,6 +238,7 @@ fn forces(figure: &Figure) -> Picture {
     let frame = |high: f64| Frame {
         x: [0.0, x[x.len() - 1]],
         y: [0.0, high],
+        logarithmic: false,
         left: 60.0,
         right: 560.0,
         bottom: 340.0,

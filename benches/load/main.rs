@@ -13,12 +13,20 @@ mod machine;
 
 mod batch;
 mod cases;
+#[path = "../claims.rs"]
+mod claims;
+#[path = "../client.rs"]
 mod client;
 mod crowds;
 mod lengths;
 mod memory;
 mod mixed;
+#[path = "../random.rs"]
+#[allow(dead_code, reason = "other benches use more of it")]
+mod random;
 mod rows;
+#[path = "../service.rs"]
+#[allow(dead_code, reason = "other benches use the rest")]
 mod service;
 mod shared;
 mod soak;

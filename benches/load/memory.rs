@@ -1,6 +1,5 @@
 //! Measures the memory that four workers keep after mixed cases. With `MALLOC_ARENA_MAX=16` in the environment, the C library's own settings apply.
 
-use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::Row;
@@ -40,10 +39,7 @@ pub async fn run() -> Vec<Row> {
     let idle = service.usage().memory_mb;
     let cases: Vec<Value> = (0..CASES).map(case).collect();
     let mut client = Client::new(&service.url);
-    let answer = client.send(Method::POST, "/v1/batches", &[202], |request| {
-        request.json(&cases)
-    });
-    let batch: Value = answer.await.json().await.expect("JSON");
+    let batch = client.post("/v1/batches", &[202], &json!(cases)).await;
     let path = batch["links"]["results"].as_str().expect("a link");
     let (text, _) = client.get(&format!("{path}?wait=600")).await;
     let text = String::from_utf8(text).expect("text");

@@ -11,6 +11,7 @@ use serde_json::{Value, json};
 
 use crate::Row;
 use crate::client::Client;
+use crate::random::Random;
 use crate::service::Service;
 
 /// Number of rows of one request of `/v1/evaluate` as CSV, whose text stays below 64 MiB.
@@ -42,16 +43,10 @@ fn columns(rows: usize) -> Vec<Vec<f64>> {
         [-2e-3, 2e-3],
         [-1e-3, 1e-3],
     ];
-    let mut state = 7_u64;
-    let mut random = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        (state >> 40) as f64 / (1_u64 << 24) as f64
-    };
+    let mut random = Random(7);
     ranges
         .iter()
-        .map(|[low, high]| (0..rows).map(|_| low + (high - low) * random()).collect())
+        .map(|[low, high]| (0..rows).map(|_| random.between(*low, *high)).collect())
         .collect()
 }
 

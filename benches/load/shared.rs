@@ -3,18 +3,17 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::model::{Kind, Queue};
+use railhead::jobs::store::Store;
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
-use railhead::jobs::store::{ClaimKind, ClaimRequest, Ending, Lease, Store, StoredResult};
+use tokio::task::JoinSet;
 
 use crate::Row;
-use crate::table::{TENANT, fill};
+use crate::claims::{Work, work};
+use crate::table::fill;
 
 const QUEUED: usize = 20_000;
 const GROUP: usize = 32;
-const RESULT_BYTES: usize = 4096;
 
 /// Claims groups of 32 jobs and ends them with results of 4 kB, with 1 and with 8 workers, until the queue is empty.
 pub async fn ends() -> Vec<Row> {
@@ -32,59 +31,15 @@ pub async fn ends() -> Vec<Row> {
     for workers in [1, 8] {
         fill(&*store, QUEUED).await;
         let start = Instant::now();
-        let workers: Vec<_> = (0..workers)
-            .map(|_| tokio::spawn(work(store.clone())))
+        let works: JoinSet<_> = (0..workers)
+            .map(|_| work(store.clone(), GROUP, None))
             .collect();
-        let mut ended = 0;
-        for worker in workers {
-            ended += worker.await.expect("a worker");
+        let mut all = Work::default();
+        for one in works.join_all().await {
+            all.add(one);
         }
-        #[expect(clippy::cast_precision_loss, reason = "few jobs")]
-        rates.push(format!(
-            "{:.0}",
-            ended as f64 / start.elapsed().as_secs_f64()
-        ));
+        let rate = all.jobs as f64 / start.elapsed().as_secs_f64();
+        rates.push(format!("{rate:.0}"));
     }
     vec![Row::plain(name, rates.join("; "))]
-}
-
-async fn work(store: Arc<dyn Store>) -> usize {
-    let result = EncodedResult {
-        solution: vec![b'x'; RESULT_BYTES].into(),
-        fields: None,
-    };
-    let ending = Ending::Succeeded {
-        remarks: Vec::new(),
-        result: StoredResult::Inline(result),
-        field_patches: 0,
-    };
-    let queue = Queue {
-        tenant: TENANT.into(),
-        kind: Kind::Case,
-    };
-    let request = ClaimRequest {
-        worker: "w",
-        queue: &queue,
-        kind: ClaimKind::New,
-        jobs: GROUP,
-        cost_us: u64::MAX,
-        each_slice_us: None,
-        suspects: true,
-        waiting: 0,
-        lease: Lease { now: 0, ms: 30_000 },
-        now: 0,
-        late_before: 0,
-    };
-    let mut ended = 0;
-    loop {
-        let claims = store.claim(&request).await.expect("a claim");
-        if claims.is_empty() {
-            return ended;
-        }
-        let ends: Vec<_> = claims
-            .into_iter()
-            .map(|claim| (claim, ending.clone()))
-            .collect();
-        ended += store.finish(&ends, 0).await.expect("an end").len();
-    }
 }

@@ -7,15 +7,15 @@ use std::time::Instant;
 
 use bytes::Bytes;
 use railhead::jobs::State;
-use railhead::jobs::model::{Kind, Queue, SubmitOptions};
+use railhead::jobs::model::{Kind, SubmitOptions};
 use railhead::jobs::store::sqlite::database::SqliteStore;
 use railhead::jobs::store::{
-    ClaimKind, ClaimRequest, Filter, Lease, Membership, NewBatch, NewJob, QueueBounds,
-    ReleaseReason, Store,
+    ClaimRequest, Filter, Lease, Membership, NewBatch, NewJob, QueueBounds, ReleaseReason, Store,
 };
 use uuid::Uuid;
 
 use crate::Row;
+use crate::claims::{TENANT, queue, request};
 use crate::machine::{median, quantile};
 
 const QUEUED: usize = 20_000;
@@ -23,7 +23,6 @@ const CLAIMS: usize = 200;
 const LISTED: usize = 200_000;
 const LISTS: usize = 50;
 const CHUNK: usize = 1000;
-pub const TENANT: &str = "anonymous";
 
 /// Measures the claim of one group.
 pub async fn claims() -> Vec<Row> {
@@ -31,26 +30,17 @@ pub async fn claims() -> Vec<Row> {
     let store = open(folder.path()).await;
     fill(&*store, QUEUED).await;
     let mut taken = Vec::new();
-    let queue = Queue {
-        tenant: TENANT.into(),
-        kind: Kind::Case,
-    };
+    let queue = queue();
     for number in 0..CLAIMS {
         let request = ClaimRequest {
-            worker: "w",
-            queue: &queue,
-            kind: ClaimKind::New,
-            jobs: 256,
             cost_us: 200_000,
-            each_slice_us: None,
-            suspects: true,
             waiting: 20_000,
             lease: Lease {
                 now: 0,
                 ms: i64::MAX,
             },
             now: i64::try_from(number).unwrap_or(0),
-            late_before: 0,
+            ..request(&queue, 256)
         };
         let start = Instant::now();
         let claims = store.claim(&request).await.expect("a claim");
@@ -96,61 +86,34 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
     let failed = vec![State::Failed];
     let of = |batch: Uuid| Some(Membership::Batch(batch));
     let all = Filter::default();
+    let failing = Filter {
+        states: failed,
+        ..all.clone()
+    };
+    let labelled = Filter {
+        labels: label,
+        ..failing.clone()
+    };
+    let within = |filter: &Filter, batch: Uuid| Filter {
+        member: of(batch),
+        ..filter.clone()
+    };
+    let other = Filter {
+        states: Vec::new(),
+        ..within(&labelled, Uuid::now_v7())
+    };
+    let old = Filter {
+        created_before: Some(1),
+        ..all.clone()
+    };
     [
-        ("nothing asked, a full page", all.clone(), 50),
-        (
-            "state",
-            Filter {
-                states: failed.clone(),
-                ..all.clone()
-            },
-            0,
-        ),
-        (
-            "label and state",
-            Filter {
-                labels: label.clone(),
-                states: failed.clone(),
-                ..all.clone()
-            },
-            0,
-        ),
-        (
-            "batch and state",
-            Filter {
-                member: of(batch),
-                states: failed.clone(),
-                ..all.clone()
-            },
-            0,
-        ),
-        (
-            "label and another batch",
-            Filter {
-                labels: label.clone(),
-                member: of(Uuid::now_v7()),
-                ..all.clone()
-            },
-            0,
-        ),
-        (
-            "label, batch and state",
-            Filter {
-                labels: label,
-                member: of(batch),
-                states: failed.clone(),
-                ..all.clone()
-            },
-            0,
-        ),
-        (
-            "a time long ago",
-            Filter {
-                created_before: Some(1),
-                ..all
-            },
-            0,
-        ),
+        ("nothing asked, a full page", all, 50),
+        ("batch and state", within(&failing, batch), 0),
+        ("label, batch and state", within(&labelled, batch), 0),
+        ("label and another batch", other, 0),
+        ("state", failing, 0),
+        ("label and state", labelled, 0),
+        ("a time long ago", old, 0),
     ]
 }
 

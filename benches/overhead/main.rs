@@ -5,8 +5,6 @@
 //! time of a simulation step on a pair of profiles. If `strace` is installed, it also prints the system calls of a job. `program=PATH` measures
 //! another program, such as `target/release/railhead`.
 
-use std::io::{BufRead, BufReader, Read, Write};
-use std::net::TcpStream;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -16,12 +14,16 @@ use railhead::contact::monitor::Unmonitored;
 use railhead::jobs::engine::Engine;
 use serde_json::{Value, json};
 
+use crate::client::{Client, id_of};
 use crate::machine::{median, quantile, seconds_of};
-use crate::service::Service;
+use crate::service::{Service, railhead};
 
+#[path = "../client.rs"]
+#[expect(dead_code, reason = "other benches use the rest")]
+mod client;
 #[path = "../machine.rs"]
 mod machine;
-#[path = "../load/service.rs"]
+#[path = "../service.rs"]
 #[expect(dead_code, reason = "other benches use the rest")]
 mod service;
 
@@ -32,81 +34,6 @@ const ROWS: usize = 2000;
 const STEPS: usize = 200;
 /// Number of requests before the measurement.
 const FIRST: usize = 20;
-
-/// A persistent connection.
-struct Connection {
-    stream: BufReader<TcpStream>,
-}
-
-impl Connection {
-    fn open(service: &Service) -> Connection {
-        let address = service.url.trim_start_matches("http://");
-        let stream = TcpStream::connect(address).expect("a connection");
-        stream.set_nodelay(true).expect("an option");
-        Connection {
-            stream: BufReader::new(stream),
-        }
-    }
-
-    /// Sends a request and returns the response body. The status must be 200 or 202.
-    fn send(&mut self, method: &str, path: &str, header: &str, body: &[u8]) -> Vec<u8> {
-        let head = format!(
-            "{method} {path} HTTP/1.1\r\nhost: localhost\r\ncontent-length: {}\r\n{header}\r\n",
-            body.len()
-        );
-        let request = [head.as_bytes(), body].concat();
-        self.stream.get_mut().write_all(&request).expect("sent");
-        let status = self.line();
-        let (mut length, mut chunked) = (0, false);
-        loop {
-            let line = self.line().to_ascii_lowercase();
-            if line.is_empty() {
-                break;
-            }
-            if let Some(text) = line.strip_prefix("content-length: ") {
-                length = text.parse().expect("a length");
-            }
-            chunked |= line == "transfer-encoding: chunked";
-        }
-        let mut answer = Vec::new();
-        if chunked {
-            loop {
-                let size = usize::from_str_radix(&self.line(), 16).expect("a size");
-                answer.extend(self.bytes(size));
-                self.line();
-                if size == 0 {
-                    break;
-                }
-            }
-        } else {
-            answer = self.bytes(length);
-        }
-        assert!(
-            status.starts_with("HTTP/1.1 20"),
-            "{method} {path}: {status} {}",
-            String::from_utf8_lossy(&answer)
-        );
-        answer
-    }
-
-    fn post(&mut self, path: &str, prefer: &str, body: &Value) -> Value {
-        let header = format!("content-type: application/json\r\n{prefer}");
-        let answer = self.send("POST", path, &header, body.to_string().as_bytes());
-        serde_json::from_slice(&answer).expect("JSON")
-    }
-
-    fn line(&mut self) -> String {
-        let mut line = String::new();
-        self.stream.read_line(&mut line).expect("a line");
-        line.trim_end().to_owned()
-    }
-
-    fn bytes(&mut self, length: usize) -> Vec<u8> {
-        let mut bytes = vec![0; length];
-        self.stream.read_exact(&mut bytes).expect("bytes");
-        bytes
-    }
-}
 
 /// Returns a case that is solved in a fraction of a millisecond. Each number gives a distinct case.
 fn small(number: usize) -> Value {
@@ -120,8 +47,8 @@ fn small(number: usize) -> Value {
     })
 }
 
-fn job(connection: &mut Connection, number: usize) {
-    let job = connection.post("/v1/jobs", "prefer: wait=10\r\n", &small(number));
+async fn job(client: &mut Client, number: usize) {
+    let job = client.submit(&small(number), Some("wait=10")).await;
     assert_eq!(job["state"], "succeeded", "{job}");
 }
 
@@ -143,26 +70,37 @@ fn main() {
     let named = arguments
         .iter()
         .find_map(|one| one.strip_prefix("program="));
-    let program = named.unwrap_or(env!("CARGO_BIN_EXE_railhead"));
-    let service = Service::start_program(program, 1, &["--rate-limit", "100000"]);
-    let mut connection = Connection::open(&service);
-    println!("| what | measured | goal |\n|---|---|---|");
-    jobs(&service, &mut connection);
-    batch(&service, &mut connection);
-    rows(&mut connection);
-    steps(&mut connection);
-    system_calls(&service, &mut connection);
+    let program = named.map_or_else(railhead, Command::new);
+    let folder = tempfile::tempdir().expect("a folder");
+    let data = folder.path().join("data");
+    let flags = ["--rate-limit", "100000"];
+    let service = Service::start_on(program, (folder, data), 1, &flags);
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .expect("a runtime");
+    runtime.block_on(async {
+        let mut client = Client::new(&service.url);
+        println!("| what | measured | goal |\n|---|---|---|");
+        jobs(&service, &mut client).await;
+        batch(&service, &mut client).await;
+        rows(&mut client).await;
+        steps(&mut client).await;
+        system_calls(&service, &mut client).await;
+    });
 }
 
-fn jobs(service: &Service, connection: &mut Connection) {
-    (0..FIRST).for_each(|number| job(connection, number));
+async fn jobs(service: &Service, client: &mut Client) {
+    for number in 0..FIRST {
+        job(client, number).await;
+    }
     let before = service.usage().processor_s;
-    let times = (FIRST..FIRST + JOBS).map(|number| {
+    let mut times = Vec::new();
+    for number in FIRST..FIRST + JOBS {
         let start = Instant::now();
-        job(connection, number);
-        start.elapsed().as_secs_f64() * 1e3
-    });
-    let times: Vec<f64> = times.collect();
+        job(client, number).await;
+        times.push(start.elapsed().as_secs_f64() * 1e3);
+    }
     let spent = service.usage().processor_s - before;
     row(
         "a job, processor",
@@ -173,7 +111,7 @@ fn jobs(service: &Service, connection: &mut Connection) {
     row("a job, p50", median(times), "ms", None);
 }
 
-fn batch(service: &Service, connection: &mut Connection) {
+async fn batch(service: &Service, client: &mut Client) {
     let cases: Vec<Value> = (0..CASES).map(|number| small(10_000 + number)).collect();
     let engine = Engine::contact();
     let solves = cases.iter().take(200).map(|case| {
@@ -182,15 +120,10 @@ fn batch(service: &Service, connection: &mut Connection) {
     });
     let solve = median(solves.collect());
     let before = service.usage().processor_s;
-    let batch = connection.post("/v1/batches", "", &json!(cases));
-    let path = format!("/v1/batches/{}", batch["id"].as_str().expect("an id"));
-    loop {
-        std::thread::sleep(Duration::from_millis(50));
-        let answer = connection.send("GET", &path, "", b"");
-        let batch: Value = serde_json::from_slice(&answer).expect("JSON");
-        if batch["states"]["succeeded"] == CASES {
-            break;
-        }
+    let batch = client.post("/v1/batches", &[202], &json!(cases)).await;
+    let path = format!("/v1/batches/{}", id_of(&batch));
+    while client.json(&path).await["states"]["succeeded"] != CASES {
+        tokio::time::sleep(Duration::from_millis(50)).await;
     }
     let spent = (service.usage().processor_s - before) / CASES as f64;
     row(
@@ -202,33 +135,28 @@ fn batch(service: &Service, connection: &mut Connection) {
 }
 
 /// Returns the times of requests to `/v1/evaluate` in ms.
-fn evaluated(
-    connection: &mut Connection,
+async fn evaluated(
+    client: &mut Client,
     number: usize,
     request: impl Fn(usize) -> Value,
 ) -> Vec<f64> {
-    let header = "content-type: application/json\r\n";
-    let times = (0..FIRST + number).map(|number| {
-        let body = request(number).to_string();
+    let mut times = Vec::new();
+    for number in 0..FIRST + number {
+        let body = request(number);
         let start = Instant::now();
-        let answer = connection.send("POST", "/v1/evaluate", header, body.as_bytes());
-        let time = start.elapsed().as_secs_f64() * 1e3;
-        let answer: Value = serde_json::from_slice(&answer).expect("JSON");
+        let answer = client.post("/v1/evaluate", &[200], &body).await;
+        times.push(start.elapsed().as_secs_f64() * 1e3);
         let status = &answer["columns"]["status"][0];
         assert!(status == "ok" || status == "target_missed", "{answer}");
-        time
-    });
-    times.skip(FIRST).collect()
+    }
+    times.split_off(FIRST)
 }
 
-fn rows(connection: &mut Connection) {
+async fn rows(client: &mut Client) {
     let mut template = small(0);
     template["solver"] = json!({ "method": "table" });
-    let times = evaluated(
-        connection,
-        ROWS,
-        |number| json!({ "template": template, "columns": { "/motion/creepage_x": [1e-8 * number as f64] } }),
-    );
+    let request = |number| json!({ "template": template, "columns": { "/motion/creepage_x": [1e-8 * number as f64] } });
+    let times = evaluated(client, ROWS, request).await;
     row("one row, p50", median(times.clone()), "ms", Some(0.6));
     row("one row, p99", quantile(times, 0.99), "ms", None);
 }
@@ -238,16 +166,14 @@ fn load(step: usize) -> f64 {
     75_000.0 + 5_000.0 * (0.3 * step as f64).sin()
 }
 
-fn steps(connection: &mut Connection) {
+async fn steps(client: &mut Client) {
     let mut case: Value =
         serde_json::from_str(include_str!("../../api/examples/wheel-rail.case.json"))
             .expect("an example");
     case["outputs"] = json!(["resultants"]);
-    let times = evaluated(
-        connection,
-        STEPS,
-        |step| json!({ "template": case, "columns": { "/load/vertical_force_n": [load(step)] } }),
-    );
+    let request =
+        |step| json!({ "template": case, "columns": { "/load/vertical_force_n": [load(step)] } });
+    let times = evaluated(client, STEPS, request).await;
     let engine = Engine::contact();
     let solves = (0..STEPS).map(|step| {
         case["load"]["vertical_force_n"] = json!(load(step));
@@ -265,7 +191,7 @@ fn steps(connection: &mut Connection) {
 }
 
 /// Prints the system calls of a job, as `strace` counts them.
-fn system_calls(service: &Service, connection: &mut Connection) {
+async fn system_calls(service: &Service, client: &mut Client) {
     const TRACED: usize = 100;
     let counts = tempfile::NamedTempFile::new().expect("a file");
     let strace = Command::new("strace")
@@ -277,8 +203,10 @@ fn system_calls(service: &Service, connection: &mut Connection) {
         println!("| system calls of a job | no `strace` here | |");
         return;
     };
-    std::thread::sleep(Duration::from_secs(2));
-    (0..TRACED).for_each(|number| job(connection, 20_000 + number));
+    tokio::time::sleep(Duration::from_secs(2)).await;
+    for number in 0..TRACED {
+        job(client, 20_000 + number).await;
+    }
     let interrupted = nix::sys::signal::kill(
         nix::unistd::Pid::from_raw(strace.id().cast_signed()),
         nix::sys::signal::Signal::SIGINT,

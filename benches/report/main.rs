@@ -4,6 +4,9 @@
 //! Run it with `cargo bench --bench report`. Times are thread times, in units of one 500 × 500 f64 LU (faer, factorised in place) of the same run.
 //! Without the reference cases of `tests/data`, nothing is written.
 
+#[path = "../drawing.rs"]
+#[allow(dead_code, reason = "other pictures use the rest")]
+mod drawing;
 #[path = "../machine.rs"]
 mod machine;
 

@@ -5,18 +5,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use railhead::jobs::store::postgres::schema::migrate;
 use reqwest::Method;
 use sqlx::PgPool;
 use tempfile::TempDir;
 use tokio::task::block_in_place;
 use tokio::time::sleep;
 
-use crate::cluster::{Cluster, counted, note_ends};
+use crate::cluster::{Cluster, assert_ended_once, counted, tables, until, until_all_ended};
 use crate::faketime::{library, set_ahead, with_clock};
-use crate::nodes::{submit, until_all_ended};
+use crate::nodes::submit;
+use crate::row;
 use crate::support::{endless_case, railhead};
-use crate::{postgres, row};
 
 const JOBS: usize = 2000;
 const LEASE: Duration = Duration::from_secs(3);
@@ -66,14 +65,7 @@ async fn hold(cluster: &Cluster, pool: &PgPool) -> Vec<String> {
         let (id, _) = cluster.submit(&endless_case(&name), &name, number).await;
         held.push(id);
     }
-    let since = Instant::now();
-    while counted(pool, RUNNING).await < 2 {
-        assert!(
-            since.elapsed() < Duration::from_secs(60),
-            "they do not begin"
-        );
-        sleep(Duration::from_millis(20)).await;
-    }
+    until("both run", async || counted(pool, RUNNING).await == 2).await;
     held
 }
 
@@ -88,12 +80,9 @@ async fn cancel(cluster: &Cluster, ids: &[String]) {
 }
 
 pub async fn run() {
-    let (Some(url), Some(library)) = (postgres::database().await, library()) else {
+    let (Some((url, pool)), Some(library)) = (tables().await, library()) else {
         return;
     };
-    migrate(&url).await.expect("tables");
-    let pool = PgPool::connect(&url).await.expect("the database");
-    note_ends(&pool).await;
     let folder = Arc::new(tempfile::tempdir().expect("a folder"));
     for (node, (_, ahead)) in NODES.iter().enumerate() {
         set_ahead(&clock_of(&folder, node), *ahead);
@@ -107,17 +96,7 @@ pub async fn run() {
         }
     });
     for (role, _) in NODES {
-        let workers = if role == "worker" { "1" } else { "0" };
-        let lease = LEASE.as_secs().to_string();
-        let flags = [
-            "--database-url",
-            &url,
-            "--workers",
-            workers,
-            "--lease-s",
-            &lease,
-        ];
-        cluster.add(role, &[&flags[..], &["--cache", "false"]].concat());
+        cluster.add(role, &url, &format!("--lease-s {}", LEASE.as_secs()));
     }
 
     // Both workers hold a job for many leases, and many small jobs are processed, while the clocks are changed.
@@ -148,8 +127,7 @@ pub async fn run() {
         counted(&pool, ended).await,
         i64::try_from(JOBS).expect("few")
     );
-    let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
-    assert_eq!(counted(&pool, twice).await, 0, "a job ended twice");
+    assert_ended_once(&pool).await;
     assert!(cluster.logged("lease expired").is_empty());
     freed(&cluster, &pool, &folder).await;
 }
@@ -164,10 +142,7 @@ async fn freed(cluster: &Arc<Cluster>, pool: &PgPool, folder: &TempDir) {
         let held = hold(cluster, pool).await;
         block_in_place(|| cluster.kill(node));
         let killed = Instant::now();
-        while counted(pool, RUNNING).await > 1 {
-            assert!(killed.elapsed() < 4 * FREE_WITHIN, "its job is not free");
-            sleep(Duration::from_millis(20)).await;
-        }
+        until("its job is free", async || counted(pool, RUNNING).await < 2).await;
         let free = killed.elapsed();
         row(
             &format!(

@@ -3,13 +3,19 @@
 use std::net::SocketAddr;
 use std::process::Command;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use railhead::jobs::store::postgres::schema::migrate;
 use reqwest::{Client, Method};
 use serde_json::Value;
+use sqlx::PgPool;
 use tempfile::TempDir;
 
+use crate::postgres;
 use crate::support::Service;
+
+/// Time limit after which something is considered to hang.
+const WITHIN: Duration = Duration::from_secs(900);
 
 /// Returns the command that starts the node with this number.
 type Prepare = Box<dyn Fn(usize) -> Command + Send + Sync>;
@@ -42,12 +48,18 @@ impl Cluster {
         })
     }
 
-    /// Adds a node, starts it and returns its number.
-    pub fn add(&self, role: &'static str, flags: &[&str]) -> usize {
+    /// Adds a node on a database, without the cache, starts it and returns its number. A `worker` has one worker, `serve` has none.
+    pub fn add(&self, role: &'static str, url: &str, flags: &str) -> usize {
+        let workers = if role == "worker" { "1" } else { "0" };
+        let database = ["--database-url", url, "--workers", workers];
+        let flags = database
+            .into_iter()
+            .chain(["--cache", "false"])
+            .chain(flags.split(' '));
         let mut nodes = self.nodes.lock().expect("the nodes");
         nodes.push(Node {
             role,
-            flags: flags.iter().map(ToString::to_string).collect(),
+            flags: flags.map(str::to_owned).collect(),
             folder: tempfile::tempdir().expect("a folder"),
             service: None,
         });
@@ -172,8 +184,17 @@ impl Cluster {
     }
 }
 
+/// Creates a database whose tables also record ends of jobs. Returns its URL and connections to it.
+pub async fn tables() -> Option<(String, PgPool)> {
+    let url = postgres::database().await?;
+    migrate(&url).await.expect("tables");
+    let pool = PgPool::connect(&url).await.expect("the database");
+    note_ends(&pool).await;
+    Some((url, pool))
+}
+
 /// Records every end of a job in a table, to detect jobs that end twice.
-pub async fn note_ends(pool: &sqlx::PgPool) {
+pub async fn note_ends(pool: &PgPool) {
     let statements = "CREATE TABLE soak_ends (job text NOT NULL, state text NOT NULL); \
         CREATE FUNCTION soak_end() RETURNS trigger LANGUAGE plpgsql AS $$ \
         BEGIN INSERT INTO soak_ends VALUES (NEW.id, NEW.state); RETURN NULL; END $$; \
@@ -186,8 +207,29 @@ pub async fn note_ends(pool: &sqlx::PgPool) {
         .expect("a table");
 }
 
+/// Waits until something is done. Panics if it seems to hang.
+pub async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
+    let since = Instant::now();
+    while !done().await {
+        assert!(since.elapsed() < WITHIN, "not seen: {what}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+/// Waits until all jobs have ended.
+pub async fn until_all_ended(pool: &PgPool) {
+    let open = "SELECT COUNT(*) FROM jobs WHERE ended_at IS NULL";
+    until("all jobs end", async || counted(pool, open).await == 0).await;
+}
+
+/// Panics if a job has ended twice.
+pub async fn assert_ended_once(pool: &PgPool) {
+    let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
+    assert_eq!(counted(pool, twice).await, 0, "a job ended twice");
+}
+
 /// Returns the number that a statement counts. Retries while the database is unavailable.
-pub async fn counted(pool: &sqlx::PgPool, statement: &'static str) -> i64 {
+pub async fn counted(pool: &PgPool, statement: &'static str) -> i64 {
     loop {
         match sqlx::query_scalar(statement).fetch_one(pool).await {
             Ok(number) => return number,

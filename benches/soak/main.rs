@@ -29,12 +29,19 @@ mod seaweed;
 #[allow(dead_code, reason = "shared with the tests")]
 mod support;
 
+#[path = "../claims.rs"]
+mod claims;
 mod clocks;
 mod cluster;
 mod hosts;
+#[path = "../machine.rs"]
+mod machine;
 mod network;
 mod nodes;
 mod queue;
+#[path = "../random.rs"]
+#[allow(dead_code, reason = "other benches use more of it")]
+mod random;
 mod rows;
 mod simulation;
 mod skew;
@@ -82,6 +89,14 @@ fn main() {
             _ => panic!("there is no soak named {name}"),
         }
     }
+}
+
+/// Returns the command without the variables `RAILHEAD_…` of the environment.
+fn without_settings(mut command: std::process::Command) -> std::process::Command {
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
+        command.env_remove(name);
+    }
+    command
 }
 
 /// Prints a line of the table.

@@ -3,17 +3,16 @@
 
 use std::time::{Duration, Instant};
 
-use railhead::jobs::store::postgres::schema::migrate;
 use reqwest::{Client, Method};
 use serde_json::json;
 use sqlx::PgPool;
 use tempfile::TempDir;
 use tokio::time::sleep;
 
-use crate::cluster::{counted, note_ends};
+use crate::cluster::{assert_ended_once, counted, tables, until, until_all_ended};
 use crate::hosts::{self, Cut, Host};
 use crate::support::{Service, case, endless_case, long_case};
-use crate::{postgres, row};
+use crate::{postgres, row, without_settings};
 
 const LEASE: Duration = Duration::from_secs(3);
 
@@ -21,7 +20,7 @@ const LEASE: Duration = Duration::from_secs(3);
 /// for everything else.
 const FREE_WITHIN: Duration = Duration::from_secs(5);
 
-/// Time limit after which something is considered to hang.
+/// Time limit of a request.
 const WITHIN: Duration = Duration::from_secs(120);
 
 /// Records which host claims which job, and delays claims of the hosts in `soak_slow` by a second.
@@ -32,8 +31,6 @@ const NOTES: &str = "CREATE TABLE soak_claims (job text NOT NULL, host text NOT 
     IF EXISTS (SELECT 1 FROM soak_slow WHERE host = host(inet_client_addr())) THEN PERFORM pg_sleep(1); END IF; RETURN NULL; END $$; \
     CREATE TRIGGER soak_claims AFTER UPDATE ON jobs FOR EACH ROW \
     WHEN (NEW.state = 'running' AND OLD.state = 'queued') EXECUTE FUNCTION soak_claim()";
-
-const OPEN: &str = "SELECT COUNT(*) FROM jobs WHERE ended_at IS NULL";
 
 /// Digest of everything that an end or a stale owner could change.
 const AS_THEY_ARE: &str = "SELECT COALESCE(md5(string_agg(concat_ws(',', id, state, ended_at, lease_token, blob_id, attempt, version), ' ' ORDER BY id)), '') \
@@ -59,10 +56,8 @@ struct Network {
 }
 
 fn start(host: &Host, role: &str, url: &str, folder: &TempDir) -> Service {
-    let mut program = host.command(env!("CARGO_BIN_EXE_railhead"));
-    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
-        program.env_remove(name);
-    }
+    let program = host.command(env!("CARGO_BIN_EXE_railhead"));
+    let mut program = without_settings(program);
     let listen = format!("{}:0", host.address);
     let workers = if role == "worker" { "1" } else { "0" };
     let lease = LEASE.as_secs().to_string();
@@ -77,10 +72,7 @@ fn start(host: &Host, role: &str, url: &str, folder: &TempDir) -> Service {
 impl Network {
     async fn new() -> Option<Network> {
         postgres::ALSO_AT.set(hosts::HERE).expect("the first");
-        let near = postgres::database().await?;
-        migrate(&near).await.expect("tables");
-        let pool = PgPool::connect(&near).await.expect("the database");
-        note_ends(&pool).await;
+        let (near, pool) = tables().await?;
         sqlx::raw_sql(NOTES).execute(&pool).await.expect("notes");
         let url = near.replace("127.0.0.1", hosts::HERE);
         let folders: Vec<_> = (0..3)
@@ -138,13 +130,6 @@ impl Network {
         asked.await.expect("all ended jobs")
     }
 
-    async fn until_all_ended(&self) {
-        until("all jobs end", async || {
-            counted(&self.pool, OPEN).await == 0
-        })
-        .await;
-    }
-
     fn take_away(&self, how: Away) {
         match how {
             Away::Cut(cut) => self.hosts[0].cut(cut),
@@ -185,7 +170,7 @@ impl Network {
         })
         .await;
         let free = lost.elapsed();
-        self.until_all_ended().await;
+        until_all_ended(&self.pool).await;
         sleep((3 * LEASE).saturating_sub(lost.elapsed())).await;
         let ended = self.as_they_are().await;
         let before = self.claims().await;
@@ -204,13 +189,8 @@ impl Network {
         })
         .await;
         let works = back.elapsed();
-        self.until_all_ended().await;
-        let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
-        assert_eq!(
-            counted(&self.pool, twice).await,
-            0,
-            "{how:?}: a job ended twice"
-        );
+        until_all_ended(&self.pool).await;
+        assert_ended_once(&self.pool).await;
         row(
             &format!(
                 "{how:?}: jobs held, seconds until they were free, seconds from its return to its next claim (at least 6)"
@@ -253,7 +233,7 @@ impl Network {
         })
         .await;
         let free = lost.elapsed();
-        self.until_all_ended().await;
+        until_all_ended(&self.pool).await;
         self.hosts[0].heal(Cut::BlackHole);
         row(
             "cut off in the transaction of a claim: seconds until its rows were free",
@@ -309,14 +289,6 @@ impl Network {
             "seconds from the return of the database until it is ready",
             format!("{ready:.1}"),
         );
-    }
-}
-
-async fn until(what: &str, mut done: impl AsyncFnMut() -> bool) {
-    let since = Instant::now();
-    while !done().await {
-        assert!(since.elapsed() < WITHIN, "not seen: {what}");
-        sleep(Duration::from_millis(20)).await;
     }
 }
 

@@ -6,24 +6,20 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use railhead::jobs::store::postgres::schema::migrate;
 use reqwest::Method;
 use serde_json::{Value, json};
 use sqlx::PgPool;
 use tokio::task::{JoinSet, block_in_place};
 use tokio::time::sleep;
 
-use crate::cluster::{Cluster, counted, note_ends};
+use crate::cluster::{Cluster, assert_ended_once, counted, tables, until_all_ended};
 use crate::faulty_server::FaultyServer;
+use crate::random::Random;
 use crate::rows::SentRun;
 use crate::support::{case, long_case};
 use crate::{postgres, row, seaweed};
 
 const CLIENTS: usize = 6;
-const OPEN: &str = "SELECT COUNT(*) FROM jobs WHERE ended_at IS NULL";
-
-/// Time limit after which something is considered to hang.
-const ENDED_WITHIN: Duration = Duration::from_secs(900);
 
 /// Returns mostly small cases. Every twentieth takes a large part of a second and has a result that goes to the object store.
 fn mixed(number: usize) -> Value {
@@ -67,16 +63,12 @@ pub async fn submit(cluster: &Arc<Cluster>, from: usize, jobs: usize) -> (Vec<St
 /// Kills and restarts a random node repeatedly until stopped. Returns the number of kills.
 async fn kill_at_random(cluster: Arc<Cluster>, nodes: Vec<usize>, stop: Arc<AtomicBool>) -> usize {
     let mut kills = 0;
-    // A separate generator, so that a run is repeatable.
-    let mut seed: u64 = 0x2545_f491_4f6c_dd1d;
+    let mut random = Random(1);
     while !stop.load(Ordering::Relaxed) {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        sleep(Duration::from_millis(1500 + seed % 2500)).await;
-        let node = nodes[usize::try_from(seed >> 33).expect("a number") % nodes.len()];
+        sleep(Duration::from_secs_f64(random.between(1.5, 4.0))).await;
+        let node = nodes[random.below(nodes.len())];
         block_in_place(|| cluster.kill(node));
-        sleep(Duration::from_millis(seed % 1500)).await;
+        sleep(Duration::from_secs_f64(random.between(0.0, 1.5))).await;
         // A node does not start while PostgreSQL is unavailable. The start is retried.
         while !started(&cluster, node).await {}
         kills += 1;
@@ -93,14 +85,6 @@ async fn started(cluster: &Cluster, node: usize) -> bool {
         sleep(Duration::from_millis(500)).await;
     }
     tried.is_ok()
-}
-
-pub async fn until_all_ended(pool: &PgPool) {
-    let since = Instant::now();
-    while counted(pool, OPEN).await > 0 {
-        assert!(since.elapsed() < ENDED_WITHIN, "some jobs do not end");
-        sleep(Duration::from_millis(200)).await;
-    }
 }
 
 /// Reads the results of these jobs at every API node and compares them.
@@ -133,29 +117,16 @@ async fn read_everywhere(cluster: &Cluster, ids: &[&String]) {
 
 /// Adds two API nodes and three workers with short leases.
 fn add_nodes(cluster: &Cluster, url: &str) -> Vec<usize> {
-    let shared = "--results-url s3://soak/results --cache false --lease-s 3 --attempts-max 20 --shutdown-grace-s 2 --drain-delay-s 0";
     // A worker is killed every few seconds, and a chunk takes some seconds. By chance, the same chunk is hit several times.
-    let roles = [
-        ("serve", "0"),
-        ("serve", "0"),
-        ("worker", "1"),
-        ("worker", "1"),
-        ("worker", "1"),
-    ];
-    let add = |(role, workers)| {
-        let flags = ["--database-url", url, "--workers", workers].into_iter();
-        cluster.add(role, &flags.chain(shared.split(' ')).collect::<Vec<_>>())
-    };
-    roles.into_iter().map(add).collect()
+    let flags = "--results-url s3://soak/results --lease-s 3 --attempts-max 20 --shutdown-grace-s 2 --drain-delay-s 0";
+    let roles = ["serve", "serve", "worker", "worker", "worker"];
+    roles.map(|role| cluster.add(role, url, flags)).to_vec()
 }
 
 pub async fn run(jobs: usize, rows: usize) {
-    let (Some(url), Some(port)) = (postgres::database().await, seaweed::server()) else {
+    let (Some((url, pool)), Some(port)) = (tables().await, seaweed::server()) else {
         return;
     };
-    migrate(&url).await.expect("tables");
-    let pool = PgPool::connect(&url).await.expect("the database");
-    note_ends(&pool).await;
     let way = FaultyServer::to(port).await;
     way.faults.refused.store(25, Ordering::Relaxed);
     way.faults.cut.store(30, Ordering::Relaxed);
@@ -241,8 +212,7 @@ async fn verify(cluster: &Cluster, pool: &PgPool, ids: &[String], before: usize)
         "{states:?}"
     );
     assert_eq!(states[0].1, i64::try_from(ids.len()).expect("a number"));
-    let twice = "SELECT COUNT(*) FROM (SELECT job FROM soak_ends GROUP BY job HAVING COUNT(*) > 1) AS twice";
-    assert_eq!(counted(pool, twice).await, 0, "a job ended twice");
+    assert_ended_once(pool).await;
     let ended = counted(pool, "SELECT COUNT(DISTINCT job) FROM soak_ends JOIN jobs ON jobs.id = job WHERE batch_id IS NULL").await;
     assert_eq!(ended, states[0].1, "every end was noted");
     let later: Vec<&String> = ids.iter().skip(before).collect();

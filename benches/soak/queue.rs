@@ -5,23 +5,19 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use railhead::jobs::State;
-use railhead::jobs::codec::result::EncodedResult;
-use railhead::jobs::model::{Kind, Queue};
 use railhead::jobs::store::postgres::database::PostgresStore;
 use railhead::jobs::store::postgres::schema::migrate;
-use railhead::jobs::store::{
-    ClaimKind, ClaimRequest, Claims, Cluster, Ending, Ends, Filter, Lease, Store, StoredResult,
-};
+use railhead::jobs::store::{Cluster, Filter, Store};
 use sqlx::{Connection, PgConnection, PgPool};
 use tokio::task::JoinSet;
 
+use crate::claims::{TENANT, Work, work};
+use crate::machine::median;
 use crate::simulation::Costs;
 use crate::{postgres, row};
 
-const TENANT: &str = "north";
 const GROUP: usize = 32;
 const WORKERS: usize = 4;
-const RESULT_BYTES: usize = 4096;
 
 /// Duration of the measurement of claims and ends.
 const MEASURED: Duration = Duration::from_secs(10);
@@ -45,72 +41,6 @@ pub async fn fill(pool: &PgPool, from: i64, to: i64) {
         .execute(pool)
         .await
         .expect("figures");
-}
-
-/// Returns a text of numbers like a solution, which hardly compresses.
-fn solution() -> Vec<u8> {
-    let mut seed: u64 = 0x2545_f491_4f6c_dd1d;
-    let mut text = Vec::new();
-    while text.len() < RESULT_BYTES {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        text.extend(format!("0.{seed},").bytes());
-    }
-    text.truncate(RESULT_BYTES);
-    text
-}
-
-/// Number of jobs that the workers ended in some time, and the seconds of each claim and of each end.
-#[derive(Default)]
-struct Work {
-    jobs: usize,
-    claims: Vec<f64>,
-    ends: Vec<f64>,
-}
-
-async fn work(store: Arc<PostgresStore>, until: Instant, group: usize) -> Work {
-    let result = EncodedResult {
-        solution: solution().into(),
-        fields: None,
-    };
-    let ending = Ending::Succeeded {
-        remarks: Vec::new(),
-        result: StoredResult::Inline(result),
-        field_patches: 0,
-    };
-    let queue = Queue {
-        tenant: TENANT.into(),
-        kind: Kind::Case,
-    };
-    let request = ClaimRequest {
-        worker: "w",
-        queue: &queue,
-        kind: ClaimKind::New,
-        jobs: group,
-        cost_us: u64::MAX,
-        each_slice_us: None,
-        suspects: true,
-        waiting: 0,
-        lease: Lease { now: 0, ms: 30_000 },
-        now: 0,
-        late_before: 0,
-    };
-    let mut done = Work::default();
-    while Instant::now() < until {
-        let began = Instant::now();
-        let claims = store.claim(&request).await.expect("a claim");
-        done.claims.push(began.elapsed().as_secs_f64());
-        assert!(!claims.is_empty(), "more jobs are needed");
-        let ends: Vec<_> = claims
-            .into_iter()
-            .map(|claim| (claim, ending.clone()))
-            .collect();
-        let began = Instant::now();
-        done.jobs += store.finish(&ends, 0).await.expect("an end").len();
-        done.ends.push(began.elapsed().as_secs_f64());
-    }
-    done
 }
 
 /// Measures claims and ends by several concurrent workers, in groups of 32.
@@ -138,22 +68,13 @@ async fn measure_as(
         }
     });
     for _ in 0..workers_at_once {
-        workers.spawn(work(store.clone(), until, group));
+        workers.spawn(work(store.clone(), group, Some(until)));
     }
     let mut all = Work::default();
     let done = workers.join_all().await;
     folding.abort();
-    for mut one in done {
-        all.jobs += one.jobs;
-        all.claims.append(&mut one.claims);
-        all.ends.append(&mut one.ends);
-    }
+    done.into_iter().for_each(|one| all.add(one));
     all
-}
-
-fn median(seconds: &mut [f64]) -> f64 {
-    seconds.sort_by(f64::total_cmp);
-    seconds[seconds.len() / 2]
 }
 
 struct Figures {
@@ -162,13 +83,12 @@ struct Figures {
     end_ms: f64,
 }
 
-fn figures(mut work: Work, how_long: Duration) -> Figures {
-    #[expect(clippy::cast_precision_loss, reason = "few jobs")]
+fn figures(work: Work, how_long: Duration) -> Figures {
     let per_job_ms = how_long.as_secs_f64() * 1e3 / work.jobs as f64;
     Figures {
         per_job_ms,
-        claim_ms: median(&mut work.claims) * 1e3,
-        end_ms: median(&mut work.ends) * 1e3,
+        claim_ms: median(work.claims) * 1e3,
+        end_ms: median(work.ends) * 1e3,
     }
 }
 
@@ -202,13 +122,11 @@ pub async fn depth() {
     let mut shallow = Work::default();
     let (mut next, mut rounds) = (few, 0);
     while rounds < 20 {
-        let mut part = measure(&store, MEASURED / 20).await;
+        let part = measure(&store, MEASURED / 20).await;
         let ended = i64::try_from(part.jobs).expect("a number");
         fill(&pool, next, next + ended).await;
         next += ended;
-        shallow.jobs += part.jobs;
-        shallow.claims.append(&mut part.claims);
-        shallow.ends.append(&mut part.ends);
+        shallow.add(part);
         rounds += 1;
     }
     let shallow = figures(shallow, MEASURED);
@@ -262,7 +180,7 @@ async fn look(store: &Arc<PostgresStore>) -> [f64; 4] {
         store.usage(TENANT).await.expect("use");
         lap(3);
     }
-    times.map(|mut times| median(&mut times) * 1e3)
+    times.map(|times| median(times) * 1e3)
 }
 
 /// Measures claims and ends per second by 8 workers, in groups of 32 with results of 4 kB, and the cost of each job for the server, with 3·10⁵
@@ -278,13 +196,11 @@ pub async fn rate() {
     let work = measure_as(&store, MEASURED, 8, GROUP).await;
     let seconds = server_seconds(&pool).await - before.0;
     let bytes = written(&pool).await - before.1;
-    #[expect(clippy::cast_precision_loss, reason = "few jobs")]
     let jobs = work.jobs as f64;
     row(
         "8 workers, groups of 32, results of 4 kB",
         figures(work, MEASURED),
     );
-    #[expect(clippy::cast_precision_loss, reason = "far below 2^53")]
     let each = (bytes as f64 / jobs / 1e3, seconds * 1e3 / jobs);
     row(
         "of each job: written to the log of PostgreSQL, processor time of PostgreSQL",
@@ -327,15 +243,10 @@ pub async fn costs() -> Option<Costs> {
         let before = server_seconds(&pool).await;
         let done = measure_as(&store, MEASURED, 4, group).await;
         let seconds = server_seconds(&pool).await - before;
-        #[expect(clippy::cast_precision_loss, reason = "few claims")]
         let server_us = seconds * 1e6 / done.claims.len() as f64;
-        let mut times: Vec<_> = done
-            .claims
-            .iter()
-            .zip(&done.ends)
-            .map(|(claim, end)| claim + end)
-            .collect();
-        measured.push((server_us, median(&mut times) * 1e6));
+        let pairs = done.claims.iter().zip(&done.ends);
+        let times = pairs.map(|(claim, end)| claim + end).collect();
+        measured.push((server_us, median(times) * 1e6));
     }
     let job_us = (measured[1].0 - measured[0].0) / 63.0;
     Some(Costs {

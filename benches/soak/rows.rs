@@ -22,7 +22,6 @@ pub struct SentRun {
 /// Returns one case with distinct loads and creepages for each row. Each row takes about a millisecond.
 fn body(rows: usize, name: &str) -> Value {
     let each = |of: fn(usize) -> f64| (0..rows).map(of).collect::<Vec<_>>();
-    #[expect(clippy::cast_precision_loss, reason = "far fewer rows than 2^53")]
     let columns = json!({
         "normal_force_n": each(|row| 50_000.0 + (row % 9973) as f64),
         "creepage_x": each(|row| 1e-4 * ((row % 41) as f64 - 20.0)),

@@ -8,6 +8,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use crate::random::Random;
 use crate::row;
 
 /// Time in µs for which a statement occupies a core of the server, and the time of its round trip.
@@ -82,21 +83,12 @@ struct Figures {
 /// Simulates workers. Each asks the server to end its solved group and for the next group.
 fn play(work: Work, workers: usize, costs: Costs) -> Figures {
     let mut cores = BinaryHeap::from([Reverse(At(0.0)); SERVER_CORES]);
-    let mut seed: u64 = 0x9e37_79b9_7f4a_7c15;
-    let mut random = || {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        #[expect(clippy::cast_precision_loss, reason = "a random number")]
-        let part = (seed >> 11) as f64 / (1_u64 << 53) as f64;
-        part
-    };
-    #[expect(clippy::cast_precision_loss, reason = "few")]
+    let mut random = Random(1);
     let (group, counts) = (work.group as f64, work.counts as f64);
     let solve_us = group * work.unit_us;
     // All workers begin within the time of one solve.
     let mut asks: BinaryHeap<_> = (0..workers)
-        .map(|_| Reverse(At(random() * solve_us)))
+        .map(|_| Reverse(At(random.part() * solve_us)))
         .collect();
     let asked_us = costs.group_us + group * costs.job_us;
     let (mut units, mut solving, mut serving) = (0.0, 0.0, 0.0);
@@ -109,7 +101,7 @@ fn play(work: Work, workers: usize, costs: Costs) -> Figures {
         };
         let served = free.max(now) + asked_us;
         cores.push(Reverse(At(served)));
-        let solve = solve_us * (0.75 + 0.5 * random());
+        let solve = solve_us * random.between(0.75, 1.25);
         asks.push(Reverse(At(served + costs.round_trip_us + solve)));
         if now > LASTS_US / 10.0 {
             units += group * counts;
@@ -118,7 +110,6 @@ fn play(work: Work, workers: usize, costs: Costs) -> Figures {
         }
     }
     let counted = 0.9 * LASTS_US;
-    #[expect(clippy::cast_precision_loss, reason = "few")]
     let (workers, cores) = (workers as f64, SERVER_CORES as f64);
     Figures {
         per_s: units / (counted * 1e-6),

@@ -8,6 +8,8 @@ use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
 use serde_json::{Value, json};
 
+use crate::machine::median;
+
 const SHAPES: [f64; 6] = [0.3, 0.6, 1.0, 1.5, 2.5, 4.0];
 const MOTIONS: [[f64; 3]; 3] = [[8e-4, 0.0, 0.0], [1e-3, 5e-4, 2e-4], [2e-4, 0.0, 1.2e-3]];
 const REPEATED: usize = 3;
@@ -110,9 +112,4 @@ fn least(case: &Value) -> f64 {
         began.elapsed().as_secs_f64()
     };
     (0..REPEATED).map(once).fold(f64::INFINITY, f64::min)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

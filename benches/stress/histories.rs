@@ -2,17 +2,11 @@
 
 use std::fmt::Write as _;
 
-use railhead_contact as contact;
-use railhead_contact::case::solver::Limits;
-use railhead_contact::monitor::Unmonitored;
-use railhead_contact::solution::words::answer::{PatchSolution, PointSolution};
+use railhead_contact::solution::words::answer::{PatchSolution, PointSolution, Solution};
 use serde_json::{Value, json};
 
-use crate::physics;
+use crate::class::{Class, solved, tried};
 use crate::random::Random;
-
-/// A class, the number of its histories, and the function that makes one.
-type Class = (&'static str, usize, fn(&mut Random, &mut Value));
 
 const CLASSES: [Class; 7] = [
     ("creepages that change", 40, creepages),
@@ -49,7 +43,7 @@ struct Shown {
     from_steady: Option<f64>,
 }
 
-/// Returns half the length of the patch of `physics::base` in mm.
+/// Returns half the length of the patch of `class::base` in mm.
 fn half_length(case: &Value) -> f64 {
     case["contact"]["a_mm"].as_f64().unwrap_or(1.0)
 }
@@ -200,53 +194,31 @@ pub fn table(seed: u64) -> String {
          | histories | tried | refused | solved | target met | steady in the end, of | failed |\n|---|---|---|---|---|---|---|\n",
     );
     let mut troubles = String::new();
-    for (name, count, make) in CLASSES {
-        let mut random = Random(seed);
-        let [
-            mut refused,
-            mut solved,
-            mut met,
-            mut ended,
-            mut steady,
-            mut failed,
-        ] = [0; 6];
-        for _ in 0..count {
-            let mut case = physics::base(&mut random);
-            case["solver"] = json!({ "target_error": TARGET });
-            make(&mut random, &mut case);
-            match one(&case) {
-                Ok(None) => refused += 1,
-                Ok(Some(shown)) => {
-                    solved += 1;
-                    met += usize::from(shown.target_met);
-                    if let Some(distance) = shown.from_steady {
-                        ended += 1;
-                        steady += usize::from(distance <= 1.0);
-                        if distance > 1.0 {
-                            let _ = writeln!(
-                                troubles,
-                                "- {distance:.2} estimates from steady rolling: `{case}`"
-                            );
-                        }
-                    }
-                }
-                Err(why) => {
-                    failed += 1;
-                    let _ = writeln!(troubles, "- {why}: `{case}`");
-                }
+    for class in CLASSES {
+        let (mut steady, mut unsteady) = (0, Vec::new());
+        let (cells, failed) = tried(class, TARGET, seed, &mut troubles, |case| {
+            let Some(shown) = one(case)? else {
+                return Ok(None);
+            };
+            match shown.from_steady {
+                Some(distance) if distance > 1.0 => unsteady.push(format!(
+                    "- {distance:.2} estimates from steady rolling: `{case}`\n"
+                )),
+                Some(_) => steady += 1,
+                None => {}
             }
-        }
-        let _ = writeln!(
-            text,
-            "| {name} | {count} | {refused} | {solved} | {met} | {steady} of {ended} | {failed} |"
-        );
+            Ok(Some(shown.target_met))
+        });
+        let ended = steady + unsteady.len();
+        let _ = writeln!(text, "{cells} {steady} of {ended} | {failed} |");
+        troubles.extend(unsteady);
     }
     text + "\n" + &troubles
 }
 
 /// Solves a history and checks it against the laws. Returns `None` if it was refused.
 fn one(case: &Value) -> Result<Option<Shown>, String> {
-    let Some(patches) = solved(case)? else {
+    let Some((Solution { patches, .. }, _)) = solved(case)? else {
         return Ok(None);
     };
     let steady = steady(case, &patches)?;
@@ -308,15 +280,6 @@ fn held(case: &Value, patch: &PatchSolution, limit: f64) -> Result<(), String> {
     Ok(())
 }
 
-fn solved(case: &Value) -> Result<Option<Vec<PatchSolution>>, String> {
-    let Ok(checked) = contact::check(case, &Limits::default()) else {
-        return Ok(None);
-    };
-    let (solution, _) =
-        contact::solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
-    Ok(Some(solution.patches))
-}
-
 /// Solves steady rolling with the last motion of a history, if it ends in rolling.
 fn steady(case: &Value, rolled: &[PatchSolution]) -> Result<Option<Vec<PatchSolution>>, String> {
     if case["motion"]["start"] == json!("pressed") {
@@ -335,7 +298,7 @@ fn steady(case: &Value, rolled: &[PatchSolution]) -> Result<Option<Vec<PatchSolu
     if let Some(speed) = case["motion"]["history"].get("speed_mm_per_s") {
         steady["motion"]["speed_mm_per_s"] = speed.clone();
     }
-    solved(&steady)
+    Ok(solved(&steady)?.map(|(solution, _)| solution.patches))
 }
 
 /// Returns the distance between two points over the sum of both estimates.

@@ -6,6 +6,7 @@
 //! run.
 
 mod after;
+mod class;
 mod condition;
 mod contacts;
 mod damaged;
@@ -15,6 +16,8 @@ mod damaged_trials;
 mod features;
 mod histories;
 mod laws;
+#[path = "../machine.rs"]
+mod machine;
 mod maintenance;
 #[path = "../../tests/routes/matrix.rs"]
 mod matrix;
@@ -23,6 +26,7 @@ mod physics;
 mod profile_reference_files;
 #[path = "../../tests/physics/profile_shapes.rs"]
 mod profile_shapes;
+#[path = "../random.rs"]
 mod random;
 mod rows;
 #[path = "../../src/jobs/runtime_probe.rs"]
@@ -37,6 +41,7 @@ use std::fmt::Write as _;
 use std::process::ExitCode;
 
 use contacts::{Sample, samples};
+use machine::quantile;
 use serde_json::Value;
 use times::{CaseTimes, told};
 use trial::{End, Trial, trial};
@@ -198,29 +203,17 @@ impl Troubles {
     }
 }
 
-fn at(values: &[f64], share: f64) -> f64 {
-    let mut values = values.to_vec();
-    values.sort_by(f64::total_cmp);
-    values
-        .get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1)))
-        .copied()
-        .unwrap_or(f64::NAN)
-}
-
-fn number(value: f64) -> String {
-    if value.is_nan() {
-        "–".to_owned()
-    } else {
-        format!("{value:.0}")
-    }
+/// Returns the quantiles of some values as cells of a table, or dashes without values.
+fn cells(values: &[f64], shares: &[f64], text: fn(f64) -> String) -> String {
+    let cell = |share: &f64| match values.is_empty() {
+        true => "–".to_owned(),
+        false => text(quantile(values.to_vec(), *share)),
+    };
+    shares.iter().map(cell).collect::<Vec<_>>().join(" | ")
 }
 
 fn small(value: f64) -> String {
-    if value.is_nan() {
-        "–".to_owned()
-    } else {
-        format!("{value:.1e}")
-    }
+    format!("{value:.1e}")
 }
 
 fn report(count: usize, seed: u64, rows: &BTreeMap<&str, Row>, troubles: &Troubles) -> String {
@@ -242,19 +235,15 @@ fn report(count: usize, seed: u64, rows: &BTreeMap<&str, Row>, troubles: &Troubl
     for (kind, row) in rows {
         let _ = writeln!(
             text,
-            "| {kind} | {} | {} | {} | {} | {} | {} | {} | {:.1e} | {} | {} | {} | {} |",
+            "| {kind} | {} | {} | {} | {} | {} | {:.1e} | {} | {} |",
             row.cases,
             row.solved,
             row.refused,
             row.not_converged,
-            number(at(&row.iterations, 0.5)),
-            number(at(&row.iterations, 0.95)),
-            number(at(&row.iterations, 1.0)),
+            cells(&row.iterations, &[0.5, 0.95, 1.0], |n| format!("{n:.0}")),
             row.residual,
-            small(at(&row.energy, 0.5)),
-            small(at(&row.energy, 0.95)),
-            small(at(&row.from_liu_hsu, 0.5)),
-            small(at(&row.from_liu_hsu, 1.0)),
+            cells(&row.energy, &[0.5, 0.95], small),
+            cells(&row.from_liu_hsu, &[0.5, 1.0], small),
         );
     }
     text.push_str(
@@ -306,10 +295,9 @@ fn accuracy(rows: &BTreeMap<&str, Row>) -> String {
             .count();
         let _ = writeln!(
             text,
-            "| {kind} | {} | {covered} | {} | {} |",
+            "| {kind} | {} | {covered} | {} |",
             errors.len(),
-            small(at(&errors, 0.5)),
-            small(at(&errors, 1.0)),
+            cells(&errors, &[0.5, 1.0], small),
         );
     }
     text.push('\n');

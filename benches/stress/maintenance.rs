@@ -2,29 +2,22 @@
 
 use std::fmt::Write as _;
 
-use railhead_contact as contact;
-use railhead_contact::case::solver::Limits;
-use railhead_contact::monitor::Unmonitored;
 use railhead_contact::post::subsurface::states::points;
 use serde_json::{Value, json};
 
-use crate::physics;
+use crate::class::{Class, solved, tried};
 use crate::random::Random;
 
 /// A law that checks an answer to a case, given in this order. It returns a message if the law is broken.
 type Law = fn(&Value, &Value) -> Result<(), String>;
-/// A class, the number of its cases, the function that makes one, and its law.
-type Class = (&'static str, usize, fn(&mut Random, &mut Value), Law);
 
-const CLASSES: [Class; 3] = [
+const CLASSES: [(Class, Law); 3] = [
     (
-        "stresses below the surface",
-        300,
-        stressed,
+        ("stresses below the surface", 300, stressed),
         stresses_are_in_balance,
     ),
-    ("damage", 1500, damaged, damage_follows_its_resultants),
-    ("temperature", 700, heated, heat_warms),
+    (("damage", 1500, damaged), damage_follows_its_resultants),
+    (("temperature", 700, heated), heat_warms),
 ];
 
 /// Half the side of the horizontal plane of stresses and its depth, in half-widths of the patch, and the number of points along a side. The fraction
@@ -208,39 +201,18 @@ pub fn table(seed: u64) -> String {
          | cases | tried | refused | solved | target met | failed |\n|---|---|---|---|---|---|\n",
     );
     let mut troubles = String::new();
-    for (name, count, make, law) in CLASSES {
-        let mut random = Random(seed);
-        let [mut refused, mut solved, mut met, mut failed] = [0; 4];
-        for _ in 0..count {
-            let mut case = physics::base(&mut random);
-            make(&mut random, &mut case);
-            match one(&case, law) {
-                Ok(None) => refused += 1,
-                Ok(Some(target_met)) => {
-                    solved += 1;
-                    met += usize::from(target_met);
-                }
-                Err(why) => {
-                    failed += 1;
-                    let _ = writeln!(troubles, "- {why}: `{case}`");
-                }
-            }
-        }
-        let _ = writeln!(
-            text,
-            "| {name} | {count} | {refused} | {solved} | {met} | {failed} |"
-        );
+    for (class, law) in CLASSES {
+        let (cells, failed) = tried(class, 0.005, seed, &mut troubles, |case| one(case, law));
+        let _ = writeln!(text, "{cells} {failed} |");
     }
     text + "\n" + &troubles
 }
 
 /// Returns whether the target was met, or `None` if the case was refused.
 fn one(case: &Value, law: Law) -> Result<Option<bool>, String> {
-    let Ok(checked) = contact::check(case, &Limits::default()) else {
+    let Some((solution, fields)) = solved(case)? else {
         return Ok(None);
     };
-    let (solution, fields) =
-        contact::solve(&checked, &Unmonitored).map_err(|error| error.to_string())?;
     let mut answer = serde_json::to_value(&solution).map_err(|error| error.to_string())?;
     let stored = fields
         .patches

@@ -9,6 +9,7 @@ use railhead_contact::{check, solve};
 use serde_json::{Value, json};
 
 use super::contacts::{Sample, samples};
+use super::machine::{median, quantile};
 use super::random::Random;
 use super::runtime_probe::{ProbedTime, USUAL_LIMIT, probe};
 use super::trial::attempt_timed;
@@ -126,8 +127,7 @@ fn beyond(times: &Times, expected: impl Fn(&CaseTimes) -> f64) -> [usize; 2] {
 }
 
 fn row(text: &mut String, name: &str, times: &Times) {
-    let mut taken: Vec<f64> = times.iter().map(|case| case.taken).collect();
-    taken.sort_by(f64::total_cmp);
+    let taken: Vec<f64> = times.iter().map(|case| case.taken).collect();
     let share = |[longer, less]: [usize; 2]| {
         100.0 * (times.len() - longer - less) as f64 / times.len().max(1) as f64
     };
@@ -143,8 +143,8 @@ fn row(text: &mut String, name: &str, times: &Times) {
         told[0],
         told[1],
         part.count(),
-        taken.get(taken.len() / 2).copied().unwrap_or(f64::NAN),
-        taken.last().copied().unwrap_or(f64::NAN),
+        median(taken.clone()),
+        quantile(taken, 1.0),
         share(beyond(times, |case| case.formulas)),
     );
 }

@@ -6,6 +6,7 @@ use railhead_contact::rolling::methods::table::spline::{Shape, cell, sigma, spin
 use serde_json::{Value, json};
 
 use crate::held_out::{CONTACTS, contact, name};
+use crate::machine::quantile;
 use crate::solver::read;
 
 /// One held-out motion.
@@ -69,22 +70,10 @@ pub fn all(table: &CreepTable) -> Vec<Judged> {
 
 fn row(name: &str, part: &[&Judged]) {
     let quantiles = |of: &dyn Fn(&Judged) -> f64| {
-        let mut values: Vec<f64> = part.iter().map(|j| of(j)).collect();
-        values.sort_by(f64::total_cmp);
-        let at = |q: f64| {
-            values
-                .get((q * values.len() as f64) as usize)
-                .or(values.last())
-                .copied()
-                .unwrap_or(f64::NAN)
-        };
-        format!(
-            "{:.4}/{:.4}/{:.4}/{:.4}",
-            at(0.5),
-            at(0.9),
-            at(0.99),
-            at(1.0)
-        )
+        let values: Vec<f64> = part.iter().map(|j| of(j)).collect();
+        let [half, most, nearly, all] =
+            [0.5, 0.9, 0.99, 1.0].map(|share| quantile(values.clone(), share));
+        format!("{half:.4}/{most:.4}/{nearly:.4}/{all:.4}")
     };
     let within = |limit: f64| {
         100.0 * part.iter().filter(|j| j.largest() <= limit).count() as f64

@@ -17,8 +17,10 @@ mod bound;
 mod fit;
 mod held_out;
 mod judge;
+#[path = "../machine.rs"]
+mod machine;
 mod nodes;
-#[path = "../stress/random.rs"]
+#[path = "../random.rs"]
 #[allow(dead_code, reason = "other benches use more of it")]
 mod random;
 mod solver;

@@ -9,6 +9,8 @@ use railhead_contact::monitor::Unmonitored;
 use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::json;
 
+use crate::machine::quantile;
+
 /// c = √(ab) in mm, G in MPa, and μN/(G c²), which is small so that the largest creepages remain allowed.
 const LENGTH: f64 = 5.0;
 const MODULUS: f64 = 80_000.0;
@@ -116,9 +118,8 @@ pub fn largest_error(found: [f64; 3], answer: Answer) -> f64 {
 }
 
 /// Prints the distance of the table from the new solutions.
-pub fn print_errors(what: &str, mut errors: Vec<f64>) {
-    errors.sort_by(f64::total_cmp);
-    let at = |part: f64| errors[(part * (errors.len() - 1) as f64) as usize];
+pub fn print_errors(what: &str, errors: Vec<f64>) {
+    let at = |share: f64| quantile(errors.clone(), share);
     println!(
         "{} {what} solved anew: {:.4} in the median, {:.4} at 99 %, {:.4} at most",
         errors.len(),

@@ -1,6 +1,5 @@
 //! Measures the time of a value by the table and by the simplified theory, in one process.
 
-use cpu_time::ThreadTime;
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
 use railhead_contact::evaluate::rows::Rows;
@@ -9,6 +8,7 @@ use railhead_contact::rolling::methods::table::file::table;
 use serde_json::json;
 
 use crate::held_out::{CONTACTS, MOTIONS, contact};
+use crate::machine::seconds_of;
 use crate::random::Random;
 
 /// Number of values of a measurement. The best of `RUNS` runs counts.
@@ -85,10 +85,9 @@ fn ns_of_row(method: &str, radii: bool) -> f64 {
 /// Returns the time in ns of one of [`VALUES`] values, in the best of several runs.
 fn best(work: impl Fn() -> f64) -> f64 {
     let run = |_| {
-        let began = ThreadTime::now();
-        let sum = work();
+        let (seconds, sum) = seconds_of(&work);
         assert!(!sum.is_infinite());
-        began.elapsed().as_secs_f64() * 1e9 / VALUES as f64
+        seconds * 1e9 / VALUES as f64
     };
     (0..RUNS).map(run).fold(f64::INFINITY, f64::min)
 }

@@ -84,7 +84,7 @@ mod profile_solutions;
 mod profile_variants;
 mod profile_verdicts;
 mod profile_worn;
-#[path = "../../benches/stress/random.rs"]
+#[path = "../../benches/random.rs"]
 mod random;
 mod readme;
 mod recorder;

@@ -39,7 +39,7 @@ pub fn solved(case: &Value) -> Result<Solution, String> {
 }
 
 /// Between these shifts, the patch on the tread ends within a millimetre of the patch on the gauge corner, inclined to it by half a radian. (`cargo
-/// bench --bench worn` solves all 336 states.)
+/// bench --bench wheels -- worn` solves all 336 states.)
 #[test]
 fn a_patch_that_ends_next_to_another_one_is_solved() {
     let mut failures = Vec::new();

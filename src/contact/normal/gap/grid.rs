@@ -1,7 +1,7 @@
 //! Grids of equal rectangles over the contact plane, their refinement criteria, and the types of a solution of a gap.
 //!
-//! Errors with the constants below are those of `tests/physics/gap_hertz.rs` and `gap_reference.rs`; `cargo bench --bench gaps` prints times and errors of the
-//! reference gaps.
+//! Errors with the constants below are those of `tests/physics/gap_hertz.rs` and `gap_reference.rs`; `cargo bench --bench report` shows times and
+//! errors of the reference gaps.
 
 use std::f64::consts::PI;
 

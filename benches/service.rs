@@ -6,6 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
+use tempfile::TempDir;
 
 /// Maximum time until the program listens.
 const STARTS_WITHIN: Duration = Duration::from_secs(20);
@@ -18,8 +19,9 @@ pub struct Service {
     child: Child,
     /// URL on which it listens, without a trailing slash.
     pub url: String,
-    data: PathBuf,
-    _folder: tempfile::TempDir,
+    /// Its data folder.
+    pub data: PathBuf,
+    _folder: TempDir,
 }
 
 /// Resources in use at one moment.
@@ -40,16 +42,22 @@ pub struct Usage {
 }
 
 impl Service {
-    /// Starts `railhead serve` and returns when it listens. Its log goes to a file, as in production.
+    /// Starts `railhead serve` on a new data folder and returns when it listens.
     pub fn start(workers: usize, flags: &[&str]) -> Service {
-        Service::start_program(env!("CARGO_BIN_EXE_railhead"), workers, flags)
+        let folder = tempfile::tempdir().expect("a folder");
+        let data = folder.path().join("data");
+        Service::start_on(railhead(), (folder, data), workers, flags)
     }
 
-    /// Starts another program in the same way as [`Service::start`].
-    pub fn start_program(program: &str, workers: usize, flags: &[&str]) -> Service {
-        let folder = tempfile::tempdir().expect("a folder");
-        let (data, log) = (folder.path().join("data"), folder.path().join("log"));
-        let child = Command::new(program)
+    /// Starts a program on a data folder. Its log goes to a file in the first folder, as in production.
+    pub fn start_on(
+        mut program: Command,
+        (folder, data): (TempDir, PathBuf),
+        workers: usize,
+        flags: &[&str],
+    ) -> Service {
+        let log = folder.path().join("log");
+        let child = program
             .args(["serve", "--listen", "127.0.0.1:0", "--log-format", "json"])
             .args(["--workers", &workers.to_string(), "--data-dir"])
             .arg(&data)
@@ -107,6 +115,15 @@ impl Drop for Service {
     }
 }
 
+/// Returns the real program without the variables `RAILHEAD_…` of the environment.
+pub fn railhead() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_railhead"));
+    for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("RAILHEAD_")) {
+        command.env_remove(name);
+    }
+    command
+}
+
 /// Returns the address in the log event `listening`.
 fn listening(log: &Path) -> String {
     let start = Instant::now();
@@ -128,7 +145,7 @@ fn listening(log: &Path) -> String {
 }
 
 /// Returns the number and the bytes of the files below a folder. Files that vanish meanwhile do not count.
-fn below(folder: &Path) -> (usize, u64) {
+pub fn below(folder: &Path) -> (usize, u64) {
     let (mut files, mut bytes) = (0, 0);
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let Ok(kind) = entry.metadata() else { continue };

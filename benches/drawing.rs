@@ -1,4 +1,4 @@
-//! Draws outlines and curves on linear axes, as SVG.
+//! Draws outlines, curves and points as SVG.
 
 use std::fmt::Write as _;
 
@@ -48,6 +48,8 @@ impl Curve {
 pub struct Frame {
     pub x: [f64; 2],
     pub y: [f64; 2],
+    /// Whether the values are decimal logarithms. The ticks are then powers of ten.
+    pub logarithmic: bool,
     pub left: f64,
     pub right: f64,
     pub bottom: f64,
@@ -73,8 +75,12 @@ impl Frame {
     }
 }
 
-/// Returns about five round values in a range.
-fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
+/// Returns whole numbers in a range, or about five round ones, with their labels.
+fn ticks([low, high]: [f64; 2], logarithmic: bool) -> Vec<(f64, String)> {
+    if logarithmic {
+        let powers = low as i32..=high as i32;
+        return powers.map(|k| (f64::from(k), power_of_ten(k))).collect();
+    }
     let rough = (high - low) / 5.0;
     let power = 10.0_f64.powf(rough.log10().floor());
     let factors = [1.0, 2.0, 5.0, 10.0];
@@ -85,12 +91,20 @@ fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
         .unwrap_or(rough);
     let first = (low / step - 1e-9).ceil() as i64;
     let last = (high / step + 1e-9).floor() as i64;
-    (first..=last).map(|k| k as f64 * step).collect()
+    let values = (first..=last).map(|k| k as f64 * step);
+    values.map(|value| (value, label(value))).collect()
 }
 
 fn label(value: f64) -> String {
     let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn power_of_ten(power: i32) -> String {
+    match power {
+        -4..=4 => format!("{}", 10.0_f64.powi(power)),
+        _ => format!("1e{power}"),
+    }
 }
 
 /// The body of an SVG picture.
@@ -137,6 +151,17 @@ impl Picture {
         ));
     }
 
+    /// Draws a disc at each point, in the colour of a line.
+    pub fn points(&mut self, frame: &Frame, points: &[[f64; 2]], line: usize) {
+        let (ink, _) = INKS[line % INKS.len()];
+        for point in points {
+            let [x, y] = frame.place(*point);
+            self.add(&format!(
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"{ink}\"/>"
+            ));
+        }
+    }
+
     pub fn key(&mut self, x: f64, y: f64, curve: Curve, name: &str) {
         self.add(&format!(
             "<path d=\"M{x} {y}h34\" {}/><text x=\"{}\" y=\"{}\">{name}</text>",
@@ -148,23 +173,22 @@ impl Picture {
 
     /// Draws ticks with values below and at the left, and the names of the axes.
     pub fn axes(&mut self, frame: &Frame, x: &str, y: &str) {
-        for value in ticks(frame.x) {
+        for (value, label) in ticks(frame.x, frame.logarithmic) {
             let [at, _] = frame.place([value, frame.y[0]]);
             self.add(&format!(
                 "<path d=\"M{at:.1} {}V{}\" stroke=\"#ddd\"/>",
                 frame.top, frame.bottom
             ));
-            self.text([at, frame.bottom + 16.0], &label(value));
+            self.text([at, frame.bottom + 16.0], &label);
         }
-        for value in ticks(frame.y) {
+        for (value, label) in ticks(frame.y, frame.logarithmic) {
             let [_, at] = frame.place([frame.x[0], value]);
             self.add(&format!(
-                "<path d=\"M{} {at:.1}H{}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                "<path d=\"M{} {at:.1}H{}\" stroke=\"#ddd\"/><text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
                 frame.left,
                 frame.right,
                 frame.left - 6.0,
-                at + 4.0,
-                label(value)
+                at + 4.0
             ));
         }
         self.text([0.5 * (frame.left + frame.right), frame.bottom + 36.0], x);
@@ -173,13 +197,12 @@ impl Picture {
 
     /// Draws ticks with values at the right, and the name of the axis.
     pub fn right_axis(&mut self, frame: &Frame, y: &str) {
-        for value in ticks(frame.y) {
+        for (value, label) in ticks(frame.y, frame.logarithmic) {
             let [_, at] = frame.place([frame.x[0], value]);
             self.add(&format!(
-                "<text x=\"{}\" y=\"{:.1}\">{}</text>",
+                "<text x=\"{}\" y=\"{:.1}\">{label}</text>",
                 frame.right + 6.0,
-                at + 4.0,
-                label(value)
+                at + 4.0
             ));
         }
         self.upright(frame.right + 60.0, frame, y);

@@ -79,6 +79,12 @@ impl Client {
         serde_json::from_slice(&bytes).expect("JSON")
     }
 
+    /// Sends JSON and returns the JSON response, which must have one of the statuses.
+    pub async fn post(&mut self, path: &str, statuses: &[u16], body: &Value) -> Value {
+        let answer = self.send(Method::POST, path, statuses, |request| request.json(body));
+        answer.await.json().await.expect("JSON")
+    }
+
     /// Submits a case and returns the representation of its job.
     pub async fn submit(&mut self, case: &Value, prefer: Option<&str>) -> Value {
         let answer = self.send(Method::POST, "/v1/jobs", &[202, 200], |request| {
