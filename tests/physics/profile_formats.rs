@@ -218,6 +218,7 @@ fn a_section_is_the_same_in_every_form_of_miniprof_that_instruments_write() {
 
 #[test]
 fn rows_of_numbers_in_a_header_are_no_points() {
+    let [y, z] = section()[0];
     let dos = "MINIPROF 101 148 1994 3 24\na.prd\nStock.......: \nWheel ID....:\n".to_owned();
     // Rows of numbers above the points: the dimensions of a wheel.
     for (form, header, line) in [
@@ -240,6 +241,11 @@ fn rows_of_numbers_in_a_header_are_no_points() {
         (
             "of the same length",
             dos.clone() + "32.58 37.11 14.71 1\n0 0 0 0\n\n",
+            5,
+        ),
+        (
+            "near the first point",
+            dos.clone() + &format!("{} {} 10.2\n", y + 0.1, z + 0.1),
             5,
         ),
     ] {
@@ -348,6 +354,12 @@ fn whole_lines_are_shown_and_texts_without_points_say_why() {
     );
     let fault = read(Format::Columns, "\"1 2\n\"3 4\n").unwrap_err();
     assert!(fault.contains("2 rows are remarks"), "{fault}");
+    let named = "id;y;z\n".to_owned() + &rows(|k, y, z| format!("P{k};{y};{z}\n"));
+    let fault = read(Format::Columns, &named).unwrap_err();
+    assert!(
+        fault.contains("line 2, \"P0;") && fault.contains("remove the first column"),
+        "{fault}"
+    );
     let counted = rows(|k, y, z| format!("{k} {y} {z}\n"));
     let fault = read(Format::Columns, &counted).unwrap_err();
     assert!(

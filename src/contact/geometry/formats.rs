@@ -809,8 +809,8 @@ impl Scanned<'_> {
         Ok(behind[0].0)
     }
 
-    /// The number of rows at the beginning of a range that belong to the header. These are the rows before its first empty line, or a single
-    /// row of another length than all others, provided that their numbers are far from those of the next row.
+    /// The number of rows at the beginning of a range that belong to the header: a single row of another length than all others, or the rows
+    /// before the first empty line if their numbers are far from those of the next row.
     fn header_rows(&self, [from, to]: [usize; 2], points: &[[f64; 2]]) -> usize {
         let rows: Vec<usize> = self.rows(from, to).collect();
         let blank = (from..to).find(|k| self.lines[*k].after_empty);
@@ -823,17 +823,12 @@ impl Scanned<'_> {
         let lone = rows.len() > 2
             && length(&rows[0]) != length(&rows[1])
             && rows[2..].iter().all(|k| length(k) == length(&rows[1]));
-        let count = if (1..POINTS_MIN).contains(&attached) {
-            attached
-        } else {
-            usize::from(lone)
-        };
-        if count == 0 || 2 * count >= rows.len() {
-            return 0;
+        if !(1..POINTS_MIN).contains(&attached) || 2 * attached >= rows.len() {
+            return usize::from(lone);
         }
-        let usual = median(&mut chords(&points[count..]).collect::<Vec<f64>>());
-        let apart = distance(points[count - 1], points[count]) > LONG_MEDIANS * usual;
-        if apart { count } else { 0 }
+        let usual = median(&mut chords(&points[attached..]).collect::<Vec<f64>>());
+        let apart = distance(points[attached - 1], points[attached]) > LONG_MEDIANS * usual;
+        if apart { attached } else { 0 }
     }
 
     /// A broken row directly above the first row, which cannot be part of the header.
@@ -878,6 +873,18 @@ impl Scanned<'_> {
         let is_broken = |k: &usize| matches!(self.contents[*k], Content::Broken { .. });
         if let Some(k) = (0..self.contents.len()).find(is_broken) {
             return self.refuse(k);
+        }
+        // Only words count as such a line if its first cell is a text.
+        let named = self.lines.iter().find(|line| {
+            let behind = words(&line.bare, self.comma).skip(1).take(2);
+            behind.filter_map(|word| number(word, self.comma)).count() == 2
+        });
+        if let Some(line) = named {
+            return format!(
+                "no points found: line {}, {} given, begins with a word; remove the first column, rows begin with numbers",
+                line.place,
+                shown(line.text)
+            );
         }
         match self.commented_out(0) {
             0 => "no points found".to_owned(),
