@@ -143,8 +143,21 @@ pub fn rails() -> Vec<Variant> {
         [-82.0, 16.0],
         [-105.0, 16.0],
     ];
+    // A groove with a flat bottom and a keeper that ends 4 mm below the top of the rail.
+    let keeper = [
+        [-38.0, 43.0],
+        [-46.0, 47.0],
+        [-68.0, 47.0],
+        [-76.0, 43.0],
+        [-78.0, 6.0],
+        [-80.0, 4.0],
+        [-101.0, 4.0],
+        [-103.0, 6.0],
+        [-103.0, 40.0],
+    ];
     vec![
         variant("as defined", rail.clone(), true),
+        variant("with a keeper", before(rail.clone(), &keeper), true),
         variant(
             "with its foot",
             before(extended(rail.clone(), &foot), &mirrored),

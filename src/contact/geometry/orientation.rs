@@ -179,7 +179,7 @@ const TIP_WIDTH: [f64; 2] = [4.0, 25.0];
 const FLANGE_HEIGHT: [f64; 2] = [12.0, 45.0];
 /// Least length in mm of a tread, and of the crown of a head. The nose of a crossing has 15 mm where wheels reach it. With twice this length it can only be a rail.
 const CROWN: f64 = 15.0;
-/// Least fall in mm at one side of a head, and least length of the steep part of a face.
+/// Least fall in mm at one side of a head, least rise behind a groove, and least length of the steep part of a face.
 const FALL: f64 = 6.0;
 /// Least fall in mm at the other side of a head. Within one descent, lips and steps of worn profiles may rise by this much.
 const FALL_LEAST: f64 = 1.0;
@@ -476,6 +476,17 @@ impl Section<'_> {
             .then_some(leftmost)
     }
 
+    /// Returns whether the section rises again behind the lowest sample of a descent, toward the first (`back`) or the last sample.
+    fn rises_behind(&self, lowest: usize, back: bool) -> bool {
+        let behind = if back {
+            0..lowest
+        } else {
+            lowest..self.points.len()
+        };
+        let bottom = self.points[lowest][1];
+        self.points[behind].iter().any(|at| at[1] >= bottom + FALL)
+    }
+
     /// The heads of rails in this section.
     fn heads(&self) -> Vec<Head> {
         let runs = self.flat_runs(CROWN).into_iter();
@@ -496,7 +507,10 @@ impl Section<'_> {
                 |fall: &Fall| fall.depth >= FALL_LEAST || [0, end].contains(&fall.lowest);
             let convex = deepest >= FALL || from - to >= CROWN_TURN;
             let convex = convex && falls.iter().flatten().all(falls_there);
-            (cut_well && convex).then_some(Head {
+            // Upside down, the bottom of a groove is a crown between two bodies.
+            let between = matches!(falls, [Some(first), Some(last)]
+                if self.rises_behind(first.lowest, true) && self.rises_behind(last.lowest, false));
+            (cut_well && convex && !between).then_some(Head {
                 crown: (last - first) as f64 * STEP,
                 falls,
             })
