@@ -85,6 +85,16 @@ impl Client {
         answer.await.json().await.expect("JSON")
     }
 
+    /// Waits for the results of a batch, whose cases must all have succeeded.
+    pub async fn batch_results(&mut self, batch: &Value, cases: usize) {
+        let path = batch["links"]["results"].as_str().expect("a link");
+        let (text, _) = self.get(&format!("{path}?wait=600")).await;
+        let text = String::from_utf8(text).expect("text");
+        let succeeded = |line: &&str| line.contains("\"state\":\"succeeded\"");
+        let succeeded = text.lines().filter(succeeded).count();
+        assert_eq!((text.lines().count(), succeeded), (cases, cases));
+    }
+
     /// Submits a case and returns the representation of its job.
     pub async fn submit(&mut self, case: &Value, prefer: Option<&str>) -> Value {
         let answer = self.send(Method::POST, "/v1/jobs", &[202, 200], |request| {

@@ -41,26 +41,19 @@ pub fn lu_seconds() -> f64 {
         Par::Seq,
         Default::default(),
     ));
-    let once = |work: &mut Mat<f64>,
-                pivots: &mut [usize],
-                inverse: &mut [usize],
-                buffer: &mut MemBuffer| {
+    let once = |_| {
         work.copy_from(&matrix);
-        seconds_of(|| {
+        let factorise = || {
             factor::lu_in_place(
                 work.as_mut(),
-                pivots,
-                inverse,
+                &mut pivots,
+                &mut inverse,
                 Par::Seq,
-                MemStack::new(buffer),
+                MemStack::new(&mut buffer),
                 Default::default(),
             );
-        })
-        .0
+        };
+        seconds_of(factorise).0
     };
-    median(
-        (0..31)
-            .map(|_| once(&mut work, &mut pivots, &mut inverse, &mut buffer))
-            .collect(),
-    )
+    median((0..31).map(once).collect())
 }

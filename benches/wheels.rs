@@ -13,6 +13,7 @@ use std::hint::black_box;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use examples::{example, wheel_places};
 use machine::{lu_seconds, median, quantile, seconds_of};
 use railhead_contact::case::rail_pair::KnownPair;
 use railhead_contact::case::solver::Limits;
@@ -25,13 +26,12 @@ use wheel_shift::{Shifted, draw};
 
 #[allow(dead_code, reason = "other pictures use the rest")]
 mod drawing;
+mod examples;
 mod machine;
 #[allow(dead_code, reason = "other benches use more of it")]
 mod random;
 mod wheel_shift;
 
-/// Lateral shifts of the wheelset in mm, from the tread to the gauge corner.
-const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];
 const REPEATS: usize = 15;
 /// Number of rows measured with the same LU.
 const ROWS_PER_LU: usize = 50;
@@ -62,15 +62,6 @@ fn main() {
     }
 }
 
-fn example(name: &str) -> Value {
-    let path = format!(
-        "{}/../api/examples/{name}",
-        concat!(env!("CARGO_MANIFEST_DIR"))
-    );
-    let text = std::fs::read_to_string(path).expect("an example");
-    serde_json::from_str(&text).expect("an example is JSON")
-}
-
 fn checked(case: &Value) -> CheckedCase {
     check(case, &Limits::default()).expect("a valid case")
 }
@@ -79,14 +70,7 @@ fn cases() {
     let lu = lu_seconds();
     println!("1 LU = {:.3} ms", 1e3 * lu);
     println!("| case | whole | check |\n|---|---|---|");
-    let of_shift = |shift: f64| {
-        let mut case = example("wheel-rail.case.json");
-        case["contact"]["lateral_shift_mm"] = json!(shift);
-        (format!("shift {shift} mm"), case)
-    };
-    let flange = ("flange".to_owned(), example("wheel-rail-flange.case.json"));
-    for (name, mut case) in SHIFTS.into_iter().map(of_shift).chain([flange]) {
-        case["outputs"] = json!(["resultants"]);
+    for (name, case) in wheel_places() {
         let problem = checked(&case);
         let best = |work: &dyn Fn()| {
             let times = (0..REPEATS).map(|_| seconds_of(work).0);
@@ -101,7 +85,7 @@ fn cases() {
 }
 
 fn rows(count: usize) {
-    let pair = example("wheel-rail.case.json");
+    let pair = example("wheel-rail");
     let (operators, known) = (Arc::default(), KnownPair::default());
     let (mut lu, mut units) = (0.0, Vec::new());
     // The first solve of a process loads the table of creep forces.
@@ -222,7 +206,7 @@ fn curve(count: usize) {
 }
 
 fn classes() -> Vec<Class> {
-    let mut new = example("wheel-rail.case.json");
+    let mut new = example("wheel-rail");
     new["contact"]["accept_rough_profiles"] = json!(true);
     let of_new = |name, shifts, rows| Class {
         name,
@@ -261,7 +245,7 @@ fn classes() -> Vec<Class> {
 fn shift() {
     let new = Shifted {
         name: "S1002 on 60E1, 75 kN, yaw 3 mrad",
-        pair: example("wheel-rail.case.json"),
+        pair: example("wheel-rail"),
         load: 75e3,
         yaw: 0.003,
     };

@@ -90,18 +90,21 @@ impl Service {
         .await
     }
 
-    /// Submits a case and returns the id of its job.
-    pub async fn submit(&self, key: &str, case: &Value) -> String {
-        let answer = self
-            .post(key, "/v1/jobs", "application/json", case.to_string())
-            .await;
-        assert_eq!(answer.status, 202, "{}", answer.text);
-        answer.json()["id"].as_str().expect("an id").to_owned()
+    /// Submits a case, waits until it is solved, and returns the id of its job.
+    pub async fn solved(&self, key: &str, case: &Value) -> String {
+        let path = self.make_as(key, "/v1/jobs", "application/json", case.to_string());
+        let path = path.await;
+        self.ended(key, &path).await;
+        path.rsplit('/').next().expect("an id").to_owned()
     }
 
-    /// Submits a body that must be accepted, and returns the path of the created resource.
+    /// Submits a body as the attacker. It must be accepted. Returns the path of the created resource.
     pub async fn make(&self, path: &str, media_type: &str, body: String) -> String {
-        let answer = self.post(&self.attacker, path, media_type, body).await;
+        self.make_as(&self.attacker, path, media_type, body).await
+    }
+
+    async fn make_as(&self, key: &str, path: &str, media_type: &str, body: String) -> String {
+        let answer = self.post(key, path, media_type, body).await;
         assert_eq!(answer.status, 202, "{}", answer.text);
         let id = answer.json()["id"].as_str().expect("an id").to_owned();
         format!("{}/{id}", path.split('?').next().unwrap_or(path))

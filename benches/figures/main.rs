@@ -3,20 +3,24 @@
 //!
 //! `cargo bench --bench figures` writes `docs/paper-figures/*.svg` and prints the values of the figures.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use drawing::{Curve, Frame, Picture};
+use examples::example;
 use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
 use railhead_contact::rolling::task::Motion;
 use railhead_contact::solution::words::answer::{Fields, Solution};
 use railhead_contact::{self, check, solve};
-use serde_json::{Value, json};
+use serde_json::json;
 use shape::sheet::Sheet;
 
 #[path = "../drawing.rs"]
 #[allow(dead_code, reason = "other pictures use the rest")]
 mod drawing;
+#[path = "../examples.rs"]
+#[allow(dead_code, reason = "other benches use the rest")]
+mod examples;
 #[path = "../../src/http/render/shape/mod.rs"]
 #[allow(
     dead_code,
@@ -34,7 +38,7 @@ fn main() {
     if !std::env::args().any(|argument| argument == "--bench") {
         return;
     }
-    let folder = root().join("docs/paper-figures");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/paper-figures");
     std::fs::create_dir_all(&folder).expect("a folder for the pictures");
     let write = |figure: u32, picture: Picture| {
         let path = folder.join(format!("figure-{figure}.svg"));
@@ -44,10 +48,6 @@ fn main() {
     write(3, borders(&Figure::new(3)));
     write(4, zones(&Figure::new(4)));
     write(5, forces(&Figure::new(5)));
-}
-
-fn root() -> PathBuf {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).to_owned()
 }
 
 /// An example solved on the fine mesh, with the paper's units.
@@ -64,9 +64,7 @@ struct Figure {
 
 impl Figure {
     fn new(number: u32) -> Figure {
-        let path = root().join(format!("api/examples/paper-figure-{number}.case.json"));
-        let text = std::fs::read_to_string(path).expect("an example");
-        let mut case: Value = serde_json::from_str(&text).expect("an example is JSON");
+        let mut case = example(&format!("paper-figure-{number}"));
         case["solver"] = json!({ "mesh": { "strips": STRIPS, "cells": CELLS } });
         // The border between stick and slip is computed from the margin to the bound.
         case["outputs"] = json!(["resultants", "zones", "pressure", "tractions"]);

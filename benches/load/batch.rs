@@ -65,13 +65,6 @@ async fn send(url: String, body: String, start: Instant) -> (f64, f64) {
     });
     let batch: Value = answer.await.json().await.expect("JSON");
     let accepted = start.elapsed().as_secs_f64();
-    let path = batch["links"]["results"].as_str().expect("a link");
-    let (text, _) = client.get(&format!("{path}?wait=600")).await;
-    let seconds = start.elapsed().as_secs_f64();
-    let text = String::from_utf8(text).expect("text");
-    let succeeded = text
-        .lines()
-        .filter(|line| line.contains("\"state\":\"succeeded\""));
-    assert_eq!((text.lines().count(), succeeded.count()), (CASES, CASES));
-    (accepted, seconds)
+    client.batch_results(&batch, CASES).await;
+    (accepted, start.elapsed().as_secs_f64())
 }

@@ -4,11 +4,11 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::Row;
 use crate::cases::meshed;
 use crate::client::{Client, id_of};
-use crate::machine::{median, quantile};
+use crate::machine::quantile;
 use crate::service::Service;
+use crate::{Row, times};
 
 const SHORT: usize = 200;
 /// Time between two submissions.
@@ -31,23 +31,18 @@ pub async fn run() -> Vec<Row> {
     }
     let before = progress(&client.json(&path).await);
     let start = Instant::now();
-    let beside = short_jobs(&service.url).await;
+    let during = short_jobs(&service.url).await;
     let (after, seconds) = (client.json(&path).await, start.elapsed().as_secs_f64());
-    let text = |times: &[f64]| {
-        let (median, p99) = (median(times.to_vec()), quantile(times.to_vec(), 0.99));
-        format!("{:.0}, {:.0} ms", 1e3 * median, 1e3 * p99)
-    };
-    let most = quantile(beside.clone(), 0.99);
     vec![
         Row::plain(
             "mixed-lengths: submission to end of a short job, median, p99, on an idle worker",
-            text(&alone),
+            times(&alone),
         ),
         Row::judged(
-            "mixed-lengths: the same beside a sweep of 10 000 motions",
-            text(&beside),
+            "mixed-lengths: the same during a sweep of 10 000 motions",
+            times(&during),
             "p99 ≤ 5 s (two slices of 2 s)",
-            most <= 5.0,
+            quantile(during, 0.99) <= 5.0,
         ),
         Row::judged(
             "mixed-lengths: progress of the sweep meanwhile",

@@ -32,6 +32,8 @@ mod shared;
 mod soak;
 mod table;
 
+use machine::quantile;
+
 /// Names of the parts.
 const PARTS: [&str; 10] = [
     "mixed",
@@ -62,6 +64,12 @@ impl Row {
     }
 }
 
+/// Returns the median and the 99 % quantile of times in s, as a text in ms.
+fn times(seconds: &[f64]) -> String {
+    let [median, p99] = [0.5, 0.99].map(|share| 1e3 * quantile(seconds.to_vec(), share));
+    format!("{median:.2}, {p99:.2} ms")
+}
+
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     // `cargo test --benches` also runs this program, and then it measures nothing.
@@ -76,49 +84,31 @@ fn main() {
     // The default of the service.
     let workers = number("workers=").unwrap_or((cores - 1).max(1));
     let jobs = number("jobs=").unwrap_or(20_000);
-    let wanted = |part: &str| {
-        let parts = || arguments.iter().filter(|one| PARTS.contains(&one.as_str()));
-        parts().next().is_none() || parts().any(|named| named == part)
-    };
+    let named = |part: &str| arguments.iter().any(|argument| argument == part);
+    let all = !PARTS.into_iter().any(named);
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .expect("a runtime");
     println!("{cores} cores, {workers} worker(s), driver on one thread of the same machine\n");
     println!("| what | measured | goal |\n|---|---|---|");
-    let print = |rows: Vec<Row>| {
+    for part in PARTS.into_iter().filter(|part| all || named(part)) {
+        let rows = runtime.block_on(async {
+            match part {
+                "mixed" => mixed::run(workers).await,
+                "soak" => soak::run(workers, jobs).await,
+                "batch" => batch::run(workers).await,
+                "crowds" => crowds::run(workers).await,
+                "claims" => table::claims().await,
+                "lists" => table::lists().await,
+                "mixed-lengths" => lengths::run().await,
+                "rows" => rows::run(workers).await,
+                "memory" => memory::run().await,
+                _ => shared::ends().await,
+            }
+        });
         for Row(what, figure, goal) in rows {
             println!("| {what} | {figure} | {goal} |");
         }
-    };
-    if wanted("mixed") {
-        print(runtime.block_on(mixed::run(workers)));
-    }
-    if wanted("soak") {
-        print(runtime.block_on(soak::run(workers, jobs)));
-    }
-    if wanted("batch") {
-        print(runtime.block_on(batch::run(workers)));
-    }
-    if wanted("crowds") {
-        print(runtime.block_on(crowds::run(workers)));
-    }
-    if wanted("claims") {
-        print(runtime.block_on(table::claims()));
-    }
-    if wanted("lists") {
-        print(runtime.block_on(table::lists()));
-    }
-    if wanted("mixed-lengths") {
-        print(runtime.block_on(lengths::run()));
-    }
-    if wanted("rows") {
-        print(runtime.block_on(rows::run(workers)));
-    }
-    if wanted("memory") {
-        print(runtime.block_on(memory::run()));
-    }
-    if wanted("shared") {
-        print(runtime.block_on(shared::ends()));
     }
 }

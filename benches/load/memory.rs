@@ -40,13 +40,7 @@ pub async fn run() -> Vec<Row> {
     let cases: Vec<Value> = (0..CASES).map(case).collect();
     let mut client = Client::new(&service.url);
     let batch = client.post("/v1/batches", &[202], &json!(cases)).await;
-    let path = batch["links"]["results"].as_str().expect("a link");
-    let (text, _) = client.get(&format!("{path}?wait=600")).await;
-    let text = String::from_utf8(text).expect("text");
-    let succeeded = text
-        .lines()
-        .filter(|line| line.contains("\"state\":\"succeeded\""));
-    assert_eq!(succeeded.count(), CASES);
+    client.batch_results(&batch, CASES).await;
     let usage = service.usage();
     vec![Row::plain(
         "memory: 400 mixed cases on 4 workers; idle, peak, afterwards; processor time",

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::Row;
 use crate::cases::{bare_rate, meshed, size_of};
 use crate::client::{Client, id_of};
 use crate::machine::{median, quantile};
 use crate::service::{Service, Usage};
+use crate::{Row, times};
 
 const CLIENTS: usize = 64;
 const TIME: Duration = Duration::from_secs(60);
@@ -58,7 +58,7 @@ pub async fn run(workers: usize) -> Vec<Row> {
     let bare = bare_rate(workers, BARE_TIME, |number| meshed(number, size));
     let service = Service::start(workers, &[]);
     let looks = idle_looks(&service).await;
-    let (idle, idle_p99) = (median(looks.clone()), quantile(looks, 0.99));
+    let (idle, idle_times) = (median(looks.clone()), times(&looks));
     let end = Instant::now() + TIME;
     let clients: Vec<_> = (0..CLIENTS)
         .map(|number| tokio::spawn(client(service.url.clone(), number, size, end)))
@@ -86,24 +86,14 @@ pub async fn run(workers: usize) -> Vec<Row> {
         Row::judged(
             "mixed: GET of a job, idle median, p99; under load median, p99",
             format!(
-                "{:.2}, {:.2} ms; {:.2}, {:.2} ms ({:.1} × idle)",
-                1e3 * idle,
-                1e3 * idle_p99,
-                1e3 * median(all.looks.clone()),
-                1e3 * p99,
+                "{idle_times}; {} ({:.1} × idle)",
+                times(&all.looks),
                 p99 / idle
             ),
             "p99 ≤ 20 × idle",
             p99 <= 20.0 * idle,
         ),
-        Row::plain(
-            "mixed: POST of a case, median, p99",
-            format!(
-                "{:.1}, {:.1} ms",
-                1e3 * median(all.submits.clone()),
-                1e3 * quantile(all.submits, 0.99)
-            ),
-        ),
+        Row::plain("mixed: POST of a case, median, p99", times(&all.submits)),
         Row::plain(
             "mixed: requests, refusals by status",
             format!(

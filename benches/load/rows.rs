@@ -10,7 +10,7 @@ use reqwest::Method;
 use serde_json::{Value, json};
 
 use crate::Row;
-use crate::client::Client;
+use crate::client::{Client, id_of};
 use crate::random::Random;
 use crate::service::Service;
 
@@ -104,23 +104,17 @@ pub async fn run(workers: usize) -> Vec<Row> {
     let mut client = Client::new(&service.url);
     let mut rows = Vec::new();
     for method in ["table", "boundary_element"] {
-        let job = client
-            .submit(&template(method, 0.005), Some("wait=60"))
-            .await;
-        let id = job["id"].as_str().expect("an id").to_owned();
+        let template = template(method, 0.005);
+        let id = id_of(&client.submit(&template, Some("wait=60")).await);
         if method == "table" {
             rows.extend(evaluated(&mut client, &id).await);
-            let sent = (&*columns(BY_TABLE), "");
-            rows.push(run_of(&service, &mut client, &id, sent, 60.0).await);
+            rows.push(run_of(&service, &mut client, &id, &columns(BY_TABLE), 60.0).await);
         } else {
             let each = bare(&columns(500));
             let within = 1.25 * each * BY_SOLVER as f64 / workers as f64;
-            let sent = (&*columns(BY_SOLVER), "");
-            rows.push(run_of(&service, &mut client, &id, sent, within).await);
-            let (steps, within) = (steps(BY_STEPS), f64::INFINITY);
-            for query in ["&starts=own", "&starts=neighbours"] {
-                rows.push(run_of(&service, &mut client, &id, (&steps, query), within).await);
-            }
+            rows.push(run_of(&service, &mut client, &id, &columns(BY_SOLVER), within).await);
+            let steps = steps(BY_STEPS);
+            rows.push(run_of(&service, &mut client, &id, &steps, f64::INFINITY).await);
         }
     }
     rows
@@ -164,7 +158,7 @@ async fn run_of(
     service: &Service,
     client: &mut Client,
     job: &str,
-    (sent, query): (&[Vec<f64>], &str),
+    sent: &[Vec<f64>],
     within: f64,
 ) -> Row {
     let count = sent[0].len();
@@ -174,11 +168,11 @@ async fn run_of(
         let request = request.header("content-type", "application/vnd.apache.arrow.stream");
         request.body(body.clone())
     };
-    let path = format!("/v1/runs?template={job}{query}");
+    let path = format!("/v1/runs?template={job}");
     let answer = client.send(Method::POST, &path, &[202], shape).await;
     let run: Value = answer.json().await.expect("JSON");
     let accepted = began.elapsed().as_secs_f64();
-    let own = format!("/v1/runs/{}", run["id"].as_str().expect("an id"));
+    let own = format!("/v1/runs/{}", id_of(&run));
     let mut memory = 0.0_f64;
     let (run, ended) = loop {
         let run = client.json(&own).await;
@@ -196,7 +190,7 @@ async fn run_of(
     memory = memory.max(service.usage().memory_mb);
     let method = run["method"].as_str().expect("a method").to_owned();
     Row::judged(
-        &format!("a run of {count} rows by `{method}`, sent as Arrow{query}"),
+        &format!("a run of {count} rows by `{method}`, sent as Arrow"),
         format!(
             "accepted after {accepted:.1} s, ended after {ended:.1} s; Parquet of {:.0} MB in {seconds:.1} s, CSV in {csv_seconds:.1} s; memory at most {memory:.0} MB",
             parquet.len() as f64 / 1e6

@@ -14,9 +14,9 @@ use railhead::jobs::store::{
 };
 use uuid::Uuid;
 
-use crate::Row;
 use crate::claims::{TENANT, queue, request};
-use crate::machine::{median, quantile};
+use crate::machine::median;
+use crate::{Row, times};
 
 const QUEUED: usize = 20_000;
 const CLAIMS: usize = 200;
@@ -115,11 +115,6 @@ fn filters(batch: Uuid) -> [(&'static str, Filter, usize); 7] {
         ("label and state", labelled, 0),
         ("a time long ago", old, 0),
     ]
-}
-
-fn times(seconds: &[f64]) -> String {
-    let (median, p99) = (median(seconds.to_vec()), quantile(seconds.to_vec(), 0.99));
-    format!("{:.2}, {:.2} ms", 1e3 * median, 1e3 * p99)
 }
 
 async fn open(folder: &Path) -> Arc<dyn Store> {

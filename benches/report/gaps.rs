@@ -9,6 +9,7 @@ use railhead_contact::normal_stage;
 use railhead_contact::solution::words::answer::Solution;
 use serde_json::{Value, json};
 
+use crate::examples::wheel_places;
 use crate::machine::{lu_seconds, median, quantile, seconds_of};
 use crate::questions::{number, problem, stored, timed};
 
@@ -186,34 +187,13 @@ fn across(formula: &Value, y: f64) -> f64 {
     powers[0] * y.powi(2) + powers[1] * y.powi(4)
 }
 
-/// Lateral shifts of the wheelset in mm, from the tread to the gauge corner.
-const SHIFTS: [f64; 7] = [3.0, 1.0, 0.0, -1.0, -2.0, -4.0, -5.5];
-
 /// Returns the section on wheel on rail by profiles. The repository has no converged results for it, so that the errors are the solver's estimates.
 fn wheels() -> String {
     let mut text = "### Wheel on rail by profiles\n\nS1002 on 60E1 as in `api/examples/wheel-rail.case.json`, by lateral shift of the wheelset, and the \
                     flange contact of `wheel-rail-flange.case.json`; 75 kN vertical, target 0.005.\n\n\
                     | case | patches | LU | tangential estimate |\n|---|---|---|---|\n"
         .to_owned();
-    let example = |name: &str| -> Value {
-        let path = format!(
-            "{}/api/examples/{name}",
-            concat!(env!("CARGO_MANIFEST_DIR"), "/..")
-        );
-        let text = std::fs::read_to_string(path).expect("an example");
-        serde_json::from_str(&text).expect("an example is JSON")
-    };
-    let mut cases: Vec<(String, Value)> = SHIFTS
-        .into_iter()
-        .map(|shift| {
-            let mut case = example("wheel-rail.case.json");
-            case["contact"]["lateral_shift_mm"] = json!(shift);
-            (format!("shift {shift} mm"), case)
-        })
-        .collect();
-    cases.push(("flange".to_owned(), example("wheel-rail-flange.case.json")));
-    for (name, mut case) in cases {
-        case["outputs"] = json!(["resultants"]);
+    for (name, case) in wheel_places() {
         let lu = lu_seconds();
         let checked = problem(&case);
         let (solution, seconds) = timed(&checked, REPEATS);

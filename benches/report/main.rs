@@ -7,6 +7,8 @@
 #[path = "../drawing.rs"]
 #[allow(dead_code, reason = "other pictures use the rest")]
 mod drawing;
+#[path = "../examples.rs"]
+mod examples;
 #[path = "../machine.rs"]
 mod machine;
 

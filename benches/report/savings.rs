@@ -34,59 +34,28 @@ pub fn section() -> String {
         "spin_per_mm": { "from": 0.003, "to": 0.003, "points": 1 },
         "combine": "grid",
     } });
+    let still = json!({ "creepage_x": 0.0 });
+    let sliding = json!({ "creepage_x": 1000.0 });
     let mut text = HEAD.to_owned();
-    for (name, motion, outputs, friction) in [
-        (
-            "longitudinal creepage, resultants only",
-            &long,
-            &resultants,
-            0.3,
-        ),
-        ("the same, all outputs", &long, &everything, 0.3),
-        (
-            "creepages and spin, resultants only (no symmetry)",
-            &both,
-            &resultants,
-            0.3,
-        ),
-        ("the same, all outputs", &both, &everything, 0.3),
-        ("no friction, all outputs", &both, &everything, 0.0),
-        (
-            "no creepage, all outputs",
-            &json!({ "creepage_x": 0.0 }),
-            &everything,
-            0.3,
-        ),
-        (
-            "everything slips (creepage 1000)",
-            &json!({ "creepage_x": 1000.0 }),
-            &resultants,
-            0.3,
-        ),
-        (
-            "creep curve of 51 points in one job",
-            &curve,
-            &resultants,
-            0.3,
-        ),
-        (
-            "sweep of 7 creepages under spin 0.003/mm, resultants only",
-            &spinning,
-            &resultants,
-            0.3,
-        ),
-        ("the same, all outputs", &spinning, &everything, 0.3),
-    ] {
+    let mut row = |name: &str, motion: &Value, outputs: &Value, friction: f64| {
         let lu = lu_seconds();
         let cost = cost(motion, outputs, friction);
-        let _ = writeln!(
-            text,
-            "| {name} | {:.3} | {} | {} |",
-            cost.seconds / lu,
-            cost.products,
-            cost.allocations
-        );
-    }
+        let (time, products, allocations) = (cost.seconds / lu, cost.products, cost.allocations);
+        let _ = writeln!(text, "| {name} | {time:.3} | {products} | {allocations} |");
+    };
+    let [some, all] = [&resultants, &everything];
+    row("longitudinal creepage, resultants only", &long, some, 0.3);
+    row("the same, all outputs", &long, all, 0.3);
+    let name = "creepages and spin, resultants only (no symmetry)";
+    row(name, &both, some, 0.3);
+    row("the same, all outputs", &both, all, 0.3);
+    row("no friction, all outputs", &both, all, 0.0);
+    row("no creepage, all outputs", &still, all, 0.3);
+    row("everything slips (creepage 1000)", &sliding, some, 0.3);
+    row("creep curve of 51 points in one job", &curve, some, 0.3);
+    let name = "sweep of 7 creepages under spin 0.003/mm, resultants only";
+    row(name, &spinning, some, 0.3);
+    row("the same, all outputs", &spinning, all, 0.3);
     text.push_str(&one_by_one());
     text.push_str(&beside_the_median(&curve));
     text.push_str(&creep_map());

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use reqwest::Method;
 use sqlx::PgPool;
 use tempfile::TempDir;
 use tokio::task::block_in_place;
@@ -62,7 +61,9 @@ async fn hold(cluster: &Cluster, pool: &PgPool) -> Vec<String> {
             "held-{}-{number}",
             counted(pool, "SELECT COUNT(*) FROM jobs").await
         );
-        let (id, _) = cluster.submit(&endless_case(&name), &name, number).await;
+        let (id, _) = cluster
+            .submit("/v1/jobs", &endless_case(&name), &name, number)
+            .await;
         held.push(id);
     }
     until("both run", async || counted(pool, RUNNING).await == 2).await;
@@ -71,11 +72,7 @@ async fn hold(cluster: &Cluster, pool: &PgPool) -> Vec<String> {
 
 async fn cancel(cluster: &Cluster, ids: &[String]) {
     for id in ids {
-        let path = format!("/v1/jobs/{id}/cancel");
-        let api = cluster.apis()[0];
-        cluster
-            .ask(api, Method::POST, &path, |request| request)
-            .await;
+        cluster.cancel(id).await;
     }
 }
 

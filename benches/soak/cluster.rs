@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use railhead::jobs::store::postgres::schema::migrate;
-use reqwest::{Client, Method};
+use reqwest::{Client, Method, RequestBuilder};
 use serde_json::Value;
 use sqlx::PgPool;
 use tempfile::TempDir;
@@ -16,6 +16,7 @@ use crate::support::Service;
 
 /// Time limit after which something is considered to hang.
 const WITHIN: Duration = Duration::from_secs(900);
+const READ_WITHIN: Duration = Duration::from_secs(120);
 
 /// Returns the command that starts the node with this number.
 type Prepare = Box<dyn Fn(usize) -> Command + Send + Sync>;
@@ -116,12 +117,12 @@ impl Cluster {
     }
 
     /// Returns the status and the text of a response, or `None` if it is missing or incomplete.
-    pub async fn ask_text(
+    async fn ask(
         &self,
         api: SocketAddr,
         method: Method,
         path: &str,
-        shape: impl FnOnce(reqwest::RequestBuilder) -> reqwest::RequestBuilder,
+        shape: impl FnOnce(RequestBuilder) -> RequestBuilder,
     ) -> Option<(u16, String)> {
         let request = self.client.request(method, format!("http://{api}{path}"));
         let answer = shape(request).send().await.ok()?;
@@ -129,26 +130,37 @@ impl Cluster {
         Some((status, answer.text().await.ok()?))
     }
 
-    /// Returns the status and the JSON of a response, or `None` if there is none.
-    pub async fn ask(
-        &self,
-        api: SocketAddr,
-        method: Method,
-        path: &str,
-        shape: impl FnOnce(reqwest::RequestBuilder) -> reqwest::RequestBuilder,
-    ) -> Option<(u16, Value)> {
-        let (status, text) = self.ask_text(api, method, path, shape).await?;
-        Some((status, serde_json::from_str(&text).ok()?))
+    /// Cancels a job.
+    pub async fn cancel(&self, id: &str) {
+        let path = format!("/v1/jobs/{id}/cancel");
+        let api = self.apis()[0];
+        self.ask(api, Method::POST, &path, |request| request).await;
     }
 
-    /// Submits a case with an idempotency key to one API node after the other until it is accepted. Returns the id of the job and the number of
-    /// retries.
-    pub async fn submit(&self, case: &Value, key: &str, place: usize) -> (String, usize) {
-        self.submit_to("/v1/jobs", case, key, place).await
+    /// Returns the text of a successful response, which must be the same at every API node. Retries after faults of the object store that are not
+    /// repaired within a request.
+    pub async fn read_everywhere(&self, path: &str) -> String {
+        let since = Instant::now();
+        let mut read = Vec::new();
+        for api in self.apis() {
+            let text = loop {
+                let asked = self.ask(api, Method::GET, path, |request| request);
+                match asked.await {
+                    Some((200, text)) => break text,
+                    other if since.elapsed() > READ_WITHIN => panic!("{path}: {other:?}"),
+                    _ => tokio::time::sleep(Duration::from_millis(100)).await,
+                }
+            };
+            read.push(text);
+        }
+        let same = read.windows(2).all(|pair| pair[0] == pair[1]);
+        assert!(same, "{path} differs");
+        read.swap_remove(0)
     }
 
-    /// Submits a body to this path in the same way as [`Cluster::submit`].
-    pub async fn submit_to(
+    /// Submits a body with an idempotency key to one API node after the other until it is accepted. Returns the id of the job or run and the number
+    /// of retries.
+    pub async fn submit(
         &self,
         path: &str,
         body: &Value,
@@ -160,11 +172,11 @@ impl Cluster {
             let apis = self.apis();
             place += 1;
             if !apis.is_empty() {
-                let shape = |request: reqwest::RequestBuilder| {
-                    request.header("Idempotency-Key", key).json(body)
-                };
+                let shape =
+                    |request: RequestBuilder| request.header("Idempotency-Key", key).json(body);
                 let asked = self.ask(apis[place % apis.len()], Method::POST, path, shape);
                 if let Some((200 | 202, job)) = asked.await {
+                    let job: Value = job.parse().expect("JSON");
                     let id = job["id"].as_str().expect("an id");
                     return (id.to_owned(), again);
                 }

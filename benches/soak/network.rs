@@ -6,12 +6,11 @@ use std::time::{Duration, Instant};
 use reqwest::{Client, Method};
 use serde_json::json;
 use sqlx::PgPool;
-use tempfile::TempDir;
 use tokio::time::sleep;
 
 use crate::cluster::{assert_ended_once, counted, tables, until, until_all_ended};
 use crate::hosts::{self, Cut, Host};
-use crate::support::{Service, case, endless_case, long_case};
+use crate::support::{Service, case, endless_case, long_case, railhead};
 use crate::{postgres, row, without_settings};
 
 const LEASE: Duration = Duration::from_secs(3);
@@ -51,11 +50,9 @@ struct Network {
     api: Service,
     hosts: [Host; 2],
     workers: [Service; 2],
-    /// Data folders of the workers.
-    _folders: Vec<TempDir>,
 }
 
-fn start(host: &Host, role: &str, url: &str, folder: &TempDir) -> Service {
+fn start(host: &Host, role: &str, url: &str) -> Service {
     let program = host.command(env!("CARGO_BIN_EXE_railhead"));
     let mut program = without_settings(program);
     let listen = format!("{}:0", host.address);
@@ -66,7 +63,7 @@ fn start(host: &Host, role: &str, url: &str, folder: &TempDir) -> Service {
     if role == "serve" {
         flags.extend(["--anonymous", "always"]);
     }
-    Service::start_as(&mut program, role, folder.path(), &flags)
+    Service::alone(&mut program, role, &flags)
 }
 
 impl Network {
@@ -75,21 +72,17 @@ impl Network {
         let (near, pool) = tables().await?;
         sqlx::raw_sql(NOTES).execute(&pool).await.expect("notes");
         let url = near.replace("127.0.0.1", hosts::HERE);
-        let folders: Vec<_> = (0..3)
-            .map(|_| tempfile::tempdir().expect("a folder"))
-            .collect();
         let flags = ["--database-url", &url, "--workers", "0", "--lease-s", "3"];
         let flags = [&flags[..], &["--cache", "false"]].concat();
-        let api = Service::start(folders[2].path(), &flags);
+        let api = Service::alone(&mut railhead(), "serve", &flags);
         let hosts = [Host::new(2), Host::new(3)];
-        let workers = [0, 1].map(|number| start(&hosts[number], "worker", &url, &folders[number]));
+        let workers = [0, 1].map(|number| start(&hosts[number], "worker", &url));
         Some(Network {
             pool,
             url,
             api,
             hosts,
             workers,
-            _folders: folders,
         })
     }
 
@@ -244,8 +237,8 @@ impl Network {
 
     /// Disconnects an API node from the database, and tests the responses to clients and when it serves them again.
     async fn lose_the_database(&self) {
-        let (host, folder) = (Host::new(4), tempfile::tempdir().expect("a folder"));
-        let node = start(&host, "serve", &self.url, &folder);
+        let host = Host::new(4);
+        let node = start(&host, "serve", &self.url);
         let running = node.submit(&endless_case("endless")).await;
         node.until(&running, "running").await;
         let (_, port) = postgres::at_port(&self.url);
@@ -281,9 +274,7 @@ impl Network {
         .await;
         let ready = back.elapsed().as_secs_f64();
         // The node learns of the cancellation at another node by the notification or by polling.
-        let cancel = format!("/v1/jobs/{running}/cancel");
-        let cancelled = self.api.request(Method::POST, &cancel).send().await;
-        assert_eq!(cancelled.expect("an answer").status(), 202);
+        self.api.cancel(&running).await;
         node.until(&running, "cancelled").await;
         row(
             "seconds from the return of the database until it is ready",

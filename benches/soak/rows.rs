@@ -1,17 +1,13 @@
 //! Tests a run of many rows concurrent with the jobs: each row has one answer in its place, the same at every API node.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use reqwest::Method;
 use serde_json::{Value, json};
 use sqlx::PgPool;
 
 use crate::cluster::Cluster;
 use crate::row;
-
-/// Time limit after which something is considered to hang.
-const READ_WITHIN: Duration = Duration::from_secs(120);
 
 /// An accepted run.
 pub struct SentRun {
@@ -44,9 +40,7 @@ fn body(rows: usize, name: &str) -> Value {
 impl SentRun {
     /// Sends a run with an idempotency key until it is accepted.
     pub async fn send(cluster: &Arc<Cluster>, rows: usize, name: &str) -> SentRun {
-        let (id, _) = cluster
-            .submit_to("/v1/runs", &body(rows, name), name, 0)
-            .await;
+        let (id, _) = cluster.submit("/v1/runs", &body(rows, name), name, 0).await;
         SentRun { id, rows }
     }
 
@@ -64,21 +58,8 @@ impl SentRun {
             "/v1/runs/{}/results?format=csv&columns=row,status,force_x_n",
             self.id
         );
-        let mut read = Vec::new();
-        for api in cluster.apis() {
-            let text = loop {
-                let asked = cluster.ask_text(api, Method::GET, &path, |request| request);
-                match asked.await {
-                    Some((200, text)) => break text,
-                    // Faults of the object store that are not repaired within the request.
-                    other if began.elapsed() > READ_WITHIN => panic!("{path}: {other:?}"),
-                    _ => tokio::time::sleep(Duration::from_millis(100)).await,
-                }
-            };
-            self.assert_rows(&text);
-            read.push(text);
-        }
-        assert!(read.windows(2).all(|pair| pair[0] == pair[1]), "{path}");
+        let text = cluster.read_everywhere(&path).await;
+        self.assert_rows(&text);
         row(
             "rows of a run, each answered in its place and alike at both API nodes; its chunks and most attempts; seconds to read it twice",
             format!(

@@ -2,14 +2,10 @@
 //! and all nodes must work afterwards.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use reqwest::Method;
-use serde_json::Value;
 use sqlx::{Connection, PgConnection, PgPool};
-use tempfile::TempDir;
 use tokio::task::block_in_place;
-use tokio::time::sleep;
 
 use crate::queue::fill;
 use crate::support::{Service, case, railhead};
@@ -18,44 +14,31 @@ use crate::{old_tables, postgres, row};
 /// Number of jobs that are already in the tables.
 const JOBS: i64 = 100_000;
 
-/// Time limit after which something is considered to hang.
-const WITHIN: Duration = Duration::from_secs(60);
-
 /// Migrates the tables, then starts the node. Returns the output of the migration as well.
-fn start(url: &str, number: usize) -> (String, Service, TempDir) {
-    let folder = tempfile::tempdir().expect("a folder");
+fn start(url: &str, number: usize) -> (String, Service) {
     let mut migrate = railhead();
     let done = migrate.args(["migrate", "--database-url", url]).output();
     let done = done.expect("the program");
     assert!(done.status.success(), "{done:?}");
     let (role, workers) = [("serve", "0"), ("worker", "1")][number % 2];
     let flags = ["--database-url", url, "--workers", workers];
-    let service = Service::start_as(&mut railhead(), role, folder.path(), &flags);
     let said = String::from_utf8_lossy(&done.stdout).into_owned();
-    (said, service, folder)
+    (said, Service::alone(&mut railhead(), role, &flags))
 }
 
 /// Checks that nodes 0, 2 and 4 answer requests: each submitted job is read at the next of these nodes.
-async fn work(nodes: &[(String, Service, TempDir)]) {
+async fn work(nodes: &[(String, Service)]) {
     for number in [0, 2, 4] {
+        let (one, other) = (&nodes[number].1, &nodes[(number + 2) % 6].1);
         let mut urgent = case(&format!("of node {number}"));
         urgent["load"]["normal_force_n"] = (50_000 + number).into();
-        let (one, other) = (&nodes[number].1, &nodes[(number + 2) % 6].1);
-        let posted = one.request(Method::POST, "/v1/jobs?priority=high");
-        let job: Value = posted
-            .json(&urgent)
-            .send()
+        let job = one
+            .post("/v1/jobs?priority=high", &urgent)
             .await
-            .expect("an answer")
-            .json()
-            .await
-            .expect("a job");
-        let path = format!("/v1/jobs/{}", job["id"].as_str().expect("an id"));
-        let since = Instant::now();
-        while other.get(&path).await["state"] != "succeeded" {
-            assert!(since.elapsed() < WITHIN, "it does not end");
-            sleep(Duration::from_millis(20)).await;
-        }
+            .is(202)
+            .json;
+        let id = job["id"].as_str().expect("an id");
+        other.until(id, "succeeded").await;
     }
 }
 
@@ -98,7 +81,7 @@ pub async fn run() {
             })
         });
         let seconds = began.elapsed().as_secs_f64();
-        let did = nodes.iter().filter(|(said, _, _)| !said.contains("exists"));
+        let did = nodes.iter().filter(|(said, _)| !said.contains("exists"));
         assert_eq!(did.count(), 1, "one makes or changes the tables");
         work(&nodes).await;
         let before = match form {

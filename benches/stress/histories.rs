@@ -6,6 +6,7 @@ use railhead_contact::solution::words::answer::{PatchSolution, PointSolution, So
 use serde_json::{Value, json};
 
 use crate::class::{Class, solved, tried};
+use crate::examples::example;
 use crate::random::Random;
 
 const CLASSES: [Class; 7] = [
@@ -25,8 +26,6 @@ const LENGTHS_STEADY: f64 = 6.0;
 const LENGTHS_FALLING: f64 = 38.0;
 /// A length in mm that exceeds every patch of the wheels below. The distances are scaled to it. Chosen by judgement.
 const WHEEL_PATCH: f64 = 25.0;
-/// The example of S1002 on 60E1.
-const WHEEL: &str = include_str!("../../api/examples/wheel-rail-flange.case.json");
 /// Allowed decrease of the frictional work from point to point, over friction limit times half-length and over the work so far. The work is the
 /// difference of two terms that have the accuracy of forces.
 const DISSIPATION: [f64; 2] = [2e-4, 0.01];
@@ -178,7 +177,7 @@ fn wheel(random: &mut Random, case: &mut Value) {
     {
         *distance = json!(scale * distance.as_f64().unwrap_or(0.0));
     }
-    *case = serde_json::from_str(WHEEL).expect("an example");
+    *case = example("wheel-rail-flange");
     case["contact"]["lateral_shift_mm"] = json!(random.between(-6.6, 6.0));
     case["contact"]["yaw_rad"] = json!(random.between(-0.02, 0.02));
     case["load"] = json!({ "normal_force_n": random.decades(1e4, 1.5e5) });

@@ -12,6 +12,9 @@ mod contacts;
 mod damaged;
 mod damaged_table;
 mod damaged_trials;
+#[path = "../examples.rs"]
+#[allow(dead_code, reason = "other benches use the rest")]
+mod examples;
 #[path = "../../tests/routes/features.rs"]
 mod features;
 mod histories;

@@ -5,10 +5,8 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use crate::class::{Class, base, solved, tried};
+use crate::examples::example;
 use crate::random::Random;
-
-/// A wheel on a rail, with the tread on the crown.
-const WHEEL: &str = include_str!("../../api/examples/wheel-rail.case.json");
 
 const CLASSES: [Class; 8] = [
     ("friction falls with slip", 600, falling),
@@ -87,7 +85,7 @@ fn unlike_motions(random: &mut Random, case: &mut Value) {
 
 fn unlike_wheel(random: &mut Random, case: &mut Value) {
     let motion = case["motion"].take();
-    *case = serde_json::from_str(WHEEL).expect("an example");
+    *case = example("wheel-rail");
     unlike(random, case);
     case["motion"] = motion;
     case["contact"]["lateral_shift_mm"] = json!(random.between(-5.0, 3.0));

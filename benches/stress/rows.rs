@@ -18,6 +18,7 @@ use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::{Value, json};
 
+use crate::contacts::reversed;
 use crate::random::Random;
 
 /// Number of templates of each class, and of rows of each template.
@@ -155,20 +156,17 @@ pub fn table(seed: u64) -> String {
             broken: vec!["crashes".to_owned()],
             ..Class::default()
         });
-        let Class {
-            rows,
-            answered,
-            solved,
-            held,
-            worst,
-            broken,
-        } = class;
         let _ = writeln!(
             text,
-            "| {name} | {rows} | {answered} | {solved} | {held} | {worst:.2} | {} |",
-            broken.len()
+            "| {name} | {} | {} | {} | {} | {:.2} | {} |",
+            class.rows,
+            class.answered,
+            class.solved,
+            class.held,
+            class.worst,
+            class.broken.len()
         );
-        for why in broken.iter().take(20) {
+        for why in class.broken.iter().take(20) {
             let _ = writeln!(troubles, "- {name}: {why}");
         }
     }
@@ -193,11 +191,7 @@ fn by_table(seed: u64) -> Class {
                     .broken
                     .push(format!("{force:?} N of {limit} N: {}", draw.case(row)));
             }
-            let mut reversed = draw.case(row);
-            for part in ["creepage_x", "creepage_y", "spin_per_mm"] {
-                let value = reversed["motion"][part].as_f64().unwrap_or(0.0);
-                reversed["motion"][part] = json!(-value);
-            }
+            let reversed = reversed(&draw.case(row));
             if let Some([other, ..]) = alone(&reversed, &mut class)
                 && (0..2).any(|k| (force[k] + other[k]).abs() > SAME * limit)
             {

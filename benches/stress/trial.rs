@@ -34,7 +34,9 @@ const DENSE_CELLS_MAX: u64 = 120;
 const FINER: f64 = 8.0;
 
 /// The outcome of a case.
+#[derive(Default)]
 pub enum End {
+    #[default]
     Solved,
     /// The case has no answer, with the reason.
     Refused(String),
@@ -44,6 +46,7 @@ pub enum End {
 }
 
 /// Result of one case.
+#[derive(Default)]
 pub struct Trial {
     pub end: End,
     pub iterations: Option<u32>,
@@ -56,21 +59,6 @@ pub struct Trial {
     pub error: Option<(f64, f64)>,
     /// Actual and expected processor seconds.
     pub times: Option<[f64; 2]>,
-}
-
-impl Trial {
-    fn new() -> Trial {
-        Trial {
-            end: End::Solved,
-            iterations: None,
-            residual: None,
-            broken: Vec::new(),
-            energy: None,
-            from_liu_hsu: None,
-            error: None,
-            times: None,
-        }
-    }
 }
 
 struct Clock(Instant);
@@ -117,7 +105,7 @@ pub fn attempt_timed(case: &Value) -> Result<((Solution, Fields), [f64; 2]), End
 
 /// Solves a sample and all cases that it is compared with.
 pub fn trial(sample: &Sample) -> Trial {
-    let mut trial = Trial::new();
+    let mut trial = Trial::default();
     let (solution, fields) = match attempt_timed(&sample.case) {
         Ok((answer, times)) => {
             trial.times = Some(times);

@@ -2,10 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
-use cpu_time::ProcessTime;
 use railhead_contact::rolling::linear_theory::coefficients;
 use railhead_contact::rolling::methods::table::evaluate::CreepTable;
 use railhead_contact::rolling::methods::table::spline::{Shape, size, spin_factor};
@@ -13,13 +10,12 @@ use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::{Value, json};
 
 use crate::random::Random;
-use crate::solver::{Contact, largest_error, print_errors, read, solve, write};
+use crate::solver::{Contact, largest_error, print_errors, read, solve, solve_parts, write};
 
 /// Number of contacts. `MOTIONS` is the number of motions of each.
 pub const CONTACTS: usize = 400;
 pub const MOTIONS: usize = 15;
 pub const TARGET: f64 = 0.002;
-const THREADS: usize = 2;
 
 /// Returns a contact and its motions. ln a/b and ν are uniform, directions are uniform on the sphere of (u_x, u_y, u_s) with x, z of any sign, and σ
 /// is uniform from 0.02 to 0.97.
@@ -64,25 +60,14 @@ pub fn solve_all() {
     let missing: Vec<usize> = (0..CONTACTS)
         .filter(|k| read(&name(*k)).is_none())
         .collect();
-    let (next, began) = (AtomicUsize::new(0), Instant::now());
-    std::thread::scope(|scope| {
-        for _ in 0..THREADS {
-            scope.spawn(|| {
-                while let Some(number) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let (contact, motions) = contact(*number);
-                    // The motions of a contact share one operator store.
-                    let operators = Arc::new(OperatorStore::new(600 << 20));
-                    let answers = solve(&operators, contact, &motions, TARGET);
-                    write(&name(*number), answers.as_flattened());
-                    println!(
-                        "contact {number} of {}: {:.0} s in all, {:.0} s on the clock",
-                        missing.len(),
-                        ProcessTime::now().as_duration().as_secs_f64(),
-                        began.elapsed().as_secs_f64()
-                    );
-                }
-            });
-        }
+    solve_parts(&missing, |number| {
+        let (contact, motions) = contact(*number);
+        // The motions of a contact share one operator store.
+        let operators = Arc::new(OperatorStore::new(600 << 20));
+        let answers = solve(&operators, contact, &motions, TARGET);
+        let name = name(*number);
+        write(&name, answers.as_flattened());
+        name
     });
 }
 

@@ -1,8 +1,7 @@
 //! The errors of the table at motions that were not used to make it.
 
-use railhead_contact::rolling::linear_theory::coefficients;
 use railhead_contact::rolling::methods::table::evaluate::CreepTable;
-use railhead_contact::rolling::methods::table::spline::{Shape, cell, sigma, spin_factor};
+use railhead_contact::rolling::methods::table::spline::{cell, sigma, spin_factor};
 use serde_json::{Value, json};
 
 use crate::held_out::{CONTACTS, contact, name};
@@ -37,9 +36,7 @@ pub fn all(table: &CreepTable) -> Vec<Judged> {
         };
         let (of, motions) = contact(number);
         let ellipse = table.ellipse(of.ratio, of.poisson);
-        let [c11, c22, _] = coefficients(of.ratio, of.poisson);
-        let [q11, q22, _] = coefficients(of.ratio, 0.25);
-        let shape = Shape::new(of.ratio.sqrt(), [q11, q22]);
+        let ([c11, c22], shape) = of.scales();
         for (motion, answer) in motions.iter().zip(answers.chunks_exact(5)) {
             let found = ellipse.creep(*motion);
             let [x, y, z] = *motion;

@@ -1,25 +1,20 @@
 //! The nodes of the table, solved column by column: all poles and sizes of one direction, a/b and ν.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
-use cpu_time::{ProcessTime, ThreadTime};
-use railhead_contact::rolling::linear_theory::coefficients;
 use railhead_contact::rolling::methods::table::evaluate::CreepTable;
 use railhead_contact::rolling::methods::table::spline::{
-    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, Shape, direction, pole, ratio,
-    size,
+    DIRECTIONS, POISSON_RATIOS, POLES, RATIOS, SIZE_STEPS, SIZES, direction, pole, ratio, size,
 };
 use railhead_contact::rolling::operator_store::OperatorStore;
 
 use crate::random::Random;
-use crate::solver::{Answer, Contact, largest_error, print_errors, read, solve, write};
+use crate::solver::{
+    Answer, Contact, largest_error, print_errors, read, solve, solve_parts, write,
+};
 
 /// The size that represents infinity.
 const MOST: f64 = 1e5;
-/// Number of threads.
-const THREADS: usize = 2;
 
 /// Returns the target of the nodes of an a/b. Long ellipses cost most: those of a/b 10 at ν = 1/2 a hundred times as much as a circle.
 pub fn target(ratio: usize) -> f64 {
@@ -44,14 +39,7 @@ fn column(node: [usize; 2], chi: usize, target: f64) -> Vec<Answer> {
         ratio: ratio(node[0]),
         poisson: POISSON_RATIOS[node[1]],
     };
-    let pair = |nu: f64| {
-        let [c11, c22, _] = coefficients(contact.ratio, nu);
-        [c11, c22]
-    };
-    let (c, shape) = (
-        pair(contact.poisson),
-        Shape::new(contact.ratio.sqrt(), pair(0.25)),
-    );
+    let (c, shape) = contact.scales();
     let operators = Arc::new(OperatorStore::new(600 << 20));
     let mut answers = vec![[f64::NAN; 5]; POLES * SIZES.len()];
     // Pure spin has no direction, and without spin ±χ are mirror images. Those nodes are solved once.
@@ -107,27 +95,11 @@ pub fn solve_all() {
             }
         }
     }
-    let (next, began) = (AtomicUsize::new(0), Instant::now());
-    std::thread::scope(|scope| {
-        for _ in 0..THREADS {
-            scope.spawn(|| {
-                while let Some((node, chi)) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let busy = ThreadTime::now();
-                    let answers = column(*node, *chi, target(node[0]));
-                    write(&name(*node, *chi), answers.as_flattened());
-                    println!(
-                        "{} of {}: a/b {:.3}, nu {}, chi {chi}: {:.1} s; {:.0} s in all, {:.0} s on the clock",
-                        next.load(Ordering::Relaxed),
-                        missing.len(),
-                        ratio(node[0]),
-                        POISSON_RATIOS[node[1]],
-                        busy.elapsed().as_secs_f64(),
-                        ProcessTime::now().as_duration().as_secs_f64(),
-                        began.elapsed().as_secs_f64()
-                    );
-                }
-            });
-        }
+    solve_parts(&missing, |(node, chi)| {
+        let answers = column(*node, *chi, target(node[0]));
+        let name = name(*node, *chi);
+        write(&name, answers.as_flattened());
+        name
     });
 }
 
@@ -146,13 +118,8 @@ pub fn recompute(count: usize, table: &CreepTable) {
             ratio: ratio(node[0]),
             poisson: POISSON_RATIOS[node[1]],
         };
-        let pair = |nu: f64| {
-            let [c11, c22, _] = coefficients(contact.ratio, nu);
-            [c11, c22]
-        };
-        let shape = Shape::new(contact.ratio.sqrt(), pair(0.25));
-        let creepage =
-            shape.creepage_of_size(size_of(k), pole(p), direction(chi), pair(contact.poisson));
+        let (c, shape) = contact.scales();
+        let creepage = shape.creepage_of_size(size_of(k), pole(p), direction(chi), c);
         let operators = Arc::new(OperatorStore::default());
         let answer = solve(&operators, contact, &[creepage], target(node[0]))[0];
         let found = table

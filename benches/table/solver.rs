@@ -2,14 +2,19 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
+use railhead_contact::rolling::linear_theory::coefficients;
+use railhead_contact::rolling::methods::table::spline::Shape;
 use railhead_contact::rolling::operator_store::OperatorStore;
 use serde_json::json;
 
-use crate::machine::quantile;
+use crate::machine::{quantile, seconds_of};
 
 /// c = √(ab) in mm, G in MPa, and μN/(G c²), which is small so that the largest creepages remain allowed.
 const LENGTH: f64 = 5.0;
@@ -24,8 +29,45 @@ pub struct Contact {
     pub poisson: f64,
 }
 
+impl Contact {
+    /// Returns C11 and C22, and the shape of the directions, which is that of ν = 1/4.
+    pub fn scales(&self) -> ([f64; 2], Shape) {
+        let pair = |poisson: f64| {
+            let [c11, c22, _] = coefficients(self.ratio, poisson);
+            [c11, c22]
+        };
+        (
+            pair(self.poisson),
+            Shape::new(self.ratio.sqrt(), pair(0.25)),
+        )
+    }
+}
+
 /// F_x/(μN), F_y/(μN), M_z/(μNc), the stick share of the patch, the estimated error.
 pub type Answer = [f64; 5];
+
+/// Number of threads that solve.
+const THREADS: usize = 2;
+
+/// Solves all parts on several threads, which write their files. Prints a line for each part, with its name.
+pub fn solve_parts<P: Sync>(parts: &[P], solve: impl Fn(&P) -> String + Sync) {
+    let (next, began) = (AtomicUsize::new(0), Instant::now());
+    std::thread::scope(|scope| {
+        for _ in 0..THREADS {
+            scope.spawn(|| {
+                while let Some(part) = parts.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let (seconds, name) = seconds_of(|| solve(part));
+                    println!(
+                        "{name}, one of {}: {seconds:.1} s; {:.0} s in all, {:.0} s on the clock",
+                        parts.len(),
+                        ProcessTime::now().as_duration().as_secs_f64(),
+                        began.elapsed().as_secs_f64()
+                    );
+                }
+            });
+        }
+    });
+}
 
 /// Solves creepages (x, y, z) as one sweep.
 pub fn solve(
