@@ -117,8 +117,13 @@ fn points_without_order_loops_and_too_few_points_are_refused_in_their_place() {
     assert_fault(
         &changed(WHEEL, scaled(&s1002(), 25.4)),
         WHEEL,
-        &["5 to 500 mm"],
+        &["10 to 500 mm"],
     );
+    let in_inches = changed(WHEEL, scaled(&s1002(), 1.0 / 25.4));
+    assert_fault(&in_inches, WHEEL, &["state unit: \"inch\""]);
+    let mut points = s1002();
+    points[17] = [-999.0, -999.0];
+    assert_fault(&changed(WHEEL, json!(points)), WHEEL, &["to (-999, -999)"]);
 }
 
 #[test]

@@ -136,6 +136,14 @@ fn extended_forms() -> Vec<(&'static str, String)> {
             rows(|k, y, z| format!("{}9.5;{y};{z}\n", if k == 0 { "z raw;y;z\n" } else { "" })),
         ),
         (
+            "titles in braces",
+            "{ y z w }\n".to_owned() + &rows(|_, y, z| format!("{y} {z} 1\n")),
+        ),
+        (
+            "a word before the titles",
+            "Data: z raw y\n".to_owned() + &rows(|_, y, z| format!("{z} 9.5 {y}\n")),
+        ),
+        (
             "a header of words, a date and a count",
             header.to_owned() + &plain(),
         ),
@@ -348,12 +356,15 @@ fn whole_lines_are_shown_and_texts_without_points_say_why() {
     assert!(read(Format::Columns, &endless).unwrap_err().len() < 3000);
     let many = read(Format::Columns, &"1 2\n".repeat(100_001)).unwrap_err();
     assert!(many.contains("more than 100000 lines"), "{many}");
-    assert_eq!(
-        read(Format::Columns, "# nothing\n").unwrap_err(),
-        "no points found"
+    let fault = read(Format::Columns, "# nothing\n").unwrap_err();
+    assert!(
+        fault.starts_with("no points found; each needs a line"),
+        "{fault}"
     );
     let fault = read(Format::Columns, "\"1 2\n\"3 4\n").unwrap_err();
     assert!(fault.contains("2 rows are remarks"), "{fault}");
+    let inches = read(Format::Columns, &("y[\"] z[\"]\n".to_owned() + &plain())).expect("inches");
+    assert_eq!(inches.unit_mm, Some(25.4));
     let named = "id;y;z\n".to_owned() + &rows(|k, y, z| format!("P{k};{y};{z}\n"));
     let fault = read(Format::Columns, &named).unwrap_err();
     assert!(

@@ -426,6 +426,10 @@ fn lines(text: &str) -> Result<Vec<Line<'_>>, String> {
 /// Returns a line without its comment.
 fn bare(text: &str) -> Cow<'_, str> {
     let line = text.trim();
+    // A sign of inch in brackets is a unit, not a comment.
+    if ["[\"]", "(\")"].iter().any(|inch| line.contains(inch)) {
+        return Cow::Owned(line.replace("[\"]", "[in]").replace("(\")", "[in]"));
+    }
     if let Some(cells) = quoted_cells(line) {
         return Cow::Owned(cells);
     }
@@ -696,9 +700,10 @@ fn titles(table: &Table) -> (Option<[usize; 2]>, Option<LengthUnit>) {
     }
     let width = table.rows[0].numbers.len();
     let mut titles = cells(line);
-    // With a cell for each column, an empty cell is the title of a column. Otherwise separators are repeated.
+    // With a cell for each column, an empty cell is the title of a column. Otherwise separators are repeated, or braces and words surround the
+    // titles.
     if titles.len() != width {
-        titles.retain(|title| !title.is_empty());
+        titles.retain(|title| title.contains(char::is_alphanumeric) && !title.ends_with(':'));
     }
     let mut names: Vec<(char, Option<LengthUnit>)> = Vec::new();
     for cell in &titles {
@@ -887,7 +892,8 @@ impl Scanned<'_> {
             );
         }
         match self.commented_out(0) {
-            0 => "no points found".to_owned(),
+            0 => "no points found; each needs a line that begins with numbers, such as y z"
+                .to_owned(),
             count => format!(
                 "no points found; {count} rows are remarks, since they begin with #, %, !, \", ' or ;"
             ),

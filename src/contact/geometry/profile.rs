@@ -17,10 +17,11 @@ use crate::geometry::plane_curve::{
 use crate::geometry::profile_quality::{self, Points, PointsRead};
 use crate::lazy_field::LazyField;
 use crate::numerics::roots::bounds;
+use crate::remark::kind::short;
 use crate::remark::list::Remark;
 
 /// Allowed range of the arc length of a profile in mm. Other lengths suggest another unit.
-pub const ARC_LENGTH: [f64; 2] = [5.0, 500.0];
+pub const ARC_LENGTH: [f64; 2] = [10.0, 500.0];
 /// Fewest points of a profile.
 pub const POINTS_MIN: usize = 8;
 /// Most points of a profile.
@@ -96,7 +97,7 @@ impl Profile {
     /// Points nearer than 1 µm are merged, and single points that run backwards are dropped. Both leave a remark.
     ///
     /// # Errors
-    /// Returns a sentence if there are too few or too many points, numbers that are not finite, an arc length outside 5 to 500 mm, loops, more
+    /// Returns a sentence if there are too few or too many points, numbers that are not finite, an arc length outside 10 to 500 mm, loops, more
     /// than 5 % of the points running backwards, or directions that are neither stated nor shown by the shape.
     pub fn new(body: Body, points: &[[f64; 2]], reading: Reading) -> Result<Profile, String> {
         Profile::in_format(body, points, reading, FormatSenses::default())
@@ -172,7 +173,7 @@ impl Profile {
     /// two, so deep that no wheel reaches its bottom.
     ///
     /// # Errors
-    /// Returns a sentence if a number is not finite, the arc length is outside 5 to 500 mm, the points form a loop, or the guard rail is not
+    /// Returns a sentence if a number is not finite, the arc length is outside 10 to 500 mm, the points form a loop, or the guard rail is not
     /// next to the rail.
     pub fn with_guard_rail(&self, points: &[[f64; 2]]) -> Result<Profile, String> {
         let own = &self.measured;
@@ -349,8 +350,16 @@ fn check_length(points: &[[f64; 2]]) -> Result<(), String> {
     if (shortest..=longest).contains(&length) {
         return Ok(());
     }
+    let steps = points.windows(2);
+    let far = steps.max_by(|a, b| distance(a[0], a[1]).total_cmp(&distance(b[0], b[1])));
+    let far = far.map_or(String::new(), |step| {
+        let [from, to] =
+            [step[0], step[1]].map(|at| format!("({}, {})", short(at[0]), short(at[1])));
+        format!("; the longest step is from {from} to {to}")
+    });
     Err(format!(
-        "the arc length of the points is {length:.4} mm; {shortest} to {longest} mm are allowed"
+        "the arc length of the points is {} mm; {shortest} to {longest} mm are allowed{far}",
+        short(length)
     ))
 }
 
