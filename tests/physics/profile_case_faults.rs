@@ -123,7 +123,7 @@ fn points_without_order_loops_and_too_few_points_are_refused_in_their_place() {
     assert_fault(&in_inches, WHEEL, &["state unit: \"inch\""]);
     let mut points = s1002();
     points[17] = [-999.0, -999.0];
-    assert_fault(&changed(WHEEL, json!(points)), WHEEL, &["to (-999, -999)"]);
+    assert_fault(&changed(WHEEL, json!(points)), WHEEL, &["(-999, -999)"]);
 }
 
 #[test]

@@ -40,7 +40,7 @@ fn another_unit_is_told_by_the_arc_length_on_both_sides() {
         assert!(fault.contains("unit"), "{fault}");
     }
     let whole = length(&rail_60e1());
-    for (length, allowed) in [(4.99, false), (5.01, true), (499.0, true), (501.0, false)] {
+    for (length, allowed) in [(9.99, false), (10.01, true), (499.0, true), (501.0, false)] {
         assert_eq!(rail(&scaled(length / whole)).is_ok(), allowed, "{length}");
     }
 }
