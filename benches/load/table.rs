@@ -167,7 +167,6 @@ fn job() -> NewJob {
         cost_us: 1000,
         slice_us: 1000,
         cache_key: None,
-        source: None,
         idempotency: None,
         traceparent: None,
         options: SubmitOptions::default(),

@@ -4,10 +4,10 @@
 //!
 //! 1. **Check** ([`submit`]): references to stored [`profiles`] are resolved, and the [`engine`] checks the case. Cases of a [`batch`]
 //!    are checked while they arrive, and staged in a file.
-//! 2. **Idempotency key and cache** ([`idempotency`], [`submit`]): a repeated key returns the existing job. A case that the tenant has
-//!    solved before becomes a job that has already succeeded.
-//! 3. **Insert** ([`store`]): one transaction checks key, quota and bounds of the queue, and inserts the job. Concurrent single
-//!    submissions share a transaction. From now on the job is durable.
+//! 2. **Idempotency key** ([`idempotency`], [`submit`]): a repeated key returns the existing job.
+//! 3. **Insert** ([`store`]): one transaction checks key, cache, quota and bounds of the queue, and inserts the job. A case that the
+//!    tenant has solved before becomes a job that has already succeeded. Concurrent single submissions share a transaction. From
+//!    now on the job is durable.
 //! 4. **Claim** ([`worker::pool`]): the [fair scheduler](attempts::fair_scheduler) selects a queue, and `Worker::step` claims a group of
 //!    its jobs. A single job is a group of one. Each claim has a fencing token, which every later write contains.
 //! 5. **Renew the lease** ([`worker::heartbeat`]): while the solver makes progress and while results are being stored. If the lease

@@ -178,26 +178,24 @@ impl Jobs {
                 answer => return answer,
             }
         }
-        let mut new = NewJob {
+        let new = NewJob {
             idempotency,
             traceparent,
             options,
             body: Bytes::from(body.map_err(|error| JobsError::Damaged(error.to_string()))?),
             ..checked?
         };
-        let id = new.id;
-        if !options.bypass_cache && new.cache_key.is_some() {
-            self.find_sources(std::iter::once(&mut new)).await?;
-        }
         let stored = self.shared.store.enqueue(&new, self.queue_bounds()).await;
         let (job, replayed) = self.of_enqueued(self.observe_write(stored)?)?;
-        if job.id == id && job.cached {
-            self.shared.ended_cached(&[id]);
-            tracing::info!(job = %id, method = new.method, "job answered from an earlier result");
-            return Ok((job, false));
+        if !replayed {
+            let ended = job.cached.then_some(job.id);
+            self.shared
+                .ended_cached(std::iter::once(&new), ended.as_slice());
         }
-        self.shared.wake_worker();
-        tracing::info!(job = %job.id, method = new.method, "job queued");
+        if replayed || !job.cached {
+            self.shared.wake_worker();
+        }
+        tracing::info!(job = %job.id, method = new.method, cached = job.cached, "job stored");
         Ok((job, replayed))
     }
 
@@ -280,33 +278,20 @@ impl Jobs {
         hasher.finalize_xof().fill(&mut key);
         Some(key)
     }
-
-    /// Sets the source of each new job for which a result is stored.
-    pub(crate) async fn find_sources(&self, jobs: impl Iterator<Item = &mut NewJob>) -> Result<()> {
-        let jobs: Vec<_> = jobs.collect();
-        let keys: Vec<_> = jobs.iter().filter_map(|job| job.cache_key).collect();
-        if keys.is_empty() {
-            return Ok(());
-        }
-        let sources = self.shared.store.cached(&keys).await?;
-        let (mut hits, now) = (0, self.shared.now_ms());
-        for job in jobs {
-            let source = job.cache_key.and_then(|key| sources.get(&key));
-            job.source = source.map(|source| (*source, now));
-            hits += u64::from(job.source.is_some());
-        }
-        self.shared
-            .metrics
-            .cache_lookup(hits, keys.len() as u64 - hits);
-        Ok(())
-    }
 }
 
 impl Shared {
-    /// Counts and announces jobs that ended with the result of their source.
-    pub(crate) fn ended_cached(&self, ids: &[Uuid]) {
-        self.metrics.ended(State::Succeeded, ids.len() as u64);
-        for id in ids {
+    /// Counts and announces the jobs that ended when they were stored, because their results were in the cache.
+    pub(crate) fn ended_cached<'a>(
+        &self,
+        stored: impl Iterator<Item = &'a NewJob>,
+        ended: &[Uuid],
+    ) {
+        let (lookups, hits) = (stored.filter_map(NewJob::lookup_key).count(), ended.len());
+        let misses = lookups.saturating_sub(hits) as u64;
+        self.metrics.cache_lookup(hits as u64, misses);
+        self.metrics.ended(State::Succeeded, hits as u64);
+        for id in ended {
             self.announce(*id);
         }
     }

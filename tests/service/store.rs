@@ -258,7 +258,6 @@ pub fn new_job() -> NewJob {
         cost_us: 1000,
         slice_us: 1000,
         cache_key: None,
-        source: None,
         idempotency: None,
         traceparent: None,
         options: SubmitOptions::default(),

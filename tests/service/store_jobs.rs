@@ -75,7 +75,6 @@ async fn of_no_jobs_nothing_is_asked(kind: StoreKind) {
     let why = ReleaseReason::NotBegun;
     assert!(store.release(&[], why, 1).await.unwrap().is_empty());
     assert!(store.orphans(&[]).await.unwrap().is_empty());
-    assert!(store.cached(&[]).await.unwrap().is_empty());
     assert!(table.finish(&claim, &success(), 1).await.is_some());
 }
 

@@ -167,7 +167,7 @@ impl Jobs {
             if cases.is_empty() {
                 break;
             }
-            let mut some: Vec<(u32, NewJob)> = cases
+            let some: Vec<(u32, NewJob)> = cases
                 .into_iter()
                 .map(|((index, own, staged), body)| {
                     let blank = self.blank_job();
@@ -184,12 +184,9 @@ impl Jobs {
                     (index, job)
                 })
                 .collect();
-            if !options.bypass_cache {
-                self.find_sources(some.iter_mut().map(|(_, job)| job))
-                    .await?;
-            }
             let ended = self.shared.store.fill_batch(new.id, &some).await?;
-            self.shared.ended_cached(&ended);
+            let stored = some.iter().map(|(_, job)| job);
+            self.shared.ended_cached(stored, &ended);
         }
         self.shared.store.complete_batch(new.id).await?;
         tracing::info!(batch = %new.id, jobs = new.count, rejected = new.rejected, "batch queued");

@@ -180,18 +180,6 @@ pub enum ReleaseReason {
     },
 }
 
-/// Result of the renewal of a lease.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Renewal {
-    /// The lease is extended.
-    Held {
-        /// Whether the job was cancelled.
-        cancel_requested: bool,
-    },
-    /// The job was taken away or has ended.
-    Lost,
-}
-
 /// The running jobs that are taken from their workers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reap {
@@ -730,9 +718,6 @@ pub struct NewJob {
     pub slice_us: u32,
     /// Key under which later identical cases find the result.
     pub cache_key: Option<CacheKey>,
-    /// A succeeded job whose result this one gets instead of being queued, and the time at which it ends so.
-    #[serde(skip)]
-    pub source: Option<(Uuid, i64)>,
     /// The idempotency key with the digest of case and options; not used in a batch.
     #[serde(skip)]
     pub idempotency: Option<(String, [u8; 32])>,
@@ -745,6 +730,11 @@ pub struct NewJob {
 }
 
 impl NewJob {
+    /// The key under which the result of an earlier job may be found.
+    pub(crate) fn lookup_key(&self) -> Option<CacheKey> {
+        self.cache_key.filter(|_| !self.options.bypass_cache)
+    }
+
     /// The deadline of the job, epoch milliseconds.
     #[must_use]
     pub fn deadline(&self) -> Option<i64> {

@@ -8,7 +8,7 @@ use tokio::time::sleep;
 
 use crate::attempts::attempt::{AttemptControl, GroupLease, HeldLeases, StopReason};
 use crate::shared::{Shared, heartbeat};
-use crate::store::{Claim, Renewal};
+use crate::store::Claim;
 
 /// Holds the leases of newly claimed jobs and renews them.
 pub(crate) fn keep(shared: &Arc<Shared>, leases: Vec<(Claim, Arc<AttemptControl>)>) -> GroupLease {
@@ -59,14 +59,11 @@ async fn renew(shared: &Shared, kept: &HeldLeases) {
             let until = now.saturating_add(shared.lease_ms());
             kept.until.store(until, Ordering::Release);
         }
-        for ((_, control), renewal) in held.iter().zip(renewed.unwrap_or_default()) {
-            match renewal {
-                Renewal::Held {
-                    cancel_requested: true,
-                } => control.stop(StopReason::Cancel),
-                Renewal::Held { .. } => {}
-                Renewal::Lost => control.stop(StopReason::Lost),
-            }
+        if let Ok(renewed) = renewed {
+            let lost = held
+                .iter()
+                .filter(|(claim, _)| !renewed.contains(&claim.id));
+            lost.for_each(|(_, control)| control.stop(StopReason::Lost));
         }
     }
     if now >= kept.until.load(Ordering::Acquire) && solving() {

@@ -120,7 +120,6 @@ async fn maintain(store: &Arc<dyn Store>) {
         .await
         .unwrap();
     assert!(matches!(added, Enqueued::Created(_)), "{added:?}");
-    store.cached(&[[7; 16]]).await.unwrap();
     store.queues().await.unwrap();
     store.stats().await.unwrap();
     store.usage(TENANT).await.unwrap();

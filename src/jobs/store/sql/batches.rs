@@ -11,6 +11,7 @@ use uuid::Uuid;
 
 use super::blobs::{drop_slices_of_ended, release_blobs};
 use super::engine::{self, DbConnection, DbRow, Row, SqlStore, built, query, query_scalar};
+use super::finish::find_sources;
 use super::rows::{
     and_labels, and_name, count, job_columns, read_blob_ids, read_bytes, read_count, read_flag,
     read_id, read_job, read_json, read_kind, read_optional_bytes, read_small, read_state, to_json,
@@ -109,7 +110,8 @@ impl Batches for SqlStore {
             count(jobs.len()), batch.to_string()
         )?;
         require_batch(batch, filled.rows_affected())?;
-        let ended = insert_jobs(&mut transaction, Some(batch), &jobs).await?;
+        let sources = find_sources(&mut transaction, jobs.iter().map(|(_, job)| *job)).await?;
+        let ended = insert_jobs(&mut transaction, Some(batch), &jobs, &sources).await?;
         transaction.commit().await?;
         Ok(ended)
     }

@@ -15,7 +15,7 @@ use super::rows::{
 use crate::error::StoreError;
 use crate::model::{Queue, State};
 use crate::store::{
-    Claim, ClaimKind, ClaimRequest, ClaimedCase, Lease, NewSlice, ReleaseReason, Renewal, Result,
+    Claim, ClaimKind, ClaimRequest, ClaimedCase, Lease, NewSlice, ReleaseReason, Result,
     SliceRecord, StoredCase, StoredResult,
 };
 
@@ -164,10 +164,10 @@ impl Claims for SqlStore {
         Ok(cases)
     }
 
-    /// Extends leases and stores progress; the answers are in the order of the claims.
-    async fn renew(&self, claims: &[(&Claim, f64)], lease: Lease) -> Result<Vec<Renewal>> {
+    /// Extends leases and stores progress; returns the jobs whose leases are held.
+    async fn renew(&self, claims: &[(&Claim, f64)], lease: Lease) -> Result<HashSet<Uuid>> {
         if claims.is_empty() {
-            return Ok(Vec::new());
+            return Ok(HashSet::new());
         }
         let held = claims
             .iter()
@@ -176,17 +176,7 @@ impl Claims for SqlStore {
             RENEW;
             to_json(&held.collect::<Vec<_>>())?, self.lease_now(lease.now), lease.ms
         )?;
-        let mut held = HashMap::with_capacity(rows.len());
-        for row in &rows {
-            held.insert(read_id(row)?, read_flag(row, "cancel_requested")?);
-        }
-        let answers = claims.iter().map(|(claim, _)| match held.get(&claim.id) {
-            Some(cancel_requested) => Renewal::Held {
-                cancel_requested: *cancel_requested,
-            },
-            None => Renewal::Lost,
-        });
-        Ok(answers.collect())
+        rows.iter().map(read_id).collect()
     }
 
     /// Returns claimed jobs to the queue without counting the attempt; jobs that were cancelled end. Returns the jobs that
@@ -340,7 +330,7 @@ fn choose(queued: &[DbRow], request: &ClaimRequest<'_>) -> Result<Vec<Uuid>> {
 /// An update of the jobs whose leases are held: the claims are `$1`, as a JSON array of ids and tokens, and of the progress
 /// for [`RENEW`].
 macro_rules! update_held {
-    ($($changes:expr),+; $returned:literal) => {
+    ($($changes:expr),+) => {
         concat!(
             "WITH held AS (SELECT value ->> 0 AS id, CAST(value ->> 1 AS bigint) AS lease_token, \
              CAST(value ->> 2 AS double precision) AS now_at FROM ",
@@ -348,16 +338,20 @@ macro_rules! update_held {
             ") UPDATE jobs SET ",
             $($changes,)+
             " FROM held WHERE jobs.id = held.id AND jobs.lease_token = held.lease_token \
-             AND jobs.state || '' = 'running' RETURNING jobs.id AS id, ",
-            $returned
+             AND jobs.state || '' = 'running' RETURNING jobs.id AS id, state, slices"
         )
     };
 }
 
 pub(crate) const RENEW: &str = update_held!(
-    "lease_until = ", lease_now!("$2"), " + $3, progress = ", greatest!(), "(held.now_at, done), \
-     version = CASE WHEN progress = ", greatest!(), "(held.now_at, done) THEN version ELSE version + 1 END";
-    "cancel_requested"
+    "lease_until = ",
+    lease_now!("$2"),
+    " + $3, progress = ",
+    greatest!(),
+    "(held.now_at, done), \
+     version = CASE WHEN progress = ",
+    greatest!(),
+    "(held.now_at, done) THEN version ELSE version + 1 END"
 );
 
 pub(crate) const RELEASE: &str = update_held!(
@@ -365,9 +359,14 @@ pub(crate) const RELEASE: &str = update_held!(
      started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
      ended_at = CASE WHEN cancel_requested = 1 THEN $2 ELSE NULL END, updated_at = $2, \
      attempt = attempt - 1, progress = done, lease_until = NULL, worker = NULL, version = version + 1, \
-     slice_us = ", greatest!(), "(slice_us, $3), cost_us = ", greatest!(), "(cost_us, $3), \
-     bypass_cache = ", greatest!(), "(bypass_cache, $4)";
-    "state, slices"
+     slice_us = ",
+    greatest!(),
+    "(slice_us, $3), cost_us = ",
+    greatest!(),
+    "(cost_us, $3), \
+     bypass_cache = ",
+    greatest!(),
+    "(bypass_cache, $4)"
 );
 
 const TEMPLATES: &str = concat!(

@@ -14,13 +14,44 @@ use crate::store::{CacheKey, Claim, Ending, NewJob, Result, StoredResult};
 pub(crate) const SOURCE: &str =
     "(SELECT id FROM jobs WHERE cache_key = asked.cache_key AND state = 'succeeded' LIMIT 1)";
 
+/// Succeeded jobs by the cache key of their results.
+pub(crate) type Sources = HashMap<CacheKey, Uuid>;
+
+/// Finds a succeeded job for each new job with the same cache key, if there is one.
+pub(crate) async fn find_sources(
+    connection: &mut DbConnection,
+    jobs: impl Iterator<Item = &NewJob>,
+) -> Result<Sources> {
+    let keys: Vec<CacheKey> = jobs.filter_map(NewJob::lookup_key).collect();
+    if keys.is_empty() {
+        return Ok(Sources::new());
+    }
+    let mut query = built(format!(
+        "WITH asked (cache_key) AS ({}) SELECT cache_key, {SOURCE} AS id FROM asked",
+        values(keys.len(), 1)
+    ));
+    for key in &keys {
+        bind!(query; key.as_slice());
+    }
+    let mut sources = Sources::new();
+    for row in &query.fetch_all(connection).await? {
+        let id = read_optional_id(row, "id")?;
+        sources.extend(read_cache_key(row)?.zip(id));
+    }
+    Ok(sources)
+}
+
 /// Ends the newly inserted jobs that have a source, with its result. A job whose source was removed in the
 /// meantime stays queued. Returns the jobs that ended.
 pub(crate) async fn end_with_sources(
     connection: &mut DbConnection,
     jobs: impl Iterator<Item = &NewJob>,
+    sources: &Sources,
 ) -> Result<Vec<Uuid>> {
-    let pairs = jobs.filter_map(|job| job.source.map(|(source, at)| (job.id, source, at, None)));
+    let pairs = jobs.filter_map(|job| {
+        let source = sources.get(&job.lookup_key()?)?;
+        Some((job.id, *source, job.created_at, None))
+    });
     end_pairs(connection, &pairs.collect::<Vec<_>>()).await
 }
 
@@ -132,27 +163,5 @@ impl Ends for SqlStore {
         ended.extend(end_pairs(&mut transaction, &pairs).await?);
         transaction.commit().await?;
         Ok(ended)
-    }
-
-    /// Finds a succeeded job for each of these keys, if there is one.
-    async fn cached(&self, keys: &[CacheKey]) -> Result<HashMap<CacheKey, Uuid>> {
-        if keys.is_empty() {
-            return Ok(HashMap::new());
-        }
-        let mut query = built(format!(
-            "WITH asked (cache_key) AS ({}) SELECT cache_key, {SOURCE} AS id FROM asked",
-            values(keys.len(), 1)
-        ));
-        for key in keys {
-            bind!(query; key.as_slice());
-        }
-        let mut connection = self.readers.acquire().await?;
-        let rows = query.fetch_all(&mut *connection).await?;
-        let mut sources = HashMap::new();
-        for row in &rows {
-            let id = read_optional_id(row, "id")?;
-            sources.extend(read_cache_key(row)?.zip(id));
-        }
-        Ok(sources)
     }
 }

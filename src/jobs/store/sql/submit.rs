@@ -7,8 +7,8 @@ use tokio::sync::{mpsc, oneshot};
 use uuid::Uuid;
 
 use super::engine::{self, DbConnection, DbPool, Row, SqlStore, built, query};
-use super::finish::end_with_sources;
-use super::rows::{count, job_columns, read_count, read_id, read_job, to_json, values};
+use super::finish::{Sources, end_with_sources, find_sources};
+use super::rows::{count, job_columns, read_count, read_job, to_json, values};
 use crate::error::StoreError;
 use crate::model::Job;
 use crate::store::{CacheKey, Enqueued, NewJob, QueueBounds, Refusal, Result};
@@ -88,30 +88,16 @@ impl Places {
     }
 }
 
-/// Selects the jobs that have succeeded.
-pub(crate) async fn succeeded(
-    connection: &mut DbConnection,
-    ids: &[Uuid],
-) -> Result<HashSet<Uuid>> {
-    if ids.is_empty() {
-        return Ok(HashSet::new());
-    }
-    let rows = sql!(fetch_all, connection,
-        concat!("SELECT id FROM jobs WHERE ", bare!("state"), " = 'succeeded' AND id", in_list!("$1"));
-        to_json(ids)?
-    )?;
-    rows.iter().map(read_id).collect()
-}
-
 /// Number of jobs in one statement; with 20 values each far below the limit of SQLite.
 const ROWS_PER_STATEMENT: usize = 250;
 
 /// Inserts jobs within the caller's transaction; jobs of a batch with their indices in it. Returns the jobs that ended at
-/// once with the result of their source.
+/// once with the result of one of the sources.
 pub(crate) async fn insert_jobs(
     connection: &mut DbConnection,
     batch: Option<Uuid>,
     jobs: &[(Option<u32>, &NewJob)],
+    sources: &Sources,
 ) -> Result<Vec<Uuid>> {
     let mut ended = Vec::new();
     let batch = batch.map(|id| id.to_string());
@@ -144,7 +130,7 @@ pub(crate) async fn insert_jobs(
             sql!(execute, &mut *connection, INSERT_LABELS; to_json(&labelled)?)?;
         }
         let jobs = some.iter().map(|(_, job)| *job);
-        ended.extend(end_with_sources(&mut *connection, jobs).await?);
+        ended.extend(end_with_sources(&mut *connection, jobs, sources).await?);
     }
     Ok(ended)
 }
@@ -250,11 +236,10 @@ async fn store_together(
     bounds: QueueBounds,
 ) -> Result<Vec<Enqueued>> {
     let mut transaction = engine::begin(writer).await?;
+    let sources = find_sources(&mut transaction, jobs.iter().copied()).await?;
     engine::lock_admission(&mut transaction).await?;
     let tenants: HashSet<&str> = jobs.iter().map(|job| &*job.tenant).collect();
     let mut places = Places::of(&mut transaction, tenants, bounds).await?;
-    let sources: Vec<Uuid> = jobs.iter().filter_map(|job| Some(job.source?.0)).collect();
-    let living = succeeded(&mut transaction, &sources).await?;
     let mut known = HashMap::new();
     for job in jobs {
         if let Some((key, digest)) = &job.idempotency
@@ -271,8 +256,8 @@ async fn store_together(
     for (_, job) in &added {
         // A job that ends at once with the result of its source needs no place.
         let ends = job
-            .source
-            .is_some_and(|(source, _)| living.contains(&source));
+            .lookup_key()
+            .is_some_and(|key| sources.contains_key(&key));
         let taken = match ends {
             true => Ok(()),
             false => places.take(&job.tenant, 1),
@@ -287,7 +272,7 @@ async fn store_together(
         transaction.commit().await?;
         return answers(jobs, known);
     }
-    insert_jobs(&mut transaction, None, &added).await?;
+    insert_jobs(&mut transaction, None, &added, &sources).await?;
     for (_, job) in &added {
         if let Some((key, digest)) = &job.idempotency {
             sql!(execute, &mut *transaction,
@@ -356,9 +341,8 @@ async fn read_back(
 /// Submission of single jobs.
 #[store_trait]
 impl SubmitJobs for SqlStore {
-    /// Inserts a job if the bounds permit it, or finds the job of its idempotency key. A job with a cached result ends at
-    /// once and needs no place in the queue; if its source was removed in the meantime, the job is queued. Dropping the
-    /// future does not cancel the call.
+    /// Inserts a job if the bounds permit it, or finds the job of its idempotency key. A job for whose cache key there is a
+    /// result ends at once and needs no place in the queue. Dropping the future does not cancel the call.
     #[once]
     async fn enqueue(&self, new: &NewJob, bounds: QueueBounds) -> Result<Enqueued> {
         let gone = || {

@@ -29,17 +29,10 @@ pub(crate) const REAP: &str = concat!(
     " RETURNING id, state, slices"
 );
 
-/// Returns those jobs of a crashed process to the queue that cannot be identified as its cause. Their attempts do not count, and
-/// they are claimed alone next time. The remaining job was the only suspect, or the only running job.
-pub(crate) const REAP_BYSTANDERS: &str = "UPDATE jobs SET \
-     state = CASE WHEN cancel_requested = 1 THEN 'cancelled' ELSE 'queued' END, \
-     ended_at = CASE WHEN cancel_requested = 1 THEN $1 ELSE NULL END, \
-     started_at = CASE WHEN cancel_requested = 1 THEN started_at ELSE NULL END, \
-     attempt = attempt - 1, suspect = 1, \
-     progress = done, lease_until = NULL, worker = NULL, version = version + 1, updated_at = $1 \
-     WHERE state = 'running' AND (group_size > 1 \
-         OR (suspect = 0 AND (SELECT COUNT(*) FROM jobs AS other WHERE other.state = 'running') > 1)) \
-     RETURNING id, state, slices";
+/// Marks the running jobs of a crashed process as a group, because none of them can be identified as its cause. A job that was a
+/// suspect, or the only running job, is the cause.
+pub(crate) const GROUP_RUNNING: &str = "UPDATE jobs SET group_size = 2 WHERE state = 'running' AND suspect = 0 AND group_size = 1 \
+     AND (SELECT COUNT(*) FROM jobs AS other WHERE other.state = 'running') > 1";
 
 /// Maintenance: expired leases, deadlines, expired jobs, and statistics.
 #[store_trait]
@@ -49,20 +42,17 @@ impl Upkeep for SqlStore {
     /// alone next time. Returns them with their new states.
     async fn reap(&self, which: Reap, now: i64, attempts_max: u32) -> Result<Vec<(Uuid, State)>> {
         let mut transaction = engine::begin(&self.writer).await?;
-        let mut rows = Vec::new();
         let late = match which {
             Reap::Expired { now } => self.lease_now(now),
             Reap::Dead => {
-                let bystanders = query(REAP_BYSTANDERS).bind(now);
-                rows = bystanders.fetch_all(&mut *transaction).await?;
+                sql!(execute, &mut *transaction, GROUP_RUNNING)?;
                 Some(i64::MAX)
             }
         };
-        let expired = sql!(fetch_all, &mut *transaction,
+        let rows = sql!(fetch_all, &mut *transaction,
             REAP;
             i64::from(attempts_max), to_json(&Failure::worker_lost(attempts_max))?, now, late
         )?;
-        rows.extend(expired);
         drop_slices_of_ended(&mut transaction, &rows).await?;
         transaction.commit().await?;
         self.requeued();

@@ -28,7 +28,7 @@ mod plans {
     };
     use crate::store::sqlite::sql::finish::{END_PAIRS, FINISH, SOURCE};
     use crate::store::sqlite::sql::upkeep::{
-        BEFORE, COUNT, EXPIRED, FAIL_LATE, LATE, OLDEST, REAP, REAP_BYSTANDERS, RESULT_BYTES,
+        BEFORE, COUNT, EXPIRED, FAIL_LATE, GROUP_RUNNING, LATE, OLDEST, REAP, RESULT_BYTES,
     };
     use crate::store::sqlite::sql::{batches, jobs};
     use crate::store::{Filter, Membership};
@@ -129,13 +129,12 @@ mod plans {
     #[tokio::test]
     async fn the_claim_and_the_reaper_find_their_jobs_by_index() {
         let store = Opened::new().await;
-        let bystanders = REAP_BYSTANDERS;
         for (statement, seek) in [
             (QUEUES, "PRIMARY KEY (state=?"),
             (PEEK, "jobs_queued (tenant=? AND kind=?"),
             (PEEK_BEGUN, "jobs_begun (tenant=? AND kind=?"),
             (REAP, "jobs_by_state (state=?"),
-            (bystanders, "jobs_by_state (state=?"),
+            (GROUP_RUNNING, "jobs_by_state (state=?"),
         ] {
             let steps = store.plan(statement).await;
             assert_seeks(&steps, seek, &["SCAN j", "TEMP B-TREE"]);
