@@ -5,7 +5,6 @@
 
 use std::ops::Range;
 
-use crate::error::SolveError;
 use crate::half_space::strip_operator::kind::Precision;
 use crate::problem::checked_case::CheckedCase;
 use crate::remark::entry::merged;
@@ -44,9 +43,12 @@ pub fn slices(case: &CheckedCase) -> Vec<Range<usize>> {
 }
 
 /// Joins the answers to consecutive motions of a case, of which there is at least one. It ends at the first error.
-pub(crate) fn joined(
-    answers: impl IntoIterator<Item = Result<(Solution, Fields), SolveError>>,
-) -> Result<(Solution, Fields), SolveError> {
+///
+/// # Errors
+/// The first error among the answers.
+pub fn joined<E>(
+    answers: impl IntoIterator<Item = Result<(Solution, Fields), E>>,
+) -> Result<(Solution, Fields), E> {
     let mut answers = answers.into_iter();
     let Some(first) = answers.next() else {
         unreachable!("a case has at least one motion")
@@ -62,7 +64,7 @@ pub(crate) fn joined(
 
 impl Solution {
     /// Appends the motions of the next slice of the same case.
-    pub fn append(&mut self, later: Solution) {
+    fn append(&mut self, later: Solution) {
         debug_assert_eq!(self.patches.len(), later.patches.len());
         for (patch, more) in self.patches.iter_mut().zip(later.patches) {
             patch.points.extend(more.points);
@@ -76,7 +78,7 @@ impl Solution {
 
 impl Fields {
     /// Appends the values per cell of the next slice of the same case.
-    pub fn append(&mut self, later: Fields) {
+    fn append(&mut self, later: Fields) {
         debug_assert_eq!(self.patches.len(), later.patches.len());
         for (patch, mut more) in self.patches.iter_mut().zip(later.patches) {
             let meshes = patch.meshes.len();

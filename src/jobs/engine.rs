@@ -13,7 +13,7 @@ use railhead_contact::error::{CaseError, SolveError};
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
 use railhead_contact::rolling::operator_store::OperatorStore;
-use railhead_contact::slices::slices;
+use railhead_contact::slices::{joined, slices};
 use railhead_contact::solution::words::answer::{Fields, Solution};
 use railhead_contact::solve_slice;
 
@@ -76,15 +76,9 @@ impl Engine {
         checked: &CheckedCase,
         monitor: &dyn Monitor,
     ) -> Result<Solution, SolveError> {
-        let mut whole: Option<Solution> = None;
-        for slice in (self.slices)(checked) {
-            let (solution, _) = (self.solve)(checked, slice, monitor)?;
-            match &mut whole {
-                None => whole = Some(solution),
-                Some(all) => all.append(solution),
-            }
-        }
-        whole.ok_or(SolveError::Cancelled)
+        let slices = (self.slices)(checked).into_iter();
+        let answers = slices.map(|slice| (self.solve)(checked, slice, monitor));
+        joined(answers).map(|(solution, _)| solution)
     }
 
     /// The same engine with another solver, which solves each case as a single slice.

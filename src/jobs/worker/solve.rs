@@ -30,6 +30,7 @@ use railhead_contact::evaluate::many::solve_many;
 use railhead_contact::evolution::task::Evolution;
 use railhead_contact::monitor::Monitor;
 use railhead_contact::problem::checked_case::CheckedCase;
+use railhead_contact::slices::joined;
 use railhead_contact::solution::words::answer::{Fields, PatchFields, Solution};
 use railhead_tables::parquet;
 use railhead_tables::table::{RowTable, TableColumn};
@@ -170,33 +171,26 @@ fn encoded(solution: &Solution, fields: &Fields) -> Result<EncodedResult, String
     })
 }
 
-/// Joins the parts of a solution in the order of their slices. `go_on` is called before each part.
+/// Joins the parts of a solution in the order of their slices, of which there is at least one. `go_on` is called before each
+/// part.
 ///
 /// # Errors
 /// A part cannot be read, or does not match the others. `None` if `go_on` returned `false`.
 fn join(parts: &[EncodedResult], go_on: impl Fn() -> bool) -> Result<Option<(Solution, Fields)>> {
-    let mut whole: Option<(Solution, Fields)> = None;
-    for part in parts {
+    let mut patches = None;
+    let answers = parts.iter().map(|part| {
         if !go_on() {
-            return Ok(None);
+            return Err(None);
         }
-        let (solution, fields) = read(part)?;
-        match &mut whole {
-            None => whole = Some((solution, fields)),
-            Some((all, all_fields)) => {
-                if all.patches.len() != solution.patches.len()
-                    || all_fields.patches.len() != fields.patches.len()
-                {
-                    let reason = "the slices of a sweep have different patches";
-                    return Err(JobsError::Damaged(reason.to_owned()));
-                }
-                all.append(solution);
-                all_fields.append(fields);
-            }
+        let (solution, fields) = read(part).map_err(Some)?;
+        let own = [solution.patches.len(), fields.patches.len()];
+        if *patches.get_or_insert(own) != own {
+            let reason = "the slices of a sweep have different patches";
+            return Err(Some(JobsError::Damaged(reason.to_owned())));
         }
-    }
-    let none = || JobsError::Damaged("a sweep without slices".to_owned());
-    whole.ok_or_else(none).map(Some)
+        Ok((solution, fields))
+    });
+    joined(answers).map_or_else(|error| error.map_or(Ok(None), Err), |whole| Ok(Some(whole)))
 }
 
 fn read(part: &EncodedResult) -> Result<(Solution, Fields)> {
@@ -398,23 +392,16 @@ mod tests {
         let checked = checked_case();
         let engine = Engine::contact();
         let mut parts = Vec::new();
-        let mut whole: Option<(Solution, Fields)> = None;
-        for cut in [0..3, 3..5, 5..7] {
+        let solved = [0..3, 3..5, 5..7].map(|cut| {
             let (solution, fields) = (engine.solve)(&checked, cut, &Unmonitored).unwrap();
             parts.push(EncodedResult {
                 solution: Bytes::from(serde_json::to_vec(&solution).unwrap()),
                 fields: Some(Bytes::from(encode(&fields).unwrap())),
             });
-            match &mut whole {
-                None => whole = Some((solution, fields)),
-                Some((all, all_fields)) => {
-                    all.append(solution);
-                    all_fields.append(fields);
-                }
-            }
-        }
+            Ok::<_, SolveError>((solution, fields))
+        });
         let (solution, fields) = join(&parts, || true).unwrap().unwrap();
-        let (expected, expected_fields) = whole.unwrap();
+        let (expected, expected_fields) = joined(solved).unwrap();
         assert_eq!(solution.total.len(), 7);
         assert_eq!(
             serde_json::to_vec(&solution).unwrap(),
@@ -426,6 +413,5 @@ mod tests {
         assert!(matches!(join(&parts, || true), Err(JobsError::Damaged(_))));
         parts[1].solution = Bytes::from_static(b"{");
         assert!(join(&parts, || true).is_err());
-        assert!(join(&[], || true).is_err());
     }
 }
