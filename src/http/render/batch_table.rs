@@ -1,7 +1,6 @@
 //! Results of a batch as a table, with a row per job and motion, or per job, motion and patch.
 
 use std::collections::HashSet;
-use std::ops::Range;
 
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::solution::words::answer::{
@@ -155,16 +154,10 @@ impl Columns {
         );
     }
 
-    /// Adds the rows of these motions of a job.
-    pub(crate) fn add(
-        &self,
-        table: &mut RowTable,
-        item: &BatchItem,
-        solution: &Solution,
-        points: Range<usize>,
-    ) {
+    /// Adds the rows of the motions of a job.
+    pub(crate) fn add(&self, table: &mut RowTable, item: &BatchItem, solution: &Solution) {
         let by_patch = self.0.iter().any(|(name, _)| name == "patch");
-        for point in points {
+        for point in 0..solution.total.len() {
             let patches: Vec<_> = match by_patch {
                 true => solution.at(point).map(|part| Some(part.number)).collect(),
                 false => vec![None],

@@ -21,7 +21,7 @@ use crate::extract::caller::{Credential, WorkPath};
 use crate::extract::query::{Parameters, id, query, reader, repeated, word};
 use crate::extract::rows::{TableUpload, separate_table};
 use crate::layers::response::StreamedUnbuffered;
-use crate::limits::{Memory, Permit, hold_while_sent};
+use crate::limits::{Memory, hold_while_sent};
 use crate::options::HttpOptions;
 use crate::problem::{ApiError, Fault, ProblemBody, ProblemKind, Result, problems};
 use crate::render::batch_table::Columns;
@@ -145,8 +145,6 @@ fn faults(draft: &BatchUpload) -> Vec<Fault> {
 
 /// Memory of a response for small results, in bytes: a page of results and its text.
 const STREAM_BYTES: usize = 2 * PAGE_BYTES;
-/// Number of motions of a large result that are written at once.
-const POINTS: usize = 64;
 
 /// The source of the lines of a response.
 struct Source {
@@ -184,7 +182,7 @@ impl Source {
     async fn write_small(&self, items: Vec<BatchItem>) -> Result<Piece, JobsError> {
         let columns = self.columns.clone();
         let written = blocking(move || match columns {
-            Some(columns) => Ok(Piece::Table(table_of_small(&columns, &items))),
+            Some(columns) => Ok(Piece::Table(table_of(&columns, &items))),
             None => Ok(Piece::Text(write_ndjson(&items)?.into())),
         });
         written.await?
@@ -218,37 +216,38 @@ impl Source {
             return Ok(ndjson_of(&item, solution)?);
         };
         // The text and the solution parsed from it.
-        let needed = 2 * bytes;
-        if !self.memory.has_room_for(needed) {
+        if !self.memory.has_room_for(2 * bytes) {
             let detail = format!(
                 "the result of {bytes} bytes exceeds the memory limit of a table (`--tenant-request-memory-mb`); ask for NDJSON"
             );
             return without(problem(&item, ProblemKind::Overloaded, detail));
         }
-        match self.read_large(needed, (bytes, solution)).await? {
-            Some((solution, share)) => Ok(table_of(columns, item, solution, share)),
-            None => without(missing_result(&item, ItemFault::Unreadable)),
-        }
+        self.table_of_large(columns, item, (bytes, solution)).await
     }
 
-    /// Reads a solution, and returns the permit for its memory; `None` if the text is not a solution.
-    async fn read_large(
+    /// Returns the lines of a table for a job with a large result. They hold the permit for its memory.
+    async fn table_of_large(
         &self,
-        needed: usize,
+        columns: Arc<Columns>,
+        mut item: BatchItem,
         (bytes, mut pieces): OpenedItem,
-    ) -> Result<Option<(Solution, Option<Permit>)>, BoxError> {
+    ) -> Result<Pieces, BoxError> {
         let refused = |error: ApiError| BoxError::from(error.detail().to_owned());
-        let turn = self.memory.rendering(self.jobs.tenant(), needed).await;
+        let turn = self.memory.rendering(self.jobs.tenant(), 2 * bytes).await;
         let turn = turn.map_err(refused)?;
         let mut text = Vec::with_capacity(bytes);
         while let Some(piece) = pieces.try_next().await? {
             text.extend_from_slice(&piece);
         }
         text.push(b'}');
-        let read = move || Ok(serde_json::from_slice::<Solution>(&text).ok());
-        let read = turn.run(read, move |_| bytes).await;
-        let (solution, share) = read.map_err(refused)?;
-        Ok(solution.map(|solution| (solution, share)))
+        item.solution = Some(text.into());
+        let rows = move || Ok(table_of(&columns, &[item]));
+        let made = turn.run(rows, move |_| bytes).await;
+        let (table, share) = made.map_err(refused)?;
+        let lines = one(Piece::Table(table)).inspect(move |_| {
+            let _held = &share;
+        });
+        Ok(lines.boxed())
     }
 }
 
@@ -270,35 +269,14 @@ fn ndjson_of(
     Ok(front.chain(middle).chain(tail).boxed())
 }
 
-/// Returns the lines of a job, some motions at a time.
-fn table_of(
-    columns: Arc<Columns>,
-    item: BatchItem,
-    solution: Solution,
-    share: Option<Permit>,
-) -> Pieces {
-    let held = (columns, item, solution, share);
-    let lines = try_unfold((0, held), |(start, held)| async move {
-        let (columns, item, solution, _) = &held;
-        let end = (start + POINTS).min(solution.total.len());
-        if start == end {
-            return Ok(None);
-        }
-        let mut table = columns.empty();
-        columns.add(&mut table, item, solution, start..end);
-        Ok(Some((Piece::Table(table), (end, held))))
-    });
-    lines.boxed()
-}
-
-/// Returns the lines of jobs with small results.
-fn table_of_small(columns: &Columns, items: &[BatchItem]) -> RowTable {
+/// Returns the lines of jobs whose solutions were read.
+fn table_of(columns: &Columns, items: &[BatchItem]) -> RowTable {
     let mut table = columns.empty();
     for item in items {
         if let Some(text) = &item.solution
             && let Ok(solution) = serde_json::from_slice::<Solution>(text)
         {
-            columns.add(&mut table, item, &solution, 0..solution.total.len());
+            columns.add(&mut table, item, &solution);
             continue;
         }
         let error = failure(item).map(|problem| problem.detail);
