@@ -33,7 +33,7 @@ use crate::problem::{ApiError, ProblemKind, Result, faulty};
 use railhead_contact::case::words::solver::Case;
 use railhead_contact::evaluate::varied::Values;
 use railhead_jobs::Jobs;
-use railhead_jobs::run::draft::RunDraft;
+use railhead_jobs::batch::upload::BatchUpload;
 use railhead_tables::error::TableError;
 use railhead_tables::read::{TableForm, TableRows, TableSource};
 use railhead_tables::strict_json::Strict;
@@ -398,7 +398,7 @@ pub(crate) struct TableUpload {
 /// Memory for reading a piece of a table, in bytes.
 const PIECE_BYTES: usize = 64 << 20;
 
-/// Reads rows into a draft, from a table or from JSON, which contains its template.
+/// Reads the rows of a run, from a table or from JSON, which contains its template.
 ///
 /// # Errors
 /// The body is too large, too slow, ends early or is malformed; or the error of the draft.
@@ -406,7 +406,7 @@ pub async fn read_run(
     (jobs, memory, options): (&Jobs, &Memory, &HttpOptions),
     (table, named): (Option<Table>, NamedColumns),
     request: Request<Body>,
-) -> Result<RunDraft> {
+) -> Result<BatchUpload> {
     let (rows_max, bytes_max) = (options.run_max_rows, options.evaluate_max_bytes);
     let drafts = jobs.clone();
     let Some(table) = table else {
@@ -420,8 +420,7 @@ pub async fn read_run(
             drop(text);
             let mut draft = drafts.draft_run(template, columns, rows_max)?;
             draft.push(values)?;
-            draft.cut_all()?;
-            Ok(draft)
+            Ok(draft.finish()?)
         });
         return read.await;
     };
@@ -442,8 +441,7 @@ pub async fn read_run(
             pace.step()?;
             draft.push(chunk?)?;
         }
-        draft.cut_all()?;
-        Ok(draft)
+        Ok(draft.finish()?)
     })
     .await
 }

@@ -103,7 +103,7 @@ pub(crate) async fn submit(
     let named = named.chain(carried.map(|title| (title, String::new())));
     let read = (table, NamedColumns(Some(named.collect())));
     let draft = read_run(state, read, request).await?;
-    let (id, replayed) = jobs.submit_run(draft, work).await?;
+    let (id, replayed) = jobs.submit_batch(draft, work).await?;
     let run = jobs.of_kind(Kind::Rows).work(id).await?;
     reply.send(&jobs, &memory, (run, replayed), None).await
 }

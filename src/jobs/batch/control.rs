@@ -64,7 +64,7 @@ const CHUNK_BYTES: usize = 4 << 20;
 const FILLING_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
 impl Jobs {
-    /// Queues the valid cases of an upload. Once this returns, all of them are durable; if it fails, none of them is
+    /// Queues the valid cases of a batch, or the chunks of a run. Once this returns, all of them are durable; if it fails, none of them is
     /// queued. Workers begin when all are queued. Returns the id of the batch, and whether it is that of an earlier
     /// submission with the same idempotency key.
     ///
@@ -74,8 +74,10 @@ impl Jobs {
     pub async fn submit_batch(
         &self,
         draft: BatchUpload,
-        options: WorkOptions,
+        mut options: WorkOptions,
     ) -> Result<(Uuid, bool)> {
+        // Results of rows are not cached.
+        options.submit.bypass_cache |= draft.new.kind == Kind::Rows;
         let span = SubmitSpan::begin(self.tracer());
         let jobs = draft.cases - draft.new.rejected;
         let submitted = self.store_batch(draft, options, span.traceparent());

@@ -4,17 +4,15 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fs::File;
 
 use serde_json::Value;
-use uuid::Uuid;
 
 use crate::batch::upload::BatchUpload;
 use crate::data_dir::nameless;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
-use crate::model::{Kind, WorkOptions};
+use crate::model::Kind;
 use crate::profiles::KnownSections;
 use crate::run::model::{REASON, REMARKS, RunChunk, RunHead};
 use crate::submit::microseconds;
-use crate::sync::blocking;
 use railhead_contact::case::words::solver::Output;
 use railhead_contact::error::{CaseError, Fault};
 use railhead_contact::evaluate::answer::NumberColumns;
@@ -102,22 +100,6 @@ impl Jobs {
         let file = nameless(&self.options().data_dir);
         file.map_err(|source| self.spool_failed(source))
     }
-
-    /// Queues a run, which is durable once this returns. Returns its id, and whether it is that of an earlier submission
-    /// with the same idempotency key.
-    ///
-    /// # Errors
-    /// As [`Jobs::submit_batch`], and [`JobsError::Case`] with every fault of the first row.
-    pub async fn submit_run(
-        &self,
-        draft: RunDraft,
-        mut options: WorkOptions,
-    ) -> Result<(Uuid, bool)> {
-        let upload = blocking(move || draft.finish()).await??;
-        // Results of rows are not cached.
-        options.submit.bypass_cache = true;
-        self.submit_batch(upload, options).await
-    }
 }
 
 impl RunDraft {
@@ -141,21 +123,16 @@ impl RunDraft {
         Ok(())
     }
 
-    /// Stages the remaining rows once all were added. Blocks.
+    /// Stages the remaining rows once all were added, and returns the upload for [`Jobs::submit_batch`]. Blocks.
     ///
     /// # Errors
     /// [`JobsError::Case`] if there are no rows or the case of the first row is invalid; or as [`BatchUpload::add`].
-    pub fn cut_all(&mut self) -> Result<()> {
+    pub fn finish(mut self) -> Result<BatchUpload> {
         if self.rows.received == 0 {
             let fault = Fault::new("/columns", "0 rows given; at least one is needed");
             return Err(CaseError(vec![fault]).into());
         }
-        self.cut(true)
-    }
-
-    /// Stages the remaining rows and sets the head.
-    fn finish(mut self) -> Result<BatchUpload> {
-        self.cut_all()?;
+        self.cut(true)?;
         if let Some(Begun {
             mut head,
             first_row,
