@@ -132,15 +132,11 @@ pub enum Priority {
 impl Priority {
     /// The rank in the database, which is the index in [`Priority::ALL`].
     pub(crate) fn rank(self) -> i64 {
-        match self {
-            Priority::High => 0,
-            Priority::Normal => 1,
-            Priority::Low => 2,
-        }
+        self as i64
     }
 
-    pub(crate) fn from_rank(rank: i64) -> Option<Priority> {
-        Priority::ALL.into_iter().find(|one| one.rank() == rank)
+    pub(crate) fn from_rank(rank: usize) -> Option<Priority> {
+        Priority::ALL.get(rank).copied()
     }
 }
 

@@ -156,19 +156,28 @@ async fn is_another(
         Err(_) if deployment.nodes == 0 => return Ok(false),
         Err(error) => return Err(error),
     }
-    let path = Path::from(format!("probe-{}", uuid::Uuid::now_v7()));
-    let written = objects
-        .put(&path, PutPayload::from_static(b"railhead"))
-        .await;
-    written.map_err(unusable)?;
-    let seen = there.head(&path).await;
-    let removed = objects.delete(&path).await;
-    removed.map_err(unusable)?;
-    match seen {
+    match with_probe(objects, async |path| there.head(path).await).await? {
         Ok(_) => Ok(false),
         Err(Error::NotFound { .. }) => Ok(true),
         Err(error) => Err(unusable(error)),
     }
+}
+
+/// Content of the object that tests a location.
+const PROBE: &[u8] = b"railhead probe";
+
+/// Writes an object with the content [`PROBE`], returns the outcome of `look` at its path, and removes it.
+async fn with_probe<T>(
+    objects: &dyn ObjectStore,
+    look: impl AsyncFnOnce(&Path) -> object_store::Result<T>,
+) -> Result<object_store::Result<T>> {
+    let path = Path::from(format!("probe-{}", uuid::Uuid::now_v7()));
+    let written = objects.put(&path, PutPayload::from_static(PROBE)).await;
+    written.map_err(unusable)?;
+    let seen = look(&path).await;
+    let removed = objects.delete(&path).await;
+    removed.map_err(unusable)?;
+    Ok(seen)
 }
 
 /// Records the location if the recorded one has not changed.
@@ -281,16 +290,9 @@ async fn probe(deployment: &Deployment, url: &ResultsUrl) -> Result<()> {
         None if deployment.results_place.is_some() => return wrong(format!("no {MARKER} there")),
         _ => {}
     }
-    let path = Path::from(format!("probe-{}", uuid::Uuid::now_v7()));
-    let text = Bytes::from_static(b"railhead doctor");
-    let payload = PutPayload::from_bytes(text.clone());
-    let written = objects.put(&path, payload).await;
-    written.map_err(unusable)?;
-    let read = objects.get_range(&path, 9..15).await;
-    let removed = objects.delete(&path).await;
-    removed.map_err(unusable)?;
-    match read {
-        Ok(read) if read == text.slice(9..15) => Ok(()),
+    let read = with_probe(&*objects, async |path| objects.get_range(path, 9..14).await);
+    match read.await? {
+        Ok(read) if read == PROBE[9..14] => Ok(()),
         Ok(_) => wrong("the object read back differs from the object written".to_owned()),
         Err(error) => Err(unusable(error)),
     }
