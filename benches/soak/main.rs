@@ -7,9 +7,6 @@
 //! is held), `rate` (8 workers), `simulation` (1 to 100 nodes with measured costs), `network` (disconnected hosts; needs root or user namespaces,
 //! `ip` and `nft`). Without a name, nothing runs. A violated guarantee ends it with a panic. `--profile dev` uses the build of the tests.
 
-#[path = "../../tests/service/cluster/cable.rs"]
-#[allow(dead_code, reason = "shared with the tests")]
-mod cable;
 #[path = "../../tests/service/cluster/faketime.rs"]
 #[allow(dead_code, reason = "shared with the tests")]
 mod faketime;
