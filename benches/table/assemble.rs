@@ -81,11 +81,11 @@ fn stored(step: u8, answer: Answer, kalker: [f64; 4], direction: [f64; 3]) -> [f
         return [0.0, 0.0, 0.0, 1.0];
     }
     let growth = if sigma < 1.0 {
-        growth(size(sigma))[0]
+        growth(size(sigma))
     } else {
         1.0
     };
     let linear = linear(kalker, direction);
-    let part = |k: usize| (answer[k] / growth - linear_part(sigma)[0] * linear[k]) as f32;
+    let part = |k: usize| (answer[k] / growth - linear_part(sigma) * linear[k]) as f32;
     [part(0), part(1), part(2), stick]
 }

@@ -37,7 +37,7 @@ pub fn indicators(values: &[f32]) -> Vec<f32> {
         let node = split(at, NODES);
         let sigma = f64::from(SIZES[node[3]]) / SIZE_STEPS;
         let grown = if sigma < 1.0 {
-            growth(size(sigma))[0]
+            growth(size(sigma))
         } else {
             1.0
         };

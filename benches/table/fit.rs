@@ -165,7 +165,7 @@ fn free_coefficients(places: &[u8]) -> Vec<Vec<f64>> {
     let mut system = vec![vec![0.0; places.len()]; places.len()];
     for (row, place) in system.iter_mut().zip(places) {
         let weights = axis.at(f64::from(*place));
-        for (k, weight) in weights.value.iter().enumerate() {
+        for (k, weight) in weights.weights.iter().enumerate() {
             row[weights.first + k] = *weight;
         }
     }

@@ -5,9 +5,8 @@ use pulp::{Simd, WithSimd};
 use crate::numerics::simd;
 use crate::rolling::linear_theory::coefficients_with_spin;
 use crate::rolling::methods::table::spline::{
-    Axis, BESIDE_SPIN, DIRECTION_COEFFICIENTS, DIRECTIONS, OUTPUTS, POISSON_RATIOS,
-    POLE_COEFFICIENTS, POLES, RATIOS, SIZE_HALF, SIZE_STEPS, SIZES, Shape, Weights, cell,
-    ln_ratio_max, sigma, spin_factor,
+    Axis, DIRECTION_COEFFICIENTS, DIRECTIONS, OUTPUTS, POISSON_RATIOS, POLE_COEFFICIENTS, POLES,
+    RATIOS, SIZE_STEPS, SIZES, Shape, Weights, cell, ln_ratio_max, sigma, spin_factor,
 };
 
 /// The size at which everything slips without spin: f(r) = 1 from there on (Vermeulen and Johnson 1964).
@@ -52,27 +51,21 @@ pub struct EllipseTable<'a> {
     poisson: [f64; 3],
 }
 
-/// Sums of the spline at a place: the functions and their derivatives by σ, θ and χ.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    value: [f64; OUTPUTS],
-    by_size: [f64; OUTPUTS],
-    by_pole: [f64; OUTPUTS],
-    by_direction: [f64; OUTPUTS],
-}
+/// Step by which a creepage is moved for its derivatives, relative to the size of all creepages. It is well above the rounding of values; steps of 0.01 are
+/// longer than the range of directions in which forces of long ellipses change.
+const STEP: f64 = 1e-3;
 
-/// f(r), the growth of the forces with the size, and its derivative.
+/// f(r), the growth of the forces with the size.
 #[inline(always)]
-pub fn growth(size: f64) -> [f64; 2] {
+pub fn growth(size: f64) -> f64 {
     let rest = (1.0 - size / SIZE_FULL).max(0.0);
-    [1.0 - rest * rest * rest, 3.0 / SIZE_FULL * rest * rest]
+    1.0 - rest * rest * rest
 }
 
-/// The factor of the part of linear theory that is not in the table, and its derivative by σ.
+/// The factor of the part of linear theory that is not in the table.
 #[inline(always)]
-pub fn linear_part(sigma: f64) -> [f64; 2] {
-    let rest = 1.0 - sigma;
-    [rest * rest, -2.0 * rest]
+pub fn linear_part(sigma: f64) -> f64 {
+    (1.0 - sigma) * (1.0 - sigma)
 }
 
 /// Forces of linear theory with `[C11, C22, C23, C33]` for a creepage.
@@ -160,61 +153,28 @@ impl EllipseTable<'_> {
         }
         let [theta, chi] = self.shape.angles(inside);
         let sigma = sigma(size);
-        let sums = self.sums::<false>(sigma, theta, chi);
+        let sums = self.sums(sigma, theta, chi);
         let linear = linear(self.kalker, inside);
-        let [growth, _] = growth(size);
-        let part = linear_part(sigma)[0] / size;
+        let growth = growth(size);
+        let part = linear_part(sigma) / size;
         // Components that vanish by symmetry are exactly 0.
         let [x, y, z] = inside.map(|part| part != 0.0);
         let there = [x, y || z, y || z];
-        let force = |k: usize| signs[k] * growth * (sums.value[k] + part * linear[k]);
+        let force = |k: usize| signs[k] * growth * (sums[k] + part * linear[k]);
         Creep {
             force: [0, 1, 2].map(|k| if there[k] { force(k) } else { 0.0 }),
-            stick: sums.value[3].clamp(0.0, 1.0),
+            stick: sums[3].clamp(0.0, 1.0),
             bound: f64::from(self.table.bounds[cell(self.ln_ratio, sigma, theta, chi)]),
         }
     }
 
-    /// The creep forces with the derivatives of the three by the creepages, `[force][creepage]`.
+    /// The creep forces with the derivatives of the three by the creepages, `[force][creepage]`, from central differences.
     pub fn with_slopes(&self, creepage: [f64; 3]) -> (Creep, [[f64; 3]; 3]) {
-        let Quarter { inside, signs } = Quarter::of(creepage);
-        let [c11, c22, c23, c33] = self.kalker;
-        let stiffness = [[c11, 0.0, 0.0], [0.0, c22, c23], [0.0, -c23, c33]];
-        let size = self.size(inside);
-        if size == 0.0 {
-            return (self.creep(creepage), stiffness);
-        }
-        let ([theta, chi], angles) = self.shape.angles_with_slopes(inside);
-        let sigma = sigma(size);
-        let sums = self.sums::<true>(sigma, theta, chi);
-        let linear = linear(self.kalker, inside);
-        let [growth, faster] = growth(size);
-        let [part, less] = linear_part(sigma);
-        let by_size = SIZE_HALF / ((size + SIZE_HALF) * (size + SIZE_HALF));
-        let size_by = [0, 1, 2].map(|j| self.scale[j] * self.scale[j] * inside[j] / size);
-        let slope = |k: usize, j: usize| {
-            let whole = sums.value[k] + part * linear[k] / size;
-            let inner = sums.by_size[k] * by_size * size_by[j]
-                + sums.by_pole[k] * angles[0][j]
-                + sums.by_direction[k] * angles[1][j]
-                + less * by_size * size_by[j] * linear[k] / size
-                + part * (stiffness[k][j] - linear[k] * size_by[j] / size) / size;
-            // A creepage has the sign of its force, and the spin that of the moment.
-            signs[k] * signs[j] * (faster * size_by[j] * whole + growth * inner)
-        };
-        let mut slopes = [0, 1, 2].map(|k| [0, 1, 2].map(|j| slope(k, j)));
-        let flat = (self.scale[0] * inside[0]).hypot(self.scale[1] * inside[1]);
-        let spin = self.scale[2] * inside[2];
-        if flat < BESIDE_SPIN * spin {
-            self.difference(creepage, BESIDE_SPIN * spin, &mut slopes);
-        }
-        (self.creep(creepage), slopes)
-    }
-
-    /// Derivatives by the creepages near pure spin, where the direction changes within no distance: differences over steps of a size.
-    fn difference(&self, creepage: [f64; 3], size: f64, slopes: &mut [[f64; 3]; 3]) {
-        for j in 0..2 {
-            let step = size / self.scale[j];
+        // Forces are linear up to much larger sizes than the second.
+        let length = STEP * self.size(creepage).max(STEP);
+        let mut slopes = [[0.0; 3]; 3];
+        for j in 0..3 {
+            let step = length / self.scale[j];
             let moved = |by: f64| {
                 let mut moved = creepage;
                 moved[j] += by;
@@ -225,6 +185,7 @@ impl EllipseTable<'_> {
                 slopes[k][j] = (ahead[k] - back[k]) / (2.0 * step);
             }
         }
+        (self.creep(creepage), slopes)
     }
 
     #[inline(always)]
@@ -238,48 +199,27 @@ impl EllipseTable<'_> {
         largest * (x * x + y * y + z * z).sqrt()
     }
 
-    /// The sums of the spline, with derivatives on request.
+    /// The functions at a place, as sums of the spline over all axes.
     #[inline(always)]
-    fn sums<const SLOPES: bool>(&self, sigma: f64, theta: f64, chi: f64) -> Sums {
+    fn sums(&self, sigma: f64, theta: f64, chi: f64) -> [f64; OUTPUTS] {
         let table = self.table;
-        let (pole, direction) = (table.pole.at(theta), table.direction.at(chi));
         let size = table.size.at(sigma);
         let near = NearNodes {
             ratio: self.ratio,
-            pole,
-            direction,
+            pole: table.pole.at(theta),
+            direction: table.direction.at(chi),
             size: size.first,
         };
-        let combined = |rows: &[f32; NEAR], weights: &[f64; 4]| self.combined(rows, weights);
-        if SLOPES {
-            let [value, by_pole, by_direction] = simd::dispatch(NearSums(&table.spline, near));
-            Sums {
-                value: combined(&value, &size.value),
-                by_size: combined(&value, &size.slope),
-                by_pole: combined(&by_pole, &size.value),
-                by_direction: combined(&by_direction, &size.value),
-            }
-        } else {
-            let [value] = simd::dispatch(NearSums(&table.spline, near));
-            Sums {
-                value: combined(&value, &size.value),
-                ..Sums::default()
-            }
-        }
-    }
-
-    /// Sums over sizes and Poisson's ratios.
-    #[inline(always)]
-    fn combined(&self, rows: &[f32; NEAR], weights: &[f64; 4]) -> [f64; OUTPUTS] {
+        let rows = simd::dispatch(NearSums(&table.spline, near));
         let mut sums = [0.0; OUTPUTS];
-        for (rows, weight) in rows.chunks_exact(SIZE_ROW).zip(weights) {
+        for (rows, weight) in rows.chunks_exact(SIZE_ROW).zip(size.weights) {
             for (rows, poisson) in rows.chunks_exact(OUTPUTS).zip(self.poisson) {
                 for (sum, value) in sums.iter_mut().zip(rows) {
                     *sum += weight * poisson * f64::from(*value);
                 }
             }
         }
-        for (sum, unit) in sums.iter_mut().zip(self.table.unit) {
+        for (sum, unit) in sums.iter_mut().zip(table.unit) {
             *sum *= f64::from(unit);
         }
         sums
@@ -340,25 +280,18 @@ impl NearNodes {
         }
     }
 
-    /// The value and, for `N = 3`, the derivatives by pole and direction.
+    /// The sums over a/b, poles and directions.
     #[inline(always)]
-    fn sums<const N: usize>(&self, spline: &[i16]) -> [[f32; NEAR]; N] {
-        let mut sums = [[0.0_f32; NEAR]; N];
+    fn sums(&self, spline: &[i16]) -> [f32; NEAR] {
+        let mut sums = [0.0_f32; NEAR];
         for i in 0..4 {
             for j in 0..4 {
-                let outer = self.ratio.value[i] * self.pole.value[j];
-                let sloped = self.ratio.value[i] * self.pole.slope[j];
+                let outer = self.ratio.weights[i] * self.pole.weights[j];
                 for k in 0..4 {
-                    let weights = [
-                        (outer * self.direction.value[k]) as f32,
-                        (sloped * self.direction.value[k]) as f32,
-                        (outer * self.direction.slope[k]) as f32,
-                    ];
+                    let weight = (outer * self.direction.weights[k]) as f32;
                     let row = self.row(spline, [i, j, k]);
-                    for (sum, weight) in sums.iter_mut().zip(weights) {
-                        for n in 0..NEAR {
-                            sum[n] += weight * f32::from(row[n]);
-                        }
+                    for n in 0..NEAR {
+                        sums[n] += weight * f32::from(row[n]);
                     }
                 }
             }
@@ -368,13 +301,13 @@ impl NearNodes {
 }
 
 /// The sums of the table, compiled for each level of SIMD. The compiler would not inline a closure of this length.
-pub struct NearSums<'a, const N: usize>(pub &'a [i16], pub NearNodes);
+pub struct NearSums<'a>(pub &'a [i16], pub NearNodes);
 
-impl<const N: usize> WithSimd for NearSums<'_, N> {
-    type Output = [[f32; NEAR]; N];
+impl WithSimd for NearSums<'_> {
+    type Output = [f32; NEAR];
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> [[f32; NEAR]; N] {
+    fn with_simd<S: Simd>(self, _: S) -> [f32; NEAR] {
         self.1.sums(self.0)
     }
 }

@@ -110,15 +110,13 @@ pub struct Axis {
     pieces: Vec<[[f64; 4]; 4]>,
 }
 
-/// The coefficients at a place: the first of four, their weights, and the derivatives of these by the place.
+/// The coefficients at a place: the first of four, and their weights.
 #[derive(Debug, Clone, Copy)]
 pub struct Weights {
     /// The first of four coefficients.
     pub first: usize,
-    /// Weights of values.
-    pub value: [f64; 4],
-    /// Weights of derivatives.
-    pub slope: [f64; 4],
+    /// Weights of the four.
+    pub weights: [f64; 4],
 }
 
 impl Axis {
@@ -171,21 +169,14 @@ impl Axis {
         let bin = (along as usize).min(last);
         let t = along - bin as f64;
         let piece = &self.pieces[bin];
-        let value = |p: &[f64; 4]| p[0] + t * (p[1] + t * (p[2] + t * p[3]));
-        let slope = |p: &[f64; 4]| self.bins_per_unit * (p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]));
+        let weight = |p: &[f64; 4]| p[0] + t * (p[1] + t * (p[2] + t * p[3]));
         Weights {
             first: self.first[bin],
-            value: [
-                value(&piece[0]),
-                value(&piece[1]),
-                value(&piece[2]),
-                value(&piece[3]),
-            ],
-            slope: [
-                slope(&piece[0]),
-                slope(&piece[1]),
-                slope(&piece[2]),
-                slope(&piece[3]),
+            weights: [
+                weight(&piece[0]),
+                weight(&piece[1]),
+                weight(&piece[2]),
+                weight(&piece[3]),
             ],
         }
     }
@@ -265,9 +256,6 @@ pub fn spin_factor(root: f64, [c11, c22]: [f64; 2]) -> f64 {
 const STEPS: usize = 4;
 /// Squares of creepages relative to that of the spin up to which the pole is at the centre. θ then differs from a right angle by about the square root of this.
 const SPIN_ALONE: f64 = 1e-20;
-/// Ratio of creepages to spin, by size, below which derivatives by creepages are differences, and those by spin are taken at this ratio. From 0.02 to 0.05 derivatives of
-/// long ellipses change by up to 0.02 of C; 0.01 is chosen by judgement, well above the rounding of values.
-pub(crate) const BESIDE_SPIN: f64 = 0.01;
 
 impl Shape {
     /// The shape with √(a/b) and `[C11, C22]` at ν = 1/4.
@@ -307,53 +295,7 @@ impl Shape {
     /// The angles `[θ, χ]` of a creepage other than 0 with x, z ≥ 0.
     #[inline(always)]
     pub fn angles(&self, creepage: [f64; 3]) -> [f64; 2] {
-        self.angles_of(self.stretched(creepage))
-    }
-
-    /// The angles with their derivatives by x, y and z. At pure spin, where the direction has no derivative, they are those at a creepage near it.
-    pub fn angles_with_slopes(&self, creepage: [f64; 3]) -> ([f64; 2], [[f64; 3]; 2]) {
-        let whole = self.stretched(creepage);
-        let share = 1.0 / whole[0].abs().max(whole[1].abs()).max(whole[2].abs());
-        let mut u = whole.map(|u| share * u);
-        let scale = self.scale.map(|scale| share * scale);
-        let [alpha, beta, m] = self.squares;
-        let least = BESIDE_SPIN * u[2];
-        let flat = u[0].hypot(u[1]);
-        if flat < least {
-            let share = least / flat;
-            [u[0], u[1]] = match flat > 0.0 {
-                true => [share * u[0], share * u[1]],
-                false => [least, 0.0],
-            };
-        }
-        let [p, q] = [u[0] * u[0], u[1] * u[1]];
-        let angles = self.angles_of(u);
-        let root = angles[0].tan();
-        let t = root * root;
-        let (da, db) = (1.0 / (m + alpha * t), 1.0 / (m + beta * t));
-        let sum = p * da + q * db;
-        let slope =
-            (1.0 + 2.0 * t) * sum - t * (1.0 + t) * (p * alpha * da * da + q * beta * db * db);
-        // θ = atan √t; t by the squares of u, divided by 2 √t (1 + t).
-        let theta = [
-            -root * u[0] * da / slope,
-            -root * u[1] * db / slope,
-            sum.sqrt() / ((1.0 + t).sqrt() * slope),
-        ];
-        // tan χ = u_y √(m² + α² t)/(u_x √(m² + β² t)); dt = 2 √t (1 + t) dθ.
-        let [cos, sin] = [u[0] * da.sqrt(), u[1] * db.sqrt()];
-        let turn = cos * sin * (alpha * da - beta * db) / sum * root * (1.0 + t);
-        let own = [-sin * da.sqrt() / sum, cos * db.sqrt() / sum, 0.0];
-        let chi = [0, 1, 2].map(|k| (own[k] + turn * theta[k]) * scale[k]);
-        (angles, [[0, 1, 2].map(|k| theta[k] * scale[k]), chi])
-    }
-
-    fn stretched(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
-        [x * self.scale[0], y * self.scale[1], z * self.scale[2]]
-    }
-
-    #[inline(always)]
-    fn angles_of(&self, u: [f64; 3]) -> [f64; 2] {
+        let u = [0, 1, 2].map(|k| creepage[k] * self.scale[k]);
         // Squares of creepages far from 1 would leave the range of numbers.
         let share = 1.0 / u[0].abs().max(u[1].abs()).max(u[2].abs());
         let u = u.map(|u| share * u);
