@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use railhead_contact as contact;
 use railhead_contact::case::solver::Limits;
+use railhead_contact::error::SolveError;
 use railhead_contact::monitor::Unmonitored;
 use railhead_contact::remark::entry::RemarkEntry;
 use railhead_contact::rolling::operator_store::OperatorStore;
-use railhead_contact::slices::slices;
+use railhead_contact::slices::{joined, slices};
 use railhead_contact::solution::words::answer::{Fields, Solution};
 use railhead_contact::{check, solve_slice};
 use serde_json::{Value, json};
@@ -211,22 +212,14 @@ fn a_sweep_solved_by_slices_in_any_order_is_the_sweep_solved_at_once() {
     assert_eq!((ranges[0].start, ranges[ranges.len() - 1].end), (0, 450));
     assert!(ranges.windows(2).all(|pair| pair[0].end == pair[1].start));
     assert_eq!(ranges, slices(&checked));
-    let mut parts: Vec<(Solution, Fields)> = ranges
-        .iter()
-        .rev()
-        .map(|range| {
-            // Each slice is solved with an empty store, as in a separate process.
-            let store = Arc::new(OperatorStore::new(0));
-            solve_slice(&store, &checked, range.clone(), &Unmonitored).expect("an answer")
-        })
-        .collect();
-    let (mut solution, mut fields) = parts.pop().expect("a slice");
-    while let Some((more, more_fields)) = parts.pop() {
-        solution.append(more);
-        fields.append(more_fields);
-    }
+    // The slices are solved in reverse order, each with an empty store as in a separate process.
+    let solved = ranges.iter().rev().map(|range| {
+        let store = Arc::new(OperatorStore::new(0));
+        solve_slice(&store, &checked, range.clone(), &Unmonitored)
+    });
+    let solved: Vec<Result<(Solution, Fields), SolveError>> = solved.collect();
+    let joined = timeless(joined(solved.into_iter().rev()).expect("an answer"));
     let whole = timeless(contact::solve(&checked, &Unmonitored).expect("an answer"));
-    let joined = timeless((solution, fields));
     assert_eq!(joined.0, whole.0);
     assert!(joined.1 == whole.1, "fields differ");
     let told = |remark: &&RemarkEntry| remark.code == "friction-unusual";

@@ -7,8 +7,8 @@ use railhead_contact::case::solver::Limits;
 use railhead_contact::monitor::Unmonitored;
 use railhead_contact::normal::hertz::{Ellipse, NormalLoad};
 use railhead_contact::rolling::operator_store::OperatorStore;
-use railhead_contact::slices::slices;
-use railhead_contact::solution::words::answer::{Fields, Solution};
+use railhead_contact::slices::{joined, slices};
+use railhead_contact::solution::words::answer::Solution;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -284,17 +284,11 @@ fn a_sweep_of_unlike_bodies_solved_by_slices_in_any_order_is_the_sweep_solved_at
         began.elapsed().as_secs_f64(),
         checked.cost().seconds
     );
-    let parts = ranges.iter().rev().map(|range| {
+    let parts = ranges.iter().map(|range| {
         let store = Arc::new(OperatorStore::new(0));
-        contact::solve_slice(&store, &checked, range.clone(), &Unmonitored).expect("an answer")
+        contact::solve_slice(&store, &checked, range.clone(), &Unmonitored)
     });
-    let mut parts: Vec<(Solution, Fields)> = parts.collect();
-    let (mut solution, mut fields) = parts.pop().expect("a slice");
-    while let Some((more, more_fields)) = parts.pop() {
-        solution.append(more);
-        fields.append(more_fields);
-    }
-    let joined = timeless((solution, fields));
+    let joined = timeless(joined(parts).expect("an answer"));
     assert_eq!(joined.0, whole.0);
     assert!(joined.1 == whole.1, "fields differ");
 }
