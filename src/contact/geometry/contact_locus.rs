@@ -9,18 +9,15 @@ use std::sync::Arc;
 use crate::geometry::envelope::{Envelope, envelope};
 use crate::geometry::locus_lines::{LocusLines, LocusPoint};
 use crate::geometry::wheel_rail::{WheelCircle, WheelRail};
-use crate::numerics::ITERATIONS_MAX;
-use crate::numerics::roots::bounds;
+use crate::numerics::roots::{bisect, bounds};
 
 /// Lateral spacing of the lines in mm, half of that of the points along the curves. The height of first touch is exact as far as the rail is
 /// straight over half of it.
 pub(crate) const STEP: f64 = 0.04;
-/// Largest lowering of a wheel in mm.
-const LOWERING_MAX: f64 = 16.0;
-/// Lowering in mm at which the estimate starts, usual under a light load.
-const LOWERING_FIRST: f64 = 0.032;
-/// Relative tolerance of the force to the power 2/3. Chosen by judgement: the estimate itself is some per cent off, and it only decides at which height the solver starts.
-const TOLERANCE: f64 = 2e-3;
+/// Range in mm of the estimated lowering of a wheel.
+const LOWERINGS: [f64; 2] = [1e-4, 16.0];
+/// Halvings of the logarithm of this range, to 0.3 %. The estimate itself is some per cent off; it decides only where the solver starts.
+const LOWERING_HALVINGS: u32 = 12;
 
 /// The lines along x on which the wheel lies above the rail.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,49 +119,10 @@ impl<'g> ContactLocus<'g> {
     /// Estimates how far below first touch the wheel is in equilibrium under a vertical force, which is given in mm² as the force divided by
     /// the contact modulus. See [`estimated_force`].
     pub fn estimated_lowering(&self, force: f64) -> f64 {
-        let below = |lowering: f64| -> Vec<LocusPoint> {
-            let inside = |line: &&LocusPoint| line.clearance < 0.5 * lowering;
-            self.lines.iter().filter(inside).copied().collect()
-        };
-        let mut deepest = 4.0 * LOWERING_FIRST;
-        let mut near = below(deepest);
-        // This power of the force is roughly proportional to the lowering.
-        let mut power = |lowering: f64| {
-            if lowering > deepest {
-                deepest = 1.5 * lowering;
-                near = below(deepest);
-            }
-            estimated_force(&near, STEP, self.rolling_radius(), lowering).powf(2.0 / 3.0)
-        };
-        let wanted = force.powf(2.0 / 3.0);
-        // The estimate jumps when one more line overlaps, so that the bracket is kept.
-        let (mut low, mut high) = ([0.0_f64; 2], None::<[f64; 2]>);
-        let mut lowering = LOWERING_FIRST;
-        for _ in 0..ITERATIONS_MAX {
-            let found = power(lowering);
-            if (found / wanted - 1.0).abs() < TOLERANCE {
-                break;
-            }
-            if found < wanted {
-                low = [lowering, found];
-            } else {
-                high = Some([lowering, found]);
-            }
-            let next = match high {
-                None if low[0] >= LOWERING_MAX => break,
-                None => (low[0] * wanted / low[1]).min(LOWERING_MAX),
-                Some(high) => {
-                    let width = high[0] - low[0];
-                    let secant = low[0] + width * (wanted - low[1]) / (high[1] - low[1]);
-                    secant.clamp(low[0] + 0.02 * width, high[0] - 0.02 * width)
-                }
-            };
-            if !next.is_finite() {
-                break;
-            }
-            lowering = next;
-        }
-        lowering
+        let radius = self.geometry.placement.rolling_radius;
+        let is_low = |power: f64| estimated_force(self.lines, STEP, radius, power.exp()) < force;
+        let [low, _] = bisect(LOWERINGS.map(f64::ln), LOWERING_HALVINGS, is_low);
+        low.exp()
     }
 
     /// Weighted mean of the overlap between wheel and rail: the parameter of the rail's curve at the mean position, and the mean inclination of
@@ -186,105 +144,43 @@ impl<'g> ContactLocus<'g> {
         let nearest = self.lines.iter().min_by(|a, b| far(a).total_cmp(&far(b)))?;
         (weight > 0.0).then_some([nearest.rail, angle / weight])
     }
-
-    fn rolling_radius(&self) -> f64 {
-        self.geometry.placement.rolling_radius
-    }
 }
 
 /// Estimates the force over the contact modulus, in mm², of a wheel with this radius at this lowering, both in mm. The lines are `step` mm apart
 /// and in the order of y; lines that do not overlap may be missing.
 ///
 /// Every patch is replaced by a horizontal circle of the area that overlaps at half the lowering, pressed by a sphere:
-/// `N = 4/3 E* √(A/π) δ`, exact for paraboloids. Neighbouring patches influence each other.
+/// `N = 4/3 E* √(A/π) δ`, exact for paraboloids. The influence of patches on each other is neglected.
 pub(crate) fn estimated_force(lines: &[LocusPoint], step: f64, radius: f64, lowering: f64) -> f64 {
     let inside = |line: &LocusPoint| line.clearance < 0.5 * lowering;
     let runs = lines.chunk_by(|a, b| inside(a) == inside(b) && b.y - a.y < 1.5 * step);
     let length =
         |line: &LocusPoint| 2.0 * (2.0 * radius * (0.5 * lowering - line.clearance)).sqrt();
-    let carried = |run: &[LocusPoint]| {
+    let force = |run: &[LocusPoint]| {
         let area: f64 = run.iter().map(|line| length(line) * step).sum();
-        let [least, _] = bounds(run.iter().map(|line| line.clearance));
-        EstimatedPatch {
-            middle: 0.5 * (run[0].y + run[run.len() - 1].y),
-            depth: lowering - least,
-            force: 4.0 / 3.0 * (area / PI).sqrt() * lowering,
-        }
+        4.0 / 3.0 * (area / PI).sqrt() * lowering
     };
-    let mut patches: Vec<EstimatedPatch> =
-        runs.filter(|run| inside(&run[0])).map(carried).collect();
-    // The result of few rounds depends on the order. This order is the same for a mirror image.
-    patches.sort_by(|a, b| b.force.total_cmp(&a.force));
-    coupled_force(&patches)
-}
-
-/// A patch in [`estimated_force`].
-struct EstimatedPatch {
-    /// y of its middle in mm.
-    middle: f64,
-    /// Largest overlap in mm.
-    depth: f64,
-    /// Force of the patch alone, over the contact modulus, in mm².
-    force: f64,
-}
-
-/// Force over the contact modulus of all patches. Patches reduce each other's overlap: the force F lowers the surface at the distance r by
-/// `F / (π E* r)` (Boussinesq 1885), and forces grow as the power 3/2 of the depth.
-fn coupled_force(patches: &[EstimatedPatch]) -> f64 {
-    let mut forces: Vec<f64> = patches.iter().map(|patch| patch.force).collect();
-    // Two rounds leave an error of less than 2 % (see the test).
-    let rounds = if patches.len() > 1 { 2 } else { 0 };
-    for _ in 0..rounds {
-        for (k, patch) in patches.iter().enumerate() {
-            let sunk = |(other, force): (&EstimatedPatch, &f64)| {
-                let apart = (patch.middle - other.middle).abs();
-                (apart > 0.0).then(|| force / (PI * apart))
-            };
-            let sunk: f64 = patches.iter().zip(&forces).filter_map(sunk).sum();
-            let left = (1.0 - sunk / patch.depth).max(0.0);
-            forces[k] = patch.force * left * left.sqrt();
-        }
-    }
-    forces.iter().sum()
+    runs.filter(|run| inside(&run[0])).map(force).sum()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The force on bumps with a radius of 300 mm at these y, which all touch at once.
-    fn carried(places: &[f64]) -> f64 {
+    #[test]
+    fn a_sphere_carries_what_hertz_says() {
         const STEP: f64 = 0.01;
         let line = |k: i32| {
             let y = STEP * f64::from(k);
-            let heights = places.iter().map(|place| (y - place).powi(2) / 600.0);
             LocusPoint {
                 y,
-                clearance: heights.fold(f64::INFINITY, f64::min),
+                clearance: y * y / 600.0,
                 rail: y,
                 wheel: y,
             }
         };
         let lines: Vec<LocusPoint> = (-4000..=4000).map(line).collect();
-        estimated_force(&lines, STEP, 300.0, 0.05)
-    }
-
-    #[test]
-    fn a_sphere_carries_what_hertz_says() {
         let hertz = 4.0 / 3.0 * 300_f64.sqrt() * 0.05_f64.powf(1.5);
-        assert!((carried(&[0.0]) / hertz - 1.0).abs() < 1e-3);
-    }
-
-    #[test]
-    fn two_patches_carry_less_than_each_alone_the_nearer_they_are() {
-        let alone = carried(&[0.0]);
-        for apart in [12.0, 40.0] {
-            let both = carried(&[-0.5 * apart, 0.5 * apart]);
-            // Each is lowered by the force of the other one: w = N / (π r), N = N₀ (1 − w/δ)^(3/2).
-            let half = 0.5 * both;
-            let left = 1.0 - half / (PI * apart * 0.05);
-            let expected = alone * left.powf(1.5);
-            assert!((half / expected - 1.0).abs() < 0.02, "{both} {alone}");
-        }
+        assert!((estimated_force(&lines, STEP, 300.0, 0.05) / hertz - 1.0).abs() < 1e-3);
     }
 }
