@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::geometry::envelope::{Envelope, envelope};
 use crate::geometry::locus_lines::{LocusLines, LocusPoint};
-use crate::geometry::wheel_rail::{WheelCircle, WheelRail};
+use crate::geometry::wheel_rail::WheelRail;
 use crate::numerics::roots::{bisect, bounds};
 
 /// Lateral spacing of the lines in mm, half of that of the points along the curves. The height of first touch is exact as far as the rail is
@@ -46,16 +46,10 @@ fn lines_of(geometry: &WheelRail) -> Result<LocusLines, String> {
         let [rail, _] = geometry.parameters(2.0 * STEP);
         envelope(&rail_points(geometry, rail), STEP)
     });
-    let circles = geometry.circles.get_or_make(|| {
-        let [_, wheel] = geometry.parameters(2.0 * STEP);
-        wheel.into_iter().map(|s| geometry.circle(s)).collect()
-    });
-    // The lowest point of every circle, if it has one.
-    let point = |circle: &WheelCircle| {
-        let found = geometry.lowest_of(circle);
-        found.map(|[_, y, z]| [y, -z, circle.s])
-    };
-    let wheel: Vec<Option<[f64; 3]>> = circles.iter().map(point).collect();
+    // The lowest point of every circle of the wheel, if it has one.
+    let [_, wheel] = geometry.parameters(2.0 * STEP);
+    let point = |s: f64| geometry.lowest(s).map(|[_, y, z]| [y, -z, s]);
+    let wheel: Vec<Option<[f64; 3]>> = wheel.into_iter().map(point).collect();
     if wheel.iter().all(Option::is_none) {
         return Err(nothing_above());
     }

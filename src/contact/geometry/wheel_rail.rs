@@ -127,8 +127,6 @@ pub struct WheelRail {
     pub(crate) rail_edge: Arc<LazyField<Envelope>>,
     /// Points along the rail's curve, independent of the position of the wheelset.
     pub(crate) rail_places: Arc<LazyField<Vec<CurvePlace>>>,
-    /// Circles of the wheel, independent of the position of the wheelset.
-    pub(crate) circles: Arc<LazyField<Vec<WheelCircle>>>,
     /// The lines on which the wheel lies above the rail, or the reason why there are none.
     pub(crate) locus: LazyField<Arc<Result<LocusLines, String>>>,
 }
@@ -177,19 +175,6 @@ pub struct Meridian {
     pub radius_slope: f64,
 }
 
-/// A circle of the wheel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct WheelCircle {
-    /// Parameter of the profile.
-    pub(crate) s: f64,
-    /// Distance from the centre along the axle, in mm.
-    along: f64,
-    /// Radius in mm.
-    radius: f64,
-    /// Derivative of the radius along the axle.
-    widening: f64,
-}
-
 impl WheelRail {
     /// Places the rail by its top and by its gauge point or its origin, and the wheel by the wheelset.
     ///
@@ -231,7 +216,6 @@ impl WheelRail {
             axes,
             rail_edge: Arc::default(),
             rail_places: Arc::default(),
-            circles: Arc::default(),
             locus: LazyField::default(),
         }
     }
@@ -305,32 +289,17 @@ impl WheelRail {
         }
     }
 
-    /// The circle of the wheel at a parameter of its profile.
-    pub(crate) fn circle(&self, s: f64) -> WheelCircle {
-        let meridian = self.meridian(s);
-        WheelCircle {
-            s,
-            along: meridian.along,
-            radius: meridian.radius,
-            widening: meridian.radius_slope / meridian.along_slope,
-        }
-    }
-
     /// The point of a wheel circle at which the normal of the surface has no component along x, so that it can touch a rail that is straight
     /// along x. x and z are relative to the wheel's centre, y is in track axes. Returns `None` if there is no such point because of the yaw.
     pub fn lowest(&self, s: f64) -> Option<[f64; 3]> {
-        self.lowest_of(&self.circle(s))
-    }
-
-    /// The lowest point of a circle; see [`WheelRail::lowest`].
-    pub(crate) fn lowest_of(&self, circle: &WheelCircle) -> Option<[f64; 3]> {
+        let circle = self.meridian(s);
         let AxleAxes {
             axle,
             across,
             forward,
             down,
         } = &self.axes;
-        let sin = circle.widening * (axle[0] / across);
+        let sin = circle.radius_slope / circle.along_slope * (axle[0] / across);
         if sin.is_nan() || sin.abs() >= 1.0 {
             return None;
         }
