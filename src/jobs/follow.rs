@@ -407,26 +407,18 @@ impl Follower {
         changed.sort_unstable_by_key(|(_, at)| *at);
         for ((kind, id), at) in changed {
             self.since = self.since.max(at);
-            match self.read_changed(kind, id).await {
-                Ok((tag, work)) => self.tell(id, at, tag, work),
+            let jobs = self.jobs.of_kind(kind);
+            let told = match jobs.read(id, POLL_PAUSE).await {
+                Ok(work) => self.tell(at, work).await,
+                Err(error) => Err(error),
+            };
+            match told {
                 // Not acknowledged yet, or gone.
-                Err(JobsError::NotFound(_) | JobsError::Expired) => {}
+                Ok(()) | Err(JobsError::NotFound(_) | JobsError::Expired) => {}
                 Err(error) => return Err(error),
             }
         }
         Ok(())
-    }
-
-    /// Reads changed work and its [`tag`]; the work is `None` if this state was reported before.
-    async fn read_changed(&self, kind: Kind, id: Uuid) -> Result<(String, Option<Work>)> {
-        let jobs = self.jobs.of_kind(kind);
-        let work = jobs.read(id, POLL_PAUSE).await?;
-        let tag = tag(&work);
-        let known = self.known.get(&id).is_some_and(|(_, known)| *known == tag);
-        match known {
-            true => Ok((tag, None)),
-            false => Ok((tag, Some(jobs.shown(work).await?))),
-        }
     }
 
     async fn tell_progress(&mut self) -> Result<()> {
@@ -439,22 +431,22 @@ impl Follower {
             let jobs = self.jobs.of_kind(kind);
             for work in jobs.list(&filter, None, RUNNING_MAX).await?.entries {
                 let job = work.job()?;
-                let (id, at) = (job.id, self.since.max(job.updated_at));
-                let work = Work::from(job);
-                self.tell(id, at, tag(&work), Some(work));
+                let at = self.since.max(job.updated_at);
+                self.tell(at, job.into()).await?;
             }
         }
         Ok(())
     }
 
     /// Records the state of work, and queues an event unless this state was reported before.
-    fn tell(&mut self, id: Uuid, at: i64, tag: String, work: Option<Work>) {
-        let before = self.known.insert(id, (at, tag.clone()));
-        if before.is_none_or(|(_, known)| known != tag)
-            && let Some(work) = work
-        {
+    async fn tell(&mut self, at: i64, work: Work) -> Result<()> {
+        let (id, tag) = (work.id(), tag(&work));
+        if self.known.get(&id).is_none_or(|(_, known)| *known != tag) {
+            let work = self.jobs.of_kind(work.kind()).shown(work).await?;
             self.told.push_back((work, self.since));
         }
+        self.known.insert(id, (at, tag));
+        Ok(())
     }
 }
 

@@ -474,15 +474,6 @@ pub struct BatchItem {
     pub key: Option<String>,
 }
 
-/// Why the result of a job of a batch cannot be read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ItemFault {
-    /// It was removed in the meantime: the job expired or was deleted.
-    Gone,
-    /// It cannot be read.
-    Unreadable,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

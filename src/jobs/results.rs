@@ -136,25 +136,14 @@ impl Jobs {
     }
 
     /// Replaces the error of a read by [`JobsError::Expired`] if the job was removed in the meantime.
-    async fn unless_gone<T>(&self, id: Uuid, read: Result<T>) -> Result<T> {
-        match read {
-            Err(error) => Err(self.gone_meanwhile(id, error).await),
-            read => read,
-        }
-    }
-
-    /// The error for a result that cannot be read: [`JobsError::Expired`] if the job was removed in the meantime, else `error`.
-    pub(crate) async fn gone_meanwhile(&self, id: Uuid, error: JobsError) -> JobsError {
-        if !matches!(
-            error,
-            JobsError::Blobs(object_store::Error::NotFound { .. })
-        ) {
-            return error;
-        }
+    pub(crate) async fn unless_gone<T>(&self, id: Uuid, read: Result<T>) -> Result<T> {
+        let Err(JobsError::Blobs(object_store::Error::NotFound { .. })) = &read else {
+            return read;
+        };
         match self.get(id).await {
-            Ok(_) => error,
-            Err(JobsError::NotFound(_) | JobsError::Expired) => JobsError::Expired,
-            Err(failed) => failed,
+            Ok(_) => read,
+            Err(JobsError::NotFound(_) | JobsError::Expired) => Err(JobsError::Expired),
+            Err(failed) => Err(failed),
         }
     }
 

@@ -36,7 +36,7 @@ use railhead_jobs::Jobs;
 use railhead_jobs::batch::control::{Items, OpenedItem, PAGE_BYTES};
 use railhead_jobs::batch::upload::BatchUpload;
 use railhead_jobs::error::JobsError;
-use railhead_jobs::model::{BatchItem, ItemFault, Kind, State as JobState};
+use railhead_jobs::model::{BatchItem, Kind, State as JobState};
 use railhead_jobs::sync::blocking;
 use railhead_tables::table::RowTable;
 
@@ -191,10 +191,8 @@ impl Source {
     /// Returns the lines of a job with a large result.
     async fn open_large(&self, item: BatchItem) -> Result<Pieces, BoxError> {
         let id = item.job.id;
-        let opened = match &item.key {
-            Some(key) => self.jobs.open_item(id, key).await,
-            None => Err(ItemFault::Unreadable),
-        };
+        let key = item.key.as_deref().unwrap_or_default();
+        let opened = self.jobs.open_item(id, key).await;
         let without = |error: ProblemBody| match &self.columns {
             Some(columns) => {
                 let mut table = columns.empty();
@@ -210,7 +208,7 @@ impl Source {
         };
         let (bytes, solution) = match opened {
             Ok(opened) => opened,
-            Err(fault) => return without(missing_result(&item, fault)),
+            Err(error) => return without(missing_result(&item, &error)),
         };
         let Some(columns) = self.columns.clone() else {
             return Ok(ndjson_of(&item, solution)?);
@@ -340,14 +338,13 @@ fn failure(item: &BatchItem) -> Option<ProblemBody> {
 }
 
 /// Returns the reason why the result of a succeeded job is missing.
-fn missing_result(item: &BatchItem, fault: ItemFault) -> ProblemBody {
-    match fault {
-        ItemFault::Gone => {
-            let detail = "the job was removed with its result while the results were read";
-            problem(item, ProblemKind::Expired, detail)
-        }
-        ItemFault::Unreadable => problem(item, ProblemKind::Internal, UNREADABLE),
+fn missing_result(item: &BatchItem, error: &JobsError) -> ProblemBody {
+    if let JobsError::Expired = error {
+        let detail = "the job was removed with its result while the results were read";
+        return problem(item, ProblemKind::Expired, detail);
     }
+    tracing::error!(job = %item.job.id, %error, "a stored result cannot be read");
+    problem(item, ProblemKind::Internal, UNREADABLE)
 }
 
 fn problem(item: &BatchItem, kind: ProblemKind, detail: impl Into<String>) -> ProblemBody {

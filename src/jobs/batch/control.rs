@@ -11,7 +11,7 @@ use uuid::Uuid;
 use crate::batch::upload::BatchUpload;
 use crate::error::{JobsError, Result};
 use crate::handle::Jobs;
-use crate::model::{BatchItem, ItemFault, Kind, State, SubmitOptions, WorkOptions};
+use crate::model::{BatchItem, Kind, State, SubmitOptions, WorkOptions};
 use crate::shared::Shared;
 use crate::storage_fault::StoragePlace;
 use crate::store::{BatchBegun, NewBatch, NewJob};
@@ -310,16 +310,9 @@ impl Jobs {
     /// Opens the result of a job of a batch that is stored outside the table.
     ///
     /// # Errors
-    /// The result was removed in the meantime, or cannot be read.
-    pub async fn open_item(&self, id: Uuid, key: &str) -> Result<OpenedItem, ItemFault> {
-        let error = match self.shared.blobs.open_solution(key).await {
-            Ok(opened) => return Ok(opened),
-            Err(error) => self.gone_meanwhile(id, error).await,
-        };
-        if matches!(error, JobsError::Expired) {
-            return Err(ItemFault::Gone);
-        }
-        tracing::error!(job = %id, %error, "a stored result cannot be read");
-        Err(ItemFault::Unreadable)
+    /// [`JobsError::Expired`] if the job was removed in the meantime; or the result cannot be read.
+    pub async fn open_item(&self, id: Uuid, key: &str) -> Result<OpenedItem> {
+        let opened = self.shared.blobs.open_solution(key).await;
+        self.unless_gone(id, opened).await
     }
 }
