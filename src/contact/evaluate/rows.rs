@@ -258,10 +258,8 @@ impl<'a> Rows<'a> {
             RowMethod::Table { .. } if !RATIO_RANGE.contains(&patch.ratio) => None,
             RowMethod::Table { .. } => {
                 let ellipse = shapes.table(patch.ratio, patch.poisson);
-                Some(match self.gradients {
-                    true => ellipse.with_slopes(creepage),
-                    false => (ellipse.creep(creepage), Slopes::default()),
-                })
+                let slopes = self.gradients.then(|| ellipse.slopes(creepage));
+                Some((ellipse.creep(creepage), slopes.unwrap_or_default()))
             }
         }
     }

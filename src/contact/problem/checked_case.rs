@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::case::words::contact::Contact;
-use crate::case::words::solver::MethodName;
+use crate::case::words::solver::{MethodName, Output};
 use crate::geometry::orientation::SureBody;
 use crate::geometry::profile::{Body, NEEDED_BEYOND, Profile};
 use crate::geometry::profile_quality::{NoiseLevel, advised_smoothing, polygon};
@@ -92,6 +92,7 @@ impl CheckedCase {
             traction_bound: run.traction_bound,
             resolution: run.resolution,
             wants_slips: run.after.needs_power(&run.outputs),
+            wants_gradients: run.wants(Output::Gradients),
             is_differenced: false,
         }
     }

@@ -53,6 +53,8 @@ pub struct RollingTask<'a> {
     pub resolution: Resolution,
     /// Whether smooth slips are needed. Forces do not depend on it.
     pub wants_slips: bool,
+    /// Whether the table gives derivatives, which take six times as long as its values.
+    pub wants_gradients: bool,
     /// Whether resultants of neighbouring motions are subtracted from each other, which requires smaller residuals.
     pub is_differenced: bool,
 }

@@ -142,6 +142,7 @@ impl EllipseMesh {
             traction_bound: bound,
             resolution: Resolution::Mesh(size),
             wants_slips: false,
+            wants_gradients: false,
             is_differenced: false,
         };
         let level = StripMesh::new(&task, size)?;

@@ -40,6 +40,7 @@ pub(crate) fn add_gradients(
     let began = monitor.elapsed();
     let task = &RollingTask {
         wants_slips: false,
+        wants_gradients: false,
         is_differenced: true,
         ..*task
     };

@@ -168,8 +168,8 @@ impl EllipseTable<'_> {
         }
     }
 
-    /// The creep forces with the derivatives of the three by the creepages, `[force][creepage]`, from central differences.
-    pub fn with_slopes(&self, creepage: [f64; 3]) -> (Creep, [[f64; 3]; 3]) {
+    /// The derivatives of the three creep forces by the creepages, `[force][creepage]`, from central differences.
+    pub fn slopes(&self, creepage: [f64; 3]) -> [[f64; 3]; 3] {
         // Forces are linear up to much larger sizes than the second.
         let length = STEP * self.size(creepage).max(STEP);
         let mut slopes = [[0.0; 3]; 3];
@@ -185,7 +185,7 @@ impl EllipseTable<'_> {
                 slopes[k][j] = (ahead[k] - back[k]) / (2.0 * step);
             }
         }
-        (self.creep(creepage), slopes)
+        slopes
     }
 
     #[inline(always)]

@@ -68,7 +68,7 @@ pub fn solve(
         resultants: found.iter().map(|answer| answer.resultants).collect(),
         errors,
         stick: Some(found.iter().map(|answer| answer.stick).collect()),
-        gradients: Some(found.iter().map(|answer| answer.gradients).collect()),
+        gradients: found.iter().map(|answer| answer.gradients).collect(),
         method: Method::Table,
         seconds: (monitor.elapsed() - began).as_secs_f64(),
         ..MotionAnswer::default()
@@ -169,7 +169,7 @@ struct PatchAnswer {
     resultants: Resultants,
     error: f64,
     stick: f64,
-    gradients: PatchGradients,
+    gradients: Option<PatchGradients>,
 }
 
 /// Results on an equivalent ellipse about the origin of the case; `limit` is μN in N.
@@ -184,37 +184,39 @@ fn on_ellipse(
             resultants: Resultants::default(),
             error: 0.0,
             stick: if motion.is_still() { 1.0 } else { 0.0 },
-            gradients: PatchGradients::default(),
+            gradients: task.wants_gradients.then(PatchGradients::default),
         };
     }
     let c = ellipse.length();
-    let [x, y] = ellipse.centre;
     let modulus = task.interface.reduction * task.elasticity.shear_modulus;
     let unit = modulus * c * c / limit;
     let creepage = dimensionless(modulus, ellipse, limit, motion);
     let here = table().ellipse(ellipse.ratio(), task.elasticity.poisson_ratio);
-    let (
-        Creep {
-            force,
-            stick,
-            bound,
-        },
-        slopes,
-    ) = here.with_slopes(creepage);
-    // First in N and mm about the centre, then by ν_x, ν_y and φ about the origin, then with the moment about the origin.
-    let arms = [1.0, 1.0, c];
-    let own =
-        [0, 1, 2].map(|k| [0, 1, 2].map(|j| slopes[k][j] * (limit * unit) * arms[k] * arms[j]));
-    let by_origin = own.map(|[by_x, by_y, by_spin]| [by_x, by_y, by_spin - y * by_x + x * by_y]);
-    let [fx, fy, m] = by_origin;
-    let moment = [0, 1, 2].map(|j| m[j] + x * fy[j] - y * fx[j]);
+    let Creep {
+        force,
+        stick,
+        bound,
+    } = here.creep(creepage);
     PatchAnswer {
         resultants: about_origin(ellipse, limit, force),
         error: bound,
         stick,
-        gradients: PatchGradients {
-            values: [fx, fy, moment],
+        gradients: task.wants_gradients.then(|| PatchGradients {
+            values: gradients(ellipse, limit * unit, here.slopes(creepage)),
             errors: None,
-        },
+        }),
     }
+}
+
+/// Converts the derivatives of an ellipse about its centre to those about the origin of the case, in N and mm; `unit` is G c² in N.
+fn gradients(ellipse: &LoadEllipse, unit: f64, slopes: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    let c = ellipse.length();
+    let [x, y] = ellipse.centre;
+    // First in N and mm about the centre, then by ν_x, ν_y and φ about the origin, then with the moment about the origin.
+    let arms = [1.0, 1.0, c];
+    let own = [0, 1, 2].map(|k| [0, 1, 2].map(|j| slopes[k][j] * unit * arms[k] * arms[j]));
+    let by_origin = own.map(|[by_x, by_y, by_spin]| [by_x, by_y, by_spin - y * by_x + x * by_y]);
+    let [fx, fy, m] = by_origin;
+    let moment = [0, 1, 2].map(|j| m[j] + x * fy[j] - y * fx[j]);
+    [fx, fy, moment]
 }
