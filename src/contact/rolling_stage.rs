@@ -9,17 +9,20 @@ use crate::normal_stage::SolvedFootprint;
 use crate::problem::checked_case::CheckedCase;
 use crate::remark::list::Remark;
 use crate::rolling::answer::{MotionAnswer, Skip};
-use crate::rolling::history::plan::HistoryTask;
 use crate::rolling::methods::table::solve as table;
 use crate::rolling::operator_store::OperatorStore;
 use crate::rolling::refinement::gradients::add_gradients;
-use crate::rolling::refinement::interpolate::RefinementState;
+use crate::rolling::refinement::interpolate::{Levels, RefinementState};
+use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{RelativeTo, Resolution, RollingTask, TARGET_LEAST};
 use crate::rolling::{force_control, history};
 use crate::solution::assemble::Assembly;
-use crate::solution::finish::share_seconds;
 use crate::solution::words::answer::{Fields, Solution};
 use crate::time_limit::TimeLimit;
+
+/// Receives the answer to each motion in order, with the mesh of its fields.
+pub(crate) type AddMotion<'a> =
+    dyn FnMut(MotionAnswer, Option<Arc<StripMesh>>) -> Result<(), SolveError> + 'a;
 
 /// Solves all motions of a problem on a footprint.
 ///
@@ -31,28 +34,67 @@ pub(crate) fn solve(
     solved: &SolvedFootprint,
     watch: &TimeLimit,
 ) -> Result<(Solution, Fields), SolveError> {
-    let answer = solve_motions(operators, case, solved, watch);
-    let (mut solution, fields) = answer.map_err(|error| watch.explained(error, case))?;
-    share_seconds(&mut solution);
-    Ok((solution, fields))
+    let mut assembly = Assembly::new(case, solved);
+    let add = &mut |point: MotionAnswer, level: Option<Arc<StripMesh>>| {
+        Ok(assembly.add(level.as_ref(), &point, watch)?)
+    };
+    solve_motions(operators, case, solved, watch, add)?;
+    Ok(assembly.finish())
 }
 
-fn solve_motions(
+/// Solves all motions of a problem on a footprint and passes each answer to `add`.
+///
+/// # Errors
+/// See [`solve`], or the error of `add`.
+pub(crate) fn solve_motions(
     operators: &Arc<OperatorStore>,
     case: &CheckedCase,
     solved: &SolvedFootprint,
     watch: &TimeLimit,
-) -> Result<(Solution, Fields), SolveError> {
+    add: &mut AddMotion,
+) -> Result<(), SolveError> {
+    // The time of the normal problem counts for the first motion.
+    let mut normal_seconds = solved.report.map_or(0.0, |report| report.seconds);
+    let add = &mut |levels: &Levels, mut point: MotionAnswer| {
+        if solved.coupling_error > 0.0 {
+            let errors = point.errors.iter_mut().flatten();
+            errors.for_each(|error| *error = error.hypot(solved.coupling_error));
+        }
+        point.seconds += std::mem::take(&mut normal_seconds);
+        let level = point.fields.as_ref().map(|fields| levels.get(fields.level));
+        add(point, level)?;
+        watch.advance();
+        Ok(())
+    };
+    let ended = on_footprint(operators, case, solved, watch, add);
+    ended.map_err(|error| watch.explained(error, case))
+}
+
+/// Receives the answer to a motion and the meshes of its refinement.
+type AddAnswer<'a> = dyn FnMut(&Levels, MotionAnswer) -> Result<(), SolveError> + 'a;
+
+fn on_footprint(
+    operators: &Arc<OperatorStore>,
+    case: &CheckedCase,
+    solved: &SolvedFootprint,
+    watch: &TimeLimit,
+    add: &mut AddAnswer,
+) -> Result<(), SolveError> {
     let mut task = case.rolling_task(&solved.footprint);
     task.resolution = task.resolution.beside(solved.coupling_error);
     if let Some(reason) = task.falls_too_fast() {
         return Err(SolveError::NotCovered { reason });
     }
     let mut state = RefinementState::new(&task, operators);
-    let mut assembly = Assembly::new(case, solved);
     if let Some(history) = &case.problem.history {
-        solve_history(&task, history, &mut state, &mut assembly, watch)?;
-        return Ok(assembly.finish());
+        let patches = solved.footprint.patches().iter();
+        let extents: Vec<[f64; 4]> = patches.map(|patch| patch.extent).collect();
+        if let Some(reason) = history::solve::too_long(history, &extents, case.run.steps_max) {
+            return Err(SolveError::NotCovered { reason });
+        }
+        let part = watch.of_next(case.problem.motions.len());
+        let mut points = history::solve::solve(&task, history, &mut state, &part)?.into_iter();
+        return points.try_for_each(|point| add(&state.levels, point));
     }
     for index in 0..case.problem.motions.len() {
         let by_table = by_table(case, &task, &state, index, watch)?;
@@ -63,20 +105,18 @@ fn solve_motions(
         let motion = StagedMotion {
             operators,
             case,
-            solved,
+            coupling: solved.coupling_error,
             index,
             watch,
             by_table,
         };
         match case.run.relative_to {
-            RelativeTo::FrictionLimit => {
-                motion.add(&mut assembly, &task, &mut state, point)?;
-            }
-            RelativeTo::Force => motion.add_to_force(&mut assembly, &task, &mut state, point, 0)?,
+            RelativeTo::FrictionLimit => motion.add(add, &task, &mut state, point)?,
+            RelativeTo::Force => motion.add_to_force(add, &task, &mut state, point, 0)?,
         }
         state.trim();
     }
-    Ok(assembly.finish())
+    Ok(())
 }
 
 /// Returns the answer of the creep table to a motion, if `auto` takes its resultants because its error bound meets the target. The resultants
@@ -100,32 +140,6 @@ fn by_table(
     Ok(is_met.then_some(found))
 }
 
-/// Solves the steps of a history.
-fn solve_history<'a>(
-    task: &'a RollingTask<'a>,
-    history: &HistoryTask,
-    state: &mut RefinementState<'a>,
-    assembly: &mut Assembly,
-    watch: &TimeLimit,
-) -> Result<(), SolveError> {
-    let (case, solved) = assembly.of();
-    let patches = solved.footprint.patches().iter();
-    let extents: Vec<[f64; 4]> = patches.map(|patch| patch.extent).collect();
-    if let Some(reason) = history::solve::too_long(history, &extents, case.run.steps_max) {
-        return Err(SolveError::NotCovered { reason });
-    }
-    let part = watch.of_next(case.problem.motions.len());
-    for mut point in history::solve::solve(task, history, state, &part)? {
-        add_coupling_error(&mut point, solved.coupling_error);
-        if assembly.is_empty() {
-            point.seconds += solved.report.map_or(0.0, |report| report.seconds);
-        }
-        assembly.add(&state.levels, &point, watch)?;
-        watch.advance();
-    }
-    Ok(())
-}
-
 /// Maximum number of repeated solves of a motion with smaller targets. The force hardly changes after the first solve.
 const ROUNDS_MAX: u32 = 3;
 /// Requested error relative to the allowed one. The force of the next solve may be smaller.
@@ -135,7 +149,8 @@ const AIMED: f64 = 0.9;
 struct StagedMotion<'a> {
     operators: &'a Arc<OperatorStore>,
     case: &'a CheckedCase,
-    solved: &'a SolvedFootprint,
+    /// The error of the pressures, see [`SolvedFootprint`].
+    coupling: f64,
     index: usize,
     watch: &'a TimeLimit<'a>,
     /// The answer of the table, if it gives the resultants.
@@ -146,7 +161,7 @@ impl StagedMotion<'_> {
     /// Adds the motion to the answer.
     fn add(
         &self,
-        assembly: &mut Assembly,
+        add: &mut AddAnswer,
         task: &RollingTask,
         state: &mut RefinementState,
         mut point: MotionAnswer,
@@ -165,21 +180,14 @@ impl StagedMotion<'_> {
             // The next motion starts as it does without gradients.
             state.predictor = predictor;
         }
-        add_coupling_error(&mut point, self.solved.coupling_error);
-        if assembly.is_empty() {
-            // The time of the normal problem counts for the first motion.
-            point.seconds += self.solved.report.map_or(0.0, |report| report.seconds);
-        }
-        assembly.add(&state.levels, &point, self.watch)?;
-        self.watch.advance();
-        Ok(())
+        add(&state.levels, point)
     }
 
     /// Adds the motion when its error is small enough relative to its force, or no target makes it smaller. The target of each round relative to
     /// μN follows from the force of the previous round.
     fn add_to_force(
         &self,
-        assembly: &mut Assembly,
+        add: &mut AddAnswer,
         task: &RollingTask,
         state: &mut RefinementState,
         point: MotionAnswer,
@@ -198,16 +206,14 @@ impl StagedMotion<'_> {
                 Ok(mut found) => {
                     found.seconds += point.seconds;
                     found.work.add_lost(point.work);
-                    return self.add_to_force(assembly, &finer, &mut finer_state, found, round + 1);
+                    return self.add_to_force(add, &finer, &mut finer_state, found, round + 1);
                 }
                 // The answer of the previous round is used with its error.
                 Err(SolveError::NotConverged { .. } | SolveError::Unmeshable { .. }) => {}
                 Err(error) => return Err(error),
             }
         }
-        // Each round numbers its levels from 0.
-        assembly.forget_levels();
-        self.add(assembly, task, state, point)
+        self.add(add, task, state, point)
     }
 
     /// Returns the target relative to μN with which the error may be small enough; `None` if it is small enough or no smaller target helps.
@@ -217,18 +223,9 @@ impl StagedMotion<'_> {
             .filter(|_| task.method == Method::BoundaryElement)?;
         let limit = task.friction.limit_of_all(task.footprint);
         let allowed = self.case.run.allowed_error(point, limit)?;
-        let coupling = self.solved.coupling_error;
-        let error = point.error()?.hypot(coupling);
+        let error = point.error()?.hypot(self.coupling);
         let wanted = Resolution::Target((AIMED * allowed).max(TARGET_LEAST));
-        let target = wanted.beside(coupling).target()?.max(TARGET_LEAST);
+        let target = wanted.beside(self.coupling).target()?.max(TARGET_LEAST);
         (error > allowed && target < asked).then_some(target)
-    }
-}
-
-/// Adds the error of the pressures (see [`SolvedFootprint`]) to the error estimates.
-fn add_coupling_error(point: &mut MotionAnswer, coupling: f64) {
-    if coupling > 0.0 {
-        let errors = point.errors.iter_mut().flatten();
-        errors.for_each(|error| *error = error.hypot(coupling));
     }
 }

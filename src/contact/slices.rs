@@ -62,6 +62,20 @@ pub fn joined<E>(
     Ok((solution, fields))
 }
 
+/// Adds the patches of one part of a contact to those of the parts before it. Totals and remarks stay those of the first part.
+pub(crate) fn add_patches(
+    whole: &mut Option<(Solution, Fields)>,
+    (solution, fields): (Solution, Fields),
+) {
+    let Some((all, all_fields)) = whole else {
+        *whole = Some((solution, fields));
+        return;
+    };
+    all.normal = all.normal.zip(solution.normal).map(|(a, b)| a.with(b));
+    all.patches.extend(solution.patches);
+    all_fields.patches.extend(fields.patches);
+}
+
 impl Solution {
     /// Appends the motions of the next slice of the same case.
     fn append(&mut self, later: Solution) {

@@ -1,5 +1,7 @@
 //! Assembles the answer from the results of the stages, with the requested outputs only.
 
+use std::sync::{Arc, Weak};
+
 use crate::case::words::solver::Output;
 use crate::friction::law::FrictionLaw;
 use crate::half_space::unlike_bodies::Elasticity;
@@ -14,10 +16,9 @@ use crate::remark::list::Remark;
 use crate::rolling::answer::{
     HistoryAnswer, MotionAnswer, PatchGradients, Resultants, SolvedFields,
 };
-use crate::rolling::refinement::interpolate::Levels;
 use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::{Motion, RelativeTo};
-use crate::solution::finish::{patch_cells, traction_max, with_tractions};
+use crate::solution::finish::{patch_cells, share_seconds, traction_max, with_tractions};
 use crate::solution::maintain;
 use crate::solution::words::answer::{
     CombinedMaterial, ErrorEstimate, Fields, GradientErrors, Gradients, HistoryPoint, MeshReport,
@@ -44,8 +45,8 @@ pub struct Assembly<'a> {
     total: Vec<Total>,
     remarks: Vec<RemarkEntry>,
     fields: Fields,
-    /// Numbers of the levels whose cells are in `fields`.
-    levels: Vec<usize>,
+    /// The meshes whose cells are in `fields`.
+    levels: Vec<Weak<StripMesh>>,
 }
 
 impl<'a> Assembly<'a> {
@@ -70,35 +71,19 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Returns the case and the footprint.
-    pub fn of(&self) -> (&'a CheckedCase, &'a SolvedFootprint) {
-        (self.case, self.solved)
-    }
-
-    /// Forgets the numbers of levels, which identify other levels from now on.
-    pub fn forget_levels(&mut self) {
-        self.levels.fill(usize::MAX);
-    }
-
-    /// Whether it has no motion yet.
-    pub fn is_empty(&self) -> bool {
-        self.total.is_empty()
-    }
-
-    /// Adds the next motion.
+    /// Adds the next motion, with the mesh of its fields.
     ///
     /// # Errors
     /// The monitor stopped the work.
     pub fn add(
         &mut self,
-        levels: &Levels,
+        level: Option<&Arc<StripMesh>>,
         point: &MotionAnswer,
         monitor: &dyn Monitor,
     ) -> Result<(), Stop> {
         let case = self.case;
         let fields = point.fields.as_ref();
-        let level = fields.map(|fields| levels.get(fields.level));
-        let on_level = level.as_deref().zip(fields);
+        let on_level = level.map(Arc::as_ref).zip(fields);
         let index = self.total.len();
         let limit = self.limits.iter().sum();
         let allowed = case.run.allowed_error(point, limit);
@@ -113,7 +98,7 @@ impl<'a> Assembly<'a> {
             .collect();
         let speed = case.problem.speeds[index];
         maintain::add_damage(case, &self.patches, &self.limits, speed, &mut points);
-        if let Some((level, fields)) = on_level {
+        if let Some((level, fields)) = level.zip(fields) {
             let solved = SolvedMotion {
                 footprint: &self.solved.footprint,
                 level,
@@ -140,15 +125,16 @@ impl<'a> Assembly<'a> {
     }
 
     /// Adds the values per cell of the next motion. Motions that were solved on one level share its cells.
-    fn add_fields(&mut self, level: &StripMesh, found: &SolvedFields, kept: Vec<PointFields>) {
+    fn add_fields(&mut self, level: &Arc<StripMesh>, found: &SolvedFields, kept: Vec<PointFields>) {
         let case = self.case;
         let count = self.patches.len();
         self.fields.patches.resize_with(count, PatchFields::default);
         // Most motions share the mesh of the previous one.
-        let known = self.levels.iter().rposition(|known| *known == found.level);
+        let own = Arc::downgrade(level);
+        let known = self.levels.iter().rposition(|known| known.ptr_eq(&own));
         let mesh = known.unwrap_or(self.levels.len());
         if known.is_none() {
-            self.levels.push(found.level);
+            self.levels.push(own);
         }
         let patches = self.fields.patches.iter_mut().zip(kept).enumerate();
         for (index, (fields, kept)) in patches {
@@ -162,11 +148,11 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Returns the answer.
+    /// Returns the answer. Its patches share the wall times of the motions.
     pub fn finish(self) -> (Solution, Fields) {
         let case = self.case;
         let patches = self.patches.iter().zip(self.limits).zip(self.points);
-        let solution = Solution {
+        let mut solution = Solution {
             patches: patches
                 .map(|((patch, limit), points)| patch_solution(patch, limit, points))
                 .collect(),
@@ -200,12 +186,13 @@ impl<'a> Assembly<'a> {
                 .map(|task| Box::new(task.figures.clone())),
             ..Solution::default()
         };
+        share_seconds(&mut solution);
         (solution, self.fields)
     }
 }
 
 /// Whether an output is requested that the [`Fields`] contain.
-pub fn wants_fields(case: &CheckedCase) -> bool {
+fn wants_fields(case: &CheckedCase) -> bool {
     let kept = |output: &Output| output.is_per_cell() || *output == Output::Subsurface;
     case.run.outputs.iter().any(kept)
 }

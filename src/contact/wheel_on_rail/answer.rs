@@ -1,20 +1,19 @@
 //! The solution of a wheel on a rail, from its pressures and tractions.
 
-use crate::case::words::solver::Output;
 use crate::error::SolveError;
 use crate::geometry::reference_curve::{ReferenceCurve, RigidMotion};
 use crate::normal::on_curve::CurveContact;
 use crate::normal::wheel::WheelContact;
 use crate::numerics::roots::bounds;
 use crate::post::damage::{DamagedPatch, damage};
-use crate::problem::checked_case::CheckedCase;
 use crate::remark::entry::{RemarkEntry, merged};
 use crate::remark::list::Remark;
 use crate::rolling::task::Resolution;
-use crate::solution::assemble::{normalised, wants_fields};
+use crate::slices::add_patches;
+use crate::solution::assemble::normalised;
 use crate::solution::finish::move_origin;
 use crate::solution::words::answer::{
-    ErrorEstimate, Fields, Origin, PatchFields, Position, Solution, Total,
+    ErrorEstimate, Fields, Origin, PatchFields, PatchSolution, Position, Solution, Total,
 };
 use crate::solution::words::damage::Damage;
 use crate::wheel_on_rail::rounds::Found;
@@ -40,29 +39,32 @@ const FRAME: &str = "every patch on the surface of the rail: x along rolling (le
                      rolling, y to the left, z up; forces, moments and tractions act on the lower body, slip is that of the upper body relative \
                      to the lower one";
 
-impl Part {
-    /// Adds errors to the estimates of all forces of a motion: an error relative to the friction limit, and one of the pressures relative to them.
-    fn add_error(&mut self, index: usize, [share, of_load]: [f64; 2], forces: &[PatchForces]) {
-        let mut all = ErrorEstimate::default();
-        for (patch, forces) in self.solution.patches.iter_mut().zip(forces) {
-            let limit = patch.friction_limit_n.unwrap_or(0.0);
-            let open = ErrorEstimate {
-                force_x_n: share * limit,
-                force_y_n: share * limit,
-                moment_z_n_mm: 0.0,
-            };
-            let point = &mut patch.points[index];
-            point.error_estimate = point.error_estimate.map(|error| error.plus(open));
-            let of_pressure =
-                share * FRICTION_LEAST * patch.normal_force_n + of_load * forces.pressed[0].abs();
-            all = all.plus(ErrorEstimate {
-                force_y_n: open.force_y_n.max(of_pressure),
-                ..open
-            });
-        }
-        let total = &mut self.solution.total[index];
-        total.error_estimate = total.error_estimate.map(|error| error.plus(all));
+/// Adds errors to the estimates of all forces of a motion: an error relative to the friction limit, and one of the pressures relative to them.
+fn add_error(
+    solution: &mut Solution,
+    index: usize,
+    [share, of_load]: [f64; 2],
+    forces: &[PatchForces],
+) {
+    let mut all = ErrorEstimate::default();
+    for (patch, forces) in solution.patches.iter_mut().zip(forces) {
+        let limit = patch.friction_limit_n.unwrap_or(0.0);
+        let open = ErrorEstimate {
+            force_x_n: share * limit,
+            force_y_n: share * limit,
+            moment_z_n_mm: 0.0,
+        };
+        let point = &mut patch.points[index];
+        point.error_estimate = point.error_estimate.map(|error| error.plus(open));
+        let of_pressure =
+            share * FRICTION_LEAST * patch.normal_force_n + of_load * forces.pressed[0].abs();
+        all = all.plus(ErrorEstimate {
+            force_y_n: open.force_y_n.max(of_pressure),
+            ..open
+        });
     }
+    let total = &mut solution.total[index];
+    total.error_estimate = total.error_estimate.map(|error| error.plus(all));
 }
 
 impl WheelSolve<'_> {
@@ -110,20 +112,23 @@ impl WheelSolve<'_> {
         };
         let mut totals = vec![nothing; changes.len()];
         let mut whole: Option<(Solution, Fields)> = None;
-        for (number, mut part) in parts.into_iter().enumerate() {
+        for (number, part) in parts.iter().enumerate() {
+            let (mut own, mut own_fields) = part.assembled(self.watch)?;
             let first = whole.as_ref().map_or(0, |(whole, _)| whole.patches.len());
-            remarks.extend(part.solution.remarks.iter().map(|remark| RemarkEntry {
+            remarks.extend(own.remarks.iter().map(|remark| RemarkEntry {
                 patch: remark.patch.map(|patch| patch + first),
                 ..remark.clone()
             }));
+            let [x, s] = part.origin;
+            let arm = minus([x, self.curve.at(s).at[0]], centre);
             for (index, total) in totals.iter_mut().enumerate() {
                 let [of_forces, of_load] = changes[index];
                 let errors = [error + of_forces, of_load];
-                part.add_error(index, errors, &of_motions[index][number]);
-                let own = self.error_of(&part, index, centre);
-                total.error_estimate = total.error_estimate.zip(own).map(|(a, b)| a.plus(b));
+                add_error(&mut own, index, errors, &of_motions[index][number]);
+                let both = total.error_estimate.zip(own.total[index].error_estimate);
+                total.error_estimate = both.map(|(sum, error)| sum.plus(error.moved(arm)));
             }
-            for k in 0..part.loads.len() {
+            for k in 0..own.patches.len() {
                 let forces: Vec<PatchForces> =
                     of_motions.iter().map(|forces| forces[number][k]).collect();
                 for (index, total) in totals.iter_mut().enumerate() {
@@ -131,23 +136,16 @@ impl WheelSolve<'_> {
                     total.force_x_n += x;
                     total.force_y_n += y;
                     total.force_z_n = total.force_z_n.map(|sum| sum + z);
-                    total.moment_z_n_mm += self.moment(&part, k, index, centre);
+                    total.moment_z_n_mm += self.moment(part, k, index, centre);
                 }
-                self.add_patch(&contact, &mut part, k, &forces)?;
+                let cells = own_fields.patches.get_mut(k);
+                self.add_patch(&contact, part, k, (&mut own.patches[k], cells), &forces)?;
             }
-            match &mut whole {
-                None => whole = Some((part.solution, part.fields)),
-                Some((all, fields)) => {
-                    all.normal = all.normal.zip(part.solution.normal).map(|(a, b)| a.with(b));
-                    all.patches.extend(part.solution.patches);
-                    fields.patches.extend(part.fields.patches);
-                }
-            }
+            add_patches(&mut whole, (own, own_fields));
         }
-        let Some((mut solution, mut fields)) = whole else {
+        let Some((mut solution, fields)) = whole else {
             unreachable!("a wheel at rest touches its rail")
         };
-        drop_unasked(self.case, &mut fields);
         if let Some(normal) = &mut solution.normal {
             normal.seconds = seconds;
         }
@@ -183,22 +181,17 @@ impl WheelSolve<'_> {
     fn add_patch(
         &self,
         contact: &CurveContact,
-        part: &mut Part,
+        part: &Part,
         k: usize,
+        (patch, cells): (&mut PatchSolution, Option<&mut PatchFields>),
         forces: &[PatchForces],
     ) -> Result<(), SolveError> {
         let geometry = &self.contact.geometry;
         let centre = part.centres[k];
         let (place, over) = self.load_centre(contact, centre)?;
         let [_, y, z] = place.point(centre[0], 0.0);
-        let by = minus(part.centres[k], part.origin);
-        move_origin(
-            &mut part.solution.patches[k],
-            part.fields.patches.get_mut(k),
-            by,
-        );
-        let load = part.loads[k];
-        let patch = &mut part.solution.patches[k];
+        move_origin(patch, cells, minus(centre, part.origin));
+        let load = &part.patches()[k];
         let limit = patch.friction_limit_n.unwrap_or(0.0);
         // All motions have the same pressures.
         let angle = forces[0].angle();
@@ -229,7 +222,7 @@ impl WheelSolve<'_> {
             if let Some(task) = &self.case.run.after.damage {
                 let across = point.damage.take().and_then(|damage| damage.across);
                 let of = DamagedPatch {
-                    patch: &load,
+                    patch: load,
                     point,
                     limit,
                     speed: *speed,
@@ -241,40 +234,6 @@ impl WheelSolve<'_> {
             }
         }
         Ok(())
-    }
-
-    /// The errors of the forces of a part in a motion in track axes, and of its moment about the vertical line through a point `[x, y]`.
-    fn error_of(&self, part: &Part, index: usize, about: [f64; 2]) -> Option<ErrorEstimate> {
-        let [x, s] = part.origin;
-        let arm = [x - about[0], self.curve.at(s).at[0] - about[1]];
-        let error = part.solution.total[index].error_estimate?;
-        Some(ErrorEstimate {
-            moment_z_n_mm: error.moment_z_n_mm
-                + arm[0].abs() * error.force_y_n
-                + arm[1].abs() * error.force_x_n,
-            ..error
-        })
-    }
-}
-
-/// Removes values per cell that were not requested.
-fn drop_unasked(case: &CheckedCase, fields: &mut Fields) {
-    let kept = |output| case.run.wants(output);
-    if !wants_fields(case) {
-        fields.patches.clear();
-        return;
-    }
-    for PatchFields { meshes, points } in &mut fields.patches {
-        if !kept(Output::Pressure) {
-            meshes
-                .iter_mut()
-                .for_each(|cells| cells.pressure_mpa = None);
-        }
-        if !kept(Output::Tractions) {
-            for point in points {
-                (point.traction_x_mpa, point.traction_y_mpa) = (None, None);
-            }
-        }
     }
 }
 
@@ -291,7 +250,7 @@ pub(super) fn turn(contact: &CurveContact) -> f64 {
 fn load_centre_of_all(curve: &ReferenceCurve, parts: &[Part]) -> [f64; 2] {
     let (mut load, mut sum) = (0.0, [0.0; 2]);
     for part in parts {
-        for k in 0..part.solution.patches.len() {
+        for k in 0..part.centres.len() {
             each_cell(part, k, 0, |[x, s], _, area, [.., p]| {
                 load += area * p;
                 sum = [sum[0] + area * p * x, sum[1] + area * p * curve.at(s).at[0]];

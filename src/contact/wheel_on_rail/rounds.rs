@@ -1,16 +1,14 @@
 //! Fixed-point iteration between the pressures and the tractions of a wheel on a rail.
 
-use crate::case::words::solver::Output;
 use crate::error::SolveError;
 use crate::geometry::reference_curve::RigidMotion;
 use crate::normal::gap::grid::NormalError;
 use crate::normal::on_curve::{CurveContact, Friction, Workspace};
 use crate::normal::wheel::{WheelContact, WheelPatch};
 use crate::problem::checked_case::CheckedCase;
-use crate::problem::physics::Run;
 use crate::remark::list::Remark;
+use crate::rolling::answer::Resultants;
 use crate::rolling::task::NEGLIGIBLE_OF_TARGET;
-use crate::solution::words::answer::Total;
 use crate::traction_estimate::{can_estimate, patch_forces};
 use crate::unlike_bodies::LEFT_BY_PRESSURE;
 use crate::vertical_equilibrium::{next_share, tolerance};
@@ -68,7 +66,6 @@ impl WheelSolve<'_> {
         friction.opened.clone_from(&contact.opened);
         let first = self.wheel(&contact)?;
         before(&first)?;
-        let exact = with_tractions(run, &run.outputs);
         let target = run.resolution.target_or_usual();
         let negligible = NEGLIGIBLE_OF_TARGET * target;
         let balance = tolerance(run.resolution);
@@ -79,7 +76,7 @@ impl WheelSolve<'_> {
         let last = problem.motions.len() - 1;
         let mut earlier = None;
         for round in 1..=ROUNDS_MAX {
-            let parts = self.tractions(&contact, &exact, open, workspace)?;
+            let parts = self.tractions(&contact, run, open, workspace)?;
             let (mut next, mut change) = (Friction::default(), 0.0);
             if coupled {
                 next = match opens {
@@ -186,9 +183,11 @@ impl WheelSolve<'_> {
         }
         // The tractions change at most in proportion to the pressures.
         let force = |index: usize| {
-            let totals = parts.iter().map(|part| &part.solution.total[index]);
-            let of_part = |total: &Total| total.force_x_n.hypot(total.force_y_n);
-            totals.map(of_part).sum::<f64>() / limit
+            let of_part = |part: &Part| {
+                let sum: Resultants = part.resultants(index).iter().sum();
+                sum.force_x.hypot(sum.force_y)
+            };
+            parts.iter().map(of_part).sum::<f64>() / limit
         };
         let changes = by_gap.iter().zip(&by_lift).enumerate();
         Ok(Neglected {
@@ -213,7 +212,7 @@ impl WheelSolve<'_> {
         if !coupled {
             return Ok((friction, coarse));
         }
-        let rough = with_tractions(&run.for_resultants(TARGET_ROUGH), &[]);
+        let rough = run.for_resultants(TARGET_ROUGH);
         let negligible = NEGLIGIBLE_OF_TARGET * run.resolution.target_or_usual();
         let limit = problem.friction.largest();
         let mut by_table = problem.history.is_none() && can_estimate(problem);
@@ -366,18 +365,6 @@ fn accelerated(
     next
 }
 
-/// A run with tractions and pressures among its outputs.
-fn with_tractions(run: &Run, outputs: &[Output]) -> Run {
-    let needed = [Output::Resultants, Output::Tractions, Output::Pressure];
-    let mut outputs: Vec<Output> = outputs.iter().copied().chain(needed).collect();
-    outputs.sort_unstable();
-    outputs.dedup();
-    Run {
-        outputs,
-        ..run.clone()
-    }
-}
-
 /// Lateral and vertical resultant of the pressures in N.
 fn resultant(contact: &CurveContact) -> [f64; 2] {
     let rows = contact.pressure.chunks_exact(contact.grid.x.len());
@@ -391,6 +378,5 @@ fn resultant(contact: &CurveContact) -> [f64; 2] {
 
 /// The friction limit of some parts in N.
 fn limit(parts: &[Part]) -> f64 {
-    let patches = parts.iter().flat_map(|part| &part.solution.patches);
-    patches.filter_map(|patch| patch.friction_limit_n).sum()
+    parts.iter().flat_map(Part::limits).sum()
 }

@@ -1,8 +1,11 @@
 //! Tractions of the patches of a wheel on a rail, and their forces.
 
+use std::sync::Arc;
+
 use crate::error::SolveError;
 use crate::friction::law::{FrictionLaw, on_rail};
 use crate::geometry::reference_curve::{CurvePlace, RigidMotion, WheelOver};
+use crate::monitor::{Monitor, Stop};
 use crate::normal::footprint::{Footprint, SurfaceSlip};
 use crate::normal::hertz::Patch;
 use crate::normal::on_curve::{CurveContact, Workspace};
@@ -12,9 +15,12 @@ use crate::normal_stage::SolvedFootprint;
 use crate::numerics::roots::bounds;
 use crate::problem::checked_case::CheckedCase;
 use crate::problem::physics::Run;
+use crate::rolling::answer::{MotionAnswer, Resultants};
+use crate::rolling::strip_mesh::StripMesh;
 use crate::rolling::task::Motion;
 use crate::rolling_stage;
-use crate::solution::words::answer::{Fields, NormalReport, PatchSolution, Solution};
+use crate::solution::assemble::Assembly;
+use crate::solution::words::answer::{Fields, NormalReport, Solution};
 use crate::time_limit::TimeLimit;
 use crate::vertical_equilibrium::tolerance;
 use crate::wheel_on_rail::{WheelSolve, minus};
@@ -26,12 +32,41 @@ const PATCHES_MAX: usize = 4;
 pub(super) struct Part {
     /// x and s in mm of the origin of its coordinates.
     pub(super) origin: [f64; 2],
-    /// Result of the normal problem about the same origin.
-    pub(super) loads: Vec<Patch>,
-    /// Their load centres `[x, s]` in mm.
+    /// Load centres `[x, s]` of the patches in mm.
     pub(super) centres: Vec<[f64; 2]>,
-    pub(super) solution: Solution,
-    pub(super) fields: Fields,
+    case: CheckedCase,
+    /// The patches and their pressures about the origin.
+    footprint: SolvedFootprint,
+    /// The answer to each motion, with the mesh of its fields.
+    motions: Vec<(MotionAnswer, Option<Arc<StripMesh>>)>,
+}
+
+impl Part {
+    /// The patches about the origin.
+    pub(super) fn patches(&self) -> &[Patch] {
+        self.footprint.footprint.patches()
+    }
+
+    /// Friction limits of the patches in N.
+    pub(super) fn limits(&self) -> impl Iterator<Item = f64> {
+        let footprint = &self.footprint.footprint;
+        let friction = &self.case.problem.friction;
+        (0..self.centres.len()).map(|k| friction.limit(footprint, k))
+    }
+
+    /// Extrapolated forces of the patches in a motion.
+    pub(super) fn resultants(&self, index: usize) -> &[Resultants] {
+        &self.motions[index].0.resultants
+    }
+
+    /// The solution about the origin, with the requested outputs.
+    pub(super) fn assembled(&self, monitor: &dyn Monitor) -> Result<(Solution, Fields), Stop> {
+        let mut assembly = Assembly::new(&self.case, &self.footprint);
+        for (motion, level) in &self.motions {
+            assembly.add(level.as_ref(), motion, monitor)?;
+        }
+        Ok(assembly.finish())
+    }
 }
 
 /// Forces of a patch in N, summed over its cells.
@@ -155,7 +190,7 @@ impl WheelSolve<'_> {
             false => 0.0,
         };
         let load_error = contact.missed.hypot(unbalanced);
-        let solved = SolvedFootprint {
+        let footprint = SolvedFootprint {
             footprint: Footprint::computed(
                 field.from_origin(origin),
                 load_error,
@@ -170,20 +205,25 @@ impl WheelSolve<'_> {
             coupling_error: open,
             remarks: Vec::new(),
         };
-        let part = CheckedCase {
+        let case = CheckedCase {
             problem: problem.of_gap(friction, motions),
             run: run.clone(),
             label: label.clone(),
             remarks: Vec::new(),
         };
-        part.fits(&solved.footprint)?;
-        let (solution, fields) = rolling_stage::solve(self.operators, &part, &solved, watch)?;
+        case.fits(&footprint.footprint)?;
+        let mut motions = Vec::new();
+        let add = &mut |motion, level| {
+            motions.push((motion, level));
+            Ok(())
+        };
+        rolling_stage::solve_motions(self.operators, &case, &footprint, watch, add)?;
         Ok(Part {
             origin,
-            loads: solved.footprint.patches().to_vec(),
             centres,
-            solution,
-            fields,
+            case,
+            footprint,
+            motions,
         })
     }
 
@@ -323,8 +363,7 @@ impl WheelSolve<'_> {
         index: usize,
     ) -> Vec<Vec<PatchForces>> {
         let of_part = |part: &Part| {
-            let field = part.solution.patches.iter().enumerate();
-            let of_patch = |(k, patch): (usize, &PatchSolution)| {
+            let of_patch = |k: usize| {
                 let mut forces = PatchForces {
                     pressed: self.pressed(contact, part, k),
                     ..PatchForces::default()
@@ -337,16 +376,16 @@ impl WheelSolve<'_> {
                     shear[2] += area * y * sin;
                 });
                 let (sin, cos) = forces.angle().sin_cos();
-                let point = &patch.points[index];
-                let beyond = point.force_y_n - plain[1];
+                let found = part.resultants(index)[k];
+                let beyond = found.force_y - plain[1];
                 forces.sheared = [
-                    point.force_x_n,
+                    found.force_x,
                     shear[1] + beyond * cos,
                     shear[2] + beyond * sin,
                 ];
                 forces
             };
-            field.map(of_patch).collect()
+            (0..part.centres.len()).map(of_patch).collect()
         };
         parts.iter().map(of_part).collect()
     }
@@ -354,8 +393,8 @@ impl WheelSolve<'_> {
     /// Sums of the pressures of a patch times the sine and the cosine of their angles, in N.
     fn pressed(&self, contact: &CurveContact, part: &Part, patch: usize) -> [f64; 2] {
         let grid = &contact.grid;
-        let [x_min, x_max, s_min, s_max] = part.solution.patches[patch].extent_mm;
-        let alone = part.solution.patches.len() == 1 && contact.parts(self.influence).len() == 1;
+        let [x_min, x_max, s_min, s_max] = part.patches()[patch].extent;
+        let alone = part.centres.len() == 1 && contact.parts(self.influence).len() == 1;
         let mut sums = [0.0; 2];
         for (j, place) in grid.places.iter().enumerate() {
             let s = place.s - part.origin[1];
@@ -391,7 +430,7 @@ impl WheelSolve<'_> {
         ];
         let cells = [nx, grid.numbers[ny - 1] + 1];
         for part in parts {
-            for k in 0..part.solution.patches.len() {
+            for k in 0..part.centres.len() {
                 each_cell(part, k, index, |place, size, _, [x, y, _]| {
                     // The cells of the grid that this cell covers, and the covered part of each.
                     let [along, across] = [0, 1].map(|axis| {
@@ -440,24 +479,26 @@ pub(super) fn each_cell(
     index: usize,
     mut call: impl FnMut([f64; 2], [f64; 2], f64, [f64; 3]),
 ) {
-    let Some(fields) = part.fields.patches.get(patch) else {
+    let (motion, level) = &part.motions[index];
+    let (Some(fields), Some(level)) = (&motion.fields, level) else {
         return;
     };
-    let (cells, point) = (fields.cells(index), &fields.points[index]);
-    let (Some(x), Some(y), Some(p)) = (
-        &point.traction_x_mpa,
-        &point.traction_y_mpa,
-        &cells.pressure_mpa,
-    ) else {
-        return;
-    };
-    for i in 0..cells.x_mm.len() {
-        let place = [
-            cells.x_mm[i] + part.origin[0],
-            cells.y_mm[i] + part.origin[1],
-        ];
-        let size = [cells.dx_mm[i], cells.dy_mm[i]];
-        call(place, size, size[0] * size[1], [x[i], y[i], p[i]]);
+    let (mesh, unit) = (&level.mesh, level.scale.traction);
+    let traction = &fields.tangential.traction;
+    for segment in mesh.segments.iter().filter(|s| s.chord.patch == patch) {
+        let (y, dy) = (segment.chord.y, segment.chord.dy);
+        for i in segment.cells.clone() {
+            let x = 0.5 * (mesh.left[i] + mesh.right[i]);
+            let size = [mesh.right[i] - mesh.left[i], dy];
+            let [q_x, q_s] = [0, 1].map(|axis| unit * traction[axis][i]);
+            let place = [x + part.origin[0], y + part.origin[1]];
+            call(
+                place,
+                size,
+                size[0] * size[1],
+                [q_x, q_s, level.pressure[i]],
+            );
+        }
     }
 }
 

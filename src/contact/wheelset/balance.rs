@@ -18,9 +18,10 @@ use crate::remark::entry::{RemarkEntry, merged};
 use crate::rolling::force_control::PLACE_MAX;
 use crate::rolling::operator_store::OperatorStore;
 use crate::rolling::task::NEGLIGIBLE_OF_TARGET;
+use crate::slices::add_patches;
 use crate::solution::words::answer::{
-    ErrorEstimate, Fields, Kinematics, Origin, PatchSolution, Solution, Total, WheelOnRail,
-    WheelsetAnswer, WheelsetPosition,
+    Fields, Kinematics, Origin, PatchSolution, Solution, Total, WheelOnRail, WheelsetAnswer,
+    WheelsetPosition,
 };
 use crate::solution::words::damage::ProfileUncertainty;
 use crate::surface_fallback;
@@ -371,14 +372,7 @@ impl<'a> WheelsetGathering<'a> {
             .max_by(|a, b| a.normal_force_n.total_cmp(&b.normal_force_n));
         let place = main.and_then(|patch: &PatchSolution| patch.position);
         let lowering = solution.wheel_lowering_mm.take();
-        match &mut self.whole {
-            None => self.whole = Some((solution, fields)),
-            Some((all, all_fields)) => {
-                all.normal = all.normal.zip(solution.normal).map(|(a, b)| a.with(b));
-                all.patches.extend(solution.patches);
-                all_fields.patches.extend(fields.patches);
-            }
-        }
+        add_patches(&mut self.whole, (solution, fields));
         WheelOnRail {
             patches: (first..first + count).collect(),
             rolling_radius_mm: place.map_or(0.0, |place| place.rolling_radius_mm),
@@ -426,12 +420,7 @@ fn about_middle(solution: &Solution) -> Total {
     };
     Total {
         moment_z_n_mm: total.moment_z_n_mm + x * total.force_y_n - y * total.force_x_n,
-        error_estimate: total.error_estimate.map(|error| ErrorEstimate {
-            moment_z_n_mm: error.moment_z_n_mm
-                + x.abs() * error.force_y_n
-                + y.abs() * error.force_x_n,
-            ..error
-        }),
+        error_estimate: total.error_estimate.map(|error| error.moved([x, y])),
         ..total
     }
 }

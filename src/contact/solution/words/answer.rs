@@ -385,6 +385,15 @@ impl ErrorEstimate {
             moment_z_n_mm: self.moment_z_n_mm + other.moment_z_n_mm,
         }
     }
+
+    /// Returns the estimate with the moment about another point; `arm` is the distance `[x, y]` in mm of the present point from it.
+    pub(crate) fn moved(self, arm: [f64; 2]) -> ErrorEstimate {
+        let [by_y, by_x] = [arm[0].abs() * self.force_y_n, arm[1].abs() * self.force_x_n];
+        ErrorEstimate {
+            moment_z_n_mm: self.moment_z_n_mm + by_y + by_x,
+            ..self
+        }
+    }
 }
 
 /// Derivatives of the resultants of a patch with respect to `[creepage_x, creepage_y, spin_per_mm]`, at constant region and pressure: the
