@@ -10,19 +10,17 @@ use crate::rolling::history::plan::HistoryStart;
 use crate::rolling::history::solve::{pressed_bytes, pressed_cells_max};
 use crate::rolling::operator_store::{OperatorKind, kept_bytes};
 use crate::rolling::refinement::interpolate::LEVELS_KEPT;
-use crate::rolling::refinement::mesh_family::{CELLS_MAX, PATCH_CELLS_MAX_LEAST, fixed_meshes};
+use crate::rolling::refinement::mesh_family::{
+    CELLS_FIRST, CELLS_MAX, PATCH_CELLS_MAX_LEAST, fixed_meshes,
+};
 use crate::rolling::task::{Motion, Resolution, TARGET_LEAST, TARGET_USUAL};
 
 /// Average number of cells of the finest mesh for the target [`TARGET_USUAL`].
 const TARGET_CELLS: f64 = 315.0;
 /// Negative exponent of the target in the number of cells.
 const TARGET_GROWTH: f64 = 0.65;
-/// Bytes per cell of the finest mesh for an iteration: the Krylov space, iterates and buffers.
+/// Bytes per cell of an iteration: the Krylov space, iterates and buffers. A kept mesh with pressure, area, bound and the values of two motions needs less.
 const WORK_BYTES_PER_CELL: f64 = 512.0;
-/// Bytes per cell of a kept level: two meshes, pressure, area, bound, and the values of two motions.
-const LEVEL_BYTES_PER_CELL: f64 = 200.0;
-/// Usual number of meshes for one motion.
-const LEVELS_PER_MOTION: f64 = 4.0;
 /// Bytes of a motion in the answer for each patch, with its text.
 const MOTION_BYTES: f64 = 2000.0;
 /// Bytes of a stress, or of the fields of a cell for one motion, in the answer and in their stored form.
@@ -107,7 +105,7 @@ impl SizeInput {
             Method::LiuHsu => 4.0 * (2.0 * cells).powi(2) * 8.0,
             Method::Fastsim | Method::Table => 0.0,
         };
-        let levels = (LEVELS_PER_MOTION * motions).min(LEVELS_KEPT as f64);
+        let levels = (self.meshes().len() * self.motions).min(LEVELS_KEPT) as f64;
         let patches = self.segments.len() as f64;
         let fields = match self.fields {
             // On average, motions have at most twice the usual number of cells.
@@ -116,7 +114,7 @@ impl SizeInput {
         };
         operators
             + solve
-            + cells * (WORK_BYTES_PER_CELL + levels * LEVEL_BYTES_PER_CELL)
+            + cells * WORK_BYTES_PER_CELL * (1.0 + levels)
             + self.kept_of_history(cells)
             + motions * patches * (MOTION_BYTES + STORED_BYTES * self.stress_points as f64)
             + fields
@@ -140,29 +138,37 @@ impl SizeInput {
     /// Returns the memory in bytes of all operators that an unlimited store would keep: those of the fixed meshes of the method, or of the meshes
     /// for a target, of which each motion with spin has its own.
     fn operators(&self) -> f64 {
-        let (finest, segments) = self.finest();
-        let of = |cells: f64, segments: f64| {
-            kept_bytes(self.operator(cells, segments) as u64, self.store) as f64
+        let separate = match self.fixed() {
+            Some(_) => 1,
+            None => self.spinning.max(1),
         };
-        if matches!(self.method, Method::Fastsim | Method::Table) {
-            return 0.0;
+        let meshes = self.meshes().into_iter();
+        let kept = meshes.map(|(cells, segments)| {
+            kept_bytes(self.operator(cells, segments) as u64, self.store) as f64
+        });
+        separate as f64 * kept.sum::<f64>()
+    }
+
+    /// Returns the numbers of cells and segments of the meshes of one motion. With a target, each has half the cells of the next finer one.
+    fn meshes(&self) -> Vec<(f64, f64)> {
+        if let Some(sizes) = self.fixed() {
+            return sizes.iter().map(|size| self.of_size(size)).collect();
         }
-        if let Some(sizes) = fixed_meshes(self.resolution, self.method) {
-            let per_strip: f64 = self.segments.iter().sum();
-            let of_size = |size: &MeshSize| {
-                let segments = f64::from(size.strips) * per_strip;
-                of(segments * f64::from(size.cells), segments)
-            };
-            return sizes.iter().map(of_size).sum();
-        }
-        // Each mesh of a motion has half the cells of the next finer one.
-        let usual = self.usual_cells(finest);
-        let halves = std::iter::successors(Some(usual), |cells| Some(0.5 * cells));
-        let chain: f64 = halves
-            .take(LEVELS_PER_MOTION as usize)
-            .map(|cells| of(cells, segments * (cells / finest).sqrt()))
-            .sum();
-        chain * self.spinning.max(1) as f64
+        let (finest, segments) = self.finest();
+        std::iter::successors(Some(self.usual_cells(finest)), |cells| Some(0.5 * cells))
+            .take_while(|cells| *cells >= CELLS_FIRST)
+            .map(|cells| (cells, segments * (cells / finest).sqrt()))
+            .collect()
+    }
+
+    fn fixed(&self) -> Option<Vec<MeshSize>> {
+        fixed_meshes(self.resolution, self.method)
+    }
+
+    /// Returns the numbers of cells and segments of a mesh over all patches.
+    fn of_size(&self, size: &MeshSize) -> (f64, f64) {
+        let segments = f64::from(size.strips) * self.segments.iter().sum::<f64>();
+        (segments * f64::from(size.cells), segments)
     }
 
     /// Returns the memory in bytes that the case takes in the operator store.
@@ -188,20 +194,13 @@ impl SizeInput {
         if self.method == Method::Table {
             return (0.0, 0.0);
         }
+        if let Some(size) = self.fixed().as_deref().and_then(<[_]>::last) {
+            return self.of_size(size);
+        }
+        // The patches share the cells. Strips of hollow patches have several segments.
         let per_strip: f64 = self.segments.iter().sum();
-        let fixed = fixed_meshes(self.resolution, self.method);
-        let size = match (self.resolution, fixed.as_deref().and_then(<[_]>::last)) {
-            (_, Some(size)) => *size,
-            (Resolution::Mesh(size), None) => size,
-            (Resolution::Target(_), None) => {
-                // The patches share the cells. Strips of hollow patches have several segments.
-                let share =
-                    (f64::from(CELLS_MAX) / self.segments.len() as f64).max(PATCH_CELLS_MAX_LEAST);
-                return (share * per_strip, share.sqrt() * per_strip);
-            }
-        };
-        let segments = f64::from(size.strips) * per_strip;
-        (segments * f64::from(size.cells), segments)
+        let share = (f64::from(CELLS_MAX) / self.segments.len() as f64).max(PATCH_CELLS_MAX_LEAST);
+        (share * per_strip, share.sqrt() * per_strip)
     }
 
     /// Returns the usual number of cells: that of an explicit mesh, or the average for the target.

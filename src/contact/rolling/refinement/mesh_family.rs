@@ -9,7 +9,7 @@ use crate::rolling::task::{MeshPlan, Motion, Resolution, RollingTask};
 
 /// Cells per patch of the coarsest mesh. 16 and 23 halve the work at a target of 0.02, but cover 90 to 93 % of ellipses, because meshes of 4 × 4 cells agree
 /// by chance.
-const CELLS_FIRST: f64 = 32.0;
+pub(crate) const CELLS_FIRST: f64 = 32.0;
 /// Total number of cells of the finest mesh.
 pub const CELLS_MAX: u32 = 2048;
 /// Least number of cells per patch of the finest mesh, for any number of patches.
