@@ -138,7 +138,9 @@ impl RowsAnswer {
     pub(crate) fn with_capacity(rows: usize, gradients: bool) -> RowsAnswer {
         let more = GRADIENT_NAMES.into_iter().filter(|_| gradients);
         let names = ROW_NAMES.into_iter().chain(more);
+        let found = [false; UNKNOWNS.len()];
         RowsAnswer {
+            solved: NumberColumns { found, gradients },
             numbers: names.map(|name| (name, Vec::with_capacity(rows))).collect(),
             status: Vec::with_capacity(rows),
             ..RowsAnswer::default()
@@ -212,31 +214,18 @@ impl RowsAnswer {
         self
     }
 
-    /// Replaces `rows` by answers of the solver in the same order.
-    pub(crate) fn replace(&mut self, rows: &[usize], solved: RowsAnswer) {
-        for ((_, column), (_, numbers)) in self.numbers.iter_mut().zip(&solved.numbers) {
-            for (row, number) in rows.iter().zip(numbers) {
-                column[*row] = *number;
-            }
-        }
-        for (row, status) in rows.iter().zip(&solved.status) {
-            self.status[*row] = *status;
-        }
-        let notes = solved.notes.into_values();
-        self.notes.extend(rows.iter().copied().zip(notes));
-    }
-
     /// Writes the outcome of a row. An answer with a number that is not finite becomes a failure.
     pub(crate) fn set(&mut self, row: usize, mut outcome: RowOutcome) {
-        if let Some(name) = self.not_finite(&outcome.numbers) {
+        let names = self.solved.names();
+        if let Some(name) = not_finite(&names, &outcome.numbers) {
             let quantity = name.to_owned();
             let reason = SolveError::NotFinite { quantity }.to_string();
             outcome = RowOutcome::without(RowStatus::Unsolvable, reason);
         }
-        let numbers = outcome.numbers.into_iter();
-        let numbers = numbers.chain(std::iter::repeat(f64::NAN));
-        for ((_, column), number) in self.numbers.iter_mut().zip(numbers) {
-            column[row] = number;
+        for (name, column) in &mut self.numbers {
+            let mut numbers = names.iter().zip(&outcome.numbers);
+            let own = numbers.find(|(own, _)| *own == name);
+            column[row] = own.map_or(f64::NAN, |(_, number)| *number);
         }
         self.status[row] = outcome.status;
         self.notes.insert(row, outcome.note);
@@ -263,17 +252,17 @@ impl RowsAnswer {
         };
         self.set(row, outcome);
     }
+}
 
-    /// Returns the name of the first number that is not finite, other than an optional one. Several patches have no derivatives.
-    fn not_finite(&self, numbers: &[f64]) -> Option<&'static str> {
-        let is_optional =
-            |name: &str| OPTIONAL_NUMBERS.contains(&name) || GRADIENT_NAMES.contains(&name);
-        let is_wrong = |(name, number): &(&str, &f64)| {
-            !(number.is_finite() || number.is_nan() && is_optional(name))
-        };
-        let mut named = self.numbers.iter().map(|(name, _)| *name).zip(numbers);
-        named.find(is_wrong).map(|(name, _)| name)
-    }
+/// Returns the name of the first number that is not finite, other than an optional one. Several patches have no derivatives.
+fn not_finite(names: &[&'static str], numbers: &[f64]) -> Option<&'static str> {
+    let is_optional =
+        |name: &str| OPTIONAL_NUMBERS.contains(&name) || GRADIENT_NAMES.contains(&name);
+    let is_wrong = |(name, number): &(&&str, &f64)| {
+        !(number.is_finite() || number.is_nan() && is_optional(name))
+    };
+    let mut named = names.iter().zip(numbers);
+    named.find(is_wrong).map(|(name, _)| *name)
 }
 
 /// Names of the columns of derivatives: of forces and moment, each with respect to both creepages and the spin.

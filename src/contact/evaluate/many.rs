@@ -53,21 +53,6 @@ pub fn solve_many(
     Ok(answer)
 }
 
-/// Solves every row as a separate case. `checked` is the checked case of the task, and `first` that of its first row, if it is known.
-fn solve_rows<E>(
-    task: &ManyTask,
-    checked: &CheckedCase,
-    first: Option<&CheckedCase>,
-    solve: &RowSolver,
-    monitor: &dyn Monitor,
-) -> Result<RowsAnswer, NotAtOnce<E>> {
-    let mut answer = RowsAnswer::unsolved(task.rows(), NumberColumns::of(checked));
-    let rows = (0..task.rows()).collect();
-    let solved = solve_each(task, rows, first, (solve, monitor), &mut answer);
-    solved.map_err(|_| NotAtOnce::Stopped)?;
-    Ok(answer.for_rows())
-}
-
 /// Maximum number of rows of one evaluation that the solver answers. The table and FASTSIM answer any number.
 pub const SOLVED_ROWS_MAX: usize = 200;
 
@@ -98,37 +83,24 @@ pub fn evaluate_at_once<E>(
     mut step: impl FnMut() -> Result<(), E>,
 ) -> Result<RowsAnswer, NotAtOnce<E>> {
     let first = Some(checked).filter(|checked| several_answers(checked).is_none());
-    let Some((rows, method)) = evaluable(task, checked) else {
-        let rows = task.rows();
-        if rows > SOLVED_ROWS_MAX {
-            return Err(NotAtOnce::TooManyRows(rows));
+    let mut open: Vec<usize> = (0..task.rows()).collect();
+    let mut answer = match evaluable(task, checked) {
+        None if open.len() > SOLVED_ROWS_MAX => return Err(NotAtOnce::TooManyRows(open.len())),
+        None => RowsAnswer::unsolved(open.len(), NumberColumns::of(checked)).for_rows(),
+        Some((rows, method)) => {
+            let answer = rows.evaluate_to(&mut step).map_err(NotAtOnce::Step)?;
+            open.retain(|row| to_solve(answer.status[*row], method));
+            answer
         }
-        return solve_rows(task, checked, first, solve, monitor);
     };
-    let mut answer = rows.evaluate_to(&mut step).map_err(NotAtOnce::Step)?;
-    let mut open: Vec<usize> = (0..answer.status.len())
-        .filter(|row| to_solve(answer.status[*row], method))
-        .collect();
     if open.len() > SOLVED_ROWS_MAX {
         // The solver finds only the reason of these rows.
         let without = [RowStatus::Refused, RowStatus::NotFinite];
         open.retain(|row| !without.contains(&answer.status[*row]));
     }
-    if !open.is_empty() && open.len() <= SOLVED_ROWS_MAX {
-        let columns = task.columns.iter();
-        let columns: Vec<VariedColumn> = columns
-            .map(|column| VariedColumn {
-                pointer: column.pointer.clone(),
-                values: column.values.pick(&open),
-            })
-            .collect();
-        let task = ManyTask {
-            columns: &columns,
-            ..*task
-        };
-        let first = first.filter(|_| open[0] == 0);
-        let solved = solve_rows(&task, checked, first, solve, monitor)?;
-        answer.replace(&open, solved);
+    if open.len() <= SOLVED_ROWS_MAX {
+        let solved = solve_each(task, open, first, (solve, monitor), &mut answer);
+        solved.map_err(|_| NotAtOnce::Stopped)?;
     }
     Ok(answer)
 }

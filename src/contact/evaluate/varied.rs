@@ -54,16 +54,6 @@ impl Values {
         }
     }
 
-    /// Returns the values of some rows.
-    #[must_use]
-    pub fn pick(&self, rows: &[usize]) -> Values {
-        let rows = rows.iter();
-        match self {
-            Values::Numbers(numbers) => Values::Numbers(rows.map(|row| numbers[*row]).collect()),
-            Values::Texts(texts) => Values::Texts(rows.map(|row| texts[*row].clone()).collect()),
-        }
-    }
-
     /// Returns the value of a row in the form of a member of a case.
     pub fn value(&self, row: usize) -> Value {
         match self {
