@@ -185,13 +185,9 @@ pub(crate) fn polynomial_weights<const N: usize>(nodes: &[f64; N], at: f64) -> [
 
 /// Value at `at` of the polynomial of least degree through at least one point `(place, value)`.
 pub fn polynomial_value(points: &[(f64, f64)], at: f64) -> f64 {
-    let mut sum = 0.0;
-    for (i, (node, value)) in points.iter().enumerate() {
-        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
-        let weight: f64 = others.map(|(_, (x, _))| (at - x) / (node - x)).product();
-        sum += weight * value;
-    }
-    sum
+    let nodes: Vec<f64> = points.iter().map(|(node, _)| *node).collect();
+    let weighted = |(i, (_, value)): (usize, &(f64, f64))| polynomial_weight(&nodes, i, at) * value;
+    points.iter().enumerate().map(weighted).sum()
 }
 
 /// A natural cubic spline; linear beyond its ends.

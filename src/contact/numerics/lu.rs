@@ -8,6 +8,7 @@ use faer::{Mat, MatMut};
 use pulp::NullaryFnOnce;
 
 use crate::monitor::{Monitor, Stop};
+use crate::numerics::roots::ROUNDING;
 use crate::numerics::simd;
 
 /// Solves `X ← A⁻¹ X` for a square matrix. The solutions for a singular matrix are not finite.
@@ -81,9 +82,6 @@ fn largest(values: &[f64]) -> usize {
     place
 }
 
-/// Smallest pivot of linearly independent functions; smaller ones are rounding errors.
-const DEPENDENT: f64 = 1e-12;
-
 /// First of the `N` coefficients of the least-squares fit of functions to samples. Each sample consists of the functions' values and the value to be fitted. `None` if the
 /// functions, which are of order 1, are linearly dependent on the samples.
 pub(crate) fn first_coefficient<const N: usize>(samples: &[([f64; N], f64)]) -> Option<f64> {
@@ -100,7 +98,7 @@ pub(crate) fn first_coefficient<const N: usize>(samples: &[([f64; N], f64)]) -> 
     // Elimination proceeds from the last coefficient, because only the first is needed.
     for k in (1..N).rev() {
         let (pivot, own) = (normal[k], right[k]);
-        if pivot[k].abs() < DEPENDENT {
+        if pivot[k].abs() < ROUNDING {
             return None;
         }
         for i in 0..k {
@@ -112,7 +110,7 @@ pub(crate) fn first_coefficient<const N: usize>(samples: &[([f64; N], f64)]) -> 
         }
     }
     let value = right[0] / normal[0][0];
-    (normal[0][0].abs() >= DEPENDENT && value.is_finite()).then_some(value)
+    (normal[0][0].abs() >= ROUNDING && value.is_finite()).then_some(value)
 }
 
 #[cfg(test)]

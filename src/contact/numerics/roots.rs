@@ -249,8 +249,6 @@ impl Cubic {
 
     /// The root in a monotone piece with a change of sign.
     fn root(&self, low: f64, high: f64) -> f64 {
-        /// Length of a Newton step that leaves an error of about its square.
-        const CLOSE: f64 = 1e-8;
         let [_, c1, c2, c3] = self.coefficients;
         let [at_low, at_high] = [low, high].map(|s| self.value(s));
         let course = if at_high > 0.0 {
@@ -260,7 +258,8 @@ impl Cubic {
         };
         let close = CloseEnough {
             value: 0.0,
-            place: CLOSE,
+            // A Newton step leaves an error of about its square.
+            place: ROUNDING,
         };
         let secant = low + (high - low) * at_low / (at_low - at_high);
         find([low, high], secant, course, close, |at| {
