@@ -21,6 +21,7 @@ use crate::method::Method;
 use crate::normal::footprint::NormalTask;
 use crate::normal::hertz::Patch;
 use crate::normal::wheel::ReferenceSurface;
+use crate::numerics::roots::ROUNDING;
 use crate::problem::memory::{SizeInput, length_over_width, segments, spinning};
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
@@ -284,8 +285,6 @@ pub(crate) fn unusual_friction(friction: &Friction) -> Option<RemarkEntry> {
 
 /// Largest |K| of methods that do not couple pressure and traction.
 const DIFFERENCE_UNCOUPLED: f64 = 0.05;
-/// Differences below this value are rounding errors of equal materials that are given by different moduli.
-const DIFFERENCE_NOISE: f64 = 1e-12;
 
 impl Elasticity {
     /// Combines the elastic constants of two bodies: `1/G = ½(1/G₁ + 1/G₂)`, `ν/G = ½(ν₁/G₁ + ν₂/G₂)`,
@@ -340,7 +339,7 @@ impl Elasticity {
 
 /// Returns a constant of the pair, or that of equal bodies if the two differ by rounding errors only.
 fn rounded(of_pair: f64, of_like_bodies: f64) -> f64 {
-    match (of_pair - of_like_bodies).abs() < DIFFERENCE_NOISE {
+    match (of_pair - of_like_bodies).abs() < ROUNDING {
         true => of_like_bodies,
         false => of_pair,
     }

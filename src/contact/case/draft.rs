@@ -162,9 +162,7 @@ fn labels(case: &mut Object) -> BTreeMap<String, String> {
         return labels;
     };
     let Value::Object(members) = value else {
-        let given = shown(value);
-        let detail = format!("{given} given; an object of texts is needed");
-        case.fault("labels", detail);
+        let _: Option<()> = case.mistaken("labels", "an object of texts");
         return labels;
     };
     if members.len() > LABELS_MAX {

@@ -10,6 +10,7 @@ use crate::case::words::material::Material;
 use crate::case::words::solver::Case;
 use crate::geometry::profile::LengthUnit;
 use crate::normal::hertz::Patch;
+use crate::problem::checked_case::PRESSURE_USUAL_MAX;
 use crate::remark::entry::RemarkEntry;
 use crate::remark::list::Remark;
 
@@ -29,8 +30,6 @@ const CREEPAGE_PERCENT: [f64; 2] = [0.05, 5.0];
 const ANGLE_MOST: f64 = 0.05;
 /// Range of usual pressures of wheels on rails in MPa.
 const PRESSURES: [f64; 2] = [200.0, 3500.0];
-/// Pressure in MPa above which the lengths that determine a patch are suspect: the static limit of ball bearings (ISO 76).
-const PRESSURE_DOUBTED: f64 = 4200.0;
 
 /// Properties of metals that are often given in another unit: the smallest usual value, its unit and the other one.
 const LEAST_OF_METALS: [(&str, f64, &str, &str); 5] = [
@@ -168,7 +167,7 @@ fn units_by_pressure(patches: &[Patch], power: f64) -> Option<String> {
     let usual = |unit: &LengthUnit| is_within(pressure / unit.mm().powf(power), PRESSURES);
     let units = [LengthUnit::M, LengthUnit::Cm, LengthUnit::Inch].into_iter();
     let units: Vec<&str> = units.filter(usual).map(LengthUnit::name).collect();
-    (pressure > PRESSURE_DOUBTED && !units.is_empty()).then(|| units.join(" or "))
+    (pressure > PRESSURE_USUAL_MAX && !units.is_empty()).then(|| units.join(" or "))
 }
 
 fn lengths_of_patch(contact: &Contact, patches: &[Patch]) -> Option<RemarkEntry> {

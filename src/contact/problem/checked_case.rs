@@ -182,7 +182,7 @@ pub(crate) fn at_edge(profile: &Profile, body: Body, contact: [f64; 2]) -> Optio
 }
 
 /// Pressure in MPa above which all wheel and rail steels yield: about 3 times a yield stress of 1.6 GPa.
-const PRESSURE_USUAL_MAX: f64 = 5000.0;
+pub(crate) const PRESSURE_USUAL_MAX: f64 = 5000.0;
 /// Shakedown limit of the pressure in MPa of rail steel in pure rolling: 4.7 times the shear yield stress (Johnson, Contact Mechanics, 1985,
 /// section 9.2), which is 550 MPa divided by √3 for R260 (EN 13674-1).
 const SHAKEDOWN_LIMIT: f64 = 1500.0;

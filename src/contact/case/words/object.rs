@@ -152,23 +152,38 @@ impl<'v, 'f> Object<'v, 'f> {
     /// Returns the value of a required member. If it is absent, adds a fault that states `what` is needed.
     pub(crate) fn required(&mut self, name: &str, what: &str) -> Option<&'v Value> {
         let value = self.value(name);
-        if value.is_none() {
-            let detail = format!("missing; {what} is needed");
-            self.fault_with(name, detail, figures(FaultCode::Missing, None));
-        }
-        value
+        value.or_else(|| self.missing(name, what, figures(FaultCode::Missing, None)))
+    }
+
+    /// Adds the fault that a member is absent, and returns `None`.
+    fn missing<T>(
+        &mut self,
+        name: &str,
+        needed: impl fmt::Display,
+        figures: FaultFigures,
+    ) -> Option<T> {
+        self.fault_with(name, format!("missing; {needed} is needed"), figures);
+        None
+    }
+
+    /// Adds the fault that a member has the wrong value or type, and returns `None`.
+    fn unsuitable<T>(
+        &mut self,
+        name: &str,
+        needed: impl fmt::Display,
+        figures: FaultFigures,
+    ) -> Option<T> {
+        let given = self.value(name).map(shown).unwrap_or_default();
+        self.fault_with(name, format!("{given} given; {needed} is needed"), figures);
+        None
     }
 
     /// Reads a number; `None` if it is absent or faulty.
     pub(crate) fn number(&mut self, name: &str, allowed: AllowedRange) -> Option<f64> {
         let value = self.value(name)?;
+        let figures = || allowed.figures(number_code(value), Some(value));
         let read = allowed.read(value);
-        if read.is_none() {
-            let detail = format!("{} given; {allowed} is needed", shown(value));
-            let code = number_code(value);
-            self.fault_with(name, detail, allowed.figures(code, Some(value)));
-        }
-        read
+        read.or_else(|| self.unsuitable(name, allowed, figures()))
     }
 
     /// Reads an optional member with `read`. The outer `None` means a fault, the inner one an absent member.
@@ -270,34 +285,28 @@ impl<'v, 'f> Object<'v, 'f> {
 
     /// Adds the fault that a member has the wrong value or type, and returns `None`.
     pub(crate) fn mistaken<T>(&mut self, name: &str, what: &str) -> Option<T> {
-        let given = self.value(name).map(shown).unwrap_or_default();
-        self.refuse(name, format!("{given} given; {what} is needed"))
+        let figures = figures(FaultCode::Invalid, self.value(name));
+        self.unsuitable(name, what, figures)
     }
 
     /// Reads a required number.
     pub(crate) fn required_number(&mut self, name: &str, allowed: AllowedRange) -> Option<f64> {
-        if !self.has(name) {
-            let detail = format!("missing; {allowed} is needed");
-            self.fault_with(name, detail, allowed.figures(FaultCode::Missing, None));
+        match self.has(name) {
+            true => self.number(name, allowed),
+            false => self.missing(name, allowed, allowed.figures(FaultCode::Missing, None)),
         }
-        self.number(name, allowed)
     }
 
     /// Reads a required whole number; `3.0` counts as whole.
     pub(crate) fn required_count(&mut self, name: &str, low: u32, high: u32) -> Option<u32> {
         let what = format!("a whole number from {low} to {high}");
         let value = self.required(name, &what)?;
-        let number = value.as_f64().filter(|n| n.fract() == 0.0);
-        match number {
-            Some(n) if f64::from(low) <= n && n <= f64::from(high) => Some(n as u32),
-            _ => {
-                let detail = format!("{} given; {what} is needed", shown(value));
-                let allowed = AllowedRange::closed(low.into(), high.into(), "");
-                let code = number_code(value);
-                self.fault_with(name, detail, allowed.figures(code, Some(value)));
-                None
-            }
-        }
+        let allowed = AllowedRange::closed(low.into(), high.into(), "");
+        let number = allowed.read(value).filter(|number| number.fract() == 0.0);
+        number.map(|number| number as u32).or_else(|| {
+            let figures = allowed.figures(number_code(value), Some(value));
+            self.unsuitable(name, what, figures)
+        })
     }
 
     /// Reads the elements of an array whose number lies in `lengths`; `read` gets the array and the index of each. Returns `None` if one of
@@ -347,25 +356,20 @@ impl<'v, 'f> Object<'v, 'f> {
     /// Reads a text of at most `length_max` characters; `None` if it is absent or faulty.
     pub(crate) fn text(&mut self, name: &str, length_max: usize) -> Option<String> {
         let value = self.value(name)?;
-        match value.as_str() {
-            Some(text) if text.chars().count() <= length_max => Some(text.to_owned()),
-            _ => {
-                let detail = format!(
-                    "{} given; a text of at most {length_max} characters is needed",
-                    shown(value)
-                );
-                let code = match value {
-                    Value::String(_) => FaultCode::TooLong,
-                    _ => FaultCode::WrongType,
-                };
-                let figures = FaultFigures {
-                    maximum: Some(length_max.into()),
-                    ..figures(code, Some(value))
-                };
-                self.fault_with(name, detail, figures);
-                None
-            }
-        }
+        let text = value.as_str();
+        let short = text.filter(|text| text.chars().count() <= length_max);
+        short.map(str::to_owned).or_else(|| {
+            let code = match text {
+                Some(_) => FaultCode::TooLong,
+                None => FaultCode::WrongType,
+            };
+            let figures = FaultFigures {
+                maximum: Some(length_max.into()),
+                ..figures(code, Some(value))
+            };
+            let needed = format!("a text of at most {length_max} characters");
+            self.unsuitable(name, needed, figures)
+        })
     }
 
     /// Reads a text like [`text`](Object::text), without line breaks and other control characters.
@@ -386,9 +390,9 @@ impl<'v, 'f> Object<'v, 'f> {
             return Some(*meaning);
         }
         let detail = format!("{} given; allowed: {}", shown(value), names(table));
-        let code = match value {
-            Value::String(_) => FaultCode::UnknownWord,
-            _ => FaultCode::WrongType,
+        let code = match text {
+            Some(_) => FaultCode::UnknownWord,
+            None => FaultCode::WrongType,
         };
         let figures = FaultFigures {
             allowed: table.iter().map(|(word, _)| (*word).to_owned()).collect(),
@@ -401,16 +405,17 @@ impl<'v, 'f> Object<'v, 'f> {
     /// Opens a member that must be an object. An absent member is opened as an empty object.
     pub(crate) fn child_or_empty(&mut self, name: &str) -> Option<Object<'v, '_>> {
         static EMPTY: LazyLock<Value> = LazyLock::new(|| Value::Object(Map::new()));
-        let value = self.value(name).unwrap_or(&EMPTY);
-        let pointer = self.pointer_to(name);
-        Object::open(value, pointer, self.faults)
+        self.opened(name, self.value(name).unwrap_or(&EMPTY))
     }
 
     /// Opens a required member that must be an object.
     pub(crate) fn child(&mut self, name: &str) -> Option<Object<'v, '_>> {
         let value = self.required(name, "an object")?;
-        let pointer = self.pointer_to(name);
-        Object::open(value, pointer, self.faults)
+        self.opened(name, value)
+    }
+
+    fn opened(&mut self, name: &str, value: &'v Value) -> Option<Object<'v, '_>> {
+        Object::open(value, self.pointer_to(name), self.faults)
     }
 
     /// Opens a member that is an array.

@@ -8,10 +8,8 @@ use crate::case::words::object::{AllowedRange, Object};
 pub(crate) const COORDINATE: AllowedRange = AllowedRange::closed(-1e6, 1e6, "mm");
 /// Allowed number of points of a grid axis and of a table of friction coefficients.
 pub(crate) const AXIS_POINTS: std::ops::RangeInclusive<usize> = 2..=1000;
-/// Smallest spacing of an axis relative to its length. Floating-point arithmetic does not resolve smaller ones.
+/// Smallest spacing of an axis relative to its largest coordinate and to its length. Floating-point arithmetic does not resolve much smaller ones.
 const SPACING_MIN: f64 = 1e-9;
-/// Smallest spacing of an axis relative to its largest coordinate.
-const SPACING_TO_COORDINATE_MIN: f64 = 1e-12;
 /// Largest ratio of neighbouring spacings. More uneven samples do not show the edge of the contact.
 const SPACING_RATIO_MAX: f64 = 1000.0;
 
@@ -22,7 +20,7 @@ pub(crate) fn axis(block: &mut Object, name: &str) -> Option<Vec<f64>> {
     let axis = block.number_array(name, AXIS_POINTS, &what, COORDINATE)?;
     let (first, last) = (axis[0], axis[axis.len() - 1]);
     let largest = first.abs().max(last.abs());
-    let least = (SPACING_MIN * (last - first).abs()).max(SPACING_TO_COORDINATE_MIN * largest);
+    let least = SPACING_MIN * (last - first).abs().max(largest);
     let late = (1..axis.len()).find(|&i| axis[i] - axis[i - 1] <= least);
     if let Some(i) = late {
         let [before, given] = [axis[i - 1], axis[i]];
