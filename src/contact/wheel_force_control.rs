@@ -33,10 +33,8 @@ pub(crate) const MISSED_LEAST: f64 = 5e-5;
 /// Target error of the resultants in the first estimate, which gives patches, loads and radii. Chosen by judgement; its influence was not
 /// measured.
 const TARGET_FIRST: f64 = 0.05;
-/// Progress after the first estimate and after the search.
-const PROGRESS: [f64; 2] = [0.1, 0.8];
-/// Number of trials after which the reported progress of the search no longer grows.
-const TRIALS_USUAL: f64 = 6.0;
+/// Usual number of solves: the first estimate, the trials of the search and the answer. Progress is reported in as many equal parts.
+const SOLVES_USUAL: f64 = 8.0;
 
 /// Solves a wheel on a rail with prescribed forces.
 ///
@@ -164,12 +162,17 @@ impl ForceSearch<'_> {
         }
     }
 
+    /// The part of the progress after a number of solves.
+    fn part(&self, solves: f64) -> MonitorPart<'_> {
+        MonitorPart::new(self.monitor, solves / SOLVES_USUAL, 1.0 / SOLVES_USUAL)
+    }
+
     fn judged(&self, case: &CheckedCase, part: MonitorPart) -> Result<SolvedWheel, SolveError> {
         trust::judged(self.operators, case, self.contact, &part)
     }
 
     fn first(&self) -> Result<FirstEstimate, SolveError> {
-        let part = MonitorPart::new(self.monitor, 0.0, PROGRESS[0]);
+        let part = self.part(0.0);
         let run = self.case.run.for_resultants(TARGET_FIRST);
         let rolling = FreeRollingState::about(&self.contact.geometry.placement);
         let found = self.judged(&self.at([0.0; 2], rolling, &run), part)?;
@@ -237,7 +240,7 @@ impl ForceSearch<'_> {
 
     /// The lateral force in N in full slip at one end; `None` if the wheel has no equilibrium there.
     fn end(&self, place: f64, first: &FirstEstimate) -> Result<Option<f64>, SolveError> {
-        let part = MonitorPart::new(self.monitor, PROGRESS[0], 0.0);
+        let part = MonitorPart::new(self.monitor, 1.0 / SOLVES_USUAL, 0.0);
         let run = self.case.run.for_resultants(TARGET_FIRST);
         let creepages = [0.0, first.law.creepage(1, place)];
         match self.judged(&self.at(creepages, first.rolling, &run), part) {
@@ -313,13 +316,8 @@ impl ForceSearch<'_> {
         let scale = [0, 1].map(|k| self.forces[k].map(|_| units[k] / reach.units[k]));
         let root: Equilibrium<2, ()> =
             Search::new(scale, [PLACE_MAX; 2]).find(reach.start, |place| {
-                let share = (PROGRESS[1] - PROGRESS[0]) / TRIALS_USUAL;
-                let part = MonitorPart::new(
-                    self.monitor,
-                    PROGRESS[0] + share * f64::min(trials, TRIALS_USUAL - 1.0),
-                    share,
-                );
                 trials += 1.0;
+                let part = self.part(f64::min(trials, SOLVES_USUAL - 2.0));
                 let case = self.at(creepages_at(place), first.rolling, &run);
                 let total = self.judged(&case, part)?.solution.total[0];
                 let found = [total.force_x_n, total.force_y_n];
@@ -333,7 +331,7 @@ impl ForceSearch<'_> {
         if !root.converged() && (root.end == Termination::AtLimit || root.residual > target) {
             return Err(self.missed(root.end, reach));
         }
-        let part = MonitorPart::new(self.monitor, PROGRESS[1], 1.0 - PROGRESS[1]);
+        let part = self.part(SOLVES_USUAL - 1.0);
         let case = self.at(creepages_at(root.place), first.rolling, &self.case.run);
         let mut found = self.judged(&case, part)?;
         let remark = root.inexact("the search for the creepages of the prescribed force");
